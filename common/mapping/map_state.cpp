@@ -99,6 +99,7 @@ void MapState::putObject(ObjectId id, ObjectRecord record) {
     unconfirmed_.erase(id);
   } else {
     unconfirmed_.insert(id);
+    if (at != records_.end() && at->second.confirmed) erased_.insert(id);
   }
   records_.insert_or_assign(id, std::move(record));
 }
@@ -137,6 +138,7 @@ void MapState::put(TrackId id, ObjectRecord record) {
   if (!identity_.isShared(id)) return putObject(id, std::move(record));
   tracks_.insert_or_assign(id, std::move(record));
   tracks_touched_.insert(id);
+  tracks_erased_.erase(id);
   combine(identity_.objectOf(id));
 }
 

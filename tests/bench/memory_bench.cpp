@@ -63,7 +63,8 @@ Objects mapOf(std::size_t count) {
 class MapFile {
  public:
   explicit MapFile(std::size_t count) {
-    map_store::Node node(config(), 5, {[](auto&) {}, [](auto&) {}, [](auto&) {}, [](auto&) {}, {}});
+    map_store::Node node(config(), 5,
+                         {[](auto&) {}, [](auto&) {}, [](auto&) {}, [](auto&) {}, [](auto&) {}});
     Objects objects = mapOf(count);
     node.onObjects(objects);
     node.tick(Duration(0));
@@ -90,19 +91,17 @@ struct Cost {
 
 Cost drive(const MapFile& file, std::uint64_t frames) {
   std::vector<Objects> objects;
-  std::vector<MapQuery> queries;
-  std::vector<Recalled> answers;
+  std::vector<MapNear> near;
   Cost cost;
   map_store::Node store(file.config(), 6,
                         {[](auto&) {}, [](auto&) {}, [](auto&) {}, [](auto&) {},
-                         [&](const Recalled& r) { answers.push_back(r); }});
+                         [&](const MapNear& m) { near.push_back(m); }});
   store.tick(Duration(0));  // publishes the whole map, once at its start
   Node filter(
       {}, makePriors(), 10,
       {.objects = [&](const Objects& m) { objects.push_back(m); },
        .events = [&](const Event& e) { cost.recalled += e.kind == EventKind::kRecalled ? 1 : 0; },
-       .predictions = {},
-       .queries = [&](const MapQuery& q) { queries.push_back(q); }});
+       .predictions = {}});
   filter.onCalibration(calibrationOf(makeCamera()));
   filter.onModel(makeModelInfo());
   const CameraModel camera{makeCamera()};
@@ -126,10 +125,9 @@ Cost drive(const MapFile& file, std::uint64_t frames) {
     start = cpuMs();
     for (const auto& m : std::exchange(objects, {})) store.onObjects(m);
     store.tick(stampOf(k).time.time_since_epoch());
-    for (const auto& q : std::exchange(queries, {})) store.onQuery(q);
     cost.store_ms += cpuMs() - start;
     start = cpuMs();
-    for (const auto& r : std::exchange(answers, {})) filter.onRecalled(r);
+    for (const auto& m : std::exchange(near, {})) filter.onNear(m);
     cost.filter_ms += cpuMs() - start;
   }
   cost.filter_ms /= static_cast<double>(frames);

@@ -14,6 +14,7 @@
 #include "common/bus/topics.h"
 #include "common/bus/wait_loop.h"
 #include "services/map_store/core/map_contents.h"
+#include "services/map_store/core/map_database.h"
 #include "tests/process/support.h"
 
 namespace perdure::test {
@@ -42,7 +43,8 @@ std::string recordTheStreet(const Folder& folder) {
 
 struct Outcome {
   map_store::WholeMap map;
-  std::string integrity;  ///< what SQLite says of the file
+  std::set<mapping::SameObject> facts;  ///< that the file holds
+  std::string integrity;                ///< what SQLite says of the file
   std::size_t loops = 0;
   std::map<ObjectId, std::size_t> born;  ///< how often each id was given to a new object
 };
@@ -123,6 +125,9 @@ class Vehicle {
     auto whole = map_store::readWholeMap(*file);
     ASSERT_TRUE(whole.has_value()) << whole.error().detail;
     outcome.map = std::move(*whole);
+    const auto facts = map_store::MapReader(&*file).facts();
+    ASSERT_TRUE(facts.has_value()) << facts.error().detail;
+    outcome.facts = *facts;
   }
 
   const Folder& folder_;
@@ -152,11 +157,16 @@ void expectWhole(const Outcome& outcome) {
   for (const auto& [id, record] : graph.records) {
     EXPECT_TRUE(graph.anchors.contains(record.sighting.anchor)) << "object " << id;
   }
-  for (const auto& [absorbed, merge] : graph.merges) {
-    EXPECT_TRUE(graph.edges.contains(merge.loop)) << "merge of " << absorbed;
-    const auto object = contents.objects.find(absorbed);
-    if (!merge.done || object == contents.objects.end()) continue;
-    EXPECT_TRUE(object->second.ended) << absorbed << " is merged, and on the map";
+  for (const mapping::SameObject& fact : outcome.facts) {
+    EXPECT_TRUE(fact.loop == 0 || graph.edges.contains(fact.loop))
+        << fact.a << " and " << fact.b << " are one by loop " << fact.loop;
+  }
+  for (const auto& [id, tracks] : mapping::Identity(outcome.facts).shared()) {
+    for (const TrackId track : tracks) {
+      const auto object = contents.objects.find(track);
+      if (track == id || object == contents.objects.end()) continue;
+      EXPECT_TRUE(object->second.ended) << track << " belongs to " << id << ", and is on the map";
+    }
   }
   for (const auto& [id, times] : outcome.born) EXPECT_EQ(times, 1u) << "id " << id;
 }

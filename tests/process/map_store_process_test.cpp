@@ -3,6 +3,10 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <map>
+#include <optional>
+#include <utility>
+
 #include "common/bus/topics.h"
 #include "common/bus/wait_loop.h"
 #include "tests/process/support.h"
@@ -64,9 +68,9 @@ TEST_F(MapStoreProcess, HasEveryObjectAgainAfterItIsKilledASecondAfterItsConfirm
 
 TEST_F(MapStoreProcess, GivesTheWorkingSetBackToAFilterThatAsks) {
   const auto child = start();
-  bus::Reader<Recalled> recalled(participant_, bus::topics::kRecalled);
+  bus::Reader<MapNear> near(participant_, bus::topics::kMapNear);
   bus::Writer<MapQuery> queries(participant_, bus::topics::kMapQuery);
-  ASSERT_TRUE(eventually(5s, [&] { return recalled.matched() > 0 && queries.matched() > 0; }));
+  ASSERT_TRUE(eventually(5s, [&] { return near.matched() > 0 && queries.matched() > 0; }));
   ASSERT_TRUE(objects_.write(frame(1, 3)).has_value());
   ASSERT_TRUE(eventually(5s, [&] { return objectsOnTheMap() == 3; }));
   MapQuery restore;
@@ -74,43 +78,47 @@ TEST_F(MapStoreProcess, GivesTheWorkingSetBackToAFilterThatAsks) {
   restore.request = 1;
   restore.kind = MapQueryKind::kRestore;
   ASSERT_TRUE(queries.write(restore).has_value());
-  std::vector<Recalled> answers;
+  std::optional<MapNear> answer;
   ASSERT_TRUE(eventually(5s, [&] {
-    recalled.drain([&](const Recalled& r) { answers.push_back(r); });
-    return !answers.empty();
+    near.drain([&](const MapNear& m) {
+      if (m.client == restore.client) answer = m;
+    });
+    return answer.has_value();
   })) << child->log();
-  EXPECT_EQ(answers[0].client, 99u);
-  EXPECT_TRUE(answers[0].restore);
-  EXPECT_EQ(answers[0].next_id, 4u);
-  ASSERT_EQ(answers[0].objects.size(), 3u);
-  EXPECT_EQ(answers[0].objects[2].best().mean, frame(1, 3).objects[2].best().mean);
-  EXPECT_EQ(answers[0].objects[2].why, frame(1, 3).objects[2].why);
+  EXPECT_EQ(answer->world, frame(1, 3).world);
+  EXPECT_EQ(answer->next_id, 4u);
+  EXPECT_TRUE(answer->as_published.empty());
+  ASSERT_EQ(answer->placed.size(), 3u);
+  EXPECT_EQ(answer->placed[2].best().mean, frame(1, 3).objects[2].best().mean);
+  EXPECT_EQ(answer->placed[2].why, frame(1, 3).objects[2].why);
 }
 
 TEST_F(MapStoreProcess, GivesBackWhatLeftTheWorkingSetAndSaysThatItHasIt) {
   const auto child = start();
-  bus::Reader<Recalled> recalled(participant_, bus::topics::kRecalled);
-  bus::Writer<MapQuery> queries(participant_, bus::topics::kMapQuery);
-  ASSERT_TRUE(eventually(5s, [&] { return recalled.matched() > 0 && queries.matched() > 0; }));
-  ASSERT_TRUE(objects_.write(frame(1, 3)).has_value());
-  ASSERT_TRUE(objects_.write(frame(2, 1)).has_value());
-  ASSERT_TRUE(eventually(5s, [&] { return objectsOnTheMap() == 3; }));
-  MapQuery query;
-  query.client = frame(1, 3).instance;
-  query.request = 5;
-  query.kind = MapQueryKind::kRecall;
-  query.radius = 100.0;
-  query.world = frame(1, 3).world;
-  ASSERT_TRUE(queries.write(query).has_value());
-  std::vector<Recalled> answers;
+  bus::Reader<MapNear> near(participant_, bus::topics::kMapNear);
+  ASSERT_TRUE(eventually(5s, [&] { return near.matched() > 0; }));
+  const Objects whole = frame(1, 3);
+  Objects left = frame(2, 1);
+  left.near_m = 100.0;
+  ASSERT_TRUE(objects_.write(whole).has_value());
+  ASSERT_TRUE(objects_.write(left).has_value());
+  MapNear newest;
+  std::uint64_t revision = 0;
   ASSERT_TRUE(eventually(5s, [&] {
-    recalled.drain([&](const Recalled& r) { answers.push_back(r); });
-    return !answers.empty();
+    near.drain([&](const MapNear& m) {
+      EXPECT_GT(m.revision, std::exchange(revision, m.revision));
+      newest = m;
+    });
+    return newest.kept == left.stamp.time;
   })) << child->log();
-  EXPECT_EQ(answers[0].request, 5u);
-  EXPECT_EQ(answers[0].kept, frame(2, 1).stamp.time);
-  ASSERT_EQ(answers[0].objects.size(), 2u);
-  EXPECT_EQ(answers[0].objects[1].best().mean, frame(1, 3).objects[2].best().mean);
+  EXPECT_EQ(newest.client, left.instance);
+  EXPECT_EQ(newest.world, left.world);
+  EXPECT_TRUE(newest.placed.empty());
+  ASSERT_EQ(newest.as_published.size(), 2u);
+  const ObjectBelief &given = newest.as_published[1], &published = whole.objects[2];
+  EXPECT_EQ(given.trackId(), published.id);
+  EXPECT_EQ(given.best().mean, published.best().mean);
+  EXPECT_EQ(given.best().cross_pose, published.best().cross_pose);
 }
 
 TEST_F(MapStoreProcess, AnswersWithItsGraph) {

@@ -18,7 +18,12 @@ void apply(SavedMap& map, Unsaved&& unsaved) {
   map.classes = std::move(unsaved.changed.classes);
   for (auto& [id, saved] : unsaved.changed.anchors) map.anchors[id] = std::move(saved);
   for (auto& [id, saved] : unsaved.changed.edges) map.edges[id] = saved;
-  for (auto& [id, record] : unsaved.changed.records) map.records[id] = std::move(record);
+  for (auto& [id, record] : unsaved.changed.records) {
+    // What is united is not parted: each object goes on as one track.
+    record.sighting.in_anchor.id = id;
+    if (record.earlier) record.earlier->in_anchor.id = id;
+    map.records[id] = std::move(record);
+  }
   for (const EdgeId id : unsaved.edges_gone) map.edges.erase(id);
   for (const ObjectId id : unsaved.records_gone) map.records.erase(id);
 }

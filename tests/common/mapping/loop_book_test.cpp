@@ -1,8 +1,11 @@
-// What becomes of loops that the graph does not believe, and of what hangs on them.
+// What becomes of loops that the graph does not believe, and of the facts that rest on them.
 #include "common/mapping/loop_book.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <iterator>
+#include <utility>
 
 #include "tests/common/mapping/synthetic_drive.h"
 
@@ -49,7 +52,6 @@ TEST_F(LoopBookTest, TellsABelievedLoopOnceAndHowFarItMovedTheBody) {
   EXPECT_EQ(verdict.told[0].id, id);
   EXPECT_NEAR(verdict.told[0].correction_m, 1.0, 0.3);
   EXPECT_THAT(judge(301.0).told, IsEmpty());
-  EXPECT_THAT(judge(300.0 + parameters_.sound_after_m + 1.0).sound, ElementsAre(id));
 }
 
 TEST_F(LoopBookTest, ALoopThatContradictsOthersWaitsAndIsGivenUp) {
@@ -103,24 +105,28 @@ TEST_F(LoopBookTest, SaysWhichLoopsAreToldAndHowTheyWereFound) {
   EXPECT_EQ(book_.closureOf(sound)->match.pairs, match.pairs);
 }
 
-TEST_F(LoopBookTest, TiesHangOnTheLoopWhoseMergesTheyRestOn) {
-  book_.hang(7, 3);
-  book_.hang(8, 4);
-  book_.hang(9, 3);
-  EXPECT_THAT(book_.tiesOf(3), ElementsAre(7u, 9u));
-  book_.remove(3);
-  EXPECT_THAT(book_.tiesOf(3), IsEmpty());
-  EXPECT_THAT(book_.tiesOf(4), ElementsAre(8u));
-}
-
-/// Four fifths of a lap, and in its map a loop that is wrong by 25 m, with a merge that was done.
+/// Four fifths of a lap, and in its map a loop closure that is wrong by 25 m, and by which a track
+/// in sight and one of 200 m before are one object.
 class WithdrawnLoop : public ::testing::Test {
  protected:
   static constexpr EdgeId kWrong = 100'000;
+  static constexpr double kLongest_m = 1.3 * kLap_m;
 
   void SetUp() override {
-    drive_.to(0.8 * kLap_m);
+    for (Drive* drive : {&drive_, &without_fact_}) {
+      drive->to(0.8 * kLap_m);
+      drive->restartOn(withLoop(drive->whole()));
+    }
     SavedMap map = drive_.whole();
+    ASSERT_GT(map.records.size(), 20u);
+    known_ =
+        std::next(map.records.begin(), static_cast<std::ptrdiff_t>(map.records.size() / 2))->first;
+    seen_ = map.records.rbegin()->first;
+    before_ = map.records.at(seen_);
+    drive_.restartOn(withFact(std::move(map), {kWrong, known_, seen_}));
+  }
+
+  static SavedMap withLoop(SavedMap map) {
     const AnchorId a = map.anchors.begin()->first, b = map.anchors.rbegin()->first;
     Edge edge{a, b, {}, EdgeKind::kLoop};
     const LevelPose there = map.anchors.at(b).T_MA;
@@ -128,67 +134,70 @@ class WithdrawnLoop : public ::testing::Test {
                      LevelPose{there.p + Eigen::Vector3d(20, 15, 0), there.yaw};
     edge.T_ab.covariance = 0.04 * Eigen::Matrix4d::Identity();
     map.edges[kWrong] = {edge, 1.0};
-    const auto first = map.records.begin(), last = std::prev(map.records.end());
-    survivor_ = first->first;
-    absorbed_ = last->first;
-    merge_ = {kWrong, survivor_, true, first->second, last->second};
-    map.merges[absorbed_] = merge_;
-    first->second = last->second;  // what was seen of the second is of the first now
-    first->second.sighting.in_anchor.id = survivor_;
-    first->second.last_seen += std::chrono::seconds(1);
-    map.records.erase(last);
-    drive_.restartOn(map);
+    return map;
+  }
+  static SavedMap withFact(SavedMap map, const SameObject& fact) {
+    MapState state({}, map);
+    state.unite(fact);
+    apply(state.unsaved(), map);
+    return map;
+  }
+  static void toTheWithdrawal(Drive& drive) {
+    while (drive.withdrawn().empty() && drive.way_m() < kLongest_m) drive.to(drive.way_m() + 1.0);
+    ASSERT_THAT(drive.withdrawn(), SizeIs(1));
   }
 
-  Drive drive_{{.seed = 2, .yaw_walk = 0.002}};
-  ObjectId survivor_ = 0, absorbed_ = 0;
-  HungMerge merge_;
+  Drive drive_{{.seed = 2, .yaw_walk = 0.002}}, without_fact_{{.seed = 2, .yaw_walk = 0.002}};
+  TrackId known_ = 0, seen_ = 0;
+  ObjectRecord before_;  ///< of the track in sight
 };
 
-TEST_F(WithdrawnLoop, IsContradictedByLaterOnesAndTakenOutWithItsMerges) {
+TEST_F(WithdrawnLoop, IsContradictedByLaterOnesAndTakenOutWithItsFacts) {
   ASSERT_TRUE(drive_.mapper().graph().edges().contains(kWrong));
-  drive_.to(1.3 * kLap_m);
+  ASSERT_EQ(drive_.objectOf(seen_), known_);
+  ASSERT_FALSE(drive_.mapper().holds(seen_));
+  drive_.to(kLongest_m);
   ASSERT_THAT(drive_.loops(), ::testing::Not(IsEmpty()));
   ASSERT_THAT(drive_.withdrawn(), SizeIs(1));
   EXPECT_EQ(drive_.withdrawn().front().id, kWrong);
+  EXPECT_THAT(drive_.withdrawn().front().pairs, ElementsAre(std::pair(known_, seen_)));
   EXPECT_FALSE(drive_.mapper().graph().edges().contains(kWrong));
   EXPECT_LT(drive_.off(), 3.0);
   ASSERT_THAT(drive_.splits(), SizeIs(1));
-  EXPECT_EQ(drive_.splits().front().survivor, survivor_);
-  EXPECT_EQ(drive_.splits().front().absorbed, absorbed_);
-  EXPECT_FALSE(drive_.mapper().merges().contains(absorbed_));
+  EXPECT_EQ(drive_.splits().front().survivor, known_);
+  EXPECT_EQ(drive_.splits().front().absorbed, seen_);
+  EXPECT_THAT(drive_.mapper().identity().factsOf(kWrong), IsEmpty());
+  EXPECT_EQ(drive_.objectOf(seen_), seen_);
 }
 
-TEST_F(WithdrawnLoop, BothObjectsAreAsTheyWouldBeWithoutTheMerge) {
-  while (drive_.withdrawn().empty() && drive_.way_m() < 1.3 * kLap_m) drive_.to(drive_.way_m() + 1);
-  ASSERT_THAT(drive_.withdrawn(), SizeIs(1));
-  const SavedMap map = drive_.whole();
-  ASSERT_TRUE(map.records.contains(absorbed_));
-  const ObjectRecord& absorbed = map.records.at(absorbed_);
-  EXPECT_EQ(absorbed.sighting.in_anchor.id, absorbed_);
-  EXPECT_EQ(absorbed.sighting.anchor, merge_.absorbed_before.sighting.anchor);
-  EXPECT_EQ(absorbed.sighting.in_anchor.p, merge_.absorbed_before.sighting.in_anchor.p);
-  EXPECT_GT(absorbed.last_seen, merge_.absorbed_before.last_seen) << "seen since, under another id";
-  ASSERT_TRUE(map.records.contains(survivor_));
-}
-
-TEST(OrderedMerges, AreKeptUntilTheirLoopIsSoundAndOutliveTheProcess) {
-  Drive drive({.seed = 1, .yaw_walk = 0.002, .way_m = 3.0 * kLap_m});
-  drive.toTheFirstLoop();
-  ASSERT_THAT(drive.mapper().merges(), ::testing::Not(IsEmpty()));
-  for (const auto& [absorbed, merge] : drive.mapper().merges()) {
-    EXPECT_TRUE(merge.done) << "the drive does what it is told";
-    EXPECT_EQ(merge.absorbed_before.sighting.in_anchor.id, absorbed);
-    EXPECT_EQ(merge.survivor_before.sighting.in_anchor.id, merge.survivor);
-    EXPECT_TRUE(drive.mapper().graph().edges().contains(merge.loop));
+TEST_F(WithdrawnLoop, BothObjectsAreAsTheyWouldBeWithoutTheFact) {
+  toTheWithdrawal(drive_);
+  toTheWithdrawal(without_fact_);
+  ASSERT_EQ(drive_.way_m(), without_fact_.way_m());
+  const SavedMap map = drive_.whole(), expected = without_fact_.whole();
+  EXPECT_GT(expected.records.at(seen_).last_seen, before_.last_seen) << "detected while it was one";
+  for (const TrackId id : {known_, seen_}) {
+    ASSERT_TRUE(map.records.contains(id)) << id;
+    expectSame(map.records.at(id), expected.records.at(id), "track " + std::to_string(id));
+    EXPECT_FALSE(map.tracks.contains(id)) << id;
   }
-  const auto before = keysOf(drive.mapper().merges());
-  drive.restart();
-  EXPECT_EQ(keysOf(drive.mapper().merges()), before);
-  const double closed_m = drive.way_m();
-  drive.toTheEnd();
-  ASSERT_GT(drive.way_m(), closed_m + LoopParameters().sound_after_m + 100.0);
-  for (const ObjectId id : before) EXPECT_FALSE(drive.mapper().merges().contains(id)) << id;
+}
+
+TEST_F(WithdrawnLoop, WhatEndedUnderOneIdDoesNotEndTheOther) {
+  SavedMap map = without_fact_.whole();
+  const auto older =
+      std::next(map.records.begin(), static_cast<std::ptrdiff_t>(map.records.size() / 3));
+  const TrackId old = older->first, young = known_;
+  const ObjectRecord before = older->second;
+  ASSERT_LT(old, young);
+  without_fact_.restartOn(withFact(std::move(map), {kWrong, old, young}));
+  Drive& drive = without_fact_;
+  drive.mapper().onGone(young);
+  EXPECT_FALSE(drive.mapper().holds(old)) << "it was detected last as the track that ended";
+  toTheWithdrawal(drive);
+  EXPECT_FALSE(drive.mapper().holds(young));
+  ASSERT_TRUE(drive.mapper().holds(old));
+  expectSame(*drive.mapper().recordOf(old), before, "the other track");
 }
 
 }  // namespace

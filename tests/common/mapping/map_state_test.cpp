@@ -13,6 +13,7 @@ namespace {
 using test::apply;
 using test::expectSame;
 using test::isEmpty;
+using test::keysOf;
 
 constexpr WorldId kOlder{1, 0}, kYounger{2, 0};
 
@@ -43,11 +44,14 @@ class Pair {
     EXPECT_TRUE(isEmpty(saving_.unsaved()));
     expectSame(stored_, whole_.unsaved().changed);
   }
-  void see(ObjectId id, AnchorId anchor, bool confirmed, double x) {
+  void see(TrackId id, AnchorId anchor, bool confirmed, double x) {
+    seconds_ += 1.0;
     both([&](MapState& state) {
-      const auto known = state.records().find(id);
-      ObjectRecord record = known == state.records().end() ? ObjectRecord() : known->second;
+      const ObjectRecord* known = state.recordOfTrack(id);
+      ObjectRecord record = known == nullptr ? ObjectRecord() : *known;
       record.confirmed = record.confirmed || confirmed;
+      record.gone = false;
+      record.last_seen = TimePoint(durationFromSeconds(seconds_));
       record.sighting.anchor = anchor;
       record.sighting.in_anchor.id = id;
       record.sighting.in_anchor.p.x() = x;
@@ -58,6 +62,7 @@ class Pair {
   const SavedMap& stored() const { return stored_; }
 
  private:
+  double seconds_ = 0.0;
   MapState saving_{{}, {}}, whole_{{}, {}};
   SavedMap stored_;
 };
@@ -88,6 +93,23 @@ TEST(MapState, AnObjectThatIsGoneAndBegunAgainUnconfirmedIsNoLongerStored) {
   pair.see(7, 1, true, 6.0);
   pair.save();
   EXPECT_EQ(pair.stored().records.at(7).sighting.in_anchor.p.x(), 6.0);
+}
+
+TEST(MapState, AnObjectThatLosesItsConfirmedTrackIsNoLongerStored) {
+  Pair pair;
+  pair.both([](MapState& state) { state.add(anchorAt(1, 0, kOlder, 0.0)); });
+  pair.see(7, 1, false, 1.0);
+  pair.see(8, 1, true, 2.0);
+  pair.both([](MapState& state) { state.unite({0, 7, 8}); });
+  pair.save();
+  EXPECT_TRUE(pair.stored().records.contains(7));
+  pair.both([](MapState& state) { state.erase(8); });
+  pair.save();
+  EXPECT_TRUE(pair.stored().records.empty());
+  EXPECT_EQ(keysOf(pair.stored().tracks), std::vector<TrackId>{7});
+  pair.see(8, 1, true, 3.0);
+  pair.save();
+  EXPECT_TRUE(pair.stored().records.contains(7)) << "and it is there again";
 }
 
 TEST(MapState, WhatCameAndWentBetweenTwoSavesLeavesNothing) {
@@ -144,9 +166,12 @@ TEST(MapState, AnyStepsLeaveWhatOneSaveWouldHaveWritten) {
         ++last;
       } else if (any < 50) {
         pair.see(1 + random() % 12, 1 + random() % last, random() % 3 == 0, normal(random));
-      } else if (any < 62) {
-        const ObjectId id = 1 + random() % 12;
+      } else if (any < 57) {
+        const TrackId id = 1 + random() % 12;
         pair.both([&](MapState& state) { state.erase(id); });
+      } else if (any < 62) {
+        const TrackId id = 1 + random() % 12;
+        pair.both([&](MapState& state) { state.end(id); });
       } else if (any < 72) {
         const AnchorId a = 1 + random() % last, b = 1 + random() % last;
         if (a == b) continue;
@@ -159,6 +184,11 @@ TEST(MapState, AnyStepsLeaveWhatOneSaveWouldHaveWritten) {
       } else if (any < 77 && !loops.empty()) {
         const EdgeId id = loops[random() % loops.size()];
         pair.both([&](MapState& state) { state.removeLoop(id); });
+      } else if (any < 80) {
+        const bool by_loop = !loops.empty() && random() % 3 > 0;
+        const SameObject fact{by_loop ? loops[random() % loops.size()] : 0, 1 + random() % 12,
+                              1 + random() % 12};
+        pair.both([&](MapState& state) { state.unite(fact); });
       } else if (any < 83) {
         pair.both([](MapState& state) { state.optimise(); });
       } else if (any < 88) {

@@ -57,7 +57,7 @@ TEST(Mapper, HoldsTheFirstLapBackUntilItsPlaceIsKnown) {
   const auto early = [&] {
     std::vector<Recallable> result;
     for (const Recallable& there : drive.mapper().near(drive.odometry().p, 40.0)) {
-      const double way_m = 10.0 * toSeconds(drive.stored(there.id).last_seen);
+      const double way_m = 10.0 * toSeconds(drive.stored(there.track).last_seen);
       if (way_m < last_of_before_m) result.push_back(there);
     }
     return result;
@@ -73,8 +73,8 @@ TEST(Mapper, HoldsTheFirstLapBackUntilItsPlaceIsKnown) {
     ASSERT_TRUE(r.T_now) << r.id;
     const Eigen::Vector3d laid_B =
         drive.odometry().inverse() *
-        (*r.T_now * Eigen::Vector3d(drive.stored(r.id).best().mean.head<3>()));
-    const Eigen::Vector3d p_B = drive.truth().inverse() * drive.thing(r.id).p;
+        (*r.T_now * Eigen::Vector3d(drive.stored(r.track).best().mean.head<3>()));
+    const Eigen::Vector3d p_B = drive.truth().inverse() * drive.thing(r.track).p;
     EXPECT_LT((laid_B - p_B).head<2>().norm(), 2.0) << r.id;
     EXPECT_LT(r.covariance.diagonal().head<2>().maxCoeff(), 1.0 + 1e-9);
     EXPECT_GT(r.covariance(0, 0), 0.0);
@@ -100,7 +100,7 @@ TEST(Mapper, AnObjectThatIsGoneIsNotRecalled) {
   ASSERT_FALSE(before.empty());
   const ObjectId gone = before.front().id;
   EXPECT_TRUE(drive.mapper().holds(gone));
-  drive.mapper().onGone(gone);
+  drive.mapper().onGone(before.front().track);
   EXPECT_FALSE(drive.mapper().holds(gone));
   const auto after = drive.mapper().near(drive.odometry().p, 40.0);
   EXPECT_EQ(after.size() + 1, before.size());

@@ -35,10 +35,18 @@ SavedMap together(SavedMap older, const SavedMap& younger) {
     sighting.anchor += shift;
     for (ClassShare& share : sighting.in_anchor.pmf) share.name = numbers.at(share.name);
   };
-  for (auto [id, record] : younger.records) {
-    moved(record.sighting);
-    if (record.earlier) moved(*record.earlier);
-    EXPECT_TRUE(older.records.emplace(id, record).second) << id;
+  const auto add = [&](const std::map<ObjectId, ObjectRecord>& from,
+                       std::map<ObjectId, ObjectRecord>& to) {
+    for (auto [id, record] : from) {
+      moved(record.sighting);
+      if (record.earlier) moved(*record.earlier);
+      EXPECT_TRUE(to.emplace(id, record).second) << id;
+    }
+  };
+  add(younger.records, older.records);
+  add(younger.tracks, older.tracks);
+  for (const SameObject& fact : younger.facts) {
+    older.facts.insert({fact.loop == 0 ? 0 : fact.loop + edge_shift, fact.a, fact.b});
   }
   return older;
 }

@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <string>
+#include <vector>
 
 #include "common/mapping/saved_map.h"
 
@@ -15,11 +17,16 @@ inline void apply(const Unsaved& unsaved, SavedMap& map) {
   for (const auto& [id, anchor] : unsaved.changed.anchors) map.anchors[id] = anchor;
   for (const auto& [id, edge] : unsaved.changed.edges) map.edges[id] = edge;
   for (const auto& [id, record] : unsaved.changed.records) map.records[id] = record;
-  for (const auto& [id, merge] : unsaved.changed.merges) map.merges[id] = merge;
+  for (const auto& [id, record] : unsaved.changed.tracks) map.tracks[id] = record;
+  map.facts.insert(unsaved.changed.facts.begin(), unsaved.changed.facts.end());
   for (const auto& [id, view] : unsaved.changed.views) map.views[id] = view;
-  for (const ObjectId id : unsaved.merges_gone) {
-    map.merges.erase(id);
-    EXPECT_FALSE(unsaved.changed.merges.contains(id)) << "the merge of " << id << " is both";
+  for (const TrackId id : unsaved.tracks_gone) {
+    map.tracks.erase(id);
+    EXPECT_FALSE(unsaved.changed.tracks.contains(id)) << "track " << id << " is both";
+  }
+  for (const SameObject& fact : unsaved.facts_gone) {
+    map.facts.erase(fact);
+    EXPECT_FALSE(unsaved.changed.facts.contains(fact)) << "a fact of loop " << fact.loop;
   }
   for (const EdgeId id : unsaved.edges_gone) {
     map.edges.erase(id);
@@ -34,8 +41,9 @@ inline void apply(const Unsaved& unsaved, SavedMap& map) {
 inline bool isEmpty(const Unsaved& unsaved) {
   return unsaved.changed.anchors.empty() && unsaved.changed.edges.empty() &&
          unsaved.changed.records.empty() && unsaved.edges_gone.empty() &&
-         unsaved.records_gone.empty() && unsaved.changed.merges.empty() &&
-         unsaved.merges_gone.empty() && unsaved.changed.views.empty();
+         unsaved.records_gone.empty() && unsaved.changed.tracks.empty() &&
+         unsaved.tracks_gone.empty() && unsaved.changed.facts.empty() &&
+         unsaved.facts_gone.empty() && unsaved.changed.views.empty();
 }
 
 template <class Map>
@@ -59,13 +67,32 @@ inline void expectSame(const Sighting& a, const Sighting& b, const std::string& 
   EXPECT_EQ(a.in_anchor.covariance, b.in_anchor.covariance) << what;
 }
 
+inline void expectSame(const ObjectRecord& a, const ObjectRecord& b, const std::string& what) {
+  EXPECT_EQ(a.session, b.session) << what;
+  EXPECT_EQ(a.way_m, b.way_m) << what;
+  EXPECT_EQ(a.last_seen, b.last_seen) << what;
+  EXPECT_EQ(a.pose_error, b.pose_error) << what;
+  EXPECT_EQ(a.confirmed, b.confirmed) << what;
+  EXPECT_EQ(a.gone, b.gone) << what;
+  expectSame(a.sighting, b.sighting, what);
+  ASSERT_EQ(a.earlier.has_value(), b.earlier.has_value()) << what;
+  if (a.earlier) expectSame(*a.earlier, *b.earlier, what + ", earlier");
+}
+
+inline void expectSame(const std::map<ObjectId, ObjectRecord>& a,
+                       const std::map<ObjectId, ObjectRecord>& b, const std::string& what) {
+  ASSERT_EQ(keysOf(a), keysOf(b)) << what;
+  for (const auto& [id, record] : a) {
+    expectSame(record, b.at(id), what + " " + std::to_string(id));
+  }
+}
+
 /// To the last bit.
 inline void expectSame(const SavedMap& a, const SavedMap& b) {
   EXPECT_EQ(a.classes, b.classes);
   ASSERT_EQ(keysOf(a.anchors), keysOf(b.anchors));
   ASSERT_EQ(keysOf(a.edges), keysOf(b.edges));
-  ASSERT_EQ(keysOf(a.records), keysOf(b.records));
-  ASSERT_EQ(keysOf(a.merges), keysOf(b.merges));
+  EXPECT_EQ(a.facts, b.facts);
   for (const auto& [id, x] : a.anchors) {
     const SavedAnchor& y = b.anchors.at(id);
     const std::string what = "anchor " + std::to_string(id);
@@ -82,16 +109,8 @@ inline void expectSame(const SavedMap& a, const SavedMap& b) {
     EXPECT_EQ(x.edge.kind, y.edge.kind) << what;
     expectSame(x.edge.T_ab, y.edge.T_ab, what);
   }
-  for (const auto& [id, x] : a.records) {
-    const ObjectRecord& y = b.records.at(id);
-    const std::string what = "object " + std::to_string(id);
-    EXPECT_EQ(x.session, y.session) << what;
-    EXPECT_EQ(x.way_m, y.way_m) << what;
-    EXPECT_EQ(x.last_seen, y.last_seen) << what;
-    expectSame(x.sighting, y.sighting, what);
-    ASSERT_EQ(x.earlier.has_value(), y.earlier.has_value()) << what;
-    if (x.earlier) expectSame(*x.earlier, *y.earlier, what);
-  }
+  expectSame(a.records, b.records, "object");
+  expectSame(a.tracks, b.tracks, "track");
 }
 
 }  // namespace perdure::mapping::test

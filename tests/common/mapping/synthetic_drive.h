@@ -1,5 +1,6 @@
-// A body that drives laps among objects, with odometry that drifts, and a filter and a store that
-// do what the mapper tells them. Sessions can follow each other on one map, each in a W of its own.
+// A body that drives laps among objects, with odometry that drifts, and a filter that takes the
+// tracks that the mapper has near. Sessions can follow each other on one map, each in a W of its
+// own.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -81,13 +82,13 @@ struct Archive {
     WorldId world;
     ObjectBelief belief;  ///< in W of `world`
   };
-  std::map<ObjectId, Stored> stored;
-  std::map<ObjectId, std::size_t> thing_of;
+  std::map<TrackId, Stored> stored;
+  std::map<TrackId, std::size_t> thing_of;
   ObjectId next_id = 1;
 };
 
-/// Drives, and does what the filter would: keeps objects in sight, gives new ones ids, takes the
-/// ids of those that the mapper lays where it sees them, and joins what it is told to join.
+/// Drives as the filter does: keeps tracks of objects in sight, draws ids for new ones, and goes on
+/// with a track that the mapper places where it detects an object. A track never changes its id.
 class Drive {
  public:
   explicit Drive(const Settings& settings, SavedMap saved = {},
@@ -138,8 +139,8 @@ class Drive {
     begun_with_ = std::move(map);
     mapper_ = std::make_unique<Mapper>(parametersOf(settings_), begun_with_);
   }
-  /// The filter calls two objects by each other's ids from now on.
-  void confuse(ObjectId a, ObjectId b) {
+  /// The filter exchanges the ids of two tracks from now on.
+  void confuse(TrackId a, TrackId b) {
     told_as_[a] = b;
     told_as_[b] = a;
   }
@@ -157,20 +158,21 @@ class Drive {
   double offBefore() const { return off_before_; }
   double offAfter() const { return off_after_; }
   double off() const { return (mapper_->T_MW() * T_WB_.p - truth().p).norm(); }
-  /// Which thing an id was given to.
-  const std::map<ObjectId, std::size_t>& things() const { return archive_->thing_of; }
-  const Thing& thing(ObjectId id) const { return things_[things().at(id)]; }
-  /// Merge orders that joined two objects that are one, and that are two.
+  /// The thing of each track.
+  const std::map<TrackId, std::size_t>& things() const { return archive_->thing_of; }
+  const Thing& thing(TrackId id) const { return things_[things().at(id)]; }
+  ObjectId objectOf(TrackId id) const { return mapper_->identity().objectOf(id); }
+  /// Objects that became one and are one, and those that are two.
   std::size_t right() const { return right_; }
   std::size_t wrong() const { return wrong_; }
-  /// Objects of the first lap that came again under their own ids.
+  /// Objects of the first lap that were detected again as the same track.
   std::size_t recalled() const { return recalled_; }
   std::size_t renamed() const { return renamed_; }
-  /// What was last believed of an object, in W.
-  const ObjectBelief& stored(ObjectId id) const { return archive_->stored.at(id).belief; }
-  /// Ids in the working set.
-  std::vector<ObjectId> inSight() const {
-    std::vector<ObjectId> ids;
+  /// The last belief of a track, in W.
+  const ObjectBelief& stored(TrackId id) const { return archive_->stored.at(id).belief; }
+  /// Tracks of the working set.
+  std::vector<TrackId> inSight() const {
+    std::vector<TrackId> ids;
     for (const Sight& sight : in_sight_) {
       if (sight.id != 0) ids.push_back(sight.id);
     }
@@ -179,7 +181,7 @@ class Drive {
 
  private:
   struct Sight {
-    ObjectId id = 0;  ///< 0: not in the working set
+    TrackId id = 0;  ///< 0: not in the working set
     Eigen::Vector4d error = Eigen::Vector4d::Zero();
     TimePoint first, last;
     std::uint32_t hits = 0;
@@ -209,7 +211,7 @@ class Drive {
     loops_.insert(loops_.end(), change.loops.begin(), change.loops.end());
     withdrawn_.insert(withdrawn_.end(), change.withdrawn.begin(), change.withdrawn.end());
     splits_.insert(splits_.end(), change.splits.begin(), change.splits.end());
-    for (const MergeOrder& merge : change.merges) join(merge);
+    for (const MergeOrder& merge : change.merges) count(merge);
   }
 
   FrameStamp stamp() const {
@@ -234,8 +236,8 @@ class Drive {
     objects.world = settings_.world;
     objects.T_WB = T_WB_.rigid();
     const LevelPose T_BM = truth().inverse();
-    std::map<ObjectId, Recallable> offered;
-    for (const Recallable& there : mapper_->near(T_WB_.p, 60.0)) offered[there.id] = there;
+    std::map<TrackId, Recallable> offered;
+    for (const Recallable& there : mapper_->near(T_WB_.p, 60.0)) offered[there.track] = there;
     for (std::size_t i = 0; i < things_.size(); ++i) {
       Sight& sight = in_sight_[i];
       const Eigen::Vector3d p_B = T_BM * things_[i].p;
@@ -259,7 +261,7 @@ class Drive {
   }
 
   void begin(std::size_t i, const Eigen::Vector3d& p_B,
-             const std::map<ObjectId, Recallable>& offered) {
+             const std::map<TrackId, Recallable>& offered) {
     Sight& sight = in_sight_[i];
     sight = {};
     for (double& e : sight.error) e = normal(1.0);
@@ -313,19 +315,11 @@ class Drive {
     return belief;
   }
 
-  void join(const MergeOrder& merge) {
+  void count(const MergeOrder& merge) {
     const auto survivor = things().find(merge.survivor), absorbed = things().find(merge.absorbed);
     ASSERT_TRUE(survivor != things().end() && absorbed != things().end());
     EXPECT_LT(merge.survivor, merge.absorbed);
     ++(survivor->second == absorbed->second ? right_ : wrong_);
-    for (Sight& sight : in_sight_) {
-      if (sight.id != merge.absorbed) continue;
-      sight.id = merge.survivor;
-      Archive::Stored merged = archive_->stored.at(merge.absorbed);
-      merged.belief.id = merge.survivor;
-      archive_->stored[merge.survivor] = merged;
-    }
-    mapper_->onMerged(merge.survivor, merge.absorbed);
   }
 
   Settings settings_;
@@ -335,7 +329,7 @@ class Drive {
   std::unique_ptr<Mapper> mapper_;
   std::shared_ptr<Archive> archive_;
   std::vector<Sight> in_sight_;
-  std::map<ObjectId, ObjectId> told_as_;
+  std::map<TrackId, TrackId> told_as_;
   LevelPose T_WB_;
   double way_m_ = 0.0, off_before_ = 0.0, off_after_ = 0.0;
   std::uint64_t sequence_ = 0;

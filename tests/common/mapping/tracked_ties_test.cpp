@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <utility>
 
 #include "common/mapping/frames/level_errors.h"
 #include "common/math/gaussian.h"
@@ -165,6 +166,27 @@ TEST(TrackedTies, OfOneObjectAreNone) {
   EXPECT_FALSE(TrackedTies(back.parameters()).find(back.body()));
 }
 
+/// The loop closure that joined the tracks has said the same already.
+TEST(TrackedTies, OfWhatALoopHasJoinedAreNone) {
+  for (const bool joined : {false, true}) {
+    Back back;
+    seeFive(back, {0.5, 0.0, 0.0}, 0.1);
+    constexpr EdgeId kLoop = 9;
+    for (TrackId id = 1; joined && id <= 5; ++id) {
+      ObjectRecord known, seen = *back.state().recordOfTrack(id);
+      known.confirmed = true;
+      known.session = seen.session;
+      known.sighting = *std::exchange(seen.earlier, std::nullopt);
+      seen.last_seen += durationFromSeconds(60.0);
+      back.state().put(id, std::move(known));
+      back.state().put(100 + id, std::move(seen));
+      back.state().unite({kLoop, id, 100 + id});
+      ASSERT_TRUE(back.state().records().at(id).earlier);
+    }
+    EXPECT_EQ(TrackedTies(back.parameters()).find(back.body()).has_value(), !joined);
+  }
+}
+
 TEST(TrackedTies, UseAnObjectOnceInAVisit) {
   Back back;
   seeFive(back, {0.3, 0.0, 0.0}, 0.1);
@@ -198,6 +220,12 @@ Settings again(std::uint32_t seed) {
   return {.seed = seed, .yaw_walk = 0.002, .way_m = 1.75 * kLap_m};
 }
 
+bool isKnownAsOneTrack(Drive& drive, TrackId id) {
+  const ObjectRecord* record = drive.mapper().recordOf(drive.objectOf(id));
+  return record != nullptr && record->sighting.in_anchor.id == id && record->earlier &&
+         record->earlier->in_anchor.id == id;
+}
+
 /// Two cars that the filter takes for each other, one time after another.
 TEST(TrackedTies, ASwappedIdentityBendsTheMapNoMoreThanTheKernelLets) {
   for (const std::uint32_t seed : {1u, 2u}) {
@@ -209,12 +237,11 @@ TEST(TrackedTies, ASwappedIdentityBendsTheMapNoMoreThanTheKernelLets) {
       const double next = right.way_m() + 60.0;
       right.to(next);
       swapped.to(next);
-      // The two nearest of a class that were known before.
+      // Two of a class that were detected before as the same track.
       const auto ids = swapped.inSight();
       for (std::size_t i = 0; i + 1 < ids.size() && swaps < 6; ++i) {
         for (std::size_t k = i + 1; k < ids.size(); ++k) {
-          const auto *a = swapped.mapper().recordOf(ids[i]), *b = swapped.mapper().recordOf(ids[k]);
-          if (a == nullptr || b == nullptr || !a->earlier || !b->earlier) continue;
+          if (!isKnownAsOneTrack(swapped, ids[i]) || !isKnownAsOneTrack(swapped, ids[k])) continue;
           if (swapped.thing(ids[i]).name != swapped.thing(ids[k]).name) continue;
           swapped.confuse(ids[i], ids[k]);
           ++swaps;

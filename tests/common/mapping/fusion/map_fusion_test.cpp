@@ -116,6 +116,12 @@ TEST(MapFusion, TwoVehiclesHaveOneObjectForEachThing) {
   EXPECT_GE(report.loops, 1u);
   EXPECT_GT(report.merges, 10u);
   EXPECT_EQ(partsOf(fused).size(), 1u);
+  // Each object goes on as one track, under its own id.
+  EXPECT_TRUE(fused.graph.tracks.empty() && fused.graph.facts.empty());
+  for (const auto& [id, record] : fused.graph.records) {
+    EXPECT_EQ(record.sighting.in_anchor.id, id);
+    EXPECT_EQ(record.earlier.value_or(record.sighting).in_anchor.id, id);
+  }
   const Tally both = tally(fused, {a, b});
   EXPECT_EQ(both.mixed, 0u);
   EXPECT_LE(both.each(), 1.03);
