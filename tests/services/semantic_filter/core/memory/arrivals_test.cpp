@@ -247,6 +247,7 @@ class SteppedAgain {
     }
   }
   const Belief& belief() const { return history_.belief(); }
+  History& history() { return history_; }
   std::size_t merges() const { return merges_; }
 
  private:
@@ -267,6 +268,20 @@ class SteppedAgain {
   History history_{parameters_, makePriors(), 20, reasons_};
   std::size_t merges_ = 0;
 };
+
+TEST(ArrivalsHistory, WhatHasLeftDoesNotArriveAgain) {
+  SteppedAgain run({});
+  run.history().erase({60});
+  run.history().stepAgainFrom(3);
+  ASSERT_EQ(run.belief().tracks.size(), 1u);
+  EXPECT_EQ(run.belief().tracks[0].id, 1u);
+  run.history().erase({1});
+  run.history().stepAgainFrom(3);
+  for (const Track& track : run.belief().tracks) {
+    EXPECT_NE(track.id, 1u);
+    EXPECT_NE(track.id, 50u) << "it was fused with track 1";
+  }
+}
 
 TEST(ArrivalsHistory, AFrameThatIsSteppedAgainTakesTheSameArrivalsInAgain) {
   const SteppedAgain on_time({});
