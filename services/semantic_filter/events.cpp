@@ -77,10 +77,6 @@ void EventTracker::merge(const MergeRecord& m, const Objects& objects, const Eve
                          Changes& changes) {
   const auto it = known_.find(m.absorbed);
   if (it == known_.end()) return;  // initiated and merged within one frame: never published
-  if (m.by_map) {
-    known_.erase(it);
-    return;
-  }
   const auto survivor =
       std::find_if(objects.objects.begin(), objects.objects.end(),
                    [&](const ObjectBelief& o) { return o.trackId() == m.survivor; });
@@ -90,6 +86,11 @@ void EventTracker::merge(const MergeRecord& m, const Objects& objects, const Eve
   e.other_id = it->second.id;
   e.class_name = it->second.class_name;
   e.probability = 1.0;
+  if (m.by_map) {  // the older id may have been its own
+    if (e.object_id != e.other_id) changes.events.push_back(e);
+    known_.erase(it);
+    return;
+  }
   changes.events.push_back(e);
   if (it->second.ever_confirmed) {
     changes.ended.push_back({m.absorbed, m.survivor, objects.stamp.time});

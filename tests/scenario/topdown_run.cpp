@@ -96,10 +96,13 @@ TopDownRun driveThrough(const TopDownSetting& setting) {
     filter.onOdometry(*odometry);
     filter.onDetections(*found);
     if (frame->stamp.sequence == setting.plant_at && !setting.planted.empty()) {
-      Recalled recalled;
-      recalled.world = odometry->world;
-      recalled.objects = setting.planted;
-      filter.onRecalled(recalled);
+      MapNear near;
+      near.instance = 5;
+      near.client = filter.instance();
+      near.revision = 1;
+      near.world = odometry->world;
+      near.placed = setting.planted;
+      filter.onNear(near);
     }
   }
   return run;

@@ -7,6 +7,25 @@
 #include "services/semantic_filter/core/measurement/pose_error.h"
 
 namespace perdure::semantic_filter {
+namespace {
+
+using SharedArrivals = std::shared_ptr<const Arrivals>;
+
+/// The same ones if none of these tracks is among them.
+SharedArrivals without(const std::set<TrackId>& ids, const SharedArrivals& arrivals) {
+  const auto isOne = [&](const ObjectBelief& b) { return ids.contains(b.trackId()); };
+  const auto isPublished = [&](const Arrivals::Published& p) { return isOne(p.belief); };
+  if (std::none_of(arrivals->placed.begin(), arrivals->placed.end(), isOne) &&
+      std::none_of(arrivals->as_published.begin(), arrivals->as_published.end(), isPublished)) {
+    return arrivals;
+  }
+  Arrivals rest = *arrivals;
+  std::erase_if(rest.placed, isOne);
+  std::erase_if(rest.as_published, isPublished);
+  return std::make_shared<const Arrivals>(std::move(rest));
+}
+
+}  // namespace
 
 History::History(const Parameters& parameters, const ClassPriors& priors, std::size_t frames,
                  ReasonCounts& reasons)
@@ -67,11 +86,18 @@ void History::stepAgainFrom(std::size_t index) {
 }
 
 void History::erase(const std::set<TrackId>& ids) {
+  std::set<TrackId> gone = ids;
+  for (const auto& [track, into] : belief_.fused) {
+    if (ids.contains(into)) gone.insert(track);
+  }
   const auto from = [&](std::vector<Track>& tracks) {
     std::erase_if(tracks, [&](const Track& t) { return ids.contains(t.id); });
   };
   from(belief_.tracks);
-  for (HistoryFrame& f : frames_) from(f.before.tracks);
+  for (HistoryFrame& f : frames_) {
+    from(f.before.tracks);
+    if (f.arrivals) f.arrivals = without(gone, f.arrivals);
+  }
 }
 
 std::optional<ComingFrame> History::comingAfter(const HistoryFrame& frame) const {

@@ -46,7 +46,8 @@ class History {
   /// Steps frame `index` and all stepped ones after it again.
   void stepAgainFrom(std::size_t index);
 
-  /// From the newest belief and those that late detections may go back to.
+  /// From the newest belief and those that late detections may go back to, with what arrived of
+  /// them.
   void erase(const std::set<TrackId>& ids);
 
   std::deque<HistoryFrame>& frames() { return frames_; }

@@ -4,6 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
+#include <memory>
+#include <set>
+#include <utility>
 
 #include "services/map_store/node.h"
 #include "services/semantic_filter/node.h"
@@ -48,20 +52,20 @@ inline std::vector<Detection> boxesFrom(const RigidTransform& T_WB, std::uint64_
   return list;
 }
 
-/// A filter and a map store, connected as by the bus. One that is `deaf` gets and sends nothing.
+/// A filter and a map store, connected as by the bus. A deaf pair exchanges nothing.
 struct Pair {
   TemporaryFolder folder;
   std::vector<Objects> objects;
   std::vector<Event> events;
+  Predictions predictions;  ///< of the newest frame
   std::vector<std::function<void()>> to_map;
   bool deaf = false;
-  bool odometry_to_map = false;  ///< the map keeps a graph
   std::unique_ptr<map_store::Node> map;
   std::uint64_t frame = 0;
   double x = 0.0;
   std::vector<TrueObject> things;
   WorldId world{5, 0};
-  RigidTransform T_W;    ///< the frame of the objects, in that of the odometry
+  RigidTransform T_W;  ///< the frame of the objects, in that of the odometry
   Node filter;
 
   explicit Pair(const Config& config = configWith(kMemory),
@@ -73,25 +77,33 @@ struct Pair {
                       objects.push_back(m);
                       if (!deaf) to_map.push_back([this, m] { map->onObjects(m); });
                     },
-                .events =
-                    [this](const Event& e) {
-                      events.push_back(e);
-                      if (!deaf) to_map.push_back([this, e] { map->onEvent(e); });
-                    },
-                .predictions = {},
-                .queries =
-                    [this](const MapQuery& q) {
-                      if (!deaf) to_map.push_back([this, q] { map->onQuery(q); });
-                    }}) {
-    map_store::Config store;
-    store.store_path = folder.file("map.sqlite");
-    map = std::make_unique<map_store::Node>(
-        store, 5,
-        map_store::Outputs{[](const MapTile&) {}, [](const MapTile&) {}, [](const MapHeader&) {},
-                           [](const MapReply&) {},
-                           [this](const Recalled& r) { filter.onRecalled(r); }});
+                .events = [this](const Event& e) { events.push_back(e); },
+                .predictions = [this](const Predictions& p) { predictions = p; }}) {
+    map = std::make_unique<map_store::Node>(storeIn(folder), 5,
+                                            outputsTo([this](const MapNear& m) {
+                                              filter.onNear(m);
+                                            }));
+    map->onQuery(helloOf(filter));
     filter.onCalibration(calibrationOf(makeCamera()));
     filter.onModel(makeModelInfo());
+  }
+
+  static map_store::Config storeIn(const TemporaryFolder& folder) {
+    map_store::Config store;
+    store.store_path = folder.file("map.sqlite");
+    return store;
+  }
+  static map_store::Outputs outputsTo(Sink<MapNear> near) {
+    return {[](const MapTile&) {}, [](const MapTile&) {}, [](const MapHeader&) {},
+            [](const MapReply&) {}, std::move(near)};
+  }
+  /// What a filter asks before its first frame.
+  static MapQuery helloOf(const Node& filter) {
+    MapQuery query;
+    query.client = filter.instance();
+    query.request = 1;
+    query.kind = MapQueryKind::kRestore;
+    return query;
   }
 
   void talk() {
@@ -104,7 +116,7 @@ struct Pair {
     for (; std::abs(until - x) > 0.5 * step; x += way, ++frame) {
       Odometry odometry = odometryAt(frame, T_W * bodyAt(x));
       odometry.world = world;
-      if (odometry_to_map && !deaf) to_map.push_back([this, odometry] { map->onOdometry(odometry); });
+      if (!deaf) to_map.push_back([this, odometry] { map->onOdometry(odometry); });
       filter.onOdometry(odometry);
       filter.onDetections(detectionsAt(frame, boxesFrom(bodyAt(x), frame, things)));
       talk();

@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 #include <set>
+#include <utility>
 
 #include "tests/services/semantic_filter/scene.h"
 
@@ -99,20 +101,23 @@ class Restless {
     node_->onModel(testing::makeModelInfo());
   }
 
-  /// The working set is restored, with its ledgers or from a peer that has none.
-  void restart(bool restore, bool without_ledgers) {
+  /// The working set comes back before the first frame or in it, with its ledgers or from a peer
+  /// that has none.
+  void restart(bool before_odometry, bool without_ledgers) {
     node_->flush();
-    Recalled recalled;
-    recalled.world = {5, 0};
-    recalled.restore = restore;
-    recalled.client = 9;
-    recalled.next_id = published_.back().next_id;
-    recalled.objects = published_.back().objects;
-    for (auto& o : recalled.objects) {
+    MapNear near;
+    near.instance = 5;
+    near.revision = 1;
+    near.world = {5, 0};
+    near.client = 9;
+    near.next_id = published_.back().next_id;
+    near.placed = published_.back().objects;
+    for (auto& o : near.placed) {
       if (without_ledgers) o.why = {};
     }
     begin();
-    node_->onRecalled(recalled);
+    if (before_odometry) return node_->onNear(near);
+    near_ = near;
   }
 
   std::vector<Detection> boxesAt(const View& view) {
@@ -143,6 +148,7 @@ class Restless {
       view.T_WB.q = view.T_WB.q * Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ());
     }
     node_->onOdometry(odometryAt(k, view.T_WB));
+    if (const auto near = std::exchange(near_, std::nullopt)) node_->onNear(*near);
     const auto boxes = detectionsAt(k, boxesAt(view));
     if (random_() % 20 == 0) return;  // lost
     if (random_() % 10 == 0) {
@@ -163,6 +169,7 @@ class Restless {
   std::vector<Objects> published_;
   std::size_t audited_ = 0;
   std::unique_ptr<Node> node_;
+  std::optional<MapNear> near_;  ///< for the frame that comes
 };
 
 TEST(NodeLedger, SumsAreTheBeliefInEveryFrame) {

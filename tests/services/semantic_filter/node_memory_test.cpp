@@ -72,14 +72,14 @@ TEST(NodeMemory, ABeliefIsRecalledBitForBitAndItsLedgerSaysSo) {
   EXPECT_NE(pair.filter.belief().tracks[0].pose.product, Matrix6d::Identity());
 }
 
-TEST(NodeMemory, NothingIsArchivedWhileNoMapStoreAnswersAndHealthCountsIt) {
+TEST(NodeMemory, NothingIsArchivedWhileNoMapStoreAnswers) {
   Pair pair;
   pair.deaf = true;
   pair.driveTo(14);
   const auto street = pair.confirmed();
   pair.driveTo(300, 2.0);
   EXPECT_EQ(pair.confirmed(), street);
-  EXPECT_GE(pair.filter.reasons().of("map_store_silent"), 10u);
+  EXPECT_EQ(pair.count(EventKind::kArchived), 0u);
   pair.deaf = false;  // the map store starts: it gets the working set before anything leaves
   pair.driveTo(360, 2.0);
   EXPECT_TRUE(pair.confirmed().empty());
@@ -142,6 +142,11 @@ TEST(NodeMemory, ANewTrackInThePlaceOfARecalledOneMergesIntoIt) {
   pair.driveTo(14);
   EXPECT_EQ(pair.confirmed(), street);
   EXPECT_GE(pair.count(EventKind::kMerged), again.size());
+  std::set<TrackId> into;
+  for (const Objects& m : pair.objects) {
+    for (const EndedTrack& e : m.ended) into.insert(e.into);
+  }
+  for (const TrackId id : into) EXPECT_TRUE(street.contains(id)) << id;
 }
 
 TEST(NodeMemory, ARestartedFilterRecallsWhatItsPredecessorArchived) {
@@ -150,26 +155,28 @@ TEST(NodeMemory, ARestartedFilterRecallsWhatItsPredecessorArchived) {
   const auto street = pair.confirmed();
   pair.driveTo(200, 2.0);
   std::vector<Objects> objects;
-  std::vector<MapQuery> queries;
-  std::vector<Recalled> answers;
+  std::vector<MapNear> answers;
   Node second(configWith(kMemory), makePriors(), 10,
               {.objects = [&](const Objects& m) { objects.push_back(m); },
                .events = {},
-               .predictions = {},
-               .queries = [&](const MapQuery& q) { queries.push_back(q); }});
-  map_store::Config store;
-  store.store_path = pair.folder.file("map.sqlite");
+               .predictions = {}});
   pair.map.reset();
-  map_store::Node map(store, 6,
-                      {[](const MapTile&) {}, [](const MapTile&) {}, [](const MapHeader&) {},
-                       [](const MapReply&) {}, [&](const Recalled& r) { answers.push_back(r); }});
+  map_store::Node map(Pair::storeIn(pair.folder), 6,
+                      Pair::outputsTo([&](const MapNear& n) { answers.push_back(n); }));
+  const auto exchange = [&] {
+    for (const MapNear& n : std::exchange(answers, {})) second.onNear(n);
+  };
+  map.onQuery(Pair::helloOf(second));
+  exchange();
   second.onCalibration(calibrationOf(makeCamera()));
   second.onModel(makeModelInfo());
   for (std::uint64_t k = pair.frame; k < pair.frame + 3; ++k) {
-    second.onOdometry(odometryAt(k, bodyAt(80)));
+    const Odometry odometry = odometryAt(k, bodyAt(80));
+    map.onOdometry(odometry);
+    second.onOdometry(odometry);
     second.flush();
-    for (const auto& q : std::exchange(queries, {})) map.onQuery(q);
-    for (const auto& r : std::exchange(answers, {})) second.onRecalled(r);
+    map.onObjects(objects.back());
+    exchange();
   }
   std::set<ObjectId> back;
   for (const auto& o : objects.back().objects) back.insert(o.id);
@@ -177,26 +184,34 @@ TEST(NodeMemory, ARestartedFilterRecallsWhatItsPredecessorArchived) {
   EXPECT_GT(objects.back().next_id, *street.rbegin());
 }
 
-TEST(NodeMemory, UnrequestedAnswersAreCountedAndChangeNothing) {
+TEST(NodeMemory, ARestartedFilterHasTheWorkingSetOfItsPredecessorInItsFirstMessage) {
   Pair pair;
   pair.driveTo(14);
-  Recalled answer;
-  answer.world = {5, 0};
-  answer.client = 9;
-  answer.request = 4711;
-  answer.objects = pair.objects.back().objects;
-  for (auto& o : answer.objects) o.id += 100;
-  const std::size_t size = pair.filter.belief().tracks.size();
-  pair.filter.onRecalled(answer);
-  EXPECT_EQ(pair.filter.reasons().of("recalled_unasked"), 1u);
-  answer.client = 77;
-  pair.filter.onRecalled(answer);
-  EXPECT_EQ(pair.filter.reasons().of("recalled_unasked"), 1u);
-  answer.client = 9;
-  answer.world = {6, 0};
-  pair.filter.onRecalled(answer);
-  EXPECT_EQ(pair.filter.reasons().of("recalled_of_other_world"), 1u);
-  EXPECT_EQ(pair.filter.belief().tracks.size(), size);
+  std::set<ObjectId> before;
+  for (const auto& o : pair.objects.back().objects) before.insert(o.id);
+  ASSERT_GE(before.size(), 3u);
+  std::vector<Objects> objects;
+  std::vector<Event> events;
+  std::vector<MapNear> answers;
+  Node second(configWith(kMemory), makePriors(), 10,
+              {.objects = [&](const Objects& m) { objects.push_back(m); },
+               .events = [&](const Event& e) { events.push_back(e); },
+               .predictions = {}});
+  pair.map.reset();
+  map_store::Node map(Pair::storeIn(pair.folder), 6,
+                      Pair::outputsTo([&](const MapNear& n) { answers.push_back(n); }));
+  map.onQuery(Pair::helloOf(second));
+  ASSERT_EQ(answers.size(), 1u);
+  second.onNear(answers.front());
+  second.onCalibration(calibrationOf(makeCamera()));
+  second.onModel(makeModelInfo());
+  second.onOdometry(odometryAt(pair.frame, bodyAt(pair.x)));
+  second.flush();
+  std::set<ObjectId> after;
+  for (const auto& o : objects.back().objects) after.insert(o.id);
+  EXPECT_EQ(after, before);
+  EXPECT_GE(objects.back().next_id, pair.objects.back().next_id);
+  for (const Event& e : events) EXPECT_NE(e.kind, EventKind::kBorn);
 }
 
 }  // namespace

@@ -305,19 +305,27 @@ TEST(Node, AnOutOfViewTrackKeepsEveryBitAndItsId) {
   EXPECT_EQ(reappeared(), confirmed);
 }
 
+/// An answer of the map to the filter `client` before its first frame.
+MapNear nearOf(std::vector<ObjectBelief> placed, ObjectId next_id, InstanceId client = 9) {
+  MapNear near;
+  near.instance = 5;
+  near.revision = 1;
+  near.world = {5, 0};
+  near.client = client;
+  near.next_id = next_id;
+  near.placed = std::move(placed);
+  return near;
+}
+
 /// Map objects with the given variance, in place of a first frame.
-Recalled restored(const std::vector<TrueObject>& things, const std::vector<double>& variances) {
-  Recalled recalled;
-  recalled.world = {5, 0};
-  recalled.restore = true;
-  recalled.client = 9;
-  recalled.next_id = 10;
+MapNear restored(const std::vector<TrueObject>& things, const std::vector<double>& variances) {
+  std::vector<ObjectBelief> placed;
   for (std::size_t i = 0; i < things.size(); ++i) {
     Track object = testing::makeObject(i + 1, things[i].class_name, things[i].x, variances[i]);
     object.life.confirmed = true;
-    recalled.objects.push_back(toBelief(object, testing::makePriors(), 0.7));
+    placed.push_back(toBelief(object, testing::makePriors(), 0.7));
   }
-  return recalled;
+  return nearOf(std::move(placed), 10);
 }
 
 TEST(Node, ABoxThatOnlyAnOccludedTrackExplainsRevisesTheOcclusionAndInitiatesNothing) {
@@ -327,7 +335,7 @@ TEST(Node, ABoxThatOnlyAnOccludedTrackExplainsRevisesTheOcclusionAndInitiatesNot
   const State chair = makeState(6.9, -4.9, 0.59, 0, 0.5, 0.75, 0.64);
   Harness h;
   const std::vector<TrueObject> things{{table, "dining table"}, {chair, "chair"}};
-  h.node.onRecalled(restored(things, {1e-4, 1e-4}));
+  h.node.onNear(restored(things, {1e-4, 1e-4}));
   const auto boxes = [&](std::uint64_t k) { return boxesAt(things, k, 0.0); };
   for (std::uint64_t k = 0; k < 10; ++k) {
     h.node.onOdometry(odometryAt(k, driveTo(0, 0.0)));
@@ -351,7 +359,7 @@ TEST(Node, ABoxOfAPartialViewIsNotThatOfARemovedObjectBesideIt) {
   const TrueObject at_border{makeState(6.3, 5.38, 0.45, 0, 0.5, 0.5, 0.9), "chair"};
   const TrueObject taken{makeState(5.6, 4.35, 0.45, 0, 0.5, 0.5, 0.9), "chair"};
   Harness h;
-  h.node.onRecalled(restored({at_border, taken}, {1e-4, 0.01}));
+  h.node.onNear(restored({at_border, taken}, {1e-4, 0.01}));
   double before = 0.0;
   for (std::uint64_t k = 0; k < 8; ++k) {
     h.node.onOdometry(odometryAt(k, driveTo(0, 0.0)));
@@ -384,15 +392,11 @@ TEST(Node, ABoxOfAPartialViewIsNotThatOfARemovedObjectBesideIt) {
 TEST(Node, ARestartedNodeContinuesWithTheSameIds) {
   Harness first;
   drive(first, 0, 20);
-  Recalled recalled;
-  recalled.world = {5, 0};
-  recalled.restore = true;
-  recalled.client = 77;
-  recalled.next_id = first.objects.back().next_id;
-  recalled.objects = first.objects.back().objects;
+  const MapNear near =
+      nearOf(first.objects.back().objects, first.objects.back().next_id, 77);
   Harness second({}, 77), stranger({}, 78);
-  second.node.onRecalled(recalled);
-  stranger.node.onRecalled(recalled);
+  second.node.onNear(near);
+  stranger.node.onNear(near);
   drive(second, 20, 25);
   drive(stranger, 20, 25);
   for (const auto& truth : kStreet) {
@@ -401,7 +405,7 @@ TEST(Node, ARestartedNodeContinuesWithTheSameIds) {
     ASSERT_TRUE(a && b);
     EXPECT_EQ(a->id, b->id);
   }
-  EXPECT_GE(second.objects.back().next_id, recalled.next_id);
+  EXPECT_GE(second.objects.back().next_id, near.next_id);
   EXPECT_EQ(stranger.objects.back().objects.front().id, 1u);
 }
 

@@ -65,9 +65,7 @@ Kept compare(const std::vector<ObjectId>& before, const std::vector<ObjectId>& a
 }
 
 std::unique_ptr<Pair> onStreet(const MemoryParameters& memory = kMemory, unsigned seed = 3) {
-  auto pair = std::make_unique<Pair>(configWith(memory), longStreet(7.0, seed));
-  pair->odometry_to_map = true;
-  return pair;
+  return std::make_unique<Pair>(configWith(memory), longStreet(7.0, seed));
 }
 
 /// Metres driven until every object with a confirmed track has its old id again, at least `least`.

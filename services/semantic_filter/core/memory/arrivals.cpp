@@ -29,7 +29,10 @@ class Arrival {
   void add(Track track) {
     const auto same = find(track.id);
     if (same != end() && !same->life.recalled) return;
-    if (belief_.fused.contains(track.id)) return;
+    if (const auto fused = belief_.fused.find(track.id); fused != belief_.fused.end()) {
+      if (arrivals_.objectOf(track.id) == arrivals_.objectOf(fused->second)) return;
+      belief_.fused.erase(fused);  // they are two objects again
+    }
     if (same != end()) {
       *same = std::move(track);
       return;

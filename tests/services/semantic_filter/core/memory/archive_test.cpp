@@ -1,9 +1,7 @@
-// Which tracks leave the working set for the map store, and what is asked of it.
+// Which tracks leave the working set for the map store.
 #include "services/semantic_filter/core/memory/archive.h"
 
 #include <gtest/gtest.h>
-
-#include <algorithm>
 
 #include "tests/services/semantic_filter/scene.h"
 
@@ -33,11 +31,10 @@ Track thingAt(ObjectId id, double x, double seen_s) {
 
 struct Leavers {
   Archive memory{kMemory, kStands};
-  /// A filter at the origin that asks and gets answers all the time.
+  /// A filter at the origin, and a map that has everything on disk at once.
   Archive::Leaving after(const std::vector<Track>& objects, double now_s = 20.0) {
     (void)memory.leaving(objects, Eigen::Vector3d::Zero(), at(now_s), at(now_s - 3.0));
-    const auto question = memory.ask(Eigen::Vector3d::Zero(), at(now_s));
-    EXPECT_TRUE(question && memory.answered(question->request, at(now_s), false));
+    memory.onKept(at(now_s));
     return memory.leaving(objects, Eigen::Vector3d::Zero(), at(now_s + 0.1), at(now_s - 2.9));
   }
 };
@@ -82,36 +79,36 @@ TEST(Archive, UnconfirmedTracksAreForgottenUnlessTheMapHasThem) {
   EXPECT_EQ(leaving.forgotten, (std::vector<ObjectId>{1, 3}));
 }
 
-TEST(Archive, AnAnswerFromBeforeATrackCouldLeaveKeepsIt) {
+TEST(Archive, ATrackWaitsUntilTheMapHasAFrameFromWhenItCouldLeave) {
   Archive memory{kMemory, kStands};
   const std::vector<Track> things = {thingAt(1, 140, 10)};
-  const auto question = memory.ask(Eigen::Vector3d::Zero(), at(14.0));
-  ASSERT_TRUE(memory.answered(question->request, at(14.0), false));
+  memory.onKept(at(14.0));
   for (double now = 16.0; now < 18.0; now += 0.1) {
     EXPECT_TRUE(
         memory.leaving(things, Eigen::Vector3d::Zero(), at(now), at(now - 3)).archived.empty());
+    memory.onKept(at(13.0));
+    EXPECT_EQ(memory.kept(), at(14.0)) << "a late message changes nothing";
   }
+  memory.onKept(at(16.0));
+  EXPECT_FALSE(
+      memory.leaving(things, Eigen::Vector3d::Zero(), at(18), at(15)).archived.empty());
 }
 
-TEST(Archive, AsksAsTheBodyMovesAndAgainAfterATruncatedAnswer) {
+TEST(Archive, ObjectsComeNearerThanTheyLeave) {
+  EXPECT_DOUBLE_EQ((Archive{kMemory, kStands}.nearRadius()), 110.0);
+  EXPECT_DOUBLE_EQ((Archive{{false, 100.0, 30.0, 5.0}, kStands}.nearRadius()), 0.0);
+}
+
+TEST(Archive, TheProductOfAnArchivedTrackIsKeptByTheTimeOfItsState) {
   Archive memory{kMemory, kStands};
-  std::size_t asked = 0;
-  for (int k = 0; k < 1000; ++k) {  // 10 m/s for 100 s
-    const Eigen::Vector3d here(k * 1.0, 0, 0);
-    const auto question = memory.ask(here, at(0.1 * k));
-    if (!question) continue;
-    ++asked;
-    EXPECT_GE(question->radius_m, 110.0 - 1e-9);
-    EXPECT_TRUE(memory.answered(question->request, at(0.1 * k), k == 500));
-  }
-  EXPECT_GE(asked, 90u);
-  EXPECT_LE(asked, 102u);
-  const Eigen::Vector3d there(2000, 0, 0);
-  auto question = memory.ask(there, at(200));
-  ASSERT_TRUE(question && memory.answered(question->request, at(200), true));
-  question = memory.ask(there, at(200.1));
-  ASSERT_TRUE(question && memory.answered(question->request, at(200.1), false));
-  EXPECT_FALSE(memory.ask(there, at(200.2)));
+  Track track = thingAt(1, 140, 10);
+  track.pose.product = 3.0 * Matrix6d::Identity();
+  memory.rememberReference(track);
+  ASSERT_TRUE(memory.referenceAt(track.as_of));
+  EXPECT_EQ(*memory.referenceAt(track.as_of), track.pose.product);
+  EXPECT_FALSE(memory.referenceAt(at(11)));
+  memory.clear();
+  EXPECT_FALSE(memory.referenceAt(track.as_of)) << "of another frame of reference";
 }
 
 }  // namespace
