@@ -1,4 +1,4 @@
-// KITTI tracking's truth, label_02/SEQUENCE.txt: one line an object and frame.
+// Ground truth of KITTI tracking, label_02/SEQUENCE.txt: one line per object and frame.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,7 +24,7 @@ struct KittiLabel {
   bool dontCare() const { return type == "DontCare"; }
 };
 
-/// KITTI gives the middle of the box's bottom; `centre` is half the height above it. Throws
+/// KITTI gives the centre of the box's bottom; `centre` is half the height above it. Throws
 /// StartupError(kData) that names each wrong line.
 std::vector<KittiLabel> readKittiLabels(const std::filesystem::path& file);
 

@@ -1,4 +1,4 @@
-// Which columns of a table of poses are which, by the names in its header.
+// Assigns the columns of a pose table by the names in its header.
 #pragma once
 
 #include <array>
@@ -12,18 +12,19 @@ namespace perdure::replay {
 struct PoseColumns {
   std::array<std::size_t, 8> of{};  ///< t x y z qx qy qz qw
   std::size_t count = 0;            ///< of all columns
-  bool nanoseconds = false;         ///< as EuRoC's files and `rostopic echo -p` have times
+  bool nanoseconds = false;         ///< times in nanoseconds, as in EuRoC's files and `rostopic
+                                    ///< echo -p`
 };
 
-/// Where each of the eight has one name (x, tx, p_RS_R_x [m], field.pose.position.x; qx, q_RS_x [],
-/// orientation.x; t, timestamp, header.stamp). Nothing where one has none or several.
+/// Finds the columns if each of the eight quantities has exactly one name (x, tx, p_RS_R_x [m],
+/// field.pose.position.x; qx, q_RS_x [], orientation.x; t, timestamp, header.stamp). Otherwise
+/// returns nothing.
 std::optional<PoseColumns> poseColumnsOf(const std::vector<std::string_view>& names);
 
-/// Names of angles (roll, pitch, yaw) and of no quaternion.
+/// True if the names contain angles (roll, pitch, yaw) and no quaternion.
 bool namesAngles(const std::vector<std::string_view>& names);
 
-/// "this is JSON …" where a line shows that the file is of a kind that is no table of poses, with
-/// the mend; else "".
+/// "this is JSON …" with the fix, if a line shows that the file is not a table of poses; else "".
 std::string otherKindOfPoses(std::string_view line, const std::vector<std::string_view>& fields);
 
 }  // namespace perdure::replay
