@@ -14,15 +14,12 @@
 namespace perdure {
 
 struct ProgramOptions {
-  std::vector<std::string> command{};  ///< the program (searched in PATH if it has no '/') and its
-                                       ///< arguments
-  std::map<std::string, std::string> environment{};  ///< added to the environment of this process,
-                                                     ///< or replacing its values
+  std::vector<std::string> command{};  ///< program (from PATH if it has no '/'), arguments
+  std::map<std::string, std::string> environment{};  ///< added to this process's environment
   std::filesystem::path folder{};  ///< working directory; empty: that of this process
-  std::filesystem::path log{};    ///< file to which its output is appended; empty: the output of
-                                  ///< this process
-  bool own_session = false;       ///< it does not receive Ctrl-C and has no input
-  bool ends_with_parent = false;  ///< it receives SIGTERM if this process ends first
+  std::filesystem::path log{};     ///< output is appended to it; empty: this process's output
+  bool own_session = false;        ///< it does not receive Ctrl-C and has no input
+  bool ends_with_parent = false;   ///< it receives SIGTERM if this process ends first
 };
 
 /// The path of the program: `name` itself if it has a '/', else the first match in PATH.

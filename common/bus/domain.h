@@ -32,8 +32,7 @@ struct Options {
   std::string vehicle = "ego";
   std::int64_t shared_memory_mb = 0;    ///< largest image sent through shared memory; 0: not used
   std::string security = {};            ///< folder of the identities; empty: no security
-  std::string identity = {};            ///< name of a folder in `security`; empty: chosen by
-                                        ///< process name
+  std::string identity = {};            ///< a folder in `security`; empty: by process name
   std::vector<std::string> peers = {};  ///< the other hosts; empty: found by multicast
 };
 /// Describes bus.interface, bus.peers, bus.domain, bus.vehicle, bus.shared_memory_mb, bus.security

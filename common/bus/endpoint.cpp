@@ -46,8 +46,7 @@ QosPtr readerQos(const Qos& qos, const SharedMemory& memory, ReadFrom from) {
 QosPtr writerQos(const Qos& qos, const WriterOptions& options, const SharedMemory& memory,
                  bool through) {
   QosPtr result = commonQos(qos, memory, through);
-  dds_qset_writer_data_lifecycle(result.get(), false);  // the end of a writer does not dispose its
-                                                        // instances
+  dds_qset_writer_data_lifecycle(result.get(), false);  // instances outlive their writer
   const bool kept = qos.kept && !(memory.on() && through);
   if (kept) dds_qset_durability(result.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
   if (qos.latched || kept) {

@@ -19,8 +19,7 @@
 namespace perdure::bus {
 
 struct WriterOptions {
-  std::int32_t strength = 0;  ///< for exclusive topics; readers receive the live writer with the
-                              ///< highest strength
+  std::int32_t strength = 0;  ///< for exclusive topics; the highest live strength is received
   double lease_s = 0.0;       ///< of the liveliness; 0: as in the topic table
 };
 
@@ -55,8 +54,7 @@ class RawWriter;
 /// The earlier messages that a reader of a non-latched topic receives.
 enum class ReadFrom {
   kNow,   ///< none
-  kKept,  ///< the newest message of writers that store it (Qos::kept); other writers are not
-          ///< matched
+  kKept,  ///< the newest message, from writers that store it (Qos::kept); no others match
 };
 
 class RawReader : public Endpoint {

@@ -65,8 +65,7 @@ bool SecurityLog::isNewcomer(const std::string& message) {
   constexpr std::size_t kMost = 1024;
   constexpr std::string_view kBefore = "remote writer ";  // same length as "remote reader "
   const auto begin = message.find("remote ") + kBefore.size();
-  const auto end = message.rfind(':', message.find(' ', begin));  // end of the participant's part
-                                                                  // of the GUID
+  const auto end = message.rfind(':', message.find(' ', begin));  // end of the participant's GUID
   if (end == std::string::npos || end <= begin) return false;
   if (strangers_.size() >= kMost) strangers_.clear();
   return strangers_.insert(message.substr(begin, end - begin)).second;
@@ -108,8 +107,7 @@ std::string SecurityLog::own() const {
 
 SecurityLog& securityLog(bool discovery) {
   static SecurityLog* const log = [discovery] {
-    auto* made = new SecurityLog;  // never deleted, because Cyclone's threads may log until the
-                                   // process ends
+    auto* made = new SecurityLog;  // never deleted: Cyclone's threads may log until exit
     dds_set_log_sink(&takeLog, made);
     if (discovery) dds_set_trace_sink(&takeTrace, made);
     return made;

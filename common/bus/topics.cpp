@@ -53,8 +53,7 @@ Table makeTable() {
       row(kImu, latched(512), kImuHz, kRecorded, kCapture | kRos2Driver, kVio),
       row(kSpeed, latched(512), kImuHz, kRecorded, kCapture, kVio),
       row(kCalibration, latched(1), 0, kRecorded, kCapture | kRos2Driver,
-          kVio | kSemanticFilter | kMapStore | kSubscriber),  // map_store reads the position on
-                                                              // Earth
+          kVio | kSemanticFilter | kMapStore | kSubscriber),  // map_store: position on Earth
       row(kOdometry, reliable(64), kCameraHz, kRecorded, kVio | kRos2Driver,
           // capture reads it with pace.mode; vio reads it only if another program writes it
           kSemanticFilter | kCapture | kMapStore | kVio | kSubscriber),

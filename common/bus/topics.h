@@ -15,8 +15,7 @@ struct Qos {
   bool reliable = true;
   int depth = 1;               ///< KEEP_LAST
   bool latched = false;        ///< TRANSIENT_LOCAL: late joiners receive the last `depth` samples
-  bool kept = false;           ///< writers store the newest sample for readers that request it
-                               ///< (ReadFrom::kKept)
+  bool kept = false;           ///< writers store the newest sample for ReadFrom::kKept
   bool exclusive = false;      ///< OWNERSHIP EXCLUSIVE and LIVELINESS MANUAL_BY_TOPIC
   double lease_s = 0.0;        ///< of the liveliness; 0: infinite
   bool shared_memory = false;  ///< used if enabled; only for topics without key and latching

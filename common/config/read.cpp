@@ -42,8 +42,7 @@ std::string shortened(const std::string& text) {
 }
 
 std::optional<double> parseNumber(const YAML::Node& node) {
-  if (!node.IsScalar() || node.Tag() == "!") return std::nullopt;  // the tag "!" marks a quoted
-                                                                   // value
+  if (!node.IsScalar() || node.Tag() == "!") return std::nullopt;  // "!" marks quoted values
   const std::string& text = node.Scalar();
   const char* begin = text.data() + (text.starts_with('+') ? 1 : 0);
   const char* end = text.data() + text.size();
@@ -107,8 +106,7 @@ class Reader {
     } else if (!isGroup(name) && !fields_.wasGroup(name)) {
       problem(key, name + ": is not a known key" + suggestion(name));
     } else if (value.IsMap()) {
-      seen_.erase(name);  // a group may continue under a second heading, but its keys must not
-                          // repeat
+      seen_.erase(name);  // a group may continue under a second heading; keys must not repeat
       readGroup(value, name + ".");
     } else if (!value.IsNull()) {
       problem(value, name + ": is a group of keys, not a value; its first key is " +

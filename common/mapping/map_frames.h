@@ -19,8 +19,7 @@ namespace perdure::mapping {
 struct FrameInMap {
   RigidTransform T_MW;
   WorldId map;               ///< M
-  bool provisional = false;  ///< M is not that of the map's first anchor, because the session is
-                             ///< not linked to it yet
+  bool provisional = false;  ///< its session is not linked to the map's first anchor yet
 };
 
 /// Uses the graph as it is at construction.

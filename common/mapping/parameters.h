@@ -19,8 +19,7 @@ struct PlaceParameters {
   double pair_least_m = 4.0, pair_most_m = 40.0;  ///< between the objects of a proposing pair
   double gate_sigmas = 4.0;                       ///< of the prior
   double known_share = 0.5;      ///< probability that an object near the trajectory is on the map
-  double known_within_m = 20.0;  ///< distance from the trajectory at which known_share has fallen
-                                 ///< to .6 of its value
+  double known_within_m = 20.0;  ///< distance from the trajectory that lowers it to .6
 };
 
 struct GraphParameters {
@@ -30,8 +29,7 @@ struct GraphParameters {
 
 /// Conditions for search and acceptance of loops, and for recall.
 struct LoopParameters {
-  double visit_m = 100.0;      ///< distance travelled since a detection, after which a new visit
-                               ///< begins
+  double visit_m = 100.0;      ///< distance travelled after which a new visit begins
   double fresh_m = 30.0;       ///< an object must have been detected within this distance
   double view_m = 60.0;        ///< range of the anchors whose objects are searched
   double search_each_m = 0.5;  ///< distance travelled between two searches
@@ -45,8 +43,7 @@ struct LoopParameters {
   /// Log-likelihood ratio at which one search suffices, around the place where the odometry lost
   /// its frame of reference.
   double at_once_nats = 25.0;
-  double nats = 8.0;       ///< least score above the second best pose, in nats, in addition to that
-                           ///< of the prior
+  double nats = 8.0;       ///< least score above the second best pose, beyond the prior's
   double near_m = 1.6;     ///< deviation of the body's position below which near_nats applies
   double near_nats = 2.5;  ///< replaces nats; covers only the assignment of objects
   double far_m = 2.5;      ///< above this deviation four objects are required

@@ -16,10 +16,9 @@ class TrackedTies {
   explicit TrackedTies(const Parameters& parameters) : parameters_(parameters) {}
 
   struct Tie {
-    LevelGaussian T_Mb;  ///< from detections alone
-    AnchorId home = 0;   ///< anchor of the earlier visit
-    std::vector<ObjectId> objects;  ///< observed on both visits as the same track; they need no
-                                    ///< loop
+    LevelGaussian T_Mb;             ///< from detections alone
+    AnchorId home = 0;              ///< anchor of the earlier visit
+    std::vector<ObjectId> objects;  ///< observed on both visits as the same track
   };
   /// Nothing if the objects add no information to the graph. Each object is used once per visit.
   std::optional<Tie> find(const Whereabouts& body) const;

@@ -24,14 +24,12 @@ using Message = std::variant<ImuSample, SpeedSample, Frame>;
 
 struct DatasetOptions {
   std::filesystem::path path = {};
-  std::string sequence = {};  ///< for KITTI tracking, and for a 7-Scenes folder with several
-                              ///< sequences
+  std::string sequence = {};  ///< for KITTI tracking, and 7-Scenes folders with several
   /// Width and height, for KITTI tracking without images.
   std::optional<std::pair<std::uint32_t, std::uint32_t>> image_size = {};
-  std::optional<std::size_t> frame_count = {};  ///< number of frames, for KITTI tracking without
-                                                ///< images and labels
-  InstanceId source = 1;                        ///< of the messages
-  std::optional<ImageEncoding> encoding = {};   ///< of cam0; default: that of the files
+  std::optional<std::size_t> frame_count = {};        ///< for KITTI tracking without files
+  InstanceId source = 1;                              ///< of the messages
+  std::optional<ImageEncoding> encoding = {};         ///< of cam0; default: that of the files
   std::optional<ImageEncoding> second_encoding = {};  ///< of cam1
   std::filesystem::path rig = {};  ///< rig file that replaces the drive's own calibration
   std::size_t every = 1;           ///< use only each N-th frame of cam0, with its partner
@@ -70,7 +68,7 @@ struct Recording {
   std::optional<PoseFile> truth;
   ReasonCounts reasons;  ///< counts of data left out while reading
   std::vector<std::string> notes =
-      {};  ///< for users: repaired or unknown items, a sentence each
+      {};  ///< for users: data that were repaired or are not known, a sentence each
 };
 
 class Dataset {

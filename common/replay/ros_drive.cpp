@@ -97,8 +97,7 @@ struct RosCamera {
   std::vector<RosImage> images = {};
   std::optional<ros::CameraInfo> info = {};
   std::string frame_id = {};
-  int bits = 8;  ///< used bits of 16, from the brightest image, because a drive may begin in the
-                 ///< dark
+  int bits = 8;  ///< used bits of 16, from the brightest image
 };
 
 class RosDriveReader {

@@ -11,8 +11,7 @@
 namespace perdure::ros::autoware {
 namespace {
 
-constexpr double kUnknownVariance = 1e6;  ///< large variance that ROS filters treat as no
-                                          ///< measurement
+constexpr double kUnknownVariance = 1e6;  ///< ROS filters ignore such values
 using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
 using Kinematics = TrackedObjectKinematics;
 using Label = ObjectClassification;

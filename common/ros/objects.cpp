@@ -14,8 +14,7 @@ namespace perdure::ros {
 namespace {
 
 using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
-constexpr double kUnknownVariance = 1e6;  ///< large variance that ROS filters treat as no
-                                          ///< measurement
+constexpr double kUnknownVariance = 1e6;  ///< ROS filters ignore such values
 constexpr double kLeastScore = 0.01;
 
 std::array<double, 36> numbersOf(const Matrix6& matrix) {

@@ -17,8 +17,7 @@ enum class ExistenceEvidence : std::uint8_t {
   kHit,        ///< observations in which it was detected
   kRepeated,   ///< repeated detections from the same viewpoint, which carry little information
   kMiss,       ///< observations without a detection, computed as if nothing occluded the object
-  kUnmappedOccluder,  ///< the part of kMiss that is revoked, because an unmapped occluder may hide
-                      ///< the object
+  kUnmappedOccluder,  ///< part of kMiss that is revoked: an unmapped occluder may hide the object
   kHidden,            ///< unused observations: a mapped object occluded it (0 nats)
   kAway,              ///< unused observations: it was outside the image (0 nats)
   kTime,              ///< survival: objects may leave
@@ -27,8 +26,7 @@ enum class ExistenceEvidence : std::uint8_t {
   kShared,            ///< its first box may belong to another object
   kMerge,             ///< evidence of another track that was merged into this one
   kRestore,           ///< evidence from before this ledger, restored at the restart of a service
-  kRecall,            ///< evidence from before this ledger, restored when the map recalled the
-                      ///< object
+  kRecall,            ///< evidence from before this ledger, restored when the object was recalled
 };
 inline constexpr std::size_t kExistenceEvidences = 14;
 
@@ -81,8 +79,7 @@ struct OustedClass {
 struct Ledger {
   std::vector<LedgerEntry> existence;  ///< by kind; they sum to log r / (1 - r)
   std::vector<ClassLedger> classes;
-  std::vector<OustedClass> ousted;  ///< at most one: the class pruned most recently while it was
-                                    ///< the strongest
+  std::vector<OustedClass> ousted;  ///< at most one: the last class pruned as the strongest
 
   bool empty() const { return existence.empty(); }
   double logOdds() const;  ///< sum of the existence entries

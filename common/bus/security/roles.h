@@ -21,8 +21,7 @@ enum class Role : std::uint32_t {
   kSubscriber = 1u << 8,   ///< third-party programs: read results, query the map
   kGateway = 1u << 9,      ///< displays the bus: reads everything, writes queries
   kRos2 = 1u << 10,        ///< the outward bridge to ROS 2: reads everything
-  kRos2Driver = 1u << 11,  ///< the bridge with inputs: also writes the topics of these inputs; on
-                           ///< demand only
+  kRos2Driver = 1u << 11,  ///< the bridge with inputs: also writes their topics; on demand only
 };
 
 /// A set of roles.

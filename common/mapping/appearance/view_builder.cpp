@@ -8,8 +8,7 @@ namespace perdure::mapping {
 namespace {
 
 constexpr double kKept_m = 40.0;         // of distance travelled
-constexpr double kRelative = 0.1;        // of the distance; points with a larger error carry little
-                                         // information
+constexpr double kRelative = 0.1;        // of the distance; least accuracy of a point
 constexpr double kFarthest_m = 60;       // from the body
 constexpr std::size_t kMostKept = 2000;  // also at rest, when the distance travelled does not grow
 

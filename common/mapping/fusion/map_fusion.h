@@ -17,8 +17,7 @@ namespace perdure::mapping {
 /// The result of adding one map.
 struct FusionReport {
   std::vector<WorldId> added, grown;  ///< sessions, by their worlds in the fused map
-  std::vector<WorldId> parted;        ///< continued differently in two maps; only one continuation
-                                      ///< is used
+  std::vector<WorldId> parted;        ///< continued differently in two maps; one of them is used
   std::size_t known = 0;              ///< sessions with nothing new
   std::size_t objects = 0;            ///< objects added, without history
   std::size_t renewed = 0;            ///< known objects with later observations

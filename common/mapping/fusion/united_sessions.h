@@ -50,8 +50,7 @@ class UnitedSessions {
   std::set<WorldId> worlds_;         ///< worlds of the map
   std::set<std::uint64_t> numbers_;  ///< numbers of these worlds
   std::map<WorldId, const Session*> known_;
-  std::map<WorldId, WorldId> world_of_;  ///< from the other map to this one, as are the next
-                                         ///< members
+  std::map<WorldId, WorldId> world_of_;  ///< from the other map to this one; also the next two
   std::map<std::uint64_t, std::uint64_t> number_of_;
   std::map<WorldId, std::vector<AnchorId>> new_anchors_;
   std::map<WorldId, AnchorId> first_new_;  ///< by world in this map

@@ -16,15 +16,13 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kGate = 3.0;      // standard deviations of a pair's distance
-constexpr double kStreet_m = 6.0;  // standard deviation of the chance density around the map's
-                                   // objects
+constexpr double kStreet_m = 6.0;  // spread of the chance density around map objects
 constexpr double kReach_m = MapIndex::kReach_m;
 // m⁻²; chance density far from the map's objects: one in a disc of 100 m radius
 constexpr double kFloor = 1.0 / (kPi * 100.0 * 100.0);
 constexpr double kCell_m = 2.0, kCell_rad = 4.0 * kPi / 180.0;
 constexpr std::size_t kMostSeen = 48, kMostVotes = 250'000, kCandidates = 128;
-constexpr std::size_t kMostCells = 4096;  // cells from which the candidates are chosen, one per
-                                          // place
+constexpr std::size_t kMostCells = 4096;  // candidates are chosen from these, one per place
 // beyond these limits two poses are different
 constexpr double kOther_m = 1.5, kOther_rad = 8.0 * kPi / 180.0;
 constexpr double kSure = 0.9;

@@ -19,8 +19,7 @@ namespace perdure::mapping {
 /// A candidate pose of the body on the map.
 struct PlaceMatch {
   LevelGaussian T_MB;  ///< without the prior's information
-  double score = 0.0;  ///< nats: log-likelihood ratio against chance, plus the log of the prior's
-                       ///< density relative to its peak
+  double score = 0.0;  ///< log-likelihood ratio against chance plus log of the prior, nats
   double next = 0.0;   ///< score of the second best pose, or of no observed object being on the map
   double cells = 1.0;  ///< number of distinguishable poses inside the prior
   /// Ids of map objects and of the observed objects certainly identical to them.

@@ -19,8 +19,7 @@ class Entries {
       std::string name(fields[0]);
       if (name.ends_with(':')) name.pop_back();
       const auto numbers = parseNumbers({fields.begin() + 1, fields.end()});
-      if (numbers) entries_[name] = *numbers;  // skips entries without numbers, for example the
-                                               // calibration time
+      if (numbers) entries_[name] = *numbers;  // others: calibration time etc.
     }
   }
 

@@ -12,8 +12,7 @@ namespace perdure::replay {
 struct PoseColumns {
   std::array<std::size_t, 8> of{};  ///< t x y z qx qy qz qw
   std::size_t count = 0;            ///< of all columns
-  bool nanoseconds = false;         ///< times in nanoseconds, as in EuRoC's files and `rostopic
-                                    ///< echo -p`
+  bool nanoseconds = false;         ///< unit of the times, as in EuRoC and `rostopic echo -p`
 };
 
 /// Finds the columns if each of the eight quantities has exactly one name (x, tx, p_RS_R_x [m],

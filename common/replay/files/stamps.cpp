@@ -41,8 +41,7 @@ std::optional<Decimal> decimalOf(std::string_view text) {
 
 /// Indices of a longest subsequence of stamps that do not decrease.
 std::vector<std::size_t> longestInOrder(const std::vector<TimePoint>& stamps) {
-  std::vector<std::size_t> ends, before(stamps.size());  // ends[k]: last index of the best sequence
-                                                         // of k + 1
+  std::vector<std::size_t> ends, before(stamps.size());  // ends[k]: end of the best k + 1
   for (std::size_t i = 0; i < stamps.size(); ++i) {
     const auto at =
         std::upper_bound(ends.begin(), ends.end(), stamps[i],

@@ -58,8 +58,7 @@ struct Message {
 
 struct ChunkIndex {
   std::uint64_t start_ns = 0, end_ns = 0;  ///< log times of the first and the last message
-  std::uint64_t offset = 0, length = 0;    ///< of the chunk's record in the file, including its
-                                           ///< header
+  std::uint64_t offset = 0, length = 0;    ///< of the chunk's record, including its header
   std::map<std::uint16_t, std::uint64_t> index_offsets = {};  ///< of MessageIndex, by channel
   std::uint64_t index_length = 0;
   std::string compression = {};

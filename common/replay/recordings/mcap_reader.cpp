@@ -406,8 +406,7 @@ Result<void> Reader::finish() {
   const bool lacks_index =
       !chunks.empty() && chunks.back().index_offsets.size() != last_index_.size();
   std::optional<ChunkIndex> last;
-  std::uint64_t end = whole_ <= kMagic.size() ? 0 : whole_;  // 0: written from the start, with its
-                                                             // header
+  std::uint64_t end = whole_ <= kMagic.size() ? 0 : whole_;  // 0: from the start
   if (lacks_index) {
     last = chunks.back();
     last->index_length = 0;

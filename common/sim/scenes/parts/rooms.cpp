@@ -123,8 +123,7 @@ bool Room::putAtWall(const Eigen::Vector2d& at_wall, double inwards, double& tak
 void Room::furnishWalls() {
   Dice& dice = builder_.dice();
   for (int wall = 0; wall < 4; ++wall) {
-    const double inwards = wrapAngle(wall * M_PI_2 + M_PI);  // direction from the walls at +x, +y,
-                                                             // −x, −y
+    const double inwards = wrapAngle(wall * M_PI_2 + M_PI);  // for walls at +x, +y, −x, −y
     const double run = wall % 2 == 0 ? width_ : length_;
     const double away = 0.5 * (wall % 2 == 0 ? length_ : width_);
     for (double along = 1.1; along < run - 1.1;) {

@@ -9,8 +9,7 @@
 namespace perdure::sim {
 namespace {
 
-constexpr double kSmallestPx = 11.0, kLargestPx = 330.0;  ///< of the longer side, in an image 320
-                                                          ///< pixels wide
+constexpr double kSmallestPx = 11.0, kLargestPx = 330.0;  ///< longer side; width 320
 constexpr double kFocalAt320 = 190.7;
 
 /// Approximate extent of the outline, seen from any side.
