@@ -7,7 +7,7 @@
 namespace perdure::idl {
 
 struct File {
-  std::string_view path;  ///< as #include names it: "idl/base.idl"
+  std::string_view path;  ///< path in #include: "idl/base.idl"
   std::string_view text;
 };
 /// All files. A file follows the files that it includes.

@@ -57,7 +57,7 @@ class Subprocess {
 };
 
 struct ProgramAnswer {
-  int status = 0;      ///< as in Subprocess::ended
+  int status = 0;      ///< exit status, like Subprocess::ended
   std::string output;  ///< both streams, in the order in which they were written
   bool too_late = false;
 };

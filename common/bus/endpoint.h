@@ -20,7 +20,7 @@ namespace perdure::bus {
 
 struct WriterOptions {
   std::int32_t strength = 0;  ///< for exclusive topics; the highest live strength is received
-  double lease_s = 0.0;       ///< of the liveliness; 0: as in the topic table
+  double lease_s = 0.0;       ///< lease of the liveliness; 0: as in the topic table
 };
 
 /// Common base of readers and writers: a DDS entity, a name for its counts, and refusals.

@@ -10,7 +10,7 @@ constexpr double kCameraHz = 10.0;
 constexpr double kImuHz = 100.0;
 constexpr std::string_view kFramePrefix = "frame/";
 constexpr Roles kWatchers = Role::kRecord | Role::kOperator | Role::kGateway | Role::kRos2 |
-                            Role::kRos2Driver;  // they read all topics
+                            Role::kRos2Driver;  // roles that read all topics
 
 template <class T>
 TopicInfo row(const Topic<T>& topic, Qos qos, double rate_hz, bool recorded, Roles writers,

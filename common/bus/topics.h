@@ -17,7 +17,7 @@ struct Qos {
   bool latched = false;        ///< TRANSIENT_LOCAL: late joiners receive the last `depth` samples
   bool kept = false;           ///< writers store the newest sample for ReadFrom::kKept
   bool exclusive = false;      ///< OWNERSHIP EXCLUSIVE and LIVELINESS MANUAL_BY_TOPIC
-  double lease_s = 0.0;        ///< of the liveliness; 0: infinite
+  double lease_s = 0.0;        ///< lease of the liveliness; 0: infinite
   bool shared_memory = false;  ///< used if enabled; only for topics without key and latching
 };
 

@@ -27,7 +27,7 @@ std::optional<Eigen::Vector2d> project(const WideLens& lens, const Eigen::Vector
                                        Eigen::Matrix<double, 2, 3>* J = nullptr);
 
 struct EquidistantFit {
-  double rms_px = 0, max_px = 0;  ///< over the image, up to `angle` from the axis
+  double rms_px = 0, max_px = 0;  ///< errors over the image, up to `angle` from the axis
   double angle = 0;               ///< radians
 };
 

@@ -17,7 +17,7 @@ struct AnchorParameters {
 /// Search for the body among the objects of the map.
 struct PlaceParameters {
   double pair_least_m = 4.0, pair_most_m = 40.0;  ///< between the objects of a proposing pair
-  double gate_sigmas = 4.0;                       ///< of the prior
+  double gate_sigmas = 4.0;                       ///< gate, in standard deviations of the prior
   double known_share = 0.5;      ///< probability that an object near the trajectory is on the map
   double known_within_m = 20.0;  ///< distance from the trajectory that lowers it to .6
 };
@@ -61,7 +61,7 @@ struct LoopParameters {
 };
 
 struct DriftScaleParameters {
-  double prior_sigma = 1.0;  ///< of the logarithm of the scale, before any loop
+  double prior_sigma = 1.0;  ///< σ of the logarithm of the scale, before any loop
   double quantile = 0.8;
 };
 

@@ -16,7 +16,7 @@ class TrackedTies {
   explicit TrackedTies(const Parameters& parameters) : parameters_(parameters) {}
 
   struct Tie {
-    LevelGaussian T_Mb;             ///< from detections alone
+    LevelGaussian T_Mb;             ///< estimate from detections alone
     AnchorId home = 0;              ///< anchor of the earlier visit
     std::vector<ObjectId> objects;  ///< observed on both visits as the same track
   };

@@ -13,7 +13,7 @@ namespace perdure::mapping {
 namespace {
 
 constexpr std::size_t kLeastPoints = 8;
-constexpr double kElsewhere_m = 3.0, kElsewhere_rad = 0.15;  // from one place to a different one
+constexpr double kElsewhere_m = 3.0, kElsewhere_rad = 0.15;  // least separation of two places
 
 /// One candidate pose, from matching the present view with that of an anchor.
 struct Way {

@@ -28,9 +28,10 @@ struct DatasetOptions {
   /// Width and height, for KITTI tracking without images.
   std::optional<std::pair<std::uint32_t, std::uint32_t>> image_size = {};
   std::optional<std::size_t> frame_count = {};        ///< for KITTI tracking without files
-  InstanceId source = 1;                              ///< of the messages
-  std::optional<ImageEncoding> encoding = {};         ///< of cam0; default: that of the files
-  std::optional<ImageEncoding> second_encoding = {};  ///< of cam1
+  InstanceId source = 1;                              ///< source id of the messages
+  std::optional<ImageEncoding> encoding = {};         ///< encoding of cam0; default: as in the
+                                                      ///< files
+  std::optional<ImageEncoding> second_encoding = {};  ///< encoding of cam1
   std::filesystem::path rig = {};  ///< rig file that replaces the drive's own calibration
   std::size_t every = 1;           ///< use only each N-th frame of cam0, with its partner
   bool decode = true;              ///< false: frames have stamp and size, but no pixels
@@ -59,9 +60,9 @@ struct Recording {
   DatasetKind kind = DatasetKind::kEuroc;
   Calibration calibration;
   std::size_t frame_count = 0;
-  std::vector<FrameFile> frames;         ///< by time, cameras in order
+  std::vector<FrameFile> frames;         ///< sorted by time, cameras in order
   std::vector<TimePoint> unpaired = {};  ///< frames of cam1 without a frame of cam0 nearby
-  std::vector<ImuSample> imu;            ///< by time
+  std::vector<ImuSample> imu;            ///< sorted by time
   std::vector<SpeedSample> speed;
   /// True poses of the body, in a world whose z points up. For KITTI drives they come from OXTS:
   /// east, north and up.

@@ -20,7 +20,7 @@ using FileList = std::vector<const Recording::FrameFile*>;
 /// Classification of a camera's images without reading them.
 struct Listed {
   std::size_t all = 0, missing = 0;
-  FileList empty, whole;  ///< by time; images of a recording count as whole
+  FileList empty, whole;  ///< sorted by time; images of a recording count as whole
 };
 
 Listed listedOf(const Recording& recording, std::size_t camera) {

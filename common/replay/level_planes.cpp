@@ -14,7 +14,7 @@ constexpr int kSpacing_px = 16;  // between patches
 constexpr int kHalf_px = 12;     // half size of a patch, which is 12 cm wide at 3 m
 constexpr int kStep_px = 3;      // between the points of a patch
 constexpr int kMost_mm = 10000;
-constexpr double kNoise = 1.5e-3;  // of inverse depth (structured light), 1/m: 1.3 cm at 3 m
+constexpr double kNoise = 1.5e-3;  // noise of inverse depth, 1/m: 1.3 cm at 3 m
 constexpr double kAbout_deg = 50.0, kMode_deg = 8.0, kAgree_deg = 5.0, kOther_deg = 20.0;
 constexpr std::size_t kFewest = 100, kCandidates = 1000;
 

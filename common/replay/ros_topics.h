@@ -13,7 +13,7 @@ namespace perdure::replay {
 struct CameraTopics {
   std::string image, info;  ///< info: sensor_msgs/CameraInfo; empty if there is none
   bool compressed = false;  ///< sensor_msgs/CompressedImage
-  bool rectified = false;   ///< from its name, "image_rect…"
+  bool rectified = false;   ///< True for names with "image_rect…"
 };
 struct ChosenTopics {
   std::vector<CameraTopics> cameras;  ///< cam0, and cam1 of a pair

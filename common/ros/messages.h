@@ -100,7 +100,7 @@ struct TransformStamped {
   static constexpr char kType[] = "geometry_msgs/TransformStamped";
   Header header;
   std::string child_frame_id;
-  Transform transform;  ///< from the child's frame into the header's frame
+  Transform transform;  ///< transform from the child's frame into the header's frame
   static void fields(auto& m, auto& a) {
     a("header", m.header), a("child_frame_id", m.child_frame_id), a("transform", m.transform);
   }

@@ -47,7 +47,7 @@ class FrameTree {
   };
   std::map<std::string, RigidTransform> toRoots(std::string frame) const;
 
-  std::map<std::string, Edge> parents_;  ///< by child
+  std::map<std::string, Edge> parents_;  ///< key: child frame
   std::map<std::string, std::string> refused_;
 };
 

@@ -6,7 +6,7 @@
 
 namespace perdure::service {
 
-double processorSeconds();      ///< of all threads since the start
+double processorSeconds();      ///< CPU time of all threads since the start
 std::uint64_t residentBytes();  ///< memory in use
 
 /// Detects steps of the wall clock: changes relative to the time since boot that are larger than

@@ -81,7 +81,7 @@ struct SimulatedDetector::Sight {
   double visible = 0.0;  ///< visible fraction of `inside`
   Eigen::Vector3d centre_W = Eigen::Vector3d::Zero();
   double distance = 0.0, alpha = 0.0;
-  double bearing = 0.0;  ///< of the camera, as seen from the object
+  double bearing = 0.0;  ///< direction of the camera, as seen from the object
 };
 
 /// Standard normal numbers for one observation. One part is drawn for each frame. The other part is
@@ -179,7 +179,7 @@ Detections SimulatedDetector::detect(std::uint64_t frame, const FrameStamp& stam
   found.model_hash = info_.hash;
   const std::vector<Sight> all = sights(frame, stamp.time, T_WB * T_BC_);
   for (const Sight& sight : all) {
-    if (sight.looks_like == model_.classes.size()) continue;  // of no class of the detector
+    if (sight.looks_like == model_.classes.size()) continue;  // not a class of the detector
     if (auto detection = look(sight, all, frame)) found.detections.push_back(std::move(*detection));
   }
   Dice dice(seedOf("false alarms", {model_.seed, frame}));

@@ -41,12 +41,12 @@ struct DetectorModel {
 
   double box_share = 0.03;        ///< σ of a side as a share of the box's width or height
   double box_floor_px = 0.8;      ///< additional σ of a side in pixels, added in quadrature
-  double side_correlation = 0.3;  ///< of the errors of opposite sides
+  double side_correlation = 0.3;  ///< correlation of the errors of opposite sides
   double shrink_below = 0.6;      ///< below this fraction boxes enclose the visible part only
 
   double false_per_frame = 0.5, false_smallest_px = 8.0;  ///< sizes are log-uniform up to the image
 
-  double separation = 4.0;        ///< of a class's mean from clutter's, in σ, for the best view
+  double separation = 4.0;        ///< distance of a class's mean from clutter's, in σ, at best
   double least_separation = 0.5;  ///< the share of it for the smallest and most occluded objects
   std::vector<ConfusionPair> confusion{{"car", "van", 0.08}, {"chair", "couch", 0.05}};
 
@@ -54,7 +54,7 @@ struct DetectorModel {
   double azimuth_sigma = 0.2, flip_share = 0.08;  ///< radians; share of azimuths turned by 180°
 
   double persistent_share = 0.5;  ///< share of the error variances that is fixed per viewpoint
-  double latency_s = 0.0;         ///< from the frame to its detections; for the publisher
+  double latency_s = 0.0;         ///< delay of the detections; used by the publisher
 };
 
 /// One row of unit length per class: the direction of its mean from that of clutter in the space of

@@ -62,10 +62,10 @@ Drive cruise(double from, double speed, double from_s, double until_s);
 
 /// The response of a vehicle's body to acceleration and to the road.
 struct Suspension {
-  double height = 1.5;  ///< of the body's origin above the ground
+  double height = 1.5;  ///< height of the body's origin above the ground
   double roll_per_accel = 0.009, pitch_per_accel = 0.006;  ///< rad per m/s²
   double bounce_m = 0.004, sway_rad = 0.0025;              ///< amplitudes on a rough road
-  std::uint64_t seed = 0;                                  ///< of the road's roughness
+  std::uint64_t seed = 0;                                  ///< seed of the road's roughness
   double lap_m = 0.0;  ///< period after which the road repeats; 0: never
 };
 Trajectory vehicleMotion(const GroundPath& path, const Drive& drive, const Suspension& suspension);

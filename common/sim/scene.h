@@ -22,7 +22,7 @@ struct SceneObject {
   /// The class that a detector assigns. It equals the class itself, except for the toy (car).
   std::string looks_like;
   std::string
-      shape;  ///< of the class (catalogue.h): hatchback, sedan, …; empty: from the look's seed
+      shape;  ///< shape of the class (catalogue.h): hatchback, sedan, …; empty: by the look's seed
   std::uint64_t look_seed = 0;  ///< colours, textures, details
   Eigen::Vector3d size =
       Eigen::Vector3d::Ones();  ///< length (x of O), width (y), height (z); metres

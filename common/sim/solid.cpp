@@ -8,7 +8,7 @@
 namespace perdure::sim {
 namespace {
 
-constexpr double kCrownFrom = 0.38;  ///< as a share of a tree's height
+constexpr double kCrownFrom = 0.38;  ///< share of a tree's height
 constexpr double kTrunkHalf = 0.2;   ///< metres
 
 Eigen::Vector2d along(double yaw) { return {std::cos(yaw), std::sin(yaw)}; }

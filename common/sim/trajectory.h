@@ -14,7 +14,7 @@ namespace perdure::sim {
 /// State of body B in the world W (z up) at one time. SI units.
 struct MotionState {
   RigidTransform T_WB;
-  Eigen::Vector3d velocity_W = Eigen::Vector3d::Zero();              ///< of B's origin, m/s
+  Eigen::Vector3d velocity_W = Eigen::Vector3d::Zero();              ///< B's origin, m/s
   Eigen::Vector3d acceleration_W = Eigen::Vector3d::Zero();          ///< m/s²
   Eigen::Vector3d angular_velocity_B = Eigen::Vector3d::Zero();      ///< w_WB_B, rad/s
   Eigen::Vector3d angular_acceleration_B = Eigen::Vector3d::Zero();  ///< rad/s²

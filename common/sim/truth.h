@@ -51,7 +51,7 @@ struct TruthView {
 
 struct Truth {
   std::vector<TruthObject> objects;
-  std::map<std::uint64_t, std::vector<TruthView>> views;  ///< by frame index
+  std::map<std::uint64_t, std::vector<TruthView>> views;  ///< key: frame index
 };
 
 bool hasTruth(const std::filesystem::path& folder);

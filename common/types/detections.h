@@ -38,13 +38,13 @@ struct Detection {
   /// was reported" against "nothing is here". Such a detection updates this object only; it never
   /// initiates a track.
   bool primed = false;
-  ObjectId primed_for = 0;  ///< id in Predictions; 0 if not primed
+  ObjectId primed_for = 0;  ///< id in Predictions; 0 if primed is false
 };
 
 struct Detections {
   FrameStamp stamp;
   std::string camera;
-  InstanceId instance = 0;       ///< of the inference process
+  InstanceId instance = 0;       ///< id of the inference process
   std::uint64_t model_hash = 0;  ///< refers to ModelInfo
   std::vector<Detection> detections;
   /// Width of the network's input divided by ModelInfo::input_width, if a time budget reduced it.
@@ -64,7 +64,7 @@ enum class BoxExtent : std::uint8_t {
 /// Describes the meaning of the activations. Latched on the topic `model`, keyed by hash.
 struct ModelInfo {
   InstanceId instance = 0;
-  std::uint64_t hash = 0;  ///< of weights and model.json
+  std::uint64_t hash = 0;  ///< hash of weights and model.json
   std::string name;
   std::vector<std::string>
       classes;  ///< lower-case; K names, activations[k + 1] belongs to classes[k]

@@ -18,7 +18,7 @@ struct Health {
   HealthState state = HealthState::kStarting;
   std::string message;  ///< one sentence: the fault and its fix, or the cause of waiting
   std::uint64_t frames_in = 0, frames_out = 0, dropped = 0;
-  double rate_hz = 0.0;  ///< of frames_out, over the last seconds
+  double rate_hz = 0.0;  ///< rate of frames_out, over the last seconds
   double cpu_s = 0.0;    ///< processor time since the start
   std::uint64_t rss_bytes = 0;
   std::map<std::string, std::uint64_t> reasons;  ///< counted reasons, including those of DDS

@@ -33,10 +33,10 @@ inline constexpr std::size_t kExistenceEvidences = 14;
 /// Kinds of evidence that change the class probabilities. The values are positions in
 /// ClassLedger::log_odds; new kinds are appended.
 enum class ClassEvidence : std::uint8_t {
-  kPrior = 0,   ///< how frequent the class is
-  kActivation,  ///< activations of the network
+  kPrior = 0,   ///< frequency of the class
+  kActivation,  ///< agreement of size and place with the boxes
   kGeometry,    ///< whether size and place explain the boxes
-  kMiss,        ///< observations without a detection
+  kMiss,        ///< agreement of the motion with the class
   kMotion,      ///< whether it moves as the class does
   kPruning,     ///< hypotheses that were pruned; the others share their weight
   kMerge,       ///< evidence of another track that was merged into this one
@@ -70,14 +70,14 @@ struct ClassLedger {
 struct OustedClass {
   std::string name, by;
   TimePoint at;
-  std::vector<double> log_odds;  ///< by kind: `by` against `name`
+  std::vector<double> log_odds;  ///< log-odds by kind: `by` against `name`
 
   bool operator==(const OustedClass&) const = default;
 };
 
 /// Empty if the writer does not record a ledger.
 struct Ledger {
-  std::vector<LedgerEntry> existence;  ///< by kind; they sum to log r / (1 - r)
+  std::vector<LedgerEntry> existence;  ///< entries by kind; they sum to log r / (1 - r)
   std::vector<ClassLedger> classes;
   std::vector<OustedClass> ousted;  ///< at most one: the last class pruned as the strongest
 

@@ -24,14 +24,14 @@ enum class OdometryState : std::uint8_t {
 
 struct Odometry {
   FrameStamp stamp;
-  InstanceId instance = 0;  ///< of the process that made it
+  InstanceId instance = 0;  ///< the process that made it
   WorldId world;
   OdometryState state = OdometryState::kInitialising;
   RigidTransform T_WB;
   Eigen::Vector3d v_WB = Eigen::Vector3d::Zero();  ///< m/s, in W
   /// Covariance of [θ, p, v]: θ on the right (body), p and v additive in W.
   Matrix9d covariance = Matrix9d::Zero();
-  Eigen::Vector3d up_W = Eigen::Vector3d::UnitZ();  ///< against gravity, unit, in W
+  Eigen::Vector3d up_W = Eigen::Vector3d::UnitZ();  ///< unit vector against gravity, in W
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = Eigen::Vector3d::Zero();
   /// Pose error now = transition · pose error at the frame `increment_from` + noise with
   /// increment_covariance, [θ, p]. has_increment is false if only poses are known.

@@ -25,7 +25,7 @@ Result<cv::Mat> decodeDepthFile(const std::string& path);
 /// For a 16-bit image: the smallest of 8, 10, 12, 14, 16 that holds its brightest value. 16 for
 /// other images and for invalid files.
 int usedBits(const std::string& path);
-/// As usedBits(), for the bytes of such a file.
+/// Like usedBits(), for the bytes of such a file.
 int usedBitsIn(std::string_view bytes);
 
 }  // namespace perdure::vision

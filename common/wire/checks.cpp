@@ -83,7 +83,7 @@ bool isText(std::string_view text) {
 }
 
 bool isSemiDefinite(const Eigen::Ref<const Eigen::MatrixXd>& P) {
-  constexpr double kRounding = 1e-6;  // on correlations
+  constexpr double kRounding = 1e-6;  // rounding errors of correlations
   if (P.rows() != P.cols() || !P.allFinite() || !isSymmetric(P)) return false;
   Eigen::MatrixXd C = correlations(P);
   if (C.size() == 0) return false;

@@ -15,7 +15,7 @@ struct ddsi_sertype;
 namespace perdure::bus {
 
 struct ForeignTopic {
-  std::string name;        ///< on the wire: "rt/camera/image_raw"
+  std::string name;        ///< name on the wire: "rt/camera/image_raw"
   std::string type;        ///< "sensor_msgs::msg::dds_::Image_"
   bool reliable = true;    ///< a best-effort reader matches any writer
   bool latched = false;    ///< TRANSIENT_LOCAL

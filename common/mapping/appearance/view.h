@@ -14,7 +14,7 @@ using Descriptor = std::array<std::uint8_t, 32>;
 
 struct SeenPoint {
   Eigen::Vector3f p = Eigen::Vector3f::Zero();  ///< in the anchor's axes, m
-  float sigma = 0.0F;                           ///< of p given the body's pose, m
+  float sigma = 0.0F;                           ///< σ of p given the body's pose, m
   Descriptor descriptor{};
   bool operator==(const SeenPoint&) const = default;
 };

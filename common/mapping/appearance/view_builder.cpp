@@ -7,10 +7,10 @@
 namespace perdure::mapping {
 namespace {
 
-constexpr double kKept_m = 40.0;         // of distance travelled
-constexpr double kRelative = 0.1;        // of the distance; least accuracy of a point
-constexpr double kFarthest_m = 60;       // from the body
-constexpr std::size_t kMostKept = 2000;  // also at rest, when the distance travelled does not grow
+constexpr double kKept_m = 40.0;         // distance travelled for which points are stored
+constexpr double kRelative = 0.1;        // largest error of a point relative to its distance
+constexpr double kFarthest_m = 60;       // largest distance from the body
+constexpr std::size_t kMostKept = 2000;  // limit for a body at rest
 
 }  // namespace
 

@@ -30,7 +30,7 @@ class ViewBuilder {
     double way_m = 0.0;     ///< distance travelled at the last observation
     Descriptor descriptor{};
   };
-  std::map<std::uint64_t, Seen> seen_;  ///< by the landmark's id
+  std::map<std::uint64_t, Seen> seen_;  ///< key: the landmark's id
 };
 
 }  // namespace perdure::mapping

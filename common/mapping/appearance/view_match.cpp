@@ -14,7 +14,7 @@ namespace perdure::mapping {
 namespace {
 
 constexpr int kAlike = 64;                 // bits: a quarter
-constexpr double kUnlikeNext = 0.8;        // of the distance to the second best
+constexpr double kUnlikeNext = 0.8;        // ratio to the distance of the second best
 constexpr std::size_t kLeastAgreeing = 4;  // number of agreeing points
 constexpr double kDeviations = 3.0;        // gate, in standard deviations
 constexpr double kPointError_m = 0.15;     // error that the covariance of a point does not include

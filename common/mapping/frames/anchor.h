@@ -13,7 +13,7 @@ using AnchorId = std::uint64_t;  ///< 0: none; ids increase with time within a s
 
 struct Anchor {
   AnchorId id = 0;
-  AnchorId previous = 0;  ///< of the same session; 0: the first one
+  AnchorId previous = 0;  ///< previous anchor of the same session; 0: the first one
   WorldId session;        ///< the odometry's frame of reference W
   FrameStamp stamp;
   RigidTransform T_WA;          ///< z against gravity; constant

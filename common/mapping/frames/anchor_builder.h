@@ -43,7 +43,7 @@ class AnchorBuilder {
   std::optional<Anchor> last_;
   std::optional<LevelGaussian> since_;
   std::optional<Odometry> before_;
-  RelativeError error_;                                  ///< of the body since the last anchor
+  RelativeError error_;                                  ///< error since the last anchor
   Eigen::Vector3d counted_W_ = Eigen::Vector3d::Zero();  ///< last position that was counted
   double way_m_ = 0.0;
 };

@@ -23,7 +23,7 @@ struct Ending {
 };
 
 struct StoredObject {
-  WorldId world;  ///< of the belief
+  WorldId world;  ///< frame of reference of the belief
   ObjectBelief belief;
   std::optional<Ending> ended;
 };
@@ -33,9 +33,9 @@ struct StoredObject {
 struct Origin {
   SessionIdentity map;  ///< its first session
   ObjectId id = 0;      ///< in that map
-  ObjectId now = 0;     ///< in this map; it may be history since
+  ObjectId now = 0;     ///< id in this map; the object may be history since
   TimePoint first_seen;
-  TimePoint last_seen;  ///< of the belief that was copied
+  TimePoint last_seen;  ///< last sighting in the belief that was copied
   bool operator==(const Origin&) const = default;
 };
 
@@ -47,7 +47,7 @@ struct Change {
   std::string class_name;
   WorldId map;                                    ///< M of the place
   Eigen::Vector3d p_M = Eigen::Vector3d::Zero();  ///< earlier position
-  TimePoint last_seen;                            ///< at that position
+  TimePoint last_seen;                            ///< last sighting at that position
   TimePoint since;                                ///< time at which it was found gone or elsewhere
   WorldId by;                                     ///< session that detected the change
   bool operator==(const Change&) const = default;

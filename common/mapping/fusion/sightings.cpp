@@ -73,7 +73,7 @@ std::optional<PlacesInM::Place> PlacesInM::of(const StoredObject& object) const 
 
 namespace {
 
-/// Finds objects of other drives that stood where a later drive observed an object leave.
+/// Finds objects of other drives at places where a later drive lost an object of the same class.
 class Departures {
  public:
   explicit Departures(MapContents& map)

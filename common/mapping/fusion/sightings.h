@@ -37,8 +37,8 @@ class PlacesInM {
   std::map<WorldId, std::map<TimePoint, AnchorId>> ways_;
 };
 
-/// Ends objects at places where another drive found an object of their class gone after they were
-/// last seen. They become history. Missing observations alone are not evidence.
+/// Ends an object if another drive later found an object of the same class gone from its place. The
+/// object becomes history. Missing observations alone are not evidence.
 std::vector<Change> endWhatIsGone(MapContents& map);
 
 }  // namespace perdure::mapping

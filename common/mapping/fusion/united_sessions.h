@@ -53,7 +53,7 @@ class UnitedSessions {
   std::map<WorldId, WorldId> world_of_;  ///< from the other map to this one; also the next two
   std::map<std::uint64_t, std::uint64_t> number_of_;
   std::map<WorldId, std::vector<AnchorId>> new_anchors_;
-  std::map<WorldId, AnchorId> first_new_;  ///< by world in this map
+  std::map<WorldId, AnchorId> first_new_;  ///< key: world in this map
   std::map<AnchorId, AnchorId> anchor_of_, frames_, first_of_;
   std::set<AnchorId> new_ids_;
   std::vector<std::uint32_t> class_of_;

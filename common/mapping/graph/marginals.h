@@ -38,7 +38,7 @@ class Marginals {
 
   const PoseGraph* graph_;
   AnchorId from_;
-  std::map<AnchorId, Eigen::Index> rows_;    ///< of anchors that are not fixed
+  std::map<AnchorId, Eigen::Index> rows_;    ///< rows of anchors that are not fixed
   std::map<AnchorId, AnchorId> components_;  ///< the first anchor of each anchor's component
   Factor factor_;
   bool usable_ = false;

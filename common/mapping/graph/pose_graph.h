@@ -34,8 +34,8 @@ struct OptimiseReport {
   double cost = 0.0;  ///< sum of χ²; loops and tracking edges with the robust kernel
   /// Factors of the information of loop and tracking edges, (0, 1].
   std::map<EdgeId, double> weights;
-  std::map<EdgeId, double> chi2;  ///< of these edges, unweighted
-  double largest_move_m = 0.0;    ///< over all anchors
+  std::map<EdgeId, double> chi2;  ///< unweighted χ² of these edges
+  double largest_move_m = 0.0;    ///< maximum over all anchors
 };
 
 class PoseGraph {

@@ -26,7 +26,7 @@ constexpr std::size_t kMostCells = 4096;  // candidates are chosen from these, o
 // beyond these limits two poses are different
 constexpr double kOther_m = 1.5, kOther_rad = 8.0 * kPi / 180.0;
 constexpr double kSure = 0.9;
-constexpr double kDefaultShare = 1e-3;  // of a class that is missing in one of the two PMFs
+constexpr double kDefaultShare = 1e-3;  // share of a class that one of the two PMFs lacks
 
 /// Log-likelihood ratio of a yaw known modulo 180° against an arbitrary yaw.
 double logSameYaw(double difference, double variance) {

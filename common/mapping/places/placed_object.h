@@ -25,7 +25,7 @@ struct PlacedObject {
   ObjectId id = 0;
   Eigen::Vector3d p = Eigen::Vector3d::Zero();               ///< centre, m
   double yaw = 0.0;                                          ///< rad, known modulo 180°
-  Eigen::Matrix4d covariance = Eigen::Matrix4d::Identity();  ///< of [p, yaw], m and rad
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Identity();  ///< [p, yaw], m and rad
   std::vector<ClassShare> pmf;
 };
 /// Variance of its position in the plane, m²: the mean of x and y.

@@ -20,7 +20,7 @@ class ClassAliases {
   std::string canonical(std::string_view name) const;
 
  private:
-  std::map<std::string, std::string> canonical_;  // from lower-case alias
+  std::map<std::string, std::string> canonical_;  // key: lower-case alias
 };
 
 }  // namespace perdure::replay

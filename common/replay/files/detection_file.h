@@ -62,7 +62,7 @@ class DetectionFile {
 
   DetectionFileOptions options_;
   std::vector<std::string> logit_classes_;
-  std::vector<std::pair<std::uint64_t, std::string>> first_seen_;  ///< of classes, in file order
+  std::vector<std::pair<std::uint64_t, std::string>> first_seen_;  ///< classes in file order
   std::map<std::uint64_t, std::vector<Row>> rows_;
   std::optional<std::set<std::uint64_t>> listed_frames_;
 };

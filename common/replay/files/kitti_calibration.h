@@ -16,7 +16,7 @@ struct KittiCalibration {
   ProjectionMatrix P2 = ProjectionMatrix::Zero();  ///< pixels from rectified camera 0, left colour
   ProjectionMatrix P3 = ProjectionMatrix::Zero();  ///< right colour
   RigidTransform T_RI;  ///< IMU (= body) in rectified camera 0, the frame of KITTI's labels
-  std::uint32_t width = 0, height = 0;  ///< of image 2; 0 if the files do not contain it
+  std::uint32_t width = 0, height = 0;  ///< size of image 2; 0 if it is not in the files
 
   /// Calibration of cam0 (P2) or cam1 (P3); T_BC follows from P's fourth column and T_RI.
   CameraCalibration camera(const std::string& name) const;

@@ -11,7 +11,7 @@ namespace perdure::replay {
 
 struct PoseColumns {
   std::array<std::size_t, 8> of{};  ///< t x y z qx qy qz qw
-  std::size_t count = 0;            ///< of all columns
+  std::size_t count = 0;            ///< number of all columns
   bool nanoseconds = false;         ///< unit of the times, as in EuRoC and `rostopic echo -p`
 };
 

@@ -16,7 +16,7 @@ namespace perdure::replay {
 /// The contents of a rig file, which may have cameras only or the IMU only.
 struct RigParts {
   Calibration sensors;
-  std::map<std::string, std::string> topics;  ///< by cam0, cam1, imu; Kalibr's `rostopic`
+  std::map<std::string, std::string> topics;  ///< keys: cam0, cam1, imu; Kalibr's `rostopic`
 };
 /// Throws StartupError with the key and the fix. `notes` receives a sentence for each unknown key.
 RigParts readRigParts(const std::filesystem::path& file, std::vector<std::string>* notes = nullptr);

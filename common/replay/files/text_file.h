@@ -12,7 +12,7 @@
 namespace perdure::replay {
 
 struct TextLine {
-  std::size_t number = 0;  ///< from 1
+  std::size_t number = 0;  ///< line number, counted from 1
   std::string text;        ///< without line end (LF or CR LF) and surrounding blanks
 };
 

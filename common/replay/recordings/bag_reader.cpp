@@ -332,7 +332,7 @@ class Bag : public RosSource {
   std::uint64_t size_ = 0;
   std::map<std::uint32_t, std::pair<std::string, std::string>> connections_;  ///< topic and type
   std::map<std::uint32_t, std::uint64_t> counts_;
-  std::vector<ChunkPlace> chunks_;  ///< by time
+  std::vector<ChunkPlace> chunks_;  ///< sorted by time
   std::set<std::string> wanted_;
   std::uint64_t from_ns_ = 0, order_ = 0;
   std::size_t next_chunk_ = 0;

@@ -52,14 +52,14 @@ struct Channel {
 struct Message {
   std::uint16_t channel = 0;
   std::uint32_t sequence = 0;
-  std::uint64_t log_ns = 0, publish_ns = 0;  ///< of the epoch
+  std::uint64_t log_ns = 0, publish_ns = 0;  ///< times since the epoch
   Bytes data = {};
 };
 
 struct ChunkIndex {
   std::uint64_t start_ns = 0, end_ns = 0;  ///< log times of the first and the last message
-  std::uint64_t offset = 0, length = 0;    ///< of the chunk's record, including its header
-  std::map<std::uint16_t, std::uint64_t> index_offsets = {};  ///< of MessageIndex, by channel
+  std::uint64_t offset = 0, length = 0;    ///< the chunk's record, including its header
+  std::map<std::uint16_t, std::uint64_t> index_offsets = {};  ///< offsets by channel
   std::uint64_t index_length = 0;
   std::string compression = {};
   std::uint64_t packed = 0, unpacked = 0;  ///< size of its records in bytes

@@ -13,7 +13,7 @@ namespace perdure::replay::mcap {
 namespace {
 
 constexpr char kBare[] = "bare";  ///< no chunk: a single message record in the file
-constexpr std::uint64_t kMostContent = 64u << 20;  ///< of a record that is not a chunk
+constexpr std::uint64_t kMostContent = 64u << 20;  ///< limit of records other than chunks
 
 /// The header of a chunk, before its records.
 struct ChunkHead {

@@ -19,8 +19,8 @@ using Records = std::shared_ptr<const std::vector<std::uint8_t>>;
 
 /// A chunk that cannot be read completely.
 struct Damage {
-  std::uint64_t offset = 0;  ///< of its record in the file
-  Reason reason;             ///< as from Reader::unpack, without the file
+  std::uint64_t offset = 0;  ///< offset of its record in the file
+  Reason reason;             ///< reason of Reader::unpack, without the file
 };
 
 class Reader {

@@ -105,8 +105,8 @@ void RecordedMessages::openFile(const fs::path& path, Chunks look) {
   files_.push_back(*std::move(reader));
 }
 
-/// The compressed file, if it was unpacked, because users know its name only, and the copy is
-/// temporary.
+/// The compressed file, if `file` is its temporary unpacked copy. Messages for users name the
+/// compressed file.
 fs::path RecordedMessages::givenFor(const fs::path& file) const {
   const auto same = [&](const auto& unpacked) { return unpacked->path() == file; };
   const auto packed = std::find_if(unpacked_.begin(), unpacked_.end(), same);

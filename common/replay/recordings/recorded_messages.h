@@ -21,7 +21,7 @@ struct RecordedMessage {
   std::string topic;                   ///< "odometry": without the prefix perdure/<vehicle>/
   std::string type;                    ///< "perdure::msg::Odometry"
   std::uint64_t log_ns = 0;            ///< time of arrival at the recorder; never decreases
-  mcap::Bytes data;                    ///< common/wire/cdr.h
+  mcap::Bytes data;                    ///< format: common/wire/cdr.h
   std::shared_ptr<const void> keeper;  ///< owner of the memory of `data`
 };
 
@@ -89,7 +89,7 @@ class RecordedMessages {
 
   UnpackedFiles unpacked_;  // must be destroyed after the files
   std::vector<mcap::Reader> files_;
-  std::vector<ChunkPlace> chunks_;  // by time
+  std::vector<ChunkPlace> chunks_;  // sorted by time
   std::map<std::string, TopicCount> topics_;
   std::uint64_t start_ns_ = UINT64_MAX, end_ns_ = 0;
   ReasonCounts reasons_;

@@ -31,7 +31,7 @@ Scene makeKilometre(std::uint64_t seed, const SceneOptions& options) {
   const GroundPath loop = loopOfKilometre();
   SpeedLimits limits;
   limits.top = kTopSpeed;
-  const double from = builder.dice().uniform(30.0, 200.0);  // on the first straight
+  const double from = builder.dice().uniform(30.0, 200.0);  // start on the first straight
   const Drive driven =
       drive(loop, limits, from, std::numeric_limits<double>::infinity(), 1.2, seconds + 2.0);
   putOnWheels(builder, loop, driven, seconds, options);

@@ -79,7 +79,7 @@ Scene makeBlock(SceneBuilder& builder, double seconds, DrivesAs drives, bool sam
   suspension.height = kStreetCameraHeight - kCameraAboveBody;
   suspension.seed = dice.seed();
   if (same_road) suspension.lap_m = loop.length();
-  const double from = dice.uniform(27.0, 33.0);  // on the first straight
+  const double from = dice.uniform(27.0, 33.0);  // start on the first straight
   builder.setBody(
       vehicleMotion(loop, drives(loop, from, std::max(seconds, kStreetSeconds) + 2.0), suspension),
       seconds, 1.15, 2.2);

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kToySeconds = 24.0, kStillSeconds = 20.0, kToyCameraHeight = 1.35;
 constexpr double kScale = 14.0;        ///< the toy is a 4.2 m car, scaled to 0.3 m
-constexpr double kToyDistance = 1.35;  ///< from the start of the camera
+constexpr double kToyDistance = 1.35;  ///< distance from the start of the camera
 constexpr double kToyInterval = 0.05;
 
 /// Position at this distance and bearing from the start of the camera, at the body's place.

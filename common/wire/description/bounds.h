@@ -24,7 +24,7 @@ inline constexpr Limits kLogit{-1e6, 1e6};
 inline constexpr Limits kInputScale{0.0, 1.0};  ///< 0: not known
 inline constexpr Limits kNats{-1e9, 1e9};       ///< sums of evidence
 inline constexpr Limits kNotNegative{0.0, 1e18};
-inline constexpr Limits kInset{-0.45, 0.45};  // of a box, per side
+inline constexpr Limits kInset{-0.45, 0.45};  // inset of a box, per side
 inline constexpr Limits kPositive{1e-12, 1e12};
 inline constexpr Limits kLatitudeDeg{-90.0, 90.0};
 inline constexpr Limits kLongitudeDeg{-360.0, 360.0};

@@ -9,7 +9,7 @@ namespace perdure::sim {
 namespace {
 
 constexpr double kPavementWidth = 3.25, kHouseDepth = 7.0;
-constexpr double kNoParking = 3.5;  ///< from the crossing road's edge
+constexpr double kNoParking = 3.5;  ///< distance from the crossing road's edge
 constexpr double kShareParked = 0.68, kVanShare = 0.16, kReversedShare = 0.12;
 
 }  // namespace

@@ -38,7 +38,7 @@ class Room {
 
 /// The gaze of a walking person: oscillates about the direction of the path.
 struct Gaze {
-  double swing = 1.0, period_s = 13.0;  ///< of the yaw, radians to each side
+  double swing = 1.0, period_s = 13.0;  ///< amplitude of the yaw to each side, radians
   double second_swing = 0.18, second_period_s = 4.7;
   double middle = 0.0;                                ///< relative to the path
   double pitch_down = 0.12, nod = 0.07, tilt = 0.05;  ///< radians

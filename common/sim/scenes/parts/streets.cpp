@@ -9,7 +9,7 @@
 namespace perdure::sim {
 namespace {
 
-constexpr double kCrossingClearance = 3.5;  ///< of parked vehicles from a crossing road's edge
+constexpr double kCrossingClearance = 3.5;  ///< parked vehicles to a crossing road's edge
 
 Solid areaOf(const Road& road) {
   const Eigen::Vector2d way = road.to - road.from;

@@ -22,7 +22,7 @@ struct Furnishing {
 };
 
 inline constexpr double kRoadWidth = 10.0;  ///< two lanes and two rows of parked cars
-inline constexpr double kLane = 1.4;        ///< from the road's centre line to the centre of a lane
+inline constexpr double kLane = 1.4;        ///< road's centre line to the centre of a lane
 
 inline constexpr double kGridX = 82.0, kGridY = 66.0;  ///< between the roads of a grid
 /// Roads in rows (along x) and columns, which extend slightly beyond the outer crossings. The first

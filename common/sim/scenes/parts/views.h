@@ -23,7 +23,7 @@ class ViewFinder {
  public:
   ViewFinder(SceneBuilder& builder, const Area& area, double top_speed);
 
-  /// A view of an object whose class is drawn uniformly from the classes in the scene.
+  /// A view of an object. Its class is drawn uniformly from the classes in the scene.
   View draw();
 
  private:
