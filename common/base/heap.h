@@ -3,9 +3,9 @@
 
 namespace perdure {
 
-/// The process retains up to 64 MB of freed memory. By default glibc returns this memory and
-/// requests it again within each frame, which causes a page fault per 4 kB. Call it in main(). It
-/// has no effect without glibc.
+/// Makes the process retain up to 64 MB of freed memory. By default glibc returns this memory and
+/// requests it again within each frame, which causes a page fault per 4 kB. Call the function in
+/// main(). It has no effect without glibc.
 void keepFreedMemory();
 
 }  // namespace perdure

@@ -88,7 +88,8 @@ class SharedVector {
   using Spare = std::vector<std::unique_ptr<Block>>;
   static constexpr std::size_t kMostSpare = 512;
 
-  /// Null if the thread is ending and its spare blocks are already destroyed.
+  /// The spare blocks of the thread. Returns null if the thread is ending and the blocks are
+  /// already destroyed.
   static Spare* spare() {
     struct Kept {
       Spare blocks;

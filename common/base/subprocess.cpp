@@ -82,7 +82,7 @@ struct Start {
   std::vector<char*> arguments, environment;
   bool own_session, ends_with_parent;
   int output;  ///< -1: the output of this process
-  int report;  ///< receives errno if the program cannot be run
+  int report;  ///< pipe for errno if the program cannot be run
   pid_t parent = getpid();
 };
 

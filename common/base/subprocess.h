@@ -18,8 +18,8 @@ struct ProgramOptions {
   std::map<std::string, std::string> environment{};  ///< added to this process's environment
   std::filesystem::path folder{};  ///< working directory; empty: that of this process
   std::filesystem::path log{};     ///< output is appended to it; empty: this process's output
-  bool own_session = false;        ///< it does not receive Ctrl-C and has no input
-  bool ends_with_parent = false;   ///< it receives SIGTERM if this process ends first
+  bool own_session = false;        ///< the program does not receive Ctrl-C and has no input
+  bool ends_with_parent = false;   ///< the program receives SIGTERM if this process ends first
 };
 
 /// The path of the program: `name` itself if it has a '/', else the first match in PATH.

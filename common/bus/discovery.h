@@ -18,8 +18,8 @@ struct RemoteEndpoint {
   bool writer = false;
 };
 
-/// Whether `process`, which writes `topic`, replaces the service `service`. A bridge or a driver
-/// may replace "capture" (images), "vio" (odometry) or "inference" (detections).
+/// Returns whether `process`, which writes `topic`, replaces the service `service`. A bridge or a
+/// driver may replace "capture" (images), "vio" (odometry) or "inference" (detections).
 bool standsIn(std::string_view service, std::string_view topic, std::string_view process);
 
 struct StandIn {

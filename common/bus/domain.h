@@ -74,10 +74,10 @@ class Domain {
   Domain as(std::string vehicle, std::string security, std::string identity) const;
   const Options& options() const { return options_; }
   const SharedMemory& sharedMemory() const { return shared_memory_; }
-  /// The present state of shared memory as text, with a fix if needed. Empty if shared memory was
-  /// not requested.
+  /// The present state of shared memory as text, with a fix if needed. The result is empty if
+  /// shared memory was not requested.
   std::string sharedMemoryText() const;
-  /// Whether a process that starts now can share memory with this process.
+  /// Returns whether a process that starts now can share memory with this process.
   bool sharesMemory() const;
   const std::shared_ptr<const Entity>& entity() const { return domain_; }
 
@@ -100,7 +100,7 @@ class Participant {
   std::shared_ptr<const Entity> keep(Entity entity) const;
   /// "imu" → "perdure/ego/imu".
   std::string wireName(const std::string& topic) const { return prefix_ + topic; }
-  /// Nothing if bus.security is off.
+  /// The identity of the participant. Returns nothing if bus.security is off.
   const std::optional<Identity>& identity() const { return identity_; }
 
  private:

@@ -336,7 +336,7 @@ void RawWriter::unregisterWire(const void* wire) { dds_unregister_instance(handl
 
 Result<void> RawWriter::disposeWire(const void* wire) {
   const dds_return_t code = dds_dispose(handle(), wire);
-  dds_unregister_instance(handle(), wire);  // so that late joiners receive no disposed instance
+  dds_unregister_instance(handle(), wire);  // hides the disposal from late joiners
   if (code == DDS_RETCODE_OK) return {};
   const Reason reason{errorWord(code), std::string("DDS: ") + dds_strretcode(-code)};
   count("dispose", reason);

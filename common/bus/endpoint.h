@@ -63,8 +63,8 @@ class RawReader : public Endpoint {
   std::size_t matched() const;
   /// The number of matched writers that missed their lease: killed, stopped or disconnected.
   std::size_t silent() const;
-  /// The highest strength among the matched writers of an exclusive topic, except `own`. Nothing if
-  /// there are no others.
+  /// The highest strength among the matched writers of an exclusive topic, except `own`. Returns
+  /// nothing if there are no others.
   std::optional<std::int32_t> strongestBut(const RawWriter& own) const;
   /// Adds the counts of DDS and of the checks since the start: <topic>_malformed_<reason>,
   /// _incompatible_qos, _sample_lost, _in_shared_memory, _writers_silent (present number).
@@ -98,7 +98,7 @@ class Reader : public RawReader {
     while (drainBatch(handler, on_gone)) {
     }
   }
-  /// Like drain(), for at most one batch. Returns true if more messages may be available.
+  /// Works like drain(), but for at most one batch. Returns true if more messages may be available.
   bool drainBatch(const Handler& handler, const Handler& on_gone = {}) {
     const auto offer = [&](const Result<T>& value) {
       if (value) {
@@ -129,7 +129,7 @@ class RawWriter : public Endpoint {
   /// The number of readers matched now.
   std::size_t matched() const;
   std::int32_t strength() const { return strength_; }
-  /// For exclusive topics; may be called at any time.
+  /// Sets the strength on an exclusive topic. It may be called at any time.
   void setStrength(std::int32_t strength);
   /// Asserts liveliness without a message, for exclusive topics.
   void assertLiveliness();
@@ -175,8 +175,8 @@ class Writer : public RawWriter {
     if constexpr (wire::kDecodedInPlace<T>) return writeWire(&sample, sample.pixels._length);
     return writeWire(&sample);
   }
-  /// For an exclusive topic without a key: until the next write, readers receive the writer with
-  /// the next lower strength.
+  /// Releases an exclusive topic without a key. Until the next write, readers receive the writer
+  /// with the next lower strength.
   void release() {
     typename wire::Type<T>::Wire sample{};
     unregisterWire(&sample);

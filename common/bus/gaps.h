@@ -9,8 +9,8 @@ namespace perdure::bus {
 /// One counter per topic with numbered stamps: the frames of one camera, or odometry.
 class Gaps {
  public:
-  /// The number of sequence numbers between this message of `source` and the newest one before it.
-  /// 0 for the first message of a source, and for repeated or late messages.
+  /// Returns the number of sequence numbers between this message of `source` and the newest one
+  /// before it. Returns 0 for the first message of a source, and for repeated or late messages.
   std::uint64_t before(std::uint64_t source, std::uint64_t sequence) {
     const bool follows = any_ && source == source_;
     if (follows && sequence <= newest_) return 0;

@@ -63,7 +63,7 @@ void takeTrace(void* log, const dds_log_data_t* data) {
 /// participant counts once.
 bool SecurityLog::isNewcomer(const std::string& message) {
   constexpr std::size_t kMost = 1024;
-  constexpr std::string_view kBefore = "remote writer ";  // same length as "remote reader "
+  constexpr std::string_view kBefore = "remote writer ";  // "remote reader " has the same length
   const auto begin = message.find("remote ") + kBefore.size();
   const auto end = message.rfind(':', message.find(' ', begin));  // end of the participant's GUID
   if (end == std::string::npos || end <= begin) return false;

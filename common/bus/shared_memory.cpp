@@ -18,7 +18,7 @@ namespace {
 constexpr char kSocket[] = "/tmp/roudi";  // fixed path in iceoryx 2.0
 constexpr char kManagement[] = "/dev/shm/iceoryx_mgmt";
 
-/// 0 if a process listens on the socket, else errno.
+/// Returns 0 if a process listens on the socket, else errno.
 int connectToRouDi() {
   const int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   if (fd < 0) return errno;

@@ -18,7 +18,7 @@ struct Qos {
   bool kept = false;           ///< writers store the newest sample for ReadFrom::kKept
   bool exclusive = false;      ///< OWNERSHIP EXCLUSIVE and LIVELINESS MANUAL_BY_TOPIC
   double lease_s = 0.0;        ///< lease of the liveliness; 0: infinite
-  bool shared_memory = false;  ///< used if enabled; only for topics without key and latching
+  bool shared_memory = false;  ///< allowed for topics without key and latching only
 };
 
 struct TopicInfo {
@@ -33,7 +33,7 @@ struct TopicInfo {
 };
 
 std::span<const TopicInfo> topicTable();
-/// The row of "imu", "frame/cam0", …; nullptr if the topic does not exist.
+/// The row of a topic, such as "imu" or "frame/cam0". Returns nullptr if the topic does not exist.
 const TopicInfo* findTopic(std::string_view name);
 
 /// The expected rate for a camera and an IMU with these rates; 0: on change.

@@ -26,11 +26,11 @@ class WaitLoop {
       return reader.drainBatch(handler, on_gone);
     });
   }
-  /// For readers of serialised messages.
+  /// Registers a handler of serialised messages.
   void on(CdrReader& reader, CdrReader::Handler handler) {
     attach(reader, [&reader, handler = std::move(handler)] { return reader.drainBatch(handler); });
   }
-  /// For readers of bytes in another folder (common/bus/foreign).
+  /// Registers a handler of byte messages (common/bus/foreign).
   template <class BytesReader>
   void onBytes(BytesReader& reader, typename BytesReader::Handler handler) {
     attach(reader, [this, &reader, handler = std::move(handler)] {

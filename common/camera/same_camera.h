@@ -5,8 +5,8 @@
 
 namespace perdure {
 
-/// True if name, size, lens, pose on the body and times are exactly equal. The nominal rate may
-/// differ.
+/// Returns true if name, size, lens, pose on the body and times are exactly equal. The nominal rate
+/// may differ.
 bool sameCamera(const CameraCalibration& a, const CameraCalibration& b);
 
 }  // namespace perdure

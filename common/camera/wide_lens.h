@@ -21,8 +21,8 @@ struct WideLens {
   std::array<double, 4> distortion{};     ///< k1 k2 p1 p2 of the unified model (omni-radtan)
 };
 
-/// Pixel of a point in the camera's frame; nothing if the point has no projection. J (2×3) = d
-/// pixel / d point, if given.
+/// Pixel of a point in the camera's frame. Returns nothing if the point has no projection. J (2×3)
+/// = d pixel / d point, if given.
 std::optional<Eigen::Vector2d> project(const WideLens& lens, const Eigen::Vector3d& point,
                                        Eigen::Matrix<double, 2, 3>* J = nullptr);
 

@@ -30,15 +30,15 @@ inline Range between(double low, double high) { return {low, high, false}; }
 
 /// A field bound to a variable, which has its default value until a file or --set changes it.
 struct Field {
-  std::string key;  ///< dotted: "tracker.max_points"
+  std::string key;  ///< dotted key, such as "tracker.max_points"
   std::variant<double*, std::int64_t*, bool*, std::string*, std::vector<double>*,
                std::vector<std::string>*>
       target;
-  Range range;                       ///< for numbers, and for each element of number lists
+  Range range;                       ///< range of numbers, and of each number in a list
   std::vector<std::string> choices;  ///< allowed values of strings; empty: any
   std::size_t length = 0;            ///< required length of lists; 0: any
-  bool required = false;             ///< must be given in the file or by --set
-  bool expert = false;               ///< for experts who have read its documentation
+  bool required = false;             ///< required in the file or by --set
+  bool expert = false;               ///< intended for experts
   Doc doc;
   bool given = false;  ///< set by readYaml and assign, even if the value was refused
 };
@@ -63,7 +63,7 @@ class Fields {
 
   /// The sentence for a key of earlier versions; empty for other keys.
   std::string formerlyOf(const std::string& key) const;
-  /// Whether earlier versions had keys in this group.
+  /// Returns whether earlier versions had keys in this group.
   bool wasGroup(const std::string& name) const;
 
   const std::vector<Field>& all() const { return fields_; }
@@ -88,7 +88,7 @@ struct Problem {
 /// unknown keys (with the nearest known one), wrong types, values out of range, missing keys,
 /// repeated keys. Targets of faulty fields retain their defaults.
 std::vector<Problem> readYaml(Fields& fields, const std::string& yaml, const std::string& file);
-/// Like readYaml, for the content of a file. A file that cannot be read is a problem too.
+/// Applies readYaml to the content of a file. A file that cannot be read is a problem too.
 std::vector<Problem> readFile(Fields& fields, const std::string& path);
 /// Applies "key=value" from --set; the value is YAML.
 std::vector<Problem> assign(Fields& fields, const std::string& assignment);

@@ -19,7 +19,7 @@ namespace perdure::mapping {
 struct FrameInMap {
   RigidTransform T_MW;
   WorldId map;               ///< M
-  bool provisional = false;  ///< its session is not linked to the map's first anchor yet
+  bool provisional = false;  ///< the session is not linked to the map's first anchor yet
 };
 
 /// Uses the graph as it is at construction.

@@ -16,7 +16,8 @@ struct AnchorParameters {
 
 /// Search for the body among the objects of the map.
 struct PlaceParameters {
-  double pair_least_m = 4.0, pair_most_m = 40.0;  ///< between the objects of a proposing pair
+  double pair_least_m = 4.0, pair_most_m = 40.0;  ///< distance between the objects of a proposing
+                                                  ///< pair
   double gate_sigmas = 4.0;                       ///< gate, in standard deviations of the prior
   double known_share = 0.5;      ///< probability that an object near the trajectory is on the map
   double known_within_m = 20.0;  ///< distance from the trajectory that lowers it to .6
@@ -45,7 +46,7 @@ struct LoopParameters {
   double at_once_nats = 25.0;
   double nats = 8.0;       ///< least score above the second best pose, beyond the prior's
   double near_m = 1.6;     ///< deviation of the body's position below which near_nats applies
-  double near_nats = 2.5;  ///< replaces nats; covers only the assignment of objects
+  double near_nats = 2.5;  ///< least score of the assignment of objects, in place of nats
   double far_m = 2.5;      ///< above this deviation four objects are required
   /// Least number of objects observed again under their old ids that link the body to earlier
   /// places. The second value is the largest deviation of the resulting position, as a fraction of

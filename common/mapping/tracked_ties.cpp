@@ -18,7 +18,7 @@ constexpr double kMostLaid = 0.25;
 struct Pair {
   ObjectId id = 0;
   AnchorId home = 0;         ///< anchor of the earlier visit
-  PlacedObject seen, known;  ///< in B, in M
+  PlacedObject seen, known;  ///< `seen` in B, `known` in M
 };
 
 MatchEquations equationsAt(const LevelPose& T_Mb, const std::vector<Pair>& pairs) {

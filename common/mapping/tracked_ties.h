@@ -20,7 +20,8 @@ class TrackedTies {
     AnchorId home = 0;              ///< anchor of the earlier visit
     std::vector<ObjectId> objects;  ///< observed on both visits as the same track
   };
-  /// Nothing if the objects add no information to the graph. Each object is used once per visit.
+  /// Returns the present tie, or nothing if the objects add no information to the graph. Each
+  /// object is used once per visit.
   std::optional<Tie> find(const Whereabouts& body) const;
   void use(const Tie& tie, double way_m);
   void begin() { used_at_m_.clear(); }

@@ -21,7 +21,8 @@ class ViewSearch {
   std::optional<LoopSearch::Found> nearby(const Whereabouts& body, const View& seen) const;
   /// Searches the components of the graph that are not linked to the body's session.
   std::optional<LoopSearch::Found> elsewhere(const Whereabouts& body, const View& seen) const;
-  /// Whether the appearance is strong evidence that the body is at a different place than `found`.
+  /// Returns whether the appearance is strong evidence that the body is at a different place than
+  /// `found`.
   bool contradicts(const LoopSearch::Found& found, const Whereabouts& body, const View& seen) const;
 
  private:

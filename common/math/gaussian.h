@@ -26,8 +26,8 @@ Eigen::MatrixXd solveSymmetric(const MatrixView& S, const MatrixView& B);
 /// S⁻¹ of a symmetric S.
 Eigen::MatrixXd inverseSymmetric(const MatrixView& S);
 
-/// B S⁻¹ of an m × n matrix B: the regression of B on the variable with covariance S. Zero if S is
-/// not positive definite (a pivot below 1e-18).
+/// B S⁻¹ of an m × n matrix B: the regression of B on the variable with covariance S. The result is
+/// zero if S is not positive definite (a pivot below 1e-18).
 Eigen::MatrixXd regressOn(const MatrixView& S, const MatrixView& B);
 
 /// A⁻¹ of any square A; not finite if A is singular.

@@ -31,8 +31,8 @@ double medianOf(std::vector<double> values) {
   return *middle;
 }
 
-/// True if the forces have no common direction and widely varying magnitudes. Gravity would give
-/// them both a common direction and a similar magnitude.
+/// Returns true if the forces have no common direction and widely varying magnitudes. Gravity would
+/// give them both a common direction and a similar magnitude.
 bool isWithoutGravity(const std::vector<ImuSample>& samples) {
   constexpr double kCommon = 0.4, kSpread = 0.3;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -150,7 +150,7 @@ void checkUpright(const Recording& recording, DataFindings& findings) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const ImuSample& sample : recording.imu) sum += sample.accel;
   const Eigen::Vector3d up_C = camera.T_BC.q.conjugate() * sum.normalized();
-  constexpr double kSurely = 0.8;  // within 37°
+  constexpr double kSurely = 0.8;  // cosine of 37°
   if (!(up_C.y() > kSurely)) return;
   findings.push_back(
       {Grade::kWarning, "images_upside_down",

@@ -24,10 +24,10 @@ using Message = std::variant<ImuSample, SpeedSample, Frame>;
 
 struct DatasetOptions {
   std::filesystem::path path = {};
-  std::string sequence = {};  ///< for KITTI tracking, and 7-Scenes folders with several
+  std::string sequence = {};  ///< name, in KITTI tracking and in 7-Scenes
   /// Width and height, for KITTI tracking without images.
   std::optional<std::pair<std::uint32_t, std::uint32_t>> image_size = {};
-  std::optional<std::size_t> frame_count = {};        ///< for KITTI tracking without files
+  std::optional<std::size_t> frame_count = {};        ///< number, in KITTI tracking
   InstanceId source = 1;                              ///< source id of the messages
   std::optional<ImageEncoding> encoding = {};         ///< encoding of cam0; default: as in the
                                                       ///< files
@@ -35,7 +35,7 @@ struct DatasetOptions {
   std::filesystem::path rig = {};  ///< rig file that replaces the drive's own calibration
   std::size_t every = 1;           ///< use only each N-th frame of cam0, with its partner
   bool decode = true;              ///< false: frames have stamp and size, but no pixels
-  /// For ROS recordings: topics by cam0, cam1, imu, if types and names do not identify them.
+  /// Topics of a ROS recording by cam0, cam1, imu, if types and names do not identify them.
   std::map<std::string, std::string> topics = {};
 };
 
@@ -52,7 +52,7 @@ enum class DatasetKind {
 struct Recording {
   struct FrameFile {
     TimePoint time;
-    std::uint64_t index = 0;  ///< in the dataset, from 0; shared by both cameras of a pair
+    std::uint64_t index = 0;  ///< frame index, from 0; shared by both cameras of a pair
     std::size_t camera = 0;   ///< index into calibration.cameras
     std::string path;         ///< empty: a frame without pixels, or with pixels from `load`
     std::function<Result<Frame>()> load = {};  ///< reads a frame from a recording; reasons image_…
@@ -83,10 +83,10 @@ class Dataset {
   const Calibration& calibration() const { return recording_.calibration; }
   /// Number of frames of cam0 in the dataset, including unreadable ones.
   std::size_t frameCount() const { return recording_.frame_count; }
-  /// Capture time of frame `index` of cam0; nothing if the dataset has no such frame.
+  /// Capture time of frame `index` of cam0. Returns nothing if the dataset has no such frame.
   std::optional<TimePoint> frameTime(std::uint64_t index) const;
-  /// Frame `index` of cam0 with its pixels, independent of next(). Nothing if it does not exist, or
-  /// if its image is missing or invalid (counted as by next()).
+  /// Frame `index` of cam0 with its pixels, independent of next(). Returns nothing if it does not
+  /// exist, or if its image is missing or invalid (counted as by next()).
   std::optional<Frame> frameAt(std::uint64_t index);
   const std::optional<PoseFile>& truth() const { return recording_.truth; }
   /// The complete contents: frames without their pixels, samples, notes.

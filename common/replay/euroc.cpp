@@ -41,7 +41,7 @@ std::string judgeImu(const Fields& fields) {
   return {};
 }
 
-/// Whether the header names accelerations before angular rates.
+/// Returns whether the header names accelerations before angular rates.
 bool namesForceFirst(const std::vector<std::string>& head) {
   if (head.size() != 7) return false;
   const auto isForce = [](const std::string& name) {
@@ -229,7 +229,7 @@ fs::path mav0Of(const fs::path& folder) {
   return fs::is_directory(folder / "mav0") ? folder / "mav0" : folder;
 }
 
-/// Whether `of` is a separate word in a name, as in imu0.yaml but not in simulation.yaml.
+/// Returns whether `of` is a separate word in a name, as in imu0.yaml but not in simulation.yaml.
 bool isWordIn(const std::string& name, const std::string& of) {
   const auto isLetter = [&](std::size_t i) {
     return i < name.size() && std::isalpha(static_cast<unsigned char>(name[i])) != 0;

@@ -60,7 +60,7 @@ std::optional<TimePoint> parseStamp(const std::string& text) {
   return TimePoint(since + Duration(*fraction));
 }
 
-/// Line k contains the stamp of record k; nothing for lines that are empty or not a stamp.
+/// Line k contains the stamp of record k. Returns nothing for lines that are empty or not a stamp.
 std::vector<std::optional<TimePoint>> readStamps(const fs::path& file) {
   std::vector<std::optional<TimePoint>> stamps;
   for (const auto& line : readLines(file, "KITTI keeps timestamps.txt in each sensor's folder")) {

@@ -10,19 +10,19 @@ namespace perdure::replay {
 namespace {
 
 constexpr double kRadians = std::numbers::pi / 180.0;
-constexpr int kSpacing_px = 16;  // between patches
+constexpr int kSpacing_px = 16;  // distance between patches
 constexpr int kHalf_px = 12;     // half size of a patch, which is 12 cm wide at 3 m
-constexpr int kStep_px = 3;      // between the points of a patch
+constexpr int kStep_px = 3;      // distance between the points of a patch
 constexpr int kMost_mm = 10000;
 constexpr double kNoise = 1.5e-3;  // noise of inverse depth, 1/m: 1.3 cm at 3 m
 constexpr double kAbout_deg = 50.0, kMode_deg = 8.0, kAgree_deg = 5.0, kOther_deg = 20.0;
 constexpr std::size_t kFewest = 100, kCandidates = 1000;
 
 /// The normal of the patch around a pixel, in the camera frame, pointing towards the camera.
-/// Nothing if depth is missing in more than a tenth of the patch, or if the patch is not flat.
-/// The inverse depth of a plane is linear in the pixel, and its noise is the same at all distances.
-/// A fit in space would bias the normals of slanted patches towards the camera, by half a degree
-/// over a floor.
+/// Returns nothing if depth is missing in more than a tenth of the patch, or if the patch is not
+/// flat. The inverse depth of a plane is linear in the pixel, and its noise is the same at all
+/// distances. A fit in space would bias the normals of slanted patches towards the camera, by half
+/// a degree over a floor.
 std::optional<Eigen::Vector3d> patchNormal(const cv::Mat& depth, const CameraCalibration& K,
                                            int row, int column) {
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();

@@ -19,7 +19,7 @@ class ReadAhead {
   ReadAhead(const ReadAhead&) = delete;
   ReadAhead& operator=(const ReadAhead&) = delete;
 
-  /// As Dataset::next, including its exceptions.
+  /// Returns the next message and throws like Dataset::next.
   std::optional<Message> next();
 
  private:

@@ -124,7 +124,8 @@ class DriveReader {
     for (std::size_t i = 0; i < recording_.speed.size(); ++i) recording_.speed[i].sequence = i;
   }
 
-  /// Index of the camera in the calibration; nothing if the calibration has no camera of this name.
+  /// Index of the camera in the calibration. Returns nothing if the calibration has no camera of
+  /// this name.
   std::optional<std::size_t> cameraOf(const Seen& seen) const {
     const auto& cameras = recording_.calibration.cameras;
     for (std::size_t i = 0; i < cameras.size(); ++i) {

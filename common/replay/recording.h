@@ -16,7 +16,7 @@ namespace perdure::replay {
 void noteOrder(const StampOrder& order, const std::string& kind, std::size_t all,
                Recording& recording);
 
-/// Whether the folder has the layout of a kind. The reader then reports missing parts.
+/// Returns whether the folder has the layout of a kind. The reader then reports missing parts.
 bool looksLikeEuroc(const std::filesystem::path& folder);
 bool looksLikeKittiRaw(const std::filesystem::path& folder);
 bool looksLikeKittiTracking(const std::filesystem::path& folder);
@@ -34,7 +34,7 @@ Recording readSevenScenes(const DatasetOptions& options);
 
 /// FOLDER/NAME.png, .jpg or .jpeg, whichever exists; else FOLDER/NAME.png.
 std::filesystem::path imagePath(const std::filesystem::path& folder, const std::string& name);
-/// Width and height of the first image that can be decoded; nothing if there is none.
+/// Width and height of the first image that can be decoded. Returns nothing if there is none.
 std::optional<std::pair<std::uint32_t, std::uint32_t>> firstImageSize(
     const std::filesystem::path& folder);
 /// Sorts the samples by time and numbers them. Samples left out are counted as imu_not_increasing

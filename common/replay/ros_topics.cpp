@@ -127,7 +127,8 @@ class Choice {
          "capture: dataset.topics; elsewhere `rostopic: TOPIC` under cam0 in the file of --rig)");
   }
 
-  /// A text such as "; those on /cam are foxglove_msgs/CompressedImage, which is not read".
+  /// Names an image topic of an unsupported type: "; those on /cam are
+  /// foxglove_msgs/CompressedImage, which is not read".
   std::string imagesOfOthers() const {
     for (const auto& [name, topic] : topics_) {
       const bool ours = topic.type == kImage || topic.type == kCompressed;

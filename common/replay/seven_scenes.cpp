@@ -116,7 +116,7 @@ fs::path sequenceFolder(const DatasetOptions& options) {
                          " holds sequences of a scene: name one with --sequence (" + list + ")");
 }
 
-/// sensor.yaml of the sequence or of its scene; nothing if there is none.
+/// sensor.yaml of the sequence or of its scene. Returns nothing if there is none.
 std::optional<SensorFile> sensorFileOf(const fs::path& folder) {
   const fs::path whole = fs::absolute(folder / "").lexically_normal().parent_path();
   for (const auto& place : {whole, whole.parent_path()}) {
@@ -179,8 +179,8 @@ CameraCalibration cameraOf(const std::optional<SensorFile>& sensor, const Datase
   return camera;
 }
 
-/// The pose of the camera in the frame P of the poses. Nothing if tracking was lost (numbers that
-/// are not finite); other errors are appended to `wrong`.
+/// The pose of the camera in the frame P of the poses. Returns nothing if tracking was lost
+/// (numbers that are not finite); other errors are appended to `wrong`.
 std::optional<RigidTransform> readPose(const fs::path& file, std::string& wrong) {
   std::vector<double> v;
   const auto is_lost = [](const std::string& text) {

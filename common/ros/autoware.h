@@ -51,7 +51,7 @@ struct TrackedObjectKinematics {
   static constexpr char kType[] = "autoware_perception_msgs/TrackedObjectKinematics";
   static constexpr std::uint8_t kUnavailable = 0, kSignUnknown = 1, kAvailable = 2;
   PoseWithCovariance pose_with_covariance;
-  TwistWithCovariance twist_with_covariance;  ///< in the object's frame
+  TwistWithCovariance twist_with_covariance;  ///< twist in the object's frame
   AccelWithCovariance acceleration_with_covariance;
   std::uint8_t orientation_availability = kUnavailable;
   bool is_stationary = false;

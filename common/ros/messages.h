@@ -217,7 +217,7 @@ struct Odometry {
   Header header;
   std::string child_frame_id;
   PoseWithCovariance pose;
-  TwistWithCovariance twist;  ///< in the child's frame
+  TwistWithCovariance twist;  ///< twist in the child's frame
   static void fields(auto& m, auto& a) {
     a("header", m.header), a("child_frame_id", m.child_frame_id);
     a("pose", m.pose), a("twist", m.twist);
@@ -326,7 +326,7 @@ struct Marker {
   Pose pose;
   Vector3 scale;
   ColorRGBA color;
-  Duration lifetime;  ///< 0: until it is deleted
+  Duration lifetime;  ///< 0: the marker remains until it is deleted
   bool frame_locked = false;
   std::vector<Point> points;
   std::vector<ColorRGBA> colors;

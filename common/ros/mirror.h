@@ -30,15 +30,15 @@ struct Outlet {
 class Mirror {
  public:
   using Out = std::function<void(const Outlet& outlet, std::vector<std::uint8_t> cdr)>;
-  /// Whether a topic has readers. Messages without readers are not created, unless the topic is
-  /// latched.
+  /// Returns whether a topic has readers. Messages without readers are not created, unless the
+  /// topic is latched.
   using Wanted = std::function<bool(const Outlet& outlet)>;
   /// `prefix` precedes all topics except /tf and /tf_static. Without `wanted` all messages are
   /// created.
   Mirror(std::string prefix, Out out, Wanted wanted = {})
       : prefix_(std::move(prefix)), out_(std::move(out)), wanted_(std::move(wanted)) {}
 
-  /// Also publishes objects as Autoware's TrackedObjects on this topic; empty: off.
+  /// Also publishes objects as Autoware's TrackedObjects on this topic, unless it is empty.
   void sayTrackedObjects(const std::string& topic) { tracked_objects_ = topic; }
 
   /// All topics that may be published for a vehicle with these cameras, for advance declaration.

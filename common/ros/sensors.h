@@ -22,7 +22,7 @@ ImuSample sampleOf(const Imu& imu);
 /// or number of coefficients), with a sentence.
 Result<CameraCalibration> cameraOf(const CameraInfo& info, bool rectified);
 
-/// In the frame imu_link, without orientation. The covariances come from `noise`.
+/// The message in the frame imu_link, without orientation. The covariances come from `noise`.
 Imu imuOf(const ImuSample& sample, const ImuCalibration* noise);
 CameraInfo infoOf(const CameraCalibration& camera, TimePoint time);
 
@@ -37,7 +37,7 @@ class FrameTree {
   bool empty() const { return parents_.empty(); }
   /// Invalid transforms: the last error of each child frame, as text for users.
   const std::map<std::string, std::string>& refused() const { return refused_; }
-  /// T_to_from: points of `from` into `to`; nothing if the two frames are not connected.
+  /// T_to_from: points of `from` into `to`. Returns nothing if the two frames are not connected.
   std::optional<RigidTransform> find(const std::string& to, const std::string& from) const;
 
  private:

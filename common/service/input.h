@@ -21,11 +21,12 @@ class Input {
 
   void heard() { heardAt(Clock::now()); }
   void heardAt(Clock::time_point now);
-  /// True after three quarters of a second without a message, or after four periods if that is
-  /// longer. An input that has never arrived is not silent; the service then reports what it is
+  /// Returns true after three quarters of a second without a message, or after four periods if that
+  /// is longer. An input that has never arrived is not silent; the service then reports what it is
   /// waiting for.
   bool silent(Clock::time_point now) const;
-  /// For example "no inertial samples for 1.2 s; mend the IMU, or start capture".
+  /// The message about the silence, such as "no inertial samples for 1.2 s; mend the IMU, or start
+  /// capture".
   std::string sentence(Clock::time_point now) const;
 
  private:

@@ -17,7 +17,7 @@ class ClockSteps {
   /// To be called once a second.
   void look();
   std::uint64_t count() const { return count_; }
-  bool recent() const;  ///< in the last 30 s
+  bool recent() const;  ///< true if there was a step in the last 30 s
 
  private:
   std::int64_t offset_ns_ = 0;

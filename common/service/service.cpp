@@ -208,7 +208,7 @@ void Context::requireIdentity() const {
                            " has ended; `perdure security renew`, and its folder here");
 }
 
-/// Text about an identity that expires soon; else empty.
+/// Text about an identity that expires soon. The result is empty for other identities.
 std::string Context::identityEnds() const {
   const auto& identity = participant_.identity();
   if (!identity || identity->until - std::chrono::system_clock::now() > bus::kRenewBefore)
@@ -226,7 +226,7 @@ void Context::noteSilence() {
   silent_inputs_ = silent;
 }
 
-/// Text about the silent inputs that prevent output; else empty.
+/// Text about the silent inputs that prevent output. The result is empty if no input is silent.
 std::string Context::silence() const {
   const auto now = Input::Clock::now();
   std::string text;

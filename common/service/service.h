@@ -26,7 +26,7 @@ class Context {
   Context(const std::string& process, const bus::Options& options,
           std::shared_ptr<spdlog::logger> log)
       : Context(process, bus::Domain(options), std::move(log)) {}
-  /// For a process that has already opened its domain.
+  /// Constructor for a process that has already opened its domain.
   Context(const std::string& process, const bus::Domain& domain,
           std::shared_ptr<spdlog::logger> log);
   ~Context();

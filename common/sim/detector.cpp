@@ -263,7 +263,8 @@ std::optional<Box> SimulatedDetector::withErrors(const Box& box, Errors& errors)
   return noisy;
 }
 
-/// 1 for large and visible objects; decreases towards least_separation for barely detectable ones.
+/// Returns 1 for large and visible objects. The value decreases towards least_separation for barely
+/// detectable ones.
 double SimulatedDetector::quality(double size_px, double visible) const {
   const double ease = foundProbability(size_px, visible) / std::max(model_.found, 1e-9);
   return model_.least_separation + (1.0 - model_.least_separation) * ease;

@@ -37,17 +37,17 @@ struct DetectorModel {
   double found = 0.96;
   double half_size_px = 14.0, size_octaves = 0.25;
   double half_visible = 0.3, visible_softness = 0.06;  ///< fractions of the outline in the image
-  double least_visible = 0.08;                         ///< below this fraction nothing is detected
+  double least_visible = 0.08;                         ///< least visible fraction for a detection
 
   double box_share = 0.03;        ///< σ of a side as a share of the box's width or height
   double box_floor_px = 0.8;      ///< additional σ of a side in pixels, added in quadrature
   double side_correlation = 0.3;  ///< correlation of the errors of opposite sides
-  double shrink_below = 0.6;      ///< below this fraction boxes enclose the visible part only
+  double shrink_below = 0.6;      ///< fraction below which boxes enclose the visible part only
 
   double false_per_frame = 0.5, false_smallest_px = 8.0;  ///< sizes are log-uniform up to the image
 
   double separation = 4.0;        ///< distance of a class's mean from clutter's, in σ, at best
-  double least_separation = 0.5;  ///< the share of it for the smallest and most occluded objects
+  double least_separation = 0.5;  ///< factor for the smallest and most occluded objects
   std::vector<ConfusionPair> confusion{{"car", "van", 0.08}, {"chair", "couch", 0.05}};
 
   bool azimuth = true;

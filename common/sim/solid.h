@@ -27,7 +27,7 @@ bool meet(const Solid& a, const Solid& b, double margin = 0.0);
 /// Distance on the ground from a point to the outline; 0 inside.
 double distanceTo(const Solid& solid, const Eigen::Vector2d& point);
 
-/// Whether the straight line from `from` to `to` (W) passes through the solid.
+/// Returns whether the straight line from `from` to `to` (W) passes through the solid.
 bool blocks(const Solid& solid, const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
 Solid solidOf(const SceneObject& object, double t_s);

@@ -150,7 +150,7 @@ struct Row {
   std::array<double, N> numbers{};
 };
 
-/// Nothing if the row is malformed.
+/// The numbers of a row. Returns nothing if the row is malformed.
 template <std::size_t N>
 std::optional<Row<N>> parseRow(std::string_view line) {
   std::vector<std::string_view> fields;

@@ -39,7 +39,7 @@ inline constexpr std::array<std::array<int, 2>, 12> kEdges{{{0, 1},
 /// gaps.
 std::vector<Eigen::Vector3d> strokesOf(const Cuboid& cuboid, bool dashed);
 
-/// True if something on the map occludes the object now.
+/// Returns true if something on the map occludes the object now.
 inline bool isHidden(const ObjectBelief& object) {
   return object.visibility == Visibility::kOccluded;
 }

@@ -80,7 +80,7 @@ struct ModelInfo {
 /// (services/inference/README.md).
 enum class SwapStep : std::uint8_t {
   kRehearsing = 0,  ///< `instance` infers in parallel with `about`; its results are not used
-  kTookOver,        ///< the results of `instance` are used; `about` watches it for probation_s
+  kTookOver,        ///< results of `instance` are used; `about` monitors it for probation_s
   kPassed,          ///< the probation of `instance` is over: `about` may stop
   kRolledBack,      ///< results of `about` (if 0: of `instance`) must not be used; see `reason`
   kRetired,         ///< `instance` stops, because `about` has passed

@@ -23,7 +23,7 @@ enum class ExistenceEvidence : std::uint8_t {
   kTime,              ///< survival: objects may leave
   kMisshapen,         ///< hypotheses whose size became impossible for their class
   kLost,              ///< hypotheses that the object drove off to an unknown place
-  kShared,            ///< its first box may belong to another object
+  kShared,            ///< the first box may belong to another object
   kMerge,             ///< evidence of another track that was merged into this one
   kRestore,           ///< evidence from before this ledger, restored at the restart of a service
   kRecall,            ///< evidence from before this ledger, restored when the object was recalled
@@ -75,7 +75,7 @@ struct OustedClass {
   bool operator==(const OustedClass&) const = default;
 };
 
-/// Empty if the writer does not record a ledger.
+/// The ledger of an object. It is empty if the writer does not record one.
 struct Ledger {
   std::vector<LedgerEntry> existence;  ///< entries by kind; they sum to log r / (1 - r)
   std::vector<ClassLedger> classes;

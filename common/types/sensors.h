@@ -31,7 +31,7 @@ struct Frame {
   std::string camera;  ///< "cam0", "cam1"
   std::uint32_t width = 0, height = 0;
   ImageEncoding encoding = ImageEncoding::kMono8;
-  SharedBytes data;  ///< for a received frame: refers to the memory in which it arrived
+  SharedBytes data;  ///< a received frame refers to the memory in which it arrived
 };
 
 struct ImuSample {

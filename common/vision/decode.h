@@ -22,10 +22,10 @@ Result<cv::Mat> decodeImageFile(const std::string& path, std::optional<ImageEnco
 /// A depth image (16 bits, one channel) without conversion, CV_16UC1. Reasons as above, and
 /// image_depth (another kind of image).
 Result<cv::Mat> decodeDepthFile(const std::string& path);
-/// For a 16-bit image: the smallest of 8, 10, 12, 14, 16 that holds its brightest value. 16 for
-/// other images and for invalid files.
+/// Number of used bits of a 16-bit image: the smallest of 8, 10, 12, 14, 16 that holds its
+/// brightest value. Returns 16 for other images and for invalid files.
 int usedBits(const std::string& path);
-/// Like usedBits(), for the bytes of such a file.
+/// Works like usedBits() on the bytes of a file.
 int usedBitsIn(std::string_view bytes);
 
 }  // namespace perdure::vision

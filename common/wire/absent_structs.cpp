@@ -11,7 +11,7 @@ namespace {
 
 using Op = std::uint32_t;
 
-/// Size of one number in bytes; nothing for other kinds.
+/// Size of one number in bytes. Returns nothing for other kinds.
 std::optional<std::size_t> sizeOf(dds_stream_typecode kind) {
   if (kind == DDS_OP_VAL_BLN) return 1;
   if (kind < DDS_OP_VAL_1BY || kind > DDS_OP_VAL_8BY) return std::nullopt;

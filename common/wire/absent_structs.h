@@ -8,7 +8,7 @@
 
 namespace perdure::wire {
 
-/// Whether the message contains all required structs. `cdr` is XCDR2 accepted by
+/// Returns whether the message contains all required structs. `cdr` is XCDR2 accepted by
 /// dds_stream_normalize_data(), without encapsulation; `ops` describe its type. Also returns false
 /// if the type has members of kinds that Perdure's types do not use.
 bool structsArePresent(std::span<const std::uint8_t> cdr, const std::uint32_t* ops);

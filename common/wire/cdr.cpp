@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kHeader = 4;
 constexpr std::uint8_t kXcdr1 = 0x00, kXcdr2 = 0x06, kDelimitedXcdr2 = 0x08;  // + 1: little-endian
-constexpr std::uint32_t kVersion1 = 1, kVersion2 = 2;                         // for Cyclone
+constexpr std::uint32_t kVersion1 = 1, kVersion2 = 2;                         // Cyclone's
 constexpr std::uint8_t kNative = std::endian::native == std::endian::little ? 1 : 0;
 
 bool isFinal(const dds_topic_descriptor_t& type) {

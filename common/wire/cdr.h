@@ -34,7 +34,8 @@ class CdrSample {
 
 /// A C struct as bytes, in the wire format of its type.
 std::vector<std::uint8_t> writeCdr(const void* sample, const dds_topic_descriptor_t& type);
-/// The message of an image without its encapsulation; empty if decodeInPlace cannot read it.
+/// The message of an image without its encapsulation. The result is empty if decodeInPlace cannot
+/// read it.
 std::span<const std::uint8_t> payloadInPlace(std::span<const std::uint8_t> message);
 
 /// Decodes a value with all checks, or returns the reason of a failure. `keeper` owns the memory of
@@ -64,7 +65,7 @@ Result<std::vector<std::uint8_t>> encodeCdr(const T& value) {
 }
 
 /// The IDL of "perdure::msg::Objects", …, with all types that it needs, as one text without
-/// #include. Empty if the type is unknown.
+/// #include. The result is empty if the type is unknown.
 std::string idlOf(std::string_view type_name);
 
 }  // namespace perdure::wire

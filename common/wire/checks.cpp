@@ -14,7 +14,7 @@ bool isSymmetric(const Eigen::Ref<const Eigen::MatrixXd>& P) {
 }
 
 /// The correlation matrix of P. Rows without variance must be zero and become rows of the identity.
-/// Empty if P has a negative variance, or a covariance without variance.
+/// The result is empty if P has a negative variance, or a covariance without variance.
 Eigen::MatrixXd correlations(const Eigen::Ref<const Eigen::MatrixXd>& P) {
   Eigen::VectorXd scale(P.rows());
   for (Eigen::Index i = 0; i < P.rows(); ++i) {

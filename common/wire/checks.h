@@ -9,9 +9,9 @@
 
 namespace perdure::wire {
 
-/// True if the value is finite and within the limits.
+/// Returns true if the value is finite and within the limits.
 bool inside(double value, const Limits& limits);
-/// Whether `bytes` is a possible size of the frame's data: raw pixels or a JPEG of them.
+/// Returns whether `bytes` is a possible size of the frame's data: raw pixels or a JPEG of them.
 bool isSizeOf(const Frame& frame, std::size_t bytes);
 /// Valid UTF-8 without NUL.
 bool isText(std::string_view text);

@@ -8,7 +8,8 @@
 
 namespace perdure::wire {
 
-/// For "perdure::msg::Objects", …; nullptr if the type itself is final, or unknown.
+/// The twin of a type such as "perdure::msg::Objects". Returns nullptr if the type itself is final,
+/// or unknown.
 const dds_topic_descriptor_t* plainTwinOf(const std::string& type_name);
 
 }  // namespace perdure::wire

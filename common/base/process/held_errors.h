@@ -1,4 +1,4 @@
-// Filters the lines that are written to std::cerr during the lifetime of this object. Used for
+// Filters the lines that are written to std::cerr during the lifetime of an object. It is used for
 // libraries that print irrelevant warnings.
 #pragma once
 

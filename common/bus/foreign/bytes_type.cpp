@@ -24,7 +24,7 @@ struct BytesMessage : ddsi_serdata {
     cdr.resize((cdr.size() + 3) / 4 * 4);  // Cyclone sends whole words
     bytes = std::make_shared<const std::vector<std::uint8_t>>(std::move(cdr));
   }
-  std::uint32_t size;  // without the padding of the last word
+  std::uint32_t size;  // size without the padding of the last word
   std::shared_ptr<const std::vector<std::uint8_t>> bytes;
 };
 

@@ -13,7 +13,7 @@ namespace perdure::mapping {
 using Descriptor = std::array<std::uint8_t, 32>;
 
 struct SeenPoint {
-  Eigen::Vector3f p = Eigen::Vector3f::Zero();  ///< in the anchor's axes, m
+  Eigen::Vector3f p = Eigen::Vector3f::Zero();  ///< position in the anchor's axes, m
   float sigma = 0.0F;                           ///< σ of p given the body's pose, m
   Descriptor descriptor{};
   bool operator==(const SeenPoint&) const = default;

@@ -13,7 +13,7 @@
 namespace perdure::mapping {
 namespace {
 
-constexpr int kAlike = 64;                 // bits: a quarter
+constexpr int kAlike = 64;                 // bits; a quarter of the descriptor
 constexpr double kUnlikeNext = 0.8;        // ratio to the distance of the second best
 constexpr std::size_t kLeastAgreeing = 4;  // number of agreeing points
 constexpr double kDeviations = 3.0;        // gate, in standard deviations

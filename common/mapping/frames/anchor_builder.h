@@ -26,7 +26,7 @@ class AnchorBuilder {
   std::optional<Anchor> add(const Odometry& odometry, AnchorId next);
 
   /// The levelled pose of the body relative to the last anchor, with the covariance of the odometry
-  /// error since then. Nothing before the first anchor.
+  /// error since then. Returns nothing before the first anchor.
   const std::optional<LevelGaussian>& sinceLast() const { return since_; }
   const std::optional<Anchor>& last() const { return last_; }
   /// Distance travelled so far. Motion within two centimetres of the last counted position adds

@@ -31,8 +31,8 @@ struct StoredObject {
 /// The origin of an object from another map. Maps that continue one another share their first
 /// session, and have equal object ids up to the point where they diverge.
 struct Origin {
-  SessionIdentity map;  ///< its first session
-  ObjectId id = 0;      ///< in that map
+  SessionIdentity map;  ///< first session of the other map
+  ObjectId id = 0;      ///< id in the other map
   ObjectId now = 0;     ///< id in this map; the object may be history since
   TimePoint first_seen;
   TimePoint last_seen;  ///< last sighting in the belief that was copied
@@ -66,9 +66,9 @@ struct MapContents {
 /// The object that an object was merged into; itself if it has not been merged.
 ObjectId survivorOf(const MapContents& map, ObjectId id);
 
-/// Whether `a`, and not `b`, is the first map of a fusion. The map with the older first session
-/// comes first; if both share that session, the map with more contents does. The result does not
-/// depend on the order of the arguments.
+/// Returns whether `a`, and not `b`, is the first map of a fusion. The map with the older first
+/// session comes first; if both share that session, the map with more contents does. The result
+/// does not depend on the order of the arguments.
 bool comesFirst(const MapContents& a, const MapContents& b);
 
 }  // namespace perdure::mapping

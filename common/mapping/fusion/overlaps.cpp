@@ -68,7 +68,7 @@ class Overlaps {
     return a.contains(b.T_MO.p) && b.contains(a.T_MO.p) && isKnown(a, b);
   }
 
-  /// True if the relative position is known better than the width of the narrower object.
+  /// Returns true if the relative position is known better than the width of the narrower object.
   bool isKnown(const Solid& a, const Solid& b) {
     const auto T_ab = relations_.between(a.seen->anchor, b.seen->anchor);
     if (!T_ab) return false;

@@ -12,7 +12,7 @@ namespace perdure::mapping {
 
 /// Result of a search for an object by its id in another map.
 struct Known {
-  ObjectId id = 0;    ///< 0: not found; it may be history since
+  ObjectId id = 0;    ///< 0: not found; the object may be history since
   bool told = false;  ///< found in a recorded origin, not only by an equal id
 };
 

@@ -14,7 +14,8 @@ class Relations {
  public:
   explicit Relations(const PoseGraph& graph) : graph_(graph) {}
 
-  /// Nothing if the graph does not connect the two anchors.
+  /// The pose of `to` relative to `from`. Returns nothing if the graph does not connect the two
+  /// anchors.
   std::optional<LevelGaussian> between(AnchorId from, AnchorId to) {
     if (from == to) return LevelGaussian();
     if (from != from_) {

@@ -17,7 +17,7 @@ struct SessionIdentity {
   std::uint64_t first = 0, second = 0;
   auto operator<=>(const SessionIdentity&) const = default;
 
-  /// True for the same session, even if one of the maps has its first anchor only.
+  /// Returns true for the same session, even if one of the maps has its first anchor only.
   bool matches(const SessionIdentity& other) const {
     return first == other.first && (second == other.second || second == 0 || other.second == 0);
   }
@@ -26,7 +26,7 @@ struct SessionIdentity {
 struct Session {
   WorldId world;
   SessionIdentity identity;
-  std::vector<AnchorId> anchors;  ///< in order, not empty
+  std::vector<AnchorId> anchors;  ///< ordered, not empty
 };
 
 /// Sessions ordered by their first anchors: the oldest session of the map comes first.

@@ -23,7 +23,7 @@ class PlacesInM {
   };
   Place of(const ObjectRecord& record) const;
   /// The place of a belief stored in its session's W, relative to the last anchor of the session
-  /// before the last sighting. Nothing if the session has no anchors.
+  /// before the last sighting. Returns nothing if the session has no anchors.
   std::optional<Place> of(const StoredObject& object) const;
 
   const MapState& state() const { return state_; }

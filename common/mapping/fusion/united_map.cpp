@@ -100,7 +100,7 @@ class Uniting {
     }
   }
 
-  /// Whether the other map merged the object into one that is the same object here.
+  /// Returns whether the other map merged the object into one that is the same object here.
   bool isHere(const Ending& ending, ObjectId id) const {
     const auto into = id_of_.find(ending.merged_into);
     return into != id_of_.end() && survivorOf(map_, into->second) == id;
@@ -126,7 +126,7 @@ class Uniting {
     }
   }
 
-  /// Whether this map has evidence of the object that the other map lacks.
+  /// Returns whether this map has evidence of the object that the other map lacks.
   bool knowsMore(ObjectId id, ObjectId theirs) const {
     const auto all = ours_.of(id);
     return std::any_of(all.begin(), all.end(),

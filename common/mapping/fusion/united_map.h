@@ -12,9 +12,9 @@ namespace perdure::mapping {
 
 /// The beliefs and records of an object in two maps that both contain it, as stored.
 struct Renewed {
-  ObjectId id = 0;  ///< in the united map
+  ObjectId id = 0;  ///< id in the united map
   StoredObject before, now;
-  std::optional<ObjectRecord> record_before, record_now;  ///< in ids of the united map
+  std::optional<ObjectRecord> record_before, record_now;  ///< records in ids of the united map
   bool shared = false;  ///< `before` contains evidence that `now` lacks
 };
 

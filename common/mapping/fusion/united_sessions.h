@@ -18,11 +18,11 @@ class UnitedSessions {
 
   /// The world in the united map for a world of the other map. A new world receives a free number.
   const WorldId& worldOf(const WorldId& world);
-  /// A record of the other map in the united map's ids. Nothing if it does not exist, or if its
-  /// part of the trajectory was left out.
+  /// A record of the other map in the united map's ids. Returns nothing if it does not exist, or if
+  /// its part of the trajectory was left out.
   std::optional<ObjectRecord> recordOf(ObjectId theirs, ObjectId id) const;
-  /// Whether a sighting of the record, in ids of the united map, belongs to a session that both
-  /// maps contain.
+  /// Returns whether a sighting of the record, in ids of the united map, belongs to a session that
+  /// both maps contain.
   bool wasSeenInBoth(const ObjectRecord& record) const;
   bool isNew(AnchorId id) const { return new_ids_.contains(id); }
 
@@ -50,7 +50,7 @@ class UnitedSessions {
   std::set<WorldId> worlds_;         ///< worlds of the map
   std::set<std::uint64_t> numbers_;  ///< numbers of these worlds
   std::map<WorldId, const Session*> known_;
-  std::map<WorldId, WorldId> world_of_;  ///< from the other map to this one; also the next two
+  std::map<WorldId, WorldId> world_of_;  ///< other map to this map; also the next two
   std::map<std::uint64_t, std::uint64_t> number_of_;
   std::map<WorldId, std::vector<AnchorId>> new_anchors_;
   std::map<WorldId, AnchorId> first_new_;  ///< key: world in this map

@@ -100,7 +100,7 @@ std::optional<LevelGaussian> Marginals::to(AnchorId anchor) const {
 /// With H = L D Lᵀ: Z = H⁻¹ has Z_jj = 1/d_j − Σ_k L_kj Z_kj and, for i > j, Z_ij = −Σ_k L_kj Z_ki,
 /// over the k > j with nonzero L_kj. Only elements of Z at nonzero elements of L are needed.
 Eigen::VectorXd Marginals::diagonalOfInverse() const {
-  const auto& L = factor_.matrixL().nestedExpression();  // without its diagonal, which is 1
+  const auto& L = factor_.matrixL().nestedExpression();  // L without its unit diagonal
   const int* starts = L.outerIndexPtr();
   const int* rows = L.innerIndexPtr();
   const double* l = L.valuePtr();

@@ -19,8 +19,8 @@ class Marginals {
 
   /// The first anchor of the component of `from`.
   AnchorId first() const { return components_.at(from_); }
-  /// T_from,anchor with its covariance. Nothing if no path leads to the anchor, or if the normal
-  /// equations cannot be solved.
+  /// T_from,anchor with its covariance. Returns nothing if no path leads to the anchor, or if the
+  /// normal equations cannot be solved.
   std::optional<LevelGaussian> to(AnchorId anchor) const;
   /// Variances of [p, yaw] in M of every anchor, relative to the first anchor of its component; m²
   /// and rad². Anchors whose variances cannot be computed are omitted. The cost is about that of

@@ -70,7 +70,7 @@ class PoseGraph {
   /// Weight of a loop or tracking edge from the last optimise(); 1 for newer edges and for
   /// odometry.
   double weight(EdgeId id) const;
-  /// True for a loop or tracking edge added after the last optimise().
+  /// Returns true for a loop or tracking edge added after the last optimise().
   bool isNew(EdgeId id) const;
   /// χ² of an edge between anchors of the graph, at their present poses.
   double chi2(const Edge& edge) const;

@@ -108,8 +108,8 @@ class Search {
     if (seen_.size() > kMostSeen) seen_.resize(kMostSeen);
   }
 
-  /// For each observed object and class: the probability divided by the share of the class on the
-  /// map.
+  /// Computes the probability of each class of each observed object, divided by the share of the
+  /// class on the map.
   void weighClasses() {
     for (const PlacedObject& o : seen_) {
       std::vector<double>& weights = class_weights_.emplace_back();

@@ -18,7 +18,7 @@ namespace perdure::mapping {
 
 /// A candidate pose of the body on the map.
 struct PlaceMatch {
-  LevelGaussian T_MB;  ///< without the prior's information
+  LevelGaussian T_MB;  ///< estimate without the prior's information
   double score = 0.0;  ///< log-likelihood ratio against chance plus log of the prior, nats
   double next = 0.0;   ///< score of the second best pose, or of no observed object being on the map
   double cells = 1.0;  ///< number of distinguishable poses inside the prior

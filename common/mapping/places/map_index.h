@@ -41,7 +41,7 @@ class PlaceGrid {
 
 class MapIndex {
  public:
-  /// Beyond this distance an object has no effect.
+  /// Distance beyond which an object has no effect.
   static constexpr double kReach_m = 24.0;
 
   /// `objects` in M; `driven`: positions in M from which they were observed.
@@ -57,10 +57,10 @@ class MapIndex {
   }
 
   struct Pair {
-    double distance;   ///< in the plane
+    double distance;   ///< distance in the plane, m
     std::size_t c, d;  ///< indices of the two objects
   };
-  /// Ordered pairs of two classes, sorted by distance; nothing if there are none.
+  /// Ordered pairs of two classes, sorted by distance. Returns nothing if there are none.
   const std::vector<Pair>* pairsOf(std::uint32_t class_c, std::uint32_t class_d) const;
 
   /// Probability that an object at a place is on the map. It decreases with the distance from the

@@ -19,7 +19,7 @@ namespace perdure::replay {
 
 struct DetectionFileOptions {
   std::filesystem::path file;
-  std::string class_name;  ///< for a file without header
+  std::string class_name;  ///< class of a file without header
   /// Subtracted from each corner. RRC counts pixels from 1. A CSV does not state its origin; the
   /// default is 0, unless the caller sets it (--box-origin).
   double box_origin = 0.0;
@@ -43,7 +43,8 @@ class DetectionFile {
   /// frame. A truncated file therefore gives the same result. The list grows with the frame, and
   /// the hash changes with it.
   ModelInfo modelAt(std::uint64_t frame) const;
-  /// Nothing if the file contains no information about the frame.
+  /// The detections of a frame. Returns nothing if the file contains no information about the
+  /// frame.
   std::optional<std::vector<Detection>> at(std::uint64_t frame) const;
   std::uint64_t firstFrame() const { return rows_.empty() ? 0 : rows_.begin()->first; }
   std::uint64_t lastFrame() const { return rows_.empty() ? 0 : rows_.rbegin()->first; }

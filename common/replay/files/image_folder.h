@@ -11,7 +11,7 @@
 
 namespace perdure::replay {
 
-/// True for the extensions of images.
+/// Returns true for the extensions of images.
 bool isImageName(const std::filesystem::path& file);
 
 class ImageFolder {
@@ -23,10 +23,10 @@ class ImageFolder {
   std::optional<std::filesystem::path> find(std::string_view name, TimePoint stamp);
   /// Number of images, recognised by their extensions.
   std::size_t size() const { return by_stem_.size(); }
-  /// Name of the first image; "" if there is none.
+  /// Name of the first image. Returns "" if there is none.
   std::string first() const;
-  /// The other contents of a folder without images: broken links, or files with other extensions;
-  /// "" if it has neither.
+  /// Describes the other contents of a folder without images: broken links, or files with other
+  /// extensions. Returns "" if it has neither.
   std::string others() const;
   /// Number of images found by another name than the written one.
   std::size_t foundOtherwise() const { return found_otherwise_; }

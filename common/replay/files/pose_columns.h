@@ -20,10 +20,11 @@ struct PoseColumns {
 /// returns nothing.
 std::optional<PoseColumns> poseColumnsOf(const std::vector<std::string_view>& names);
 
-/// True if the names contain angles (roll, pitch, yaw) and no quaternion.
+/// Returns true if the names contain angles (roll, pitch, yaw) and no quaternion.
 bool namesAngles(const std::vector<std::string_view>& names);
 
-/// "this is JSON …" with the fix, if a line shows that the file is not a table of poses; else "".
+/// Returns "this is JSON …" with the fix if a line shows that the file is not a table of poses.
+/// Otherwise returns "".
 std::string otherKindOfPoses(std::string_view line, const std::vector<std::string_view>& fields);
 
 }  // namespace perdure::replay

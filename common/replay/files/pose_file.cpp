@@ -35,7 +35,7 @@ std::optional<TimePoint> parseSeconds(std::string_view text) {
   return TimePoint(durationFromSeconds(*seconds));
 }
 
-/// Whether the names of eight columns put w of the quaternion first (q_w, qx [], q_RS_y …).
+/// Returns whether the names of eight columns put w of the quaternion first (q_w, qx [], q_RS_y …).
 bool namesWFirst(const std::vector<std::string_view>& names) {
   constexpr std::string_view kOrder = "wxyz";
   if (names.size() != 8) return false;

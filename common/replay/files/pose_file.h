@@ -31,11 +31,11 @@ class PoseFile {
   PoseFile(PoseFormat format, std::vector<StampedPose> poses);
 
   PoseFormat format() const { return format_; }
-  /// For KITTI poses, which have no time, the time is 0.
+  /// The time of KITTI poses is 0, because they have none.
   const std::vector<StampedPose>& poses() const { return poses_; }
 
   /// TUM: by time, interpolated between neighbours at most `max_gap` apart; a pose within 1 ms is
-  /// used as it is. KITTI: by the frame's index. Nothing outside the trajectory.
+  /// used as it is. KITTI: by the frame's index. Returns nothing outside the trajectory.
   std::optional<RigidTransform> at(std::uint64_t frame, TimePoint time,
                                    Duration max_gap = std::chrono::milliseconds(500)) const;
 

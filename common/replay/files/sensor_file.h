@@ -30,10 +30,10 @@ class SensorFile {
   /// Returns `otherwise` if the key is missing.
   double number(const char* key, double low, double otherwise) const;
   std::string text(const char* key) const;
-  /// Numbers of a list, of a list of rows, or of `data` below the key; nothing if the key is
-  /// missing.
+  /// Numbers of a list, of a list of rows, or of `data` below the key. Returns nothing if the key
+  /// is missing.
   std::optional<std::vector<double>> list(const char* key) const;
-  /// A rigid transform as 4×4 numbers, row by row; nothing if the key is missing.
+  /// A rigid transform as 4×4 numbers, row by row. Returns nothing if the key is missing.
   std::optional<RigidTransform> transform(const char* key) const;
   /// The pose of the sensor in the body; the identity if the file does not contain it.
   RigidTransform T_BS() const { return transform("T_BS").value_or(RigidTransform()); }
@@ -65,8 +65,8 @@ class SensorFile {
 /// lens (common/camera/wide_lens.h). Time offset, readout and rate are 0 if they are missing.
 CameraCalibration readCamera(const SensorFile& file, const std::string& name,
                              const std::optional<RigidTransform>& T_BC_given = {});
-/// For two cameras of Kalibr's chain: if T_cam_imu is missing, T_cn_cnm1 (this camera from the
-/// previous one) gives T_BC.
+/// The pose of the second of two cameras in Kalibr's chain. If T_cam_imu is missing, T_cn_cnm1
+/// (this camera from the previous one) gives T_BC.
 std::optional<RigidTransform> placeInChain(const SensorFile& file, const CameraCalibration& before);
 /// The rate is `rate_hz` or `update_rate`.
 ImuCalibration readImuCalibration(const SensorFile& file);

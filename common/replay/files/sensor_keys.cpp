@@ -62,7 +62,7 @@ std::vector<double> coefficientsOf(const SensorFile& file) {
   return {};
 }
 
-/// Kalibr's unified, extended unified and double sphere lenses; nothing for other lenses.
+/// Kalibr's unified, extended unified and double sphere lenses. Returns nothing for other lenses.
 std::optional<WideLens> wideLensOf(const SensorFile& file) {
   const std::string lens = toLower(file.text("camera_model"));
   const std::string model = lens.substr(0, lens.find('-'));

@@ -32,7 +32,7 @@ class SensorTable {
   SensorTable(const SensorTable&) = delete;  // rows refer to its text
   SensorTable& operator=(const SensorTable&) = delete;
 
-  /// Names of the columns in lower case; empty if the file has no header.
+  /// Names of the columns in lower case. The result is empty if the file has no header.
   const std::vector<std::string>& head() const { return head_; }
   /// Rows in order of increasing time.
   const std::vector<TableRow>& rows() const { return rows_; }

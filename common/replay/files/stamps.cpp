@@ -84,7 +84,8 @@ class Line {
   }
   const std::vector<std::size_t>& indices() const { return indices_; }
 
-  /// True if the stamp is far outside its neighbours' stamps and does not fill a gap elsewhere.
+  /// Returns true if the stamp is far outside its neighbours' stamps and does not fill a gap
+  /// elsewhere.
   bool isStray(std::size_t index) const {
     const auto next = std::lower_bound(indices_.begin(), indices_.end(), index);
     const TimePoint stamp = stamps_[index];

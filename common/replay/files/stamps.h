@@ -14,11 +14,11 @@
 namespace perdure::replay {
 
 /// Parses whole nanoseconds, ≥ 0, exactly: "1403636579763555584", also with a decimal point and
-/// zeros, or in the format of numpy.savetxt ("1.403636579763555584e+18"). Nothing if a fraction
-/// remains.
+/// zeros, or in the format of numpy.savetxt ("1.403636579763555584e+18"). Returns nothing if a
+/// fraction remains.
 std::optional<TimePoint> parseNanoseconds(std::string_view text);
 
-/// The reason and the fix if parseNanoseconds() returns nothing; else "".
+/// The reason and the fix if parseNanoseconds() returns nothing. Otherwise returns "".
 std::string whyNoStamp(std::string_view text);
 
 /// a − b, limited to ±292 years, because a file may contain any stamps.
@@ -30,8 +30,8 @@ Duration multipleOf(std::int64_t n, Duration d);
 struct StampOrder {
   std::vector<std::size_t> kept;
   std::size_t moved = 0;     ///< out of order; sorted
-  std::size_t strays = 0;    ///< left out: a few with stamps far from their neighbours'
-  std::size_t repeated = 0;  ///< left out: repeated stamps
+  std::size_t strays = 0;    ///< removed: a few stamps far from their neighbours
+  std::size_t repeated = 0;  ///< removed: repeated stamps
 };
 
 /// Increasing stamps are all kept. Otherwise the stamps out of order are examined. They are strays

@@ -13,7 +13,7 @@ namespace perdure::replay {
 
 struct TextLine {
   std::size_t number = 0;  ///< line number, counted from 1
-  std::string text;        ///< without line end (LF or CR LF) and surrounding blanks
+  std::string text;        ///< text without line end (LF or CR LF) and surrounding blanks
 };
 
 /// Non-empty lines, without a UTF-8 byte order mark. UTF-16 is refused (kData). Throws
@@ -33,13 +33,14 @@ char separatorOf(std::string_view line);
 /// Fields split by this separator, without empty fields at the end of the line.
 std::vector<std::string_view> fieldsOf(std::string_view line);
 
-/// The whole text as a finite number. Nothing if characters remain, or for infinity and NaN.
+/// The whole text as a finite number. Returns nothing if characters remain, or for infinity and
+/// NaN.
 std::optional<double> parseNumber(std::string_view text);
 std::optional<std::int64_t> parseInteger(std::string_view text);
 /// All fields as finite numbers, or nothing.
 std::optional<std::vector<double>> parseNumbers(const std::vector<std::string_view>& fields);
-/// True for column names: there are several fields, and none is infinite, NaN, or begins like a
-/// number.
+/// Returns true for column names: there are several fields, and none is infinite, NaN, or begins
+/// like a number.
 bool isHeader(const std::vector<std::string_view>& fields);
 
 /// Collects the errors of one file and throws them together: "file:line: what".

@@ -38,7 +38,7 @@ X numberIn(std::string_view bytes) {
   return x;
 }
 
-/// Parses "name=value" fields, each after its length; nothing if they do not fit.
+/// Parses "name=value" fields, each after its length. Returns nothing if they do not fit.
 std::optional<HeadFields> fieldsOf(Bytes head) {
   HeadFields fields;
   mcap::Take take(head);
@@ -235,8 +235,8 @@ class Bag : public RosSource {
                        [this](std::uint32_t one) { return connections_.contains(one); });
   }
 
-  /// For a file without its end: reads connection records from the chunk that first uses each
-  /// connection.
+  /// Reads connection records from the chunk that first uses each connection, if the end of the
+  /// file is missing.
   void learnConnections(const ChunkPlace& chunk) {
     if (const auto records = unpack(chunk))
       forEachMessage(**records, [](std::uint32_t, std::uint64_t, Bytes) {});

@@ -118,7 +118,7 @@ struct Record {
   Op op{};
   Bytes content;
 };
-/// Removes the first record from `bytes` and returns it; nothing if it is truncated.
+/// Removes the first record from `bytes` and returns it. Returns nothing if it is truncated.
 std::optional<Record> takeRecord(Bytes& bytes);
 
 void putSchema(std::vector<std::uint8_t>& to, const Schema& schema);

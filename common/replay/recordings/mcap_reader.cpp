@@ -214,7 +214,7 @@ Reader::Summary Reader::takeSummary(Bytes records) {
   return counted && describesAll() ? Summary::kHolds : Summary::kTooLittle;
 }
 
-/// Whether all chunks lie within the file.
+/// Returns whether all chunks lie within the file.
 bool Reader::plausible() const {
   return std::all_of(chunks_.begin(), chunks_.end(), [this](const ChunkIndex& chunk) {
     return chunk.offset >= kMagic.size() && chunk.offset <= size_ && chunk.length >= kRecordHead &&
@@ -222,7 +222,7 @@ bool Reader::plausible() const {
   });
 }
 
-/// Whether the summary alone locates all messages with their channels and schemas.
+/// Returns whether the summary alone locates all messages with their channels and schemas.
 bool Reader::describesAll() const {
   if (statistics_.messages == 0) return true;
   return !chunks_.empty() && chunks_.size() == statistics_.chunks &&
@@ -406,7 +406,7 @@ Result<void> Reader::finish() {
   const bool lacks_index =
       !chunks.empty() && chunks.back().index_offsets.size() != last_index_.size();
   std::optional<ChunkIndex> last;
-  std::uint64_t end = whole_ <= kMagic.size() ? 0 : whole_;  // 0: from the start
+  std::uint64_t end = whole_ <= kMagic.size() ? 0 : whole_;  // 0: rewrite all
   if (lacks_index) {
     last = chunks.back();
     last->index_length = 0;

@@ -32,17 +32,17 @@ class Reader {
   ~Reader();
 
   const std::filesystem::path& path() const { return path_; }
-  /// Whether the file is complete: a footer, the magic, and no wrong summary. Otherwise a scan has
-  /// found all complete records.
+  /// Returns whether the file is complete: a footer, the magic, and no wrong summary. Otherwise a
+  /// scan has found all complete records.
   bool finished() const { return finished_; }
-  /// Whether another recording follows in the same file, as after `cat` of two files. The second
-  /// one is not read.
+  /// Returns whether another recording follows in the same file, as after `cat` of two files. The
+  /// second one is not read.
   bool followed() const { return followed_; }
   const Catalogue& catalogue() const { return catalogue_; }
   const std::vector<ChunkIndex>& chunks() const { return chunks_; }
   const Statistics& statistics() const { return statistics_; }
   std::uint64_t size() const { return size_; }
-  /// For an unfinished file: number of bytes after the last complete chunk.
+  /// Number of bytes after the last complete chunk of an unfinished file.
   std::uint64_t cutBytes() const { return size_ - whole_; }
   /// Damage found by a scan.
   const std::vector<Damage>& damage() const { return damage_; }

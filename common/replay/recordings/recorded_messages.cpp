@@ -27,7 +27,7 @@ std::vector<fs::path> plainFilesIn(const fs::path& path) {
   return files;
 }
 
-/// True for topics that a recorder repeats at the start of each segment.
+/// Returns true for topics that a recorder repeats at the start of each segment.
 bool isLatchedAlone(const std::string& topic) { return topic == "calibration" || topic == "model"; }
 
 }  // namespace

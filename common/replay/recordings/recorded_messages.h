@@ -43,7 +43,7 @@ class RecordedMessages {
     std::uint64_t messages = 0;
   };
 
-  /// Whether every chunk is unpacked at once, so that topics() describes the readable part.
+  /// kEach: every chunk is unpacked at once, so that topics() describes the readable part.
   enum class Chunks { kByIndex, kEach };
   /// Opens a .mcap file, or a folder that contains such files. Compressed files (.mcap.zstd) are
   /// unpacked. Throws StartupError with the fix.
@@ -62,8 +62,8 @@ class RecordedMessages {
   /// Restarts with these topics only (all if `wanted` is empty), without chunks that end before
   /// `from_ns`.
   void rewind(std::function<bool(const std::string& topic)> wanted = {}, std::uint64_t from_ns = 0);
-  /// The next message by log time; nothing at the end. Messages repeated by the recorder at the
-  /// start of each segment (calibration, model) are returned once.
+  /// The next message by log time. Returns nothing at the end. Messages repeated by the recorder at
+  /// the start of each segment (calibration, model) are returned once.
   std::optional<RecordedMessage> next();
 
  private:

@@ -65,8 +65,8 @@ std::unique_ptr<RosSource> openDb3(const std::filesystem::path& file);
 
 class RosMessages {
  public:
-  /// Whether the path is such a file, or a folder with such files. Recordings of Perdure are
-  /// excluded.
+  /// Returns whether the path is such a file, or a folder with such files. Recordings of Perdure
+  /// are excluded.
   static bool looksLikeOne(const std::filesystem::path& path);
   /// Throws StartupError with the fix.
   explicit RosMessages(const std::filesystem::path& path);
@@ -99,7 +99,7 @@ class RosMessages {
   std::vector<std::optional<RosMessage>> heads_;  ///< the next message of each source
   RosTopics topics_;
   std::uint64_t start_ns_ = UINT64_MAX, end_ns_ = 0;
-  ReasonCounts reasons_;  ///< in addition to those of the sources
+  ReasonCounts reasons_;  ///< counts not included in those of the sources
   std::string last_problem_;
 };
 

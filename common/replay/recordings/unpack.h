@@ -16,9 +16,9 @@ std::vector<std::uint8_t> unpackedBz2(std::span<const std::uint8_t> packed, std:
 std::vector<std::uint8_t> unpackedLz4(std::span<const std::uint8_t> packed, std::uint64_t most);
 std::vector<std::uint8_t> unpackedZstd(std::span<const std::uint8_t> packed, std::uint64_t most);
 
-/// Whether the bytes begin with a zstd frame.
+/// Returns whether the bytes begin with a zstd frame.
 bool isZstd(std::span<const std::uint8_t> bytes);
-/// Decompresses one frame; nothing if it is damaged, truncated or larger than `most`.
+/// Decompresses one frame. Returns nothing if it is damaged, truncated or larger than `most`.
 std::optional<std::vector<std::uint8_t>> wholeOfZstd(std::span<const std::uint8_t> packed,
                                                      std::uint64_t most);
 

@@ -62,7 +62,7 @@ class Unpacking {
   explicit Unpacking(OpenFile in) : in_(std::move(in)), room_(ZSTD_DStreamOutSize()) { read(); }
 
   bool empty() const { return filled_.size == 0; }
-  /// Whether the available bytes match the start of a zstd frame.
+  /// Returns whether the available bytes match the start of a zstd frame.
   bool looksPacked() const {
     constexpr std::array<std::uint8_t, 4> kFrame{0x28, 0xB5, 0x2F, 0xFD},
         kSkippable{0x50, 0x2A, 0x4D, 0x18};

@@ -34,7 +34,8 @@ class UnpackedFile {
   std::uint64_t size_ = 0;
 };
 
-/// Whether a file is compressed and contains a file with this extension: "run_0.db3.zstd" or .zst.
+/// Returns whether a file is compressed and contains a file with this extension: "run_0.db3.zstd"
+/// or .zst.
 bool isPacked(const std::filesystem::path& file, std::string_view extension);
 /// `path` itself, or the compressed files of a folder that have no unpacked file beside them;
 /// sorted by name.

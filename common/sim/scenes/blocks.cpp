@@ -59,7 +59,7 @@ std::vector<Eigen::Vector2d> turnsAmongBlocks(Dice& dice) {
   return points;
 }
 
-/// For each block, the number of objects that differ from the template of all blocks.
+/// The number of objects in each block that differ from the template of all blocks.
 std::vector<std::size_t> changesOf(Dice& dice) {
   std::vector<std::size_t> changes(kBlocks, 0);
   for (std::size_t i = 0; i < kBlocks; ++i) {

@@ -42,7 +42,7 @@ inline constexpr std::size_t kDetections =
 inline constexpr std::size_t kLandmarks = 65536;
 inline constexpr std::size_t kObjects = 16384;
 inline constexpr std::size_t kReplyObjects = 100000;
-inline constexpr std::size_t kReplyAnchors = 65536;  ///< and loops between them
+inline constexpr std::size_t kReplyAnchors = 65536;  ///< also the limit of loops
 inline constexpr std::size_t kReasons = 1024;
 inline constexpr std::size_t kEvidenceKinds = 64;
 /// Tolerance of the norm of a quaternion or a unit vector, and of the sum of a PMF.

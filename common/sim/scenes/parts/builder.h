@@ -45,7 +45,7 @@ class SceneBuilder {
   /// Returns false, without an effect, if the gap to any other object would be less than `margin`.
   bool put(SceneObject object, const Place& place, double margin = 0.05);
   bool put(PropKind kind, const Eigen::Vector3d& size, const Place& place, double margin = 0.02);
-  /// Like `put`, for essential objects of a scene. Returns a reference to the new object.
+  /// Places an object as put() does, but aborts on failure. Returns a reference to the new object.
   SceneObject& mustPut(SceneObject object, const Place& place);
   void mustPut(PropKind kind, const Eigen::Vector3d& size, const Place& place);
   /// Adds an object with its own motion, which the caller has checked (see reserveWay).

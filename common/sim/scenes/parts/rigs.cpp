@@ -8,7 +8,7 @@ namespace perdure::sim {
 namespace {
 
 constexpr double kHalfFieldOfView = 40.0 * M_PI / 180.0;
-constexpr double kReadout = 0.02;  ///< rolling shutter, s
+constexpr double kReadout = 0.02;  ///< readout time of the rolling shutter, s
 
 CameraCalibration makeCamera(const std::string& name, const SceneOptions& options, double left,
                              double pitch_down) {

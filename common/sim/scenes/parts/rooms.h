@@ -40,7 +40,7 @@ class Room {
 struct Gaze {
   double swing = 1.0, period_s = 13.0;  ///< amplitude of the yaw to each side, radians
   double second_swing = 0.18, second_period_s = 4.7;
-  double middle = 0.0;                                ///< relative to the path
+  double middle = 0.0;                                ///< mean direction relative to the path
   double pitch_down = 0.12, nod = 0.07, tilt = 0.05;  ///< radians
 };
 

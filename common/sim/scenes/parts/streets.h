@@ -10,7 +10,7 @@ namespace perdure::sim {
 
 /// The kinds and densities of objects along a street. Distances in metres.
 struct Furnishing {
-  double mean_gap = 1.6;         ///< between parked vehicles
+  double mean_gap = 1.6;         ///< gap between parked vehicles
   double free_share = 0.22;      ///< share of empty slots, 5 to 11 m long
   double van_share = 0.16;       ///< among parked vehicles
   double reversed_share = 0.12;  ///< share of vehicles parked against the traffic
@@ -24,7 +24,7 @@ struct Furnishing {
 inline constexpr double kRoadWidth = 10.0;  ///< two lanes and two rows of parked cars
 inline constexpr double kLane = 1.4;        ///< road's centre line to the centre of a lane
 
-inline constexpr double kGridX = 82.0, kGridY = 66.0;  ///< between the roads of a grid
+inline constexpr double kGridX = 82.0, kGridY = 66.0;  ///< distance between roads
 /// Roads in rows (along x) and columns, which extend slightly beyond the outer crossings. The first
 /// crossing is at the origin.
 std::vector<Road> gridOfRoads(int columns, int rows);

@@ -89,7 +89,7 @@ std::optional<Eigen::Vector2d> ViewFinder::standAt(const SceneObject& object, do
   return std::nullopt;
 }
 
-/// True if at least two of five points of the object are visible.
+/// Returns true if at least two of five points of the object are visible.
 bool ViewFinder::sees(const Eigen::Vector3d& eye, const SceneObject& object) const {
   const RigidTransform T_WO = object.motion.poseAt(0.0);
   int seen = 0;
