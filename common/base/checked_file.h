@@ -28,7 +28,7 @@ class CheckedFile {
   std::ofstream stream_;
 };
 
-/// Writes the whole content at once; throws as CheckedFile does.
+/// Writes the whole content at once. Throws like CheckedFile.
 void writeChecked(const std::filesystem::path& file, std::string_view content);
 
 /// Flushes a stream into `file`, which stays open. Throws StartupError(kInputOutput) if the flush

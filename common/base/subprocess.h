@@ -63,7 +63,7 @@ struct ProgramAnswer {
 };
 
 /// Runs a program to its end and returns its output (`options.log` must be empty). The program is
-/// killed after `longest`. Throws as Subprocess does.
+/// killed after `longest`. Throws like Subprocess.
 ProgramAnswer runProgram(const ProgramOptions& options,
                          std::chrono::milliseconds longest = std::chrono::hours(1));
 

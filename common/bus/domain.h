@@ -48,7 +48,8 @@ Options commonOptions(const std::string& folder, std::vector<config::Problem>& p
 Options withEnvironment(Options options);
 
 /// Cyclone's configuration for these options, in the form of CYCLONEDDS_URI. `locator` is that of
-/// shared memory; empty: without. Security is set for the participant and is not included.
+/// shared memory; if it is empty, shared memory is off. Security is set for the participant and is
+/// not included.
 std::string configurationXml(const Options& options, const std::string& locator = {});
 /// The configuration for third-party programs, with the identity if the options name one.
 std::string foreignXml(const Options& options);

@@ -84,9 +84,9 @@ struct Problem {
   std::string str() const;
 };
 
-/// Reads YAML text into the fields' targets and returns *all* problems at once: syntax errors,
-/// unknown keys (with the nearest known one), wrong types, values out of range, missing keys,
-/// repeated keys. Targets of faulty fields retain their defaults.
+/// Reads YAML text into the fields' targets and returns *all* problems at once. They are syntax
+/// errors, unknown keys (with the nearest known one), wrong types, values out of range, missing
+/// keys and repeated keys. Targets of faulty fields retain their defaults.
 std::vector<Problem> readYaml(Fields& fields, const std::string& yaml, const std::string& file);
 /// Applies readYaml to the content of a file. A file that cannot be read is a problem too.
 std::vector<Problem> readFile(Fields& fields, const std::string& path);

@@ -139,7 +139,7 @@ PERDURE_INLINE void timesTransposedTile(const double* A, long rows, const double
   }
 }
 
-/// Computes all rows from i on of these columns.
+/// Computes all rows from i on of columns j to j + N of A Bᵀ.
 template <int N>
 PERDURE_INLINE void timesTransposedColumns(const double* A, long rows, const double* B,
                                            long columns, long inner, long i, long j,

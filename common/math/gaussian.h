@@ -103,7 +103,7 @@ void makeSymmetric(Matrix& P) {
   P = (0.5 * (P + P.transpose())).eval();
 }
 
-/// Finite, symmetric within 1e-6 relative, and positive definite.
+/// Returns whether P is finite, symmetric within 1e-6 relative, and positive definite.
 template <class Derived>
 bool isCovariance(const Eigen::MatrixBase<Derived>& P) {
   if (P.rows() != P.cols() || !P.allFinite()) return false;

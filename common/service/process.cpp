@@ -54,7 +54,7 @@ void ClockSteps::look() {
   constexpr std::int64_t kStep = 100'000'000;  // ns; NTP slews at most 0.5 ms per second
   std::int64_t within = 0;
   const std::int64_t offset = wallOffsetNs(within);
-  if (within > kStep / 2) return;  // interrupted between the readings: try again next time
+  if (within > kStep / 2) return;  // interrupted between the readings
   if (std::abs(offset - offset_ns_) > kStep) {
     ++count_;
     last_ = std::chrono::steady_clock::now();

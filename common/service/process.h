@@ -14,7 +14,7 @@ std::uint64_t residentBytes();  ///< memory in use
 class ClockSteps {
  public:
   ClockSteps();
-  /// To be called once a second.
+  /// Checks for a step. Call it once a second.
   void look();
   std::uint64_t count() const { return count_; }
   bool recent() const;  ///< true if there was a step in the last 30 s

@@ -237,7 +237,7 @@ class Roughness {
       if (lap_m > 0.0) wave.length = lap_m / std::round(lap_m / wave.length);
     }
   }
-  /// Three heights within -1 and 1, for bounce, roll and pitch.
+  /// Three heights between -1 and 1, for bounce, roll and pitch.
   Eigen::Vector3d at(double distance) const {
     Eigen::Vector3d height = Eigen::Vector3d::Zero();
     for (std::size_t i = 0; i < waves_.size(); ++i) {

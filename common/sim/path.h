@@ -57,7 +57,7 @@ struct Drive {
 /// or until it stops at distance `to` (infinite: never).
 Drive drive(const GroundPath& path, const SpeedLimits& limits, double from, double to,
             double rest_s, double until_s);
-/// Constant speed from start to end, without a rest.
+/// Drives at constant speed from start to end, without a rest.
 Drive cruise(double from, double speed, double from_s, double until_s);
 
 /// The response of a vehicle's body to acceleration and to the road.

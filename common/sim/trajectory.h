@@ -1,5 +1,5 @@
-// The pose of a body at any time, with exact derivatives: a uniform quintic B-spline for the
-// position and a cumulative one of order 5 for the rotation (Sommer et al., "Efficient Derivative
+// The pose of a body at any time, with exact derivatives. The position is a uniform quintic
+// B-spline, the rotation a cumulative one of order 5 (Sommer et al., "Efficient Derivative
 // Computation for Cumulative B-Splines on Lie Groups", CVPR 2020).
 #pragma once
 

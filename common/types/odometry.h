@@ -47,7 +47,7 @@ struct Landmark {
   Eigen::Vector3d p_W = Eigen::Vector3d::Zero();
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< m², in W, relative to the pose
   Eigen::Matrix<double, 3, 6> cross_pose = Eigen::Matrix<double, 3, 6>::Zero();  ///< [θ, p]
-  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  ///< distorted, in `camera`
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  ///< distorted pixel in `camera`
   std::array<std::uint8_t, 32> descriptor{};        ///< 256-bit BRIEF (ORB), or zeros
 };
 

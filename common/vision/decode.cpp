@@ -37,7 +37,7 @@ std::string headOf(const std::string& path) {
   return head;
 }
 
-/// Returns true for JPEG and 8-bit PNG, by the header. Other formats must be decoded.
+/// Returns true if the header is that of a JPEG or an 8-bit PNG. Other formats must be decoded.
 bool hasEightBits(std::string_view bytes) {
   if (bytes.starts_with("\xFF\xD8")) return true;
   return bytes.starts_with("\x89PNG") && bytes.size() > kDepthOfPng && bytes[kDepthOfPng] <= 8;

@@ -62,7 +62,8 @@ bool inside(double value, const Limits& limits) {
 }
 
 bool isSizeOf(const Frame& frame, std::size_t bytes) {
-  constexpr std::size_t kFewest = 4, kHeaders = 4096;  // start and end mark; tables, comments
+  constexpr std::size_t kFewest = 4, kHeaders = 4096;  // bytes of start and end marks; bytes of
+                                                       // tables and comments
   const std::size_t pixels = std::size_t{frame.width} * frame.height * channelsOf(frame.encoding);
   if (!isCompressed(frame.encoding)) return bytes == pixels;
   return bytes >= kFewest && bytes <= 2 * pixels + kHeaders;

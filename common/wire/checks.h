@@ -13,11 +13,12 @@ namespace perdure::wire {
 bool inside(double value, const Limits& limits);
 /// Returns whether `bytes` is a possible size of the frame's data: raw pixels or a JPEG of them.
 bool isSizeOf(const Frame& frame, std::size_t bytes);
-/// Valid UTF-8 without NUL.
+/// Returns whether `text` is valid UTF-8 without NUL.
 bool isText(std::string_view text);
-/// Symmetric and positive semi-definite within rounding, for any units of its rows.
+/// Returns whether P is symmetric and positive semi-definite within rounding, for any units of its
+/// rows.
 bool isSemiDefinite(const Eigen::Ref<const Eigen::MatrixXd>& P);
-/// Symmetric and positive definite, for any units of its rows.
+/// Returns whether P is symmetric and positive definite, for any units of its rows.
 bool isDefinite(const Eigen::Ref<const Eigen::MatrixXd>& P);
 
 }  // namespace perdure::wire

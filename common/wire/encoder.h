@@ -125,7 +125,7 @@ class Encoder : public Checked {
   void pixels(const char* name, const Frame& d, perdure_msg_Frame& w) {
     if (!d.data || !isSizeOf(d, d.data->size())) return refuse(name, "size_mismatch");
     if (!checkCount(name, d.data->size(), kImageBytes)) return;
-    w.pixels._buffer = const_cast<std::uint8_t*>(d.data->data());  // not modified
+    w.pixels._buffer = const_cast<std::uint8_t*>(d.data->data());  // the data are not modified
     w.pixels._length = w.pixels._maximum = static_cast<std::uint32_t>(d.data->size());
     w.pixels._release = false;
   }

@@ -91,8 +91,8 @@ class Departures {
   }
 
  private:
-  /// Returns nothing if the drive itself has another object of the class there, because the deleted
-  /// object was then a duplicate.
+  /// Returns the object of another drive at the place of `gone`. Returns nothing if the drive
+  /// itself has another object of the class there, because `gone` was then a duplicate.
   const Standing* leftBy(const StoredObject& gone) const {
     const auto where = places_.of(gone);
     if (!where) return nullptr;

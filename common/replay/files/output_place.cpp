@@ -19,7 +19,7 @@ fs::path realOf(const fs::path& path) {
 
 constexpr char kRun[] = "run.mcap";
 
-/// Names of sensor folders in the supported layouts.
+/// Returns whether `name` is a sensor folder in a supported layout.
 bool isOfSensors(const std::string& name) {
   constexpr std::array kSensorFolders{"mav0",  "oxts", "calib",   "color",
                                       "depth", "pose", "label_02"};

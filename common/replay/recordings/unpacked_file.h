@@ -42,7 +42,7 @@ bool isPacked(const std::filesystem::path& file, std::string_view extension);
 std::vector<std::filesystem::path> packedFiles(const std::filesystem::path& path,
                                                std::string_view extension);
 using UnpackedFiles = std::vector<std::shared_ptr<const UnpackedFile>>;
-/// All of packedFiles(), unpacked. Throws as UnpackedFile::of.
+/// All of packedFiles(), unpacked. Throws like UnpackedFile::of.
 UnpackedFiles unpackedFiles(const std::filesystem::path& path, std::string_view extension);
 
 }  // namespace perdure::replay

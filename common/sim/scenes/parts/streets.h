@@ -12,7 +12,7 @@ namespace perdure::sim {
 struct Furnishing {
   double mean_gap = 1.6;         ///< gap between parked vehicles
   double free_share = 0.22;      ///< share of empty slots, 5 to 11 m long
-  double van_share = 0.16;       ///< among parked vehicles
+  double van_share = 0.16;       ///< share of vans among parked vehicles
   double reversed_share = 0.12;  ///< share of vehicles parked against the traffic
   double tree_every = 15.0, pole_every = 27.0;
   double person_every = 26.0, bicycle_every = 24.0;  ///< spacing along the pavement

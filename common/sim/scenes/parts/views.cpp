@@ -42,7 +42,7 @@ View ViewFinder::draw() {
     const auto view = lookAt(builder_.scene().objects[dice.pick(indices)]);
     if (view) return *view;
   }
-  // A random view without a target object.
+  // No object was visible; choose a random view without a target.
   for (;;) {
     const Eigen::Vector2d point(dice.uniform(area_.low.x(), area_.high.x()),
                                 dice.uniform(area_.low.y(), area_.high.y()));
