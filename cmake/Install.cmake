@@ -1,5 +1,5 @@
-# What is installed, in the components that deploy/packages makes packages of. The folders are
-# those of GNUInstallDirs; PERDURE_SYSTEM_LIBDIR is where systemd and udev look, relative to the
+# Installs the project as components; deploy/packages turns each into a package. The folders follow
+# GNUInstallDirs. PERDURE_SYSTEM_LIBDIR is the folder that systemd and udev read, relative to the
 # prefix or absolute (Debian 12: /lib).
 include_guard()
 include(GNUInstallDirs)
@@ -10,8 +10,8 @@ set(share ${CMAKE_INSTALL_DATADIR}/perdure)
 set(etc ${CMAKE_INSTALL_FULL_SYSCONFDIR}/perdure)
 set(state ${CMAKE_INSTALL_FULL_LOCALSTATEDIR}/lib/perdure)
 
-# perdure_installed_config(FILE [OLD NEW]…): config/FILE, with each line OLD replaced by NEW where
-# an installation has its files elsewhere than the source tree.
+# perdure_installed_config(FILE [OLD NEW]…): installs config/FILE. Each line OLD is replaced by NEW,
+# because an installation has its files in other folders than the source tree.
 function(perdure_installed_config file)
   file(READ ${PROJECT_SOURCE_DIR}/config/${file} text)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/config/${file})
@@ -28,7 +28,7 @@ function(perdure_installed_config file)
   install(FILES ${PROJECT_BINARY_DIR}/etc/${file} DESTINATION ${etc} COMPONENT services)
 endfunction()
 
-# The services, their configuration, and what the system must know of them.
+# The services, their configuration, and the files that the system needs to run them.
 install(TARGETS perdure-capture perdure-vio perdure-inference perdure-semantic-filter
   perdure-map-store COMPONENT services)
 perdure_installed_config(capture.yaml "state: \"\"         #" "state: ${state}/capture.json #")
@@ -42,7 +42,7 @@ perdure_installed_config(bus.yaml)
 perdure_installed_config(class_priors.yaml)
 perdure_installed_config(class_aliases.yaml)
 install(FILES deploy/roudi.toml DESTINATION ${etc} COMPONENT services)
-# /usr/share/perdure looks like the root of the sources: config, models, perdure_model.
+# /usr/share/perdure has the layout of the source root: config, models, perdure_model.
 install(CODE "
   set(folder \"\$ENV{DESTDIR}${CMAKE_INSTALL_FULL_DATADIR}/perdure\")
   file(MAKE_DIRECTORY \"\${folder}\")
@@ -58,7 +58,7 @@ foreach(kind sysctl sysusers tmpfiles)
     COMPONENT services)
 endforeach()
 
-# What shows it, with the page where npm built one.
+# The gateway, with its web page if npm built one.
 install(TARGETS perdure-gateway COMPONENT gateway)
 install(FILES deploy/systemd/perdure-gateway.service
   DESTINATION ${PERDURE_SYSTEM_LIBDIR}/systemd/system COMPONENT gateway)
@@ -72,7 +72,7 @@ install(FILES deploy/systemd/perdure-ros2.service
   DESTINATION ${PERDURE_SYSTEM_LIBDIR}/systemd/system COMPONENT ros2)
 install(FILES config/ros2.yaml DESTINATION ${etc} COMPONENT ros2)
 
-# The command, with what model import runs.
+# The command line tool, with the programs that `model import` runs.
 install(TARGETS perdure COMPONENT tools)
 install(DIRECTORY tools/model/perdure_model DESTINATION ${share} COMPONENT tools
   FILES_MATCHING PATTERN "*.py")
@@ -80,7 +80,7 @@ install(FILES config/simulated_detector.yaml DESTINATION ${etc} COMPONENT tools)
 
 install(DIRECTORY models/ DESTINATION ${share}/models COMPONENT models PATTERN README.md EXCLUDE)
 
-# For Python, where it was built: where Debian's python3 looks.
+# The Python module, if it was built, in the folder that Debian's python3 searches.
 if(TARGET perdure_python)
   set(dist_packages lib/python3/dist-packages/perdure)
   install(TARGETS _perdure _map LIBRARY DESTINATION ${dist_packages} COMPONENT python)
@@ -93,7 +93,7 @@ if(TARGET perdure_python)
     DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/perdure-python/examples COMPONENT python)
 endif()
 
-# For programs of other people: find_package(Perdure), Perdure::idl, #include "idl/objects.h".
+# Files for third-party programs: find_package(Perdure), Perdure::idl, #include "idl/objects.h".
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/Perdure)
 set_target_properties(perdure_idl PROPERTIES EXPORT_NAME idl)
 target_include_directories(perdure_idl SYSTEM INTERFACE

@@ -1,4 +1,4 @@
-# How every folder declares its library, program and tests: one call each.
+# Functions by which every folder declares its library, program and tests, with one call each.
 include_guard()
 
 add_library(perdure_options INTERFACE)
@@ -8,19 +8,21 @@ target_compile_options(perdure_options INTERFACE
   $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
     -Wimplicit-fallthrough -Wnull-dereference -Wno-psabi>
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PERDURE_WARNINGS_AS_ERRORS}>>:-Werror>
-  # Release of GCC 12 warns falsely inside Eigen's and the standard library's inlined code.
+  # GCC 12 gives false warnings in Release builds, inside inlined code of Eigen and the standard
+  # library.
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<COMPILE_LANGUAGE:CXX>>:-Wno-maybe-uninitialized -Wno-array-bounds
     -Wno-stringop-overflow -Wno-stringop-overread -Wno-null-dereference -Wno-restrict>)
 
-# The second linker of binutils takes a fifth of the time: OpenCV's libraries name hundreds of others.
+# The gold linker needs a fifth of the time, because the libraries of OpenCV depend on hundreds of
+# others.
 include(CheckLinkerFlag)
 check_linker_flag(CXX -fuse-ld=gold PERDURE_GOLD)
 if(PERDURE_GOLD)
   add_link_options(-fuse-ld=gold)
 endif()
 
-# What nearly every file reads first, compiled once: three seconds of each file. Code for
-# modules (perdure_loadable) needs headers of its own.
+# Precompiles the headers that nearly every file includes, which saves three seconds per file. Code
+# for modules (perdure_loadable) needs its own precompiled headers.
 file(GENERATE OUTPUT ${PROJECT_BINARY_DIR}/common_headers.cpp CONTENT "")
 foreach(kind common loadable)
   add_library(perdure_${kind}_headers STATIC ${PROJECT_BINARY_DIR}/common_headers.cpp)
@@ -31,16 +33,16 @@ endforeach()
 set_target_properties(perdure_loadable_headers PROPERTIES POSITION_INDEPENDENT_CODE ON)
 target_compile_options(perdure_loadable_headers PRIVATE -fno-semantic-interposition)
 
-# Compiles the files of a target in batches: where many small files read the same large headers
-# that takes a third of the time. Names of unnamed namespaces must then differ within the target.
+# Compiles the files of a target in batches. This takes a third of the time if many small files
+# include the same large headers. Names in unnamed namespaces must then differ within the target.
 function(perdure_together name)
   set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
-  # GCC takes a file of a batch for a header, and a struct defined there for one that others see.
+  # GCC treats a file of a batch as a header, and warns about structs defined there.
   target_compile_options(${name} PRIVATE
     $<$<AND:$<CXX_COMPILER_ID:GNU>,$<COMPILE_LANGUAGE:CXX>>:-Wno-subobject-linkage>)
 endfunction()
 
-# perdure_library(NAME SOURCES … DEPENDS … [TOGETHER]): a static library; NAME is the folder with
+# perdure_library(NAME SOURCES … DEPENDS … [TOGETHER]): a static library. NAME is the folder with
 # underscores. TOGETHER compiles its files in batches.
 function(perdure_library name)
   cmake_parse_arguments(ARG "TOGETHER" "" "SOURCES;DEPENDS" ${ARGN})
@@ -66,16 +68,16 @@ function(perdure_program name)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
 endfunction()
 
-# What no test of `tests/run` needs is built by name, or all of it as `long_tests`: benchmarks, and
-# what only tests labelled long use.
+# Targets that no test of `tests/run` needs are built by name, or all together as `long_tests`.
+# These are the benchmarks and the targets that only tests labelled long use.
 add_custom_target(long_tests)
 function(perdure_only_when_asked name)
   set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
   add_dependencies(long_tests ${name})
 endfunction()
 
-# perdure_benchmark(NAME SOURCES … DEPENDS … [SMOKE ARGS…]): an executable in bench/, built when
-# asked. SMOKE: a test labelled long runs it with these, to see that it runs.
+# perdure_benchmark(NAME SOURCES … DEPENDS … [SMOKE ARGS…]): an executable in bench/, built on
+# request only. SMOKE: a test labelled long runs the benchmark with these arguments.
 function(perdure_benchmark name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;SMOKE" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
@@ -88,8 +90,8 @@ function(perdure_benchmark name)
   endif()
 endfunction()
 
-# What every test reads first, compiled once; and the tests' own files are optimised less: what they
-# test is in libraries.
+# Precompiles the headers that every test includes. The files of the tests are optimised less,
+# because the code under test is in libraries.
 if(PERDURE_BUILD_TESTS)
   file(GENERATE OUTPUT ${PROJECT_BINARY_DIR}/test_headers.cpp CONTENT "")
   add_library(perdure_test_headers STATIC ${PROJECT_BINARY_DIR}/test_headers.cpp)
@@ -99,8 +101,8 @@ if(PERDURE_BUILD_TESTS)
     <gmock/gmock.h> <gtest/gtest.h> <Eigen/Core> <Eigen/Geometry>)
 endif()
 
-# perdure_test_program(NAME SOURCES … DEPENDS …): a GoogleTest program in tests/, whose files are
-# compiled in batches.
+# perdure_test_program(NAME SOURCES … DEPENDS …): a GoogleTest program in tests/, compiled in
+# batches.
 function(perdure_test_program name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
@@ -114,8 +116,8 @@ function(perdure_test_program name)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/tests)
 endfunction()
 
-# perdure_test(NAME SOURCES … DEPENDS … [LABELS …] [TIMEOUT s] [ARGS …]): one such program, one
-# ctest entry. Labels: unit (default), process, scenario, golden, fuzz, data, long.
+# perdure_test(NAME SOURCES … DEPENDS … [LABELS …] [TIMEOUT s] [ARGS …]): a GoogleTest program with
+# one ctest entry. Labels: unit (default), process, scenario, golden, fuzz, data, long.
 function(perdure_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPENDS;LABELS;ARGS;ENVIRONMENT" ${ARGN})
   if(NOT PERDURE_BUILD_TESTS)
@@ -135,15 +137,15 @@ function(perdure_test name)
     ENVIRONMENT "PERDURE_BIN=${PROJECT_BINARY_DIR}/bin;PERDURE_SOURCE=${PROJECT_SOURCE_DIR};${ARG_ENVIRONMENT}")
 endfunction()
 
-# perdure_fast(NAME): a library in which a vehicle's time goes. GCC would take the optimisation of a
-# precompiled header, not this one, without a word.
+# perdure_fast(NAME): a library that takes much of the run time on a vehicle. It has no precompiled
+# header, because GCC would silently use the optimisation level of that header.
 function(perdure_fast name)
   target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O3>)
   set_target_properties(${name} PROPERTIES DISABLE_PRECOMPILE_HEADERS ON)
 endfunction()
 
-# perdure_loadable(TARGETS…): libraries that go into a module which another program loads. Calls
-# within them stay as they are in programs.
+# perdure_loadable(TARGETS…): libraries that are linked into a module, which another program loads.
+# Calls within these libraries stay direct, as in programs.
 function(perdure_loadable)
   foreach(target ${ARGN})
     set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)

@@ -1,4 +1,4 @@
-// The .idl files as text, for recordings, which carry the schemas of what they hold.
+// The .idl files as text, for recordings, which contain the schemas of their messages.
 #pragma once
 
 #include <span>
@@ -7,10 +7,10 @@
 namespace perdure::idl {
 
 struct File {
-  std::string_view path;  ///< as #include names it: "idl/base.idl"
+  std::string_view path;  ///< path in #include: "idl/base.idl"
   std::string_view text;
 };
-/// What a file includes stands before it.
+/// All files. A file follows the files that it includes.
 std::span<const File> files();
 
 }  // namespace perdure::idl

@@ -1,4 +1,4 @@
-// A queue between two threads with a bound, a named policy when it is full, and a count of drops.
+// A bounded queue between two threads, with a named policy for a full queue and a count of drops.
 #pragma once
 
 #include <chrono>
@@ -14,8 +14,8 @@
 namespace perdure {
 
 enum class Overflow {
-  kDropOldest,  ///< newest first in importance: what is old is lost and counted
-  kBlock,       ///< the producer waits: nothing is lost
+  kDropOldest,  ///< the oldest element is dropped and counted
+  kBlock,       ///< the producer waits; nothing is lost
 };
 
 template <class T>
@@ -25,7 +25,7 @@ class BoundedQueue {
     check(capacity > 0, "a queue holds at least one element");
   }
 
-  /// False when the queue was closed.
+  /// Returns false if the queue is closed.
   bool push(T value) {
     std::unique_lock lock(mutex_);
     if (policy_ == Overflow::kBlock) {
@@ -41,21 +41,21 @@ class BoundedQueue {
     return true;
   }
 
-  /// Waits for an element; nothing once the queue is closed and empty.
+  /// Waits for an element. Returns nothing if the queue is closed and empty.
   std::optional<T> pop() {
     std::unique_lock lock(mutex_);
     not_empty_.wait(lock, [&] { return closed_ || !queue_.empty(); });
     return takeFront();
   }
 
-  /// Waits for an element so long at most.
+  /// Waits for an element, at most for `longest`.
   std::optional<T> popWithin(std::chrono::nanoseconds longest) {
     std::unique_lock lock(mutex_);
     not_empty_.wait_for(lock, longest, [&] { return closed_ || !queue_.empty(); });
     return takeFront();
   }
 
-  /// An element if there is one, without waiting.
+  /// Returns an element if one is available, without waiting.
   std::optional<T> tryPop() {
     const std::lock_guard lock(mutex_);
     return takeFront();

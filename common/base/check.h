@@ -1,4 +1,4 @@
-// Programmer's mistakes: a condition that must hold, checked in every build type.
+// Checks against programming errors: conditions that must hold, checked in every build type.
 #pragma once
 
 #include <source_location>
@@ -9,7 +9,8 @@ namespace perdure {
 /// Prints "file:line: function: must hold: <what>" to stderr and aborts.
 [[noreturn]] void failCheck(std::string_view what, const std::source_location& where);
 
-/// Aborts with the place and `what must hold` unless `condition`. Never use it on outside input.
+/// Aborts with the source location and `what must hold` unless `condition` is true. Never use it on
+/// external input.
 inline void check(bool condition, std::string_view what,
                   const std::source_location& where = std::source_location::current()) {
   if (!condition) [[unlikely]] failCheck(what, where);

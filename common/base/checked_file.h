@@ -1,4 +1,5 @@
-// Files of results that are whole or not there: written beside their name, and every write checked.
+// Result files that are either complete or absent. A temporary file is written first, and every
+// write is checked.
 #pragma once
 
 #include <filesystem>
@@ -7,19 +8,19 @@
 
 namespace perdure {
 
-/// Writes NAME.part and gives it its name when it is closed; what was there before stays until
-/// then. What is no plain file (a device, a pipe) is written directly.
+/// Writes NAME.part and renames it to NAME when it is closed; an existing file remains until then.
+/// Devices and pipes are written directly.
 class CheckedFile {
  public:
-  /// Throws StartupError(kUnavailable) where the file cannot be opened.
+  /// Throws StartupError(kUnavailable) if the file cannot be opened.
   explicit CheckedFile(std::filesystem::path file);
   CheckedFile(const CheckedFile&) = delete;
   CheckedFile& operator=(const CheckedFile&) = delete;
-  /// Removes what was not closed.
+  /// Removes the file if it was not closed.
   ~CheckedFile();
 
   std::ostream& stream() { return stream_; }
-  /// Throws StartupError(kInputOutput), and removes what there is, where not all was written.
+  /// If a write failed, removes the temporary file and throws StartupError(kInputOutput).
   void close();
 
  private:
@@ -27,11 +28,11 @@ class CheckedFile {
   std::ofstream stream_;
 };
 
-/// The whole content at once; throws as CheckedFile does.
+/// Writes the whole content at once. Throws like CheckedFile.
 void writeChecked(const std::filesystem::path& file, std::string_view content);
 
-/// Flushes a stream into `file` that stays open; throws StartupError(kInputOutput) where that, or
-/// anything before, did not succeed.
+/// Flushes a stream into `file`, which stays open. Throws StartupError(kInputOutput) if the flush
+/// or an earlier write failed.
 void flushChecked(std::ostream& stream, const std::filesystem::path& file);
 
 /// Throws StartupError(kInputOutput): "FILE: `why` (or the system's reason); free space, …".

@@ -1,4 +1,4 @@
-// Reasons for which a program cannot start, with the exit status of sysexits.h.
+// Reasons why a program cannot start, with the exit status of sysexits.h.
 #pragma once
 
 #include <stdexcept>
@@ -10,14 +10,14 @@ enum class ExitCode : int {
   kOk = 0,
   kFailure = 1,
   kUsage = 64,          ///< wrong command line
-  kData = 65,           ///< the data are there, but cannot be used as they are
+  kData = 65,           ///< the data exist, but cannot be used as they are
   kUnavailable = 69,    ///< a device, file or folder is missing or unreadable
-  kInputOutput = 74,    ///< something cannot be written: the disk is full
+  kInputOutput = 74,    ///< a write failed, for example because the disk is full
   kConfiguration = 78,  ///< the configuration is wrong
 };
 
-/// Thrown only before a service runs, and caught once in runService (or a tool's main).
-/// The message is one or more sentences that say the mend.
+/// Thrown only before a service runs, and caught once in runService (or in main of a tool). The
+/// message is one or more sentences that state the fix.
 class StartupError : public std::runtime_error {
  public:
   StartupError(ExitCode code, const std::string& message)

@@ -1,11 +1,11 @@
-// What a program that does the same work for each frame wants of the heap.
+// Heap settings for programs that repeat the same work for each frame.
 #pragma once
 
 namespace perdure {
 
-/// Memory that was freed stays with the process (up to 64 MB of it): by default glibc gives it back
-/// and asks for it again within each frame, a page fault for each 4 kB. For main(); elsewhere than
-/// with glibc it does nothing.
+/// Makes the process retain up to 64 MB of freed memory. By default glibc returns this memory and
+/// requests it again within each frame, which causes a page fault per 4 kB. Call the function in
+/// main(). It has no effect without glibc.
 void keepFreedMemory();
 
 }  // namespace perdure

@@ -10,31 +10,32 @@
 
 namespace perdure {
 
-/// One start of one process; random, never 0 for a real process.
+/// Identifies one start of one process; random, and never 0 for a real process.
 using InstanceId = std::uint64_t;
 InstanceId makeInstanceId();
 
-/// What people and programs call an object: the lowest id among the tracks that the map holds to be
-/// one. Never reused within a map. 0 means "no object".
+/// The public id of an object: the lowest id of the tracks that the map considers one object. Never
+/// reused within a map. 0 means "no object".
 using ObjectId = std::uint64_t;
-/// The filter's estimate of an object over one or more visits. Drawn by the filter, never changed.
+/// The filter's estimate of an object over one or more visits. The filter assigns the id; it never
+/// changes.
 using TrackId = std::uint64_t;
 
-/// Which image a message is about: (source instance, sequence number) is its identity; the rest
-/// is carried along so that no reader has to look it up.
+/// Identifies the image of a message by source instance and sequence number. The other members save
+/// the readers a look-up.
 struct FrameStamp {
   InstanceId source = 0;         ///< the capture process that made the frame
-  std::uint64_t sequence = 0;    ///< index of the frame in the drive; goes on after a restart
+  std::uint64_t sequence = 0;    ///< index of the frame in the drive; continues after a restart
   TimePoint time;                ///< middle of the exposure, sensor clock
-  std::int64_t captured_ns = 0;  ///< CLOCK_MONOTONIC of capture's host when it was handed over
+  std::int64_t captured_ns = 0;  ///< CLOCK_MONOTONIC of capture's host when the frame was passed on
 
   bool sameFrame(const FrameStamp& other) const {
     return source == other.source && sequence == other.sequence;
   }
 };
 
-/// The frame of reference of poses. `world` lives as long as W does, restarts of vio included;
-/// `epoch` goes up whenever W is lost and begun anew.
+/// The frame of reference of poses. `world` is valid as long as W, also across restarts of vio.
+/// `epoch` increases whenever W is lost and restarted.
 struct WorldId {
   std::uint64_t world = 0;
   std::uint32_t epoch = 0;

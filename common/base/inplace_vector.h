@@ -1,5 +1,5 @@
-// A vector of at most N elements that lies where it is declared: nothing on the heap. The part of
-// C++26's std::inplace_vector that is needed here, for default-constructible elements.
+// A vector of at most N elements with storage inside the object, without heap memory. It has the
+// part of C++26's std::inplace_vector that Perdure needs, for default-constructible elements.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@ class InplaceVector {
 
   InplaceVector() = default;
 
-  /// Checked: more than N is a programming error.
+  /// Checked: exceeding N elements is a programming error.
   void push_back(const T& value) {
     check(size_ < N, "an InplaceVector holds no more than its capacity");
     items_[size_++] = value;

@@ -1,4 +1,4 @@
-// What is expected to go wrong at run time (late, malformed, gated out) is a value with a reason.
+// Errors expected at run time (late, malformed, gated out) are values with a reason.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +9,8 @@
 
 namespace perdure {
 
-/// Why something was not done. `code` is a short stable snake_case word that Health counts;
-/// `detail` says what a person needs to mend it.
+/// The reason for a failure. `code` is a short, stable snake_case word that Health counts; `detail`
+/// states how to fix the cause.
 struct Reason {
   std::string code;
   std::string detail;
@@ -23,7 +23,8 @@ inline tl::unexpected<Reason> fail(std::string_view code, std::string_view detai
   return tl::unexpected<Reason>(Reason{std::string(code), std::string(detail)});
 }
 
-/// Counts of reasons since the start, published in Health. Ordered, so that output is repeatable.
+/// Counts of reasons since the start, published in Health. Ordered, so that the output is
+/// repeatable.
 class ReasonCounts {
  public:
   void add(const Reason& reason, std::uint64_t count = 1) { add(reason.code, count); }

@@ -22,7 +22,7 @@ struct Free {
   }
 };
 
-/// A page of it that was never used costs no memory.
+/// Pages that were never used need no memory.
 struct Block {
   std::unique_ptr<std::byte, Free> memory;
   std::size_t used = 0;

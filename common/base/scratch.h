@@ -1,14 +1,15 @@
-// Memory for what lives no longer than one step of an estimator: containers take it from a block of
-// the thread and give it back all at once, when the step ends. In a steady state nothing of them is
-// on the heap.
+// Memory for data that an estimator needs within one step only. Containers take it from a block of
+// the thread, which is freed as a whole at the end of the step. In a steady state the heap is not
+// used.
 //
 //   void step() {
-//     const ScratchScope scope;       // what is taken from here on is free again at its end
+//     const ScratchScope scope;       // frees all memory taken from here on at its end
 //     ScratchVector<double> shares;   // must not outlive the scope
 //   }
 //
-// A container grows in the scope that it was made in, not in one within. Without a scope, or where
-// the block is full, the heap serves; so it does under AddressSanitizer, which sees what outlives.
+// A container may grow only in the scope in which it was created, not in a nested scope. Without a
+// scope, or if the block is full, the heap is used. The heap is also used under AddressSanitizer,
+// which detects containers that outlive their scope.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +21,7 @@
 
 namespace perdure {
 
-/// The block of the present thread. Scopes nest: the inner one ends first.
+/// Uses the block of the current thread. Scopes nest: the inner one ends first.
 class ScratchScope {
  public:
   ScratchScope();
@@ -34,9 +35,9 @@ class ScratchScope {
 
 namespace scratch {
 
-/// Aligned for every scalar and for vectors of 32 bytes.
+/// Memory aligned for every scalar and for vectors of 32 bytes.
 void* take(std::size_t bytes);
-/// Frees what came from the heap; the rest waits for the end of its scope.
+/// Frees memory taken from the heap. Other memory is freed at the end of its scope.
 void giveBack(void* memory);
 
 }  // namespace scratch

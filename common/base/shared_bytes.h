@@ -1,5 +1,5 @@
-// Bytes that several hold and nobody changes: a vector's, or a part of something larger that stays
-// where it lies as long as they are held.
+// Immutable bytes with several owners: a vector, or a part of a larger buffer that stays in place
+// while it has owners.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@ class SharedBytes {
       : keeper_(bytes), bytes_(bytes ? std::span(*bytes) : std::span<const std::uint8_t>()) {}
   SharedBytes(std::shared_ptr<std::vector<std::uint8_t>> bytes)
       : SharedBytes(std::shared_ptr<const std::vector<std::uint8_t>>(std::move(bytes))) {}
-  /// `keeper` keeps what `bytes` point into.
+  /// `keeper` owns the memory that `bytes` refers to.
   SharedBytes(std::shared_ptr<const void> keeper, std::span<const std::uint8_t> bytes)
       : keeper_(std::move(keeper)), bytes_(bytes) {}
 

@@ -1,8 +1,8 @@
-// A vector whose copies share their elements until one of them is written to (copy on write): what
-// is kept of every frame costs what the frame changed. To ask for an element of one that is not
-// const is to write; read() is for those who only look.
+// A vector whose copies share their elements until one of them is modified (copy on write). Data
+// stored for every frame therefore cost only the changed parts. Element access through a non-const
+// vector counts as modification; use read() for reading.
 //
-// Elements that no copy has any more leave their memory to the next ones of the thread.
+// The memory of released elements is reused by later vectors of the same thread.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,7 @@
 
 namespace perdure {
 
-/// Copies may not be written to from several threads at once.
+/// Copies must not be written from several threads at once.
 template <class T>
 class SharedVector {
  public:
@@ -45,15 +45,15 @@ class SharedVector {
     static const Vector kEmpty;
     return block_ ? block_->items : kEmpty;
   }
-  /// Its own from now on, with room for `room` elements. References to elements are void once a copy
-  /// was made.
+  /// Gives write access to unshared elements, with capacity for `room` elements. Making a copy
+  /// invalidates references to elements.
   Vector& write(std::size_t room = 0) {
     if (!block_) {
       block_ = takeBlock();
       block_->items.reserve(room);
     } else if (block_->owners.load(std::memory_order_acquire) > 1) {
       Block* own = takeBlock();
-      // Room to grow: blocks go round, and soon all have enough.
+      // Reserve room to grow. Blocks are reused, so that they soon have enough capacity.
       own->items.reserve(std::max(room, std::bit_ceil(block_->items.size() + 1)));
       own->items = block_->items;
       leave();
@@ -88,7 +88,8 @@ class SharedVector {
   using Spare = std::vector<std::unique_ptr<Block>>;
   static constexpr std::size_t kMostSpare = 512;
 
-  /// Null when the thread ends and its spare blocks are gone already.
+  /// The spare blocks of the thread. Returns null if the thread is ending and the blocks are
+  /// already destroyed.
   static Spare* spare() {
     struct Kept {
       Spare blocks;

@@ -1,4 +1,4 @@
-// Where a node puts its results: DDS in a service, a neighbour or a file in one process.
+// Destination of a node's results: DDS in a service; another node or a file within one process.
 #pragma once
 
 #include <functional>

@@ -55,7 +55,8 @@ struct Pipe {
   }
 };
 
-/// "NAME=value" words: this process's own, with those of `more` in their place.
+/// "NAME=value" strings: the environment of this process, with the values of `more` added or
+/// replaced.
 std::vector<std::string> environmentWith(const std::map<std::string, std::string>& more) {
   std::vector<std::string> words;
   for (char** entry = environ; *entry != nullptr; ++entry) {
@@ -73,14 +74,15 @@ std::vector<char*> pointersTo(std::vector<std::string>& words) {
   return pointers;
 }
 
-/// What the child needs, made before fork: after it only system calls are safe.
+/// The data that the child needs. They are prepared before fork, because only system calls are safe
+/// after it.
 struct Start {
   std::string program, folder;
   std::vector<std::string> words, variables;
   std::vector<char*> arguments, environment;
   bool own_session, ends_with_parent;
-  int output;  ///< -1: that of this process
-  int report;  ///< where errno goes if it cannot be run
+  int output;  ///< -1: the output of this process
+  int report;  ///< pipe for errno if the program cannot be run
   pid_t parent = getpid();
 };
 
@@ -127,7 +129,7 @@ Start startOf(const ProgramOptions& options, int output, int report) {
   _exit(127);
 }
 
-/// Its process, which is then known to run the program.
+/// Returns the id of the child process after its execve has succeeded.
 pid_t launch(const ProgramOptions& options, int output) {
   Pipe report;
   const Start start = startOf(options, output, report.write_end.get());
@@ -139,7 +141,7 @@ pid_t launch(const ProgramOptions& options, int output) {
   ssize_t n = 0;
   do n = read(report.read_end.get(), &why, sizeof why);
   while (n < 0 && errno == EINTR);
-  if (n != static_cast<ssize_t>(sizeof why)) return pid;  // closed by execve
+  if (n != static_cast<ssize_t>(sizeof why)) return pid;  // execve closed the pipe
   waitpid(pid, nullptr, 0);
   refuse(options.command[0], std::strerror(why));
 }
@@ -148,7 +150,7 @@ int statusOf(int wait_status) {
   return WIFEXITED(wait_status) ? WEXITSTATUS(wait_status) : 128 + WTERMSIG(wait_status);
 }
 
-/// Reads until the other end is closed; false where that takes longer.
+/// Reads until the other end is closed. Returns false if that takes longer than `end`.
 bool readAll(int fd, std::string& text, Clock::time_point end) {
   char buffer[4096];
   for (;;) {
@@ -236,7 +238,7 @@ ProgramAnswer runProgram(const ProgramOptions& options, std::chrono::millisecond
   ProgramAnswer answer;
   answer.too_late = !readAll(output.read_end.get(), answer.output, end);
   int status = 0;
-  // What printed is closed; it may still run for a while.
+  // The output is closed, but the process may still run for a while.
   while (!answer.too_late && waitpid(pid, &status, WNOHANG) == 0) {
     answer.too_late = Clock::now() >= end;
     std::this_thread::sleep_for(kStep);

@@ -1,4 +1,5 @@
-// A program that runs beside this one: no shell, its arguments as they are.
+// A program that runs in parallel with this one. No shell is used; the arguments are passed
+// unchanged.
 #pragma once
 
 #include <sys/types.h>
@@ -13,22 +14,22 @@
 namespace perdure {
 
 struct ProgramOptions {
-  std::vector<std::string> command{};  ///< the program (in PATH if it has no '/'); its arguments
-  std::map<std::string, std::string> environment{};  ///< beside, or in place of, this process's own
-  std::filesystem::path folder{};  ///< where it works; empty: where this process does
-  std::filesystem::path log{};    ///< what it prints is appended here; empty: where this one prints
-  bool own_session = false;       ///< Ctrl-C does not reach it, and it reads nothing
-  bool ends_with_parent = false;  ///< SIGTERM where this process dies before it
+  std::vector<std::string> command{};  ///< program (from PATH if it has no '/'), arguments
+  std::map<std::string, std::string> environment{};  ///< added to this process's environment
+  std::filesystem::path folder{};  ///< working directory; empty: that of this process
+  std::filesystem::path log{};     ///< output is appended to it; empty: this process's output
+  bool own_session = false;        ///< the program does not receive Ctrl-C and has no input
+  bool ends_with_parent = false;   ///< the program receives SIGTERM if this process ends first
 };
 
-/// Where the program lies: `name` itself where it has a '/', else the first in PATH.
+/// The path of the program: `name` itself if it has a '/', else the first match in PATH.
 std::optional<std::filesystem::path> findProgram(const std::string& name);
 
-/// Killed and waited for at the end of the scope, unless it is left alone.
+/// The process is killed and waited for at the end of the scope, unless leaveAlone() was called.
 class Subprocess {
  public:
-  /// Throws StartupError(kUnavailable), "PROGRAM cannot be started: why", also where the log cannot
-  /// be written.
+  /// Throws StartupError(kUnavailable), "PROGRAM cannot be started: why", also if the log cannot be
+  /// written.
   explicit Subprocess(const ProgramOptions& options);
   ~Subprocess();
   Subprocess(const Subprocess&) = delete;
@@ -36,15 +37,17 @@ class Subprocess {
 
   pid_t pid() const { return pid_; }
   void signal(int number) const;
-  /// Its exit status, or 128 + the signal that ended it; nothing while it runs.
+  /// The exit status of the process, or 128 + the signal that ended it. Returns nothing while it
+  /// runs.
   std::optional<int> ended();
-  /// The same, when it has ended.
+  /// Waits for the end of the process and returns its status as ended() does.
   int waitForEnd();
-  /// The same, after at most `longest`.
+  /// Waits for at most `longest` and returns the status as ended() does.
   std::optional<int> wait(std::chrono::milliseconds longest);
-  /// SIGTERM, and SIGKILL where that has not ended it after `patience`. Returns when it is gone.
+  /// Sends SIGTERM, and SIGKILL if the process still runs after `patience`. Returns when it has
+  /// ended.
   void stop(std::chrono::milliseconds patience);
-  /// It may live on after this object.
+  /// The process may outlive this object.
   void leaveAlone() { left_alone_ = true; }
 
  private:
@@ -54,13 +57,13 @@ class Subprocess {
 };
 
 struct ProgramAnswer {
-  int status = 0;      ///< as of Subprocess::ended
+  int status = 0;      ///< exit status, like Subprocess::ended
   std::string output;  ///< both streams, in the order in which they were written
   bool too_late = false;
 };
 
-/// Runs a program to its end and keeps what it prints (`options.log` must be empty). Killed after
-/// `longest`. Throws as Subprocess does.
+/// Runs a program to its end and returns its output (`options.log` must be empty). The program is
+/// killed after `longest`. Throws like Subprocess.
 ProgramAnswer runProgram(const ProgramOptions& options,
                          std::chrono::milliseconds longest = std::chrono::hours(1));
 

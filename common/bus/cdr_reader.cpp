@@ -10,7 +10,7 @@
 namespace perdure::bus {
 namespace {
 
-/// Cyclone's own copy, in one piece.
+/// The serialised message in Cyclone's memory, contiguous.
 class Serialised {
  public:
   explicit Serialised(ddsi_serdata* data) : data_(data) {

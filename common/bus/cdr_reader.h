@@ -1,4 +1,4 @@
-// A topic's messages as they came, for those who keep them without looking: recorders.
+// Reads the messages of a topic in serialised form, for recorders.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@
 namespace perdure::bus {
 
 struct CdrMessage {
-  std::span<const std::uint8_t> bytes;  ///< common/wire/cdr.h; valid within the call
-  std::int64_t written_ns = 0;          ///< by the writer's system clock
+  std::span<const std::uint8_t> bytes;  ///< common/wire/cdr.h; valid during the call
+  std::int64_t written_ns = 0;          ///< system clock of the writer
 };
 
 class CdrReader : public RawReader {
@@ -21,8 +21,8 @@ class CdrReader : public RawReader {
   CdrReader(const Participant& participant, const std::string& topic)
       : RawReader(participant, topic) {}
 
-  /// Hands over at most one batch, in its order; true where there may be more. What is disposed is
-  /// not told.
+  /// Passes at most one batch to the handler, in order. Returns true if more messages may be
+  /// available. Disposals are not reported.
   bool drainBatch(const Handler& handler);
 };
 

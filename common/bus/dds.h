@@ -1,4 +1,4 @@
-// Cyclone's C API with owning pointers. Internal to common/bus: the only place that includes it.
+// Cyclone's C API with owning pointers. Internal to common/bus, which alone includes that API.
 #pragma once
 
 #include <dds/dds.h>
@@ -14,7 +14,7 @@ struct QosDeleter {
 };
 using QosPtr = std::unique_ptr<dds_qos_t, QosDeleter>;
 
-// What DDS knows of a reader or a writer since its start.
+// Status counts of a reader or a writer since its start, as DDS reports them.
 
 inline std::size_t matchedWriters(dds_entity_t reader) {
   dds_subscription_matched_status_t status{};

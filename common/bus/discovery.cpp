@@ -27,7 +27,7 @@ std::string nameOf(const dds_qos_t* qos) {
   return result;
 }
 
-/// Visits every living sample of a built-in topic without taking it.
+/// Visits every live sample of a built-in topic without taking it.
 template <class Sample>
 void readAll(const Entity& reader, const std::function<void(const Sample&)>& visit) {
   constexpr std::size_t kMost = 1024;
@@ -45,8 +45,8 @@ Entity builtinReader(const Participant& participant, dds_entity_t topic) {
   return Entity(dds_create_reader(participant.handle(), topic, nullptr, nullptr));
 }
 
-/// The topic without which a service's work is missed; "frame/" is of any camera. Empty: nobody
-/// stands in for it.
+/// The topic without which the output of a service is missing; "frame/" stands for any camera.
+/// Empty: no other program can replace the service.
 std::string_view essentialTopicOf(std::string_view service) {
   if (service == "capture") return "frame/";
   if (service == "vio") return "odometry";
@@ -59,7 +59,7 @@ std::string_view essentialTopicOf(std::string_view service) {
 bool standsIn(std::string_view service, std::string_view topic, std::string_view process) {
   const std::string_view essential = essentialTopicOf(service);
   constexpr std::string_view kOurs[] = {"capture", "vio", "inference", "semantic_filter",
-                                        "map_store"};  // none of them does another's work
+                                        "map_store"};  // services do not replace each other
   if (essential.empty() || process.empty()) return false;
   if (std::find(std::begin(kOurs), std::end(kOurs), process) != std::end(kOurs)) return false;
   return essential.ends_with('/') ? topic.starts_with(essential) : topic == essential;

@@ -1,4 +1,4 @@
-// Who is on the bus: participants, and the readers and writers that each topic has.
+// The participants on the bus, and the readers and writers of each topic.
 #pragma once
 
 #include <chrono>
@@ -14,27 +14,28 @@ namespace perdure::bus {
 struct RemoteEndpoint {
   std::string wire_name;  ///< "perdure/ego/imu"
   std::string type_name;
-  std::string process;  ///< of its participant, where it has a name
+  std::string process;  ///< name of its participant, if it has one
   bool writer = false;
 };
 
-/// Whether `process`, which writes `topic`, does the work of the service `service` in its place: of
-/// "capture" (images), "vio" (odometry) or "inference" (detections), as a bridge or a driver may.
+/// Returns whether `process`, which writes `topic`, replaces the service `service`. A bridge or a
+/// driver may replace "capture" (images), "vio" (odometry) or "inference" (detections).
 bool standsIn(std::string_view service, std::string_view topic, std::string_view process);
 
 struct StandIn {
   std::string process, topic;
 };
-/// Who stands in for `service`; topics are named without `prefix`.
+/// The process that replaces `service`, if any. Topics in the result are named without `prefix`.
 std::optional<StandIn> standInFor(std::string_view service,
                                   const std::vector<RemoteEndpoint>& endpoints,
                                   const std::string& prefix);
 
-/// Watches discovery. It takes about a second until all of a running system is known.
+/// Observes discovery. It takes about a second until a running system is fully discovered.
 class Discovery {
  public:
   explicit Discovery(const Participant& participant);
-  /// Names of the participants known now, our own included; "" where one has none.
+  /// Names of the participants discovered so far, including this process; "" for one without a
+  /// name.
   std::vector<std::string> participants();
   std::vector<RemoteEndpoint> endpoints();
 

@@ -16,12 +16,12 @@
 namespace perdure::bus {
 namespace {
 
-/// Highest index of a participant without multicast: so many processes fit on one host.
+/// Highest index of a participant without multicast. It limits the number of processes on one host.
 constexpr int kMaxParticipantIndex = 60;
 constexpr double kMostSharedMemory = 256;  // MB; wire/description/bounds.h allows no larger images
 
 std::string loopbackXml() {
-  // Unicast only; large fragments and buffers, because nothing can be lost between hosts.
+  // Unicast only. Fragments and buffers are large, because no data can be lost between hosts.
   return "<General><Interfaces><NetworkInterface name=\"lo\"/></Interfaces>"
          "<AllowMulticast>false</AllowMulticast>"
          "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize></General>"
@@ -32,8 +32,8 @@ std::string loopbackXml() {
          "<Peers><Peer Address=\"127.0.0.1\"/></Peers></Discovery>";
 }
 
-/// The IPv4 address of an interface, or its name where it has none: Cyclone says then what is
-/// wrong.
+/// The IPv4 address of an interface. Without one it returns the name, so that Cyclone reports the
+/// error.
 std::string addressOf(const std::string& interface) {
   ifaddrs* all = nullptr;
   if (getifaddrs(&all) != 0) return interface;
@@ -48,12 +48,13 @@ std::string addressOf(const std::string& interface) {
   return interface;
 }
 
-/// What is lost between hosts is asked for and sent again within a frame's period: Cyclone's own
-/// 100 ms double the age of every image of which a fragment is lost.
+/// Data lost between hosts are requested and sent again within a frame's period. With Cyclone's
+/// default of 100 ms, each lost fragment would double the age of its image.
 constexpr char kResendSoon[] =
     "<NackDelay>5ms</NackDelay><HeartbeatInterval>20ms</HeartbeatInterval>";
 
-/// Hosts that multicast does not reach are spoken to by unicast alone; those on this one too.
+/// Hosts that multicast does not reach are addressed by unicast only, and so are processes of this
+/// host.
 std::string peersXml(const std::string& interface, const std::vector<std::string>& peers) {
   if (peers.empty()) return {};
   std::string xml = "<Peers><Peer Address=\"" + addressOf(interface) + "\"/>";
@@ -61,8 +62,8 @@ std::string peersXml(const std::string& interface, const std::vector<std::string
   return xml + "</Peers>";
 }
 
-/// A host that was gone for longer than the lease (10 s) is met again within this time, not in half
-/// a minute.
+/// Shortens the time until a host is discovered again after an absence longer than the lease (10
+/// s). The default takes half a minute.
 constexpr char kMeetSoon[] = "<SPDPInterval>2s</SPDPInterval>";
 
 std::string networkXml(const Options& options) {
@@ -94,13 +95,13 @@ std::string identityFolder(const Options& options, const std::string& process) {
          (options.identity.empty() ? identityOf(process) : options.identity);
 }
 
-/// CYCLONEDDS_URI, where it says something.
+/// CYCLONEDDS_URI, if set and not empty.
 const char* givenConfiguration() {
   const char* uri = std::getenv("CYCLONEDDS_URI");
   return uri != nullptr && *uri != '\0' ? uri : nullptr;
 }
 
-/// Of an interface, or of a host.
+/// Checks the name of an interface or of a host.
 bool isPlainName(const std::string& name) {
   return !name.empty() && name.find_first_of("<>&\"' \t\n") == std::string::npos;
 }
@@ -117,17 +118,17 @@ void requireNames(const Options& options) {
   }
 }
 
-/// Deleted before its parent is.
+/// The entity is deleted before its parent.
 std::shared_ptr<const Entity> keptBy(std::shared_ptr<const Entity> parent, Entity entity) {
   struct Kept {
-    std::shared_ptr<const Entity> parent;  // goes last
+    std::shared_ptr<const Entity> parent;  // destroyed last
     Entity entity;
   };
   auto kept = std::make_shared<const Kept>(Kept{std::move(parent), std::move(entity)});
   return {kept, &kept->entity};
 }
 
-/// What goes through shared memory is neither encrypted nor granted to some only.
+/// Data in shared memory are neither encrypted nor restricted to some participants.
 void refuseOpenMemory(const Options& options) {
   if (options.security.empty() || options.shared_memory_mb == 0) return;
   throw StartupError(ExitCode::kConfiguration,
@@ -141,7 +142,7 @@ SharedMemory findSharedMemory(const Options& options) {
   if (givenConfiguration() != nullptr) {
     return {{}, "CYCLONEDDS_URI, which is set, goes before bus.shared_memory_mb"};
   }
-  constexpr std::size_t kAround = 1024;  // what is in a message beside its pixels
+  constexpr std::size_t kAround = 1024;  // size of a message without its pixels, at most
   const auto locator = sharedMemoryLocator();
   if (!locator) return {{}, locator.error().detail};
   return {*locator, {}, (static_cast<std::size_t>(options.shared_memory_mb) << 20) - kAround};
@@ -165,8 +166,8 @@ std::int32_t createDomain(const Options& options, const std::string& locator) {
   return domain;
 }
 
-/// Gives a participant the identity in this folder. Its properties go before what CYCLONEDDS_URI
-/// says of security.
+/// Assigns the identity in `folder` to a participant. Its properties take precedence over the
+/// security settings in CYCLONEDDS_URI.
 Identity secure(dds_qos_t& qos, const std::string& folder) {
   const auto identity = readIdentity(folder);
   if (!identity) {
@@ -206,7 +207,7 @@ Entity& Entity::operator=(Entity&& other) noexcept {
 }
 
 void describe(Options& options, config::Fields& fields) {
-  constexpr double kMaxDomain = 230;  // ports end there
+  constexpr double kMaxDomain = 230;  // port numbers end there
   fields.text("bus.interface", options.interface,
               {"network interface of the topics: lo, or one that other hosts are on"});
   fields.texts(
@@ -249,7 +250,7 @@ Options withEnvironment(Options options) {
 }
 
 std::string configurationXml(const Options& options, const std::string& locator) {
-  // The trace goes to securityLog(), and to no file.
+  // The trace is passed to securityLog() and not written to a file.
   return domainXml(options, locator,
                    options.security.empty() ? ""
                                             : "<Tracing><Category>discovery</Category>"

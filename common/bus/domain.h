@@ -1,4 +1,5 @@
-// Where processes meet: the DDS domain, its network interface, and one participant a process.
+// The connection of processes: the DDS domain, its network interface, and one participant per
+// process.
 #pragma once
 
 #include <cstdint>
@@ -29,54 +30,55 @@ struct Options {
   std::string interface = "lo";
   std::int64_t domain = 0;
   std::string vehicle = "ego";
-  std::int64_t shared_memory_mb = 0;    ///< largest image that goes through it; 0: none does
-  std::string security = {};            ///< folder of the identities; empty: open to all
-  std::string identity = {};            ///< name of a folder in it; empty: by the process
-  std::vector<std::string> peers = {};  ///< the other hosts; empty: by multicast
+  std::int64_t shared_memory_mb = 0;    ///< largest image sent through shared memory; 0: not used
+  std::string security = {};            ///< folder of the identities; empty: no security
+  std::string identity = {};            ///< a folder in `security`; empty: by process name
+  std::vector<std::string> peers = {};  ///< the other hosts; empty: found by multicast
 };
-/// bus.interface, bus.peers, bus.domain, bus.vehicle, bus.shared_memory_mb, bus.security,
-/// bus.identity. The variable PERDURE_DOMAIN goes before bus.domain.
+/// Describes bus.interface, bus.peers, bus.domain, bus.vehicle, bus.shared_memory_mb, bus.security
+/// and bus.identity. The variable PERDURE_DOMAIN takes precedence over bus.domain.
 void describe(Options& options, config::Fields& fields);
 
-/// What all processes of a host have in common: the file that the variable PERDURE_BUS names
-/// (empty: none), else bus.yaml in `folder`, where there is one. Adds what is wrong in it to
-/// `problems`.
+/// The options shared by all processes of a host. They are read from the file named by the variable
+/// PERDURE_BUS (empty: none), else from bus.yaml in `folder` if it exists. Errors in the file are
+/// appended to `problems`.
 Options commonOptions(const std::string& folder, std::vector<config::Problem>& problems);
 
-/// The options with PERDURE_DOMAIN in force.
+/// The options after applying PERDURE_DOMAIN.
 Options withEnvironment(Options options);
 
-/// Cyclone's configuration for these options, as it may stand in CYCLONEDDS_URI. `locator` is that
-/// of shared memory; empty: without. Security is the participant's, and not in it.
+/// Cyclone's configuration for these options, in the form of CYCLONEDDS_URI. `locator` is that of
+/// shared memory; if it is empty, shared memory is off. Security is set for the participant and is
+/// not included.
 std::string configurationXml(const Options& options, const std::string& locator = {});
-/// The same for programs that are not ours, with the identity that the options name, if they do.
+/// The configuration for third-party programs, with the identity if the options name one.
 std::string foreignXml(const Options& options);
 
-/// Shared memory, as it was found at the start.
+/// The state of shared memory at the start.
 struct SharedMemory {
   std::string locator;         ///< empty: off
-  std::string why_not;         ///< where it is asked for and off, with the mend
-  std::size_t most_bytes = 0;  ///< of a message
+  std::string why_not;         ///< if requested but off: the cause and its fix
+  std::size_t most_bytes = 0;  ///< per message
   bool on() const { return !locator.empty(); }
 };
 
-/// One a process, and one more for programs that are not ours. Where CYCLONEDDS_URI is set it is
-/// used instead of bus.interface and bus.shared_memory_mb, as Cyclone does.
+/// One per process, and a second one for third-party programs. If CYCLONEDDS_URI is set, it
+/// replaces bus.interface and bus.shared_memory_mb, as is usual for Cyclone.
 class Domain {
  public:
-  /// Throws StartupError (69) where DDS cannot use the interface.
+  /// Throws StartupError (69) if DDS cannot use the interface.
   explicit Domain(const Options& options);
-  /// Another one in the same process, for programs that are not ours: `options.domain` stands as it
-  /// is, and there is no shared memory and no security in it.
+  /// A second domain in the same process, for third-party programs. `options.domain` is used as it
+  /// is; shared memory and security are off.
   static Domain foreign(Options options);
-  /// The same domain, for participants of another vehicle or under another identity.
+  /// The same domain, for participants of another vehicle or with another identity.
   Domain as(std::string vehicle, std::string security, std::string identity) const;
   const Options& options() const { return options_; }
   const SharedMemory& sharedMemory() const { return shared_memory_; }
-  /// What there is to say of shared memory now, for people, with the mend; empty where it was not
-  /// asked for.
+  /// The present state of shared memory as text, with a fix if needed. The result is empty if
+  /// shared memory was not requested.
   std::string sharedMemoryText() const;
-  /// Who starts now shares memory with this process.
+  /// Returns whether a process that starts now can share memory with this process.
   bool sharesMemory() const;
   const std::shared_ptr<const Entity>& entity() const { return domain_; }
 
@@ -90,16 +92,16 @@ class Domain {
 
 class Participant {
  public:
-  /// `process` is shown by `perdure topics` and `perdure doctor`. Throws StartupError where the
-  /// identity is not fit for bus.security (69), or DDS refuses.
+  /// `process` is shown by `perdure topics` and `perdure doctor`. Throws StartupError if the
+  /// identity is not valid for bus.security (69), or if DDS refuses it.
   Participant(const Domain& domain, const std::string& process);
   std::int32_t handle() const { return participant_->handle(); }
   const SharedMemory& sharedMemory() const { return shared_memory_; }
-  /// An entity of this participant, which stays as long as that does.
+  /// An entity of this participant. It keeps the participant alive.
   std::shared_ptr<const Entity> keep(Entity entity) const;
   /// "imu" → "perdure/ego/imu".
   std::string wireName(const std::string& topic) const { return prefix_ + topic; }
-  /// Nothing where bus.security is off.
+  /// The identity of the participant. Returns nothing if bus.security is off.
   const std::optional<Identity>& identity() const { return identity_; }
 
  private:

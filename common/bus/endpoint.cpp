@@ -16,9 +16,9 @@ dds_duration_t duration(double seconds) {
   return seconds > 0 ? static_cast<dds_duration_t>(seconds * 1e9) : DDS_INFINITY;
 }
 
-/// `through`: whether this endpoint may use shared memory. Cyclone leaves endpoints that do not
-/// hear their own participant out of it. Exclusive writers are left out by their liveliness, and
-/// their readers may have to hear their own participant.
+/// `through`: whether this endpoint may use shared memory. Cyclone excludes endpoints that ignore
+/// their own participant from shared memory. Exclusive writers are excluded by their liveliness,
+/// and their readers may need messages of their own participant.
 QosPtr commonQos(const Qos& qos, const SharedMemory& memory, bool through) {
   constexpr double kMaxBlocking = 0.1;
   QosPtr result(dds_create_qos());
@@ -35,9 +35,9 @@ QosPtr commonQos(const Qos& qos, const SharedMemory& memory, bool through) {
   return result;
 }
 
-/// Readers ask for the weakest liveliness, so that every writer's suits them.
+/// Readers request the weakest liveliness, so that they match every writer.
 QosPtr readerQos(const Qos& qos, const SharedMemory& memory, ReadFrom from) {
-  const bool of_before = from == ReadFrom::kKept;  // shared memory has nothing of before
+  const bool of_before = from == ReadFrom::kKept;  // shared memory does not store earlier messages
   QosPtr result = commonQos(qos, memory, qos.shared_memory && !of_before);
   if (of_before) dds_qset_durability(result.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
   return result;
@@ -46,7 +46,7 @@ QosPtr readerQos(const Qos& qos, const SharedMemory& memory, ReadFrom from) {
 QosPtr writerQos(const Qos& qos, const WriterOptions& options, const SharedMemory& memory,
                  bool through) {
   QosPtr result = commonQos(qos, memory, through);
-  dds_qset_writer_data_lifecycle(result.get(), false);  // a death is not the end of its objects
+  dds_qset_writer_data_lifecycle(result.get(), false);  // instances outlive their writer
   const bool kept = qos.kept && !(memory.on() && through);
   if (kept) dds_qset_durability(result.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
   if (qos.latched || kept) {
@@ -83,8 +83,8 @@ Entity created(dds_entity_t handle, const std::string& what) {
   return Entity(handle);
 }
 
-/// With keys or latching shared memory loses messages, or crashes (Cyclone 0.10.2); what goes
-/// through it is closed to nobody.
+/// Shared memory is refused for topics with keys or latching, because Cyclone 0.10.2 loses messages
+/// or crashes. It is also refused under security, because it has no access control.
 void checkSharing(const Participant& participant, const Entity& entity, const std::string& topic,
                   const Qos& qos) {
   if (participant.identity() && dds_is_shared_memory_available(entity.handle())) {
@@ -101,7 +101,7 @@ void checkSharing(const Participant& participant, const Entity& entity, const st
                          "bus.shared_memory_mb");
 }
 
-/// The topic entity may go at once: readers and writers keep what they need of it.
+/// The topic entity may be deleted at once, because readers and writers hold references to it.
 Entity createTopic(const Participant& participant, const std::string& topic) {
   return created(dds_create_topic(participant.handle(), infoOf(topic).type,
                                   participant.wireName(topic).c_str(), nullptr, nullptr),
@@ -289,7 +289,7 @@ void RawWriter::report(ReasonCounts& counts) const {
   add(counts, "liveliness_lost", livelinessLost());
 }
 
-/// Its readers hear the same topic over the network interface from now on.
+/// From now on the readers receive the topic over the network interface.
 void RawWriter::leaveSharedMemory(const Reason& reason) {
   constexpr dds_duration_t kPatience = DDS_MSECS(500), kPause = DDS_MSECS(5);
   const std::size_t readers = matched();
@@ -301,8 +301,9 @@ void RawWriter::leaveSharedMemory(const Reason& reason) {
   }
 }
 
-/// RouDi joins writer and readers up to 100 ms after DDS has matched them; what is written before
-/// is lost. The first message with readers waits, so that a drive begins with its first frame.
+/// RouDi connects a writer to its readers up to 100 ms after DDS has matched them; earlier messages
+/// are lost. The first message with readers waits for that, so that no frame at the start of a
+/// drive is lost.
 void RawWriter::awaitJoin() {
   constexpr dds_duration_t kJoin = DDS_MSECS(200);
   if (!in_shared_memory_ || joined_ || matched() == 0) return;
@@ -311,7 +312,7 @@ void RawWriter::awaitJoin() {
 }
 
 Result<void> RawWriter::writeWire(const void* wire, std::size_t bytes) {
-  // iceoryx aborts the process where no chunk is large enough.
+  // iceoryx aborts the process if no chunk is large enough.
   if (in_shared_memory_ && bytes > participant_.sharedMemory().most_bytes) {
     leaveSharedMemory({"too_large", "an image of " + std::to_string(bytes) +
                                         " bytes; raise bus.shared_memory_mb, and the chunks in "
@@ -335,7 +336,7 @@ void RawWriter::unregisterWire(const void* wire) { dds_unregister_instance(handl
 
 Result<void> RawWriter::disposeWire(const void* wire) {
   const dds_return_t code = dds_dispose(handle(), wire);
-  dds_unregister_instance(handle(), wire);  // so that late joiners get no tombstone
+  dds_unregister_instance(handle(), wire);  // hides the disposal from late joiners
   if (code == DDS_RETCODE_OK) return {};
   const Reason reason{errorWord(code), std::string("DDS: ") + dds_strretcode(-code)};
   count("dispose", reason);

@@ -1,5 +1,5 @@
-// Readers and writers of domain messages: conversion, checks and counts inside.
-// A writer may be used by any one thread at a time; counts may be asked for from any thread.
+// Readers and writers of domain messages, with conversion, checks and counts. A writer may be used
+// by any one thread at a time; counts may be read from any thread.
 #pragma once
 
 #include <atomic>
@@ -19,16 +19,16 @@
 namespace perdure::bus {
 
 struct WriterOptions {
-  std::int32_t strength = 0;  ///< of exclusive topics; the highest living one is heard
-  double lease_s = 0.0;       ///< of the liveliness; 0 = the table's
+  std::int32_t strength = 0;  ///< for exclusive topics; the highest live strength is received
+  double lease_s = 0.0;       ///< lease of the liveliness; 0: as in the topic table
 };
 
-/// What both have: a DDS entity, a name for its counts, and refusals.
+/// Common base of readers and writers: a DDS entity, a name for its counts, and refusals.
 class Endpoint {
  public:
   const std::string& topic() const { return topic_; }
   std::int32_t handle() const { return handle_; }
-  /// What a person needs to mend each refusal: the detail of its first one, by its count's name.
+  /// The detail of the first refusal of each kind, by the name of its count. It states the fix.
   std::map<std::string, std::string> firstDetails() const;
 
  protected:
@@ -36,7 +36,7 @@ class Endpoint {
   const std::shared_ptr<const Entity>& entity() const { return entity_; }
   void replace(std::shared_ptr<const Entity> entity);
   void count(const char* what, const Reason& reason);
-  /// Adds "<topic>_<what>" where it is not 0.
+  /// Adds "<topic>_<what>" if it is not 0.
   void add(ReasonCounts& counts, const char* what, std::uint64_t n) const;
   void addRefusals(ReasonCounts& counts) const;
 
@@ -51,33 +51,33 @@ class Endpoint {
 
 class RawWriter;
 
-/// What a reader of a topic that is not latched gets of before.
+/// The earlier messages that a reader of a non-latched topic receives.
 enum class ReadFrom {
-  kNow,   ///< nothing
-  kKept,  ///< the newest, of writers that keep it (Qos::kept); those that do not are not heard
+  kNow,   ///< none
+  kKept,  ///< the newest message, from writers that store it (Qos::kept); no others match
 };
 
 class RawReader : public Endpoint {
  public:
-  /// How many writers are matched now.
+  /// The number of writers matched now.
   std::size_t matched() const;
-  /// Of them, those that missed their lease: killed, stopped, cut off.
+  /// The number of matched writers that missed their lease: killed, stopped or disconnected.
   std::size_t silent() const;
-  /// The highest strength among the matched writers of an exclusive topic but `own`; nothing where
-  /// there are no others.
+  /// The highest strength among the matched writers of an exclusive topic, except `own`. Returns
+  /// nothing if there are no others.
   std::optional<std::int32_t> strongestBut(const RawWriter& own) const;
-  /// Adds what DDS and the checks counted since the start: <topic>_malformed_<reason>,
-  /// _incompatible_qos, _sample_lost, _in_shared_memory, _writers_silent (how many are now).
+  /// Adds the counts of DDS and of the checks since the start: <topic>_malformed_<reason>,
+  /// _incompatible_qos, _sample_lost, _in_shared_memory, _writers_silent (present number).
   void report(ReasonCounts& counts) const;
 
  protected:
   RawReader(const Participant& participant, const std::string& topic,
             ReadFrom from = ReadFrom::kNow);
-  /// Takes what is there, at most one batch; true where there may be more.
+  /// Takes the available messages, at most one batch. Returns true if more may be available.
   bool takeBatch(const std::function<void(const void* wire)>& on_value,
                  const std::function<void(const void* wire)>& on_gone);
   using InPlace = std::function<void(std::span<const std::uint8_t>, std::shared_ptr<const void>)>;
-  /// The same of messages as they lie, which stay as long as their keeper.
+  /// Takes messages without copying them. Each stays valid as long as its keeper.
   bool takeBatchInPlace(const InPlace& on_value);
 
  private:
@@ -92,13 +92,13 @@ class Reader : public RawReader {
   Reader(const Participant& participant, const Topic<T>& topic, ReadFrom from = ReadFrom::kNow)
       : RawReader(participant, topic.name, from) {}
 
-  /// Hands over everything that has come, in its order; malformed messages are counted. `on_gone`
-  /// gets the key of each disposed instance (other fields mean nothing).
+  /// Passes all received messages to `handler`, in order; malformed messages are counted. `on_gone`
+  /// receives the key of each disposed instance (other fields are undefined).
   void drain(const Handler& handler, const Handler& on_gone = {}) {
     while (drainBatch(handler, on_gone)) {
     }
   }
-  /// The same for at most one batch; true where there may be more.
+  /// Works like drain(), but for at most one batch. Returns true if more messages may be available.
   bool drainBatch(const Handler& handler, const Handler& on_gone = {}) {
     const auto offer = [&](const Result<T>& value) {
       if (value) {
@@ -126,24 +126,24 @@ class Reader : public RawReader {
 
 class RawWriter : public Endpoint {
  public:
-  /// How many readers are matched now.
+  /// The number of readers matched now.
   std::size_t matched() const;
   std::int32_t strength() const { return strength_; }
-  /// Of exclusive topics, at any time.
+  /// Sets the strength on an exclusive topic. It may be called at any time.
   void setStrength(std::int32_t strength);
-  /// "I live" without a message, for exclusive topics.
+  /// Asserts liveliness without a message, for exclusive topics.
   void assertLiveliness();
-  /// How often this writer missed its own lease and was taken for dead.
+  /// The number of times that this writer missed its own lease and was considered dead.
   std::uint64_t livelinessLost() const;
-  /// Waits until every matched reader has acknowledged everything; false after the time.
+  /// Waits until every matched reader has acknowledged all messages. Returns false on timeout.
   bool waitForAcknowledgement(double seconds);
-  /// Adds <topic>_refused_<reason> (values this process should not have made), _write_<error>,
+  /// Adds <topic>_refused_<reason> (invalid values of this process), _write_<error>,
   /// _incompatible_qos, _liveliness_lost, _left_shared_memory_<reason>.
   void report(ReasonCounts& counts) const;
 
  protected:
   RawWriter(const Participant& participant, const std::string& topic, const WriterOptions& options);
-  /// `bytes` of its pixels: what is too large for shared memory takes this writer out of it.
+  /// `bytes`: size of the pixels. If they do not fit into shared memory, the writer stops using it.
   Result<void> writeWire(const void* wire, std::size_t bytes = 0);
   Result<void> disposeWire(const void* wire);
   void unregisterWire(const void* wire);
@@ -165,7 +165,7 @@ class Writer : public RawWriter {
   Writer(const Participant& participant, const Topic<T>& topic, const WriterOptions& options = {})
       : RawWriter(participant, topic.name, options) {}
 
-  /// What cannot be written is counted and told.
+  /// Values that cannot be written are counted, and the reason is returned.
   Result<void> write(const T& value) {
     typename wire::Type<T>::Wire sample;
     if (auto encoded = wire::encode(value, sample, arena_); !encoded) {
@@ -175,12 +175,13 @@ class Writer : public RawWriter {
     if constexpr (wire::kDecodedInPlace<T>) return writeWire(&sample, sample.pixels._length);
     return writeWire(&sample);
   }
-  /// Of an exclusive topic without a key: until the next write readers hear the next strongest.
+  /// Releases an exclusive topic without a key. Until the next write, readers receive the writer
+  /// with the next lower strength.
   void release() {
     typename wire::Type<T>::Wire sample{};
     unregisterWire(&sample);
   }
-  /// The instance with this value's key is gone, for late joiners too. Only the key is read.
+  /// Disposes the instance with this value's key, also for late joiners. Only the key is read.
   Result<void> dispose(const T& key) {
     typename wire::Type<T>::Wire sample;
     wire::encodeKey(key, sample, arena_);

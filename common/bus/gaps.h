@@ -1,16 +1,16 @@
-// Counts what never came. A reader that keeps the last few samples overwrites the oldest where its
-// process is late, and DDS says so to nobody; the numbers of the stamps do.
+// Counts lost messages. A reader with a short history overwrites its oldest samples if its process
+// is late. DDS does not report this loss, but the sequence numbers of the stamps reveal it.
 #pragma once
 
 #include <cstdint>
 
 namespace perdure::bus {
 
-/// One for each topic whose stamps number it: frames of one camera, odometry.
+/// One counter per topic with numbered stamps: the frames of one camera, or odometry.
 class Gaps {
  public:
-  /// How many numbers lie between this message of `source` and the newest one before it. 0 for the
-  /// first of a source, and for what comes twice or late.
+  /// Returns the number of sequence numbers between this message of `source` and the newest one
+  /// before it. Returns 0 for the first message of a source, and for repeated or late messages.
   std::uint64_t before(std::uint64_t source, std::uint64_t sequence) {
     const bool follows = any_ && source == source_;
     if (follows && sequence <= newest_) return 0;

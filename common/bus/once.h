@@ -1,4 +1,4 @@
-// Drops what was already seen: messages of one frame may come twice around a change of owner.
+// Drops repeated messages. Messages of one frame may arrive twice around a change of the writer.
 #pragma once
 
 #include <cstdint>
@@ -8,12 +8,12 @@
 
 namespace perdure::bus {
 
-/// Remembers the newest `capacity` identities (source instance, sequence number).
+/// Stores the newest `capacity` identities (source instance, sequence number).
 class Once {
  public:
   explicit Once(std::size_t capacity = 1024) : capacity_(capacity) {}
 
-  /// True the first time.
+  /// Returns true on the first occurrence.
   bool first(std::uint64_t source, std::uint64_t sequence) {
     if (!seen_.emplace(source, sequence).second) {
       ++repeated_;

@@ -8,9 +8,9 @@
 namespace perdure::bus {
 namespace {
 
-constexpr std::uint32_t kHeader = 4;  // of CDR, before a message from the network
+constexpr std::uint32_t kHeader = 4;  // CDR header of messages from the network
 
-/// One reference to Cyclone's own copy, or to a chunk of shared memory.
+/// One reference to Cyclone's serialised message, or to a chunk of shared memory.
 class Held {
  public:
   Held(std::shared_ptr<const Entity> reader, ddsi_serdata* data)
@@ -29,13 +29,13 @@ class Held {
   std::span<const std::uint8_t> cdr() const {
     if (!inSharedMemory()) return {static_cast<const std::uint8_t*>(part_.iov_base), part_.iov_len};
     const iceoryx_header_t* header = iceoryx_header_from_chunk(data_->iox_chunk);
-    // Types of fixed size alone lie there as they are in C.
+    // Only types of fixed size are stored unserialised, in their C layout.
     if (header->shm_data_state != IOX_CHUNK_CONTAINS_SERIALIZED_DATA) return {};
     return {static_cast<const std::uint8_t*>(data_->iox_chunk), header->data_size};
   }
 
  private:
-  const std::shared_ptr<const Entity> reader_;  // Cyclone gives chunks back through it
+  const std::shared_ptr<const Entity> reader_;  // Cyclone returns chunks through it
   ddsi_serdata* const data_;
   ddsrt_iovec_t part_{};
 };

@@ -1,4 +1,4 @@
-// Messages as they came, where they lie: in shared memory, or whole from the network. Internal to
+// Received messages in place: in shared memory, or complete from the network. Internal to
 // common/bus.
 #pragma once
 
@@ -15,12 +15,12 @@ namespace perdure::bus {
 inline constexpr std::size_t kBatch = 64;  ///< messages taken at once
 
 struct RawSample {
-  std::span<const std::uint8_t> cdr;  ///< without header, native byte order
+  std::span<const std::uint8_t> cdr;  ///< CDR without header, in native byte order
   bool in_shared_memory = false;
-  std::shared_ptr<const void> keeper;  ///< of `cdr`; of its reader, too
+  std::shared_ptr<const void> keeper;  ///< owner of `cdr` and of its reader
 };
 
-/// At most `most`; empty where nothing is there.
+/// At most `most` samples. The result is empty if none is available.
 std::vector<RawSample> takeInPlace(const std::shared_ptr<const Entity>& reader, std::size_t most);
 
 }  // namespace perdure::bus

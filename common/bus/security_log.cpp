@@ -13,7 +13,7 @@ struct Kind {
   const char* says;
   const char* count;
 };
-/// Cyclone 0.10.2's words; the first that fits.
+/// Messages of Cyclone 0.10.2; the first match applies.
 constexpr std::array kKinds{
     Kind{"Non secure remote ", "no_certificate"},
     Kind{"unable to get local issuer certificate", "unknown_authority"},
@@ -28,10 +28,10 @@ constexpr std::array kKinds{
     Kind{"does not allow remote topic", "writer"},
     Kind{"does not allow remote reader", "reader"},
 };
-/// Of this process's own identity.
+/// Messages about this process's own identity.
 constexpr std::array kOwn{"validating local", "Local topic permission denied",
                           "validate local identity", "Could not load security"};
-/// Of a process that is about to end, or has refused already.
+/// Message about a process that is about to end, or that was refused already.
 constexpr const char* kNothing = "Remote secure participant ";
 
 bool contains(const std::string& text, const char* words) {
@@ -53,18 +53,19 @@ void takeLog(void* log, const dds_log_data_t* data) {
 
 void takeTrace(void* log, const dds_log_data_t* data) {
   constexpr std::uint32_t kLogged = DDS_LC_FATAL | DDS_LC_ERROR | DDS_LC_WARNING | DDS_LC_INFO;
-  if ((data->priority & kLogged) != 0) return;  // the other sink has it
+  if ((data->priority & kLogged) != 0) return;  // the other sink receives it
   (void)static_cast<SecurityLog*>(log)->take({data->message, data->size});
 }
 
 }  // namespace
 
-/// Each of a stranger's endpoints is refused, and again when it is heard again: it counts once.
+/// Each endpoint of an unknown participant is refused, and refused again at each rediscovery. The
+/// participant counts once.
 bool SecurityLog::isNewcomer(const std::string& message) {
   constexpr std::size_t kMost = 1024;
-  constexpr std::string_view kBefore = "remote writer ";  // as long as "remote reader "
+  constexpr std::string_view kBefore = "remote writer ";  // "remote reader " has the same length
   const auto begin = message.find("remote ") + kBefore.size();
-  const auto end = message.rfind(':', message.find(' ', begin));  // the participant's part of it
+  const auto end = message.rfind(':', message.find(' ', begin));  // end of the participant's GUID
   if (end == std::string::npos || end <= begin) return false;
   if (strangers_.size() >= kMost) strangers_.clear();
   return strangers_.insert(message.substr(begin, end - begin)).second;
@@ -106,7 +107,7 @@ std::string SecurityLog::own() const {
 
 SecurityLog& securityLog(bool discovery) {
   static SecurityLog* const log = [discovery] {
-    auto* made = new SecurityLog;  // stays: Cyclone's threads may log until the process ends
+    auto* made = new SecurityLog;  // never deleted: Cyclone's threads may log until exit
     dds_set_log_sink(&takeLog, made);
     if (discovery) dds_set_trace_sink(&takeTrace, made);
     return made;

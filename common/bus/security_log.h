@@ -1,4 +1,4 @@
-// What Cyclone says of those whom security shut out: counted by kind instead of logged each time.
+// Cyclone's messages about refused participants, counted by kind instead of logged each time.
 #pragma once
 
 #include <map>
@@ -10,18 +10,18 @@
 
 namespace perdure::bus {
 
-/// From any thread.
+/// May be used from any thread.
 class SecurityLog {
  public:
-  /// One message of Cyclone's log. False where it is none of security.
+  /// Takes one message of Cyclone's log. Returns false if it does not concern security.
   bool take(const std::string& message);
   /// Adds security_refused_no_certificate (participants), _unknown_authority, _expired, _revoked,
-  /// _certificate (handshakes; who is refused tries again each second), _permissions, _writer,
+  /// _certificate (handshakes; a refused participant retries each second), _permissions, _writer,
   /// _reader.
   void report(ReasonCounts& counts) const;
   /// The first message of each kind.
   std::map<std::string, std::string> firstDetails() const;
-  /// The latest thing that was wrong with this process's own identity.
+  /// The latest error of this process's own identity.
   std::string own() const;
 
  private:
@@ -34,8 +34,9 @@ class SecurityLog {
   std::string own_;
 };
 
-/// Of this process: Cyclone's log has one sink. The first call sets it; `discovery` takes Cyclone's
-/// trace of discovery too, which is the only place where it names those without a certificate.
+/// The log of this process, because Cyclone's log has one sink. The first call installs the sink.
+/// `discovery` also takes Cyclone's discovery trace, because only the trace names participants
+/// without a certificate.
 SecurityLog& securityLog(bool discovery = false);
 
 }  // namespace perdure::bus

@@ -15,10 +15,10 @@
 namespace perdure::bus {
 namespace {
 
-constexpr char kSocket[] = "/tmp/roudi";  // where iceoryx 2.0 has it
+constexpr char kSocket[] = "/tmp/roudi";  // fixed path in iceoryx 2.0
 constexpr char kManagement[] = "/dev/shm/iceoryx_mgmt";
 
-/// 0 where a process holds the socket, else errno.
+/// Returns 0 if a process listens on the socket, else errno.
 int connectToRouDi() {
   const int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   if (fd < 0) return errno;
@@ -56,7 +56,8 @@ Result<std::string> sharedMemoryLocator() {
                 "RouDi answers, but its memory /dev/shm/iceoryx_mgmt is not in sight; "
                 "services and RouDi need the same /dev/shm");
   }
-  // A new start makes a new file. The host is in it because files of two hosts may look alike.
+  // Each start of RouDi creates a new file. The host is included, because files of two hosts may
+  // have equal numbers.
   const std::uint64_t identity =
       digest(fmt::format("{} {} {}", bootId(), segment.st_dev, segment.st_ino));
   std::string locator = "iceoryx/00:00:00:00:00:00:00:00";

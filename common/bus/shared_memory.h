@@ -1,5 +1,5 @@
-// Whether messages may go through shared memory: iceoryx's RouDi must answer, or Cyclone would wait
-// for it for a minute and abort.
+// Checks whether messages may use shared memory. RouDi of iceoryx must respond, because Cyclone
+// would otherwise wait for a minute and abort.
 #pragma once
 
 #include <string>
@@ -8,9 +8,9 @@
 
 namespace perdure::bus {
 
-/// One start of RouDi on this host, as a locator of Cyclone. Processes of the same one share
-/// memory; others, those from before a restart of RouDi among them, meet over the network
-/// interface. Reasons: "no_roudi" (the detail says the mend).
+/// A Cyclone locator that identifies one start of RouDi on this host. Processes with the same
+/// locator share memory. Others, for example from before a restart of RouDi, communicate over the
+/// network interface. Reasons: "no_roudi" (the detail states the fix).
 Result<std::string> sharedMemoryLocator();
 
 }  // namespace perdure::bus

@@ -9,8 +9,8 @@
 namespace perdure::bus {
 namespace {
 
-/// Endpoints of the same type that nobody else matches, and that stay out of shared memory, as all
-/// do whose liveliness is by hand.
+/// QoS of endpoints that match each other only. They do not use shared memory, because their
+/// liveliness is manual.
 QosPtr privateQos() {
   QosPtr qos(dds_create_qos());
   dds_qset_partition1(qos.get(), "perdure/size");
@@ -34,7 +34,7 @@ void tellSizesOfFrames(std::int32_t participant, std::int32_t topic) {
   sample.camera = none;
   ddsi_serdata* data = nullptr;
   dds_sample_info_t info;
-  // A message within the process arrives before the write ends, and knows its type.
+  // A message within the process arrives before the write ends, and gives access to its type.
   if (dds_write(writer.handle(), &sample) != DDS_RETCODE_OK ||
       dds_takecdr(reader.handle(), &data, 1, &info, DDS_ANY_STATE) != 1) {
     return;

@@ -10,12 +10,12 @@ constexpr double kCameraHz = 10.0;
 constexpr double kImuHz = 100.0;
 constexpr std::string_view kFramePrefix = "frame/";
 constexpr Roles kWatchers = Role::kRecord | Role::kOperator | Role::kGateway | Role::kRos2 |
-                            Role::kRos2Driver;  // they read all
+                            Role::kRos2Driver;  // roles that read all topics
 
 template <class T>
 TopicInfo row(const Topic<T>& topic, Qos qos, double rate_hz, bool recorded, Roles writers,
               Roles readers) {
-  // The table outlives the call: names are those of the constants in topics.h.
+  // The names in the table stay valid, because they are constants of topics.h.
   return {topic.name,
           &wire::Type<T>::descriptor(),
           qos,
@@ -40,7 +40,8 @@ Qos exclusive(int depth, double rate_hz) {
 
 using Table = std::array<TopicInfo, 20>;
 
-/// After the rate: who writes, and who reads besides those that record and watch.
+/// The roles after the rate are the writers and the readers, without the roles that record and
+/// monitor.
 Table makeTable() {
   using namespace topics;
   using enum Role;
@@ -52,9 +53,9 @@ Table makeTable() {
       row(kImu, latched(512), kImuHz, kRecorded, kCapture | kRos2Driver, kVio),
       row(kSpeed, latched(512), kImuHz, kRecorded, kCapture, kVio),
       row(kCalibration, latched(1), 0, kRecorded, kCapture | kRos2Driver,
-          kVio | kSemanticFilter | kMapStore | kSubscriber),  // map_store: its place on Earth
+          kVio | kSemanticFilter | kMapStore | kSubscriber),  // map_store: position on Earth
       row(kOdometry, reliable(64), kCameraHz, kRecorded, kVio | kRos2Driver,
-          // capture follows it (pace.mode); vio only where another program gives it
+          // capture reads it with pace.mode; vio reads it only if another program writes it
           kSemanticFilter | kCapture | kMapStore | kVio | kSubscriber),
       row(kLandmarks, reliable(64), kCameraHz, kRecorded, kVio,
           kSemanticFilter | kMapStore | kSubscriber),
@@ -64,10 +65,10 @@ Table makeTable() {
           kInference | kSemanticFilter | kSubscriber),
       row(kSwap, reliable(16), 0, kRecorded, kInference, kInference | kSemanticFilter),
       row(kObjects, kept(8), kCameraHz, kRecorded, kSemanticFilter,
-          kMapStore | kVio | kSubscriber),  // vio masks what moves (input.moving_mask)
+          kMapStore | kVio | kSubscriber),  // vio masks moving objects (input.moving_mask)
       row(kObjectState, latched(1), 0, kNotRecorded, kSemanticFilter, kSubscriber),
       row(kEvents, latched(256), 0, kRecorded, kSemanticFilter | kMapStore,
-          kSubscriber),  // map_store: loops of the graph
+          kSubscriber),  // map_store writes loops of the graph
       row(kPredictions, bestEffort(1), kCameraHz, kRecorded, kSemanticFilter,
           kInference | kSubscriber),
       row(kMap, latched(1), 0, kNotRecorded, kMapStore, kSubscriber),
@@ -106,7 +107,7 @@ double expectedRate(const TopicInfo& info, double camera_hz, double imu_hz) {
 }
 
 double leaseFor(double rate_hz) {
-  constexpr double kShortest = 0.1;  // under it a busy machine flaps (measured)
+  constexpr double kShortest = 0.1;  // shorter leases expire falsely on a busy machine (measured)
   return rate_hz > 0 ? std::max(kShortest, 3.0 / rate_hz) : kShortest;
 }
 

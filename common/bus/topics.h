@@ -1,6 +1,5 @@
 // Every topic of the system in one table: type, quality of service, expected rate, recorded or not,
-// who writes and who reads it.
-// Names on the wire are perdure/<vehicle>/<name>.
+// writers and readers. Names on the wire are perdure/<vehicle>/<name>.
 #pragma once
 
 #include <span>
@@ -15,35 +14,35 @@ namespace perdure::bus {
 struct Qos {
   bool reliable = true;
   int depth = 1;               ///< KEEP_LAST
-  bool latched = false;        ///< TRANSIENT_LOCAL: who comes late gets the last `depth` samples
-  bool kept = false;           ///< writers keep the newest, for readers that ask (ReadFrom::kKept)
+  bool latched = false;        ///< TRANSIENT_LOCAL: late joiners receive the last `depth` samples
+  bool kept = false;           ///< writers store the newest sample for ReadFrom::kKept
   bool exclusive = false;      ///< OWNERSHIP EXCLUSIVE and LIVELINESS MANUAL_BY_TOPIC
-  double lease_s = 0.0;        ///< of the liveliness; 0 = infinite
-  bool shared_memory = false;  ///< where it is on; for topics without key and latching alone
+  double lease_s = 0.0;        ///< lease of the liveliness; 0: infinite
+  bool shared_memory = false;  ///< allowed for topics without key and latching only
 };
 
 struct TopicInfo {
   std::string_view name;  ///< "frame/" stands for frame/<camera>
   const dds_topic_descriptor_t* type = nullptr;
   Qos qos;
-  double rate_hz = 0.0;  ///< nominal, of a 10 Hz camera and a 100 Hz IMU; 0 = on change
+  double rate_hz = 0.0;  ///< nominal, for a 10 Hz camera and a 100 Hz IMU; 0: on change
   bool recorded = true;
-  Roles writers = {}, readers = {};  ///< what DDS-Security grants, where it is on
+  Roles writers = {}, readers = {};  ///< granted by DDS-Security, if enabled
 
   std::string typeName() const;
 };
 
 std::span<const TopicInfo> topicTable();
-/// The row of "imu", "frame/cam0", …; nullptr where there is none.
+/// The row of a topic, such as "imu" or "frame/cam0". Returns nullptr if the topic does not exist.
 const TopicInfo* findTopic(std::string_view name);
 
-/// The expected rate with a camera and an IMU of these rates; 0 = on change.
+/// The expected rate for a camera and an IMU with these rates; 0: on change.
 double expectedRate(const TopicInfo& info, double camera_hz, double imu_hz);
 
-/// The shortest lease that does not flap: three periods, and never under 100 ms.
+/// The shortest lease that does not expire falsely: three periods, at least 100 ms.
 double leaseFor(double rate_hz);
 
-/// A name that knows the type of its messages.
+/// A topic's name with the type of its messages.
 template <class T>
 struct Topic {
   std::string name;
@@ -72,7 +71,8 @@ inline const Topic<MapReply> kMapReply{"map/reply"};
 inline const Topic<Health> kHealth{"health"};
 }  // namespace topics
 
-/// Calls visit(Topic<T>) with the type that belongs to a name; false where there is none.
+/// Calls visit(Topic<T>) with the type that belongs to a name. Returns false if the name is
+/// unknown.
 template <class Visit>
 bool withTopic(const std::string& name, Visit visit) {
   bool found = false;

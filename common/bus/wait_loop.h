@@ -1,6 +1,6 @@
-// The one loop of a service: waits for messages, ticks and wake-ups, and calls handlers in the
-// order of their registration. Handlers run in the thread that calls run(). Readers may be of
-// several participants, in several domains.
+// The main loop of a service. It waits for messages, ticks and wake-ups, and calls handlers in the
+// order of their registration. Handlers run in the thread that calls run(). Readers may belong to
+// several participants in several domains.
 #pragma once
 
 #include <atomic>
@@ -26,11 +26,11 @@ class WaitLoop {
       return reader.drainBatch(handler, on_gone);
     });
   }
-  /// The same of messages as they came.
+  /// Registers a handler of serialised messages.
   void on(CdrReader& reader, CdrReader::Handler handler) {
     attach(reader, [&reader, handler = std::move(handler)] { return reader.drainBatch(handler); });
   }
-  /// The same of a reader of bytes that another folder has (common/bus/foreign).
+  /// Registers a handler of byte messages (common/bus/foreign).
   template <class BytesReader>
   void onBytes(BytesReader& reader, typename BytesReader::Handler handler) {
     attach(reader, [this, &reader, handler = std::move(handler)] {
@@ -39,25 +39,25 @@ class WaitLoop {
       });
     });
   }
-  /// Not any more; the reader may end then. Not from a handler of messages or ticks: those are
-  /// being gone through.
+  /// Removes a reader, which may be destroyed afterwards. Must not be called from a handler of
+  /// messages or ticks, because the loop is iterating over the readers then.
   void off(const Endpoint& reader);
-  /// First after one period; a late tick is not made up for.
-  /// `wanted`: it rests while that is false; asked in the loop's thread.
+  /// The first tick comes after one period; missed ticks are not repeated.
+  /// The tick is suspended while `wanted` returns false; the loop's thread calls `wanted`.
   void every(std::chrono::nanoseconds period, std::function<void()> tick,
              std::function<bool()> wanted = {});
-  /// Runs in the loop's thread soon after wake(); several wake-ups may become one call.
+  /// The handler runs in the loop's thread soon after wake(). Several wake-ups may become one call.
   void onWake(std::function<void()> handler) { on_wake_ = std::move(handler); }
 
-  /// Until stop().
+  /// Runs until stop().
   void run();
-  /// Waits once, at most `longest`, and handles what is there.
+  /// Waits once, at most for `longest`, and handles what is available.
   void runOnce(std::chrono::nanoseconds longest);
-  /// From any thread (not from a signal handler); run() ends after the handler at work, and what
-  /// was taken with its message is dropped.
+  /// May be called from any thread, but not from a signal handler. run() returns after the current
+  /// handler; other messages of its batch are dropped.
   void stop();
   bool stopped() const { return stopped_; }
-  /// From any thread (not from a signal handler).
+  /// May be called from any thread, but not from a signal handler.
   void wake();
 
  private:

@@ -13,7 +13,7 @@ constexpr double kMinDepth = 1e-3;
 
 using Coefficients = std::array<double, 8>;
 
-/// The factor of a squared radius, and its derivative.
+/// A radial factor as a function of the squared radius, and its derivative.
 struct Radial {
   double value, slope;
 };
@@ -77,7 +77,7 @@ double monotoneRadius2OfEquidistant(const Coefficients& d) {
   return std::numeric_limits<double>::infinity();
 }
 
-// The squared radius at which the distorted radius stops growing: beyond it points fold back.
+// The squared radius at which the distorted radius stops growing. Beyond it the mapping folds back.
 double monotoneRadius2(DistortionModel model, const Coefficients& d) {
   if (model == DistortionModel::kNone) return std::numeric_limits<double>::infinity();
   if (model == DistortionModel::kEquidistant) return monotoneRadius2OfEquidistant(d);

@@ -17,13 +17,13 @@ class CameraModel {
   /// has).
   explicit CameraModel(const CameraCalibration& calibration);
 
-  /// Pixel of a point in C; nothing when the point is not in front (z < 1e-3 m) or lies outside
-  /// the range in which the distortion is invertible. J_point (2×3) = d pixel / d point, when
-  /// given.
+  /// Pixel of a point in C. Returns nothing if the point is not in front of the camera (z < 1e-3 m)
+  /// or lies outside the range in which the distortion is invertible. J_point (2×3) = d pixel / d
+  /// point, if given.
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& point_C,
                                          Eigen::Matrix<double, 2, 3>* J_point = nullptr) const;
-  /// Normalised, undistorted image point (x/z, y/z) of a pixel, by Newton's iteration.
-  /// Nothing where the iteration does not converge.
+  /// Normalised, undistorted image point (x/z, y/z) of a pixel, by Newton's iteration. Returns
+  /// nothing if the iteration does not converge.
   std::optional<Eigen::Vector2d> unproject(const Eigen::Vector2d& pixel) const;
   /// Distorted pixel of a normalised point; J (2×2) = d pixel / d normalised.
   Eigen::Vector2d distort(const Eigen::Vector2d& normalised, Eigen::Matrix2d* J = nullptr) const;

@@ -12,7 +12,7 @@ bool isOneOf(const std::string& name, std::initializer_list<const char*> names) 
 /// Brown's model has four coefficients, five with k3, or eight (rational).
 Result<void> setRadial(CameraCalibration& camera, std::vector<double> values) {
   while (values.size() > 8 && values.back() == 0.0)
-    values.pop_back();  // thin prism, tilt: not used
+    values.pop_back();  // thin prism and tilt terms that are zero
   if (values.size() != 4 && values.size() != 5 && values.size() != 8) {
     return fail("distortion_coefficients", "is missing or has not 4, 5 or 8 numbers");
   }

@@ -1,4 +1,4 @@
-// Models of distortion by the names that EuRoC, Kalibr, OpenCV and ROS have for them.
+// Distortion models by their names in EuRoC, Kalibr, OpenCV and ROS.
 #pragma once
 
 #include <string>
@@ -9,8 +9,8 @@
 
 namespace perdure {
 
-/// Sets model and coefficients. Reasons are what is wrong, `distortion_model` or
-/// `distortion_coefficients`; the detail goes on the sentence that begins with it.
+/// Sets model and coefficients. The reason names the invalid item, `distortion_model` or
+/// `distortion_coefficients`; the detail continues the sentence that begins with that name.
 Result<void> setLens(CameraCalibration& camera, const std::string& model,
                      std::vector<double> coefficients);
 

@@ -1,11 +1,12 @@
-// Whether two calibrations are of one camera.
+// Compares two calibrations of a camera.
 #pragma once
 
 #include "common/types/sensors.h"
 
 namespace perdure {
 
-/// Name, size, lens, place on the body and times, to the last digit. The nominal rate may differ.
+/// Returns true if name, size, lens, pose on the body and times are exactly equal. The nominal rate
+/// may differ.
 bool sameCamera(const CameraCalibration& a, const CameraCalibration& b);
 
 }  // namespace perdure

@@ -15,7 +15,7 @@ namespace {
 constexpr double kWidest = 85.0 * std::numbers::pi / 180.0;
 constexpr double kMostError = 0.5;  // px
 
-/// x and y are divided by `value`; `slope` is its gradient.
+/// The divisor of x and y, with its gradient `slope`.
 struct Divisor {
   double value = 0;
   Eigen::Vector3d slope = Eigen::Vector3d::Zero();
@@ -59,7 +59,7 @@ struct Sample {
   Eigen::Vector2d side, pixel;  ///< side: the direction in the image
 };
 
-/// Directions that the image has a pixel for, evenly over it.
+/// Directions that are visible in the image, evenly distributed over it.
 std::vector<Sample> samplesOf(const WideLens& lens, const CameraCalibration& camera) {
   std::vector<Sample> samples;
   for (int i = 1; i <= 85; ++i) {
@@ -83,7 +83,7 @@ std::optional<Eigen::Vector2d> project(const WideLens& lens, const Eigen::Vector
                                        Eigen::Matrix<double, 2, 3>* J) {
   if (!(p.norm() > 1e-9)) return std::nullopt;
   const Divisor divisor = divisorOf(lens, p);
-  // Near or beyond zero lies what folds back.
+  // Beyond this limit the projection folds back.
   if (!(divisor.value > 1e-6 * p.norm())) return std::nullopt;
   const Eigen::Vector2d n = p.head<2>() / divisor.value;
   Eigen::Matrix2d J_n;

@@ -1,6 +1,6 @@
-// Lens models of wide cameras as Kalibr has them, and the equidistant lens that stands for one
-// here: unified (Mei and Rives, ICRA 2007, eq. 1-4; Kalibr "omni"), extended unified (Khomutenko et
-// al., RA-L 2016, eq. 9; "eucm"), double sphere (Usenko et al., 3DV 2018, eq. 40-45; "ds").
+// Lens models of wide-angle cameras as in Kalibr, and the equidistant lens that approximates them.
+// Models: unified (Mei and Rives, ICRA 2007, eq. 1-4; Kalibr "omni"), extended unified (Khomutenko
+// et al., RA-L 2016, eq. 9; "eucm"), double sphere (Usenko et al., 3DV 2018, eq. 40-45; "ds").
 #pragma once
 
 #include <Eigen/Core>
@@ -18,22 +18,23 @@ struct WideLens {
   double a = 0.0;                         ///< unified, double sphere: xi; extended unified: alpha
   double b = 0.0;                         ///< extended unified: beta; double sphere: alpha
   double fx = 0, fy = 0, cx = 0, cy = 0;  ///< pixels
-  std::array<double, 4> distortion{};     ///< k1 k2 p1 p2, of the unified model (omni-radtan)
+  std::array<double, 4> distortion{};     ///< k1 k2 p1 p2 of the unified model (omni-radtan)
 };
 
-/// Pixel of a point in the camera's frame; nothing where the model has none. J (2×3) = d pixel /
-/// d point, when given.
+/// Pixel of a point in the camera's frame. Returns nothing if the point has no projection. J (2×3)
+/// = d pixel / d point, if given.
 std::optional<Eigen::Vector2d> project(const WideLens& lens, const Eigen::Vector3d& point,
                                        Eigen::Matrix<double, 2, 3>* J = nullptr);
 
 struct EquidistantFit {
-  double rms_px = 0, max_px = 0;  ///< over the image, as far as `angle` from the axis
+  double rms_px = 0, max_px = 0;  ///< errors over the image, up to `angle` from the axis
   double angle = 0;               ///< radians
 };
 
-/// Puts the equidistant lens into `camera` (whose size is set) that is nearest to `lens` over its
-/// image, up to 85° off the axis: nothing here uses what is beyond. Reasons: "intrinsics" where the
-/// lens sees nothing of its image, or differs by more than half a pixel from every such lens.
+/// Sets the equidistant lens in `camera` (whose size is set) that best approximates `lens` over its
+/// image, up to 85° off the axis. Nothing in Perdure uses larger angles. Reason: "intrinsics", if
+/// the lens does not project into its image, or if the best approximation errs by more than half a
+/// pixel.
 Result<EquidistantFit> fitEquidistant(const WideLens& lens, CameraCalibration& camera);
 
 }  // namespace perdure

@@ -1,5 +1,5 @@
-// One description of a configuration's fields, from which reading, validation, printing and the
-// README's tables all come. A service writes `void describe(Config&, config::Fields&)`.
+// One description of a configuration's fields. Reading, validation, printing and the tables of the
+// README files use it. A service writes `void describe(Config&, config::Fields&)`.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,8 @@
 
 namespace perdure::config {
 
-/// How a field is described to people. `mend` ends the error message: "…; <mend>".
+/// Documentation of a field for users. `mend` states the fix at the end of the error message: "…;
+/// <mend>".
 struct Doc {
   std::string text;       ///< one line
   std::string unit = {};  ///< "rad/s/√Hz", "px", "" for none
@@ -21,25 +22,25 @@ struct Doc {
 struct Range {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
-  bool low_open = false;  ///< the lower bound itself is not allowed
+  bool low_open = false;  ///< the lower bound itself is excluded
 };
 inline Range positive() { return {0.0, std::numeric_limits<double>::infinity(), true}; }
 inline Range atLeast(double low) { return {low, std::numeric_limits<double>::infinity(), false}; }
 inline Range between(double low, double high) { return {low, high, false}; }
 
-/// A field bound to a variable, which holds the default until a file or --set changes it.
+/// A field bound to a variable, which has its default value until a file or --set changes it.
 struct Field {
-  std::string key;  ///< dotted: "tracker.max_points"
+  std::string key;  ///< dotted key, such as "tracker.max_points"
   std::variant<double*, std::int64_t*, bool*, std::string*, std::vector<double>*,
                std::vector<std::string>*>
       target;
-  Range range;                       ///< numbers, and each element of number lists
-  std::vector<std::string> choices;  ///< strings: allowed values; empty = any
-  std::size_t length = 0;            ///< lists: required length; 0 = any
-  bool required = false;             ///< must be given in the file or by --set
-  bool expert = false;               ///< for those who have read what it does
+  Range range;                       ///< range of numbers, and of each number in a list
+  std::vector<std::string> choices;  ///< allowed values of strings; empty: any
+  std::size_t length = 0;            ///< required length of lists; 0: any
+  bool required = false;             ///< required in the file or by --set
+  bool expert = false;               ///< intended for experts
   Doc doc;
-  bool given = false;  ///< set by readYaml and assign, also where the value was refused
+  bool given = false;  ///< set by readYaml and assign, even if the value was refused
 };
 
 class Fields {
@@ -52,17 +53,17 @@ class Fields {
   void numbers(std::string key, std::vector<double>& target, Range range, Doc doc,
                std::size_t length = 0);
   void texts(std::string key, std::vector<std::string>& target, Doc doc);
-  /// The field described last must be given.
+  /// Marks the field described last as required.
   void require();
-  /// Whether fields that are described from here on are marked expert.
+  /// Sets whether the fields described next are marked expert.
   void expert(bool on) { expert_ = on; }
-  /// A key of earlier versions is refused by this sentence: "is now tracks.confirm", "is fixed at
+  /// Refuses a key of earlier versions with this sentence: "is now tracks.confirm", "is fixed at
   /// 0.05".
   void formerly(std::string key, std::string sentence);
 
-  /// The sentence about a key of earlier versions; empty for others.
+  /// The sentence for a key of earlier versions; empty for other keys.
   std::string formerlyOf(const std::string& key) const;
-  /// Whether earlier versions had keys in this group.
+  /// Returns whether earlier versions had keys in this group.
   bool wasGroup(const std::string& name) const;
 
   const std::vector<Field>& all() const { return fields_; }
@@ -75,30 +76,30 @@ class Fields {
   bool expert_ = false;
 };
 
-/// One thing wrong. str(): "file:line:col: key: value is not > 0 rad/s/√Hz; mend".
+/// One error. str(): "file:line:col: key: value is not > 0 rad/s/√Hz; mend".
 struct Problem {
   std::string file;
-  int line = 0, column = 0;  ///< from 1; 0 where there is none (--set, missing key)
+  int line = 0, column = 0;  ///< counted from 1; 0 without a position (--set, missing key)
   std::string message;
   std::string str() const;
 };
 
-/// Reads YAML text into the fields' targets and returns *all* problems at once: bad syntax,
-/// unknown keys (with the nearest known one), wrong types, values out of range, missing keys,
-/// doubled keys. Targets of faulty fields keep their defaults.
+/// Reads YAML text into the fields' targets and returns *all* problems at once. They are syntax
+/// errors, unknown keys (with the nearest known one), wrong types, values out of range, missing
+/// keys and repeated keys. Targets of faulty fields retain their defaults.
 std::vector<Problem> readYaml(Fields& fields, const std::string& yaml, const std::string& file);
-/// readYaml of a file's content; a file that cannot be read is a problem too.
+/// Applies readYaml to the content of a file. A file that cannot be read is a problem too.
 std::vector<Problem> readFile(Fields& fields, const std::string& path);
-/// "key=value" as from --set; the value is YAML.
+/// Applies "key=value" from --set; the value is YAML.
 std::vector<Problem> assign(Fields& fields, const std::string& assignment);
-/// Problems of fields that are required and were given neither by file nor by --set.
-/// (readYaml and assign remember what was given.)
+/// Problems of required fields that neither a file nor --set has given. (readYaml and assign record
+/// which fields were given.)
 std::vector<Problem> missing(const Fields& fields, const std::string& file);
 
-/// Throws StartupError (78) with one line for each problem; does nothing where there are none.
+/// Throws StartupError (78) with one line per problem. Does nothing if there are none.
 void refuse(const std::vector<Problem>& problems);
 
-/// The current values as commented YAML that reads back to the same values.
+/// The current values as commented YAML, which reads back to the same values.
 std::string toYaml(const Fields& fields);
 /// A Markdown table: key, default, unit, range, meaning.
 std::string toMarkdown(const Fields& fields);

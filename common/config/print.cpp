@@ -56,7 +56,7 @@ std::string commentOf(const Field& field) {
   return text;
 }
 
-/// Groups in the order of their first appearance, each key once.
+/// Groups in order of first appearance, each key once.
 struct Group {
   std::string name;
   const Field* field = nullptr;

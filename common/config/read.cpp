@@ -17,7 +17,7 @@
 namespace perdure::config {
 namespace {
 
-/// Edits (insert, delete, replace, swap of neighbours) between two words.
+/// Number of edits (insert, delete, replace, swap of neighbours) between two words.
 std::size_t editDistance(const std::string& a, const std::string& b) {
   std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
   for (std::size_t i = 0; i <= a.size(); ++i) {
@@ -42,7 +42,7 @@ std::string shortened(const std::string& text) {
 }
 
 std::optional<double> parseNumber(const YAML::Node& node) {
-  if (!node.IsScalar() || node.Tag() == "!") return std::nullopt;  // "!": it was quoted
+  if (!node.IsScalar() || node.Tag() == "!") return std::nullopt;  // "!" marks quoted values
   const std::string& text = node.Scalar();
   const char* begin = text.data() + (text.starts_with('+') ? 1 : 0);
   const char* end = text.data() + text.size();
@@ -67,7 +67,7 @@ bool inside(double value, const Range& range) {
   return (range.low_open ? value > range.low : value >= range.low) && value <= range.high;
 }
 
-/// Walks one document and writes into the fields; collects what is wrong on the way.
+/// Traverses one document, writes its values into the fields, and collects problems.
 class Reader {
  public:
   Reader(Fields& fields, std::string file, bool located)
@@ -106,7 +106,7 @@ class Reader {
     } else if (!isGroup(name) && !fields_.wasGroup(name)) {
       problem(key, name + ": is not a known key" + suggestion(name));
     } else if (value.IsMap()) {
-      seen_.erase(name);  // a group may go on under a second heading; its keys may not
+      seen_.erase(name);  // a group may continue under a second heading; keys must not repeat
       readGroup(value, name + ".");
     } else if (!value.IsNull()) {
       problem(value, name + ": is a group of keys, not a value; its first key is " +
@@ -129,7 +129,7 @@ class Reader {
     return {};
   }
 
-  /// The nearest known key or group, where one is near enough to be meant.
+  /// The nearest known key or group, if one is similar enough.
   std::string suggestion(const std::string& name) const {
     std::set<std::string> known;
     for (const Field& field : fields_.all()) {
@@ -242,7 +242,7 @@ class Reader {
   std::vector<Problem> problems_;
 };
 
-/// Listens to a document without keeping it.
+/// Parses a document without storing it.
 class Ignore : public YAML::EventHandler {
  public:
   void OnDocumentStart(const YAML::Mark& mark) override { start = mark; }
@@ -261,8 +261,8 @@ class Ignore : public YAML::EventHandler {
   YAML::Mark start;
 };
 
-/// Where something follows the first document. (YAML::LoadAll of 0.7 may loop without end on
-/// malformed text, and YAML::Load ignores what follows.)
+/// The position of text that follows the first document, if any. (YAML::LoadAll of 0.7 may loop
+/// forever on malformed text, and YAML::Load ignores text after the first document.)
 std::optional<YAML::Mark> afterFirstDocument(const std::string& yaml) {
   std::istringstream stream(yaml);
   YAML::Parser parser(stream);

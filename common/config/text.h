@@ -7,9 +7,9 @@
 
 namespace perdure::config {
 
-/// The shortest decimal that reads back to the same double.
+/// The shortest decimal number that reads back to the same double.
 std::string numberText(double value);
-/// "> 0", "≥ 1", "0 … 5", or empty for any; the unit is appended where there is one.
+/// "> 0", "≥ 1", "0 … 5", or empty for any value. The unit is appended if there is one.
 std::string rangeText(const Range& range, const std::string& unit);
 /// A double-quoted YAML scalar.
 std::string quoted(const std::string& text);

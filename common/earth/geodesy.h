@@ -14,12 +14,12 @@ struct Geodetic {
 };
 
 Eigen::Vector3d toEcef(const Geodetic& g);
-/// |ecef| of at least 1000 km.
+/// Requires |ecef| of at least 1000 km.
 Geodetic fromEcef(const Eigen::Vector3d& ecef);
 /// The rotation whose columns are east, north and up at g, in ECEF.
 Eigen::Matrix3d enuAxes(const Geodetic& g);
 
-/// Maps points of W to the ellipsoid, given where the body stood in W at the anchor's time.
+/// Maps points of W to the ellipsoid, based on the pose of the body in W at the time of the anchor.
 class GeoReference {
  public:
   GeoReference(const GeoAnchor& anchor, const RigidTransform& T_WB_at_anchor);
@@ -28,7 +28,7 @@ class GeoReference {
  private:
   Eigen::Vector3d origin_ecef_;
   Eigen::Matrix3d enu_axes_;
-  Eigen::Matrix3d R_EW_;  ///< W to ENU: the yaw between them
+  Eigen::Matrix3d R_EW_;  ///< rotation from W to ENU, about the vertical
   Eigen::Vector3d p_WB_;
 };
 

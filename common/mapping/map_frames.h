@@ -1,9 +1,9 @@
-// How the objects of a map lie in M, the frame in which it is one. What is stored of an object is
-// in the W of the session that saw it last; the anchor at which it was last detected says how W lay
-// in M there: T_MW = T_MA T_WA⁻¹.
+// Transforms objects into M, the frame in which the map is consistent. An object is stored in the W
+// of the session that observed it last. The anchor at its last detection gives the pose of W in M:
+// T_MW = T_MA T_WA⁻¹.
 //
-// M of a component of the graph is the W of the session of its first anchor. Its z axis is against
-// gravity.
+// M of a component of the graph is the W of the session of its first anchor. Its z axis points
+// against gravity.
 #pragma once
 
 #include <map>
@@ -15,29 +15,29 @@
 
 namespace perdure::mapping {
 
-/// How W lies in M beside an anchor.
+/// The pose of W in M near an anchor.
 struct FrameInMap {
   RigidTransform T_MW;
   WorldId map;               ///< M
-  bool provisional = false;  ///< M is not that of the map's first anchor: not found there yet
+  bool provisional = false;  ///< the session is not linked to the map's first anchor yet
 };
 
-/// As the graph has it when this is made.
+/// Uses the graph as it is at construction.
 class MapFrames {
  public:
   MapFrames() = default;
   MapFrames(const PoseGraph& graph, const std::map<AnchorId, Anchor>& anchors);
   explicit MapFrames(const MapState& state) : MapFrames(state.graph(), state.anchors()) {}
 
-  /// The anchor that what is stored of an object belongs to; 0: none. `world` is its W, `last_seen`
-  /// when it was last detected. By its record where that tells of the same detection; else, and
-  /// where there is none, the last one of its session that was set until then.
+  /// The anchor that an object's stored data belong to; 0: none. `world` is its W, and `last_seen`
+  /// the time of its last detection. The anchor is that of the record, if the record is of the same
+  /// detection. Otherwise it is the last anchor of the session at that time.
   AnchorId anchorOf(const ObjectRecord* record, const WorldId& world, TimePoint last_seen) const;
 
-  /// Beside an anchor. Of none, or one that is not known: M is `world`, and W is M.
+  /// The frame near an anchor. Without an anchor, or for an unknown one, M is `world`, and W is M.
   FrameInMap at(AnchorId anchor, const WorldId& world) const;
 
-  /// The M that a session's newest anchor lies in; the session's own W where it has none.
+  /// The M of a session's newest anchor; the session's own W if it has no anchor.
   WorldId mapOf(const WorldId& session) const;
 
  private:

@@ -11,13 +11,14 @@
 namespace perdure::mapping {
 namespace {
 
-/// Above it, of its variance, what is known of an object's place came from where it was laid.
+/// Above this share of its variance, an object's position mostly comes from the map, not from
+/// detections.
 constexpr double kMostLaid = 0.25;
 
 struct Pair {
   ObjectId id = 0;
-  AnchorId home = 0;         ///< of the visit before
-  PlacedObject seen, known;  ///< in B, in M
+  AnchorId home = 0;         ///< anchor of the earlier visit
+  PlacedObject seen, known;  ///< `seen` in B, `known` in M
 };
 
 MatchEquations equationsAt(const LevelPose& T_Mb, const std::vector<Pair>& pairs) {
@@ -26,7 +27,8 @@ MatchEquations equationsAt(const LevelPose& T_Mb, const std::vector<Pair>& pairs
   return equations;
 }
 
-/// Those of one visit, of which the body's place is known best: an edge leads to its anchors.
+/// Selects the pairs of the one visit that constrains the body's position best, because the edge
+/// leads to an anchor of that visit. Returns that anchor.
 AnchorId keepOneVisit(std::vector<Pair>& pairs, const MapState& state, double visit_m) {
   AnchorId best = 0;
   double most = 0.0;
@@ -51,8 +53,8 @@ bool TrackedTies::isUsed(ObjectId id, double way_m) const {
   return at != used_at_m_.end() && way_m - at->second < parameters_.loop.visit_m;
 }
 
-/// An object's posterior holds what it was laid with, once: with the share r of the information,
-/// detections alone have the covariance P / (1 − r).
+/// The posterior of an object contains its recalled position as a prior. If r is that prior's share
+/// of the information, detections alone have the covariance P / (1 − r).
 std::optional<TrackedTies::Tie> TrackedTies::find(const Whereabouts& body) const {
   const LoopParameters& loop = parameters_.loop;
   const double way_m = body.way.way_m();
@@ -84,7 +86,7 @@ std::optional<TrackedTies::Tie> TrackedTies::find(const Whereabouts& body) const
   const Eigen::Vector4d step = equationsAt(x, pairs).stepNear(inverseSymmetric(by_graph.covariance),
                                                               Eigen::Vector4d::Zero());
   tie.T_Mb.mean = {x.p + step.head<3>(), wrapAngle(x.yaw + step[3])};
-  // There what is left is the detections' own error, and no longer the drift.
+  // At this pose the residuals contain the errors of detections only, without the drift.
   tie.T_Mb.covariance = equationsAt(tie.T_Mb.mean, pairs).covariance();
   if (planeSigma(tie.T_Mb.covariance) > loop.tracked_gain * laid_m) return std::nullopt;
   return tie;

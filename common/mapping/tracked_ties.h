@@ -1,6 +1,6 @@
-// What objects that are seen again under their old ids say about the drift since then. The filter
-// laid them where the graph said, and detections have since moved them to where they are.
-// Derivation: tools/docs/maths/pose_graph.md.
+// Measures drift with objects that are observed again under their old ids. The filter recalled them
+// at the poses of the graph, and detections have corrected these since. Derivation:
+// tools/docs/maths/pose_graph.md.
 #pragma once
 
 #include <map>
@@ -16,11 +16,12 @@ class TrackedTies {
   explicit TrackedTies(const Parameters& parameters) : parameters_(parameters) {}
 
   struct Tie {
-    LevelGaussian T_Mb;  ///< by detections alone
-    AnchorId home = 0;   ///< that most of the objects belong to
-    std::vector<ObjectId> objects;  ///< seen on both visits as the same track: no loop is needed
+    LevelGaussian T_Mb;             ///< estimate from detections alone
+    AnchorId home = 0;              ///< anchor of the earlier visit
+    std::vector<ObjectId> objects;  ///< observed on both visits as the same track
   };
-  /// Nothing while they say no more than the graph. Each object is used once in a visit.
+  /// Returns the present tie, or nothing if the objects add no information to the graph. Each
+  /// object is used once per visit.
   std::optional<Tie> find(const Whereabouts& body) const;
   void use(const Tie& tie, double way_m);
   void begin() { used_at_m_.clear(); }
@@ -29,7 +30,7 @@ class TrackedTies {
   bool isUsed(ObjectId id, double way_m) const;
 
   Parameters parameters_;
-  std::map<ObjectId, double> used_at_m_;  ///< way of the session
+  std::map<ObjectId, double> used_at_m_;  ///< distance travelled in the session at the last use
 };
 
 }  // namespace perdure::mapping

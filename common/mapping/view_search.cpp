@@ -13,9 +13,9 @@ namespace perdure::mapping {
 namespace {
 
 constexpr std::size_t kLeastPoints = 8;
-constexpr double kElsewhere_m = 3.0, kElsewhere_rad = 0.15;  // from one place to another one
+constexpr double kElsewhere_m = 3.0, kElsewhere_rad = 0.15;  // least separation of two places
 
-/// One way to lay the view of now onto that of an anchor.
+/// One candidate pose, from matching the present view with that of an anchor.
 struct Way {
   AnchorId anchor = 0;
   LevelGaussian T_MB;
@@ -34,7 +34,7 @@ std::optional<Way> wayTo(AnchorId anchor, const Whereabouts& body, const View& s
   return Way{anchor, {T_Ma * match->T_AB.mean, turnedBy(T_Ma.R(), match->T_AB.covariance)}, *match};
 }
 
-/// The best way, and how good the best one of another place is.
+/// The best candidate, with the score of the best one at another place.
 std::optional<PlaceMatch> bestOf(const std::vector<Way>& ways, AnchorId& home) {
   const auto best = std::max_element(ways.begin(), ways.end(), [](const Way& a, const Way& b) {
     return a.match.nats < b.match.nats;
@@ -72,7 +72,7 @@ std::optional<LoopSearch::Found> ViewSearch::nearby(const Whereabouts& body,
     ++asked;
     const auto way = wayTo(id, body, seen);
     if (!way) continue;
-    // The error of the way, and what is known of the body as this anchor sees it.
+    // The error of the candidate plus the prior of the body relative to this anchor.
     const LevelGaussian prior = bodyByGraph(body, *T_ba);
     Eigen::Matrix4d S = prior.covariance + way->T_MB.covariance;
     addFloor(S, parameters_.loop.floor_m, parameters_.loop.floor_rad);
@@ -115,7 +115,7 @@ std::optional<LoopSearch::Found> ViewSearch::elsewhere(const Whereabouts& body,
 bool ViewSearch::contradicts(const LoopSearch::Found& found, const Whereabouts& body,
                              const View& seen) const {
   const auto components = componentsOf(body.state.graph());
-  // What was seen on this visit says where the body was taken to be.
+  // Views of this visit are excluded, because they depend on the assumed pose of the body.
   const auto of_late = body.anchorsOfVisit(parameters_.loop.visit_m);
   std::vector<Way> ways;
   for (const auto& [id, component] : components) {

@@ -1,6 +1,6 @@
-// Looks for the body by what places look like: the second cue beside objects. It proposes loops
-// where objects say nothing, and is a second witness of those that objects propose.
-// Derivation: tools/docs/maths/appearance.md.
+// Place recognition by appearance, the second cue besides objects. It proposes loops if objects
+// give no evidence, and confirms or contradicts loops proposed by objects. Derivation:
+// tools/docs/maths/appearance.md.
 #pragma once
 
 #include <optional>
@@ -15,12 +15,14 @@ class ViewSearch {
  public:
   explicit ViewSearch(const Parameters& parameters) : parameters_(parameters) {}
 
-  /// `seen`: landmarks of the way of late, in the body's newest anchor. Among what hangs together
-  /// with the body by the graph: only what would make its place clearly better known.
+  /// `seen`: recent landmarks, in the axes of the body's newest anchor. Searches the part of the
+  /// graph that is linked to the body. Returns only results that clearly reduce the uncertainty of
+  /// the body's position.
   std::optional<LoopSearch::Found> nearby(const Whereabouts& body, const View& seen) const;
-  /// In the components of the graph that the body's session does not hang together with.
+  /// Searches the components of the graph that are not linked to the body's session.
   std::optional<LoopSearch::Found> elsewhere(const Whereabouts& body, const View& seen) const;
-  /// Whether what the place looks like says surely that the body is elsewhere than `found` does.
+  /// Returns whether the appearance is strong evidence that the body is at a different place than
+  /// `found`.
   bool contradicts(const LoopSearch::Found& found, const Whereabouts& body, const View& seen) const;
 
  private:

@@ -1,4 +1,4 @@
-// The χ² distribution: gates of filters and bands of consistency tests.
+// The χ² distribution, for gates of filters and bounds of consistency tests.
 #pragma once
 
 namespace perdure {

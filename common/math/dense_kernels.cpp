@@ -12,8 +12,8 @@ namespace {
 using simd::Four, simd::four, simd::Two, simd::two;
 
 constexpr long kFour = 4, kEight = 8;
-/// Columns j to j + 4 of rows i to i + 4 N, less what the columns before j explain; where they lie
-/// below the diagonal block, which is factorised, times its inverse.
+/// Subtracts the contribution of the columns before j from columns j to j + 4 of rows i to i + 4 N.
+/// Below the diagonal block, which is factorised, it also applies the inverse of that block.
 template <int N, bool kBelow>
 PERDURE_INLINE void reduceTile(double* S, long stride, long i, long j, const Four& inverse) {
   double* column[kFour];
@@ -42,7 +42,7 @@ PERDURE_INLINE void reduceTile(double* S, long stride, long i, long j, const Fou
   }
 }
 
-/// The same of one row, and of `width` columns.
+/// The same for one row and `width` columns.
 PERDURE_INLINE void reduceRow(double* S, long stride, long i, long j, long width,
                               const Four& inverse) {
   for (long c = 0; c < width; ++c) {
@@ -52,7 +52,8 @@ PERDURE_INLINE void reduceRow(double* S, long stride, long i, long j, long width
   }
 }
 
-/// Of `width` columns from j on, less what those before j explain.
+/// Subtracts the contribution of earlier columns in the block and factorises `width` columns from j
+/// on.
 PERDURE_INLINE bool factoriseBlock(double* S, long stride, long j, long width, Four& inverse) {
   for (long c = j; c < j + width; ++c) {
     double* column = S + c * stride;
@@ -68,7 +69,7 @@ PERDURE_INLINE bool factoriseBlock(double* S, long stride, long j, long width, F
   return true;
 }
 
-/// Rows i to i + N of 4 W columns that lie row by row, from those before them.
+/// Solves rows i to i + N of 4 W columns, stored row by row, from the rows before them.
 template <int N, int W>
 PERDURE_INLINE void whitenRows(const double* L, long stride, long i, double* X) {
   constexpr long kWidth = kFour * W;
@@ -93,7 +94,7 @@ PERDURE_INLINE void whitenRows(const double* L, long stride, long i, double* X) 
   }
 }
 
-/// Of up to 4 W columns, by way of `X`, n × 4 W.
+/// Whitens up to 4 W columns; `X`, n × 4 W, is a work space.
 template <int W>
 PERDURE_INLINE void whitenPanel(const double* L, long stride, long n, double* B, long columns,
                                 double* X) {
@@ -109,7 +110,7 @@ PERDURE_INLINE void whitenPanel(const double* L, long stride, long n, double* B,
   }
 }
 
-/// Rows i on of columns j to j + N of A Bᵀ.
+/// Computes rows from i on of columns j to j + N of A Bᵀ.
 template <class V, int kRows, int N>
 PERDURE_INLINE void timesTransposedTile(const double* A, long rows, const double* B, long columns,
                                         long inner, long i, long j, double* product) {
@@ -138,7 +139,7 @@ PERDURE_INLINE void timesTransposedTile(const double* A, long rows, const double
   }
 }
 
-/// Of those columns the rows from i on.
+/// Computes all rows from i on of columns j to j + N of A Bᵀ.
 template <int N>
 PERDURE_INLINE void timesTransposedColumns(const double* A, long rows, const double* B,
                                            long columns, long inner, long i, long j,

@@ -1,16 +1,17 @@
-// The loops in which a batch of some ten to a hundred dimensions spends its time. Eigen's own
-// are made for larger matrices: to pack blocks of these costs more than the sums. On x86-64 they
-// are compiled for AVX2 as well, taken where the machine has it; without fused multiply-add, so
-// that a result does not depend on the machine.
+// The loops that dominate the run time of a batch with ten to a hundred dimensions. Eigen's own
+// kernels are made for larger matrices: packing blocks of this size costs more than the sums. On
+// x86-64 the functions are also compiled for AVX2, which is used if the machine supports it. Fused
+// multiply-add is not used, so that results do not depend on the machine.
 #pragma once
 
 namespace perdure::dense {
 
-/// Puts L of S = L Lᵀ into the lower triangle of an n × n matrix, columns `stride` numbers apart.
-/// What is above the diagonal is void then. False where S is not positive definite.
+/// Stores L of S = L Lᵀ in the lower triangle of an n × n matrix with column stride `stride`. The
+/// elements above the diagonal are undefined afterwards. Returns false if S is not positive
+/// definite.
 bool factorise(double* S, long stride, long n);
 
-/// B ← L⁻¹ B of an n × m matrix whose columns are n numbers apart.
+/// B ← L⁻¹ B for an n × m matrix with column stride n.
 void whiten(const double* L, long stride, long n, double* B, long m);
 
 /// The 4 × 4 blocks on and below the diagonal of A B, with A n × 6 and B 6 × n; n is a multiple of
@@ -21,10 +22,10 @@ void multiplySix(const double* A, const double* B, long n, double* product);
 void timesTransposed(const double* A, long rows, const double* B, long columns, long inner,
                      double* product);
 
-/// A Aᵀ with A rows × inner; of what is above the diagonal only some is written.
+/// A Aᵀ with A rows × inner; only some of the elements above the diagonal are written.
 void lowerTimesTransposed(const double* A, long rows, long inner, double* product);
 
-/// A B with A 4 × inner and B inner × columns, whose columns are `stride` numbers apart.
+/// A B with A 4 × inner and B inner × columns; the columns of B have the stride `stride`.
 void fourRowsTimes(const double* A, const double* B, long stride, long inner, long columns,
                    double* product);
 

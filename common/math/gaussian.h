@@ -1,6 +1,6 @@
-// Small tools on Gaussians: density, symmetry, definiteness; and the decompositions of covariances
-// that every estimator needs, compiled once and for any size (Eigen's own, for each fixed size and
-// each file anew, cost a third of the build).
+// Small functions for Gaussians: density, symmetry, definiteness, and decompositions of
+// covariances. The decompositions are compiled once for any size. If Eigen's templates were
+// instantiated for each size and file, they would take a third of the build time.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,46 +26,46 @@ Eigen::MatrixXd solveSymmetric(const MatrixView& S, const MatrixView& B);
 /// S⁻¹ of a symmetric S.
 Eigen::MatrixXd inverseSymmetric(const MatrixView& S);
 
-/// B S⁻¹ of an m × n matrix B: what B's rows have in common with what S is the covariance of. Zero
-/// where S is not positive definite (a pivot below 1e-18).
+/// B S⁻¹ of an m × n matrix B: the regression of B on the variable with covariance S. The result is
+/// zero if S is not positive definite (a pivot below 1e-18).
 Eigen::MatrixXd regressOn(const MatrixView& S, const MatrixView& B);
 
-/// A⁻¹ of any square A; not finite where there is none.
+/// A⁻¹ of any square A; not finite if A is singular.
 Eigen::MatrixXd inverse(const MatrixView& A);
 Eigen::Matrix<double, 6, 6> inverse(const Eigen::Matrix<double, 6, 6>& A);
 
-/// The nearest symmetric matrix to S whose eigenvalues are `least` or more.
+/// The nearest symmetric matrix to S whose eigenvalues are at least `least`.
 Eigen::MatrixXd withLeastEigenvalue(const MatrixView& S, double least);
 
-/// Of a symmetric S, in increasing order.
+/// Eigenvalues of a symmetric S, in increasing order.
 Eigen::VectorXd eigenvalues(const MatrixView& S);
 
-/// Puts L of S = L Lᵀ into S's lower triangle; the upper one is neither read nor written. False
-/// where S is not positive definite: S is then void.
+/// Stores L of S = L Lᵀ in S's lower triangle; the upper one is neither read nor written. Returns
+/// false if S is not positive definite; S is then undefined.
 bool choleskyInPlace(Eigen::Ref<Eigen::MatrixXd> S);
 
 /// B ← L⁻¹ B with L in the lower triangle of an n × n matrix; B is n × m.
 void whitenInPlace(const MatrixView& L, Eigen::Ref<Eigen::MatrixXd> B);
 
-/// What an expression is kept in, by columns.
+/// The type in which an expression is stored, by columns.
 template <class Derived>
 using ByColumns =
     Eigen::Matrix<double, Derived::RowsAtCompileTime, Derived::ColsAtCompileTime, Eigen::ColMajor,
                   Derived::MaxRowsAtCompileTime, Derived::MaxColsAtCompileTime>;
 
-/// S = L Lᵀ. `Matrix` is what S is kept in; results have the type of the argument. So what has a
-/// fixed or bounded size stays off the heap.
+/// The factorisation S = L Lᵀ. `Matrix` is the storage type of S; results have the type of the
+/// argument. Data of fixed or bounded size therefore need no heap memory.
 template <class Matrix>
 class Cholesky {
  public:
   Cholesky() = default;
   explicit Cholesky(std::type_identity_t<Matrix> S) : L_(std::move(S)) { factorise(); }
 
-  /// S, to be filled where it is kept; then factorise().
+  /// The storage of S. Fill it, then call factorise().
   Matrix& matrix() { return L_; }
   void factorise() { positive_ = dense::factorise(L_.data(), L_.rows(), L_.rows()); }
 
-  bool positive() const { return positive_; }  ///< if not, nothing else may be asked
+  bool positive() const { return positive_; }  ///< if false, no other function may be called
   /// Returns L⁻¹ B.
   template <class Derived>
   ByColumns<Derived> whiten(const Eigen::MatrixBase<Derived>& B) const {
@@ -103,7 +103,7 @@ void makeSymmetric(Matrix& P) {
   P = (0.5 * (P + P.transpose())).eval();
 }
 
-/// Finite, symmetric within 1e-6 relative, and positive definite.
+/// Returns whether P is finite, symmetric within 1e-6 relative, and positive definite.
 template <class Derived>
 bool isCovariance(const Eigen::MatrixBase<Derived>& P) {
   if (P.rows() != P.cols() || !P.allFinite()) return false;

@@ -1,4 +1,4 @@
-// How many bits of two binary descriptors differ.
+// The number of different bits of two binary descriptors.
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 
 namespace perdure {
 
-/// Of two 256-bit descriptors, [0, 256].
+/// Distance of two 256-bit descriptors, [0, 256].
 inline int hammingDistance(const std::array<std::uint8_t, 32>& a,
                            const std::array<std::uint8_t, 32>& b) {
   std::array<std::uint64_t, 4> x, y;

@@ -1,4 +1,4 @@
-// Central differences, for the tests of analytic Jacobians and for cheap non-critical ones.
+// Central differences, for tests of analytic Jacobians and for cheap uncritical Jacobians.
 #pragma once
 
 #include <Eigen/Core>

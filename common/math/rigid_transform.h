@@ -39,7 +39,7 @@ struct RigidTransform {
 RigidTransform boxPlus(const RigidTransform& T, const Eigen::Matrix<double, 6, 1>& delta);
 /// The [θ, δp] with b ⊞ delta = a.
 Eigen::Matrix<double, 6, 1> boxMinus(const RigidTransform& a, const RigidTransform& b);
-/// Rotation by slerp, position linearly; s in [0, 1].
+/// Interpolates the rotation by slerp and the position linearly; s in [0, 1].
 RigidTransform interpolate(const RigidTransform& a, const RigidTransform& b, double s);
 
 }  // namespace perdure

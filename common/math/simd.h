@@ -1,19 +1,20 @@
-// Four numbers at once, for the few loops that a frame spends its time in. Written with GCC's
-// vector types: what has no AVX2 computes the same by halves. On x86-64 a function may be compiled
-// for AVX2 as well, taken where the machine has it; without fused multiply-add, so that a result
-// does not depend on the machine.
+// Vectors of four numbers, for the few loops that dominate the run time of a frame. They use GCC's
+// vector types: without AVX2 the same operations run in two halves. On x86-64 a function may also
+// be compiled for AVX2, which is used if the machine supports it. Fused multiply-add is not used,
+// so that results do not depend on the machine.
 #pragma once
 
 #include <algorithm>
 
-// The loader picks a clone before a sanitizer's run time has begun.
+// No clones under a sanitizer, because the loader selects a clone before the sanitizer's run time
+// starts.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
     !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define PERDURE_ALSO_AVX2 __attribute__((target_clones("avx2", "default")))
 #else
 #define PERDURE_ALSO_AVX2
 #endif
-// A clone's own functions have to be part of it.
+// The functions called by a clone must be inlined, to be compiled for the same target.
 #define PERDURE_INLINE inline __attribute__((always_inline))
 
 namespace perdure::simd {

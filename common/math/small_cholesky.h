@@ -1,5 +1,5 @@
-// S = L Lᵀ of the small matrices of fixed size that a filter takes by the thousand: on the stack,
-// and without the cost of a call for any size (gaussian.h has those).
+// S = L Lᵀ for small matrices of fixed size, which a filter factorises by the thousand. They stay
+// on the stack and avoid the call overhead of the functions for any size in gaussian.h.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,8 +7,8 @@
 
 namespace perdure {
 
-/// Puts L of S = L Lᵀ into S's lower triangle; the upper one is neither read nor written. False
-/// where S is not positive definite: S is then void.
+/// Stores L of S = L Lᵀ in S's lower triangle; the upper one is neither read nor written. Returns
+/// false if S is not positive definite; S is then undefined.
 template <int N>
 bool choleskyInPlace(Eigen::Matrix<double, N, N>& S) {
   for (int j = 0; j < N; ++j) {

@@ -1,5 +1,6 @@
-// Products of matrices of fixed size by dense_kernels.h: what an update of a filter takes by the
-// thousand. Sums are in the order of the inner dimension, as Eigen's lazyProduct has them.
+// Products of matrices of fixed size, based on dense_kernels.h, for the updates of a filter, which
+// need them by the thousand. Sums are in the order of the inner dimension, as in Eigen's
+// lazyProduct.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,7 +18,7 @@ Eigen::Matrix<double, N, M> timesTransposed(const Eigen::Matrix<double, N, K>& A
   return product;
 }
 
-/// A Aᵀ of an N × K matrix, on and below the diagonal; above it whatever.
+/// A Aᵀ of an N × K matrix, on and below the diagonal; elements above it are undefined.
 template <int N, int K>
 Eigen::Matrix<double, N, N> lowerTimesTransposed(const Eigen::Matrix<double, N, K>& A) {
   Eigen::Matrix<double, N, N> product = Eigen::Matrix<double, N, N>::Zero();

@@ -70,7 +70,7 @@ Eigen::Matrix3d rotationAboutZ(double yaw) {
 Eigen::Quaterniond levelling(const Eigen::Vector3d& up) {
   const Eigen::Vector3d from = up.normalized(), to = Eigen::Vector3d::UnitZ();
   const double cosine = to.dot(from);
-  Eigen::Quaterniond q(0.0, 1.0, 0.0, 0.0);  // upside down every horizontal axis is as good
+  Eigen::Quaterniond q(0.0, 1.0, 0.0, 0.0);  // upside down: any horizontal axis is valid
   if (cosine < -1.0 + kUpsideDown) return q;
   const double s = std::sqrt((1.0 + cosine) * 2.0);
   q.vec() = from.cross(to) * (1.0 / s);

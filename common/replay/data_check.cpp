@@ -18,7 +18,7 @@ namespace {
 
 using Grade = DataFinding::Grade;
 
-/// Which of what is known as (low, high) a median falls into.
+/// A range (low, high) of the median that identifies a wrong unit.
 struct Unit {
   double low, high;
   const char *code, *text;
@@ -31,7 +31,8 @@ double medianOf(std::vector<double> values) {
   return *middle;
 }
 
-/// Whether forces have no direction in common and many sizes, which gravity would give them.
+/// Returns true if the forces have no common direction and widely varying magnitudes. Gravity would
+/// give them both a common direction and a similar magnitude.
 bool isWithoutGravity(const std::vector<ImuSample>& samples) {
   constexpr double kCommon = 0.4, kSpread = 0.3;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -47,7 +48,7 @@ bool isWithoutGravity(const std::vector<ImuSample>& samples) {
 }
 
 void addForceUnit(const std::vector<ImuSample>& samples, double force, DataFindings& findings) {
-  // Gravity is 9.8 m/s²; what moves reads somewhat more or less.
+  // Gravity is 9.8 m/s²; a moving sensor measures slightly different values.
   constexpr std::array kUnits{
       Unit{0.85, 1.25, "accel_in_g", "the unit is g; multiply the columns by 9.80665"},
       Unit{850, 1250, "accel_in_mg", "the unit is mg; multiply the columns by 0.00980665"},
@@ -77,12 +78,12 @@ void addForceUnit(const std::vector<ImuSample>& samples, double force, DataFindi
   }
 }
 
-/// "12.3 s … 18.2 s", as nanoseconds where they are needed to see the unit.
+/// The range in nanoseconds, which shows the unit of the stamps.
 std::string rangeText(TimePoint first, TimePoint last) {
   return fmt::format("{} … {} ns", toNanoseconds(first), toNanoseconds(last));
 }
 
-/// What one range of stamps may be in place of the other.
+/// A guess at the relation of the two ranges of stamps: a different unit or a different clock.
 std::string guessOfClock(TimePoint images, TimePoint imu) {
   const double ratio = static_cast<double>(toNanoseconds(images)) /
                        std::max(1.0, static_cast<double>(toNanoseconds(imu)));
@@ -142,14 +143,14 @@ void checkRate(const Recording& recording, DataFindings& findings) {
                    rate, said)});
 }
 
-/// Whether the mean force, which is away from the ground, points down in the image.
+/// Checks whether the mean specific force, which points upwards, points down in the image.
 void checkUpright(const Recording& recording, DataFindings& findings) {
   if (recording.imu.size() < 20 || recording.calibration.cameras.empty()) return;
   const CameraCalibration& camera = recording.calibration.cameras.front();
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const ImuSample& sample : recording.imu) sum += sample.accel;
   const Eigen::Vector3d up_C = camera.T_BC.q.conjugate() * sum.normalized();
-  constexpr double kSurely = 0.8;  // within 37°
+  constexpr double kSurely = 0.8;  // cosine of 37°
   if (!(up_C.y() > kSurely)) return;
   findings.push_back(
       {Grade::kWarning, "images_upside_down",

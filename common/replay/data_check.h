@@ -1,5 +1,5 @@
-// What a program can know of a recording before it starts: whether stamps, units, images and
-// calibration fit together. Each finding says what was found, where, and the mend.
+// Checks of a recording before a run: consistency of stamps, units, images and calibration. Each
+// finding states the error, its place, and the fix.
 #pragma once
 
 #include <opencv2/core/mat.hpp>
@@ -14,32 +14,34 @@ struct DataFinding {
   enum class Grade { kWarning, kFatal };
   Grade grade = Grade::kWarning;
   std::string code;  ///< short, stable, snake_case
-  std::string text;  ///< a sentence, with the mend
+  std::string text;  ///< a sentence, with the fix
 };
 using DataFindings = std::vector<DataFinding>;
 
-/// What is to be done with the data: only what is used is looked at.
+/// The use of the data: only the parts that are used are checked.
 struct DataUse {
   bool images = true, imu = true;
 };
 
-/// In the text of images_upside_down.
+/// Contained in the text of images_upside_down.
 inline constexpr char kUpsideDown[] = "images upside down";
 
-/// Looks at some images of each camera, at the sizes of all files, and at all stamps and samples.
-/// Codes: image_unreadable, images_unreadable, images_empty, image_size, image_flat, stamps_equal,
+/// Checks some images of each camera, the sizes of all files, and all stamps and samples. Codes:
+/// image_unreadable, images_unreadable, images_empty, image_size, image_flat, stamps_equal,
 /// stamps_count, stamps_unit, clocks_apart, imu_covers_part, imu_rate, accel_in_g, accel_in_mg,
 /// accel_in_mm, accel_scale, accel_without_gravity, imu_columns_exchanged, gyro_scale,
 /// images_upside_down.
 DataFindings checkData(const Recording& recording, const DataUse& use);
 
-/// Of the inertial samples alone.
+/// Checks the inertial samples only.
 DataFindings checkImuUnits(const std::vector<ImuSample>& samples);
 
-/// The frame's image, grey; of 16 bits by what it uses. Reasons as Dataset counts them.
+/// The image of a frame in grey; 16-bit images are scaled by their used bits. Reasons as counted by
+/// Dataset.
 Result<cv::Mat> monoImageOf(const Recording::FrameFile& frame);
 
-/// Throws StartupError(kData) with all that is fatal; nothing where nothing is. `where` begins it.
+/// Throws StartupError(kData) with all fatal findings; does nothing if there are none. The message
+/// begins with `where`.
 void refuseFatal(const DataFindings& findings, const std::string& where);
 
 }  // namespace perdure::replay

@@ -19,7 +19,7 @@
 namespace perdure::replay {
 namespace {
 
-/// The median interval, or 0 where there are too few samples to tell.
+/// The median interval, or 0 if there are too few samples.
 Duration usualInterval(const std::vector<ImuSample>& samples) {
   if (samples.size() < 3) return Duration{0};
   std::vector<Duration> intervals;
@@ -35,7 +35,7 @@ std::string nameOf(const Recording::FrameFile& file) {
   return file.path.empty() ? "frame " + std::to_string(file.index) : file.path;
 }
 
-/// A copy: the frame's own pixels lie in a chunk of the recording.
+/// Returns a copy, because the frame's pixels lie in a chunk of the recording.
 Result<cv::Mat> recordedImage(const Recording::FrameFile& file,
                               std::optional<ImageEncoding> encoding) {
   const auto loaded = file.load();
@@ -49,7 +49,7 @@ Result<cv::Mat> recordedImage(const Recording::FrameFile& file,
   return image->clone();
 }
 
-/// Frames keep their numbers; samples stay.
+/// Keeps every N-th frame with its number; samples are unchanged.
 void keepEach(std::size_t every, Recording& recording) {
   std::set<std::uint64_t> kept;
   std::size_t seen = 0;
@@ -67,14 +67,14 @@ bool hasMessages(const std::filesystem::path& path) {
   return RecordedMessages::looksLikeOne(path) || RosMessages::looksLikeOne(path);
 }
 
-/// It is unpacked once where it is packed: to see whose it is, and to read it.
+/// A packed recording is unpacked only once, to detect its kind and to read it.
 Recording readMessages(const DatasetOptions& options) {
   const UnpackedFiles kept = unpackedFiles(options.path, ".mcap");
   return RosMessages::looksLikeOne(options.path) ? readRosDrive(options)
                                                  : readRecordedDrive(options);
 }
 
-/// A file that is there, and by its name is none that can be read.
+/// Refuses an existing file whose name is not that of a readable format.
 [[noreturn]] void refuseFile(const std::filesystem::path& path) {
   std::string head(16, '\0');
   std::ifstream(path, std::ios::binary)
@@ -215,7 +215,8 @@ std::optional<Frame> Dataset::decodeFrame(const Recording::FrameFile& file) {
   return frame;
 }
 
-/// By the brightest of five images over the drive: one factor for all, so that nothing flickers.
+/// The used bits are those of the brightest of five images over the drive. One scale for all images
+/// prevents flicker.
 int Dataset::bitsOf(const Recording::FrameFile& file) {
   const auto known = bits_.find(file.camera);
   if (known != bits_.end()) return known->second;

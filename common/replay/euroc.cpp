@@ -1,6 +1,6 @@
-// EuRoC ASL folders: mav0/{cam0,cam1,imu0,state_groundtruth_estimate0}, CSVs and sensor.yaml, and
-// where there is one speed0 (`#timestamp [ns],speed [m s^-1]`), which simulated vehicles have.
-// The body is the IMU: where imu0's T_BS is not the identity, everything is moved to it.
+// EuRoC ASL folders: mav0/{cam0,cam1,imu0,state_groundtruth_estimate0}, CSVs and sensor.yaml. An
+// optional speed0 (`#timestamp [ns],speed [m s^-1]`) exists for simulated vehicles. The body is the
+// IMU: if T_BS of imu0 is not the identity, all data are transformed to the IMU.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -41,7 +41,7 @@ std::string judgeImu(const Fields& fields) {
   return {};
 }
 
-/// Whether the head names accelerations first, then rates of turn.
+/// Returns whether the header names accelerations before angular rates.
 bool namesForceFirst(const std::vector<std::string>& head) {
   if (head.size() != 7) return false;
   const auto isForce = [](const std::string& name) {
@@ -99,10 +99,10 @@ void readSpeed(const fs::path& folder, Recording& recording) {
   recording.calibration.has_speed = !recording.speed.empty();
 }
 
-/// The camera's list of frames, with the paths of its images.
+/// The list of a camera's frames, with the paths of its images.
 class FrameList {
  public:
-  /// `look`: whether images must be there.
+  /// `look`: whether the images must exist.
   FrameList(const fs::path& folder, bool look)
       : folder_(folder), look_(look), images_(look ? folder / "data" : fs::path()) {}
 
@@ -117,7 +117,8 @@ class FrameList {
     return found ? found->string() : written.string();
   }
 
-  /// Throws where no image that is named is there; else says what was found by other names.
+  /// Throws if none of the listed images exists. Otherwise notes images that were found under other
+  /// names.
   void close(Recording& recording) const {
     if (!look_ || named_ == 0) return;
     const std::string images = (folder_ / "data").string();
@@ -153,7 +154,7 @@ class FrameList {
   std::string first_;
 };
 
-/// Frames of one camera; cam1's frames take the index of cam0's frame at the same time.
+/// Reads the frames of one camera; frames of cam1 have the index of cam0's frame at the same time.
 void readFrames(const fs::path& folder, std::size_t camera, bool look, Recording& recording) {
   const SensorTable table(folder / "data.csv", camera == 0 ? "frame" : "stereo",
                           [](const Fields&) { return std::string(); });
@@ -167,7 +168,7 @@ void readFrames(const fs::path& folder, std::size_t camera, bool look, Recording
                                             "list stamp and file of each image in it");
   }
   for (const TableRow& row : table.rows()) {
-    // A row that is left out keeps its number; a list that was sorted is counted anew.
+    // A skipped row retains its number; a list that was sorted is numbered again.
     const std::uint64_t number = table.wasSorted() ? row.number : recording.frames.size();
     Recording::FrameFile frame{row.time, number, camera, list.pathOf(row)};
     if (camera != 0) {
@@ -206,7 +207,7 @@ PoseFile readGroundTruth(const fs::path& file, const RigidTransform& T_BI, Recor
 
 void readTruth(const fs::path& mav0, const RigidTransform& T_BI, Recording& recording) {
   fs::path euroc = mav0 / "state_groundtruth_estimate0" / "data.csv";
-  if (!fs::exists(euroc)) euroc = mav0 / "mocap0" / "data.csv";  // TUM-VI's
+  if (!fs::exists(euroc)) euroc = mav0 / "mocap0" / "data.csv";  // file name in TUM-VI
   const fs::path tum = mav0.parent_path() / "gt_tum.txt";
   if (fs::exists(euroc)) {
     recording.truth = readGroundTruth(euroc, T_BI, recording);
@@ -218,7 +219,7 @@ void readTruth(const fs::path& mav0, const RigidTransform& T_BI, Recording& reco
   if (recording.truth && recording.truth->poses().empty()) recording.truth.reset();
 }
 
-/// Without the slash that a shell's completion leaves.
+/// The path without a trailing slash, which shell completion adds.
 fs::path cleanOf(const fs::path& folder) {
   const fs::path path = fs::absolute(folder).lexically_normal();
   return path.has_filename() ? path : path.parent_path();
@@ -228,7 +229,7 @@ fs::path mav0Of(const fs::path& folder) {
   return fs::is_directory(folder / "mav0") ? folder / "mav0" : folder;
 }
 
-/// Whether `of` is a word in a name, as in imu0.yaml and not in simulation.yaml.
+/// Returns whether `of` is a separate word in a name, as in imu0.yaml but not in simulation.yaml.
 bool isWordIn(const std::string& name, const std::string& of) {
   const auto isLetter = [&](std::size_t i) {
     return i < name.size() && std::isalpha(static_cast<unsigned char>(name[i])) != 0;
@@ -239,8 +240,8 @@ bool isWordIn(const std::string& name, const std::string& of) {
   return false;
 }
 
-/// What Kalibr left of the cameras ("camchain") or of the IMU ("imu"), in the folder or where
-/// TUM-VI has it: the first is taken.
+/// Kalibr's result files of the cameras ("camchain") or of the IMU ("imu"), in the folder or at
+/// their place in TUM-VI. The first is used.
 std::vector<fs::path> kalibrFiles(const fs::path& mav0, const std::string& of) {
   constexpr char kChain[] = "camchain";
   std::vector<fs::path> all;
@@ -262,7 +263,7 @@ std::vector<fs::path> kalibrFiles(const fs::path& mav0, const std::string& of) {
   return all;
 }
 
-/// Where there are several, somebody meant one of them.
+/// If there are several files, notes which of them is used.
 void noteChoice(const std::vector<fs::path>& files, Recording& recording) {
   if (files.size() < 2) return;
   std::string others;
@@ -281,8 +282,8 @@ void noteKeys(const SensorFile& file, Recording& recording) {
   recording.notes.insert(recording.notes.end(), keys.begin(), keys.end());
 }
 
-/// Where a folder's calibration comes from: each sensor's sensor.yaml, else the rig file that was
-/// given, else what Kalibr left (camchain*.yaml, imu*.yaml).
+/// The sources of a folder's calibration, in this order: each sensor's sensor.yaml, the given rig
+/// file, files of Kalibr (camchain*.yaml, imu*.yaml).
 class EurocCalibration {
  public:
   EurocCalibration(const fs::path& mav0, const fs::path& rig) : mav0_(mav0) {
@@ -327,9 +328,9 @@ class EurocCalibration {
 
  private:
   fs::path mav0_;
-  std::vector<fs::path> chains_;  ///< of which the first is rig_
+  std::vector<fs::path> chains_;  ///< the first of these is rig_
   std::optional<Calibration> rig_;
-  RigidTransform T_BI_;  ///< of EuRoC's body, which everything is moved from
+  RigidTransform T_BI_;  ///< IMU in EuRoC's body, from which all data are transformed
 };
 
 }  // namespace

@@ -17,10 +17,10 @@ namespace fs = std::filesystem;
 using ImageGrade = DataFinding::Grade;
 using FileList = std::vector<const Recording::FrameFile*>;
 
-/// The camera's images by what can be known without reading them.
+/// Classification of a camera's images without reading them.
 struct Listed {
   std::size_t all = 0, missing = 0;
-  FileList empty, whole;  ///< by time; those of a recording are whole
+  FileList empty, whole;  ///< sorted by time; images of a recording count as whole
 };
 
 Listed listedOf(const Recording& recording, std::size_t camera) {
@@ -39,7 +39,7 @@ Listed listedOf(const Recording& recording, std::size_t camera) {
   return listed;
 }
 
-/// The first, the middle and the last, and of files `more` by chance, which is always the same.
+/// The first, middle and last file, and `more` files from a fixed random sequence.
 FileList someOf(const FileList& all, std::size_t more) {
   if (all.empty()) return {};
   const std::size_t last = all.size() - 1;
@@ -56,7 +56,7 @@ std::string nameIn(const Recording::FrameFile& file) {
                            : fs::path(file.path).filename().string();
 }
 
-/// What is there of a file that is not.
+/// Explains why a file is missing.
 std::string whyMissing(const Recording::FrameFile& file) {
   std::error_code error;
   if (!fs::is_symlink(file.path, error)) return file.path + " is not there";
@@ -72,7 +72,7 @@ std::string whyUnreadable(const Recording::FrameFile& file, const std::string& d
                  : detail;
 }
 
-/// Nothing of cam0, no run; without cam1 cam0 goes on alone.
+/// Without images of cam0 a run is impossible; without cam1 it continues with cam0.
 ImageGrade gradeOfNone(std::size_t camera) {
   return camera == 0 ? ImageGrade::kFatal : ImageGrade::kWarning;
 }
@@ -84,7 +84,7 @@ void addNone(const Recording& recording, std::size_t camera, const std::string& 
        fmt::format("no image of {} {}", recording.calibration.cameras[camera].name, what)});
 }
 
-/// False where nothing is left to look at.
+/// Returns false if no image is left to check.
 bool checkFiles(const Recording& recording, std::size_t camera, const Listed& listed,
                 DataFindings& findings) {
   const auto& name = recording.calibration.cameras[camera].name;
@@ -102,7 +102,7 @@ bool checkFiles(const Recording& recording, std::size_t camera, const Listed& li
             findings);
     return false;
   }
-  constexpr double kMostLost = 0.1;  // as of files that are not there
+  constexpr double kMostLost = 0.1;  // share of empty files, as for missing files
   const auto empty = static_cast<double>(listed.empty.size());
   if (empty > kMostLost * static_cast<double>(listed.all)) {
     findings.push_back(
@@ -122,7 +122,7 @@ bool isFlat(const cv::Mat& image) {
   return deviation[0] < 1.5;
 }
 
-/// What the images that were tried are like.
+/// Results of the images that were read.
 struct Looked {
   std::size_t tried = 0, unreadable = 0, other_size = 0, flat = 0;
   std::string size, first_unreadable, why;
@@ -157,7 +157,7 @@ void checkImages(const Recording& recording, std::size_t camera, DataFindings& f
   const Listed listed = listedOf(recording, camera);
   if (listed.all == 0 || !checkFiles(recording, camera, listed, findings)) return;
   Looked looked = lookAt(someOf(listed.whole, 9), calibration);
-  // Not by chance of the few.
+  // Check more images, because the first sample may be unrepresentative.
   if (looked.unreadable == looked.tried) looked = lookAt(someOf(listed.whole, 60), calibration);
   if (looked.unreadable == looked.tried) {
     return addNone(recording, camera,

@@ -1,6 +1,7 @@
-// KITTI raw drives (*_sync): image_02 and image_03, OXTS as inertial samples and speed. The body
-// is the OXTS unit's IMU: x forward, y left, z up. Stamps are as the files say (OXTS runs 7 ms
-// after the images); the right image takes the left one's, for one trigger exposes both.
+// KITTI raw drives (*_sync): image_02 and image_03, and OXTS as inertial samples and speed. The
+// body is the IMU of the OXTS unit: x forward, y left, z up. Stamps are those of the files (OXTS is
+// 7 ms after the images). The right image has the stamp of the left one, because one trigger
+// exposes both.
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -35,7 +36,7 @@ std::string tenDigits(std::size_t number) {
   return text;
 }
 
-/// "2011-09-26 13:04:32.345808896", taken as UTC.
+/// Parses "2011-09-26 13:04:32.345808896" as UTC.
 std::optional<TimePoint> parseStamp(const std::string& text) {
   int year = 0, month = 0, day = 0, hour = 0, minute = 0, second = 0, used = 0;
   if (std::sscanf(text.c_str(), "%d-%d-%d %d:%d:%d%n", &year, &month, &day, &hour, &minute, &second,
@@ -59,7 +60,7 @@ std::optional<TimePoint> parseStamp(const std::string& text) {
   return TimePoint(since + Duration(*fraction));
 }
 
-/// The stamp of record k stands in line k; nothing where a line is not a stamp, or empty.
+/// Line k contains the stamp of record k. Returns nothing for lines that are empty or not a stamp.
 std::vector<std::optional<TimePoint>> readStamps(const fs::path& file) {
   std::vector<std::optional<TimePoint>> stamps;
   for (const auto& line : readLines(file, "KITTI keeps timestamps.txt in each sensor's folder")) {
@@ -69,7 +70,7 @@ std::vector<std::optional<TimePoint>> readStamps(const fs::path& file) {
   return stamps;
 }
 
-/// The folder with the three calibration files: the drive's own, or the one above.
+/// The folder with the three calibration files: the drive's folder or its parent.
 fs::path calibrationFolder(const fs::path& drive) {
   const fs::path path = fs::absolute(drive).lexically_normal();
   const fs::path clean = path.has_filename() ? path : path.parent_path();
@@ -81,8 +82,8 @@ fs::path calibrationFolder(const fs::path& drive) {
                "calib_velo_to_cam.txt, calib_imu_to_velo.txt) beside or above the drive");
 }
 
-/// The OXTS unit as an IMU. Its records are momentary values at 10 Hz, not averages: what the
-/// vehicle does between two of them is unknown, and that, not the sensor, is the noise.
+/// The OXTS unit as an IMU. Its records are instantaneous values at 10 Hz, not averages. The noise
+/// is therefore the unknown motion between two records, not that of the sensor.
 ImuCalibration oxtsCalibration() {
   ImuCalibration imu;
   imu.gyro_noise = 5e-3;
@@ -120,8 +121,8 @@ std::vector<OxtsRecord> readOxts(const fs::path& folder, Recording& recording) {
   return records;
 }
 
-/// East, north and up of the first record: a Mercator map of its latitude's scale, as KITTI's own
-/// development kit makes poses.
+/// East, north and up relative to the first record, by a Mercator projection with the scale of its
+/// latitude, as in KITTI's development kit.
 RigidTransform poseOf(const OxtsRecord& record, const OxtsRecord& first) {
   constexpr double kEarthRadius = 6378137.0, kRadians = std::numbers::pi / 180.0;
   const double* v = record.values.data();

@@ -1,5 +1,5 @@
-// KITTI tracking: calib/SEQUENCE.txt and, where there are any, image_02, image_03, label_02.
-// The sequences carry no stamps: 10 Hz from t = 0.
+// KITTI tracking: calib/SEQUENCE.txt and, if present, image_02, image_03, label_02. The sequences
+// have no stamps: 10 Hz from t = 0 is assumed.
 #include <algorithm>
 #include <cstdio>
 
@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr Duration kInterval = std::chrono::milliseconds(100);
-constexpr std::int64_t kMostImages = 1'000'000;  // names have six digits
+constexpr std::int64_t kMostImages = 1'000'000;  // image names have six digits
 
 std::string availableSequences(const fs::path& root) {
   std::vector<std::string> names;
@@ -88,7 +88,7 @@ std::pair<std::uint32_t, std::uint32_t> imageSize(const DatasetOptions& options,
   return {size.width, size.height};
 }
 
-/// The poses that stand beside the labels, the best first.
+/// The pose file beside the labels; the most accurate kind is preferred.
 std::optional<PoseFile> readPoses(const DatasetOptions& options) {
   for (const char* folder : {"poses", "poses_orb", "poses_oxts"}) {
     const fs::path file = options.path / folder / (options.sequence + ".txt");

@@ -10,18 +10,19 @@ namespace perdure::replay {
 namespace {
 
 constexpr double kRadians = std::numbers::pi / 180.0;
-constexpr int kSpacing_px = 16;  // between patches
-constexpr int kHalf_px = 12;     // of a patch: 12 cm wide at 3 m
-constexpr int kStep_px = 3;      // between its points
+constexpr int kSpacing_px = 16;  // distance between patches
+constexpr int kHalf_px = 12;     // half size of a patch, which is 12 cm wide at 3 m
+constexpr int kStep_px = 3;      // distance between the points of a patch
 constexpr int kMost_mm = 10000;
-constexpr double kNoise = 1.5e-3;  // of structured light's inverse depth, 1/m: 1.3 cm at 3 m
+constexpr double kNoise = 1.5e-3;  // noise of inverse depth, 1/m: 1.3 cm at 3 m
 constexpr double kAbout_deg = 50.0, kMode_deg = 8.0, kAgree_deg = 5.0, kOther_deg = 20.0;
 constexpr std::size_t kFewest = 100, kCandidates = 1000;
 
-/// The normal of the patch about a pixel, in the camera, towards it; nothing where depth is missing
-/// in more than a tenth of it, or where it is not flat. A plane's inverse depth is linear in the
-/// pixel, and its noise is the same at all distances; a fit in space would turn the normals of
-/// slanting patches towards the camera, by half a degree over a floor.
+/// The normal of the patch around a pixel, in the camera frame, pointing towards the camera.
+/// Returns nothing if depth is missing in more than a tenth of the patch, or if the patch is not
+/// flat. The inverse depth of a plane is linear in the pixel, and its noise is the same at all
+/// distances. A fit in space would bias the normals of slanted patches towards the camera, by half
+/// a degree over a floor.
 std::optional<Eigen::Vector3d> patchNormal(const cv::Mat& depth, const CameraCalibration& K,
                                            int row, int column) {
   Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
@@ -41,7 +42,7 @@ std::optional<Eigen::Vector3d> patchNormal(const cv::Mat& depth, const CameraCal
   const Eigen::Vector3d plane = A.ldlt().solve(b);  // n / d of n · x = d
   const double residual = std::sqrt(std::max(0.0, squares - plane.dot(b)) / points);
   if (!(residual < 2.0 * kNoise) || !(plane.norm() > 1e-6)) return std::nullopt;
-  return Eigen::Vector3d(-plane.normalized());  // d > 0: n points away
+  return Eigen::Vector3d(-plane.normalized());  // d > 0: n points away from the camera
 }
 
 std::size_t countWithin(const std::vector<Eigen::Vector3d>& normals, const Eigen::Vector3d& axis,
@@ -56,7 +57,7 @@ struct Mode {
   std::size_t count = 0;
 };
 
-/// The normal with the most others about it, among those that `allowed` lets pass.
+/// The normal with the most neighbours, among those that `allowed` accepts.
 template <class Allowed>
 Mode densest(const std::vector<Eigen::Vector3d>& normals, Allowed&& allowed) {
   Mode best;
@@ -69,7 +70,7 @@ Mode densest(const std::vector<Eigen::Vector3d>& normals, Allowed&& allowed) {
   return best;
 }
 
-/// The mean of those within `angle_deg`, until it stays.
+/// The mean of the normals within `angle_deg`, iterated.
 Eigen::Vector3d settled(const std::vector<Eigen::Vector3d>& normals, Eigen::Vector3d axis,
                         double angle_deg) {
   constexpr int kRounds = 20;

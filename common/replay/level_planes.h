@@ -1,7 +1,7 @@
-// Which way is up, by the level planes of depth images: floors, table tops and seats that are seen
-// from above. Normals of small patches (least squares in
-// inverse depth) are gathered over the images; up is where
-// most of them agree, near the mean of the camera's own up.
+// Estimates the vertical from level planes in depth images: floors, table tops and seats seen from
+// above. Normals of small patches (least squares in inverse depth) are collected over the images.
+// The estimate is the direction on which most of them agree, near the mean vertical axis of the
+// camera.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,25 +14,25 @@
 
 namespace perdure::replay {
 
-/// Up, and what speaks for it.
+/// The estimated vertical, and its support.
 struct UpEstimate {
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< unit, in the frame of the poses
-  std::size_t patches = 0;                        ///< whose normals are within 5° of it
+  std::size_t patches = 0;                        ///< patches with normals within 5° of it
   std::size_t all = 0;                            ///< patches of all planes
 };
 
 class LevelPlanes {
  public:
-  /// `depth`: CV_16UC1, millimetres; 0, and more than 10 m (65535 too), is no measurement. `K`: its
-  /// lens, whose distortion is not used. R_PC: camera in the frame P of the poses.
+  /// `depth`: CV_16UC1, millimetres; 0 and values above 10 m (including 65535) are invalid. `K`:
+  /// its lens, without distortion. R_PC: camera in the frame P of the poses.
   void add(const cv::Mat& depth, const CameraCalibration& K, const Eigen::Matrix3d& R_PC);
-  /// `about`: roughly up, any length: the mean of the camera's up. Reasons: planes_none (fewer than
-  /// 100 patches agree within 50° of it), planes_ambiguous (another direction, more than 20° off,
-  /// has more than two thirds as many).
+  /// `about`: approximate vertical, of any length: the mean vertical axis of the camera. Reasons:
+  /// planes_none (fewer than 100 patches agree within 50° of it), planes_ambiguous (another
+  /// direction, more than 20° off, has more than two thirds as many).
   Result<UpEstimate> up(const Eigen::Vector3d& about) const;
 
  private:
-  std::vector<Eigen::Vector3d> normals_P_;  ///< towards the camera
+  std::vector<Eigen::Vector3d> normals_P_;  ///< pointing towards the camera
 };
 
 }  // namespace perdure::replay

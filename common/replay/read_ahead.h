@@ -1,4 +1,4 @@
-// Reads and decodes the messages of a drive ahead, on a thread of its own.
+// Reads and decodes the messages of a drive in advance, in a separate thread.
 #pragma once
 
 #include <exception>
@@ -12,13 +12,14 @@ namespace perdure::replay {
 
 class ReadAhead {
  public:
-  /// Up to `messages` ahead. `drive` must outlive this and is read by nobody else meanwhile.
+  /// Reads up to `messages` in advance. `drive` must outlive this object, and nothing else may read
+  /// it.
   explicit ReadAhead(Dataset& drive, std::size_t messages = 64);
   ~ReadAhead();
   ReadAhead(const ReadAhead&) = delete;
   ReadAhead& operator=(const ReadAhead&) = delete;
 
-  /// As Dataset::next, with what that throws.
+  /// Returns the next message and throws like Dataset::next.
   std::optional<Message> next();
 
  private:

@@ -1,5 +1,5 @@
-// What perdure record left, as a dataset: sensors and calibration, and images where they were
-// recorded. Images are unpacked when they are asked for.
+// Recordings of `perdure record` as a dataset: sensors, calibration, and images if they were
+// recorded. Images are decoded on request.
 #include <algorithm>
 #include <cstring>
 #include <tuple>
@@ -15,14 +15,14 @@ namespace {
 
 constexpr std::string_view kFramePrefix = "frame/";
 
-/// One image in the recording: all that is kept of it until it is asked for.
+/// Reference to one image in the recording; its pixels are read on request.
 struct Seen {
   FrameStamp stamp;
   std::string camera;
   std::uint64_t log_ns = 0;
 };
 
-/// Gives images in the order of the recording fast, and any other by going back.
+/// Reads images quickly in the order of the recording. Any other order requires a rewind.
 class Images {
  public:
   explicit Images(const std::filesystem::path& path) : messages_(path) { rewind(0); }
@@ -80,7 +80,8 @@ class DriveReader {
   }
 
  private:
-  /// Messages of neither Perdure nor ROS: protobuf, JSON and others that MCAP holds.
+  /// Refuses messages of neither Perdure nor ROS, for example protobuf or JSON, which MCAP can
+  /// contain.
   void refuseStrangers() const {
     for (const auto& [name, topic] : messages_.topics()) {
       if (topic.schema_encoding == "omgidl") continue;
@@ -123,7 +124,8 @@ class DriveReader {
     for (std::size_t i = 0; i < recording_.speed.size(); ++i) recording_.speed[i].sequence = i;
   }
 
-  /// Cameras in their order; nothing where the calibration has none of the name.
+  /// Index of the camera in the calibration. Returns nothing if the calibration has no camera of
+  /// this name.
   std::optional<std::size_t> cameraOf(const Seen& seen) const {
     const auto& cameras = recording_.calibration.cameras;
     for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -144,7 +146,7 @@ class DriveReader {
         if (!seen.camera.empty()) file.load = [store, seen] { return store->at(seen); };
         const std::pair identity(seen.stamp.source, seen.stamp.sequence);
         if (wanted == 0) {
-          if (!first.emplace(identity, file).second) continue;  // came twice
+          if (!first.emplace(identity, file).second) continue;  // received twice
           ++recording_.frame_count;
         } else {
           const auto pair = first.find(identity);

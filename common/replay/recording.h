@@ -1,4 +1,4 @@
-// What the readers of dataset folders share, and the readers themselves.
+// Common functions of the readers for dataset folders, and the readers themselves.
 #pragma once
 
 #include <filesystem>
@@ -12,35 +12,35 @@
 
 namespace perdure::replay {
 
-/// Counts what an order leaves out or moves, and says it.
+/// Counts and notes the stamps that an order leaves out or moves.
 void noteOrder(const StampOrder& order, const std::string& kind, std::size_t all,
                Recording& recording);
 
-/// Whether the folder looks like one of a kind; `reader` then says what is missing in it.
+/// Returns whether the folder has the layout of a kind. The reader then reports missing parts.
 bool looksLikeEuroc(const std::filesystem::path& folder);
 bool looksLikeKittiRaw(const std::filesystem::path& folder);
 bool looksLikeKittiTracking(const std::filesystem::path& folder);
-/// Colour images with a pose file each, or a scene of such sequences (seq-01 …).
+/// Colour images with one pose file each, or a scene of such sequences (seq-01 …).
 bool looksLikeSevenScenes(const std::filesystem::path& folder);
-/// Frames are counted from 0 in the order of their times. A recording without images has the frames
-/// that its odometry is about, without pixels.
+/// Frames are numbered from 0 in the order of their times. A recording without images has the
+/// frames of its odometry, without pixels.
 Recording readRecordedDrive(const DatasetOptions& options);
-/// What is missing in the recording the rig file says.
+/// The rig file gives the calibration that is missing in the recording.
 Recording readRosDrive(const DatasetOptions& options);
 Recording readEuroc(const DatasetOptions& options);
 Recording readKittiRaw(const DatasetOptions& options);
 Recording readKittiTracking(const DatasetOptions& options);
 Recording readSevenScenes(const DatasetOptions& options);
 
-/// FOLDER/NAME.png, .jpg or .jpeg, the one that exists; else FOLDER/NAME.png.
+/// FOLDER/NAME.png, .jpg or .jpeg, whichever exists; else FOLDER/NAME.png.
 std::filesystem::path imagePath(const std::filesystem::path& folder, const std::string& name);
-/// Width and height of the first image that decodes; nothing where there is none.
+/// Width and height of the first image that can be decoded. Returns nothing if there is none.
 std::optional<std::pair<std::uint32_t, std::uint32_t>> firstImageSize(
     const std::filesystem::path& folder);
-/// Brings the samples into the order of their times and numbers them. What is left out is counted:
-/// imu_not_increasing, imu_stray; what was moved: imu_unsorted (files/stamps.h).
+/// Sorts the samples by time and numbers them. Samples left out are counted as imu_not_increasing
+/// or imu_stray, moved ones as imu_unsorted (files/stamps.h).
 void orderImu(Recording& recording);
-/// Brings items with stamps into order, and counts KIND_not_increasing, KIND_stray, KIND_unsorted.
+/// Sorts items by their stamps, and counts KIND_not_increasing, KIND_stray, KIND_unsorted.
 template <class Item, class TimeOf>
 void orderByTime(std::vector<Item>& items, const std::string& kind, Recording& recording,
                  TimeOf&& timeOf) {
@@ -55,9 +55,9 @@ void orderByTime(std::vector<Item>& items, const std::string& kind, Recording& r
 /// Sorts frames by time, then camera.
 void sortFrames(Recording& recording);
 inline constexpr Duration kPairedWithin = std::chrono::milliseconds(5);
-/// The frame of cam0 that was taken within kPairedWithin; `first` by time.
+/// The frame of cam0 taken within kPairedWithin; `first` is sorted by time.
 const Recording::FrameFile* pairOf(const std::vector<Recording::FrameFile>& first, TimePoint time);
-/// Frames a second of a camera; 1 where they do not tell.
+/// Frame rate of a camera in Hz; 1 if it cannot be determined.
 double rateOf(const std::vector<Recording::FrameFile>& frames, std::size_t camera);
 
 }  // namespace perdure::replay

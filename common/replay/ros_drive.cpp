@@ -1,5 +1,5 @@
-// A recording of ROS as a dataset: images, inertial samples, and what camera_info and tf_static say
-// of the calibration; the rig file says the rest. Images are taken out when they are asked for.
+// A ROS recording as a dataset: images, inertial samples, and calibration from camera_info and
+// tf_static. The rig file gives the missing calibration. Images are read on request.
 #include <algorithm>
 #include <map>
 #include <utility>
@@ -18,11 +18,11 @@ namespace {
 
 constexpr char kTransforms[] = "/tf_static";
 
-/// One image in the recording: all that is kept of it until it is asked for.
+/// Reference to one image in the recording; its pixels are read on request.
 struct RosImage {
   TimePoint time;
   std::uint64_t log_ns = 0;
-  std::uint64_t number = 0;  ///< in the order of the recording
+  std::uint64_t number = 0;  ///< position in the order of the recording
 };
 
 std::string_view textOf(const SharedBytes& bytes) {
@@ -42,8 +42,8 @@ TimePoint stampOf(const ros::Header& header, std::uint64_t log_ns) {
   return time == TimePoint() ? fromNanoseconds(static_cast<std::int64_t>(log_ns)) : time;
 }
 
-/// Gives one camera's images in the order of the recording fast, also where many were recorded at
-/// one time, and any other by going back.
+/// Reads one camera's images quickly in the order of the recording, even if many have the same
+/// recording time. Any other order requires a rewind.
 class RosImages {
  public:
   RosImages(const std::filesystem::path& path, CameraTopics topics, int bits)
@@ -88,16 +88,16 @@ class RosImages {
   RosMessages messages_;
   CameraTopics topics_;
   int bits_;
-  std::uint64_t next_ = 0;  ///< number from which on images lie ahead
+  std::uint64_t next_ = 0;  ///< images with this number and above are not read yet
 };
 
-/// What the recording told of one camera.
+/// The information about one camera in the recording.
 struct RosCamera {
   CameraTopics topics;
   std::vector<RosImage> images = {};
   std::optional<ros::CameraInfo> info = {};
   std::string frame_id = {};
-  int bits = 8;  ///< of 16, as many as the brightest needs: the drive may begin in the dark
+  int bits = 8;  ///< used bits of 16, from the brightest image
 };
 
 class RosDriveReader {
@@ -126,7 +126,7 @@ class RosDriveReader {
   }
 
  private:
-  /// Where a topic is missing in what was cut off, the cut is why.
+  /// If a topic is missing in a truncated file, the error names the truncation as its cause.
   ChosenTopics chosenTopics() const {
     const std::string problem = messages_.lastProblem();
     const std::string kept = " holds no topic any more: it is cut off or damaged";
@@ -214,7 +214,7 @@ class RosDriveReader {
     if (camera.topics.compressed) {
       const auto image = valueIn<ros::CompressedImage>(message, "frame");
       if (!image) return;
-      constexpr std::uint64_t kLooks = 16;  // along the drive: each is decoded
+      constexpr std::uint64_t kLooks = 16;  // images decoded along the drive
       const std::uint64_t all = messages_.topics().at(message.topic).messages;
       if (camera.bits < 16 && camera.images.size() % std::max<std::uint64_t>(all / kLooks, 1) == 0)
         camera.bits = std::max(camera.bits, vision::usedBitsIn(textOf(image->data)));
@@ -309,7 +309,7 @@ class RosDriveReader {
            (refused.empty() ? "" : ": " + refused.begin()->second);
   }
 
-  /// What is missing may have stood there.
+  /// Text about damage that may explain missing data.
   std::string damage() const {
     const std::string problem = messages_.lastProblem();
     return problem.empty() ? "" : "; the file is cut off or damaged: " + problem;

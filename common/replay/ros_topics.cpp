@@ -14,7 +14,7 @@ constexpr std::string_view kPacked = "/compressed";
 
 std::string parentOf(const std::string& topic) { return topic.substr(0, topic.rfind('/')); }
 
-/// "/cam0/image_raw" of both it and "/cam0/image_raw/compressed".
+/// The common name "/cam0/image_raw" of that topic and of "/cam0/image_raw/compressed".
 std::string streamOf(const std::string& topic) {
   return topic.ends_with(kPacked) ? topic.substr(0, topic.size() - kPacked.size()) : topic;
 }
@@ -34,7 +34,7 @@ std::string listOf(const std::vector<std::string>& names) {
   return list;
 }
 
-/// "left" → "1st", "cam1" → "cam0": a pair's second name as its first would be.
+/// "left" → "1st", "cam1" → "cam0": replaces the second name of a pair by the first.
 std::string asFirst(std::string name) {
   const std::pair<const char*, const char*> kNames[] = {
       {"right", "left"}, {"cam1", "cam0"}, {"camera1", "camera0"}, {"infra2", "infra1"}};
@@ -83,7 +83,7 @@ class Choice {
     }
   }
 
-  /// Topics without their compressed twins; of one camera's several the raw one.
+  /// Image topics without their compressed variants. If a camera has several, only the raw one.
   std::vector<std::string> candidates() const {
     std::map<std::string, std::vector<std::string>> by_camera;
     for (const auto& topic : ofTypes(topics_, {kImage, kCompressed})) {
@@ -127,7 +127,8 @@ class Choice {
          "capture: dataset.topics; elsewhere `rostopic: TOPIC` under cam0 in the file of --rig)");
   }
 
-  /// "; those on /cam are foxglove_msgs/CompressedImage, which is not read".
+  /// Names an image topic of an unsupported type: "; those on /cam are
+  /// foxglove_msgs/CompressedImage, which is not read".
   std::string imagesOfOthers() const {
     for (const auto& [name, topic] : topics_) {
       const bool ours = topic.type == kImage || topic.type == kCompressed;
@@ -156,8 +157,8 @@ class Choice {
     return alone && all.size() == 1 ? all.front() : "";
   }
 
-  /// The topic of the other half where a driver gives accelerometer and gyroscope apart, as
-  /// RealSense's does: /camera/accel/sample, /camera/gyro/sample.
+  /// The second topic, if a driver publishes accelerometer and gyroscope separately. RealSense's
+  /// driver uses /camera/accel/sample and /camera/gyro/sample.
   std::string otherHalfOf(const std::string& topic) const {
     for (const auto& [half, other] : {std::pair("accel", "gyro"), std::pair("gyro", "accel")}) {
       const auto at = topic.rfind(half);

@@ -1,5 +1,5 @@
-// Which topics of a ROS recording are the cameras and the inertial unit: those that were asked for,
-// else those that their types and names tell.
+// Selects the topics of the cameras and the inertial unit in a ROS recording: the requested topics,
+// otherwise those identified by type and name.
 #pragma once
 
 #include <map>
@@ -11,20 +11,22 @@
 namespace perdure::replay {
 
 struct CameraTopics {
-  std::string image, info;  ///< info: of sensor_msgs/CameraInfo; empty where there is none
+  std::string image, info;  ///< info: sensor_msgs/CameraInfo; empty if there is none
   bool compressed = false;  ///< sensor_msgs/CompressedImage
-  bool rectified = false;   ///< by its name, "image_rect…"
+  bool rectified = false;   ///< True for names with "image_rect…"
 };
 struct ChosenTopics {
   std::vector<CameraTopics> cameras;  ///< cam0, and cam1 of a pair
-  std::string imu;                    ///< empty where there is none
+  std::string imu;                    ///< empty if there is none
 };
 
-/// "cam0=/left/image_raw", … by cam0, cam1, imu. Throws StartupError(kUsage) with the mend.
+/// Parses "cam0=/left/image_raw", … into topics by cam0, cam1, imu. Throws StartupError(kUsage)
+/// with the fix.
 std::map<std::string, std::string> topicsOf(const std::vector<std::string>& assignments);
 
-/// `wanted`: topics by cam0, cam1, imu. Where several may be meant, or one that is wanted is not
-/// there: throws StartupError with all of the kind and the mend. `file` begins its sentences.
+/// `wanted`: topics by cam0, cam1, imu. If the choice is ambiguous, or a requested topic is
+/// missing, throws StartupError. The message begins with `file` and lists the candidates and the
+/// fix.
 ChosenTopics chooseTopics(const RosTopics& topics, const std::map<std::string, std::string>& wanted,
                           const std::string& file);
 

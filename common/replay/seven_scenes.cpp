@@ -1,9 +1,10 @@
-// 7-Scenes sequences (Shotton et al., CVPR 2013): frame-000000.color.png, .pose.txt and, of some
+// 7-Scenes sequences (Shotton et al., CVPR 2013): frame-000000.color.png, .pose.txt and, for some
 // frames, .depth.png in one folder; or color/000000.jpg, pose/000000.txt and depth/000000.png. A
-// pose is the depth camera in the scene, 4×4. There are no stamps (30 Hz from t = 0), no IMU, and
-// no word on gravity: sensor.yaml may give it, else the level planes of the depth images do. W is
-// the poses' frame, turned the shortest way so that z is up. The body is the depth camera, x
-// forward, y left, z up. Images and depth are of two cameras, and not registered.
+// pose is that of the depth camera in the scene, 4×4.
+// There are no stamps (30 Hz from t = 0 is assumed), no IMU and no gravity direction. The vertical
+// comes from sensor.yaml, otherwise from the level planes of the depth images. W is the frame of
+// the poses after the smallest rotation that makes z vertical. The body is the depth camera, x
+// forward, y left, z up. Colour and depth come from two cameras and are not registered.
 #include <algorithm>
 #include <cstdio>
 #include <map>
@@ -24,10 +25,10 @@ namespace fs = std::filesystem;
 
 constexpr double kRate_hz = 30.0;
 constexpr std::uint32_t kWidth = 640, kHeight = 480;
-// The authors give 585 px and no place, which is the depth camera's lens. Images are taken with 525
-// px, as in DSAC* (Brachmann and Rother, PAMI 2021). Over the red kitchen, what depth points look
-// like in images that are 40 and 80 frames apart agrees best at 518 px, 23 mm beside the depth
-// camera; a Kinect's are 25 mm apart.
+// The authors give 585 px and no pose, which is the lens of the depth camera. The colour images use
+// 525 px, as in DSAC* (Brachmann and Rother, PAMI 2021).
+// In the red kitchen, depth points were compared with colour images 40 and 80 frames apart. The
+// agreement is best at 518 px and a baseline of 23 mm; the baseline of a Kinect is 25 mm.
 constexpr double kDepthFocal_px = 585.0, kFocal_px = 525.0, kBaseline_m = 0.025;
 constexpr std::size_t kDepthImages = 25;
 constexpr double kFarthest_m = 1e6;
@@ -36,14 +37,14 @@ TimePoint timeOf(std::size_t index) {
   return TimePoint(durationFromSeconds(static_cast<double>(index) / kRate_hz));
 }
 
-/// The files of one kind, by the number of their frame.
+/// The files of one kind, by frame number.
 using Numbered = std::map<std::size_t, fs::path>;
 
 struct SceneFiles {
   Numbered colour, pose, depth;
 };
 
-/// "frame-000012" or "000012".
+/// Parses "frame-000012" or "000012".
 std::optional<std::size_t> numberOf(std::string_view stem) {
   constexpr std::string_view kPrefix = "frame-";
   if (stem.starts_with(kPrefix)) stem.remove_prefix(kPrefix.size());
@@ -53,7 +54,7 @@ std::optional<std::size_t> numberOf(std::string_view stem) {
   return number ? std::optional(static_cast<std::size_t>(*number)) : std::nullopt;
 }
 
-/// Files of the folder whose names are a frame's number and one of `endings`.
+/// Files of the folder whose names are a frame number and one of `endings`.
 Numbered filesOf(const fs::path& folder, const std::vector<std::string>& endings) {
   Numbered files;
   std::error_code ignored;
@@ -102,7 +103,7 @@ std::vector<std::string> sequencesOf(const fs::path& scene) {
   return names;
 }
 
-/// The folder of the sequence: the one that was given, or the named one of a scene.
+/// The folder of the sequence: the given one, or the named sequence of a scene.
 fs::path sequenceFolder(const DatasetOptions& options) {
   if (hasFolders(options.path) || holdsFrames(options.path)) return options.path;
   const auto names = sequencesOf(options.path);
@@ -115,7 +116,7 @@ fs::path sequenceFolder(const DatasetOptions& options) {
                          " holds sequences of a scene: name one with --sequence (" + list + ")");
 }
 
-/// sensor.yaml of the sequence, or of its scene; nothing where there is none.
+/// sensor.yaml of the sequence or of its scene. Returns nothing if there is none.
 std::optional<SensorFile> sensorFileOf(const fs::path& folder) {
   const fs::path whole = fs::absolute(folder / "").lexically_normal().parent_path();
   for (const auto& place : {whole, whole.parent_path()}) {
@@ -146,7 +147,8 @@ CameraCalibration depthCamera() {
   return camera;
 }
 
-/// Of the rig file, else of sensor.yaml where that has a lens, else what is known of the Kinect.
+/// Camera from the rig file, otherwise from sensor.yaml if it contains a lens, otherwise the known
+/// values of the Kinect.
 CameraCalibration cameraOf(const std::optional<SensorFile>& sensor, const DatasetOptions& options,
                            const fs::path& first_image) {
   CameraCalibration camera;
@@ -177,8 +179,8 @@ CameraCalibration cameraOf(const std::optional<SensorFile>& sensor, const Datase
   return camera;
 }
 
-/// The camera in the poses' frame P. Nothing where the file says that tracking was lost (numbers
-/// that are not finite); what is wrong otherwise is added to `wrong`.
+/// The pose of the camera in the frame P of the poses. Returns nothing if tracking was lost
+/// (numbers that are not finite); other errors are appended to `wrong`.
 std::optional<RigidTransform> readPose(const fs::path& file, std::string& wrong) {
   std::vector<double> v;
   const auto is_lost = [](const std::string& text) {
@@ -215,7 +217,7 @@ std::optional<RigidTransform> readPose(const fs::path& file, std::string& wrong)
   return RigidTransform(R, p);
 }
 
-/// T_PC by frame. Wrong files are refused, the first ten by name.
+/// T_PC by frame. Invalid files are refused; the message names the first ten.
 std::map<std::size_t, RigidTransform> readPoses(const SceneFiles& files, Recording& recording) {
   std::map<std::size_t, RigidTransform> poses;
   std::string all;
@@ -278,7 +280,7 @@ UpEstimate estimateUp(const fs::path& folder, const SceneFiles& files,
   return *up;
 }
 
-/// Unit, against gravity in the poses' frame: as sensor.yaml says, else by planes.
+/// Unit vector against gravity in the frame of the poses: from sensor.yaml, otherwise from planes.
 Eigen::Vector3d upOf(const fs::path& folder, const std::optional<SensorFile>& sensor,
                      const SceneFiles& files, const std::map<std::size_t, RigidTransform>& poses,
                      Recording& recording) {

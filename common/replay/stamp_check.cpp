@@ -13,7 +13,7 @@ namespace {
 using StampGrade = DataFinding::Grade;
 using StampList = std::vector<TimePoint>;
 
-/// The median interval in ns of stamps in order, without those that are equal.
+/// The median interval of ordered stamps in ns, without equal stamps.
 std::optional<double> intervalOf(StampList stamps) {
   std::sort(stamps.begin(), stamps.end());
   std::vector<std::int64_t> intervals;
@@ -41,11 +41,11 @@ StampList stampsOfCamera(const Recording& recording) {
   return stamps;
 }
 
-/// `repeated` were left out, as their stamp was there before.
+/// `repeated` stamps were left out, because they were equal to earlier ones.
 bool checkEqual(const char* of, std::uint64_t repeated, std::size_t kept, DataFindings& findings) {
   const auto all = repeated + kept;
   const bool unusable = 10 * kept < all;
-  // A list that has each line twice has lost nothing.
+  // A list with each line twice has lost no data.
   if (2 * repeated <= all || repeated < 3) return false;
   findings.push_back(
       {unusable ? StampGrade::kFatal : StampGrade::kWarning, "stamps_equal",
@@ -55,7 +55,7 @@ bool checkEqual(const char* of, std::uint64_t repeated, std::size_t kept, DataFi
   return unusable;
 }
 
-/// 0, 1, 2 …, as of what was numbered.
+/// Detects the counts 0, 1, 2 … in place of times.
 void checkCount(const char* of, const StampList& stamps, DataFindings& findings) {
   constexpr std::int64_t kHighest = 100'000'000;
   if (stamps.empty() || toNanoseconds(stamps.back()) > kHighest) return;
@@ -89,10 +89,10 @@ void checkStamps(const Recording& recording, const DataUse& use, DataFindings& f
                   images = stampsOfCamera(recording);
   if (of_imu) checkEqual("IMU", recording.reasons.of("imu_not_increasing"), imu.size(), findings);
   checkEqual("images", recording.reasons.of("frame_not_increasing"), images.size(), findings);
-  // Frames alone, as of KITTI tracking, may be numbered where nothing else has a time.
+  // Frames without IMU may be numbered if there are no other times, as in KITTI tracking.
   if (!of_imu || images.empty()) return;
   const auto factor = factorOfStamps(imu, images);
-  if (factor == 1) {  // samples of 1 kHz in whole ms count, too
+  if (factor == 1) {  // also detects 1 kHz samples in whole ms
     checkCount("images", images, findings);
     checkCount("samples of the IMU", imu, findings);
     return;

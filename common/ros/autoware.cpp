@@ -11,7 +11,7 @@
 namespace perdure::ros::autoware {
 namespace {
 
-constexpr double kUnknownVariance = 1e6;  ///< what ROS' filters take as no measurement
+constexpr double kUnknownVariance = 1e6;  ///< ROS filters ignore such values
 using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
 using Kinematics = TrackedObjectKinematics;
 using Label = ObjectClassification;
@@ -29,7 +29,7 @@ std::uint8_t labelOf(const std::string& class_name) {
   return found == kLabels.end() ? Label::kUnknown : found->second;
 }
 
-/// One entry a label, the most probable first.
+/// One entry per label, the most probable first.
 std::vector<ObjectClassification> classificationOf(const ObjectBelief& object) {
   std::map<std::uint8_t, double> sums;
   for (const ClassBelief& belief : object.classes) sums[labelOf(belief.name)] += belief.probability;
@@ -48,7 +48,7 @@ Uuid uuidOf(ObjectId id) {
   return uuid;
 }
 
-/// Of centre and yaw, which is about `up`, turned into M.
+/// Pose covariance in M from centre and yaw; the yaw is about `up`.
 std::array<double, 36> poseCovariance(const ClassBelief& belief, const Eigen::Vector3d& up_W,
                                       const Eigen::Matrix3d& R_MW) {
   Eigen::Matrix<double, 6, 4> J = Eigen::Matrix<double, 6, 4>::Zero();

@@ -1,5 +1,5 @@
-// Objects as Autoware's stack hears them: autoware_perception_msgs/TrackedObjects, as its messages
-// 1.0 and later have it.
+// Objects for Autoware: autoware_perception_msgs/TrackedObjects, as in its messages since version
+// 1.0.
 #pragma once
 
 #include "common/ros/messages.h"
@@ -51,7 +51,7 @@ struct TrackedObjectKinematics {
   static constexpr char kType[] = "autoware_perception_msgs/TrackedObjectKinematics";
   static constexpr std::uint8_t kUnavailable = 0, kSignUnknown = 1, kAvailable = 2;
   PoseWithCovariance pose_with_covariance;
-  TwistWithCovariance twist_with_covariance;  ///< in the object's frame
+  TwistWithCovariance twist_with_covariance;  ///< twist in the object's frame
   AccelWithCovariance acceleration_with_covariance;
   std::uint8_t orientation_availability = kUnavailable;
   bool is_stationary = false;
@@ -95,10 +95,10 @@ struct TrackedObjects {
   static void fields(auto& m, auto& a) { a("header", m.header), a("objects", m.objects); }
 };
 
-/// Confirmed objects in `map`, in which W lies as T_MW says. Of an object: its number in the last
-/// eight bytes of the UUID; classes that Autoware does not know are UNKNOWN; pose, covariance and
-/// size of its most probable class. The orientation is known but for its sign, and fully where it
-/// moves; where its σ is more than 1 rad it is not.
+/// Confirmed objects in `map`; T_MW is the pose of W in it. The last eight bytes of the UUID are
+/// the id. Classes unknown to Autoware are UNKNOWN. Pose, covariance and size are those of the most
+/// probable class. The sign of the orientation is known only for moving objects. If the σ of the
+/// yaw is above 1 rad, the orientation is marked as unavailable.
 TrackedObjects trackedObjectsOf(const Objects& objects, const RigidTransform& T_MW);
 
 }  // namespace perdure::ros::autoware

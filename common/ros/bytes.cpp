@@ -6,7 +6,8 @@ namespace perdure::ros {
 namespace {
 
 constexpr std::size_t kHead = 4;
-/// Second byte of CDR's head: the byte order is its lowest bit, the rest the rules.
+/// Second byte of the CDR header. Its lowest bit is the byte order; the other bits are the
+/// encoding.
 enum : std::uint8_t { kLittle = 1, kXcdr1 = 0, kXcdr2 = 6 };
 
 }  // namespace

@@ -1,6 +1,6 @@
-// ROS' messages as bytes and back: CDR as ROS 2 has it (XCDR1 with its head of four bytes; either
-// byte order and plain XCDR2 are read), and what ROS 1 writes. Any bytes are taken; nothing is
-// asked of memory that the bytes do not fill.
+// Encodes and decodes ROS messages: CDR of ROS 2 and the format of ROS 1. CDR is written as XCDR1
+// with its header of four bytes; both byte orders and plain XCDR2 are read. Input may be arbitrary
+// bytes; memory is allocated only for data that exist.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +24,7 @@ template <class M>
 concept Struct = requires {
   M::kType;
 };
-/// A number, a truth value or a byte: what takes its own size.
+/// A number, a Boolean value or a byte, aligned to its size.
 template <class X>
 concept Plain = std::is_arithmetic_v<X> || std::same_as<X, std::byte>;
 
@@ -73,10 +73,10 @@ class CdrWriter {
 
 enum class Encoding { kCdr, kRos1 };
 
-/// Takes a message's values one after the other; after the first that the bytes lack, none.
+/// Reads the values of a message in order. After the first missing value it reads no further.
 class BytesReader {
  public:
-  /// `keeper` keeps `bytes`: images are not copied out of them.
+  /// `keeper` owns the memory of `bytes`; images refer to it without a copy.
   BytesReader(std::span<const std::uint8_t> bytes, Encoding encoding,
               std::shared_ptr<const void> keeper);
 
@@ -133,7 +133,7 @@ std::vector<std::uint8_t> cdrOf(const M& message) {
   return bytes;
 }
 
-/// Reason "malformed": the bytes end before the message does.
+/// Reason "malformed": the bytes end before the message.
 template <Struct M>
 Result<M> messageOf(std::span<const std::uint8_t> bytes, Encoding encoding,
                     std::shared_ptr<const void> keeper) {

@@ -12,7 +12,7 @@
 namespace perdure::ros {
 namespace {
 
-/// A struct's fields: type and name of each, and what it is made of, before it.
+/// A struct's fields with type and name, after the definitions of the structs that it contains.
 struct Definition {
   std::string type, message;
 };
@@ -28,7 +28,8 @@ constexpr const char* nameOfPlain() {
   if constexpr (std::same_as<X, std::int32_t>) return "int32";
 }
 
-/// Goes through a struct and writes its fields down; `all` gets every struct once, parts first.
+/// Visits a struct and writes its fields. `all` receives every struct once, contained structs
+/// first.
 class Walk {
  public:
   explicit Walk(std::vector<Definition>& all) : all_(all) {}

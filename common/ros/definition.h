@@ -1,4 +1,4 @@
-// What ROS' messages are called and how their definitions read, made of the structs' own fields.
+// Names and definitions of ROS messages, generated from the fields of the structs.
 #pragma once
 
 #include <string>
@@ -9,11 +9,11 @@ namespace perdure::ros {
 
 /// "sensor_msgs/Image" → "sensor_msgs/msg/Image".
 std::string ros2Name(const std::string& type);
-/// "sensor_msgs/msg/Image" → "sensor_msgs/Image"; ROS 1's names stay.
+/// "sensor_msgs/msg/Image" → "sensor_msgs/Image"; names of ROS 1 are unchanged.
 std::string plainName(const std::string& name);
 
-/// The message's definition with those of all that it is made of, as rosbag2 writes it (`ros2msg`).
-/// M: one of the messages that have a topic of their own.
+/// The definition of the message and of all messages that it contains, in the format of rosbag2
+/// (`ros2msg`). M is a message type with a topic.
 template <class M>
 std::string definitionOf();
 

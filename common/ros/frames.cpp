@@ -5,8 +5,8 @@ namespace {
 
 Quaternion quaternionOf(const Eigen::Quaterniond& q) { return {q.x(), q.y(), q.z(), q.w()}; }
 
-/// Points of the optical frame (x right, y down, z forward) into the link's (x forward, y left, z
-/// up).
+/// Transforms points of the optical frame (x right, y down, z forward) into the link frame (x
+/// forward, y left, z up).
 const RigidTransform& opticalInLink() {
   static const RigidTransform T(Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5), Eigen::Vector3d::Zero());
   return T;

@@ -1,5 +1,5 @@
-// The frames of REP-105 and REP-103 as Perdure has them: map (M of the map store) → odom (W of the
-// odometry) → base_link (the body, which is the IMU) → <camera>_link → <camera>_optical.
+// The frames of REP-105 and REP-103 in Perdure: map (M of the map store) → odom (W of the odometry)
+// → base_link (the body, which is the IMU) → <camera>_link → <camera>_optical.
 #pragma once
 
 #include <string>
@@ -25,7 +25,7 @@ TransformStamped transformOf(TimePoint time, const std::string& parent, const st
 
 /// map → odom and odom → base_link.
 TFMessage movingFrames(TimePoint time, const RigidTransform& T_MW, const RigidTransform& T_WB);
-/// base_link → imu_link, and of each camera base_link → link → optical.
+/// base_link → imu_link, and for each camera base_link → link → optical.
 TFMessage fixedFrames(const Calibration& calibration);
 
 }  // namespace perdure::ros

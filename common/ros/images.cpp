@@ -13,7 +13,7 @@
 namespace perdure::ros {
 namespace {
 
-/// How an encoding of ROS lies in memory, and what makes BGR or grey of it.
+/// The memory layout of a ROS encoding, and its conversion to BGR or grey.
 struct PixelForm {
   const char* name;
   int type;
@@ -31,7 +31,7 @@ const PixelForm kEncodings[] = {
     {"rgba8", CV_8UC4, cv::COLOR_RGBA2BGR},
     {"mono16", CV_16UC1},
     {"16UC1", CV_16UC1},
-    // OpenCV names a pattern by its second row.
+    // OpenCV names a Bayer pattern by its second row.
     {"bayer_rggb8", CV_8UC1, cv::COLOR_BayerBG2BGR},
     {"bayer_bggr8", CV_8UC1, cv::COLOR_BayerRG2BGR},
     {"bayer_gbrg8", CV_8UC1, cv::COLOR_BayerGR2BGR},
@@ -57,7 +57,7 @@ Result<const PixelForm*> encodingOf(const Image& image) {
               fmt::format("images are `{}`; {} are read", image.encoding, knownEncodings()));
 }
 
-/// The message's own rows.
+/// A view of the message's rows.
 Result<cv::Mat> rowsOf(const Image& image, const PixelForm& encoding) {
   const std::uint64_t least = std::uint64_t{image.width} * CV_ELEM_SIZE(encoding.type);
   const std::uint64_t bytes = std::uint64_t{image.step} * image.height;
@@ -76,7 +76,7 @@ Result<cv::Mat> rowsOf(const Image& image, const PixelForm& encoding) {
                  pixels, image.step);
 }
 
-/// Values of 16 bits in this machine's order.
+/// 16-bit values in the byte order of this machine.
 cv::Mat inOrder(const cv::Mat& rows, bool bigendian) {
   if (bigendian == (std::endian::native == std::endian::big)) return rows;
   cv::Mat swapped = rows.clone();

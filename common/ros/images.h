@@ -1,4 +1,4 @@
-// ROS' images as frames and back.
+// Converts ROS images to frames and back.
 #pragma once
 
 #include "common/base/result.h"
@@ -7,17 +7,17 @@
 
 namespace perdure::ros {
 
-/// Size, encoding and pixels: grey as it is, colours as BGR, Bayer patterns and YUV 4:2:2 as BGR.
-/// Of 16 bits the lower `bits` are used, and of these the upper eight. Pixels that are as a frame
-/// has them are not copied. Reasons: image_encoding (the detail says which are read),
+/// Size, encoding and pixels. Grey images stay grey; colours, Bayer patterns and YUV 4:2:2 become
+/// BGR. For 16-bit images, the upper eight of the lower `bits` are used. Pixels already in a
+/// frame's format are not copied. Reasons: image_encoding (the detail lists the supported ones),
 /// image_malformed.
 Result<Frame> frameOf(const Image& image, int bits = 16);
-/// mono8 or bgr8, in the frame <camera>_optical; not of a compressed frame.
+/// An image of mono8 or bgr8 in the frame <camera>_optical. The frame must not be compressed.
 Image imageOf(const Frame& frame);
-/// Of a frame that is JPEG.
+/// The message for a JPEG frame.
 CompressedImage compressedOf(const Frame& frame);
-/// Of an image with 16 bits: the fewest of 8, 10, 12, 14, 16 that hold its brightest value; 16 of
-/// others.
+/// Number of used bits of a 16-bit image: the smallest of 8, 10, 12, 14, 16 that holds its
+/// brightest value. Returns 16 for other images.
 int usedBits(const Image& image);
 
 }  // namespace perdure::ros

@@ -1,6 +1,6 @@
-// ROS' messages as structs, named and ordered as ROS 2 (Humble and later) has them. What ROS 1
-// calls by the same name is the same but for a number in its header. Each says its fields once, for
-// every way of writing them: CDR, ROS 1's bytes, the text of the definition.
+// ROS messages as structs, with the names and field order of ROS 2 (Humble and later). Messages of
+// the same name in ROS 1 differ only by a number in their header. Each struct lists its fields
+// once, for all formats: CDR, ROS 1 bytes, and the text of the definition.
 #pragma once
 
 #include <array>
@@ -100,7 +100,7 @@ struct TransformStamped {
   static constexpr char kType[] = "geometry_msgs/TransformStamped";
   Header header;
   std::string child_frame_id;
-  Transform transform;  ///< of the child's points into the header's frame
+  Transform transform;  ///< transform from the child's frame into the header's frame
   static void fields(auto& m, auto& a) {
     a("header", m.header), a("child_frame_id", m.child_frame_id), a("transform", m.transform);
   }
@@ -145,7 +145,7 @@ struct Image {
   std::uint32_t height = 0, width = 0;
   std::string encoding;
   std::uint8_t is_bigendian = 0;
-  std::uint32_t step = 0;  ///< bytes in a row
+  std::uint32_t step = 0;  ///< bytes per row
   SharedBytes data;
   static void fields(auto& m, auto& a) {
     a("header", m.header), a("height", m.height), a("width", m.width), a("encoding", m.encoding);
@@ -167,7 +167,7 @@ struct Imu {
   static constexpr char kType[] = "sensor_msgs/Imu";
   Header header;
   Quaternion orientation;
-  std::array<double, 9> orientation_covariance{};  ///< [0] = -1: there is no orientation
+  std::array<double, 9> orientation_covariance{};  ///< [0] = -1: no orientation
   Vector3 angular_velocity;
   std::array<double, 9> angular_velocity_covariance{};
   Vector3 linear_acceleration;  ///< specific force
@@ -199,7 +199,7 @@ struct PointCloud2 {
   using PointFields = std::vector<PointField>;
   Header header;
   std::uint32_t height = 1, width = 0;
-  PointFields point_fields;  ///< `fields` of ROS
+  PointFields point_fields;  ///< `fields` in ROS
   bool is_bigendian = false;
   std::uint32_t point_step = 0, row_step = 0;
   SharedBytes data;
@@ -217,7 +217,7 @@ struct Odometry {
   Header header;
   std::string child_frame_id;
   PoseWithCovariance pose;
-  TwistWithCovariance twist;  ///< in the child's frame
+  TwistWithCovariance twist;  ///< twist in the child's frame
   static void fields(auto& m, auto& a) {
     a("header", m.header), a("child_frame_id", m.child_frame_id);
     a("pose", m.pose), a("twist", m.twist);
@@ -326,7 +326,7 @@ struct Marker {
   Pose pose;
   Vector3 scale;
   ColorRGBA color;
-  Duration lifetime;  ///< 0: until it is deleted
+  Duration lifetime;  ///< 0: the marker remains until it is deleted
   bool frame_locked = false;
   std::vector<Point> points;
   std::vector<ColorRGBA> colors;

@@ -1,6 +1,6 @@
-// Perdure's topics as those of ROS 2: one message of Perdure in, all messages of ROS that it makes
-// out, encoded. What a message needs besides (calibration, classes, where the odometry lies in the
-// map, the newest rate of turn) is kept of those before.
+// Publishes Perdure's topics as topics of ROS 2. Each input message of Perdure gives encoded ROS
+// messages. Further data that they need (calibration, classes, pose of the odometry in the map,
+// latest angular rate) are stored from earlier messages.
 #pragma once
 
 #include <functional>
@@ -19,7 +19,7 @@
 
 namespace perdure::ros {
 
-/// A topic of ROS 2 that is written.
+/// An output topic of ROS 2.
 struct Outlet {
   std::string topic;       ///< "/perdure/objects"
   std::string type;        ///< "vision_msgs/Detection3DArray"
@@ -30,21 +30,23 @@ struct Outlet {
 class Mirror {
  public:
   using Out = std::function<void(const Outlet& outlet, std::vector<std::uint8_t> cdr)>;
-  /// Whether somebody reads it. What nobody reads is not made, unless it is latched.
+  /// Returns whether a topic has readers. Messages without readers are not created, unless the
+  /// topic is latched.
   using Wanted = std::function<bool(const Outlet& outlet)>;
-  /// `prefix` stands before all topics but /tf and /tf_static. Without `wanted` all is.
+  /// `prefix` precedes all topics except /tf and /tf_static. Without `wanted` all messages are
+  /// created.
   Mirror(std::string prefix, Out out, Wanted wanted = {})
       : prefix_(std::move(prefix)), out_(std::move(out)), wanted_(std::move(wanted)) {}
 
-  /// Objects go as Autoware's TrackedObjects to this topic besides; empty: they do not.
+  /// Also publishes objects as Autoware's TrackedObjects on this topic, unless it is empty.
   void sayTrackedObjects(const std::string& topic) { tracked_objects_ = topic; }
 
-  /// All that may be written of a vehicle with these cameras, for those who tell beforehand.
+  /// All topics that may be published for a vehicle with these cameras, for advance declaration.
   std::vector<Outlet> outlets(const std::vector<std::string>& cameras) const;
 
   void onCalibration(const Calibration& calibration);  ///< tf_static, camera_info
   void onFrame(const Frame& frame);  ///< image_raw or image_raw/compressed, camera_info
-  void onImage(const Frame& frame);  ///< the same without camera_info
+  void onImage(const Frame& frame);  ///< images only, without camera_info
   std::string imageTopic(const std::string& camera) const {  ///< image_raw
     return prefix_ + "/" + camera + "/image_raw";
   }
@@ -55,11 +57,11 @@ class Mirror {
   void onDetections(const Detections& detections);
   void onMapFrame(const MapFrame& frame) { map_frame_ = frame; }
   void onObjects(const Objects& objects);  ///< objects, markers, Autoware's
-  /// Diagnostics, at the newest time that was heard of.
+  /// Diagnostics, at the newest time of any message.
   void onHealth(const Health& health);
 
  private:
-  /// `make()` gives the message, and is called where somebody wants it.
+  /// `make()` creates the message; it is called only if a reader exists.
   template <class Make>
   void say(const std::string& topic, Make make, bool latched = false);
   template <class M>

@@ -14,7 +14,7 @@ namespace perdure::ros {
 namespace {
 
 using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
-constexpr double kUnknownVariance = 1e6;  ///< what ROS' filters take as no measurement
+constexpr double kUnknownVariance = 1e6;  ///< ROS filters ignore such values
 constexpr double kLeastScore = 0.01;
 
 std::array<double, 36> numbersOf(const Matrix6& matrix) {
@@ -23,7 +23,7 @@ std::array<double, 36> numbersOf(const Matrix6& matrix) {
   return numbers;
 }
 
-/// Of centre and yaw, which is about `up`: the turn is yaw · up.
+/// Pose covariance from centre and yaw. The rotation vector is yaw · up.
 Matrix6 poseCovarianceOf(const ClassBelief& belief, const Eigen::Vector3d& up) {
   Eigen::Matrix<double, 6, 4> J = Eigen::Matrix<double, 6, 4>::Zero();
   J.topLeftCorner<3, 3>().setIdentity();
@@ -165,7 +165,7 @@ Odometry odometryOf(const perdure::Odometry& odometry, const std::optional<Eigen
   message.child_frame_id = kBodyFrame;
   message.pose.pose = poseOf(odometry.T_WB);
   const Eigen::Matrix3d R = odometry.T_WB.R();
-  // From [θ in the body, p, v] to [p, θ in W] and to v in the body.
+  // Jacobian from [θ in the body, p, v] to [p, θ in W] and to v in the body.
   Eigen::Matrix<double, 6, 9> J = Eigen::Matrix<double, 6, 9>::Zero();
   J.block<3, 3>(0, 3).setIdentity();
   J.block<3, 3>(3, 0) = R;

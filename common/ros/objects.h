@@ -1,4 +1,4 @@
-// What Perdure sees and believes, as ROS' detections, markers, poses and diagnostics.
+// Converts Perdure's detections and objects to ROS detections, markers, poses and diagnostics.
 #pragma once
 
 #include <optional>
@@ -11,20 +11,22 @@
 
 namespace perdure::ros {
 
-/// Confirmed objects in `odom`. Each class that is possible is a result: its score is existence ×
-/// its probability, its pose and covariance those of its own Gaussian. The box is that of the most
-/// probable class.
+/// Confirmed objects in `odom`. Each possible class is a result: its score is existence × its
+/// probability, and its pose and covariance are those of its own Gaussian. The box is that of the
+/// most probable class.
 Detection3DArray detections3dOf(const Objects& objects);
-/// What a network found in an image of `camera`, with the classes of its model (their numbers where
-/// that is not known). A score is the probability against clutter and the other classes; those
-/// under 1 % are left out. Answers to predictions are none.
+/// Detections of a network in an image of `camera`, with the class names of its model, or class
+/// numbers if the model is not known. A score is the probability against clutter and the other
+/// classes; scores under 1 % are left out. Answers to predictions are excluded.
 Detection2DArray detections2dOf(const Detections& detections, const ModelInfo* model);
-/// Begins with the removal of all that was before. Solid where it is in sight, edges alone where it
-/// is not, dashed where something hides it. Name spaces are the classes.
+/// The first marker deletes all earlier ones. Visible objects are solid, others have edges only;
+/// the edges of occluded objects are dashed. Namespaces are the classes.
 MarkerArray markersOf(const Objects& objects);
-/// `gyro`: the newest rate of turn, for the twist; else its angular part has a huge covariance.
+/// `gyro`: the latest angular rate, for the twist. Without it the angular part has a huge
+/// covariance.
 Odometry odometryOf(const perdure::Odometry& odometry, const std::optional<Eigen::Vector3d>& gyro);
-/// x, y, z and σ (the name that viewers look for is `intensity`) of each, in `odom`.
+/// x, y, z and σ of each landmark in `odom`. The field of σ has the name `intensity`, which viewers
+/// expect.
 PointCloud2 cloudOf(const Landmarks& landmarks);
 DiagnosticStatus statusOf(const Health& health);
 

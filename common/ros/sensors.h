@@ -1,4 +1,5 @@
-// ROS' sensors as Perdure's and back: inertial samples, lenses, and where frames lie to each other.
+// Converts ROS sensor messages to Perdure's and back: inertial samples, lenses, and transforms
+// between frames.
 #pragma once
 
 #include <map>
@@ -13,30 +14,30 @@
 namespace perdure::ros {
 
 TimePoint timeOf(const Time& time);
-/// Source and sequence are the caller's.
+/// The caller sets source and sequence.
 ImuSample sampleOf(const Imu& imu);
-/// Size and lens of the images that the message is about: by K and D as they come, by P where they
-/// are `rectified` already; binning and region are taken into account. Neither name nor place nor
-/// rate. Reasons: "not_finite" (a number that is none, infinity), "uncalibrated" (no focal length),
-/// "lens" (a model or a number of coefficients that is not known), with a sentence.
+/// Size and lens of the images that the message describes: from K and D, or from P if they are
+/// `rectified`. Binning and region of interest are applied. Name, pose and rate are not set.
+/// Reasons: "not_finite" (NaN or infinity), "uncalibrated" (no focal length), "lens" (unknown model
+/// or number of coefficients), with a sentence.
 Result<CameraCalibration> cameraOf(const CameraInfo& info, bool rectified);
 
-/// In the frame imu_link, without an orientation; `noise` gives the covariances.
+/// The message in the frame imu_link, without orientation. The covariances come from `noise`.
 Imu imuOf(const ImuSample& sample, const ImuCalibration* noise);
 CameraInfo infoOf(const CameraCalibration& camera, TimePoint time);
 
 RigidTransform transformOf(const Transform& transform);
-/// "/base_link", as ROS 1 may say, is "base_link".
+/// Removes the leading slash that ROS 1 allows: "/base_link" becomes "base_link".
 std::string frameName(const std::string& frame_id);
 
-/// What is known of how frames lie to each other.
+/// The known transforms between frames.
 class FrameTree {
  public:
   void add(const TFMessage& message);
   bool empty() const { return parents_.empty(); }
-  /// Of transforms that are none, the last of each child: what is wrong with it, for people.
+  /// Invalid transforms: the last error of each child frame, as text for users.
   const std::map<std::string, std::string>& refused() const { return refused_; }
-  /// T_to_from: points of `from` into `to`; nothing where no way leads from one to the other.
+  /// T_to_from: points of `from` into `to`. Returns nothing if the two frames are not connected.
   std::optional<RigidTransform> find(const std::string& to, const std::string& from) const;
 
  private:
@@ -46,7 +47,7 @@ class FrameTree {
   };
   std::map<std::string, RigidTransform> toRoots(std::string frame) const;
 
-  std::map<std::string, Edge> parents_;  ///< by child
+  std::map<std::string, Edge> parents_;  ///< key: child frame
   std::map<std::string, std::string> refused_;
 };
 

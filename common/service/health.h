@@ -1,4 +1,5 @@
-// What a process says of itself once a second: counted by its handlers, completed from the system.
+// The health message of a process, published once a second. Handlers count; the system's values are
+// added.
 #pragma once
 
 #include <atomic>
@@ -20,13 +21,13 @@ class HealthMeter {
   void frameOut() { ++frames_out_; }
   void dropped(std::uint64_t n = 1) { dropped_ += n; }
   void setDropped(std::uint64_t total) { dropped_ = total; }
-  /// What the process is, with one sentence: what is wrong and the mend, or what it waits for.
+  /// Sets the state with one sentence: the fault and its fix, or the cause of waiting.
   void state(HealthState state, const std::string& message = {});
 
   std::uint64_t framesIn() const { return frames_in_; }
   std::uint64_t framesOut() const { return frames_out_; }
 
-  /// The message of this second; reasons are the caller's.
+  /// The message of this second; the caller adds the reasons.
   Health sample(std::chrono::steady_clock::time_point now);
 
  private:

@@ -7,8 +7,8 @@
 namespace perdure::service {
 namespace {
 
-constexpr double kSilent = 0.75, kPeriods = 4.0;         // s
-constexpr double kLongestPeriod = 5.0, kWeight = 0.125;  // s; of the newest one
+constexpr double kSilent = 0.75, kPeriods = 4.0;         // s; number of periods
+constexpr double kLongestPeriod = 5.0, kWeight = 0.125;  // s; weight of the newest period
 
 double secondsBetween(Input::Clock::time_point from, Input::Clock::time_point to) {
   return std::chrono::duration<double>(to - from).count();

@@ -1,4 +1,4 @@
-// What a service needs to come for something to go out: it is noticed where it falls silent.
+// An input that a service needs to produce output. The service detects when the input stops.
 #pragma once
 
 #include <chrono>
@@ -7,23 +7,26 @@
 
 namespace perdure::service {
 
-/// Among Health's reasons while nothing but the silence of inputs makes it degraded.
+/// A reason in Health, set if the silence of inputs is the only cause of the degraded state.
 inline constexpr char kInputSilent[] = "input_silent";
 
-/// In the loop's thread only.
+/// To be used in the loop's thread only.
 class Input {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// "inertial samples", and what mends their silence: "mend the IMU, or start capture".
+  /// The name of the input, "inertial samples", and the fix for its silence: "mend the IMU, or
+  /// start capture".
   Input(std::string what, std::string mend) : what_(std::move(what)), mend_(std::move(mend)) {}
 
   void heard() { heardAt(Clock::now()); }
   void heardAt(Clock::time_point now);
-  /// Silent for three quarters of a second, or for four of its periods where that is longer. What
-  /// has never come is not silent: the service says itself what it waits for.
+  /// Returns true after three quarters of a second without a message, or after four periods if that
+  /// is longer. An input that has never arrived is not silent; the service then reports what it is
+  /// waiting for.
   bool silent(Clock::time_point now) const;
-  /// "no inertial samples for 1.2 s; mend the IMU, or start capture"
+  /// The message about the silence, such as "no inertial samples for 1.2 s; mend the IMU, or start
+  /// capture".
   std::string sentence(Clock::time_point now) const;
 
  private:

@@ -21,7 +21,8 @@ std::int64_t nowNs(clockid_t clock) {
   return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
 }
 
-/// Of the wall clock from the time since boot; `within_ns`: how far apart the two were read.
+/// Offset of the wall clock from the time since boot; `within_ns` is the time between the two
+/// readings.
 std::int64_t wallOffsetNs(std::int64_t& within_ns) {
   const std::int64_t before = nowNs(CLOCK_BOOTTIME);
   const std::int64_t wall = nowNs(CLOCK_REALTIME);
@@ -50,10 +51,10 @@ ClockSteps::ClockSteps() {
 }
 
 void ClockSteps::look() {
-  constexpr std::int64_t kStep = 100'000'000;  // ns; NTP slews at 0.5 ms a second
+  constexpr std::int64_t kStep = 100'000'000;  // ns; NTP slews at most 0.5 ms per second
   std::int64_t within = 0;
   const std::int64_t offset = wallOffsetNs(within);
-  if (within > kStep / 2) return;  // stopped in between: next time
+  if (within > kStep / 2) return;  // interrupted between the readings
   if (std::abs(offset - offset_ns_) > kStep) {
     ++count_;
     last_ = std::chrono::steady_clock::now();

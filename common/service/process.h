@@ -1,4 +1,4 @@
-// What the operating system says of and hears from this process.
+// The interface of this process to the operating system.
 #pragma once
 
 #include <chrono>
@@ -6,17 +6,18 @@
 
 namespace perdure::service {
 
-double processorSeconds();      ///< of all threads since the start
-std::uint64_t residentBytes();  ///< of memory
+double processorSeconds();      ///< CPU time of all threads since the start
+std::uint64_t residentBytes();  ///< memory in use
 
-/// Sees when the wall clock was set: against the time since boot, by more than slewing could.
+/// Detects steps of the wall clock: changes relative to the time since boot that are larger than
+/// slewing causes.
 class ClockSteps {
  public:
   ClockSteps();
-  /// To be asked about once a second.
+  /// Checks for a step. Call it once a second.
   void look();
   std::uint64_t count() const { return count_; }
-  bool recent() const;  ///< in the last 30 s
+  bool recent() const;  ///< true if there was a step in the last 30 s
 
  private:
   std::int64_t offset_ns_ = 0;
@@ -24,19 +25,19 @@ class ClockSteps {
   std::chrono::steady_clock::time_point last_{};
 };
 
-/// systemd's protocol, where NOTIFY_SOCKET is set; else nothing.
+/// Sends systemd's notifications if NOTIFY_SOCKET is set; otherwise does nothing.
 void notifyReady();
 void notifyStopping();
 
-/// systemd's watchdog, where it watches this process (WATCHDOG_USEC): what lives says so at least
-/// once in its period, or is killed.
+/// Client of systemd's watchdog, if it is enabled for this process (WATCHDOG_USEC). systemd kills a
+/// process that sends no message within the watchdog's period.
 class Watchdog {
  public:
   using Clock = std::chrono::steady_clock;
   Watchdog();
-  /// How often there is something to say; zero where nobody watches.
+  /// The interval of messages; zero without a watchdog.
   std::chrono::microseconds period() const { return period_; }
-  /// "I live": passed on four times in the watchdog's time at most.
+  /// Sends a keep-alive message, at most four times per watchdog period.
   void feed(Clock::time_point now);
 
  private:

@@ -56,14 +56,14 @@ void addOptions(CLI::App& app, CommandLine& line) {
   app.set_version_flag("--version", std::string(PERDURE_VERSION));
 }
 
-/// What all services of this host share is beside the service's own file.
+/// The options shared by all services of this host, from a file beside the service's own file.
 bus::Options commonBus(const CommandLine& line, std::vector<config::Problem>& problems) {
   const auto folder = std::filesystem::path(line.config_file).parent_path();
   const bool beside = !line.config_file.empty();
   return bus::commonOptions(beside ? (folder.empty() ? "." : folder.string()) : "", problems);
 }
 
-/// Reads file and assignments; throws StartupError with everything that is wrong, `problems` too.
+/// Reads file and assignments. Throws StartupError with all errors, including `problems`.
 void readConfiguration(config::Fields& fields, const CommandLine& line,
                        std::vector<config::Problem> problems) {
   const auto append = [&](std::vector<config::Problem> more) {
@@ -84,7 +84,7 @@ std::shared_ptr<spdlog::logger> makeLog(const std::string& process, const std::s
   return log;
 }
 
-/// Everything after the command line is read; throws StartupError.
+/// Everything after reading the command line; throws StartupError.
 void start(const Program& program, const CommandLine& line) {
   const BlockedSignals blocked;
   Common common;
@@ -155,7 +155,7 @@ void Context::run() {
   publishHealth();
 }
 
-/// Each turn that was finished feeds the watchdog: a handler that hangs, or a stopped process, does
+/// Each completed turn of the loop feeds the watchdog. A hanging handler or a stopped process does
 /// not.
 void Context::runLoop() {
   constexpr std::chrono::microseconds kLongest{1'000'000};
@@ -177,7 +177,7 @@ ReasonCounts Context::reasons() const {
   return counts;
 }
 
-/// Health counts refusals; the log says once of each kind which field it was.
+/// Health counts refusals. The log contains the field of the first refusal of each kind.
 void Context::logNewRefusals() {
   for (const auto& endpoint : endpoints_) {
     for (const auto& [count, detail] : endpoint->firstDetails()) {
@@ -191,7 +191,7 @@ void Context::logNewRefusals() {
   }
 }
 
-/// Logged where it changes: RouDi may go and come while the services run.
+/// Changes are logged, because RouDi may stop and start while the services run.
 void Context::noteSharedMemory() {
   const std::string text = domain_.sharedMemoryText();
   if (text == shared_memory_) return;
@@ -199,7 +199,8 @@ void Context::noteSharedMemory() {
   log_->log(domain_.sharedMemory().on() ? spdlog::level::info : spdlog::level::warn, "{}", text);
 }
 
-/// Cyclone cuts a process off when its identity ends; started again it takes the renewed one.
+/// Cyclone disconnects a process when its identity expires. After a restart the process uses the
+/// renewed identity.
 void Context::requireIdentity() const {
   const auto& identity = participant_.identity();
   if (!identity || identity->until > std::chrono::system_clock::now()) return;
@@ -207,7 +208,7 @@ void Context::requireIdentity() const {
                            " has ended; `perdure security renew`, and its folder here");
 }
 
-/// What there is to say of an identity that is near its end; else nothing.
+/// Text about an identity that expires soon. The result is empty for other identities.
 std::string Context::identityEnds() const {
   const auto& identity = participant_.identity();
   if (!identity || identity->until - std::chrono::system_clock::now() > bus::kRenewBefore)
@@ -216,7 +217,7 @@ std::string Context::identityEnds() const {
          "; `perdure security renew`, then restart the service";
 }
 
-/// Who falls silent or comes back is told of without waiting for the second.
+/// Publishes Health at once if an input stops or resumes.
 void Context::noteSilence() {
   const auto now = Input::Clock::now();
   const auto silent = static_cast<std::size_t>(std::count_if(
@@ -225,7 +226,7 @@ void Context::noteSilence() {
   silent_inputs_ = silent;
 }
 
-/// What nothing goes out for the want of; else nothing.
+/// Text about the silent inputs that prevent output. The result is empty if no input is silent.
 std::string Context::silence() const {
   const auto now = Input::Clock::now();
   std::string text;
@@ -256,7 +257,7 @@ void Context::publishHealth() {
   const std::string silent = silence();
   const bool well_but_silent = !silent.empty() && health.state == HealthState::kOk;
   if (!silent.empty() && health.state != HealthState::kFailed) {
-    // What was wrong before may be why it is silent.
+    // An earlier error may be the cause of the silence, so its message is retained.
     const bool well = health.state == HealthState::kOk || health.message.empty();
     health.message = well ? silent : health.message + "; " + silent;
     health.state = HealthState::kDegraded;

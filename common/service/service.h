@@ -1,5 +1,5 @@
-// What every service's main has in common: options, configuration, log, signals, health, watchdog.
-// README.md beside this file shows how a main looks.
+// The common part of every service's main: options, configuration, log, signals, health, watchdog.
+// README.md in this folder shows an example of a main.
 #pragma once
 
 #include <spdlog/logger.h>
@@ -20,13 +20,13 @@
 
 namespace perdure::service {
 
-/// Given to a service's body: its endpoints, its loop, its health and its log.
+/// The context of a service's body: its endpoints, loop, health and log.
 class Context {
  public:
   Context(const std::string& process, const bus::Options& options,
           std::shared_ptr<spdlog::logger> log)
       : Context(process, bus::Domain(options), std::move(log)) {}
-  /// In a process that has opened its domain already.
+  /// Constructor for a process that has already opened its domain.
   Context(const std::string& process, const bus::Domain& domain,
           std::shared_ptr<spdlog::logger> log);
   ~Context();
@@ -41,7 +41,8 @@ class Context {
   HealthMeter& health() { return health_; }
   spdlog::logger& log() { return *log_; }
 
-  /// A reader whose messages go to `handler` in the loop's thread. Counted in Health.
+  /// A reader whose messages go to `handler` in the loop's thread. Its counts are published in
+  /// Health.
   template <class T>
   bus::Reader<T>& on(const bus::Topic<T>& topic, std::type_identity_t<Sink<T>> handler,
                      std::type_identity_t<Sink<T>> on_gone = {}) {
@@ -51,7 +52,7 @@ class Context {
     endpoints_.push_back(reader);
     return *reader;
   }
-  /// A writer. Counted in Health.
+  /// A writer. Its counts are published in Health.
   template <class T>
   bus::Writer<T>& writer(const bus::Topic<T>& topic, const bus::WriterOptions& options = {}) {
     auto writer = std::make_shared<bus::Writer<T>>(participant_, topic, options);
@@ -59,35 +60,35 @@ class Context {
     endpoints_.push_back(writer);
     return *writer;
   }
-  /// A writer as a node's output. What cannot be written is counted in Health.
+  /// A writer as a node's output. Messages that cannot be written are counted in Health.
   template <class T>
   Sink<T> sink(const bus::Topic<T>& topic) {
     return [&to = writer(topic)](const T& value) { (void)to.write(value); };
   }
 
-  /// Counts that Health publishes besides; asked once a second in the loop's thread.
+  /// Additional counts for Health; `source` is called once a second in the loop's thread.
   void countReasons(std::function<void(ReasonCounts&)> source);
   void countReasons(std::function<const ReasonCounts&()> source);
-  /// Called once a second before Health is published: to set its state.
+  /// `update` is called once a second before Health is published, to set its state.
   void onHealth(std::function<void()> update) { on_health_ = std::move(update); }
 
-  /// Without this nothing goes out. Where it came and has fallen silent, Health is degraded and
-  /// says so, at once. Its handler calls heard().
+  /// Declares an input that is necessary for any output. If it arrives and then stops, Health
+  /// becomes degraded at once and names it. Its handler calls heard().
   Input& needs(const std::string& what, const std::string& mend) {
     if (inputs_.empty()) every(std::chrono::milliseconds(100), [this] { noteSilence(); });
     return inputs_.emplace_back(what, mend);
   }
 
-  /// What must go on beside the loop, in a thread of its own, for the watchdog to be fed: false
-  /// where it hangs. Asked in the loop's thread.
+  /// Monitors a separate thread: the watchdog is fed only while `goes_on` returns true. It is
+  /// called in the loop's thread.
   void watch(std::function<bool()> goes_on) { watched_.push_back(std::move(goes_on)); }
 
   void every(std::chrono::nanoseconds period, std::function<void()> tick) {
     loop_.every(period, std::move(tick));
   }
-  /// Says that the service is ready and runs the loop until SIGTERM, SIGINT or stop().
+  /// Reports readiness and runs the loop until SIGTERM, SIGINT or stop().
   void run();
-  /// From any thread.
+  /// May be called from any thread.
   void stop() { loop_.stop(); }
   bool stopping() const { return loop_.stopped(); }
 
@@ -111,7 +112,7 @@ class Context {
   std::list<std::function<void(ReasonCounts&)>> reason_sources_;
   std::list<std::shared_ptr<const bus::Endpoint>> endpoints_;
   std::set<std::string> logged_refusals_;
-  std::string shared_memory_;  ///< what was said of it last
+  std::string shared_memory_;  ///< last text about shared memory
   bus::WaitLoop loop_;
   std::list<Input> inputs_;
   std::size_t silent_inputs_ = 0;
@@ -120,7 +121,7 @@ class Context {
   ClockSteps clock_steps_;
 };
 
-/// An option of the command line that stands for --set key=value.
+/// A command line option as an abbreviation of --set key=value.
 struct Shorthand {
   std::string option, key, type;
 };
@@ -128,16 +129,16 @@ struct Shorthand {
 struct Program {
   std::string process;  ///< "capture", "vio", …: the name in Health and in the log
   std::string summary;  ///< one sentence for --help
-  /// The service's own fields; those of bus.* and log.* are added.
+  /// Describes the service's own fields; those of bus.* and log.* are added.
   std::function<void(config::Fields&)> describe;
-  /// Makes the nodes, wires them, and calls context.run(). May throw StartupError before that.
+  /// Creates and connects the nodes, and calls context.run(). May throw StartupError before that.
   std::function<void(Context&)> body;
   /// Checks between fields, after reading; may throw StartupError. Part of --check-config.
   std::function<void()> verify = {};
   std::vector<Shorthand> shorthands = {};
 };
 
-/// The whole main of a service; returns its exit status.
+/// The complete main of a service; returns its exit status.
 int runService(int argc, char** argv, const Program& program);
 
 }  // namespace perdure::service

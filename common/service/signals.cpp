@@ -31,7 +31,7 @@ SignalThread::SignalThread(const BlockedSignals&, std::function<void()> on_signa
       }) {}
 
 SignalThread::~SignalThread() {
-  pthread_kill(thread_.native_handle(), SIGTERM);  // wakes it where no signal came
+  pthread_kill(thread_.native_handle(), SIGTERM);  // wakes the thread if no signal was received
   thread_.join();
 }
 

@@ -1,4 +1,4 @@
-// SIGTERM and SIGINT as an ordinary call in an ordinary thread.
+// Delivers SIGTERM and SIGINT as a normal call in a normal thread.
 #pragma once
 
 #include <functional>
@@ -6,13 +6,13 @@
 
 namespace perdure::service {
 
-/// Blocks both signals in this thread and all that it starts from now on: make it first.
+/// Blocks both signals in this thread and in all threads that it starts later. Create it first.
 class BlockedSignals {
  public:
   BlockedSignals();
 };
 
-/// Calls `on_signal` (once) in a thread of its own when one of them comes.
+/// Calls `on_signal` once, in a separate thread, when one of the signals is received.
 class SignalThread {
  public:
   SignalThread(const BlockedSignals& blocked, std::function<void()> on_signal);

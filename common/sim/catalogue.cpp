@@ -8,7 +8,7 @@
 namespace perdure::sim {
 namespace {
 
-// Sizes of European traffic and furniture (manufacturers' data sheets, rounded).
+// Sizes of European vehicles and furniture (manufacturers' data sheets, rounded).
 const std::map<std::string, std::vector<Shape>>& catalogue() {
   static const std::map<std::string, std::vector<Shape>> shapes{
       {"car",
@@ -70,7 +70,7 @@ SceneObject drawObject(const std::string& class_name, Dice& dice, const std::str
   object.class_name = class_name;
   object.looks_like = class_name == "toy" ? "car" : class_name;
   object.shape = shape.name;
-  // Large things are large in all directions: one number for half of the spread.
+  // Sizes in all directions are correlated: one common number determines half of the spread.
   const double overall = dice.unit();
   for (Eigen::Index i = 0; i < 3; ++i) {
     const double s = 0.5 * (overall + dice.unit());

@@ -1,4 +1,4 @@
-// What things of each class are like: the shapes there are and how large they get.
+// Properties of each class: its shapes and the ranges of their sizes.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,22 +11,22 @@
 
 namespace perdure::sim {
 
-/// A shape of a class and the range of its sizes: length (x, forwards), width, height; metres.
-/// An empty name leaves the shape to the look's seed.
+/// A shape of a class with the range of its sizes: length (x, forwards), width, height; metres. If
+/// the name is empty, the look's seed determines the shape.
 struct Shape {
   std::string name;
   Eigen::Vector3d smallest, largest;
-  double share = 1.0;  ///< how often, relative to the class's other shapes
+  double share = 1.0;  ///< frequency relative to the class's other shapes
 };
 
-/// The eight classes that the truth knows, in the order of the project's network.
+/// The eight classes of the truth, in the order of the project's network.
 const std::vector<std::string>& truthClasses();
 const std::vector<Shape>& shapesOf(const std::string& class_name);
 
-/// A new thing of the class: class, shape, size and look are set; id and place are not.
+/// A new object of the class with class, shape, size and look, but without id and place.
 SceneObject drawObject(const std::string& class_name, Dice& dice, const std::string& look_set);
 
-/// The seed of a look. Its top byte is the set's number, so that sets share none.
+/// The seed of a look. Its top byte is the number of the set, so that sets have no common seeds.
 std::uint64_t lookSeed(Dice& dice, const std::string& look_set);
 
 }  // namespace perdure::sim

@@ -62,7 +62,7 @@ Eigen::MatrixXd classDirections(const DetectorModel& model) {
   for (const ConfusionPair& pair : model.confusion) {
     if (!(pair.share > 0.0 && pair.share < 0.5)) refuse("confusion is not within 0 and 0.5");
     const auto i = indexOf(pair.first), j = indexOf(pair.second);
-    // Half the distance between two unit Gaussians is the quantile of taking one for the other.
+    // Half the distance between two unit Gaussians is the quantile of their confusion probability.
     const double half = std::sqrt(chi2Quantile(1.0 - 2.0 * pair.share, 1)) / model.separation;
     cosines(i, j) = cosines(j, i) = std::max(0.0, 1.0 - 2.0 * half * half);
   }
@@ -73,19 +73,20 @@ Eigen::MatrixXd classDirections(const DetectorModel& model) {
   return llt.matrixL();
 }
 
-/// A thing in the image, as the truth has it.
+/// An object in the image, according to the truth.
 struct SimulatedDetector::Sight {
   TruthView view;
   std::size_t looks_like = 0;
   Box inside;            ///< the outline within the image
-  double visible = 0.0;  ///< share of `inside` that is seen
+  double visible = 0.0;  ///< visible fraction of `inside`
   Eigen::Vector3d centre_W = Eigen::Vector3d::Zero();
   double distance = 0.0, alpha = 0.0;
-  double bearing = 0.0;  ///< of the camera, from the thing
+  double bearing = 0.0;  ///< direction of the camera, as seen from the object
 };
 
-/// Unit normal numbers for one look: a part is drawn anew, a part is the thing's own function of
-/// where it is seen from (waves of random phase, so that its correlation falls as the view turns).
+/// Standard normal numbers for one observation. One part is drawn for each frame. The other part is
+/// a fixed function of object and viewpoint: waves of random phase, whose correlation decreases as
+/// the viewpoint changes.
 class SimulatedDetector::Errors {
  public:
   Errors(std::uint64_t seed, std::uint64_t frame, std::uint64_t object, double persistent,
@@ -103,7 +104,7 @@ class SimulatedDetector::Errors {
     double own = 0.0;
     for (const auto& wave : waves_) {
       const double a = own_.normal(), b = own_.normal();
-      own += 0.5 * (wave[0] * a + wave[1] * b);  // four waves of variance one
+      own += 0.5 * (wave[0] * a + wave[1] * b);  // four waves with a total variance of one
     }
     return std::sqrt(1.0 - persistent_) * fresh_.normal() + std::sqrt(persistent_) * own;
   }
@@ -178,15 +179,15 @@ Detections SimulatedDetector::detect(std::uint64_t frame, const FrameStamp& stam
   found.model_hash = info_.hash;
   const std::vector<Sight> all = sights(frame, stamp.time, T_WB * T_BC_);
   for (const Sight& sight : all) {
-    if (sight.looks_like == model_.classes.size()) continue;  // nothing that it knows
+    if (sight.looks_like == model_.classes.size()) continue;  // not a class of the detector
     if (auto detection = look(sight, all, frame)) found.detections.push_back(std::move(*detection));
   }
   Dice dice(seedOf("false alarms", {model_.seed, frame}));
-  double left = std::exp(-model_.false_per_frame);  // Poisson's number, by Knuth's products
+  double left = std::exp(-model_.false_per_frame);  // Poisson-distributed number by Knuth's method
   for (double product = dice.unit(); product > left; product *= dice.unit()) {
     found.detections.push_back(falseAlarm(dice));
   }
-  // The order says nothing of who is who.
+  // Sort, so that the order contains no information about identities.
   std::sort(
       found.detections.begin(), found.detections.end(), [](const Detection& a, const Detection& b) {
         return std::tie(a.box.x1, a.box.y1, a.box.x2) < std::tie(b.box.x1, b.box.y1, b.box.x2);
@@ -214,8 +215,8 @@ std::optional<Detection> SimulatedDetector::look(const Sight& sight, const std::
   return detection;
 }
 
-/// What is left when the nearer thing that covers most of it has taken its side away; what hides
-/// it and is no object takes the side that the thing's own id names.
+/// The visible part of the box: the nearer object with the largest overlap hides one side. If the
+/// occluder is not an object, the side is a function of the object's id.
 Box SimulatedDetector::visiblePart(const Sight& sight, const std::vector<Sight>& all) const {
   Box box = sight.inside;
   if (sight.visible >= model_.shrink_below) return box;
@@ -249,7 +250,7 @@ std::optional<Box> SimulatedDetector::withErrors(const Box& box, Errors& errors)
   const double shift_x = common * errors.normal(), shift_y = common * errors.normal();
   const auto side = [&](double at, double shift, double sigma, double limit) {
     const double error = sigma * (shift + own * errors.normal());
-    // A side that the border cuts is at the border.
+    // A side cut by the image border stays at the border.
     if (at <= 0.0 || at >= limit) return at;
     return std::clamp(at + error, 0.0, limit);
   };
@@ -262,7 +263,8 @@ std::optional<Box> SimulatedDetector::withErrors(const Box& box, Errors& errors)
   return noisy;
 }
 
-/// 1 for large and visible things, towards least_separation for those hardly found.
+/// Returns 1 for large and visible objects. The value decreases towards least_separation for barely
+/// detectable ones.
 double SimulatedDetector::quality(double size_px, double visible) const {
   const double ease = foundProbability(size_px, visible) / std::max(model_.found, 1e-9);
   return model_.least_separation + (1.0 - model_.least_separation) * ease;

@@ -1,9 +1,10 @@
-// A detector that is drawn from the truth: boxes with noise, misses by size and visibility, false
-// alarms, class confusion, azimuths with flips. It measures the filter apart from any network.
+// A simulated detector, drawn from the truth. It produces boxes with noise, misses by size and
+// visibility, false alarms, class confusion, and azimuths with flips. It allows tests of the filter
+// without a network.
 //
-// Its class evidence is truthful by construction: each box has a feature vector drawn from a unit
-// Gaussian about its class's mean (clutter: about the origin), and the activations are the exact
-// log-likelihood ratios of that vector. Errors of looks from nearly the same place are alike.
+// Its class evidence is correct by construction. Each box has a feature vector from a unit Gaussian
+// about the mean of its class (clutter: about the origin). The activations are the exact
+// log-likelihood ratios of that vector. Errors from similar viewpoints are correlated.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,61 +19,62 @@
 
 namespace perdure::sim {
 
-/// Two classes that are taken for each other in `share` of the looks at large, visible things.
+/// Two classes that are confused in a fraction `share` of the observations of large, visible
+/// objects.
 struct ConfusionPair {
   std::string first, second;
   double share = 0.05;
 };
 
-/// Sizes are √(width · height) of the part of the outline within the image, in pixels.
+/// Sizes are √(width · height) of the part of the outline inside the image, in pixels.
 struct DetectorModel {
   std::uint64_t seed = 1;
   std::vector<std::string> classes{"car",   "van",          "person",  "bicycle",
                                    "chair", "dining table", "monitor", "couch"};
 
-  // Found with probability found · σ(log₂(size / half_size_px) / size_octaves)
-  //                               · σ((visible − half_visible) / visible_softness).
+  // Detection probability: found · σ(log₂(size / half_size_px) / size_octaves)
+  //                        · σ((visible − half_visible) / visible_softness).
   double found = 0.96;
   double half_size_px = 14.0, size_octaves = 0.25;
-  double half_visible = 0.3, visible_softness = 0.06;  ///< shares of the outline in the image
-  double least_visible = 0.08;                         ///< nothing is found below
+  double half_visible = 0.3, visible_softness = 0.06;  ///< fractions of the outline in the image
+  double least_visible = 0.08;                         ///< least visible fraction for a detection
 
-  double box_share = 0.03;        ///< deviation of a side, share of the box's width or height,
-  double box_floor_px = 0.8;      ///< and in pixels beside it (added in squares)
-  double side_correlation = 0.3;  ///< of opposite sides' errors
-  double shrink_below = 0.6;      ///< boxes of things seen less than this are of the visible part
+  double box_share = 0.03;        ///< σ of a side as a share of the box's width or height
+  double box_floor_px = 0.8;      ///< additional σ of a side in pixels, added in quadrature
+  double side_correlation = 0.3;  ///< correlation of the errors of opposite sides
+  double shrink_below = 0.6;      ///< fraction below which boxes enclose the visible part only
 
   double false_per_frame = 0.5, false_smallest_px = 8.0;  ///< sizes are log-uniform up to the image
 
-  double separation = 4.0;        ///< of a class's mean from clutter's, in deviations, at its best
-  double least_separation = 0.5;  ///< share of it that is left for the smallest and most hidden
+  double separation = 4.0;        ///< distance of a class's mean from clutter's, in σ, at best
+  double least_separation = 0.5;  ///< factor for the smallest and most occluded objects
   std::vector<ConfusionPair> confusion{{"car", "van", 0.08}, {"chair", "couch", 0.05}};
 
   bool azimuth = true;
-  double azimuth_sigma = 0.2, flip_share = 0.08;  ///< radians; of azimuths, turned by 180°
+  double azimuth_sigma = 0.2, flip_share = 0.08;  ///< radians; share of azimuths turned by 180°
 
-  double persistent_share = 0.5;  ///< of all errors' variances: alike while the view is alike
-  double latency_s = 0.0;         ///< from the frame to its detections; for who delivers them
+  double persistent_share = 0.5;  ///< share of the error variances that is fixed per viewpoint
+  double latency_s = 0.0;         ///< delay of the detections; used by the publisher
 };
 
-/// A row of unit length for each class: the direction of its mean from clutter's in the space of
-/// features. At right angles, but for pairs that are confused. Throws StartupError(kConfiguration).
+/// One row of unit length per class: the direction of its mean from that of clutter in the space of
+/// features. Rows are orthogonal, except for confused pairs. Throws StartupError(kConfiguration).
 Eigen::MatrixXd classDirections(const DetectorModel& model);
 
 class SimulatedDetector {
  public:
-  /// Throws StartupError(kConfiguration) for numbers that make no sense. `camera` is the one whose
-  /// views the truth holds.
+  /// Throws StartupError(kConfiguration) for invalid numbers. `camera` is the camera whose views
+  /// the truth contains.
   SimulatedDetector(DetectorModel model, Truth truth, const CameraCalibration& camera);
 
   const ModelInfo& info() const { return info_; }
   const DetectorModel& model() const { return model_; }
   const Truth& truth() const { return truth_; }
 
-  /// What it sees in the frame with this index, from 0; T_WB is the body's true pose in the
-  /// truth's world. Depends on nothing but the arguments and the seed.
+  /// The detections in the frame with this index, from 0. T_WB is the true pose of the body in the
+  /// world of the truth. The result depends on the arguments and the seed only.
   Detections detect(std::uint64_t frame, const FrameStamp& stamp, const RigidTransform& T_WB) const;
-  /// The probability with which a thing is found, by the size in the image and the share seen.
+  /// The detection probability of an object, from its size in the image and its visible fraction.
   double foundProbability(double size_px, double visible) const;
 
  private:
@@ -93,7 +95,7 @@ class SimulatedDetector {
   double width_, height_;
   RigidTransform T_BC_;
   ModelInfo info_;
-  Eigen::MatrixXd means_;  ///< a row for each class, of unit length
+  Eigen::MatrixXd means_;  ///< one row per class, of unit length
 };
 
 }  // namespace perdure::sim

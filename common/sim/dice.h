@@ -1,4 +1,5 @@
-// Seeded choices: the same seed gives the same on every machine and with every library.
+// Seeded random choices: the same seed gives the same results on every machine and with every
+// library.
 #pragma once
 
 #include <cmath>
@@ -9,7 +10,7 @@
 
 namespace perdure::sim {
 
-/// SplitMix64's finaliser (Steele et al., 2014): neighbouring seeds give unrelated numbers.
+/// SplitMix64's finaliser (Steele et al., 2014): adjacent seeds give unrelated numbers.
 constexpr std::uint64_t mixBits(std::uint64_t x) {
   x += 0x9E3779B97F4A7C15ULL;
   x = (x ^ (x >> 30U)) * 0xBF58476D1CE4E5B9ULL;
@@ -17,7 +18,7 @@ constexpr std::uint64_t mixBits(std::uint64_t x) {
   return x ^ (x >> 31U);
 }
 
-/// A seed of its own for a purpose and some numbers (a scene's seed, a frame, an object's id).
+/// A separate seed for a purpose and some numbers (a scene's seed, a frame, an object's id).
 constexpr std::uint64_t seedOf(std::string_view purpose,
                                std::initializer_list<std::uint64_t> numbers) {
   std::uint64_t seed = 0;
@@ -30,14 +31,14 @@ class Dice {
  public:
   explicit Dice(std::uint64_t seed) : engine_(mixBits(seed)) {}
 
-  /// Within [0, 1).
+  /// Uniform in [0, 1).
   double unit() { return static_cast<double>(engine_() >> 11U) * 0x1.0p-53; }
   double uniform(double low, double high) { return low + (high - low) * unit(); }
   bool chance(double probability) { return unit() < probability; }
-  /// 0 … count − 1; count > 0.
+  /// Uniform in 0 … count − 1; count > 0.
   std::size_t below(std::size_t count) { return static_cast<std::size_t>(engine_() % count); }
   std::uint64_t seed() { return engine_(); }
-  /// Of mean 0 and deviation 1 (Box and Muller).
+  /// Normal with mean 0 and standard deviation 1 (Box and Muller).
   double normal() {
     const double radius = std::sqrt(-2.0 * std::log(1.0 - unit()));
     return radius * std::cos(6.283185307179586 * unit());

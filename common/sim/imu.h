@@ -1,5 +1,5 @@
-// What an IMU in the body reports: point samples of the exact motion, with the errors of the
-// continuous-time model of Kalibr and EuRoC (white noise and a bias that walks, by densities).
+// Simulates an IMU in the body: point samples of the exact motion, with the errors of the
+// continuous-time model of Kalibr and EuRoC (white noise and bias random walk, given by densities).
 #pragma once
 
 #include <vector>
@@ -14,12 +14,12 @@ inline constexpr double kGravity = 9.81;  ///< m/s²; W's z axis points against 
 
 struct ImuRecord {
   ImuSample sample;
-  /// What was in it, at its time.
+  /// The biases in the sample, at its time.
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = Eigen::Vector3d::Zero();
 };
 
-/// From the scene's t = 0 until `seconds`, at calibration.rate_hz; `epoch` is the sensor time of
-/// t = 0. A prefix of a longer record is the same record.
+/// Samples from the scene's t = 0 until `seconds`, at calibration.rate_hz. `epoch` is the sensor
+/// time of t = 0. A shorter record equals the start of a longer one.
 std::vector<ImuRecord> simulateImu(const Trajectory& body, const ImuCalibration& calibration,
                                    const ImuErrors& errors, std::uint64_t seed, double seconds,
                                    TimePoint epoch);

@@ -15,7 +15,7 @@ constexpr double kStep = 0.25;  ///< metres between points of a path
 
 using Points = std::vector<Eigen::Vector2d>;
 
-/// The corner's arc, or the point itself where the way does not turn or the radius is 0.
+/// The arc of a corner, or the point itself if the path is straight there or the radius is 0.
 Points roundedCorner(const Eigen::Vector2d& before, const Corner& corner,
                      const Eigen::Vector2d& after) {
   const Eigen::Vector2d in = (corner.point - before).normalized();
@@ -51,7 +51,7 @@ Points outlineOf(const std::vector<Corner>& corners, bool closed) {
   return outline;
 }
 
-/// Points at equal distances along the outline; `step` becomes what divides it evenly.
+/// Points at equal distances along the outline; `step` is adjusted to divide the outline evenly.
 Points resampled(const Points& outline, double& step) {
   std::vector<double> along{0.0};
   for (std::size_t i = 1; i < outline.size(); ++i) {
@@ -69,14 +69,14 @@ Points resampled(const Points& outline, double& step) {
   return points;
 }
 
-/// The mean over a window, twice: curvature then changes steadily.
+/// The moving average, applied twice, so that the curvature changes steadily.
 template <class Value>
 std::vector<Value> smoothed(std::vector<Value> values, int half, bool closed) {
   const int n = static_cast<int>(values.size());
   for (int pass = 0; pass < 2; ++pass) {
     const std::vector<Value> before = values;
     for (int i = 0; i < n; ++i) {
-      // Near an open end the window shrinks, so that the end stays where it is.
+      // Near an open end the window shrinks, so that the end does not move.
       const int reach = closed ? half : std::min({half, i, n - 1 - i});
       Value sum = before[static_cast<std::size_t>(i)];
       for (int k = 1; k <= reach; ++k) {
@@ -116,9 +116,9 @@ GroundPath::GroundPath(const std::vector<Corner>& corners, bool closed, double s
     : closed_(closed), step_(kStep) {
   check(corners.size() >= (closed ? 3u : 2u), "a path has enough corners");
   Points points = resampled(outlineOf(corners, closed), step_);
-  if (closed) points.pop_back();  // it is the first one again
+  if (closed) points.pop_back();  // equal to the first point
   points = smoothed(std::move(points), static_cast<int>(0.5 * smoothing_m / kStep), closed);
-  // Smoothing shortens the curves: equal distances again.
+  // Smoothing shortens curves, so the points are resampled at equal distances.
   if (closed) points.push_back(points.front());
   points = resampled(points, step_ = kStep);
   if (closed) points.pop_back();
@@ -161,7 +161,7 @@ double Drive::distanceAt(double t_s) const {
 
 namespace {
 
-/// The highest speeds that keep all limits, at every step from `from` on.
+/// The highest speeds within all limits, at every step from `from` on.
 std::vector<double> speedProfile(const GroundPath& path, const SpeedLimits& limits, double from,
                                  double length, bool stops) {
   const auto count = static_cast<std::size_t>(std::ceil(length / kStep)) + 1;
@@ -192,7 +192,7 @@ Drive drive(const GroundPath& path, const SpeedLimits& limits, double from, doub
   const std::vector<double> speed = speedProfile(path, limits, from, length, stops);
   Drive result;
   double t = rest_s;
-  std::size_t i = 0;  // of the profile
+  std::size_t i = 0;  // index in the profile
   const auto count = static_cast<std::size_t>(std::ceil(until_s / result.interval_s)) + 1;
   while (result.distance.size() < count) {
     const double now = result.interval_s * static_cast<double>(result.distance.size());
@@ -210,7 +210,7 @@ Drive drive(const GroundPath& path, const SpeedLimits& limits, double from, doub
     }
     result.distance.push_back(from + s);
   }
-  // A driver's foot takes a while: about half a second from one acceleration to another.
+  // A driver needs about half a second to change the acceleration.
   result.distance = smoothed(std::move(result.distance), 4, false);
   return result;
 }
@@ -227,7 +227,7 @@ Drive cruise(double from, double speed, double from_s, double until_s) {
 
 namespace {
 
-/// Waves of the road under the wheels, of about 3 to 9 m.
+/// Waves of the road surface with lengths of 3 to 9 m.
 class Roughness {
  public:
   Roughness(std::uint64_t seed, double lap_m) {
@@ -237,7 +237,7 @@ class Roughness {
       if (lap_m > 0.0) wave.length = lap_m / std::round(lap_m / wave.length);
     }
   }
-  /// Three heights within -1 and 1: of bounce, roll and pitch.
+  /// Three heights between -1 and 1, for bounce, roll and pitch.
   Eigen::Vector3d at(double distance) const {
     Eigen::Vector3d height = Eigen::Vector3d::Zero();
     for (std::size_t i = 0; i < waves_.size(); ++i) {

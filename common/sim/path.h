@@ -1,4 +1,4 @@
-// Ways on the ground and how fast they are driven: from corner points to a trajectory's controls.
+// Paths on the ground and the speeds along them: from corner points to a trajectory's controls.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,7 +9,7 @@
 
 namespace perdure::sim {
 
-/// A point of a way and the radius with which it is rounded.
+/// A corner point of a path and the radius of its curve.
 struct Corner {
   Eigen::Vector2d point;
   double radius = 0.0;
@@ -17,12 +17,12 @@ struct Corner {
 
 struct PathPoint {
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
-  double heading = 0.0;    ///< radians, continuous along the way (not wrapped)
+  double heading = 0.0;    ///< radians, continuous along the path (not wrapped)
   double curvature = 0.0;  ///< 1/m, left turns positive
 };
 
-/// Straight lines and arcs, with curvature that grows and falls steadily. A closed path goes on
-/// round and round; an open one goes on straight beyond its ends.
+/// Straight lines and arcs, with gradual changes of curvature. A closed path repeats; an open path
+/// continues straight beyond its ends.
 class GroundPath {
  public:
   GroundPath(const std::vector<Corner>& corners, bool closed, double smoothing_m = 4.0);
@@ -40,36 +40,36 @@ class GroundPath {
 
 struct SpeedLimits {
   double top = 8.0;         ///< m/s
-  double lateral = 2.2;     ///< m/s², of curves
+  double lateral = 2.2;     ///< m/s², in curves
   double accelerate = 1.6;  ///< m/s²
   double brake = 1.8;       ///< m/s²
 };
 
-/// When it is where on its path.
+/// The distance along the path as a function of time.
 struct Drive {
   double start_s = 0.0, interval_s = 0.05;
-  std::vector<double> distance;  ///< along the path, one every interval
+  std::vector<double> distance;  ///< distance along the path, one value per interval
 
   double distanceAt(double t_s) const;
 };
 
-/// Stands for `rest_s` at distance `from`, then drives as fast as the limits let it until
-/// `until_s`, or until it stands again at distance `to` (infinite: never).
+/// Rests for `rest_s` at distance `from`, then drives as fast as the limits allow until `until_s`,
+/// or until it stops at distance `to` (infinite: never).
 Drive drive(const GroundPath& path, const SpeedLimits& limits, double from, double to,
             double rest_s, double until_s);
-/// At one speed from beginning to end, with no rest.
+/// Drives at constant speed from start to end, without a rest.
 Drive cruise(double from, double speed, double from_s, double until_s);
 
-/// How a vehicle's body answers to its driving and to the road.
+/// The response of a vehicle's body to acceleration and to the road.
 struct Suspension {
-  double height = 1.5;  ///< of the body's origin above the ground
+  double height = 1.5;  ///< height of the body's origin above the ground
   double roll_per_accel = 0.009, pitch_per_accel = 0.006;  ///< rad per m/s²
   double bounce_m = 0.004, sway_rad = 0.0025;              ///< amplitudes on a rough road
-  std::uint64_t seed = 0;                                  ///< of the road's roughness
-  double lap_m = 0.0;  ///< after which the road is the same again; 0: never
+  std::uint64_t seed = 0;                                  ///< seed of the road's roughness
+  double lap_m = 0.0;  ///< period after which the road repeats; 0: never
 };
 Trajectory vehicleMotion(const GroundPath& path, const Drive& drive, const Suspension& suspension);
-/// Of a thing that stays upright.
+/// The motion of an object that stays upright.
 Trajectory uprightMotion(const GroundPath& path, const Drive& drive, double height);
 
 }  // namespace perdure::sim

@@ -1,6 +1,6 @@
-// A scene with exact truth: what stands where and when, how the body moves, and with which sensors
-// it looks. A scene is a value made from (name, seed, options); the same three give the same scene.
-// W has z up; the ground is z = 0.
+// A scene with exact truth: objects and their poses over time, the motion of the body, and its
+// sensors. A scene is a value determined by name, seed and options. W has z up; the ground is z =
+// 0.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,22 +14,23 @@
 
 namespace perdure::sim {
 
-/// A thing that the map is to find (or to see through, as the toy): it is in the truth.
+/// An object that the map should contain (or reject, as the toy). It is part of the truth.
 struct SceneObject {
   std::uint64_t id = 0;  ///< > 0
   std::string
       class_name;  ///< truth: car, van, person, bicycle, chair, dining table, monitor, couch, toy
-  /// What a detector takes it for; the class itself but for the toy (a car).
+  /// The class that a detector assigns. It equals the class itself, except for the toy (car).
   std::string looks_like;
   std::string
-      shape;  ///< of the class (catalogue.h): hatchback, sedan, …; empty: by the look's seed
+      shape;  ///< shape of the class (catalogue.h): hatchback, sedan, …; empty: by the look's seed
   std::uint64_t look_seed = 0;  ///< colours, textures, details
   Eigen::Vector3d size =
       Eigen::Vector3d::Ones();  ///< length (x of O), width (y), height (z); metres
-  /// Centre of its box, yaw about +z. Object frame O: x forwards, z up, origin in the centre.
+  /// Pose of the centre of its box, yaw about +z. Object frame O: x forwards, z up, origin in the
+  /// centre.
   Trajectory motion{RigidTransform{}};
-  bool moves = false;  ///< ever, while it is present
-  /// It moves at once, between two frames (someone moved it): the truth has two keys and no way
+  bool moves = false;  ///< moves at some time during its presence
+  /// It jumps between two frames, as if moved by a person. The truth has two keys and no motion
   /// between them. `moves` is set too.
   bool steps = false;
   double present_from_s = -1e9, present_until_s = 1e9;
@@ -39,8 +40,9 @@ struct SceneObject {
 
 enum class PropKind { kFacade, kTree, kPole, kHedge, kWall, kKerb, kFloor, kCrate, kShelf };
 
-/// Scenery: seen and able to hide things, but in no truth. Pose of its box's centre. Long things
-/// (facades, walls, hedges, kerbs, shelves) have x along their length; their front is −y.
+/// Scenery: visible and able to occlude objects, but not part of the truth. The pose is that of the
+/// centre of its box. Long props (facades, walls, hedges, kerbs, shelves) have x along their
+/// length; their front is −y.
 struct Prop {
   PropKind kind = PropKind::kFacade;
   std::uint64_t look_seed = 0;
@@ -49,17 +51,17 @@ struct Prop {
 };
 
 enum class GroundKind { kStreet, kRoom };
-/// A stretch of road with pavements, for the ground's picture.
+/// A section of road with pavements, for the rendered ground.
 struct Road {
   Eigen::Vector2d from, to;
   double width_m = 7.0;
 };
 
 struct CameraErrors {
-  double exposure_s = 0.008;      ///< motion blur over this time; stamps are its middle
+  double exposure_s = 0.008;      ///< motion blur over this time; the stamp is its middle
   double noise_electrons = 12.0;  ///< read noise; shot noise follows from full_well
   double full_well_electrons = 10000.0;
-  double vignetting = 0.15;  ///< darkening at the corner, share
+  double vignetting = 0.15;  ///< darkening at the corner, as a share
   double gain_walk = 0.02;   ///< relative, 1/√s
 };
 struct ImuErrors {
@@ -74,8 +76,8 @@ struct SpeedErrors {
   bool noise = true;
 };
 
-/// The sensors. `calibration` is what the sensor.yaml files say; `true_calibration` what the world
-/// does (the same unless a test of calibration wants otherwise).
+/// The sensors. `calibration` is written to the sensor.yaml files; `true_calibration` describes the
+/// simulated sensors. The two differ only in tests of calibration.
 struct Rig {
   Calibration calibration, true_calibration;
   std::vector<CameraErrors> cameras;
@@ -86,14 +88,14 @@ struct Rig {
 struct Scene {
   std::string name, proves;
   std::uint64_t seed = 0;
-  double seconds = 0.0;  ///< how long the body's motion is worth watching
+  double seconds = 0.0;  ///< useful duration of the body's motion
   Trajectory body{RigidTransform{}};
   Rig rig;
   std::vector<SceneObject> objects;
   std::vector<Prop> props;
   GroundKind ground = GroundKind::kStreet;
   std::vector<Road> roads;
-  Eigen::Vector3d sun_W{0.4, 0.3, 0.87};  ///< unit vector towards it
+  Eigen::Vector3d sun_W{0.4, 0.3, 0.87};  ///< unit vector towards the sun
   double sun_strength = 1.0, sky_strength = 0.5;
 };
 
@@ -102,8 +104,8 @@ struct SceneOptions {
   bool stereo = false, mono8 = false, rolling_shutter = false, noise = true;
   std::uint32_t width = 640, height = 480;
   double rate_hz = 20.0;
-  /// Looks (colours, textures, shapes' details) come from seeds that differ between training,
-  /// testing and use, so that a network is never tried on what it learnt.
+  /// Looks (colours, textures, details of shapes) have different seeds for training, testing and
+  /// use. A network is therefore never tested on its training data.
   std::string look_set = "use";  ///< use, train, test
 };
 
@@ -113,7 +115,7 @@ struct SceneName {
 /// street, room, toy, occlusion, vanish, row, roll, still, straight, traffic, town, blocks, lap,
 /// and `random`, single views for training.
 const std::vector<SceneName>& sceneNames();
-/// Throws StartupError(kUsage) with the known names.
+/// Throws StartupError(kUsage) with the known names if `name` is unknown.
 Scene makeScene(const std::string& name, std::uint64_t seed, const SceneOptions& options);
 
 }  // namespace perdure::sim

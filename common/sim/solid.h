@@ -1,4 +1,5 @@
-// Upright boxes that things fill, and whether two of them meet: nothing in a scene interpenetrates.
+// Upright boxes around objects, and a test for their intersection. No two objects of a scene may
+// intersect.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,28 +10,28 @@
 
 namespace perdure::sim {
 
-/// A box turned about the vertical only. Metres, W.
+/// A box rotated about the vertical only. Metres, W.
 struct Solid {
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();
   double yaw = 0.0;
-  Eigen::Vector2d half = Eigen::Vector2d::Zero();  ///< of length and width
+  Eigen::Vector2d half = Eigen::Vector2d::Zero();  ///< half of length and width
   double low = 0.0, high = 0.0;                    ///< z
 
   std::array<Eigen::Vector2d, 4> corners() const;
 };
 
-/// The gap between them along the separating direction that shows most of it: a lower bound of the
-/// distance, negative where they meet by at least that much.
+/// The largest gap between the two along their separating directions. It is a lower bound of the
+/// distance; negative values mean an overlap of at least that size.
 double gapBetween(const Solid& a, const Solid& b);
 bool meet(const Solid& a, const Solid& b, double margin = 0.0);
 /// Distance on the ground from a point to the outline; 0 inside.
 double distanceTo(const Solid& solid, const Eigen::Vector2d& point);
 
-/// Whether the straight line from `from` to `to` (W) goes through it.
+/// Returns whether the straight line from `from` to `to` (W) passes through the solid.
 bool blocks(const Solid& solid, const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
 Solid solidOf(const SceneObject& object, double t_s);
-/// What it fills: a tree is a thin trunk and a crown above it, the rest their boxes.
+/// The solids of a prop: a thin trunk and a crown for a tree, one box for other props.
 std::vector<Solid> solidsOf(const Prop& prop);
 
 }  // namespace perdure::sim

@@ -1,4 +1,4 @@
-// What a vehicle's wheels report: the speed of the body's origin along its x axis.
+// Simulates the wheel speed of a vehicle: the speed of the body's origin along its x axis.
 #pragma once
 
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace perdure::sim {
 
-/// From the scene's t = 0 until `seconds`; `epoch` is the sensor time of t = 0.
+/// Samples from the scene's t = 0 until `seconds`; `epoch` is the sensor time of t = 0.
 std::vector<SpeedSample> simulateSpeed(const Trajectory& body, const SpeedErrors& errors,
                                        std::uint64_t seed, double seconds, TimePoint epoch);
 

@@ -14,7 +14,7 @@ constexpr int kPositionOrder = 6, kRotationOrder = 5;
 constexpr auto kPositionWeights = blendingMatrix<kPositionOrder>();
 constexpr auto kRotationWeights = cumulativeMatrix<kRotationOrder>();
 
-/// Controls around one time; those outside are the first or the last.
+/// Controls near one time. Indices outside the range give the first or the last control.
 class Controls {
  public:
   Controls(const std::vector<RigidTransform>& all, std::int64_t first) : all_(all), first_(first) {}
@@ -30,7 +30,7 @@ class Controls {
 };
 
 void evaluatePosition(const Controls& controls, double s, double interval, MotionState& state) {
-  // About one control, so that a position far from the origin costs no digits.
+  // Sums offsets from one control, so that positions far from the origin lose no digits.
   const Eigen::Vector3d base = controls[2].p;
   state.T_WB.p = base;
   for (std::size_t i = 0; i < kPositionOrder; ++i) {
@@ -77,7 +77,8 @@ MotionState Trajectory::at(double t_s) const {
   const double u =
       std::clamp((t_s - start_s_) / interval_s_, -8.0, static_cast<double>(control_.size()) + 8.0);
   const double position_segment = std::floor(u), rotation_segment = std::floor(u + 0.5);
-  // The rotation's spline has its knots half-way between the controls: then both lag by nothing.
+  // The knots of the rotation's spline lie half-way between the controls. Both splines therefore
+  // have no lag.
   evaluatePosition(Controls(control_, static_cast<std::int64_t>(position_segment) - 2),
                    u - position_segment, interval_s_, state);
   evaluateRotation(Controls(control_, static_cast<std::int64_t>(rotation_segment) - 2),

@@ -1,5 +1,5 @@
-// Where a body is at any time, with exact derivatives: a uniform quintic B-spline for the position
-// and a cumulative one of order 5 for the rotation (Sommer et al., "Efficient Derivative
+// The pose of a body at any time, with exact derivatives. The position is a uniform quintic
+// B-spline, the rotation a cumulative one of order 5 (Sommer et al., "Efficient Derivative
 // Computation for Cumulative B-Splines on Lie Groups", CVPR 2020).
 #pragma once
 
@@ -14,7 +14,7 @@ namespace perdure::sim {
 /// State of body B in the world W (z up) at one time. SI units.
 struct MotionState {
   RigidTransform T_WB;
-  Eigen::Vector3d velocity_W = Eigen::Vector3d::Zero();              ///< of B's origin, m/s
+  Eigen::Vector3d velocity_W = Eigen::Vector3d::Zero();              ///< B's origin, m/s
   Eigen::Vector3d acceleration_W = Eigen::Vector3d::Zero();          ///< m/s²
   Eigen::Vector3d angular_velocity_B = Eigen::Vector3d::Zero();      ///< w_WB_B, rad/s
   Eigen::Vector3d angular_acceleration_B = Eigen::Vector3d::Zero();  ///< rad/s²
@@ -22,16 +22,17 @@ struct MotionState {
 
 class Trajectory {
  public:
-  /// A pose every `interval_s` from `start_s`; the spline smooths them (it does not pass through
-  /// its control poses). At least one pose; the first and last are held outside. Derivatives are
-  /// continuous up to acceleration's own rate (C⁴ position, C³ rotation). Neighbouring controls
-  /// are less than half a turn apart. Two poses with a tiny interval make a step.
+  /// Control poses every `interval_s` from `start_s`, at least one. The spline smooths them and
+  /// does not pass through them. The first and last control apply outside the range.
+  /// Derivatives are continuous up to the rate of the acceleration (C⁴ position, C³ rotation).
+  /// Adjacent controls must be less than half a turn apart. Two poses with a very short interval
+  /// form a step.
   Trajectory(double start_s, double interval_s, std::vector<RigidTransform> control_poses);
-  /// A body that never moves.
+  /// A body at rest.
   explicit Trajectory(const RigidTransform& T_WB) : Trajectory(0.0, 1.0, {T_WB}) {}
 
-  /// Any finite t. The body rests from three intervals before the first control pose back, and
-  /// from three after the last one on.
+  /// Valid for any finite t. The body is at rest until three intervals before the first control,
+  /// and from three intervals after the last one.
   MotionState at(double t_s) const;
   RigidTransform poseAt(double t_s) const { return at(t_s).T_WB; }
 

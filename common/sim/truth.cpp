@@ -22,7 +22,7 @@ bool samePlace(const TruthKey& a, const TruthKey& b) {
   return (a.centre_W - b.centre_W).norm() < 1e-6 && std::abs(wrapAngle(a.yaw - b.yaw)) < 1e-6;
 }
 
-/// When, between the two times, it left its place: for things that are moved at once.
+/// The time between the two times at which an object with an instantaneous move left its place.
 double timeOfStep(const SceneObject& object, double before_s, double after_s) {
   const TruthKey start = keyAt(object, before_s, {});
   while (after_s - before_s > 1e-4) {
@@ -32,7 +32,7 @@ double timeOfStep(const SceneObject& object, double before_s, double after_s) {
   return after_s;
 }
 
-/// A key at the start of each rest that is at least one sample long.
+/// One key at the start of each rest that lasts at least one sample.
 std::vector<TruthKey> keysOfStanding(const SceneObject& object, double seconds, TimePoint epoch) {
   std::vector<TruthKey> keys{keyAt(object, 0.0, epoch)};
   double last_s = 0.0;
@@ -53,7 +53,7 @@ std::vector<TruthKey> keysOfMoving(const SceneObject& object, double seconds, Ti
   for (int i = 0; keys.empty() || (i - 1) / kKeysPerSecond < seconds; ++i) {
     keys.push_back(keyAt(object, i / kKeysPerSecond, epoch));
     const std::size_t n = keys.size();
-    // Of a rest only its first and last keys are needed.
+    // A rest needs only its first and last keys.
     if (n >= 3 && samePlace(keys[n - 1], keys[n - 2]) && samePlace(keys[n - 2], keys[n - 3])) {
       keys.erase(keys.end() - 2);
     }

@@ -1,5 +1,5 @@
-// The truth of a simulated folder: objects_truth.json, visibility_truth.csv and inside_truth.csv,
-// written and read. A folder without inside_truth.csv is read as one where it is empty.
+// The truth of a simulated folder: reads and writes objects_truth.json, visibility_truth.csv and
+// inside_truth.csv. A missing inside_truth.csv is treated as an empty file.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,8 +16,8 @@
 
 namespace perdure::sim {
 
-/// An object where it is from `from` on until the next key, or on a straight way between keys
-/// where `moves` is set (keys are then dense: ten a second).
+/// The pose of an object at a time. The object stays there until the next key. If `moves` is set,
+/// it moves on a straight line between keys, which are then dense: ten per second.
 struct TruthKey {
   TimePoint time;
   Eigen::Vector3d centre_W = Eigen::Vector3d::Zero();
@@ -29,7 +29,7 @@ struct TruthObject {
   Eigen::Vector3d size = Eigen::Vector3d::Ones();  ///< length, width, height
   bool moves = false;
   TimePoint present_from, present_until;
-  std::vector<TruthKey> keys;  ///< at least one, by time
+  std::vector<TruthKey> keys;  ///< at least one, sorted by time
 
   bool presentAt(TimePoint t) const { return t >= present_from && t < present_until; }
   TruthKey at(TimePoint t) const;
@@ -38,24 +38,24 @@ struct TruthObject {
 /// One object in one frame of cam0. Rows exist for objects whose full outline touches the image.
 struct TruthView {
   std::uint64_t object_id = 0;
-  /// Pixels in which it is seen over the pixels of its whole outline, the part beyond the image's
-  /// border included.
+  /// Number of visible pixels divided by the pixels of the complete outline, including the part
+  /// outside the image.
   double visible_fraction = 0.0;
-  Box box;  ///< of its whole outline as if nothing hid it, not clipped to the image
-  /// Of the part of that outline within the image; set where the border cuts it.
+  Box box;  ///< box of the complete, unoccluded outline, not clipped to the image
+  /// Box of the part of that outline inside the image; set if the image border cuts it.
   std::optional<Box> inside = {};
 
-  /// Returns the box within an image of this size: `inside`, or the common part of box and image.
+  /// The box within an image of this size: `inside`, or the intersection of box and image.
   Box boxInside(double width, double height) const;
 };
 
 struct Truth {
   std::vector<TruthObject> objects;
-  std::map<std::uint64_t, std::vector<TruthView>> views;  ///< by frame index
+  std::map<std::uint64_t, std::vector<TruthView>> views;  ///< key: frame index
 };
 
 bool hasTruth(const std::filesystem::path& folder);
-/// Throws StartupError(kUnavailable) that names the file, the line and the mend.
+/// Throws StartupError(kUnavailable) with the file, the line and the fix.
 Truth readTruth(const std::filesystem::path& folder);
 /// `epoch` is the sensor time of the scene's t = 0.
 std::vector<TruthObject> truthOf(const Scene& scene, TimePoint epoch);

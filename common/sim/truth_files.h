@@ -1,4 +1,4 @@
-// The names of the truth's files and of the columns.
+// Names of the truth files and of their columns.
 #pragma once
 
 namespace perdure::sim {

@@ -31,7 +31,7 @@ std::ifstream open(const fs::path& file) {
   return stream;
 }
 
-/// One object of objects_truth.json; complaints say which and what.
+/// Reads one object of objects_truth.json; errors name the object and the cause.
 class ObjectReader {
  public:
   ObjectReader(const Json& json, std::string where) : json_(json), where_(std::move(where)) {
@@ -143,14 +143,14 @@ std::optional<Number> parse(std::string_view text) {
   return value;
 }
 
-/// A row that begins with a frame and an object.
+/// A row that begins with a frame and an object id.
 template <std::size_t N>
 struct Row {
   std::uint64_t frame = 0, object = 0;
   std::array<double, N> numbers{};
 };
 
-/// Nothing where the row is malformed.
+/// The numbers of a row. Returns nothing if the row is malformed.
 template <std::size_t N>
 std::optional<Row<N>> parseRow(std::string_view line) {
   std::vector<std::string_view> fields;
@@ -171,7 +171,7 @@ std::optional<Row<N>> parseRow(std::string_view line) {
   return row;
 }
 
-/// Gives each row of a file with this header to `use`, with the file and line for complaints.
+/// Passes each row of a file with this header to `use`, with file and line for error messages.
 template <std::size_t N>
 void readRows(const fs::path& file, const char* header, const char* numbers,
               const std::function<void(const std::string&, const Row<N>&)>& use) {
@@ -211,7 +211,7 @@ std::map<std::uint64_t, std::vector<TruthView>> readViews(const fs::path& file,
   return views;
 }
 
-/// Enters what lies inside the image. Folders of earlier versions have no such file.
+/// Adds the boxes inside the image. Folders of earlier versions lack this file.
 void readInside(const fs::path& file, std::map<std::uint64_t, std::vector<TruthView>>& views) {
   if (!fs::exists(file)) return;
   readRows<4>(file, kInsideHeader, "six", [&](const std::string& where, const Row<4>& row) {

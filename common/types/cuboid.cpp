@@ -9,9 +9,10 @@ namespace perdure {
 namespace {
 
 constexpr double kDash = 0.25, kGap = 0.2;  // m
-constexpr int kMostDashes = 40;             // of an edge
+constexpr int kMostDashes = 40;             // per edge
 
-/// Of the whole line where it is not dashed.
+/// Adds the ends of the strokes from a to b: one stroke for a solid line, several for a dashed
+/// line.
 void addStrokes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool dashed,
                 std::vector<Eigen::Vector3d>& ends) {
   const double length = (b - a).norm();
@@ -22,7 +23,7 @@ void addStrokes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool dashed,
   }
   const int strokes =
       std::clamp(static_cast<int>(std::round(length / (kDash + kGap))), 2, kMostDashes);
-  // As many gaps as fit between the strokes, which begin and end at the corners.
+  // The number of gaps is one less than the number of strokes, which begin and end at the corners.
   const double unit = 1.0 / (strokes * (kDash + kGap) - kGap);
   for (int i = 0; i < strokes; ++i) {
     const double from = i * (kDash + kGap) * unit;

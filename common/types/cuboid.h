@@ -1,5 +1,5 @@
-// An object's cuboid in W: its corners, its edges, and how it is labelled, as all pictures of live
-// scenes have it.
+// The cuboid of an object in W: its corners, edges and label, as drawn in all pictures of live
+// scenes.
 #pragma once
 
 #include <array>
@@ -15,12 +15,12 @@ struct Cuboid {
   RigidTransform T_WO;
   Eigen::Vector3d size = Eigen::Vector3d::Zero();  ///< length, width, height, m
 };
-/// Of the most probable class. `up_W`: against gravity; the yaw is about it.
+/// The cuboid of the most probable class. `up_W` points against gravity; it is the axis of the yaw.
 Cuboid cuboidOf(const ObjectBelief& object, const Eigen::Vector3d& up_W);
 
-/// In W; bit 0: front, bit 1: left, bit 2: top.
+/// Corners in W. Bit 0 of the index: front; bit 1: left; bit 2: top.
 std::array<Eigen::Vector3d, 8> cornersOf(const Cuboid& cuboid);
-/// Pairs of corners; the thirteenth marks the front: across its lower half.
+/// Pairs of corners, one pair per edge.
 inline constexpr std::array<std::array<int, 2>, 12> kEdges{{{0, 1},
                                                             {2, 3},
                                                             {4, 5},
@@ -34,18 +34,19 @@ inline constexpr std::array<std::array<int, 2>, 12> kEdges{{{0, 1},
                                                             {2, 6},
                                                             {3, 7}}};
 
-/// Ends of strokes, two and two: the edges, and one from the middle of the floor to the front's
-/// lower edge, which says where it faces. Dashed: short ones with gaps between.
+/// The ends of the strokes, two per stroke. The strokes are the edges and a line from the middle of
+/// the floor to the lower edge of the front, which shows the heading. Dashed: short strokes with
+/// gaps.
 std::vector<Eigen::Vector3d> strokesOf(const Cuboid& cuboid, bool dashed);
 
-/// Something on the map hides it now.
+/// Returns true if something on the map occludes the object now.
 inline bool isHidden(const ObjectBelief& object) {
   return object.visibility == Visibility::kOccluded;
 }
 inline bool isInSight(const ObjectBelief& object) {
   return object.visibility == Visibility::kVisible || object.visibility == Visibility::kPartial;
 }
-/// "car 76"
+/// The label of the object, for example "car 76".
 std::string nameOf(const ObjectBelief& object);
 
 }  // namespace perdure

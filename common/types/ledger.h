@@ -1,5 +1,5 @@
-// Why an object is believed: what each kind of evidence has added to its log-odds. The sums are the
-// published belief, so that nothing it says can be without a reason.
+// The reasons of each change of r and π: the log-odds that each kind of evidence has added. The
+// published belief is the sum of these entries, so that every change has a recorded reason.
 #pragma once
 
 #include <cstdint>
@@ -10,54 +10,55 @@
 
 namespace perdure {
 
-/// What changes existence. Positions in Ledger::existence; new ones at the end.
+/// Kinds of evidence that change the existence. The values are positions in Ledger::existence; new
+/// kinds are appended.
 enum class ExistenceEvidence : std::uint8_t {
-  kPrior = 0,  ///< odds of a new thing before its first box
-  kHit,        ///< looks that showed it
-  kRepeated,   ///< looks that showed it from where it had been looked at: worth little
-  kMiss,       ///< looks at its place that did not show it, as if nothing could be in the way
-  kUnmappedOccluder,  ///< what of that is excused, because something off the map may hide it
-  kHidden,            ///< looks that were not used: something on the map hid it (0 nats)
-  kAway,              ///< looks that were not used: it was outside the picture (0 nats)
-  kTime,              ///< survival: things leave
-  kMisshapen,         ///< beliefs in it that lost the size of their class
-  kLost,              ///< beliefs that it drove off, to where nobody knows
-  kShared,            ///< its first box may have been another object's
-  kMerge,             ///< what another object knew that turned out to be the same
-  kRestore,           ///< what was believed before this ledger, when a service was started again
-  kRecall,            ///< the same, when it came back from the map
+  kPrior = 0,  ///< odds of a new object before its first box
+  kHit,        ///< observations in which it was detected
+  kRepeated,   ///< repeated detections from the same viewpoint, which carry little information
+  kMiss,       ///< observations without a detection, computed as if nothing occluded the object
+  kUnmappedOccluder,  ///< part of kMiss that is revoked: an unmapped occluder may hide the object
+  kHidden,            ///< unused observations: a mapped object occluded it (0 nats)
+  kAway,              ///< unused observations: it was outside the image (0 nats)
+  kTime,              ///< survival: objects may leave
+  kMisshapen,         ///< hypotheses whose size became impossible for their class
+  kLost,              ///< hypotheses that the object drove off to an unknown place
+  kShared,            ///< the first box may belong to another object
+  kMerge,             ///< evidence of another track that was merged into this one
+  kRestore,           ///< evidence from before this ledger, restored at the restart of a service
+  kRecall,            ///< evidence from before this ledger, restored when the object was recalled
 };
 inline constexpr std::size_t kExistenceEvidences = 14;
 
-/// What changes the probabilities of classes. Positions in ClassLedger::log_odds; new ones at the
-/// end.
+/// Kinds of evidence that change the class probabilities. The values are positions in
+/// ClassLedger::log_odds; new kinds are appended.
 enum class ClassEvidence : std::uint8_t {
-  kPrior = 0,   ///< how frequent the class is
-  kActivation,  ///< what the network said
+  kPrior = 0,   ///< frequency of the class
+  kActivation,  ///< agreement of size and place with the boxes
   kGeometry,    ///< whether size and place explain the boxes
-  kMiss,        ///< looks that did not show it
+  kMiss,        ///< agreement of the motion with the class
   kMotion,      ///< whether it moves as the class does
-  kPruning,     ///< explanations that were given up; the others share what they had
-  kMerge,       ///< what another object knew that turned out to be the same
-  kRestore,     ///< what was believed before this ledger
-  kContext,     ///< of earlier versions: what stood near it
+  kPruning,     ///< hypotheses that were pruned; the others share their weight
+  kMerge,       ///< evidence of another track that was merged into this one
+  kRestore,     ///< evidence from before this ledger
+  kContext,     ///< earlier versions only: objects nearby
 };
 inline constexpr std::size_t kClassEvidences = 9;
 
 const char* nameOf(ExistenceEvidence kind);  ///< "prior", "hit", …
 const char* nameOf(ClassEvidence kind);      ///< "prior", "activation", …
 
-/// All evidence of one kind.
+/// The sum of all evidence of one kind.
 struct LedgerEntry {
   double log_odds = 0.0;    ///< nats, sum
-  std::uint32_t count = 0;  ///< looks, merges, …; 0: none so far
-  TimePoint first, last;    ///< of what was counted
+  std::uint32_t count = 0;  ///< observations, merges, …; 0: none so far
+  TimePoint first, last;    ///< times of the first and the last item counted
 
   bool operator==(const LedgerEntry&) const = default;
 };
 
-/// By kind; they sum to log π of the class. Between two classes the differences matter: a part that
-/// all classes have in common is a matter of normalisation.
+/// Log-odds by kind; their sum is log π of the class. Only differences between two classes matter,
+/// because the normalisation removes any part that all classes share.
 struct ClassLedger {
   std::string name;
   std::vector<double> log_odds;
@@ -65,28 +66,28 @@ struct ClassLedger {
   bool operator==(const ClassLedger&) const = default;
 };
 
-/// A class that was given up, and by how much it was behind another one then.
+/// A class that was pruned, and its log-odds deficit against another class at that time.
 struct OustedClass {
   std::string name, by;
   TimePoint at;
-  std::vector<double> log_odds;  ///< by kind: `by` against `name`
+  std::vector<double> log_odds;  ///< log-odds by kind: `by` against `name`
 
   bool operator==(const OustedClass&) const = default;
 };
 
-/// Empty where the writer does not keep one.
+/// The ledger of an object. It is empty if the writer does not record one.
 struct Ledger {
-  std::vector<LedgerEntry> existence;  ///< by kind; they sum to log r / (1 - r)
+  std::vector<LedgerEntry> existence;  ///< entries by kind; they sum to log r / (1 - r)
   std::vector<ClassLedger> classes;
-  std::vector<OustedClass> ousted;  ///< at most one: that which was last given up as the strongest
+  std::vector<OustedClass> ousted;  ///< at most one: the last class pruned as the strongest
 
   bool empty() const { return existence.empty(); }
-  double logOdds() const;  ///< of existence: the sum
+  double logOdds() const;  ///< sum of the existence entries
 
   bool operator==(const Ledger&) const = default;
 };
 
-/// log p / (1 - p); p within 1e-15 of 0 or 1 counts as that far away.
+/// log p / (1 - p). Values of p within 1e-15 of 0 or 1 are clamped to that distance.
 double logOdds(double probability);
 
 }  // namespace perdure

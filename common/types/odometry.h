@@ -1,4 +1,5 @@
-// What vio says: where the body is, how sure it is, and the sparse attributed points (eq. 3, 5).
+// The output of vio: the pose of the body, its covariance, and the sparse attributed points (eq. 3,
+// 5).
 #pragma once
 
 #include <Eigen/Core>
@@ -16,38 +17,38 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Matrix9d = Eigen::Matrix<double, 9, 9>;
 
 enum class OdometryState : std::uint8_t {
-  kInitialising = 0,  ///< not to be used
+  kInitialising = 0,  ///< not usable yet
   kTracking = 1,
-  kDegraded = 2,  ///< usable, on inertial or speed alone, or just resumed
+  kDegraded = 2,  ///< usable, based on inertial or speed data alone, or just resumed
 };
 
 struct Odometry {
   FrameStamp stamp;
-  InstanceId instance = 0;  ///< of the process that made it
+  InstanceId instance = 0;  ///< the process that made it
   WorldId world;
   OdometryState state = OdometryState::kInitialising;
   RigidTransform T_WB;
   Eigen::Vector3d v_WB = Eigen::Vector3d::Zero();  ///< m/s, in W
-  /// Of [θ, p, v]: θ on the right (body), p and v additive in W.
+  /// Covariance of [θ, p, v]: θ on the right (body), p and v additive in W.
   Matrix9d covariance = Matrix9d::Zero();
-  Eigen::Vector3d up_W = Eigen::Vector3d::UnitZ();  ///< against gravity, unit, in W
+  Eigen::Vector3d up_W = Eigen::Vector3d::UnitZ();  ///< unit vector against gravity, in W
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = Eigen::Vector3d::Zero();
   /// Pose error now = transition · pose error at the frame `increment_from` + noise with
-  /// increment_covariance, [θ, p]. has_increment is false where only poses are known.
+  /// increment_covariance, [θ, p]. has_increment is false if only poses are known.
   bool has_increment = false;
   std::uint64_t increment_from = 0;
   Matrix6d transition = Matrix6d::Identity();
   Matrix6d increment_covariance = Matrix6d::Zero();
 };
 
-/// A sparse point with what is needed to find it again (paper, line 131).
+/// A sparse point with the data needed to recognise it again (paper, line 131).
 struct Landmark {
   std::uint64_t id = 0;
   Eigen::Vector3d p_W = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();       ///< m², in W, relative to the pose
-  Eigen::Matrix<double, 3, 6> cross_pose = Eigen::Matrix<double, 3, 6>::Zero();  ///< with [θ, p]
-  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();            ///< as seen, distorted, in `camera`
-  std::array<std::uint8_t, 32> descriptor{};                  ///< 256-bit BRIEF (ORB), or zeros
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< m², in W, relative to the pose
+  Eigen::Matrix<double, 3, 6> cross_pose = Eigen::Matrix<double, 3, 6>::Zero();  ///< [θ, p]
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  ///< distorted pixel in `camera`
+  std::array<std::uint8_t, 32> descriptor{};        ///< 256-bit BRIEF (ORB), or zeros
 };
 
 struct Landmarks {

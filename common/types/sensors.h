@@ -1,4 +1,4 @@
-// What capture hands over: images, inertial samples, speed, calibration. SI units, sensor clock.
+// The output of capture: images, inertial samples, speed, calibration. SI units, sensor clock.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,10 +14,10 @@
 
 namespace perdure {
 
-/// JPEG on the way only: who looks at frames unpacks them first (common/vision/jpeg.h).
+/// JPEG is used in transport only; readers decode frames first (common/vision/jpeg.h).
 enum class ImageEncoding : std::uint8_t { kMono8 = 0, kBgr8 = 1, kJpegMono8 = 2, kJpegBgr8 = 3 };
 
-/// Of the image, also where it is compressed: bytes per pixel when it is not.
+/// Number of channels of the decoded image; equals the bytes per pixel of a raw image.
 constexpr std::uint32_t channelsOf(ImageEncoding e) {
   return e == ImageEncoding::kBgr8 || e == ImageEncoding::kJpegBgr8 ? 3 : 1;
 }
@@ -31,7 +31,7 @@ struct Frame {
   std::string camera;  ///< "cam0", "cam1"
   std::uint32_t width = 0, height = 0;
   ImageEncoding encoding = ImageEncoding::kMono8;
-  SharedBytes data;  ///< of a received frame: in the memory in which it came
+  SharedBytes data;  ///< a received frame refers to the memory in which it arrived
 };
 
 struct ImuSample {
@@ -42,7 +42,7 @@ struct ImuSample {
   Eigen::Vector3d accel = Eigen::Vector3d::Zero();  ///< specific force in B plus bias, m/s²
 };
 
-/// Speed of the body's origin along its x axis (a vehicle's wheels, an odometer).
+/// Speed of the body's origin along its x axis, from the wheels of a vehicle or an odometer.
 struct SpeedSample {
   InstanceId source = 0;
   std::uint64_t sequence = 0;
@@ -67,7 +67,7 @@ struct CameraCalibration {
   std::uint32_t width = 0, height = 0;
   double fx = 0, fy = 0, cx = 0, cy = 0;  ///< pixels
   DistortionModel distortion = DistortionModel::kNone;
-  std::vector<double> distortion_coefficients;  ///< as many as coefficientsOf() says
+  std::vector<double> distortion_coefficients;  ///< their number is that of coefficientsOf()
   RigidTransform T_BC;                          ///< camera in body
   double time_offset_s = 0.0;                   ///< t_imu = t_image + time_offset_s
   double readout_s = 0.0;                       ///< rolling shutter, first to last row; 0 = global
@@ -82,7 +82,7 @@ struct ImuCalibration {
   double rate_hz = 0.0;          ///< nominal
 };
 
-/// Where the body stood on Earth at a sensor time.
+/// The position and heading of the body on Earth at a sensor time.
 struct GeoAnchor {
   TimePoint time;
   double latitude_deg = 0, longitude_deg = 0, height_m = 0;  ///< WGS 84
@@ -91,7 +91,7 @@ struct GeoAnchor {
 
 struct Calibration {
   InstanceId source = 0;
-  std::vector<CameraCalibration> cameras;  ///< the first one is the camera of detections
+  std::vector<CameraCalibration> cameras;  ///< the first is the camera of the detections
   std::optional<ImuCalibration> imu;
   bool has_speed = false;
   std::optional<GeoAnchor> anchor;

@@ -11,11 +11,11 @@ namespace {
 
 using std::string_view_literals::operator""sv;
 
-/// libjpeg fills what is missing with grey and reports success: look for the end marks instead.
+/// libjpeg fills missing data with grey and reports success. The end marks are checked instead.
 bool endsAsItShould(std::string_view bytes) {
   constexpr std::string_view kJpegStart = "\xFF\xD8"sv, kJpegEnd = "\xFF\xD9"sv;
   constexpr std::string_view kPngStart = "\x89PNG"sv, kPngEnd = "IEND\xAE\x42\x60\x82"sv;
-  constexpr std::size_t kTrailing = 64;  // writers may pad behind the end mark
+  constexpr std::size_t kTrailing = 64;  // writers may add padding after the end mark
   const auto tail = bytes.substr(bytes.size() - std::min(bytes.size(), kTrailing));
   if (bytes.starts_with(kJpegStart)) return tail.find(kJpegEnd) != tail.npos;
   if (bytes.starts_with(kPngStart)) return tail.find(kPngEnd) != tail.npos;
@@ -37,7 +37,7 @@ std::string headOf(const std::string& path) {
   return head;
 }
 
-/// By its head: JPEG, or PNG that says so. Other kinds have to be decoded to tell.
+/// Returns true if the header is that of a JPEG or an 8-bit PNG. Other formats must be decoded.
 bool hasEightBits(std::string_view bytes) {
   if (bytes.starts_with("\xFF\xD8")) return true;
   return bytes.starts_with("\x89PNG") && bytes.size() > kDepthOfPng && bytes[kDepthOfPng] <= 8;
@@ -106,7 +106,7 @@ Result<cv::Mat> decodeDepthFile(const std::string& path) {
 }
 
 int usedBits(const std::string& path) {
-  if (!std::filesystem::is_regular_file(path)) return 16;  // OpenCV would complain on stderr
+  if (!std::filesystem::is_regular_file(path)) return 16;  // OpenCV would print an error to stderr
   if (hasEightBits(headOf(path))) return 16;
   try {
     return bitsOf(cv::imread(path, kSixteenGrey));

@@ -1,4 +1,4 @@
-// Image files (PNG, JPEG) into pixels; what is cut short is refused, not shown half grey.
+// Decodes image files (PNG, JPEG). Truncated files are refused instead of being filled with grey.
 #pragma once
 
 #include <opencv2/core/mat.hpp>
@@ -11,21 +11,21 @@
 
 namespace perdure::vision {
 
-/// Decodes into CV_8UC1 or CV_8UC3 (BGR): `encoding` where given, else as the file is. Of images
-/// with 16 bits the lower `bits` (8 … 16) are used, and of these the upper eight. Reasons:
-/// image_truncated (no end mark of JPEG or PNG), image_corrupt (does not decode).
+/// Decodes into CV_8UC1 or CV_8UC3 (BGR): as given by `encoding`, otherwise as in the file. For
+/// 16-bit images, the upper eight of the lower `bits` (8 … 16) are used. Reasons: image_truncated
+/// (no end mark of JPEG or PNG), image_corrupt (cannot be decoded).
 Result<cv::Mat> decodeImage(std::string_view bytes, std::optional<ImageEncoding> encoding,
                             int bits = 16);
-/// The same from a file; reason image_missing where it cannot be read.
+/// Decodes a file; reason image_missing if it cannot be read.
 Result<cv::Mat> decodeImageFile(const std::string& path, std::optional<ImageEncoding> encoding,
                                 int bits = 16);
-/// A depth image (16 bits, one channel) as it is, CV_16UC1. Reasons as above, and image_depth
-/// (another kind of image).
+/// A depth image (16 bits, one channel) without conversion, CV_16UC1. Reasons as above, and
+/// image_depth (another kind of image).
 Result<cv::Mat> decodeDepthFile(const std::string& path);
-/// Of an image with 16 bits: 8, 10, 12, 14 or 16, the fewest that hold its brightest value. Of
-/// other images and of what is no image: 16.
+/// Number of used bits of a 16-bit image: the smallest of 8, 10, 12, 14, 16 that holds its
+/// brightest value. Returns 16 for other images and for invalid files.
 int usedBits(const std::string& path);
-/// The same of the bytes of such a file.
+/// Works like usedBits() on the bytes of a file.
 int usedBitsIn(std::string_view bytes);
 
 }  // namespace perdure::vision

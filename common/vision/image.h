@@ -1,4 +1,4 @@
-// Frames as OpenCV matrices and back, without a copy wherever the encoding allows it.
+// Converts frames to OpenCV matrices and back, without a copy if the encoding allows it.
 #pragma once
 
 #include <opencv2/core/mat.hpp>
@@ -8,12 +8,12 @@
 
 namespace perdure::vision {
 
-/// The frame's own pixels (CV_8UC1 or CV_8UC3, BGR); valid while frame.data lives, never written.
+/// The frame's own pixels (CV_8UC1 or CV_8UC3, BGR); read-only, and valid as long as frame.data.
 /// Reasons: image_missing (no data), image_malformed (size and bytes disagree).
 Result<cv::Mat> viewOf(const Frame& frame);
-/// CV_8UC1: a view where the frame is mono, else converted. Reasons as viewOf.
+/// CV_8UC1: a view if the frame is mono, otherwise converted. Reasons as for viewOf.
 Result<cv::Mat> monoOf(const Frame& frame);
-/// CV_8UC3, BGR: a view where the frame is BGR, else the grey value three times.
+/// CV_8UC3, BGR: a view if the frame is BGR, otherwise the grey value three times.
 Result<cv::Mat> bgrOf(const Frame& frame);
 
 /// Copies the pixels into the frame and sets its size and encoding.

@@ -61,12 +61,13 @@ Result<Frame> decompressed(const Frame& frame, ImageEncoding wanted) {
       width < 1 || height < 1) {
     return fail("jpeg_malformed", tjGetErrorStr2(turbo.get()));
   }
-  // Before memory is asked for: the frame's size is bounded, the JPEG's is what somebody wrote.
+  // Checked before memory is allocated: the frame's size is bounded, but the JPEG may state any
+  // size.
   if (std::cmp_not_equal(width, frame.width) || std::cmp_not_equal(height, frame.height)) {
     return fail("jpeg_size_wrong", "the JPEG's width and height are not the frame's");
   }
   auto pixels = std::make_shared<std::vector<std::uint8_t>>(pixelBytes(frame, wanted));
-  // What is cut short is only a warning to TurboJPEG, which fills the rest with grey.
+  // TurboJPEG reports truncated data only as a warning and fills the rest with grey.
   if (tjDecompress2(turbo.get(), bytes, size, pixels->data(), width, 0, height, pixelFormat(wanted),
                     TJFLAG_STOPONWARNING | TJFLAG_ACCURATEDCT) != 0) {
     return fail("jpeg_malformed", tjGetErrorStr2(turbo.get()));

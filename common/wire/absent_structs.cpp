@@ -11,15 +11,15 @@ namespace {
 
 using Op = std::uint32_t;
 
-/// Bytes of one number; nothing where the kind is another.
+/// Size of one number in bytes. Returns nothing for other kinds.
 std::optional<std::size_t> sizeOf(dds_stream_typecode kind) {
   if (kind == DDS_OP_VAL_BLN) return 1;
   if (kind < DDS_OP_VAL_1BY || kind > DDS_OP_VAL_8BY) return std::nullopt;
   return std::size_t{1} << (kind - DDS_OP_VAL_1BY);
 }
 
-/// Goes through a message as Cyclone will, by its operations, and reads lengths only. Its functions
-/// give the operation behind the one that they are at; nullptr where they do not know it.
+/// Follows a message by Cyclone's operations, as Cyclone does, and reads lengths only. The
+/// functions return the next operation, or nullptr for an unknown one.
 class Walk {
  public:
   explicit Walk(std::span<const std::uint8_t> cdr) : cdr_(cdr) {}
@@ -51,7 +51,7 @@ class Walk {
   const Op* sequence(const Op* ops) {
     const auto kind = DDS_OP_SUBTYPE(*ops);
     const auto size = sizeOf(kind);
-    if (!size) number();  // bytes of all elements
+    if (!size) number();  // size of all elements in bytes
     const std::uint32_t count = number();
     if (size) return skip(*size, count), ops + 2;
     for (std::uint32_t i = 0; i < count; ++i) {
@@ -65,7 +65,7 @@ class Walk {
     return kind == DDS_OP_VAL_STR ? ops + 2 : ops + DDS_OP_ADR_JMP(ops[3]);
   }
 
-  /// A member that the message lacks: nullptr where Cyclone would abort.
+  /// Handles a member that is missing in the message; returns nullptr if Cyclone would abort.
   static const Op* absent(const Op* ops) {
     const auto kind = DDS_OP_TYPE(*ops), part = DDS_OP_SUBTYPE(*ops);
     if (kind == DDS_OP_VAL_STR || sizeOf(kind)) return ops + 2;
@@ -88,7 +88,7 @@ class Walk {
     return value;
   }
   void text() { at_ += number(); }
-  /// In XCDR2 nothing is aligned to more than four bytes.
+  /// XCDR2 aligns to at most four bytes.
   void skip(std::size_t size, std::size_t count) {
     if (count == 0) return;
     const std::size_t unit = std::min<std::size_t>(size, 4);

@@ -1,4 +1,4 @@
-// Memory for the sequences of one outgoing message; kept and reused from message to message.
+// Memory for the sequences of one outgoing message, reused from message to message.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@ namespace perdure::wire {
 
 class Arena {
  public:
-  /// Zeroed room for `count` elements of a C type, valid until clear().
+  /// Zeroed memory for `count` elements of a C type, valid until clear().
   template <class T>
   T* allocate(std::size_t count) {
     static_assert(std::is_trivially_copyable_v<T>);

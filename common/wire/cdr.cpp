@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kHeader = 4;
 constexpr std::uint8_t kXcdr1 = 0x00, kXcdr2 = 0x06, kDelimitedXcdr2 = 0x08;  // + 1: little-endian
-constexpr std::uint32_t kVersion1 = 1, kVersion2 = 2;                         // as Cyclone counts
+constexpr std::uint32_t kVersion1 = 1, kVersion2 = 2;                         // Cyclone's
 constexpr std::uint8_t kNative = std::endian::native == std::endian::little ? 1 : 0;
 
 bool isFinal(const dds_topic_descriptor_t& type) {
@@ -21,7 +21,7 @@ bool isFinal(const dds_topic_descriptor_t& type) {
   return dds_stream_extensibility(type.m_ops, &kind) && kind == DDSI_SERTYPE_EXT_FINAL;
 }
 
-/// The version of XCDR that an encapsulation means for a type; 0: none that suits it.
+/// The XCDR version of an encapsulation for a type; 0 if it does not fit the type.
 std::uint32_t versionOf(std::uint8_t encapsulation, const dds_topic_descriptor_t& type) {
   const auto form = static_cast<std::uint8_t>(encapsulation & ~1u);
   if (!isFinal(type)) return form == kDelimitedXcdr2 ? kVersion2 : 0;
@@ -42,9 +42,9 @@ Result<CdrSample> CdrSample::read(std::span<const std::uint8_t> message,
   if (version == 0) {
     return fail("bad_encapsulation", std::string("not how ") + type.m_typename + " is encoded");
   }
-  // Cyclone checks and turns bytes in place, and wants them aligned. In XCDR2 it asks for four
-  // bytes where a number of an array has eight: what it turns may be twice as long as what there
-  // is, and then ends behind it.
+  // Cyclone checks and byte-swaps in place, and requires aligned memory. In XCDR2 it checks for
+  // four bytes per array element even if an element has eight. Byte-swapping may therefore access
+  // up to twice the size of the data.
   const auto payload = message.subspan(kHeader);
   std::vector<std::uint64_t> aligned(2 * payload.size() / sizeof(std::uint64_t) + 1);
   if (!payload.empty()) std::memcpy(aligned.data(), payload.data(), payload.size());
@@ -62,7 +62,7 @@ Result<CdrSample> CdrSample::read(std::span<const std::uint8_t> message,
     return fail("malformed_cdr", std::string(type.m_typename) + " that lacks a struct");
   }
   std::unique_ptr<void, Free> sample(dds_alloc(type.m_size), Free{&type});
-  std::memset(sample.get(), 0, type.m_size);  // what is read in would be freed otherwise
+  std::memset(sample.get(), 0, type.m_size);  // otherwise Cyclone would free the old pointers
   dds_istream_t stream;
   dds_istream_init(&stream, size, bytes, version);
   dds_stream_read(&stream, static_cast<char*>(sample.get()), type.m_ops);

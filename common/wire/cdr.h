@@ -1,6 +1,6 @@
-// Messages as bytes, as they travel and as recordings hold them: four bytes of encapsulation
-// (RTPS 2.5, 10.5), then XCDR1 (final types) or delimited XCDR2 (appendable ones), which readers
-// that know more or fewer members read too. Without DDS: no participant, no network.
+// Messages as bytes, on the network and in recordings: four bytes of encapsulation (RTPS 2.5,
+// 10.5), then XCDR1 (final types) or delimited XCDR2 (appendable ones). Readers with more or fewer
+// known members can read XCDR2 too. This code needs no DDS participant and no network.
 #pragma once
 
 #include <cstdint>
@@ -14,10 +14,11 @@
 
 namespace perdure::wire {
 
-/// Owns the generated C struct that some bytes held.
+/// Owns the generated C struct decoded from bytes.
 class CdrSample {
  public:
-  /// Any bytes: nothing is read outside them. Reasons: bad_encapsulation, malformed_cdr.
+  /// Accepts arbitrary bytes and reads nothing outside them. Reasons: bad_encapsulation,
+  /// malformed_cdr.
   static Result<CdrSample> read(std::span<const std::uint8_t> message,
                                 const dds_topic_descriptor_t& type);
   const void* get() const { return sample_.get(); }
@@ -31,12 +32,14 @@ class CdrSample {
   std::unique_ptr<void, Free> sample_;
 };
 
-/// A C struct as bytes, in the form that its type has on the wire.
+/// A C struct as bytes, in the wire format of its type.
 std::vector<std::uint8_t> writeCdr(const void* sample, const dds_topic_descriptor_t& type);
-/// The pixels' message without its encapsulation; empty where it is not what decodeInPlace reads.
+/// The message of an image without its encapsulation. The result is empty if decodeInPlace cannot
+/// read it.
 std::span<const std::uint8_t> payloadInPlace(std::span<const std::uint8_t> message);
 
-/// A value with all checks, or why not. `keeper` keeps `message`, in which pixels stay.
+/// Decodes a value with all checks, or returns the reason of a failure. `keeper` owns the memory of
+/// `message`, which the pixels refer to.
 template <class T>
 Result<T> decodeCdr(std::span<const std::uint8_t> message, std::shared_ptr<const void> keeper) {
   if constexpr (kDecodedInPlace<T>) {
@@ -50,7 +53,7 @@ Result<T> decodeCdr(std::span<const std::uint8_t> message, std::shared_ptr<const
   }
 }
 
-/// The reverse; reasons as encode().
+/// Encodes a value; reasons as for encode().
 template <class T>
 Result<std::vector<std::uint8_t>> encodeCdr(const T& value) {
   Arena arena;
@@ -61,8 +64,8 @@ Result<std::vector<std::uint8_t>> encodeCdr(const T& value) {
   return writeCdr(&sample, Type<T>::descriptor());
 }
 
-/// The IDL of "perdure::msg::Objects", …, with all that it needs, as one text without #include;
-/// empty where there is no such type.
+/// The IDL of "perdure::msg::Objects", …, with all types that it needs, as one text without
+/// #include. The result is empty if the type is unknown.
 std::string idlOf(std::string_view type_name);
 
 }  // namespace perdure::wire

@@ -1,4 +1,4 @@
-// The first refusal of a message and the path of its field. Internal to common/wire.
+// The first refusal in a message, with the path of its field. Internal to common/wire.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,7 +17,7 @@ class Checked {
   bool failed() const { return reason_.has_value(); }
   const Reason& reason() const { return reason_.value(); }
 
-  /// `holds` is asked only of values that were read.
+  /// `holds` is called only for values that were read.
   template <class Predicate>
   void ensure(const char* name, const char* code, Predicate holds) {
     if (!failed() && !holds()) refuse(name, code);
@@ -89,7 +89,7 @@ class Checked {
  private:
   struct Step {
     const char* name;
-    long index;  // -1: not an element of a list
+    long index;  // -1: not a list element
   };
   std::vector<Step> path_;
   std::optional<Reason> reason_;

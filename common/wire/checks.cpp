@@ -13,8 +13,8 @@ bool isSymmetric(const Eigen::Ref<const Eigen::MatrixXd>& P) {
   return (P - P.transpose()).cwiseAbs().maxCoeff() <= kSymmetry * largest;
 }
 
-/// The correlations of P; rows without variance must be zero and become rows of the identity.
-/// Empty where P has a negative variance or a covariance without variance.
+/// The correlation matrix of P. Rows without variance must be zero and become rows of the identity.
+/// The result is empty if P has a negative variance, or a covariance without variance.
 Eigen::MatrixXd correlations(const Eigen::Ref<const Eigen::MatrixXd>& P) {
   Eigen::VectorXd scale(P.rows());
   for (Eigen::Index i = 0; i < P.rows(); ++i) {
@@ -31,7 +31,7 @@ bool hasCholesky(const Eigen::MatrixXd& C) {
   return C.size() > 0 && C.allFinite() && Eigen::LLT<Eigen::MatrixXd>(C).info() == Eigen::Success;
 }
 
-/// Bytes of the UTF-8 character that begins with `lead`; 0 where none does.
+/// Length in bytes of the UTF-8 character that begins with `lead`; 0 if `lead` is invalid.
 std::size_t lengthOf(unsigned char lead) {
   if (lead < 0x80) return 1;
   if (lead >= 0xc2 && lead < 0xe0) return 2;
@@ -39,7 +39,7 @@ std::size_t lengthOf(unsigned char lead) {
   return lead >= 0xf0 && lead < 0xf5 ? 4 : 0;
 }
 
-/// Over-long forms, surrogates and code points beyond U+10FFFF show in the second byte.
+/// The second byte reveals over-long forms, surrogates and code points beyond U+10FFFF.
 bool secondByteFits(unsigned char lead, unsigned char second) {
   switch (lead) {
     case 0xe0:
@@ -62,7 +62,8 @@ bool inside(double value, const Limits& limits) {
 }
 
 bool isSizeOf(const Frame& frame, std::size_t bytes) {
-  constexpr std::size_t kFewest = 4, kHeaders = 4096;  // start and end mark; tables, comments
+  constexpr std::size_t kFewest = 4, kHeaders = 4096;  // bytes of start and end marks; bytes of
+                                                       // tables and comments
   const std::size_t pixels = std::size_t{frame.width} * frame.height * channelsOf(frame.encoding);
   if (!isCompressed(frame.encoding)) return bytes == pixels;
   return bytes >= kFewest && bytes <= 2 * pixels + kHeaders;
@@ -83,7 +84,7 @@ bool isText(std::string_view text) {
 }
 
 bool isSemiDefinite(const Eigen::Ref<const Eigen::MatrixXd>& P) {
-  constexpr double kRounding = 1e-6;  // on correlations
+  constexpr double kRounding = 1e-6;  // rounding errors of correlations
   if (P.rows() != P.cols() || !P.allFinite() || !isSymmetric(P)) return false;
   Eigen::MatrixXd C = correlations(P);
   if (C.size() == 0) return false;

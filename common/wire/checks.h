@@ -1,4 +1,4 @@
-// Predicates on values from outside. Total: they take anything and never crash.
+// Predicates on external values. They accept any value and never crash.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,15 +9,16 @@
 
 namespace perdure::wire {
 
-/// Finite and inside.
+/// Returns true if the value is finite and within the limits.
 bool inside(double value, const Limits& limits);
-/// Whether a frame's data may have so many bytes: those of its pixels, or of a JPEG of them.
+/// Returns whether `bytes` is a possible size of the frame's data: raw pixels or a JPEG of them.
 bool isSizeOf(const Frame& frame, std::size_t bytes);
-/// UTF-8 without NUL.
+/// Returns whether `text` is valid UTF-8 without NUL.
 bool isText(std::string_view text);
-/// Symmetric and positive semi-definite within rounding, whatever the units of its rows.
+/// Returns whether P is symmetric and positive semi-definite within rounding, for any units of its
+/// rows.
 bool isSemiDefinite(const Eigen::Ref<const Eigen::MatrixXd>& P);
-/// Symmetric and positive definite, whatever the units of its rows.
+/// Returns whether P is symmetric and positive definite, for any units of its rows.
 bool isDefinite(const Eigen::Ref<const Eigen::MatrixXd>& P);
 
 }  // namespace perdure::wire

@@ -1,4 +1,4 @@
-// Wire → domain, checking every field. Internal to common/wire.
+// Decodes wire types into domain types and checks every field. Internal to common/wire.
 #pragma once
 
 #include <cstring>
@@ -11,7 +11,7 @@ namespace perdure::wire {
 class Decoder : public Checked {
  public:
   Decoder() = default;
-  /// Pixels stay where they are, in memory that `keeper` keeps.
+  /// Pixels are not copied; `keeper` owns their memory.
   explicit Decoder(std::shared_ptr<const void> keeper) : keeper_(std::move(keeper)) {}
 
   template <class X>
@@ -135,7 +135,7 @@ class Decoder : public Checked {
   }
 
  private:
-  /// A byte from outside may be neither 0 nor 1: it must not be read as a bool.
+  /// An external byte may be neither 0 nor 1. It must not be read as a bool.
   bool isTrue(const char* name, const bool& w) {
     std::uint8_t byte = 0;
     std::memcpy(&byte, &w, sizeof byte);

@@ -1,4 +1,4 @@
-// Domain → wire, checking every field. Internal to common/wire.
+// Encodes domain types into wire types and checks every field. Internal to common/wire.
 #pragma once
 
 #include <algorithm>
@@ -25,7 +25,7 @@ class Encoder : public Checked {
     checkNumber(name, d, limits);
     w = d;
   }
-  /// What rounding put a little outside is sent as 0 or 1.
+  /// Values slightly outside [0, 1] due to rounding are sent as 0 or 1.
   void probability(const char* name, const double& d, double& w) {
     constexpr double kRounding = 1e-9;
     checkNumber(name, d, {kProbability.low - kRounding, kProbability.high + kRounding});
@@ -38,7 +38,7 @@ class Encoder : public Checked {
   }
   void text(const char* name, const std::string& d, char*& w, std::size_t longest) {
     checkText(name, d, longest);
-    w = const_cast<char*>(d.c_str());  // Cyclone's C types have no const; it is only read
+    w = const_cast<char*>(d.c_str());  // Cyclone's C types lack const; the text is only read
   }
   void name(const char* field, const std::string& d, char*& w) {
     if (d.empty()) refuse(field, "empty");
@@ -125,7 +125,7 @@ class Encoder : public Checked {
   void pixels(const char* name, const Frame& d, perdure_msg_Frame& w) {
     if (!d.data || !isSizeOf(d, d.data->size())) return refuse(name, "size_mismatch");
     if (!checkCount(name, d.data->size(), kImageBytes)) return;
-    w.pixels._buffer = const_cast<std::uint8_t*>(d.data->data());  // only read, as texts
+    w.pixels._buffer = const_cast<std::uint8_t*>(d.data->data());  // the data are not modified
     w.pixels._length = w.pixels._maximum = static_cast<std::uint32_t>(d.data->size());
     w.pixels._release = false;
   }

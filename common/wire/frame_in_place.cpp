@@ -10,7 +10,7 @@ class Cursor {
  public:
   explicit Cursor(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
 
-  /// The next value, aligned to its size.
+  /// Reads the next value, aligned to its size.
   template <class X>
   bool value(X& x) {
     static_assert(std::is_arithmetic_v<X>);
@@ -20,7 +20,7 @@ class Cursor {
     at_ += sizeof(X);
     return true;
   }
-  /// A length and as many bytes.
+  /// Reads a length and that number of bytes.
   bool counted(std::span<const std::uint8_t>& part) {
     std::uint32_t length = 0;
     if (!value(length) || !has(length)) return false;
@@ -36,7 +36,7 @@ class Cursor {
   std::size_t at_ = 0;
 };
 
-/// Cyclone's C types have no const; what they point to is only read.
+/// Cyclone's C types lack const, but the data are only read.
 template <class X>
 X* borrowed(std::span<const std::uint8_t> bytes) {
   return reinterpret_cast<X*>(const_cast<std::uint8_t*>(bytes.data()));

@@ -16,7 +16,8 @@ const idl::File* fileOf(std::string_view struct_name) {
   return nullptr;
 }
 
-/// The file's text after that of what it includes; no file includes another twice (idl/README.md).
+/// The file's text after that of the files that it includes. No file is included twice
+/// (idl/README.md).
 std::string inlined(const idl::File& file) {
   std::string before, text;
   std::istringstream lines{std::string(file.text)};

@@ -9,7 +9,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// JSON has no NaN and no infinity: null stands for them.
+/// JSON has neither NaN nor infinity; null replaces them.
 Json numberJson(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Json choiceJson(EventKind kind) { return nameOf(kind); }

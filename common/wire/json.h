@@ -1,5 +1,5 @@
-// Messages as JSON for people and tools; the field names are those of this file's neighbours,
-// describe.h. Times are nanoseconds, matrices lists of rows, pixels only counted.
+// Messages as JSON for users and tools. Field names are those of describe.h in this folder. Times
+// are in nanoseconds, matrices are lists of rows, and pixels are only counted.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -1,4 +1,5 @@
-// The twins of the wire's appendable types in which every struct is final: the same in memory.
+// Variants of the wire's appendable types in which every struct is final; their memory layout is
+// identical.
 #pragma once
 
 #include <string>
@@ -7,7 +8,8 @@
 
 namespace perdure::wire {
 
-/// Of "perdure::msg::Objects", …; nullptr where the type is final itself, or unknown.
+/// The twin of a type such as "perdure::msg::Objects". Returns nullptr if the type itself is final,
+/// or unknown.
 const dds_topic_descriptor_t* plainTwinOf(const std::string& type_name);
 
 }  // namespace perdure::wire

@@ -1,5 +1,5 @@
-// What is written to std::cerr while this lives, line by line, and only what is worth it: for
-// libraries that complain of what does not matter.
+// Filters the lines that are written to std::cerr during the lifetime of an object. It is used for
+// libraries that print irrelevant warnings.
 #pragma once
 
 #include <functional>
@@ -11,7 +11,8 @@ namespace perdure {
 
 class HeldErrors {
  public:
-  /// `worth`: whether a line, without its end, is passed on. One at a time in a process.
+  /// `worth` decides whether a line, without its line end, is passed on. Only one object may exist
+  /// in a process.
   explicit HeldErrors(std::function<bool(const std::string&)> worth);
   ~HeldErrors();
   HeldErrors(const HeldErrors&) = delete;

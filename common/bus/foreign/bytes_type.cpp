@@ -13,7 +13,7 @@
 namespace perdure::bus {
 namespace {
 
-constexpr std::size_t kHead = 4;  // of CDR
+constexpr std::size_t kHead = 4;  // CDR header
 
 struct BytesType : ddsi_sertype {};
 
@@ -24,7 +24,7 @@ struct BytesMessage : ddsi_serdata {
     cdr.resize((cdr.size() + 3) / 4 * 4);  // Cyclone sends whole words
     bytes = std::make_shared<const std::vector<std::uint8_t>>(std::move(cdr));
   }
-  std::uint32_t size;  // without what fills the last word
+  std::uint32_t size;  // size without the padding of the last word
   std::shared_ptr<const std::vector<std::uint8_t>> bytes;
 };
 
@@ -62,7 +62,7 @@ ddsi_serdata* fromPieces(const ddsi_sertype* type, ddsi_serdata_kind kind, ddsrt
   return made(type, kind, std::move(cdr));
 }
 
-/// Without a key all messages are of one instance.
+/// Without a key all messages belong to one instance.
 ddsi_serdata* keyOf(const ddsi_sertype* type) { return made(type, SDK_KEY, {}); }
 
 ddsi_serdata_ops messageOps() {
@@ -111,7 +111,7 @@ ddsi_sertype_ops typeOps() {
     ddsi_sertype_fini(type);
     delete static_cast<BytesType*>(type);
   };
-  // There are no samples in C: what comes is taken, and what goes is given, as bytes.
+  // C samples do not exist for this type: messages are taken and written as bytes.
   ops.zero_samples = [](const ddsi_sertype*, void*, std::size_t) {};
   ops.realloc_samples = [](void**, const ddsi_sertype*, void*, std::size_t, std::size_t) {};
   ops.free_samples = [](const ddsi_sertype*, void**, std::size_t, dds_free_op_t) {};

@@ -1,5 +1,5 @@
-// A type of which DDS knows the name alone: its messages are bytes, as they are on the wire.
-// Internal to common/bus.
+// A DDS type that is defined by its name only. Its messages are the serialised bytes. Internal to
+// common/bus.
 #pragma once
 
 #include <cstdint>
@@ -13,13 +13,14 @@ struct ddsi_sertype;
 
 namespace perdure::bus {
 
-/// Without a key, in XCDR1; it matches by its name, as types of ROS do. The caller owns one
+/// A type without a key, in XCDR1. It matches by name, as ROS types do. The caller owns one
 /// reference.
 ddsi_sertype* makeBytesType(const std::string& name);
 
-/// A message of such a type; the caller owns one reference. `cdr` with its head of four bytes.
+/// A message of such a type; the caller owns one reference. `cdr` includes its header of four
+/// bytes.
 ddsi_serdata* messageOf(const ddsi_sertype* type, std::vector<std::uint8_t> cdr);
-/// The bytes of a message, head and all, which stay as long as they are held.
+/// The bytes of a message, including the header. They stay valid as long as they have an owner.
 SharedBytes bytesOf(const ddsi_serdata* message);
 
 }  // namespace perdure::bus

@@ -19,7 +19,7 @@ Entity made(dds_entity_t handle, const std::string& what) {
                      "DDS cannot create " + what + ": " + dds_strretcode(-handle));
 }
 
-/// The topic, and its type with one reference that is the caller's where `keep` is given.
+/// The topic, and its type. If `keep` is given, the caller owns one reference to the type.
 Entity foreignTopic(const Participant& participant, const ForeignTopic& topic,
                     ddsi_sertype** keep = nullptr) {
   ddsi_sertype* type = makeBytesType(topic.type);
@@ -43,7 +43,7 @@ QosPtr foreignQos(const ForeignTopic& topic) {
                       topic.latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, topic.depth);
   dds_qset_writer_data_lifecycle(qos.get(), false);
-  // Shared memory is left to Perdure's own images, too.
+  // Shared memory is reserved for Perdure's own images.
   dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
   if (topic.latched) {
     dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_LAST, topic.depth,

@@ -1,5 +1,5 @@
-// Topics of programs that are not ours, by name and type alone: messages are the bytes of their
-// CDR, whatever they are. What they say is checked by whoever reads them.
+// Topics of third-party programs, given by name and type only. Messages are raw CDR bytes; the code
+// that decodes them must check their contents.
 #pragma once
 
 #include <cstdint>
@@ -15,24 +15,25 @@ struct ddsi_sertype;
 namespace perdure::bus {
 
 struct ForeignTopic {
-  std::string name;        ///< on the wire: "rt/camera/image_raw"
+  std::string name;        ///< name on the wire: "rt/camera/image_raw"
   std::string type;        ///< "sensor_msgs::msg::dds_::Image_"
-  bool reliable = true;    ///< a reader that is not takes what any writer offers
+  bool reliable = true;    ///< a best-effort reader matches any writer
   bool latched = false;    ///< TRANSIENT_LOCAL
   int depth = 1;           ///< KEEP_LAST
-  std::string count = {};  ///< begins the names of its counts; empty: the topic's name
+  std::string count = {};  ///< prefix of the names of its counts; empty: the topic's name
 };
 
-/// Neither hears its own participant: what is mirrored does not come back.
+/// Readers and writers ignore their own participant, so that mirrored messages do not return.
 class ForeignReader : public Endpoint {
  public:
-  /// `cdr` with its head of four bytes; it stays as long as it is held.
+  /// `cdr` includes its header of four bytes. It stays valid as long as it has an owner.
   using Handler = std::function<void(const SharedBytes& cdr)>;
 
   ForeignReader(const Participant& participant, const ForeignTopic& topic);
 
   std::size_t matched() const;
-  /// Hands over at most one batch, in its order; true where there may be more.
+  /// Passes at most one batch to the handler, in order. Returns true if more messages may be
+  /// available.
   bool drainBatch(const Handler& handler);
   /// Adds <count>_incompatible_qos, _sample_lost.
   void report(ReasonCounts& counts) const;
@@ -44,7 +45,8 @@ class ForeignWriter : public Endpoint {
   ~ForeignWriter();
 
   std::size_t matched() const;
-  /// `cdr` with its head. What cannot be written is counted and told.
+  /// `cdr` includes its header. Messages that cannot be written are counted, and the reason is
+  /// returned.
   Result<void> write(std::vector<std::uint8_t> cdr);
   /// Adds <count>_write_<error>, _incompatible_qos.
   void report(ReasonCounts& counts) const;

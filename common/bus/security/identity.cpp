@@ -58,7 +58,7 @@ std::chrono::system_clock::time_point timeOf(const ASN1_TIME* time) {
   return std::chrono::system_clock::from_time_t(timegm(&parts));
 }
 
-/// X509_V_OK, or why the certificate is not accepted.
+/// Returns X509_V_OK, or the code of the reason why the certificate is not accepted.
 int verify(X509* certificate, X509* authority, X509_CRL* revoked) {
   const Store store(X509_STORE_new());
   X509_STORE_add_cert(store.get(), authority);

@@ -1,4 +1,4 @@
-// OpenSSL's objects with owners.
+// Owning pointers for OpenSSL objects.
 #pragma once
 
 #include <openssl/bio.h>
@@ -26,7 +26,7 @@ using RevokedList = std::unique_ptr<X509_CRL, Freed<X509_CRL_free>>;
 using Key = std::unique_ptr<EVP_PKEY, Freed<EVP_PKEY_free>>;
 using Bio = std::unique_ptr<BIO, Freed<freeBio>>;
 
-/// nullptr where the file cannot be read as such a PEM.
+/// Returns nullptr if the file is not a readable PEM certificate.
 inline Certificate readCertificate(const std::string& path) {
   const Bio file(BIO_new_file(path.c_str(), "r"));
   return Certificate(file ? PEM_read_bio_X509(file.get(), nullptr, nullptr, nullptr) : nullptr);

@@ -1,5 +1,4 @@
-// Who may write and read which topic: the roles of identities under DDS-Security, and what the
-// topic table grants to each.
+// The roles of identities under DDS-Security, and the topics that each role may write and read.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +8,7 @@
 
 namespace perdure::bus {
 
-/// The services, what records and plays, and people.
+/// The services, the tools that record and play, and the roles of users.
 enum class Role : std::uint32_t {
   kCapture = 1u << 0,
   kVio = 1u << 1,
@@ -19,10 +18,10 @@ enum class Role : std::uint32_t {
   kRecord = 1u << 5,       ///< `perdure record`: reads everything
   kOperator = 1u << 6,     ///< the other commands: read everything, write queries
   kPlayer = 1u << 7,       ///< `perdure play`: writes everything; made on demand only
-  kSubscriber = 1u << 8,   ///< programs of other people: results, and queries of the map
-  kGateway = 1u << 9,      ///< shows what is on the bus: reads everything, writes queries
-  kRos2 = 1u << 10,        ///< the bridge to ROS 2 outwards: reads everything
-  kRos2Driver = 1u << 11,  ///< the bridge with inputs: also what they stand for; on demand only
+  kSubscriber = 1u << 8,   ///< third-party programs: read results, query the map
+  kGateway = 1u << 9,      ///< displays the bus: reads everything, writes queries
+  kRos2 = 1u << 10,        ///< the outward bridge to ROS 2: reads everything
+  kRos2Driver = 1u << 11,  ///< the bridge with inputs: also writes their topics; on demand only
 };
 
 /// A set of roles.
@@ -44,8 +43,8 @@ struct RoleName {
   std::string_view name;
 };
 std::span<const RoleName> roleNames();
-/// Of a process, as its participant is called ("capture", "perdure doctor", "black_box"): the
-/// identity that it takes where bus.identity says none.
+/// The default identity of a process, by the name of its participant ("capture", "perdure doctor",
+/// "black_box"). It is used if bus.identity is not set.
 std::string identityOf(const std::string& process);
 
 }  // namespace perdure::bus

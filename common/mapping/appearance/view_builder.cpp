@@ -7,10 +7,10 @@
 namespace perdure::mapping {
 namespace {
 
-constexpr double kKept_m = 40.0;         // of way
-constexpr double kRelative = 0.1;        // of the distance: placed worse, a point says little
-constexpr double kFarthest_m = 60;       // from the body
-constexpr std::size_t kMostKept = 2000;  // also at rest, where the way does not grow
+constexpr double kKept_m = 40.0;         // points are stored over this distance travelled
+constexpr double kRelative = 0.1;        // largest error of a point relative to its distance
+constexpr double kFarthest_m = 60;       // largest distance from the body
+constexpr std::size_t kMostKept = 2000;  // limit for a body at rest
 
 }  // namespace
 
@@ -23,7 +23,7 @@ void ViewBuilder::add(const Landmarks& landmarks, const Eigen::Vector3d& p_WB, d
     seen_[landmark.id] = {landmark.p_W, sigma, sigma / distance, way_m, landmark.descriptor};
   }
   std::erase_if(seen_, [&](const auto& each) { return way_m - each.second.way_m > kKept_m; });
-  while (seen_.size() > kMostKept) seen_.erase(seen_.begin());  // ids grow with time
+  while (seen_.size() > kMostKept) seen_.erase(seen_.begin());  // ids increase with time
 }
 
 View ViewBuilder::viewFrom(const RigidTransform& T_WA, double way_m, double back_m) const {

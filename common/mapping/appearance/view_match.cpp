@@ -13,16 +13,16 @@
 namespace perdure::mapping {
 namespace {
 
-constexpr int kAlike = 64;                 // bits: a quarter
-constexpr double kUnlikeNext = 0.8;        // of the distance to the next best
-constexpr std::size_t kLeastAgreeing = 4;  // points that agree
-constexpr double kDeviations = 3.0;        // deviations
-constexpr double kPointError_m = 0.15;     // what a point's covariance does not know of
-constexpr double kBaseline_m = 1.0;        // between two points that propose a yaw
+constexpr int kAlike = 64;                 // bits; a quarter of the descriptor
+constexpr double kUnlikeNext = 0.8;        // ratio to the distance of the second best
+constexpr std::size_t kLeastAgreeing = 4;  // number of agreeing points
+constexpr double kDeviations = 3.0;        // gate, in standard deviations
+constexpr double kPointError_m = 0.15;     // error that the covariance of a point does not include
+constexpr double kBaseline_m = 1.0;        // least distance of two points that propose a yaw
 
 struct Alike {
   Eigen::Vector3d a, b;
-  double variance = 0.0;  // of a - b along each axis
+  double variance = 0.0;  // variance of a - b along each axis
 };
 
 struct Nearest {
@@ -44,7 +44,7 @@ Nearest nearestOf(const SeenPoint& point, const View& among) {
   return nearest;
 }
 
-/// Each is the other's nearest, and clearly so.
+/// Pairs that are mutual nearest neighbours and pass the ratio test.
 std::vector<Alike> alikeOnes(const View& stored, const View& seen) {
   std::vector<Alike> pairs;
   for (std::size_t k = 0; k < seen.size(); ++k) {
@@ -64,7 +64,8 @@ bool agrees(const Alike& pair, const LevelPose& T_AB) {
   return (T_AB * pair.b - pair.a).squaredNorm() < kDeviations * kDeviations * pair.variance;
 }
 
-/// T_AB that lays the middle of two points on that of two others, and turns one line on the other.
+/// T_AB that maps the middle of two points to that of two others, and aligns the lines between
+/// them.
 std::optional<LevelPose> proposedBy(const Alike& first, const Alike& second) {
   const Eigen::Vector3d line_a = second.a - first.a, line_b = second.b - first.b;
   const double sigma = std::sqrt(first.variance + second.variance);
@@ -76,8 +77,8 @@ std::optional<LevelPose> proposedBy(const Alike& first, const Alike& second) {
   return T_AB;
 }
 
-/// Least squares over the pairs that agree; its covariance is widened where they err by more than
-/// they say.
+/// Least squares over the agreeing pairs. The covariance is widened if the residuals exceed the
+/// assumed errors.
 LevelGaussian fitted(const std::vector<Alike>& pairs, LevelPose T_AB) {
   Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
   double chi2 = 0.0, count = 0.0;
@@ -111,8 +112,8 @@ double logChoose(std::size_t n, std::size_t k) {
   return logFactorial(n) - logFactorial(k) - logFactorial(n - k);
 }
 
-/// Probability that a wrong pair agrees with a proposal by chance: its gate is a small part of the
-/// space in which the stored points lie.
+/// Probability that a wrong pair agrees with a proposal by chance: the volume of its gate divided
+/// by the volume of the stored points.
 double chanceOf(const std::vector<Alike>& pairs) {
   Eigen::Vector3d middle = Eigen::Vector3d::Zero(), spread = Eigen::Vector3d::Zero();
   double gate = 0.0;
@@ -122,7 +123,7 @@ double chanceOf(const std::vector<Alike>& pairs) {
     spread += (pair.a - middle).cwiseAbs2() / n;
     gate += kDeviations * std::sqrt(pair.variance) / n;
   }
-  // Of a uniform distribution with this spread, along each axis.
+  // Width of a uniform distribution with this spread, along each axis.
   const Eigen::Array3d width = (12.0 * spread).cwiseSqrt().array().max(2.0 * gate);
   const double sphere = 4.0 / 3.0 * M_PI * gate * gate * gate;
   return std::min(0.5, sphere / width.prod());
@@ -152,7 +153,7 @@ std::optional<ViewMatch> matchViews(const View& stored, const View& seen) {
   match.points = static_cast<std::size_t>(std::count_if(
       pairs.begin(), pairs.end(), [&](const Alike& p) { return agrees(p, match.T_AB.mean); }));
   if (match.points < kLeastAgreeing || !isCovariance(match.T_AB.covariance)) return std::nullopt;
-  // Two points are spent on each proposal.
+  // Each proposal uses two points.
   const auto others = static_cast<double>(match.points - 2);
   match.nats = -(logChoose(pairs.size(), 2) + logChoose(pairs.size() - 2, match.points - 2) +
                  others * std::log(chanceOf(pairs)));

@@ -1,5 +1,6 @@
-// Where a view lies in another one, by points that look alike and lie to each other alike.
-// Gravity is known, so position and yaw are sought. Derivation: tools/docs/maths/appearance.md.
+// Estimates the pose of one view in another from points with similar descriptors and a consistent
+// geometry. Gravity is known, so only position and yaw are estimated. Derivation:
+// tools/docs/maths/appearance.md.
 #pragma once
 
 #include <cstddef>
@@ -11,14 +12,15 @@
 namespace perdure::mapping {
 
 struct ViewMatch {
-  LevelGaussian T_AB;      ///< of the view that is looked for (B) in the stored one (A)
-  std::size_t points = 0;  ///< that agree
-  /// Against as many agreeing by chance, in nats: minus the logarithm of the expected number of
+  LevelGaussian T_AB;      ///< pose of the observed view (B) in the stored view (A)
+  std::size_t points = 0;  ///< number of agreeing points
+  /// Evidence against agreement by chance, in nats: minus the logarithm of the expected number of
   /// such agreements (Desolneux, Moisan, Morel 2000, number of false alarms).
   double nats = 0.0;
 };
 
-/// Returns the best way, whether good enough or not; nothing where less than four points agree.
+/// Returns the best pose, even if its evidence is weak. Returns nothing if fewer than four points
+/// agree.
 std::optional<ViewMatch> matchViews(const View& stored, const View& seen);
 
 }  // namespace perdure::mapping

@@ -1,5 +1,5 @@
-// Anchor: a place on the way of the body to which long-term memory is tied. Objects keep their
-// pose relative to an anchor. When the graph moves anchors, objects move with them.
+// Anchor: a place on the trajectory of the body, to which the long-term memory is linked. Objects
+// are stored relative to an anchor. When the graph moves anchors, objects move with them.
 #pragma once
 
 #include <cstdint>
@@ -9,17 +9,17 @@
 
 namespace perdure::mapping {
 
-using AnchorId = std::uint64_t;  ///< 0: none. Ids grow with time within a session
+using AnchorId = std::uint64_t;  ///< 0: none; ids increase with time within a session
 
 struct Anchor {
   AnchorId id = 0;
-  AnchorId previous = 0;  ///< of the same session; 0: the first one
+  AnchorId previous = 0;  ///< previous anchor of the same session; 0: the first one
   WorldId session;        ///< the odometry's frame of reference W
   FrameStamp stamp;
-  RigidTransform T_WA;          ///< z against gravity; never changes
+  RigidTransform T_WA;          ///< z against gravity; constant
   LevelGaussian from_previous;  ///< T_previous,A by odometry
-  double way_m = 0.0;           ///< driven in the session so far
-  double scale2 = 1.0;          ///< by which loops have multiplied the increment's covariance
+  double way_m = 0.0;           ///< distance travelled in the session so far
+  double scale2 = 1.0;          ///< factor by which loops have scaled the increment's covariance
 };
 
 }  // namespace perdure::mapping

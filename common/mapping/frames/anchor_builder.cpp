@@ -5,7 +5,7 @@
 namespace perdure::mapping {
 namespace {
 constexpr double kDeadBandMetres = 0.02;
-/// A turn or an uncertain yaw sets no anchor nearer to the last one.
+/// Least distance between anchors, also after a turn or with an uncertain yaw.
 constexpr double kLeastMetres = 1.0;
 }  // namespace
 

@@ -1,4 +1,4 @@
-// Sets anchors along the way of the odometry, each with the increment from the one before.
+// Sets anchors along the trajectory of the odometry, each with the increment from the previous one.
 #pragma once
 
 #include <optional>
@@ -10,31 +10,31 @@
 
 namespace perdure::mapping {
 
-/// Poses of one session, in order.
+/// Processes the poses of one session, in order.
 class AnchorBuilder {
  public:
   explicit AnchorBuilder(const AnchorParameters& parameters)
       : parameters_(parameters), error_({parameters.walk_position, parameters.walk_yaw}) {}
 
-  /// Goes on from the newest anchor of a session after a break: the way since it is taken for
-  /// straight, and for walked as by poses that come without increments.
+  /// Continues from the newest anchor of a session after an interruption. The trajectory since then
+  /// is assumed to be straight, with the errors of poses without increments.
   void resume(const Anchor& last);
 
-  /// Returns an anchor at the body if one is due: at the first pose, then by way, turn or
-  /// uncertainty of yaw since the last one. `next` is its id. None at rest but the first, none
-  /// while the odometry initialises.
+  /// Returns an anchor at the body if one is due. The first pose creates an anchor; later ones
+  /// depend on distance travelled, turn or yaw uncertainty since the last anchor. `next` is its id.
+  /// At rest, and while the odometry initialises, there are no further anchors.
   std::optional<Anchor> add(const Odometry& odometry, AnchorId next);
 
-  /// The body, levelled, relative to the last anchor, with the covariance of what the odometry may
-  /// be off by since then. Nothing before the first anchor.
+  /// The levelled pose of the body relative to the last anchor, with the covariance of the odometry
+  /// error since then. Returns nothing before the first anchor.
   const std::optional<LevelGaussian>& sinceLast() const { return since_; }
   const std::optional<Anchor>& last() const { return last_; }
-  /// Driven so far. Motion within two centimetres of where it was last counted adds nothing: that
-  /// is noise of a body at rest.
+  /// Distance travelled so far. Motion within two centimetres of the last counted position adds
+  /// nothing, because it is noise of a body at rest.
   double way_m() const { return way_m_; }
 
  private:
-  /// Returns what the way grew by.
+  /// Returns the increase in distance travelled.
   double countWay(const Eigen::Vector3d& p_W);
   bool isDue() const;
   Anchor setAnchor(const Odometry& odometry, AnchorId id);
@@ -43,8 +43,8 @@ class AnchorBuilder {
   std::optional<Anchor> last_;
   std::optional<LevelGaussian> since_;
   std::optional<Odometry> before_;
-  RelativeError error_;                                  ///< of the body since the last anchor
-  Eigen::Vector3d counted_W_ = Eigen::Vector3d::Zero();  ///< where the way was last counted
+  RelativeError error_;                                  ///< error since the last anchor
+  Eigen::Vector3d counted_W_ = Eigen::Vector3d::Zero();  ///< last position that was counted
   double way_m_ = 0.0;
 };
 

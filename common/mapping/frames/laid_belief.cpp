@@ -7,7 +7,7 @@ namespace perdure::mapping {
 
 namespace {
 
-/// Of an object's state: d(state in A) by the state in B.
+/// Jacobian of an object's state in A with respect to its state in B.
 Matrix7d stateTurn(const RigidTransform& T_AB) {
   Matrix7d G = Matrix7d::Identity();
   G.topLeftCorner<3, 3>() = T_AB.R();

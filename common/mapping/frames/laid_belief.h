@@ -1,4 +1,4 @@
-// Beliefs of objects in another level frame.
+// Transforms beliefs about objects between level frames.
 #pragma once
 
 #include "common/types/map.h"
@@ -9,16 +9,15 @@ namespace perdure::mapping {
 
 /// Transforms a belief from frame B into frame A; both are level.
 ObjectBelief turned(const RigidTransform& T_AB, ObjectBelief belief);
-/// The same of what the map shows of it. `world` stays as it is.
+/// The same transform for a published map object. `world` is unchanged.
 MapObject turned(const RigidTransform& T_AB, MapObject object);
 
-/// Takes out of the covariances what the error of the pose explains, whose covariance was P_pose
-/// when the object was last detected: what is left is known relative to the body. cross_pose is
-/// then zero.
+/// Removes the part of the covariances that the pose error explains. P_pose is the covariance of
+/// that error when the object was last detected. The remaining covariance is relative to the body,
+/// and cross_pose is zero.
 ObjectBelief relativeToBody(ObjectBelief belief, const Matrix6d& P_pose);
 
-/// Adds the error of the frame that a belief was brought from, [δp, δyaw] of m and rad, turning
-/// about `about`.
+/// Adds the error of the source frame, [δp, δyaw] in m and rad, with a rotation about `about`.
 ObjectBelief withFrameError(ObjectBelief belief, const Eigen::Matrix4d& covariance,
                             const Eigen::Vector3d& about);
 

@@ -1,4 +1,4 @@
-// Errors of level poses and of objects: how they turn, and what they say at least.
+// Errors of level poses and of objects: their rotation, and their lower bounds.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,17 +7,17 @@
 
 namespace perdure::mapping {
 
-/// d(error of an object of B in A) by d(error of T_AB): it turns about B's origin. `arm_A` from
-/// there to the object.
+/// Jacobian of an object's error in A with respect to the error of T_AB, which rotates about B's
+/// origin. `arm_A` is the vector from that origin to the object.
 Eigen::Matrix4d byFrame(const Eigen::Vector3d& arm_A);
 
-/// A covariance of [p, yaw] in axes that R turns it into.
+/// The covariance of [p, yaw] after a rotation of the axes by R.
 Eigen::Matrix4d turnedBy(const Eigen::Matrix3d& R, const Eigen::Matrix4d& covariance);
 
-/// The larger deviation of x and y, m.
+/// The larger standard deviation of x and y, m.
 double planeSigma(const Eigen::Matrix4d& covariance);
 
-/// Adds the least deviations of a place (m) and of a yaw (rad).
+/// Adds the minimal standard deviations of position (m) and yaw (rad).
 void addFloor(Eigen::Matrix4d& covariance, double floor_m, double floor_rad);
 
 }  // namespace perdure::mapping

@@ -1,5 +1,5 @@
-// Poses in frames whose z axes are against gravity: position and yaw. What roll and pitch a vehicle
-// has is known from gravity at each place; it does not drift.
+// Poses between frames whose z axes point against gravity: position and yaw. Roll and pitch of the
+// body are known from gravity at each place and do not drift.
 #pragma once
 
 #include <Eigen/Core>
@@ -31,22 +31,23 @@ struct LevelGaussian {
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
 };
 
-/// T_AB T_BC of independent errors.
+/// T_AB T_BC, with independent errors.
 LevelGaussian compose(const LevelGaussian& T_AB, const LevelGaussian& T_BC);
 LevelGaussian inverse(const LevelGaussian& T_AB);
 
-/// d(error of T_AB T_BC) by the error of T_AB, and of T_BC.
+/// Jacobian of the error of T_AB T_BC with respect to the error of T_AB; the second function: of
+/// T_BC.
 Eigen::Matrix4d composedByFirst(const LevelPose& T_AB, const LevelPose& T_BC);
 Eigen::Matrix4d composedBySecond(const LevelPose& T_AB);
-/// d(error of T_AB⁻¹) by the error of T_AB.
+/// Jacobian of the error of T_AB⁻¹ with respect to the error of T_AB.
 Eigen::Matrix4d invertedBy(const LevelPose& T_AB);
 
-/// Position and yaw of a transform between frames that are both level, or nearly.
+/// Position and yaw of a transform between two frames that are level, or nearly so.
 LevelPose levelOf(const RigidTransform& T_AB);
 
-/// The frame at the place of B whose z axis is `up_A` and whose x axis is B's x, made level. Where
-/// B's x is within 17° of the vertical it is B's z, along which a camera looks. Both in A; `up_A`
-/// is a unit vector.
+/// The frame at the origin of B with z axis `up_A`; its x axis is the horizontal projection of B's
+/// x axis. If B's x axis is within 17° of the vertical, B's z axis is used instead, which is the
+/// viewing direction of a camera. All in A; `up_A` is a unit vector.
 RigidTransform levelled(const RigidTransform& T_AB, const Eigen::Vector3d& up_A);
 
 }  // namespace perdure::mapping

@@ -8,7 +8,7 @@ namespace {
 using Matrix46 = Eigen::Matrix<double, 4, 6>;
 using Matrix10 = Eigen::Matrix<double, 10, 10>;
 
-/// d[δp, δyaw] by the pose error [θ, p].
+/// Jacobian of [δp, δyaw] with respect to the pose error [θ, p].
 Matrix46 levelByPose(const Odometry& odometry) {
   Matrix46 B = Matrix46::Zero();
   B.topRightCorner<3, 3>().setIdentity();
@@ -16,7 +16,7 @@ Matrix46 levelByPose(const Odometry& odometry) {
   return B;
 }
 
-/// What an error of position and yaw becomes while the body moves on rigidly.
+/// Propagates an error of position and yaw along a rigid motion of the body.
 Eigen::Matrix4d carried(const Odometry& before, const Odometry& now) {
   Eigen::Matrix4d S = Eigen::Matrix4d::Identity();
   S.topRightCorner<3, 1>() = now.up_W.cross(now.T_WB.p - before.T_WB.p);

@@ -10,7 +10,7 @@
 namespace perdure::mapping {
 namespace {
 
-/// What a class that one of the two does not consider has there.
+/// Probability assigned to a class that only one of the two beliefs contains.
 constexpr double kNotConsidered = 1e-3;
 constexpr double kLeastShare = 1e-12;
 
@@ -26,7 +26,7 @@ double probabilityOf(const ObjectBelief& belief, const std::string& name) {
   return c == nullptr ? kNotConsidered : std::max(c->probability, kLeastShare);
 }
 
-/// By the class that is likeliest to both.
+/// The weight for the most probable class of both beliefs together.
 double weightOf(const ObjectBelief& host, const ObjectBelief& guest) {
   double weight = 0.5, likeliest = 0.0;
   for (const ClassBelief& c : host.classes) {
@@ -68,7 +68,7 @@ void poolClasses(ObjectBelief& result, const ObjectBelief& guest, double weight)
       [](const ClassBelief& a, const ClassBelief& b) { return a.probability > b.probability; });
 }
 
-/// The sums of a ledger are what is believed.
+/// Enters the fusion as a merge, so that the sums of the ledger equal the belief.
 void enterMerge(ObjectBelief& result) {
   Ledger& why = result.why;
   if (why.empty()) return;

@@ -11,10 +11,10 @@ namespace perdure::mapping {
 namespace {
 
 constexpr int kYaw = 3;
-/// χ² (7 degrees of freedom, .9999) beyond which two estimates contradict each other.
+/// χ² (7 degrees of freedom, .9999) above which two estimates contradict each other.
 constexpr double kContradict = 29.9;
 
-/// Eigenvalues of B measured by A.
+/// Generalised eigenvalues of B with respect to A.
 Eigen::VectorXd relativeSpread(const Matrix7d& a, const Matrix7d& b) {
   const Cholesky<Matrix7d> L(a);
   const Matrix7d half = L.whiten(b);
@@ -23,14 +23,14 @@ Eigen::VectorXd relativeSpread(const Matrix7d& a, const Matrix7d& b) {
   return eigenvalues(both);
 }
 
-/// Derivative of log det (w A⁻¹ + (1 - w) B⁻¹): falls with w.
+/// Derivative of log det (w A⁻¹ + (1 - w) B⁻¹), which decreases with w.
 double slopeAt(double w, const Eigen::VectorXd& spread) {
   double slope = 0.0;
   for (const double s : spread) slope += (s - 1.0) / (w * s + 1.0 - w);
   return slope;
 }
 
-/// Mean and covariance of either by chance.
+/// Mean and covariance of an equal mixture of both.
 CuboidGaussian coveringBoth(const CuboidGaussian& a, const CuboidGaussian& b, const Vector7d& d,
                             double w) {
   CuboidGaussian both;

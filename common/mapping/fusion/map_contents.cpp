@@ -7,7 +7,7 @@
 namespace perdure::mapping {
 namespace {
 
-/// Of what can differ between copies of one map.
+/// Digest of the contents that can differ between copies of one map.
 std::uint64_t digestOf(const MapContents& map) {
   std::string text;
   const auto add = [&](auto value) {

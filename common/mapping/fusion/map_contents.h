@@ -1,5 +1,5 @@
-// All that a map holds, to be brought together with others: the graph, its objects and their
-// history, where each came from, and what has changed between drives.
+// The complete contents of a map, for fusion with other maps: the graph, objects and their history,
+// their origins, and the changes between drives.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace perdure::mapping {
 
-/// Why an object is history: kGone, or kMerged into another.
+/// The reason why an object is history: kGone, or kMerged into another object.
 struct Ending {
   EventKind kind = EventKind::kGone;
   TimePoint time;
@@ -23,51 +23,52 @@ struct Ending {
 };
 
 struct StoredObject {
-  WorldId world;  ///< of the belief
+  WorldId world;  ///< frame of reference of the belief
   ObjectBelief belief;
   std::optional<Ending> ended;
 };
 
-/// An object of a map that was taken in. Maps that go on from one another share their first session
-/// and number their objects alike up to where they parted.
+/// The origin of an object from another map. Maps that continue one another share their first
+/// session, and have equal object ids up to the point where they diverge.
 struct Origin {
-  SessionIdentity map;  ///< its first session
-  ObjectId id = 0;      ///< there
-  ObjectId now = 0;     ///< here; it may be history since
+  SessionIdentity map;  ///< first session of the other map
+  ObjectId id = 0;      ///< id in the other map
+  ObjectId now = 0;     ///< id in this map; the object may be history since
   TimePoint first_seen;
-  TimePoint last_seen;  ///< of the belief that was taken
+  TimePoint last_seen;  ///< last sighting in the belief that was copied
   bool operator==(const Origin&) const = default;
 };
 
-/// What one drive saw and another one did not find any more.
+/// A difference between an earlier drive and a later one.
 struct Change {
   enum class Kind : std::uint8_t { kGone = 0, kMoved = 1 };
   Kind kind = Kind::kGone;
   ObjectId id = 0;
   std::string class_name;
-  WorldId map;                                    ///< M in which the place is
-  Eigen::Vector3d p_M = Eigen::Vector3d::Zero();  ///< where it stood
-  TimePoint last_seen;                            ///< there
-  TimePoint since;                                ///< gone, or seen elsewhere
-  WorldId by;                                     ///< session that says so
+  WorldId map;                                    ///< M of the place
+  Eigen::Vector3d p_M = Eigen::Vector3d::Zero();  ///< earlier position
+  TimePoint last_seen;                            ///< last sighting at that position
+  TimePoint since;                                ///< time at which it was found gone or elsewhere
+  WorldId by;                                     ///< session that detected the change
   bool operator==(const Change&) const = default;
 };
 
 struct MapContents {
   SavedMap graph;
-  std::map<ObjectId, StoredObject> objects;  ///< history included
+  std::map<ObjectId, StoredObject> objects;  ///< including history
   std::vector<Origin> origins;
   std::vector<Change> changes;
 
-  std::size_t present() const;  ///< objects that have not ended
+  std::size_t present() const;  ///< number of objects that have not ended
   ObjectId largestId() const;
 };
 
-/// What an object has become by merges, itself where it has not been merged.
+/// The object that an object was merged into; itself if it has not been merged.
 ObjectId survivorOf(const MapContents& map, ObjectId id);
 
-/// Whether `a` begins the fused map rather than `b`: the one with the older first session; of maps
-/// that share it the one that knows more. Does not depend on an order of arguments.
+/// Returns whether `a`, and not `b`, is the first map of a fusion. The map with the older first
+/// session comes first; if both share that session, the map with more contents does. The result
+/// does not depend on the order of the arguments.
 bool comesFirst(const MapContents& a, const MapContents& b);
 
 }  // namespace perdure::mapping

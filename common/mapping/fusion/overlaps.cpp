@@ -12,7 +12,7 @@
 namespace perdure::mapping {
 namespace {
 
-/// Centres of things that overlap are no farther apart.
+/// Largest distance between the centres of overlapping objects.
 constexpr double kReach_m = 6.0;
 
 struct Solid {
@@ -20,7 +20,7 @@ struct Solid {
   const Sighting* seen = nullptr;
   std::string class_name;
   LevelPose T_MO;
-  Eigen::Vector3d half = Eigen::Vector3d::Zero();  ///< of length, width, height
+  Eigen::Vector3d half = Eigen::Vector3d::Zero();  ///< half of length, width, height
 
   bool contains(const Eigen::Vector3d& p_M) const {
     const Eigen::Vector3d p = T_MO.inverse() * p_M;
@@ -68,7 +68,7 @@ class Overlaps {
     return a.contains(b.T_MO.p) && b.contains(a.T_MO.p) && isKnown(a, b);
   }
 
-  /// Better than how wide the narrower of them is.
+  /// Returns true if the relative position is known better than the width of the narrower object.
   bool isKnown(const Solid& a, const Solid& b) {
     const auto T_ab = relations_.between(a.seen->anchor, b.seen->anchor);
     if (!T_ab) return false;

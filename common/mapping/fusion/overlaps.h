@@ -1,6 +1,6 @@
-// Objects that stand in one place: solid things cannot. The replay's search compares places alone
-// and leaves some of them apart; so does a filter that saw one thing as two.
-// Derivation: tools/docs/maths/fusion.md.
+// Finds objects that occupy the same place, which solid objects cannot do. The replay's search
+// compares positions only and leaves some of them separate. A filter that tracked one object twice
+// does so too. Derivation: tools/docs/maths/fusion.md.
 #pragma once
 
 #include <vector>
@@ -11,10 +11,11 @@
 
 namespace perdure::mapping {
 
-/// What is to be merged; the older id survives. `aligned`: the map's sightings after the alignment,
-/// `graph`: its poses. Two objects are one where they are of one class, the centre of each lies in
-/// the cuboid of the other, their relation is known better than how wide the narrower one is, and
-/// neither has a second such partner.
+/// The merges to be done; the older id survives. `aligned` has the map's sightings after the
+/// alignment, `graph` its poses.
+/// Two objects are merged on four conditions. They have the same class. The centre of each lies in
+/// the cuboid of the other. Their relative position is known better than the width of the narrower
+/// one. Neither has a second such partner.
 std::vector<MergeOrder> overlapping(const MapContents& map, const SavedMap& aligned,
                                     const PoseGraph& graph);
 

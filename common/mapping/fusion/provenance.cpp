@@ -38,7 +38,7 @@ Origin Provenance::nameOf(ObjectId id) const {
 
 std::vector<Origin> Provenance::toldOf(ObjectId id) const { return under(by_now_, id, told_); }
 
-/// A belief that is newer than all that is told of it was followed here since.
+/// If a belief is newer than all its recorded origins, this map has observed the object since.
 std::vector<Origin> Provenance::of(ObjectId id) const {
   const StoredObject& object = map_.objects.at(id);
   auto all = under(object.ended ? by_now_ : by_survivor_, id, told_);

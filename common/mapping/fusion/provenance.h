@@ -1,5 +1,5 @@
-// What objects of a map rest on: which objects of which maps, and up to when each was followed.
-// Evidence that two maps have in common is known by it, whatever its ids have become.
+// The origins of a map's objects: the objects of other maps that they contain, and the time of the
+// last observation of each. This identifies evidence that two maps share, even if ids have changed.
 #pragma once
 
 #include <map>
@@ -10,29 +10,32 @@
 
 namespace perdure::mapping {
 
-/// Where an object is what another map calls `name`.
+/// Result of a search for an object by its id in another map.
 struct Known {
-  ObjectId id = 0;    ///< 0: nothing is. It may be history since
-  bool told = false;  ///< by a row of provenance, not by the same id alone
+  ObjectId id = 0;    ///< 0: not found; the object may be history since
+  bool told = false;  ///< found in a recorded origin, not only by an equal id
 };
 
 class Provenance {
  public:
-  /// The map must have a session, and outlive this. Objects may be added to it meanwhile.
+  /// The map must have a session and outlive this object. Objects may be added to the map in the
+  /// meantime.
   explicit Provenance(const MapContents& map);
 
-  /// How other maps know the object: by the id that it has here.
+  /// The identity of the object in other maps, from its id in this map.
   Origin nameOf(ObjectId id) const;
-  /// All that the object rests on. Of one that has not ended this holds what was merged into it.
+  /// All origins of the object. For an object that has not ended they include those of merged
+  /// objects.
   std::vector<Origin> of(ObjectId id) const;
-  /// Rows for the object itself, without what was merged into it.
+  /// The recorded origins of the object itself, without those of merged objects.
   std::vector<Origin> toldOf(ObjectId id) const;
   bool covers(ObjectId id, const Origin& origin) const;
   Known find(const Origin& origin) const;
 
-  /// `origin.now` is an object of the map. One that is known is only followed further.
+  /// `origin.now` must be an object of the map. For a known origin only the time of the last
+  /// observation is updated.
   void add(const Origin& origin);
-  /// Before its belief is changed, what it says of itself is told.
+  /// Records the object's own origin. Call it before its belief is changed.
   void tell(ObjectId id);
   const std::vector<Origin>& told() const { return told_; }
 

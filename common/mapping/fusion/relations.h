@@ -1,4 +1,4 @@
-// Relations between anchors of one graph.
+// Relative poses between anchors of one graph.
 #pragma once
 
 #include <memory>
@@ -8,12 +8,14 @@
 
 namespace perdure::mapping {
 
-/// With one factorisation for each anchor that others are asked from: ask for its own in a row.
+/// Computes one factorisation per `from` anchor. Requests with the same `from` should be
+/// consecutive.
 class Relations {
  public:
   explicit Relations(const PoseGraph& graph) : graph_(graph) {}
 
-  /// Nothing where the graph does not connect them.
+  /// The pose of `to` relative to `from`. Returns nothing if the graph does not connect the two
+  /// anchors.
   std::optional<LevelGaussian> between(AnchorId from, AnchorId to) {
     if (from == to) return LevelGaussian();
     if (from != from_) {

@@ -22,7 +22,7 @@ class Bits {
   std::string text_;
 };
 
-/// Covariances are scaled when loops show how far the odometry errs: they are left out.
+/// Covariances are excluded, because loops rescale them according to the odometry error.
 void add(Bits& bits, const Anchor& anchor) {
   bits.add(anchor.stamp.source);
   bits.add(anchor.stamp.sequence);

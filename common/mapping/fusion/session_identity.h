@@ -1,5 +1,5 @@
-// What a session is known by in any map: its first anchors, bit for bit. Numbers of worlds and ids
-// of different vehicles are the same ones.
+// Identifies a session in any map by its first anchors, bit for bit. Numbers of worlds and ids are
+// not unique across vehicles.
 #pragma once
 
 #include <cstdint>
@@ -11,12 +11,13 @@
 
 namespace perdure::mapping {
 
-/// Digests of a session's first anchor, and of its first two; `second` is 0 while there is one.
+/// Digests of a session's first anchor and of its first two anchors. `second` is 0 if there is only
+/// one anchor.
 struct SessionIdentity {
   std::uint64_t first = 0, second = 0;
   auto operator<=>(const SessionIdentity&) const = default;
 
-  /// The same session, of which one map may know one anchor only.
+  /// Returns true for the same session, even if one of the maps has its first anchor only.
   bool matches(const SessionIdentity& other) const {
     return first == other.first && (second == other.second || second == 0 || other.second == 0);
   }
@@ -25,13 +26,13 @@ struct SessionIdentity {
 struct Session {
   WorldId world;
   SessionIdentity identity;
-  std::vector<AnchorId> anchors;  ///< in order, not empty
+  std::vector<AnchorId> anchors;  ///< ordered, not empty
 };
 
-/// By their first anchors: the oldest session of the map comes first.
+/// Sessions ordered by their first anchors: the oldest session of the map comes first.
 std::vector<Session> sessionsOf(const SavedMap& map);
 
-/// That of `sessions` with this identity, or null.
+/// The session with this identity, or null.
 const Session* find(const std::vector<Session>& sessions, const SessionIdentity& identity);
 
 }  // namespace perdure::mapping

@@ -8,7 +8,7 @@
 namespace perdure::mapping {
 namespace {
 
-/// Between a place as one drive knows it and as another one does.
+/// Between the positions of one place in two drives.
 constexpr double kSamePlace_m = 1.5;
 
 struct Standing {
@@ -73,7 +73,7 @@ std::optional<PlacesInM::Place> PlacesInM::of(const StoredObject& object) const 
 
 namespace {
 
-/// Of what a drive saw go: what other drives have seen there earlier.
+/// Finds objects of other drives at places where a later drive lost an object of the same class.
 class Departures {
  public:
   explicit Departures(MapContents& map)
@@ -91,7 +91,8 @@ class Departures {
   }
 
  private:
-  /// Where the drive saw another one of the class stand, what it saw go was a copy of that.
+  /// Returns the object of another drive at the place of `gone`. Returns nothing if the drive
+  /// itself has another object of the class there, because `gone` was then a duplicate.
   const Standing* leftBy(const StoredObject& gone) const {
     const auto where = places_.of(gone);
     if (!where) return nullptr;

@@ -1,5 +1,6 @@
-// Where objects stand in M, by the graph: present ones by their newest sighting, history by the
-// anchor of its session at that time. And what one drive no longer found of what another one saw.
+// Positions of objects in M, from the graph. Present objects have the position of their newest
+// sighting; history has that of the anchor of its session at that time. Also finds objects of one
+// drive that a later drive reports as gone.
 #pragma once
 
 #include <optional>
@@ -10,7 +11,7 @@
 
 namespace perdure::mapping {
 
-/// Components of the graph, and what they are called.
+/// Components of the graph, and their names.
 class PlacesInM {
  public:
   explicit PlacesInM(const SavedMap& map);
@@ -21,8 +22,8 @@ class PlacesInM {
     AnchorId anchor = 0;
   };
   Place of(const ObjectRecord& record) const;
-  /// Of a belief in its session's W, beside the anchor of its session before it was last seen;
-  /// nothing where the session has no anchors.
+  /// The place of a belief stored in its session's W, relative to the last anchor of the session
+  /// before the last sighting. Returns nothing if the session has no anchors.
   std::optional<Place> of(const StoredObject& object) const;
 
   const MapState& state() const { return state_; }
@@ -36,8 +37,8 @@ class PlacesInM {
   std::map<WorldId, std::map<TimePoint, AnchorId>> ways_;
 };
 
-/// Objects that stand where another drive has seen one of their class go, later than they were seen
-/// last. They become history. Silence says nothing.
+/// Ends an object if another drive later found an object of the same class gone from its place. The
+/// object becomes history. Missing observations alone are not evidence.
 std::vector<Change> endWhatIsGone(MapContents& map);
 
 }  // namespace perdure::mapping

@@ -35,15 +35,15 @@ class Uniting {
     return at == map_.graph.records.end() ? nullptr : &at->second;
   }
 
-  /// Ids that were given after two maps parted are of different objects, even where the same is
-  /// said of both. Where nothing says by which session an object was seen, it may be one.
+  /// Ids assigned after two maps diverged belong to different objects, even if their origins are
+  /// equal. If the session of the last sighting is not recorded, the objects may be identical.
   bool mayBeOne(ObjectId theirs, ObjectId id) const {
     const auto record = sessions_.recordOf(theirs, theirs);
     const ObjectRecord* known = recordOf(survivorOf(map_, id));
     return !record || !known || sessions_.wasSeenInBoth(*record) || sessions_.wasSeenInBoth(*known);
   }
 
-  /// What an object of theirs is in the map; 0: new.
+  /// The id in this map of an object of the other map; 0: new.
   ObjectId knownAs(ObjectId theirs) const {
     const Known by_name = ours_.find(theirs_.nameOf(theirs));
     if (by_name.id != 0 && mayBeOne(theirs, by_name.id)) return by_name.id;
@@ -100,7 +100,7 @@ class Uniting {
     }
   }
 
-  /// What theirs was merged into is the same object here.
+  /// Returns whether the other map merged the object into one that is the same object here.
   bool isHere(const Ending& ending, ObjectId id) const {
     const auto into = id_of_.find(ending.merged_into);
     return into != id_of_.end() && survivorOf(map_, into->second) == id;
@@ -126,7 +126,7 @@ class Uniting {
     }
   }
 
-  /// Whether the map has evidence of the object that theirs lacks.
+  /// Returns whether this map has evidence of the object that the other map lacks.
   bool knowsMore(ObjectId id, ObjectId theirs) const {
     const auto all = ours_.of(id);
     return std::any_of(all.begin(), all.end(),

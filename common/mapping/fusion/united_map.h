@@ -1,5 +1,5 @@
-// Another map's sessions, anchors, edges and objects beside those of a map, renumbered where they
-// collide; what the map knows already is not added again.
+// Adds sessions, anchors, edges and objects of another map to a map. Colliding ids are renumbered;
+// known contents are not added again.
 #pragma once
 
 #include <map>
@@ -10,25 +10,24 @@
 
 namespace perdure::mapping {
 
-/// What an object was to each of two maps that know it, both as stored.
+/// The beliefs and records of an object in two maps that both contain it, as stored.
 struct Renewed {
-  ObjectId id = 0;  ///< in the united map
+  ObjectId id = 0;  ///< id in the united map
   StoredObject before, now;
-  std::optional<ObjectRecord> record_before, record_now;  ///< in ids of the united map
-  bool shared = false;  ///< `before` rests on evidence that `now` lacks
+  std::optional<ObjectRecord> record_before, record_now;  ///< records in ids of the united map
+  bool shared = false;  ///< `before` contains evidence that `now` lacks
 };
 
 struct Addition {
-  std::vector<WorldId> sessions;  ///< new ones, by their worlds in the united map
-  std::vector<WorldId> grown;     ///< known ones that go on
+  std::vector<WorldId> sessions;  ///< new sessions, by their worlds in the united map
+  std::vector<WorldId> grown;     ///< known sessions that continue
   std::size_t known = 0;          ///< sessions with nothing new
-  std::vector<WorldId> parted;    ///< that two copies continued in different ways: left out
-  std::set<ObjectId> objects;     ///< new ones
-  std::vector<Renewed> renewed;   ///< known ones that were seen again, or ended
+  std::vector<WorldId> parted;    ///< continued differently in two copies; left out
+  std::set<ObjectId> objects;     ///< new objects
+  std::vector<Renewed> renewed;   ///< known objects that were observed again, or that ended
 };
 
-/// Objects that are renewed keep their belief as it is in `map`: what becomes of it needs the
-/// graph.
+/// Renewed objects retain their belief in `map`, because its fusion requires the graph.
 Addition unite(MapContents& map, const MapContents& other);
 
 }  // namespace perdure::mapping

@@ -98,7 +98,8 @@ void UnitedSessions::matchAnchors(const Session& session, const Session& same) {
   }
 }
 
-/// Ids of a session's anchors follow each other: where one goes on, those after it move up.
+/// Anchor ids of a session are consecutive. If a session continues, the ids of later anchors
+/// increase.
 void UnitedSessions::makeRoom() {
   if (!addition_.grown.empty()) moveUp();
   AnchorId next = map_.graph.anchors.empty() ? 1 : map_.graph.anchors.rbegin()->first + 1;
@@ -168,7 +169,7 @@ void UnitedSessions::addAnchors() {
   }
 }
 
-/// The known anchor of the same component that lies nearest; 0: none.
+/// The nearest known anchor of the same component; 0: none.
 AnchorId UnitedSessions::reference(AnchorId id, const std::map<AnchorId, AnchorId>& known,
                                    const std::map<AnchorId, AnchorId>& components) const {
   const Eigen::Vector3d& p = other_.graph.anchors.at(id).T_MA.p;
@@ -206,8 +207,8 @@ void UnitedSessions::addAnchor(AnchorId theirs, AnchorId id, AnchorId reference,
   new_ids_.insert(id);
 }
 
-/// Those that a new anchor has brought. One that ties parts of the map which do not hang together
-/// yet is left to the search, which moves them.
+/// Adds the edges of new anchors. An edge between components that are not linked yet is left out,
+/// because the search finds it and moves the components.
 void UnitedSessions::addEdges() {
   EdgeId next = map_.graph.edges.empty() ? 1 : map_.graph.edges.rbegin()->first + 1;
   for (const auto& [id, theirs] : other_.graph.edges) {

@@ -1,4 +1,4 @@
-// Their sessions, anchors and edges beside those of a map, and what became of their numbers.
+// Adds the sessions, anchors and edges of another map to a map, and records their new numbers.
 #pragma once
 
 #include <map>
@@ -13,16 +13,16 @@ namespace perdure::mapping {
 
 class UnitedSessions {
  public:
-  /// Changes the graph of `map`. References are kept.
+  /// Modifies the graph of `map`. Stores references to all three arguments.
   UnitedSessions(MapContents& map, const MapContents& other, Addition& addition);
 
-  /// Their world in the united map; one that is free where it was not met yet.
+  /// The world in the united map for a world of the other map. A new world receives a free number.
   const WorldId& worldOf(const WorldId& world);
-  /// Their record in the united map's ids; nothing where there is none, or of a way that was left
-  /// out.
+  /// A record of the other map in the united map's ids. Returns nothing if it does not exist, or if
+  /// its part of the trajectory was left out.
   std::optional<ObjectRecord> recordOf(ObjectId theirs, ObjectId id) const;
-  /// Whether a sighting of the record, in ids of the united map, is of a session that both maps
-  /// know.
+  /// Returns whether a sighting of the record, in ids of the united map, belongs to a session that
+  /// both maps contain.
   bool wasSeenInBoth(const ObjectRecord& record) const;
   bool isNew(AnchorId id) const { return new_ids_.contains(id); }
 
@@ -47,13 +47,13 @@ class UnitedSessions {
   const MapContents& other_;
   Addition& addition_;
   const std::vector<Session> sessions_, other_sessions_;
-  std::set<WorldId> worlds_;         ///< of the map
-  std::set<std::uint64_t> numbers_;  ///< of these
+  std::set<WorldId> worlds_;         ///< worlds of the map
+  std::set<std::uint64_t> numbers_;  ///< numbers of these worlds
   std::map<WorldId, const Session*> known_;
-  std::map<WorldId, WorldId> world_of_;  ///< theirs to ours; so are the next ones
+  std::map<WorldId, WorldId> world_of_;  ///< other map to this map; also the next two
   std::map<std::uint64_t, std::uint64_t> number_of_;
   std::map<WorldId, std::vector<AnchorId>> new_anchors_;
-  std::map<WorldId, AnchorId> first_new_;  ///< by our world
+  std::map<WorldId, AnchorId> first_new_;  ///< key: world in this map
   std::map<AnchorId, AnchorId> anchor_of_, frames_, first_of_;
   std::set<AnchorId> new_ids_;
   std::vector<std::uint32_t> class_of_;

@@ -1,4 +1,4 @@
-// Which anchors hang together by edges that are believed.
+// Groups of anchors that are connected by accepted edges.
 #pragma once
 
 #include <map>
@@ -7,7 +7,7 @@
 
 namespace perdure::mapping {
 
-/// Of each anchor the first one, that with the lowest id, of its component.
+/// Maps each anchor to the anchor with the lowest id in its component.
 std::map<AnchorId, AnchorId> componentsOf(const PoseGraph& graph);
 
 }  // namespace perdure::mapping

@@ -1,6 +1,5 @@
-// How large the error of the odometry is compared with what it says, as loops show it. Poses that
-// come without covariances say nothing; what they are assumed to walk by may be wrong by far, to
-// either side.
+// Estimates from loops the ratio of the true odometry error to the reported error. For poses
+// without covariances the assumed random walk may be far too small or too large.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,18 +13,18 @@ class DriftScale {
  public:
   explicit DriftScale(const DriftScaleParameters& parameters);
 
-  /// A loop showed that the body was off by `error`, [δp, δyaw]. `measured`: covariance of what the
-  /// loop measured; `odometry`: of the error, as the odometry says it.
+  /// Adds a loop that measured the error [δp, δyaw]. `measured`: covariance of the loop
+  /// measurement; `odometry`: covariance of the error according to the odometry.
   void add(const Eigen::Vector4d& error, const Eigen::Matrix4d& measured,
            const Eigen::Matrix4d& odometry);
 
-  /// By which covariances of the odometry are to be multiplied. An upper quantile: a scale that is
-  /// too small makes wrong objects of right ones.
+  /// The factor for covariances of the odometry. It is an upper quantile, because a factor that is
+  /// too small leads to wrong associations.
   double variance() const;
 
  private:
   double quantile_;
-  std::vector<double> log_scales_;  ///< of deviations, a grid
+  std::vector<double> log_scales_;  ///< grid over the scale of the standard deviation
   std::vector<double> log_posterior_;
 };
 

@@ -1,5 +1,5 @@
-// What the pose graph minimises: the residual of an edge between two anchors, and the robust cost
-// of edges that may be wrong (Agarwal et al. 2013, dynamic covariance scaling). Derivation:
+// The cost terms of the pose graph: the residual of an edge between two anchors, and the robust
+// cost of edges that may be wrong (Agarwal et al. 2013, dynamic covariance scaling). Derivation:
 // tools/docs/maths/pose_graph.md.
 #pragma once
 
@@ -12,7 +12,7 @@
 
 namespace perdure::mapping {
 
-/// [p, yaw].
+/// The state [p, yaw].
 Eigen::Vector4d stateOf(const LevelPose& pose);
 
 /// Whitened [R_aᵀ (p_b − p_a) − t, yaw_b − yaw_a − ψ] of a measured T_ab = (t, ψ). Parameters are
@@ -28,12 +28,12 @@ class EdgeCost final : public ceres::SizedCostFunction<4, 4, 4> {
   Eigen::Matrix4d whitening_;  ///< L⁻¹ of the covariance L Lᵀ
 };
 
-/// χ² as it is up to `kernel`, and less than thrice the kernel however large χ² is.
+/// Equals χ² up to `kernel`, and stays below three times the kernel for any larger χ².
 class ScalingLoss final : public ceres::LossFunction {
  public:
   explicit ScalingLoss(double kernel) : kernel_(kernel) {}
   void Evaluate(double chi2, double rho[3]) const override;
-  /// By which the edge's information counts, (0, 1]: the square of the switch variable.
+  /// Factor of the edge's information, (0, 1]: the square of the switch variable.
   double weight(double chi2) const;
 
  private:

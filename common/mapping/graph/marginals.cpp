@@ -80,7 +80,7 @@ std::optional<LevelGaussian> Marginals::to(AnchorId anchor) const {
   if (anchor == from_) return result;
   if (!usable_) return result = std::nullopt;
   const Eigen::MatrixXd columns = columnsOf(anchor);
-  // δ(T_fa) = T_f⁻¹ turned: position R_fᵀ (δp_a − δp_f − δyaw_f up × (p_a − p_f)), yaw δyaw_a −
+  // δ(T_fa) = T_f⁻¹ rotated: position R_fᵀ (δp_a − δp_f − δyaw_f up × (p_a − p_f)), yaw δyaw_a −
   // δyaw_f.
   const Eigen::Vector3d arm = T_Ma.p - T_Mf.p;
   Eigen::Matrix4d by_from = -Eigen::Matrix4d::Identity();
@@ -98,9 +98,9 @@ std::optional<LevelGaussian> Marginals::to(AnchorId anchor) const {
 }
 
 /// With H = L D Lᵀ: Z = H⁻¹ has Z_jj = 1/d_j − Σ_k L_kj Z_kj and, for i > j, Z_ij = −Σ_k L_kj Z_ki,
-/// over the k > j where L_kj is not zero. What is needed of Z lies where L is not zero.
+/// over the k > j with nonzero L_kj. Only elements of Z at nonzero elements of L are needed.
 Eigen::VectorXd Marginals::diagonalOfInverse() const {
-  const auto& L = factor_.matrixL().nestedExpression();  // without its diagonal, which is 1
+  const auto& L = factor_.matrixL().nestedExpression();  // L without its unit diagonal
   const int* starts = L.outerIndexPtr();
   const int* rows = L.innerIndexPtr();
   const double* l = L.valuePtr();

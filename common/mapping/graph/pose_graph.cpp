@@ -17,9 +17,9 @@ namespace {
 using States = std::map<AnchorId, Eigen::Vector4d>;
 
 constexpr double kNoWay = std::numeric_limits<double>::infinity();
-/// From one kernel to the next when it is narrowed.
+/// Factor from one kernel to the next narrower one.
 constexpr double kNarrowing = 0.1;
-/// What is enough before it is narrowed again: a relative change of cost.
+/// Relative change of cost at which the kernel is narrowed again.
 constexpr double kCoarse = 0.01;
 constexpr int kCoarseIterations = 4;
 
@@ -48,14 +48,14 @@ ceres::Solver::Options quietSolver(std::int64_t iterations) {
   options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   options.max_num_iterations = static_cast<int>(iterations);
   options.num_threads = 1;
-  // Long chains bend by steps that any damping in proportion to the diagonal would stop.
+  // Long chains need large steps, which any damping proportional to the diagonal would prevent.
   options.initial_trust_region_radius = 1e16;
   options.logging_type = ceres::SILENT;
   return options;
 }
 
-/// The graph as a problem of least squares. Edges that no optimisation has seen yet have a kernel
-/// of their own.
+/// The graph as a least-squares problem. Edges that were not optimised before have a separate
+/// kernel.
 class LeastSquares {
  public:
   LeastSquares(const PoseGraph& graph, const GraphParameters& parameters)
@@ -73,11 +73,12 @@ class LeastSquares {
     }
   }
 
-  /// Returns the cost that it came down to; infinity where there was no way, and nothing moved.
+  /// Returns the final cost. Returns infinity, without moving anything, if the solver finds no
+  /// usable solution.
   double descend() { return descend(options_); }
 
-  /// The same from where it stands, with a kernel for new edges that is as wide as the largest χ²
-  /// first, and is then narrowed. Infinity where it sees that it will be more than `known`.
+  /// Descends from the present states. The kernel for new edges starts as wide as the largest χ²,
+  /// and is then narrowed. Returns infinity as soon as the cost is certain to exceed `known`.
   double descendByWideKernels(double known) {
     ceres::Solver::Options coarse = options_;
     coarse.function_tolerance = kCoarse;
@@ -86,7 +87,8 @@ class LeastSquares {
     for (bool widest = true; kernel > kernel_; kernel *= kNarrowing, widest = false) {
       new_loss_ = ScalingLoss(kernel);
       const double cost = descend(coarse);
-      // One edge costs plain χ² under the widest kernel: to believe it costs no less than this.
+      // Under the widest kernel a single edge costs plain χ². The cost with this edge accepted is
+      // at least this value.
       const double least = (converged_ ? 1.0 - kCoarse : 0.5) * cost;
       if (widest && new_edges_.size() == 1 && least > known) return kNoWay;
       coarse.max_num_iterations = std::min(coarse.max_num_iterations, kCoarseIterations);
@@ -101,7 +103,7 @@ class LeastSquares {
   }
 
   const States& states() const { return states_; }
-  /// Where it goes on from: the same anchors.
+  /// Sets the starting point; `states` must have the same anchors.
   void setStates(const States& states) {
     for (auto& [id, state] : states_) state = states.at(id);
   }

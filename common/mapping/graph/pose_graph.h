@@ -1,6 +1,6 @@
 // The pose graph over anchors: position and yaw of each (Carlone 2014 for the parametrisation;
-// Agarwal 2013, dynamic covariance scaling, for loops that may be wrong).
-// Derivation: tools/docs/maths/pose_graph.md.
+// Agarwal 2013, dynamic covariance scaling, for loops that may be wrong). Derivation:
+// tools/docs/maths/pose_graph.md.
 #pragma once
 
 #include <cstdint>
@@ -16,12 +16,12 @@ using EdgeId = std::uint64_t;  ///< counts from 1
 
 enum class EdgeKind : std::uint8_t { kOdometry = 0, kLoop = 1, kTracking = 2 };
 
-/// A loop or tracking edge that counts by less is taken for wrong: with the default kernel a χ² of
-/// 24, which one in ten thousand true ones has.
+/// A loop or tracking edge with a smaller weight is considered wrong. With the default kernel this
+/// is a χ² of 24, which one in ten thousand true edges exceeds.
 inline constexpr double kBelieved = 0.5;
 
-/// T_ab measured, with its covariance. The optimiser adds a millimetre and 1e-5 rad to it, so it
-/// may be singular.
+/// Measured T_ab with its covariance. The covariance may be singular, because the optimiser adds a
+/// millimetre and 1e-5 rad.
 struct Edge {
   AnchorId a = 0, b = 0;
   LevelGaussian T_ab;
@@ -31,35 +31,35 @@ struct Edge {
 struct OptimiseReport {
   bool converged = false;
   int iterations = 0;
-  double cost = 0.0;  ///< sum of χ², of loops and tracking edges by the kernel
-  /// By which the information of a loop or tracking edge counts, (0, 1].
+  double cost = 0.0;  ///< sum of χ²; loops and tracking edges with the robust kernel
+  /// Factors of the information of loop and tracking edges, (0, 1].
   std::map<EdgeId, double> weights;
-  std::map<EdgeId, double> chi2;  ///< of the same, unweighted
-  double largest_move_m = 0.0;    ///< of any anchor
+  std::map<EdgeId, double> chi2;  ///< unweighted χ² of these edges
+  double largest_move_m = 0.0;    ///< maximum over all anchors
 };
 
 class PoseGraph {
  public:
   explicit PoseGraph(const GraphParameters& parameters) : parameters_(parameters) {}
 
-  /// Adds the first anchor of a session at `T_MA`. Of each component (anchors that hang together
-  /// by believed edges) the first anchor is held fast; a session begins one of its own.
+  /// Adds the first anchor of a session at `T_MA`; it begins a new component. A component is a set
+  /// of anchors connected by accepted edges. The first anchor of each component is fixed.
   void addFirst(AnchorId id, const LevelPose& T_MA);
-  /// Adds an anchor where its increment puts it in M, and its odometry edge. `previous` must be in
-  /// the graph.
+  /// Adds an anchor with its odometry edge, at the pose in M that follows from its increment.
+  /// `previous` must be in the graph.
   void add(AnchorId id, AnchorId previous, const LevelGaussian& from_previous);
-  /// Adds an edge between two anchors of the graph; nothing moves before optimise().
+  /// Adds an edge between two anchors of the graph. Poses do not change before optimise().
   EdgeId add(const Edge& edge);
-  /// Adds it as it was, with the id that it had. Ids of new edges go on above.
+  /// Adds a stored edge with its earlier id. New edges receive higher ids.
   void restore(EdgeId id, const Edge& edge, double weight);
   void remove(EdgeId id);
   /// Multiplies the covariances of odometry edges that lead to `anchors`.
   void scaleOdometry(double factor, const std::set<AnchorId>& anchors);
-  /// Holds the first anchor of each component fast, and no other. optimise() does so by itself.
+  /// Fixes the first anchor of each component, and no other. optimise() calls it.
   void holdFirstAnchors();
 
-  /// Lowest cost from the present poses on. Where the kernel would reject a new edge from there,
-  /// also by way of wider kernels: a true loop after much drift looks like a wrong one.
+  /// Minimises the cost from the present poses. If the kernel would reject a new edge there, also
+  /// tries wider kernels, because after much drift a true loop resembles a wrong one.
   OptimiseReport optimise();
 
   bool contains(AnchorId id) const { return poses_.contains(id); }
@@ -67,13 +67,14 @@ class PoseGraph {
   void setPose(AnchorId id, const LevelPose& pose) { poses_.at(id) = pose; }
   const std::map<AnchorId, LevelPose>& poses() const { return poses_; }
   const std::map<EdgeId, Edge>& edges() const { return edges_; }
-  /// Of a loop or tracking edge by the last optimise(); 1 for what is newer, and for odometry.
+  /// Weight of a loop or tracking edge from the last optimise(); 1 for newer edges and for
+  /// odometry.
   double weight(EdgeId id) const;
-  /// A loop or tracking edge that no optimise() has seen yet.
+  /// Returns true for a loop or tracking edge added after the last optimise().
   bool isNew(EdgeId id) const;
-  /// Of an edge between anchors of the graph, where they are now.
+  /// χ² of an edge between anchors of the graph, at their present poses.
   double chi2(const Edge& edge) const;
-  /// How many there were when anchors were last held fast: at the last optimise().
+  /// Number of components when anchors were last fixed, at the last optimise().
   std::size_t components() const { return held_fast_.size(); }
   bool isHeldFast(AnchorId id) const { return held_fast_.contains(id); }
 

@@ -15,20 +15,20 @@ namespace perdure::mapping {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kGate = 3.0;      // deviations of a pair's distance
-constexpr double kStreet_m = 6.0;  // deviation of the chance density around the map's objects
+constexpr double kGate = 3.0;      // standard deviations of a pair's distance
+constexpr double kStreet_m = 6.0;  // spread of the chance density around map objects
 constexpr double kReach_m = MapIndex::kReach_m;
-// m⁻²; chance density where the map has no objects: one in a disc of 100 m radius
+// m⁻²; chance density far from the map's objects: one in a disc of 100 m radius
 constexpr double kFloor = 1.0 / (kPi * 100.0 * 100.0);
 constexpr double kCell_m = 2.0, kCell_rad = 4.0 * kPi / 180.0;
 constexpr std::size_t kMostSeen = 48, kMostVotes = 250'000, kCandidates = 128;
-constexpr std::size_t kMostCells = 4096;  // of which candidates are chosen, one of each place
-// beyond this, a way is another one
+constexpr std::size_t kMostCells = 4096;  // candidates are chosen from these, one per place
+// beyond these limits two poses are different
 constexpr double kOther_m = 1.5, kOther_rad = 8.0 * kPi / 180.0;
 constexpr double kSure = 0.9;
-constexpr double kDefaultShare = 1e-3;  // of a class that one of the two PMFs does not name
+constexpr double kDefaultShare = 1e-3;  // share of a class that one of the two PMFs lacks
 
-/// log-likelihood ratio of a yaw known modulo 180°, against any yaw.
+/// Log-likelihood ratio of a yaw known modulo 180° against an arbitrary yaw.
 double logSameYaw(double difference, double variance) {
   const double d = wrapHalfTurn(difference);
   double density = 0.0;
@@ -83,7 +83,8 @@ class Search {
       match.pairs.emplace_back(map_[k].id, seen_[i].id);
     }
     if (match.pairs.empty()) return std::nullopt;
-    // What the pairs say alone; where they say little, the mean stays near the prior's.
+    // Uses the pairs alone. In directions with little information the mean stays near that of the
+    // prior.
     const Eigen::Vector4d step =
         equations.stepNear(prior_information_, difference(prior_.mean, first.x));
     match.T_MB.mean.p += step.head<3>();
@@ -107,7 +108,8 @@ class Search {
     if (seen_.size() > kMostSeen) seen_.resize(kMostSeen);
   }
 
-  /// Of each seen object and class: probability by the share of the class on the map.
+  /// Computes the probability of each class of each observed object, divided by the share of the
+  /// class on the map.
   void weighClasses() {
     for (const PlacedObject& o : seen_) {
       std::vector<double>& weights = class_weights_.emplace_back();
@@ -120,7 +122,7 @@ class Search {
     }
   }
 
-  /// p(one object has both PMFs) by p(two objects have them).
+  /// Likelihood ratio of the two PMFs: one object against two objects.
   double sameClass(std::size_t i, std::size_t k) const {
     const std::vector<double>& weights = class_weights_[i];
     double ratio = kDefaultShare;
@@ -144,7 +146,7 @@ class Search {
            std::abs(d[3]) < g * std::sqrt(prior_.covariance(3, 3)) + kCell_rad;
   }
 
-  /// How many ways the prior leaves that are different places: each a metre, three degrees.
+  /// Number of different places inside the prior, in cells of one metre and three degrees.
   double cells() const {
     constexpr double kDistinct_m = 1.0, kDistinct_rad = 3.0 * kPi / 180.0;
     const double area =
@@ -170,7 +172,8 @@ class Search {
     cell.heading += votes * Eigen::Vector2d(std::cos(x.yaw), std::sin(x.yaw));
   }
 
-  /// Each pair of seen objects and each like pair of the map, nearest distances first.
+  /// Votes by each pair of observed objects with each similar pair of the map, nearest distances
+  /// first.
   void votePairs(Cells& cells) const {
     struct SeenPair {
       std::size_t a, b;
@@ -215,7 +218,7 @@ class Search {
     }
   }
 
-  /// Each object alone, where the prior knows the yaw.
+  /// Votes by single objects, if the prior has an accurate yaw.
   void voteSingles(Cells& cells) const {
     if (prior_.covariance(3, 3) > kCell_rad * kCell_rad) return;
     for (std::size_t i = 0; i < seen_.size(); ++i) {
@@ -248,7 +251,7 @@ class Search {
       LevelPose x;
       x.yaw = std::atan2(cell.heading.y(), cell.heading.x());
       x.p << cell.place / cell.votes, prior_.mean.p.z();
-      // The votes of one way spread over cells that touch.
+      // Votes for one pose are spread over adjacent cells.
       const bool another = std::all_of(result.begin(), result.end(), [&](const LevelPose& chosen) {
         return (chosen.p - x.p).head<2>().norm() > kCell_m ||
                std::abs(wrapAngle(chosen.yaw - x.yaw)) > kCell_rad;
@@ -261,7 +264,8 @@ class Search {
     return result;
   }
 
-  /// Height of the body at which objects stand as high as those of their class on the map.
+  /// Height of the body that best matches the heights of objects with those of their class on the
+  /// map.
   double height(const LevelPose& x) const {
     std::vector<double> heights;
     for (std::size_t i = 0; i < seen_.size(); ++i) {
@@ -281,14 +285,14 @@ class Search {
   }
 
   struct Likelihood {
-    double of_map = 0.0;     ///< density if it is an object of the map
-    double by_chance = 0.0;  ///< density of an object there by chance
-    std::size_t object = 0;  ///< the likeliest
+    double of_map = 0.0;     ///< density given that it is an object of the map
+    double by_chance = 0.0;  ///< density of an unrelated object at that place
+    std::size_t object = 0;  ///< the most probable object
     double of_object = 0.0;
-    double known = 0.0;  ///< probability that an object there is on the map
+    double known = 0.0;  ///< probability that an object at that place is on the map
   };
 
-  /// Densities of the object's place, m⁻².
+  /// Densities of the object's position, m⁻².
   Likelihood likelihoodOf(std::size_t i, const LevelPose& x, const Eigen::Matrix3d& R,
                           double blur) const {
     const PlacedObject& seen = seen_[i];
@@ -325,7 +329,7 @@ class Search {
     return l;
   }
 
-  /// The most probable map object of a seen one, and its probability.
+  /// The most probable map object for an observed one, and its probability.
   std::pair<std::size_t, double> matchOf(std::size_t i, const LevelPose& x,
                                          const Eigen::Matrix3d& R, double blur) const {
     const Likelihood l = likelihoodOf(i, x, R, blur);
@@ -333,8 +337,8 @@ class Search {
     return {l.object, l.known * l.of_object / all};
   }
 
-  /// Map objects, each with the seen object that it surely is. If two seen objects match one map
-  /// object, neither makes a pair: they may be neighbours.
+  /// Map objects, each with its certain observed object. If two observed objects match one map
+  /// object, neither forms a pair, because they may be neighbours.
   std::map<std::size_t, std::size_t> surePairs(const LevelPose& x) const {
     const Eigen::Matrix3d R = x.R();
     std::map<std::size_t, std::size_t> pairs;
@@ -357,7 +361,7 @@ class Search {
     return sum;
   }
 
-  /// The best score inside the prior if nothing of what is seen is on the map.
+  /// The best score inside the prior if no observed object is on the map.
   double scoreOfNone() const {
     const double reach = 2.0 * std::sqrt(prior_.covariance.topLeftCorner<2, 2>().trace());
     double best = -1e9;

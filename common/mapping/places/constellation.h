@@ -1,7 +1,7 @@
-// Place recognition by constellations: where the body is in the map, from how the objects around it
-// lie to each other. Gravity is known, so position and yaw are sought. Pairs of objects propose
-// ways to lay what is seen onto the map, and single ones where the yaw is known. The likelihood of
-// all that is seen decides, together with what the odometry knows before. Derivation:
+// Place recognition by constellations: estimates the pose of the body in the map from the
+// arrangement of the objects around it. Gravity is known, so only position and yaw are estimated.
+// Pairs of objects propose poses, and so do single objects if the yaw is known. The likelihood of
+// all observed objects and the prior of the odometry decide. Derivation:
 // tools/docs/maths/constellation.md.
 #pragma once
 
@@ -16,21 +16,20 @@
 
 namespace perdure::mapping {
 
-/// A way to lay what is seen onto the map.
+/// A candidate pose of the body on the map.
 struct PlaceMatch {
-  LevelGaussian T_MB;  ///< without the prior's information
-  double score = 0.0;  ///< nats: log-likelihood ratio against chance, and log of the prior's
-                       ///< density ratio to its peak
-  double next = 0.0;   ///< score of the best other way, or of nothing being on the map
-  double cells = 1.0;  ///< distinguishable ways inside the prior
-  /// Of map and of what is seen, surely one object.
+  LevelGaussian T_MB;  ///< estimate without the prior's information
+  double score = 0.0;  ///< log-likelihood ratio against chance plus log of the prior, nats
+  double next = 0.0;   ///< score of the second best pose, or of no observed object being on the map
+  double cells = 1.0;  ///< number of distinguishable poses inside the prior
+  /// Ids of map objects and of the observed objects certainly identical to them.
   std::vector<std::pair<ObjectId, ObjectId>> pairs;
-  std::size_t points = 0;  ///< landmarks that look alike and agree, where these say it
+  std::size_t points = 0;  ///< number of landmarks that match and agree, if landmarks were used
 };
 
-/// Returns the best way, whether good enough or not; nothing if no object is surely one of the
-/// map's. `seen` in the body's level frame B; `prior`: T_MB as it is known before. Where nothing is
-/// known it is as wide as the map.
+/// Returns the best pose, even if its score is low. Returns nothing if no observed object certainly
+/// matches one of the map. `seen` is in the body's level frame B. `prior` is the prior of T_MB;
+/// without prior knowledge it is as wide as the map.
 std::optional<PlaceMatch> bestMatch(std::vector<PlacedObject> seen, const MapIndex& map,
                                     const LevelGaussian& prior, const PlaceParameters& parameters);
 

@@ -6,9 +6,9 @@
 namespace perdure::mapping {
 namespace {
 
-/// Ways further than this many reaches do not count.
+/// Trajectories farther away than this many reaches have no effect.
 constexpr double kWays = 4.0;
-constexpr double kAnyShare = 0.02;  ///< of what the map has where nobody drove
+constexpr double kAnyShare = 0.02;  ///< share of objects on the map far from all trajectories
 
 std::vector<Eigen::Vector2d> placesOf(const std::vector<PlacedObject>& objects) {
   std::vector<Eigen::Vector2d> places;

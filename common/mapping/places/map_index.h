@@ -1,4 +1,4 @@
-// Objects of a map to be searched: by place, and pairs of them by their classes and distance.
+// Search index of a map's objects: by place, and pairs of them by class and distance.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,12 +14,12 @@
 
 namespace perdure::mapping {
 
-/// Indices of places in the plane, by squares.
+/// Indices of points in the plane, stored by grid squares.
 class PlaceGrid {
  public:
   PlaceGrid(double width, const std::vector<Eigen::Vector2d>& places);
 
-  /// Calls `visit` for all within the squares' width of p, and some beyond.
+  /// Calls `visit` for all points within one square's width of p, and for some points beyond.
   template <class Visit>
   void around(const Eigen::Vector2d& p, const Visit& visit) const {
     for (std::int64_t x = cell(p.x()) - 1; x <= cell(p.x()) + 1; ++x) {
@@ -41,34 +41,36 @@ class PlaceGrid {
 
 class MapIndex {
  public:
-  /// Beyond it from an object nothing of it counts.
+  /// Distance beyond which an object has no effect.
   static constexpr double kReach_m = 24.0;
 
-  /// `objects` in M; `driven`: places in M from which they were seen.
+  /// `objects` in M; `driven`: positions in M from which they were observed.
   MapIndex(std::vector<PlacedObject> objects, std::vector<Eigen::Vector2d> driven,
            const PlaceParameters& parameters);
 
   const std::vector<PlacedObject>& objects() const { return objects_; }
-  /// Calls `visit` with the number of each object within kReach_m of a place, and of some beyond.
+  /// Calls `visit` with the number of each object within kReach_m of a place, and of some objects
+  /// beyond.
   template <class Visit>
   void around(const Eigen::Vector2d& p, const Visit& visit) const {
     by_place_.around(p, visit);
   }
 
   struct Pair {
-    double distance;   ///< in the plane
-    std::size_t c, d;  ///< numbers of objects
+    double distance;   ///< distance in the plane, m
+    std::size_t c, d;  ///< indices of the two objects
   };
-  /// Ordered pairs of two classes, by distance; nothing where there are none.
+  /// Ordered pairs of two classes, sorted by distance. Returns nothing if there are none.
   const std::vector<Pair>* pairsOf(std::uint32_t class_c, std::uint32_t class_d) const;
 
-  /// Probability that what stands at a place is on the map: falls with the distance to where the
-  /// body drove when the map was made.
+  /// Probability that an object at a place is on the map. It decreases with the distance from the
+  /// trajectories of the mapping drives.
   double knownShare(const Eigen::Vector2d& at) const;
   /// Share of a class among the objects, [0, 1].
   double commonShare(std::uint32_t class_number) const;
 
-  /// Middle of the objects, and the mean square of their distance from it along each axis.
+  /// Centre of the objects; the next function returns their mean squared distance from it along
+  /// each axis.
   Eigen::Vector2d centre() const { return centre_; }
   Eigen::Vector2d spread2() const { return spread2_; }
 
@@ -84,7 +86,7 @@ class MapIndex {
   Eigen::Vector2d centre_ = Eigen::Vector2d::Zero(), spread2_ = Eigen::Vector2d::Zero();
 };
 
-/// Number of the likeliest class; the PMF must not be empty.
+/// Number of the most probable class; the PMF must not be empty.
 std::uint32_t mostProbable(const PlacedObject& object);
 
 }  // namespace perdure::mapping

@@ -1,4 +1,4 @@
-// An object at rest in a level frame, and where the body is by objects of known identity.
+// A static object in a level frame, and the pose of the body from objects of known identity.
 // Derivation: tools/docs/maths/constellation.md.
 #pragma once
 
@@ -11,7 +11,7 @@
 
 namespace perdure::mapping {
 
-/// Probability of a class, by a number that the caller gives to its name.
+/// Probability of a class; the caller assigns numbers to class names.
 struct ClassShare {
   std::uint32_t name = 0;
   double probability = 0.0;
@@ -20,20 +20,20 @@ struct ClassShare {
 /// Wraps modulo 180° into (-90°, 90°].
 double wrapHalfTurn(double angle);
 
-/// An object at rest in some level frame.
+/// A static object in a level frame.
 struct PlacedObject {
   ObjectId id = 0;
   Eigen::Vector3d p = Eigen::Vector3d::Zero();               ///< centre, m
   double yaw = 0.0;                                          ///< rad, known modulo 180°
-  Eigen::Matrix4d covariance = Eigen::Matrix4d::Identity();  ///< of [p, yaw], m and rad
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Identity();  ///< [p, yaw], m and rad
   std::vector<ClassShare> pmf;
 };
-/// Of its place, m², the mean of x and y.
+/// Variance of its position in the plane, m²: the mean of x and y.
 double planeVariance(const PlacedObject& object);
 
-/// The object of frame B in frame A. The transform's own error is not added.
+/// Transforms an object from frame B to frame A, without the error of the transform.
 PlacedObject transformed(const LevelPose& T_AB, PlacedObject object);
-/// The object of frame B in frame A, with the error of T_AB.
+/// Transforms an object from frame B to frame A, including the error of T_AB.
 PlacedObject laid(const LevelGaussian& T_AB, const PlacedObject& object);
 
 /// Normal equations of T_MB from objects of known identity.
@@ -42,16 +42,17 @@ struct MatchEquations {
   Eigen::Vector4d pull = Eigen::Vector4d::Zero();
   double chi2 = 0.0, weights = 0.0;
 
-  /// `seen` in B, `known` in M; x: T_MB at which it is linear. `blur` (m) is added to the
-  /// deviation of the place.
+  /// Adds the pair `seen` (in B) and `known` (in M); x: T_MB at the linearisation point. `blur` (m)
+  /// is added to the standard deviation of the position.
   void add(const PlacedObject& seen, const PlacedObject& known, const LevelPose& x,
            double weight = 1.0, double blur = 0.0);
   Eigen::Vector4d step() const;
-  /// The same where some directions may not be seen at all: these go by a prior, whose mean lies
-  /// `to_prior` from x. It counts by a tenth of its information, so that it pulls at nothing else.
+  /// Solves with a prior, because some directions may be unobservable. The mean of the prior lies
+  /// `to_prior` from x. The prior has a tenth of its information, so that it has little effect in
+  /// other directions.
   Eigen::Vector4d stepNear(const Eigen::Matrix4d& prior_information,
                            const Eigen::Vector4d& to_prior) const;
-  /// Is widened where errors are larger than assumed.
+  /// The covariance, widened if the residuals exceed the assumed errors.
   Eigen::Matrix4d covariance() const;
 };
 

@@ -1,4 +1,4 @@
-// Names of classes as the world writes them, and as we do: lower-case, one name for one thing.
+// Maps class names of external data to the names used here: lower-case, one name per class.
 #pragma once
 
 #include <filesystem>
@@ -10,17 +10,17 @@ namespace perdure::replay {
 
 class ClassAliases {
  public:
-  /// Only lowers the case.
+  /// Converts to lower case only.
   ClassAliases() = default;
-  /// From `config/class_aliases.yaml`: `canonical: [alias, …]`. Throws StartupError
-  /// (kUnavailable where it is missing, kConfiguration with file:line:col where it is wrong).
+  /// Reads `config/class_aliases.yaml`: `canonical: [alias, …]`. Throws StartupError: kUnavailable
+  /// if the file is missing, kConfiguration with file:line:col if it is invalid.
   static ClassAliases load(const std::filesystem::path& file);
 
-  /// The canonical, lower-case name; a name that nobody listed is only lower-cased.
+  /// The canonical, lower-case name. An unlisted name is only converted to lower case.
   std::string canonical(std::string_view name) const;
 
  private:
-  std::map<std::string, std::string> canonical_;  // from lower-case alias
+  std::map<std::string, std::string> canonical_;  // key: lower-case alias
 };
 
 }  // namespace perdure::replay

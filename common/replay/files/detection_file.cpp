@@ -11,7 +11,7 @@
 namespace perdure::replay {
 namespace {
 
-/// Where each field stands in a row.
+/// Positions of the fields in a row.
 struct Columns {
   std::size_t frame = 0, x1 = 0, y1 = 0, x2 = 0, y2 = 0, score = 0, count = 0;
   char separator = ',';
@@ -66,7 +66,7 @@ Columns headerlessColumns(const TextLine& line) {
   return columns;
 }
 
-/// An empty answer, or what is wrong with the numbers of the row.
+/// Returns an empty string, or the error in the numbers of the row.
 std::string fillBox(const std::vector<std::string_view>& fields, const Columns& columns,
                     const DetectionFileOptions& options, DetectionFile::Row& row) {
   const auto x1 = parseNumber(fields[columns.x1]), y1 = parseNumber(fields[columns.y1]);

@@ -30,7 +30,7 @@ ImageFolder::ImageFolder(fs::path folder) : folder_(std::move(folder)) {
       if (!fs::is_directory(file, ignored)) ++other_endings_[file.extension().string()];
       continue;
     }
-    // Of two with one stem the first by name is taken.
+    // Of two files with the same stem, the first by name is used.
     std::string& name = by_stem_[file.stem().string()];
     const std::string other = file.filename().string();
     if (name.empty() || other < name) name = other;

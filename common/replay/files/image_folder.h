@@ -1,4 +1,4 @@
-// The images of a camera's folder, found by what a list calls them.
+// The images in a camera's folder, found by the names in a list.
 #pragma once
 
 #include <filesystem>
@@ -11,29 +11,29 @@
 
 namespace perdure::replay {
 
-/// By its ending.
+/// Returns true for the extensions of images.
 bool isImageName(const std::filesystem::path& file);
 
 class ImageFolder {
  public:
   explicit ImageFolder(std::filesystem::path folder);
 
-  /// The image that is meant: by its name; else by the last part of the name, with another ending
-  /// or none; else by the stamp. Nothing where there is none.
+  /// Finds an image by its name; otherwise by the last part of the name with another extension or
+  /// none; otherwise by the stamp. Returns nothing if no image matches.
   std::optional<std::filesystem::path> find(std::string_view name, TimePoint stamp);
-  /// Images that are there, by their endings.
+  /// Number of images, recognised by their extensions.
   std::size_t size() const { return by_stem_.size(); }
-  /// The first one's name; "" where there is none.
+  /// Name of the first image. Returns "" if there is none.
   std::string first() const;
-  /// Why it may hold no image: links to nothing, or files of other endings; "" where it has
-  /// neither.
+  /// Describes the other contents of a folder without images: broken links, or files with other
+  /// extensions. Returns "" if it has neither.
   std::string others() const;
-  /// How many were found, but not by the name as it is written.
+  /// Number of images found by another name than the written one.
   std::size_t foundOtherwise() const { return found_otherwise_; }
 
  private:
   std::filesystem::path folder_;
-  std::map<std::string, std::string, std::less<>> by_stem_;  ///< names
+  std::map<std::string, std::string, std::less<>> by_stem_;  ///< file names
   std::map<std::string, std::size_t> other_endings_;
   std::size_t dead_links_ = 0;
   std::string first_dead_;

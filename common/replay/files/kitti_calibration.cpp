@@ -10,7 +10,7 @@
 namespace perdure::replay {
 namespace {
 
-/// `name: numbers` or, as the official tracking files partly do, `name numbers`.
+/// Lines `name: numbers` or `name numbers`; the official tracking files use both.
 class Entries {
  public:
   Entries(const std::filesystem::path& file, std::string_view mend) : file_(file) {
@@ -19,13 +19,13 @@ class Entries {
       std::string name(fields[0]);
       if (name.ends_with(':')) name.pop_back();
       const auto numbers = parseNumbers({fields.begin() + 1, fields.end()});
-      if (numbers) entries_[name] = *numbers;  // times of calibration and the like are not numbers
+      if (numbers) entries_[name] = *numbers;  // dates have no numbers
     }
   }
 
   bool has(const std::string& name) const { return entries_.contains(name); }
 
-  /// The entry of one of the names with `count` numbers.
+  /// The entry with `count` numbers under one of the names.
   const std::vector<double>& get(const std::vector<std::string>& names, std::size_t count) const {
     for (const auto& name : names) {
       const auto found = entries_.find(name);
@@ -40,7 +40,8 @@ class Entries {
                                                    " is missing; fetch KITTI's calibration again");
   }
 
-  /// Of a camera: K with focal lengths from 1 to 1e6 pixels, and [I | t] with t in metres.
+  /// Projection matrix of a camera: K with focal lengths from 1 to 1e6 pixels, and [I | t] with t
+  /// in metres.
   ProjectionMatrix projection(const std::string& name) const {
     const ProjectionMatrix P = matrix({name});
     const bool focal = P(0, 0) >= 1.0 && P(1, 1) >= 1.0 && P.cwiseAbs().maxCoeff() <= 1e6;

@@ -15,21 +15,21 @@ using ProjectionMatrix = Eigen::Matrix<double, 3, 4>;
 struct KittiCalibration {
   ProjectionMatrix P2 = ProjectionMatrix::Zero();  ///< pixels from rectified camera 0, left colour
   ProjectionMatrix P3 = ProjectionMatrix::Zero();  ///< right colour
-  RigidTransform T_RI;  ///< IMU (= body) into rectified camera 0, in which KITTI's labels are
-  std::uint32_t width = 0, height = 0;  ///< of image 2; 0 where the files do not say
+  RigidTransform T_RI;  ///< IMU (= body) in rectified camera 0, the frame of KITTI's labels
+  std::uint32_t width = 0, height = 0;  ///< size of image 2; 0 if it is not in the files
 
-  /// cam0 (P2) or cam1 (P3) as the system sees it; T_BC from P's fourth column and T_RI.
+  /// Calibration of cam0 (P2) or cam1 (P3); T_BC follows from P's fourth column and T_RI.
   CameraCalibration camera(const std::string& name) const;
 };
 
-/// Throws StartupError that names the file or entry with the mend: kUnavailable where it is
-/// missing, kData where it is wrong.
+/// Throws StartupError that names the file or entry and the fix: kUnavailable if it is missing,
+/// kData if it is invalid.
 KittiCalibration readTrackingCalibration(const std::filesystem::path& file);
-/// `folder` holds the three files.
+/// `folder` contains the three files.
 KittiCalibration readRawCalibration(const std::filesystem::path& folder);
 
-/// Sizes of KITTI tracking's training images where no image says so: 1242×375 but for the
-/// sequences 0014–0020.
+/// Image sizes of KITTI tracking's training sequences, used without images: 1242×375, except for
+/// the sequences 0014–0020.
 struct ImageSize {
   std::uint32_t width = 1242, height = 375;
 };

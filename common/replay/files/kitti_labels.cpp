@@ -7,10 +7,10 @@
 namespace perdure::replay {
 namespace {
 
-constexpr double kLastFrame = 999999;  // KITTI's names of images have six digits
+constexpr double kLastFrame = 999999;  // KITTI's image names have six digits
 constexpr double kMostCount = 1e6;
 
-/// Frame, track, truncated and occluded, which become integers.
+/// Checks frame, track, truncated and occluded, before they are converted to integers.
 bool countsMakeSense(const std::vector<double>& v) {
   const auto within = [](double x) { return std::abs(x) <= kMostCount; };
   return v[0] >= 0 && v[0] <= kLastFrame && within(v[1]) && within(v[3]) && within(v[4]);

@@ -19,7 +19,7 @@ fs::path realOf(const fs::path& path) {
 
 constexpr char kRun[] = "run.mcap";
 
-/// Of the layouts that are read.
+/// Returns whether `name` is a sensor folder in a supported layout.
 bool isOfSensors(const std::string& name) {
   constexpr std::array kSensorFolders{"mav0",  "oxts", "calib",   "color",
                                       "depth", "pose", "label_02"};
@@ -38,7 +38,7 @@ void refuseInside(const fs::path& out, const fs::path& data, const std::string& 
   if (first == "..") return;
   const bool sensors = folder.filename() == "mav0" ||
                        (isOfSensors(first) && fs::is_directory(folder / first, error));
-  // The folder of a recording is that of a run, whose results may be written anew.
+  // A folder with a run's recording may also receive the results of another run.
   const bool of_run = first == "." && fs::is_regular_file(folder / kRun, error);
   if (of_run || (first != "." && !sensors)) return;
   throw StartupError(ExitCode::kUsage, option + " " + out.string() + " lies in the data, " +

@@ -1,4 +1,4 @@
-// Where results may be written: never into what they are made of.
+// Checks of output locations, so that results never overwrite input data.
 #pragma once
 
 #include <filesystem>
@@ -6,13 +6,13 @@
 
 namespace perdure::replay {
 
-/// Throws StartupError(kUsage) where `out` is the folder `data`, or lies in mav0 or another folder
-/// of sensors in it, by links too. A folder of its own beside them may be. `option` begins the
-/// sentence ("--out").
+/// Throws StartupError(kUsage) if `out` is the folder `data`, or lies in mav0 or another sensor
+/// folder in it. Links are resolved. A separate folder beside the sensor folders is accepted. The
+/// message begins with `option` ("--out").
 void refuseInside(const std::filesystem::path& out, const std::filesystem::path& data,
                   const std::string& option);
 
-/// Throws StartupError(kUsage) where the file that is written is the recording that is read.
+/// Throws StartupError(kUsage) if the output file is the input recording.
 void refuseOverwriting(const std::filesystem::path& written, const std::filesystem::path& data,
                        const std::string& option);
 

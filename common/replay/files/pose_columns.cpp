@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kTime = 0, kX = 1, kQx = 4;
 
-/// Without unit, quotes and the signs of a comment.
+/// The name without unit, quotes and comment signs.
 std::string plainName(std::string_view name) {
   std::string plain = toLower(trim(name.substr(0, name.find_first_of("[("))));
   std::erase_if(plain, [](char c) { return c == '"' || c == '\'' || c == '#' || c == '%'; });
@@ -27,7 +27,7 @@ bool isTime(const std::string& name) {
                         "timestamp_ns", "time_ns", "t_ns", "stamp_ns"});
 }
 
-/// Which of t x y z qx qy qz qw a name is; nothing where it is none.
+/// Index of the name among t x y z qx qy qz qw. Returns nothing for other names.
 std::optional<std::size_t> columnOf(const std::string& name) {
   if (isTime(name)) return kTime;
   constexpr std::string_view kAxes = "xyzw";
@@ -74,7 +74,7 @@ std::optional<PoseColumns> poseColumnsOf(const std::vector<std::string_view>& na
 }
 
 bool namesAngles(const std::vector<std::string_view>& names) {
-  bool angles = false, quaternion = false, time = false;  // prose of a comment names no time
+  bool angles = false, quaternion = false, time = false;  // false for comments in prose
   for (const auto& written : names) {
     std::string name = plainName(written);
     time = time || isTime(name) || name.ends_with("stamp");

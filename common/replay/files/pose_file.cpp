@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kUnitTolerance = 1e-2;
 
-/// Seconds as written, to the nanosecond: a double holds only 0.2 µs of a Unix time.
+/// Parses seconds exactly to the nanosecond; a double resolves only 0.2 µs of a Unix time.
 std::optional<TimePoint> parseSeconds(std::string_view text) {
   const auto dot = text.find('.');
   const bool plain = text.find_first_of("eE") == text.npos;
@@ -35,7 +35,7 @@ std::optional<TimePoint> parseSeconds(std::string_view text) {
   return TimePoint(durationFromSeconds(*seconds));
 }
 
-/// Whether names of eight columns say that a quaternion's w comes first (q_w, qx [], q_RS_y …).
+/// Returns whether the names of eight columns put w of the quaternion first (q_w, qx [], q_RS_y …).
 bool namesWFirst(const std::vector<std::string_view>& names) {
   constexpr std::string_view kOrder = "wxyz";
   if (names.size() != 8) return false;
@@ -46,7 +46,7 @@ bool namesWFirst(const std::vector<std::string_view>& names) {
   return true;
 }
 
-/// pandas writes a number before each line, under no name.
+/// A header may begin with an empty name, because pandas writes a row number before each line.
 bool isHeaderOfPoses(std::vector<std::string_view> fields) {
   if (fields.size() > 2 && fields.front().empty()) fields.erase(fields.begin());
   return isHeader(fields);
@@ -123,7 +123,7 @@ PoseFile PoseFile::read(const std::filesystem::path& file, std::string_view mend
   std::optional<PoseColumns> named;
   for (const auto& line : lines) {
     const std::size_t expected = std::exchange(last_line, line.number) + 1;
-    // A line without time is the pose of the frame of its number.
+    // A line without time is the pose of the frame with its line number.
     if (columns > 8 && !named && line.number != expected && !poses.empty()) {
       wrong.add(expected,
                 "the line is empty, and poses are counted by lines; write the frame's pose");

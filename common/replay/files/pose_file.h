@@ -1,5 +1,5 @@
-// Trajectories in files: TUM lines (t x y z qx qy qz qw, body in world) and KITTI lines of 12 or
-// 16 numbers (row-major, one a frame, body of frame k in body of frame 0).
+// Reads trajectories: TUM lines (t x y z qx qy qz qw, body in world) and KITTI lines of 12 or 16
+// numbers (row-major, one per frame, body of frame k in body of frame 0).
 #pragma once
 
 #include <filesystem>
@@ -21,20 +21,21 @@ struct StampedPose {
 
 class PoseFile {
  public:
-  /// Throws StartupError(kData) that names each wrong line: a wrong count of numbers, a
-  /// quaternion whose norm is not 1 (to 1e-2), a rotation matrix that is not orthonormal (to
-  /// 1e-2), times that do not increase. Lines that begin with '#' are comments, a first line
-  /// without numbers is a header; either may name the columns in another order, or eight of more
-  /// (poseColumnsOf); names of angles are refused. `mend`: what to do where it cannot be read.
+  /// Throws StartupError(kData) that names each wrong line. Errors are a wrong count of numbers, a
+  /// quaternion whose norm is not 1 (to 1e-2), a rotation matrix that is not orthonormal (to 1e-2),
+  /// and times that do not increase.
+  /// Lines that begin with '#' are comments, and a first line without numbers is a header. Either
+  /// may give another column order, or eight columns of a larger number (poseColumnsOf). Names of
+  /// angles are refused. `mend`: the fix if the file cannot be read.
   static PoseFile read(const std::filesystem::path& file, std::string_view mend = kMend);
   PoseFile(PoseFormat format, std::vector<StampedPose> poses);
 
   PoseFormat format() const { return format_; }
-  /// KITTI poses have no time: theirs is 0.
+  /// The time of KITTI poses is 0, because they have none.
   const std::vector<StampedPose>& poses() const { return poses_; }
 
-  /// TUM: by time, interpolated between neighbours that are at most `max_gap` apart; a pose
-  /// within 1 ms is taken as it is. KITTI: by the frame's index. Nothing outside.
+  /// TUM: by time, interpolated between neighbours at most `max_gap` apart; a pose within 1 ms is
+  /// used as it is. KITTI: by the frame's index. Returns nothing outside the trajectory.
   std::optional<RigidTransform> at(std::uint64_t frame, TimePoint time,
                                    Duration max_gap = std::chrono::milliseconds(500)) const;
 

@@ -32,7 +32,7 @@ SensorFile::SensorFile(const std::filesystem::path& file) : name_(file.string())
   if (!stream) throwMissing(file, "a sensor's calibration", "EuRoC keeps it beside data.csv");
   std::string text, line;
   while (std::getline(stream, line)) {
-    if (line.starts_with('%')) line.clear();  // OpenCV's "%YAML:1.0" is not YAML
+    if (line.starts_with('%')) line.clear();  // OpenCV's "%YAML:1.0" is not valid YAML
     text += line + "\n";
   }
   try {
@@ -44,7 +44,7 @@ SensorFile::SensorFile(const std::filesystem::path& file) : name_(file.string())
   refuseKeysThatComeTwice();
 }
 
-/// Others take the first one, or the last.
+/// Refuses repeated keys, because other parsers use either the first or the last.
 void SensorFile::refuseKeysThatComeTwice() const {
   std::set<std::string> keys;
   for (const auto& entry : root_) {
@@ -130,7 +130,7 @@ void SensorFile::wrong(const std::string& key, const std::string& what) const {
 }
 
 std::vector<std::string> SensorFile::unknownKeys() const {
-  // Of EuRoC, Kalibr and ROS; nothing here needs them.
+  // Keys of EuRoC, Kalibr and ROS that are not used here.
   static const std::set<std::string> kOfNoUse{"sensor_type",
                                               "comment",
                                               "rostopic",

@@ -1,5 +1,5 @@
-// A sensor's calibration as YAML: EuRoC's sensor.yaml, a section of a rig file or of Kalibr's
-// camchain and imu files, or ROS' camera_info.
+// A sensor's calibration in YAML: EuRoC's sensor.yaml, a section of a rig file or of Kalibr's
+// camchain and imu files, or camera_info of ROS.
 #pragma once
 
 #include <yaml-cpp/yaml.h>
@@ -17,28 +17,28 @@ namespace perdure::replay {
 
 class SensorFile {
  public:
-  /// Throws StartupError: kUnavailable where the file is missing; kData where it is no map, or a
-  /// key is there twice. So do the others where a value is missing or makes no sense.
+  /// Throws StartupError: kUnavailable if the file is missing; kData if it is not a map, or if a
+  /// key is repeated. The other functions throw if a value is missing or invalid.
   explicit SensorFile(const std::filesystem::path& file);
 
   bool has(const std::string& key) const { return static_cast<bool>(value(key)); }
-  /// What stands under `key`, with the name of the file in messages.
+  /// The section under `key`; messages contain the name of the file.
   SensorFile section(const std::string& key) const;
   std::vector<double> numbers(const char* key, std::size_t count) const;
-  /// At least `low`.
+  /// Requires a value of at least `low`.
   double number(const char* key, double low) const;
-  /// `otherwise` where the key is missing.
+  /// Returns `otherwise` if the key is missing.
   double number(const char* key, double low, double otherwise) const;
   std::string text(const char* key) const;
-  /// Numbers of a list, of a list of rows, or of the `data` below the key; nothing where the key is
-  /// missing.
+  /// Numbers of a list, of a list of rows, or of `data` below the key. Returns nothing if the key
+  /// is missing.
   std::optional<std::vector<double>> list(const char* key) const;
-  /// A rigid transform as 4×4 numbers, row by row; nothing where the key is missing.
+  /// A rigid transform as 4×4 numbers, row by row. Returns nothing if the key is missing.
   std::optional<RigidTransform> transform(const char* key) const;
-  /// The sensor in the body; the identity where the file does not say.
+  /// The pose of the sensor in the body; the identity if the file does not contain it.
   RigidTransform T_BS() const { return transform("T_BS").value_or(RigidTransform()); }
   [[noreturn]] void wrong(const std::string& key, const std::string& what) const;
-  /// A sentence for each key that nobody asked for and that is not known to be of no use here.
+  /// A sentence for each key that was not read and is not known as irrelevant.
   std::vector<std::string> unknownKeys() const;
 
  private:
@@ -53,30 +53,29 @@ class SensorFile {
   mutable std::set<std::string> asked_;
 };
 
-/// Keys of EuRoC, Kalibr or ROS:
+/// Reads a camera with keys of EuRoC, Kalibr or ROS:
 ///
 ///     resolution | image_width, image_height     intrinsics | camera_matrix
 ///     distortion_model, distortion_coefficients | distortion_coeffs
 ///     T_BS | T_imu_cam | T_cam_imu (its inverse)  time_offset_s | timeshift_cam_imu
 ///
-/// One of the three transforms must be there. Where `T_BC_given` is given it may be missing.
-/// Models: none; radial-tangential, radtan, plumb_bob (4 coefficients, 5 with k3, 8 rational);
-/// equidistant, equi, fisheye, kannala_brandt; Kalibr's omni, eucm and ds become the equidistant
-/// lens that is nearest to them (common/camera/wide_lens.h). Time offset, readout and rate are 0
-/// where they are missing.
+/// One of the three transforms is required, unless `T_BC_given` is set. Models: none;
+/// radial-tangential, radtan, plumb_bob (4 coefficients, 5 with k3, 8 rational); equidistant, equi,
+/// fisheye, kannala_brandt. Kalibr's omni, eucm and ds are approximated by the nearest equidistant
+/// lens (common/camera/wide_lens.h). Time offset, readout and rate are 0 if they are missing.
 CameraCalibration readCamera(const SensorFile& file, const std::string& name,
                              const std::optional<RigidTransform>& T_BC_given = {});
-/// Of two cameras of Kalibr's chain: where T_cam_imu is missing, T_cn_cnm1 (this camera from the
-/// one before) gives T_BC.
+/// The pose of the second of two cameras in Kalibr's chain. If T_cam_imu is missing, T_cn_cnm1
+/// (this camera from the previous one) gives T_BC.
 std::optional<RigidTransform> placeInChain(const SensorFile& file, const CameraCalibration& before);
 /// The rate is `rate_hz` or `update_rate`.
 ImuCalibration readImuCalibration(const SensorFile& file);
 
-/// What the two read, a key a line and all digits, but for T_BS.
+/// The keys that the two functions above read, except T_BS: one per line, with all digits.
 std::string cameraKeys(const CameraCalibration& camera);
 std::string imuKeys(const ImuCalibration& imu);
 std::string transformKey(const RigidTransform& T_BS);
-/// A whole sensor.yaml. The IMU is the body.
+/// A complete sensor.yaml. The IMU is the body.
 std::string cameraYaml(const CameraCalibration& camera, const std::string& comment);
 std::string imuYaml(const ImuCalibration& imu, const std::string& comment);
 

@@ -1,4 +1,4 @@
-// Cameras and inertial units out of the keys that EuRoC, Kalibr and ROS have for them.
+// Reads cameras and inertial units from the keys of EuRoC, Kalibr and ROS.
 #include <algorithm>
 #include <utility>
 
@@ -40,7 +40,7 @@ void readFocalLengths(const SensorFile& file, CameraCalibration& camera) {
   camera.fx = f[0], camera.fy = f[1], camera.cx = f[2], camera.cy = f[3];
 }
 
-/// "pinhole-radtan", as Kalibr's command line has it, is pinhole and radtan.
+/// Kalibr's "pinhole-radtan" is split into pinhole and radtan.
 std::string distortionName(const SensorFile& file) {
   const std::string lens = toLower(file.text("camera_model"));
   const auto dash = lens.find('-');
@@ -62,14 +62,14 @@ std::vector<double> coefficientsOf(const SensorFile& file) {
   return {};
 }
 
-/// Kalibr's unified, extended unified and double sphere lenses; nothing where it is another.
+/// Kalibr's unified, extended unified and double sphere lenses. Returns nothing for other lenses.
 std::optional<WideLens> wideLensOf(const SensorFile& file) {
   const std::string lens = toLower(file.text("camera_model"));
   const std::string model = lens.substr(0, lens.find('-'));
   WideLens wide;
   std::vector<double> v;
   if (model == "omni" || model == "mei" || model == "unified") {
-    v = file.numbers("intrinsics", 5);  // xi, focal lengths, centre
+    v = file.numbers("intrinsics", 5);  // xi, focal lengths, principal point
     v.insert(v.begin() + 1, 0.0);
   } else if (model == "eucm" || model == "ds" || model == "double_sphere") {
     wide.kind = model == "eucm" ? WideLens::Kind::kExtendedUnified : WideLens::Kind::kDoubleSphere;
@@ -109,7 +109,8 @@ void readLens(const SensorFile& file, CameraCalibration& camera) {
   if (!set) file.wrong(set.error().code, set.error().detail);
 }
 
-/// From the first row to the last; Kalibr and TUM's rolling shutter have it of a row.
+/// Readout time from the first row to the last; Kalibr and TUM's rolling shutter data give it per
+/// row.
 double readoutOf(const SensorFile& file, std::uint32_t rows) {
   for (const auto& [key, unit_s] : {std::pair("line_delay", 1.0), std::pair("line-delay", 1.0),
                                     std::pair("line_delay_nanoseconds", 1e-9)}) {

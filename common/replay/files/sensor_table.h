@@ -1,4 +1,4 @@
-// data.csv of a sensor's folder: a stamp and values a line, read line by line, brought into order.
+// The data.csv of a sensor's folder: a stamp and values per line, sorted by time.
 #pragma once
 
 #include <filesystem>
@@ -14,34 +14,33 @@
 namespace perdure::replay {
 
 struct TableRow {
-  std::size_t number = 0;  ///< among the rows, from 0, those that are left out counted too
+  std::size_t number = 0;  ///< row number from 0, including skipped rows
   TimePoint time;
   std::vector<std::string_view> fields;  ///< the first is the stamp
 };
 
 class SensorTable {
  public:
-  /// Why a row cannot be used; "" where it can.
+  /// Returns the reason why a row cannot be used; "" if it can.
   using Judge = std::function<std::string(const std::vector<std::string_view>& fields)>;
 
-  /// `kind` begins the reasons that are counted: KIND_malformed, KIND_not_increasing (a stamp that
-  /// was there before), KIND_stray (its stamp is far from its neighbours'), KIND_unsorted (rows
-  /// that were moved). Fields are separated by commas, semicolons or blanks. Throws
-  /// StartupError(kData) with the first line that is wrong where fewer than half of the rows can be
-  /// used.
+  /// `kind` is the prefix of the counted reasons: KIND_malformed, KIND_not_increasing (a repeated
+  /// stamp), KIND_stray (a stamp far from those of its neighbours), KIND_unsorted (rows that were
+  /// moved). Fields are separated by commas, semicolons or blanks. If fewer than half of the rows
+  /// can be used, throws StartupError(kData) with the first wrong line.
   SensorTable(const std::filesystem::path& file, const std::string& kind, const Judge& judge);
-  SensorTable(const SensorTable&) = delete;  // rows point into it
+  SensorTable(const SensorTable&) = delete;  // rows refer to its text
   SensorTable& operator=(const SensorTable&) = delete;
 
-  /// Names of the columns, small letters; empty where the file has no head.
+  /// Names of the columns in lower case. The result is empty if the file has no header.
   const std::vector<std::string>& head() const { return head_; }
-  /// By time, which increases.
+  /// Rows in order of increasing time.
   const std::vector<TableRow>& rows() const { return rows_; }
-  /// How many the file has, wrong ones too.
+  /// Number of rows in the file, including wrong ones.
   std::size_t lines() const { return lines_; }
   bool wasSorted() const { return reasons_.of(kind_ + "_unsorted") == 0; }
   const ReasonCounts& reasons() const { return reasons_; }
-  /// What was mended, a sentence each.
+  /// Repairs, a sentence each.
   const std::vector<std::string>& notes() const { return notes_; }
 
  private:

@@ -10,11 +10,11 @@
 namespace perdure::replay {
 namespace {
 
-constexpr std::size_t kFew = 3;        ///< strays, whatever the number of stamps
-constexpr std::size_t kFewShare = 50;  ///< one in so many
-constexpr int kFarIntervals = 32;      ///< outside of the neighbours' stamps
+constexpr std::size_t kFew = 3;        ///< number of strays accepted for any number of stamps
+constexpr std::size_t kFewShare = 50;  ///< one stray per this number of stamps
+constexpr int kFarIntervals = 32;      ///< distance from the neighbours' stamps, in intervals
 
-/// A decimal number as digits and where its point stands, counted from their beginning.
+/// A decimal number as digits, and the position of its point from their start.
 struct Decimal {
   std::string digits;
   std::int64_t point = 0;
@@ -39,9 +39,9 @@ std::optional<Decimal> decimalOf(std::string_view text) {
   return all_digits && !decimal.digits.empty() ? std::optional(decimal) : std::nullopt;
 }
 
-/// Indices of a longest list of stamps that do not decrease.
+/// Indices of a longest subsequence of stamps that do not decrease.
 std::vector<std::size_t> longestInOrder(const std::vector<TimePoint>& stamps) {
-  std::vector<std::size_t> ends, before(stamps.size());  // ends[k]: of the best list of k + 1
+  std::vector<std::size_t> ends, before(stamps.size());  // ends[k]: end of the best k + 1
   for (std::size_t i = 0; i < stamps.size(); ++i) {
     const auto at =
         std::upper_bound(ends.begin(), ends.end(), stamps[i],
@@ -74,7 +74,7 @@ bool areFew(std::size_t count, std::size_t all) {
   return 2 * count < all && count <= std::max(kFew, all / kFewShare);
 }
 
-/// Stamps that are in line, and what to say of those that are not.
+/// The longest ordered sequence of stamps, used to judge the other stamps.
 class Line {
  public:
   explicit Line(const std::vector<TimePoint>& stamps) : stamps_(stamps) {
@@ -84,7 +84,8 @@ class Line {
   }
   const std::vector<std::size_t>& indices() const { return indices_; }
 
-  /// Far outside of the stamps that stand before and behind it, and where nothing is missing.
+  /// Returns true if the stamp is far outside its neighbours' stamps and does not fill a gap
+  /// elsewhere.
   bool isStray(std::size_t index) const {
     const auto next = std::lower_bound(indices_.begin(), indices_.end(), index);
     const TimePoint stamp = stamps_[index];
@@ -104,12 +105,12 @@ class Line {
   }
 
   const std::vector<TimePoint>& stamps_;
-  std::vector<std::size_t> indices_;  // increasing, and so are their stamps
+  std::vector<std::size_t> indices_;  // increasing, as are their stamps
   std::vector<TimePoint> sorted_;
   Duration usual_{0};
 };
 
-/// Leaves out the few before or behind a long pause.
+/// Removes a few stamps before or after a long pause at the ends.
 void cutEnds(const std::vector<TimePoint>& stamps, StampOrder& order) {
   auto& kept = order.kept;
   if (kept.size() < 20) return;

@@ -1,5 +1,5 @@
-// Stamps of a recording as people have them: spelled in several ways, out of order, and single ones
-// far from where their neighbours are.
+// Stamps of recordings in practice: in several notations, out of order, and with outliers far from
+// their neighbours.
 #pragma once
 
 #include <cstddef>
@@ -13,31 +13,33 @@
 
 namespace perdure::replay {
 
-/// Whole nanoseconds, ≥ 0: "1403636579763555584", with a point and zeros behind it, or as
-/// numpy.savetxt has it ("1.403636579763555584e+18"), exactly. Nothing where a fraction is left.
+/// Parses whole nanoseconds, ≥ 0, exactly: "1403636579763555584", also with a decimal point and
+/// zeros, or in the format of numpy.savetxt ("1.403636579763555584e+18"). Returns nothing if a
+/// fraction remains.
 std::optional<TimePoint> parseNanoseconds(std::string_view text);
 
-/// Why parseNanoseconds() gave nothing, and the mend; "" where it gave something.
+/// The reason and the fix if parseNanoseconds() returns nothing. Otherwise returns "".
 std::string whyNoStamp(std::string_view text);
 
-/// a − b. A file may state any stamps: where they are farther apart than 292 years, that.
+/// a − b, limited to ±292 years, because a file may contain any stamps.
 Duration between(TimePoint a, TimePoint b);
-/// n · d, at most that, too.
+/// n · d, with the same limit.
 Duration multipleOf(std::int64_t n, Duration d);
 
-/// Which stamps are kept, as indices, so that they increase.
+/// The stamps to keep, as indices in increasing order of the stamps.
 struct StampOrder {
   std::vector<std::size_t> kept;
-  std::size_t moved = 0;     ///< did not stand in order and were sorted
-  std::size_t strays = 0;    ///< left out: a few whose stamp is far from their neighbours'
-  std::size_t repeated = 0;  ///< left out: the stamp was there before
+  std::size_t moved = 0;     ///< out of order; sorted
+  std::size_t strays = 0;    ///< removed: a few stamps far from their neighbours
+  std::size_t repeated = 0;  ///< removed: repeated stamps
 };
 
-/// Stamps that increase are all kept. Else those that are out of line are strays where they are few
-/// (a fiftieth, or three, where a fifth at most is out of line) and far outside of their
-/// neighbours' stamps, and fill no hole elsewhere; with more of them the list was not sorted, and
-/// nothing is left out. Also strays: up to three stamps before the first or behind the last of the
-/// others, with a pause that is longer than ten seconds and a thousand usual intervals.
+/// Increasing stamps are all kept. Otherwise the stamps out of order are examined. They are strays
+/// if they are few and far outside their neighbours' stamps, and do not fill a gap elsewhere. Few
+/// means a fiftieth or three, if at most a fifth is out of order. With more of them the list is
+/// treated as unsorted, and no stamp is left out.
+/// Up to three stamps at either end are strays as well, if they are separated by a pause longer
+/// than ten seconds and a thousand usual intervals.
 StampOrder orderOf(const std::vector<TimePoint>& stamps);
 
 }  // namespace perdure::replay

@@ -1,6 +1,6 @@
-// Bags of ROS 1 (format 2.0): records of named fields and data, messages in chunks, an index behind
-// each. The file is gone through by the heads of its records, so that a bag that was never closed
-// (`.bag.active`, or renamed) is read as far as it goes.
+// Bags of ROS 1 (format 2.0): records of named fields and data, and messages in chunks, each
+// followed by an index. The reader scans the record headers. A bag that was never closed
+// (`.bag.active`, or renamed) is therefore read as far as possible.
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -26,7 +26,7 @@ using HeadFields = std::map<std::string, std::string>;
 constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
 constexpr std::uint64_t kMostHead = 1u << 20;
 constexpr std::uint64_t kMostChunk = 64u << 20;  // rosbag writes 768 kB
-constexpr std::uint64_t kMostHeld = 1u << 30;    // of chunks that are unpacked at one time
+constexpr std::uint64_t kMostHeld = 1u << 30;    // memory of chunks unpacked at one time
 
 enum class Op : std::uint8_t { kMessage = 2, kIndex = 4, kChunk = 5, kConnection = 7 };
 
@@ -38,7 +38,7 @@ X numberIn(std::string_view bytes) {
   return x;
 }
 
-/// "name=value" after their lengths; nothing where they do not fit.
+/// Parses "name=value" fields, each after its length. Returns nothing if they do not fit.
 std::optional<HeadFields> fieldsOf(Bytes head) {
   HeadFields fields;
   mcap::Take take(head);
@@ -124,7 +124,7 @@ class Bag : public RosSource {
   struct Pending {
     RosMessage message;
     std::uint64_t order = 0;
-    bool operator<(const Pending& other) const {  // the queue's top is the largest
+    bool operator<(const Pending& other) const {  // the top of the queue is the largest
       return std::tie(message.log_ns, order) > std::tie(other.message.log_ns, other.order);
     }
   };
@@ -235,7 +235,8 @@ class Bag : public RosSource {
                        [this](std::uint32_t one) { return connections_.contains(one); });
   }
 
-  /// Where the file lacks its end: the chunk in which a connection is first used has its record.
+  /// Reads connection records from the chunk that first uses each connection, if the end of the
+  /// file is missing.
   void learnConnections(const ChunkPlace& chunk) {
     if (const auto records = unpack(chunk))
       forEachMessage(**records, [](std::uint32_t, std::uint64_t, Bytes) {});
@@ -297,7 +298,7 @@ class Bag : public RosSource {
     return known != connections_.end() && wanted_.contains(known->second.first);
   }
 
-  /// Chunks whose times overlap are unpacked together; rosbag's own overlap by fractions of a
+  /// Chunks with overlapping times are unpacked together; those of rosbag overlap by fractions of a
   /// second.
   void hold(const Records& records) {
     std::erase_if(held_, [](const auto& one) { return one.expired(); });
@@ -331,7 +332,7 @@ class Bag : public RosSource {
   std::uint64_t size_ = 0;
   std::map<std::uint32_t, std::pair<std::string, std::string>> connections_;  ///< topic and type
   std::map<std::uint32_t, std::uint64_t> counts_;
-  std::vector<ChunkPlace> chunks_;  ///< by time
+  std::vector<ChunkPlace> chunks_;  ///< sorted by time
   std::set<std::string> wanted_;
   std::uint64_t from_ns_ = 0, order_ = 0;
   std::size_t next_chunk_ = 0;

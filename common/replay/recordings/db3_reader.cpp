@@ -55,7 +55,7 @@ class Db3 : public RosSource {
         last_ns_ = log_ns;
         return message();
       }
-      // Text sorts behind all numbers; an index that is damaged, anyhow.
+      // Text sorts after all numbers; a damaged index may give any order.
       count({"stamp_malformed", path_.string() +
                                     ": a message whose time is no whole number, or goes "
                                     "back; it is left out"});
@@ -64,13 +64,13 @@ class Db3 : public RosSource {
   }
 
  private:
-  /// False at the end.
+  /// Returns false at the end.
   bool step() {
     if (!rows_) return false;
     const int got = sqlite3_step(rows_.get());
     if (got == SQLITE_ROW) return true;
     if (got != SQLITE_DONE && sorted_ && last_ns_ < 0) {
-      // What has to be sorted first ends before its first row; they were written as they came.
+      // Sorting failed before its first row. Use the order in which the messages were written.
       sorted_ = false;
       rows_ = prepared(chosen_ + "id");
       return step();
@@ -126,7 +126,7 @@ class Db3 : public RosSource {
     noteEnd(got);
   }
 
-  /// One by one: of a sum nothing would be left where a page is damaged.
+  /// Counts row by row, because an aggregate query returns nothing if a page is damaged.
   void countMessages() {
     const auto rows = prepared("SELECT topic_id, timestamp FROM messages ORDER BY id");
     int got = SQLITE_ROW;
@@ -146,7 +146,7 @@ class Db3 : public RosSource {
   std::filesystem::path path_;
   std::unique_ptr<sqlite3, Close> database_;
   std::map<sqlite3_int64, std::string> names_;
-  std::string chosen_;  ///< the query of what is wanted, without its order
+  std::string chosen_;  ///< query of the selected messages, without its order
   Statement rows_;
   bool sorted_ = true;
   sqlite3_int64 last_ns_ = -1;

@@ -1,5 +1,5 @@
-// MCAP, the container of recordings (mcap.dev/spec, version 0): records, and the bytes that they
-// are made of. Numbers are little-endian. Internal to common/replay.
+// MCAP, the container format of recordings (mcap.dev/spec, version 0): its records and their
+// encoding. Numbers are little-endian. Internal to common/replay.
 #pragma once
 
 #include <array>
@@ -52,17 +52,17 @@ struct Channel {
 struct Message {
   std::uint16_t channel = 0;
   std::uint32_t sequence = 0;
-  std::uint64_t log_ns = 0, publish_ns = 0;  ///< of the epoch
+  std::uint64_t log_ns = 0, publish_ns = 0;  ///< times since the epoch
   Bytes data = {};
 };
 
 struct ChunkIndex {
   std::uint64_t start_ns = 0, end_ns = 0;  ///< log times of the first and the last message
-  std::uint64_t offset = 0, length = 0;    ///< of the chunk's record in the file, head included
-  std::map<std::uint16_t, std::uint64_t> index_offsets = {};  ///< of MessageIndex, by channel
+  std::uint64_t offset = 0, length = 0;    ///< the chunk's record, including its header
+  std::map<std::uint16_t, std::uint64_t> index_offsets = {};  ///< offsets by channel
   std::uint64_t index_length = 0;
   std::string compression = {};
-  std::uint64_t packed = 0, unpacked = 0;  ///< bytes of its records
+  std::uint64_t packed = 0, unpacked = 0;  ///< size of its records in bytes
 };
 
 struct Statistics {
@@ -91,7 +91,7 @@ class Put {
   std::vector<std::uint8_t>& to_;
 };
 
-/// Takes values; false, and nothing taken, where the bytes end before.
+/// Reads values. Returns false and consumes nothing if the bytes end too early.
 class Take {
  public:
   explicit Take(Bytes bytes) : bytes_(bytes) {}
@@ -118,7 +118,7 @@ struct Record {
   Op op{};
   Bytes content;
 };
-/// The record at the beginning of `bytes`, which are shortened by it; nothing where it is cut off.
+/// Removes the first record from `bytes` and returns it. Returns nothing if it is truncated.
 std::optional<Record> takeRecord(Bytes& bytes);
 
 void putSchema(std::vector<std::uint8_t>& to, const Schema& schema);
@@ -133,7 +133,7 @@ std::optional<Message> messageFrom(Bytes content);
 std::optional<ChunkIndex> chunkIndexFrom(Bytes content);
 std::optional<Statistics> statisticsFrom(Bytes content);
 
-/// CRC-32 (ISO-HDLC), as MCAP has it; `before` is that of the bytes before.
+/// CRC-32 (ISO-HDLC) as used by MCAP; `before` is the checksum of the preceding bytes.
 std::uint32_t crc(Bytes bytes, std::uint32_t before = 0);
 
 }  // namespace perdure::replay::mcap

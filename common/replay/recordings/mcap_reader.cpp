@@ -12,14 +12,14 @@
 namespace perdure::replay::mcap {
 namespace {
 
-constexpr char kBare[] = "bare";  ///< no chunk: one message's record in the file itself
-constexpr std::uint64_t kMostContent = 64u << 20;  ///< of a record other than a chunk
+constexpr char kBare[] = "bare";  ///< no chunk: a single message record in the file
+constexpr std::uint64_t kMostContent = 64u << 20;  ///< limit of records other than chunks
 
-/// What stands before a chunk's records.
+/// The header of a chunk, before its records.
 struct ChunkHead {
   ChunkIndex place;
   std::uint32_t crc = 0;
-  std::uint64_t records_at = 0;  ///< from the beginning of the content
+  std::uint64_t records_at = 0;  ///< offset from the start of the content
 };
 
 std::optional<ChunkHead> chunkHeadFrom(Bytes content) {
@@ -145,7 +145,7 @@ void Reader::letGo() {
   file_ = -1;
 }
 
-/// Fewer bytes where the file ends before, or cannot be read.
+/// Returns fewer bytes if the file ends earlier or cannot be read.
 std::vector<std::uint8_t> Reader::read(std::uint64_t at, std::uint64_t length) const {
   const int file = file_ >= 0 ? file_ : ::open(path_.c_str(), O_RDONLY | O_CLOEXEC);
   std::vector<std::uint8_t> bytes(at < size_ ? std::min(length, size_ - at) : 0);
@@ -162,7 +162,7 @@ std::vector<std::uint8_t> Reader::read(std::uint64_t at, std::uint64_t length) c
   return bytes;
 }
 
-/// What may be left out (all of it, statistics, indexes) is no fault.
+/// Missing optional parts (the whole summary, statistics, indexes) are not an error.
 Reader::Summary Reader::readSummary() {
   constexpr std::uint64_t kEnd = kRecordHead + kFooterContent + kMagic.size();
   if (size_ < kMagic.size() + kEnd) return Summary::kTooLittle;
@@ -214,7 +214,7 @@ Reader::Summary Reader::takeSummary(Bytes records) {
   return counted && describesAll() ? Summary::kHolds : Summary::kTooLittle;
 }
 
-/// Whether chunks lie in the file.
+/// Returns whether all chunks lie within the file.
 bool Reader::plausible() const {
   return std::all_of(chunks_.begin(), chunks_.end(), [this](const ChunkIndex& chunk) {
     return chunk.offset >= kMagic.size() && chunk.offset <= size_ && chunk.length >= kRecordHead &&
@@ -222,7 +222,7 @@ bool Reader::plausible() const {
   });
 }
 
-/// Whether all messages, and what they refer to, can be found by the summary alone.
+/// Returns whether the summary alone locates all messages with their channels and schemas.
 bool Reader::describesAll() const {
   if (statistics_.messages == 0) return true;
   return !chunks_.empty() && chunks_.size() == statistics_.chunks &&
@@ -230,7 +230,7 @@ bool Reader::describesAll() const {
          catalogue_.schemas.size() == statistics_.schemas;
 }
 
-/// Whether it came to the footer with the magic behind it, the file's end.
+/// Returns true if the scan reached the footer and the final magic at the end of the file.
 bool Reader::scan() {
   catalogue_ = {};
   chunks_.clear();
@@ -243,7 +243,7 @@ bool Reader::scan() {
     std::uint8_t op = 0;
     std::uint64_t length = 0;
     if (!take.number(op) || !take.number(length) || op == 0) return false;
-    if (length > size_ - at - kRecordHead) return false;  // cut off
+    if (length > size_ - at - kRecordHead) return false;  // truncated
     const std::uint64_t end = at + kRecordHead + length;
     if (static_cast<Op>(op) == Op::kFooter) return endsAt(end);
     if (static_cast<Op>(op) == Op::kDataEnd) in_data = false;
@@ -261,7 +261,7 @@ bool Reader::endsAt(std::uint64_t end) {
   return next.empty();
 }
 
-/// False where nothing behind can be believed.
+/// Returns false if the rest of the file is not trustworthy.
 bool Reader::scanRecord(Op op, std::uint64_t at, std::uint64_t length) {
   if (op == Op::kChunk) return scanChunk(at, length);
   if (op == Op::kHeader && chunks_.empty()) whole_ = at + kRecordHead + length;
@@ -314,7 +314,7 @@ bool Reader::scanChunk(std::uint64_t at, std::uint64_t length) {
   return true;
 }
 
-/// Into the statistics and last_index_; false where they end within a record.
+/// Updates the statistics and last_index_. Returns false if the data end within a record.
 bool Reader::countMessages(const Records& records) {
   last_index_.clear();
   const auto visit = [&](const Message& message, std::uint64_t offset) {
@@ -351,7 +351,7 @@ void Reader::scanMessageIndex(std::uint64_t at, std::uint64_t length, Bytes cont
   if (chunk.index_offsets.size() == last_index_.size()) whole_ = at + kRecordHead + length;
 }
 
-/// A message outside of chunks, as small writers leave them.
+/// Adds a message outside chunks, as minimal writers produce.
 void Reader::addBare(std::uint64_t at, std::uint64_t length) {
   const auto message = messageFrom(read(at + kRecordHead, length));
   if (!message) return;
@@ -406,7 +406,7 @@ Result<void> Reader::finish() {
   const bool lacks_index =
       !chunks.empty() && chunks.back().index_offsets.size() != last_index_.size();
   std::optional<ChunkIndex> last;
-  std::uint64_t end = whole_ <= kMagic.size() ? 0 : whole_;  // 0: begun anew, with its header
+  std::uint64_t end = whole_ <= kMagic.size() ? 0 : whole_;  // 0: rewrite all
   if (lacks_index) {
     last = chunks.back();
     last->index_length = 0;

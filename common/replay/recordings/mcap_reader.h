@@ -1,7 +1,7 @@
-// A recording's file as it is read: by its summary, or, where that is missing or wrong (a recorder
-// that was killed, or a writer that leaves out what it may), by going through it record by record.
-// Records of kinds that are not known are passed over, and so are bytes behind a record's last
-// field. Any bytes are taken; nothing is believed that was not checked.
+// Reads a recording's file by its summary. If the summary is missing or wrong, the file is scanned
+// record by record. This happens after a crash of the recorder, or with writers that omit optional
+// parts. Unknown records, and bytes after the last known field of a record, are skipped. Input may
+// be arbitrary bytes; all values are checked before use.
 #pragma once
 
 #include <filesystem>
@@ -17,47 +17,48 @@ namespace perdure::replay::mcap {
 
 using Records = std::shared_ptr<const std::vector<std::uint8_t>>;
 
-/// A chunk that cannot be read, or not to its end.
+/// A chunk that cannot be read completely.
 struct Damage {
-  std::uint64_t offset = 0;  ///< of its record in the file
-  Reason reason;             ///< as Reader::unpack has it, without the file
+  std::uint64_t offset = 0;  ///< offset of its record in the file
+  Reason reason;             ///< reason of Reader::unpack, without the file
 };
 
 class Reader {
  public:
-  /// Reasons: "file", "not_mcap"; the detail says the mend.
+  /// Reasons: "file", "not_mcap"; the detail states the fix.
   static Result<Reader> open(const std::filesystem::path& path);
   Reader(Reader&& other) noexcept;
   Reader& operator=(Reader&&) = delete;
   ~Reader();
 
   const std::filesystem::path& path() const { return path_; }
-  /// Whether the file goes to its end: a footer and the magic, and no summary that is wrong.
-  /// Otherwise all that is whole was found by looking.
+  /// Returns whether the file is complete: a footer, the magic, and no wrong summary. Otherwise a
+  /// scan has found all complete records.
   bool finished() const { return finished_; }
-  /// Whether another recording begins where it ends, as `cat` leaves two: that one is not read.
+  /// Returns whether another recording follows in the same file, as after `cat` of two files. The
+  /// second one is not read.
   bool followed() const { return followed_; }
   const Catalogue& catalogue() const { return catalogue_; }
   const std::vector<ChunkIndex>& chunks() const { return chunks_; }
   const Statistics& statistics() const { return statistics_; }
   std::uint64_t size() const { return size_; }
-  /// Of an unfinished file: bytes behind the last whole chunk.
+  /// Number of bytes after the last complete chunk of an unfinished file.
   std::uint64_t cutBytes() const { return size_ - whole_; }
-  /// Of a file that was gone through.
+  /// Damage found by a scan.
   const std::vector<Damage>& damage() const { return damage_; }
-  /// Goes through every chunk that the summary names: damage() is of all then, and chunks() and
-  /// statistics() are of what can be read.
+  /// Unpacks every chunk of the summary. damage() is then complete, and chunks() and statistics()
+  /// describe the readable part.
   void check();
 
-  /// The chunk's records. Reasons: "chunk_damaged", "chunk_of_other_compression",
+  /// The records of the chunk. Reasons: "chunk_damaged", "chunk_of_other_compression",
   /// "chunk_too_large", "file".
   Result<Records> unpack(const ChunkIndex& chunk) const;
 
-  /// Keeps no file open from now on; unpack() opens it each time.
+  /// Closes the file; from now on unpack() opens it for each call.
   void letGo();
 
-  /// Makes an unfinished file a finished one: cuts what is not whole (cutBytes), writes the
-  /// summary. Refuses what finishable() does.
+  /// Completes an unfinished file: cuts incomplete data (cutBytes) and writes the summary. Fails
+  /// with the reasons of finishable().
   Result<void> finish();
   /// Reasons: "followed" (by another recording, which would be lost), "not_chunked".
   Result<void> finishable() const;
@@ -88,17 +89,18 @@ class Reader {
   Catalogue catalogue_;
   std::vector<ChunkIndex> chunks_;
   Statistics statistics_;
-  Draft::Index last_index_;  ///< of the last chunk that the scan found
+  Draft::Index last_index_;  ///< index of the last chunk found by the scan
 };
 
-/// "FILE: 2 of 41 chunks cannot be read; the first, at byte 812: …", of one that has some.
+/// Describes the damage of a file: "FILE: 2 of 41 chunks cannot be read; the first, at byte 812:
+/// …".
 std::string sentenceOfDamage(const std::filesystem::path& file, const Reader& reader);
 
-/// That another recording follows the first one in `file`, and the mend.
+/// A sentence that another recording follows the first one in `file`, with the fix.
 std::string sentenceOfFollowed(const std::filesystem::path& file);
 
-/// Goes through a chunk's records; false where they are damaged (what came before was given).
-/// `other` gets schemas and channels.
+/// Visits the messages in a chunk's records. Returns false if they are damaged; earlier messages
+/// have been visited then. `other` receives schemas and channels.
 bool forEachMessage(Bytes records,
                     const std::function<void(const Message&, std::uint64_t offset)>& visit,
                     Catalogue& other);

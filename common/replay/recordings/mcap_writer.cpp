@@ -42,7 +42,7 @@ std::vector<std::uint8_t> compressed(const std::vector<std::uint8_t>& records) {
   return bytes;
 }
 
-/// Appends the indexes, and notes in `place` where they stand; `at` is where `to` will begin.
+/// Appends the indexes and records their offsets in `place`; `at` is the file offset of `to`.
 void putIndexes(std::vector<std::uint8_t>& to, std::uint64_t at, const Draft::Index& index,
                 ChunkIndex& place) {
   const std::size_t before = to.size();
@@ -61,7 +61,7 @@ void putIndexes(std::vector<std::uint8_t>& to, std::uint64_t at, const Draft::In
   place.index_length = to.size() - before;
 }
 
-/// Calls `put` for each group of records and tells readers where it stands.
+/// Builds the summary section: group() calls `put` for each group of records, and adds its offset.
 class Summary {
  public:
   explicit Summary(std::uint64_t at) : at_(at) {}
@@ -76,7 +76,8 @@ class Summary {
     Put(content).number(static_cast<std::uint64_t>(bytes_.size() - before));
     Put(offsets_).record(Op::kSummaryOffset, content);
   }
-  /// With the footer, whose checksum is of all from here to itself, and the magic.
+  /// Returns the summary with the footer and the magic. The footer's checksum covers all bytes from
+  /// the start of the summary up to itself.
   std::vector<std::uint8_t> finished() {
     const std::uint64_t offsets_at = at_ + bytes_.size();
     Put put(bytes_);
@@ -247,7 +248,7 @@ Result<void> Writer::appendIndex(ChunkIndex& chunk, const Draft::Index& index) {
 
 std::vector<std::uint8_t> Writer::summary() const {
   std::vector<std::uint8_t> end{static_cast<std::uint8_t>(Op::kDataEnd), 4, 0, 0, 0, 0, 0, 0, 0};
-  Put(end).number(std::uint32_t{0});  // no checksum of the data section: chunks have theirs
+  Put(end).number(std::uint32_t{0});  // no checksum of the data section, because each chunk has one
   Statistics statistics = statistics_;
   statistics.schemas = static_cast<std::uint32_t>(catalogue_.schemas.size());
   statistics.channels = static_cast<std::uint32_t>(catalogue_.channels.size());

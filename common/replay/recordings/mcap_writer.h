@@ -1,5 +1,5 @@
-// Recordings as they are written: chunks of messages, packed and indexed, and at the end the
-// summary. What was written stays readable whenever the writer dies: at most the last chunk is cut.
+// Writes recordings: compressed and indexed chunks of messages, followed by the summary. Written
+// data remain readable if the writer ends at any time; at most the last chunk is truncated.
 #pragma once
 
 #include <filesystem>
@@ -14,16 +14,16 @@
 
 namespace perdure::replay::mcap {
 
-/// What messages refer to, by id.
+/// Schemas and channels of the messages, by id.
 struct Catalogue {
   std::map<std::uint16_t, Schema> schemas = {};
   std::map<std::uint16_t, Channel> channels = {};
 };
 
-/// Messages of a short time, one after the other, not yet packed.
+/// Consecutive messages of a short period, not compressed yet.
 class Draft {
  public:
-  /// In the order of arrival; log times do not go back.
+  /// Messages are added in the order of arrival; log times must not decrease.
   void add(const Message& message);
   bool empty() const { return index_.empty(); }
   std::size_t bytes() const { return records_.size(); }
@@ -41,27 +41,28 @@ class Draft {
   std::uint64_t start_ns_ = UINT64_MAX, end_ns_ = 0, messages_ = 0;
 };
 
-/// A packed chunk, as it goes into any file.
+/// A compressed chunk, independent of the file.
 struct Chunk {
   ChunkIndex place;                  ///< offsets not yet set
-  std::vector<std::uint8_t> record;  ///< the chunk's record, whole
+  std::vector<std::uint8_t> record;  ///< complete record of the chunk
   Draft::Index index;
   std::uint64_t messages = 0;
 
-  std::size_t bytes() const;  ///< of memory, about
+  std::size_t bytes() const;  ///< approximate memory
 };
-/// By zstd, fastest level.
+/// Compresses by zstd at the fastest level.
 Chunk pack(const Draft& draft);
 
-/// Of a Writer's reason.
+/// The exit status for a reason of Writer.
 ExitCode exitCodeOf(const Reason& reason);
 
 class Writer {
  public:
-  /// A new file. Reasons: "file", "disk_full" (the detail is the system's); none is left then.
+  /// Creates a file. Reasons: "file", "disk_full" (the detail is that of the system); no file
+  /// remains then.
   static Result<Writer> create(const std::filesystem::path& path, const std::string& profile = {});
-  /// An existing one, from `end` on: what is behind is cut off. `chunks` and `counted` are what
-  /// stands before.
+  /// Opens an existing file and truncates it at `end`. `chunks` and `counted` describe the data
+  /// before.
   static Result<Writer> resume(const std::filesystem::path& path, std::uint64_t end,
                                const Catalogue& catalogue, std::vector<ChunkIndex> chunks,
                                const Statistics& counted);
@@ -69,14 +70,14 @@ class Writer {
   Writer& operator=(Writer&& other) noexcept;
   ~Writer();
 
-  /// Writes the chunk and those of its schemas and channels that are new to this file. Where that
-  /// fails ("disk_full", "file") the file is as before, and it may be tried again.
+  /// Writes the chunk, and those of its schemas and channels that are new to this file. On failure
+  /// ("disk_full", "file") the file is restored, and the call may be repeated.
   Result<void> append(const Chunk& chunk, const Catalogue& catalogue);
-  /// Writes the message indexes that a chunk which stands in the file still lacks.
+  /// Writes the missing message indexes of a chunk in the file.
   Result<void> appendIndex(ChunkIndex& chunk, const Draft::Index& index);
-  /// Writes the summary; the same.
+  /// Writes the summary; failures as in append().
   Result<void> finish();
-  /// What was written is on the disk when this returns.
+  /// Returns when all written data are on disk.
   void sync() const;
 
   const std::filesystem::path& path() const { return path_; }

@@ -13,7 +13,7 @@ namespace fs = std::filesystem;
 
 constexpr char kExtension[] = ".mcap";
 
-/// Without those that are packed.
+/// The recording files that are not compressed as a whole.
 std::vector<fs::path> plainFilesIn(const fs::path& path) {
   std::error_code ignored;
   std::vector<fs::path> files;
@@ -27,7 +27,7 @@ std::vector<fs::path> plainFilesIn(const fs::path& path) {
   return files;
 }
 
-/// What a recorder writes again at the beginning of each segment.
+/// Returns true for topics that a recorder repeats at the start of each segment.
 bool isLatchedAlone(const std::string& topic) { return topic == "calibration" || topic == "model"; }
 
 }  // namespace
@@ -101,11 +101,12 @@ void RecordedMessages::openFile(const fs::path& path, Chunks look) {
     start_ns_ = std::min(start_ns_, chunk.start_ns);
     end_ns_ = std::max(end_ns_, chunk.end_ns);
   }
-  reader->letGo();  // a folder may hold more segments than a process may open
+  reader->letGo();  // a folder may have more segments than a process may open
   files_.push_back(*std::move(reader));
 }
 
-/// The packed one, where it was unpacked: people know no other, and the copy goes.
+/// The compressed file, if `file` is its temporary unpacked copy. Messages for users name the
+/// compressed file.
 fs::path RecordedMessages::givenFor(const fs::path& file) const {
   const auto same = [&](const auto& unpacked) { return unpacked->path() == file; };
   const auto packed = std::find_if(unpacked_.begin(), unpacked_.end(), same);

@@ -1,4 +1,4 @@
-// The messages of a recording, one file or a folder of segments, in the order in which they came.
+// The messages of a recording (a file or a folder of segments) in the order of arrival.
 #pragma once
 
 #include <filesystem>
@@ -18,14 +18,15 @@
 namespace perdure::replay {
 
 struct RecordedMessage {
-  std::string topic;                   ///< "odometry": without perdure/<vehicle>/
+  std::string topic;                   ///< "odometry": without the prefix perdure/<vehicle>/
   std::string type;                    ///< "perdure::msg::Odometry"
-  std::uint64_t log_ns = 0;            ///< when the recorder got it; never goes back
-  mcap::Bytes data;                    ///< common/wire/cdr.h
-  std::shared_ptr<const void> keeper;  ///< of data
+  std::uint64_t log_ns = 0;            ///< time of arrival at the recorder; never decreases
+  mcap::Bytes data;                    ///< format: common/wire/cdr.h
+  std::shared_ptr<const void> keeper;  ///< owner of the memory of `data`
 };
 
-/// As a value of the topic's type. Reasons: "other_type" and those of decodeCdr.
+/// Decodes the message as a value of the topic's type. Reasons: "other_type" and those of
+/// decodeCdr.
 template <class T>
 Result<T> valueOf(const RecordedMessage& message) {
   if (message.type != wire::Type<T>::descriptor().m_typename) {
@@ -42,26 +43,27 @@ class RecordedMessages {
     std::uint64_t messages = 0;
   };
 
-  /// Whether every chunk is unpacked at once, so that topics() is of what can be read.
+  /// kEach: every chunk is unpacked at once, so that topics() describes the readable part.
   enum class Chunks { kByIndex, kEach };
-  /// A .mcap file, or a folder that holds some; packed ones (.mcap.zstd) are unpacked. Throws
-  /// StartupError with the mend.
+  /// Opens a .mcap file, or a folder that contains such files. Compressed files (.mcap.zstd) are
+  /// unpacked. Throws StartupError with the fix.
   explicit RecordedMessages(const std::filesystem::path& path, Chunks look = Chunks::kByIndex);
   static bool looksLikeOne(const std::filesystem::path& path);
 
   const std::map<std::string, TopicCount>& topics() const { return topics_; }
   std::uint64_t startNs() const { return start_ns_; }
   std::uint64_t endNs() const { return end_ns_; }
-  /// Files without a summary, and chunks that are damaged, so far.
+  /// Counts of files without a summary and of damaged chunks found so far.
   const ReasonCounts& reasons() const { return reasons_; }
   const std::string& lastProblem() const { return last_problem_; }
-  /// For people: what was unpacked.
+  /// Notes for users about unpacked files.
   std::vector<std::string> notes() const;
 
-  /// Only of these topics (all where `wanted` is empty), and without chunks that end before.
+  /// Restarts with these topics only (all if `wanted` is empty), without chunks that end before
+  /// `from_ns`.
   void rewind(std::function<bool(const std::string& topic)> wanted = {}, std::uint64_t from_ns = 0);
-  /// The next one by log time; nothing at the end. What a recorder repeats at the beginning of each
-  /// segment (calibration, model) is given once.
+  /// The next message by log time. Returns nothing at the end. Messages repeated by the recorder at
+  /// the start of each segment (calibration, model) are returned once.
   std::optional<RecordedMessage> next();
 
  private:
@@ -72,7 +74,7 @@ class RecordedMessages {
   struct Pending {
     RecordedMessage message;
     std::uint64_t order = 0;
-    bool operator<(const Pending& other) const {  // the queue's top is the largest
+    bool operator<(const Pending& other) const {  // the top of the queue is the largest
       return std::tie(message.log_ns, order) > std::tie(other.message.log_ns, other.order);
     }
   };
@@ -85,9 +87,9 @@ class RecordedMessages {
   void load(const ChunkPlace& place);
   bool isRepeated(const RecordedMessage& message);
 
-  UnpackedFiles unpacked_;  // goes after the files
+  UnpackedFiles unpacked_;  // must be destroyed after the files
   std::vector<mcap::Reader> files_;
-  std::vector<ChunkPlace> chunks_;  // by time
+  std::vector<ChunkPlace> chunks_;  // sorted by time
   std::map<std::string, TopicCount> topics_;
   std::uint64_t start_ns_ = UINT64_MAX, end_ns_ = 0;
   ReasonCounts reasons_;
@@ -100,7 +102,7 @@ class RecordedMessages {
   std::set<std::pair<std::string, std::uint64_t>> repeatable_;  // topic and digest
 };
 
-/// "perdure/ego/frame/cam0" → "frame/cam0"; others stay.
+/// "perdure/ego/frame/cam0" → "frame/cam0"; other names are unchanged.
 std::string topicOf(const std::string& channel);
 
 }  // namespace perdure::replay

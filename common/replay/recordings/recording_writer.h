@@ -1,4 +1,4 @@
-// Recordings of messages that a program has at hand: one file, whole when it is finished.
+// Writes the messages of a program to a recording: one file, complete when it is finished.
 #pragma once
 
 #include <filesystem>
@@ -11,10 +11,11 @@ namespace perdure::replay {
 
 class RecordingWriter {
  public:
-  /// A new file. Throws StartupError: kUnavailable; the disk is full: kInputOutput.
+  /// Creates a file. Throws StartupError: kUnavailable, or kInputOutput if the disk is full.
   explicit RecordingWriter(const std::filesystem::path& file);
 
-  /// Log times do not go back. `topic` is "odometry", …; reasons as encodeCdr and Writer::append.
+  /// Log times must not decrease. `topic` is "odometry", …; reasons as for encodeCdr and
+  /// Writer::append.
   template <class T>
   Result<void> add(const std::string& topic, const T& value, std::uint64_t log_ns) {
     const auto bytes = wire::encodeCdr(value);
@@ -27,7 +28,7 @@ class RecordingWriter {
     std::string topic, type, idl;
   };
   Result<void> addBytes(const Kind& kind, mcap::Bytes data, std::uint64_t log_ns);
-  /// What was added since the last cut becomes a chunk; it comes by itself where that is large.
+  /// Writes the messages since the last cut as a chunk. Large chunks are cut automatically.
   Result<void> cut();
   Result<void> finish();
 

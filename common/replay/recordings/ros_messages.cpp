@@ -17,8 +17,8 @@ bool isRosEncoding(const std::string& schema_encoding) {
          schema_encoding == "ros1msg";
 }
 
-/// MCAP of both ROS. Where the schema says which, not the profile: converters write what they like
-/// into that.
+/// MCAP of ROS 1 and ROS 2. The schema identifies the version, because converters write arbitrary
+/// profiles.
 class McapSource : public RosSource {
  public:
   explicit McapSource(const fs::path& path) : messages_(path) {
@@ -139,7 +139,7 @@ std::optional<RosMessage> RosMessages::next() {
   return message;
 }
 
-/// CDR never begins as a frame of zstd does.
+/// Zstd frames are recognised by their first bytes, which CDR never has.
 bool RosMessages::unpack(RosMessage& message) {
   static constexpr std::uint64_t kLargest = 1u << 30;
   if (topics_.at(message.topic).encoding != ros::Encoding::kCdr || !isZstd(message.data)) {

@@ -1,5 +1,5 @@
-// The messages of ROS' recordings, in the order in which they came: MCAP and SQLite (`.db3`) of
-// ROS 2, bags of ROS 1, each a file or a folder of them.
+// The messages of ROS recordings in the order of arrival: MCAP and SQLite (`.db3`) of ROS 2, and
+// bags of ROS 1. Each is a file or a folder of files.
 #pragma once
 
 #include <filesystem>
@@ -19,32 +19,32 @@ namespace perdure::replay {
 
 struct RosMessage {
   std::string topic;         ///< "/cam0/image_raw"
-  std::uint64_t log_ns = 0;  ///< when it was recorded; never goes back
+  std::uint64_t log_ns = 0;  ///< time of recording; never decreases
   std::span<const std::uint8_t> data;
-  std::shared_ptr<const void> keeper;  ///< of data
+  std::shared_ptr<const void> keeper;  ///< owner of the memory of `data`
 };
 
 struct RosTopic {
-  std::string type;  ///< "sensor_msgs/Image", of both ROS
+  std::string type;  ///< "sensor_msgs/Image", for both ROS versions
   ros::Encoding encoding = ros::Encoding::kCdr;
   std::uint64_t messages = 0;
 };
 using RosTopics = std::map<std::string, RosTopic>;
 
-/// One recording, whatever it is made of.
+/// One recording file of any format.
 class RosSource {
  public:
   virtual ~RosSource() = default;
   const RosTopics& topics() const { return topics_; }
-  /// What was damaged or cut so far.
+  /// Counts of damaged or truncated data so far.
   const ReasonCounts& reasons() const { return reasons_; }
   const std::string& lastProblem() const { return last_problem_; }
-  /// Only these topics, and nothing that ended before.
+  /// Restarts with these topics only, without data that ended before `from_ns`.
   virtual void rewind(const std::set<std::string>& wanted, std::uint64_t from_ns) = 0;
   virtual std::optional<RosMessage> next() = 0;
-  /// For people: what was unpacked.
+  /// Notes for users about unpacked files.
   virtual std::vector<std::string> notes() const { return {}; }
-  /// When the first and the last message were recorded.
+  /// Recording time of the first message; the next function returns that of the last one.
   std::uint64_t startNs() const { return start_ns_; }
   std::uint64_t endNs() const { return end_ns_; }
 
@@ -59,45 +59,47 @@ class RosSource {
   std::uint64_t start_ns_ = UINT64_MAX, end_ns_ = 0;
 };
 
-/// Throw StartupError with the mend.
+/// These functions throw StartupError with the fix.
 std::unique_ptr<RosSource> openBag(const std::filesystem::path& file);
 std::unique_ptr<RosSource> openDb3(const std::filesystem::path& file);
 
 class RosMessages {
  public:
-  /// Whether it is such a file, or a folder with some. A recording of Perdure's own is none.
+  /// Returns whether the path is such a file, or a folder with such files. Recordings of Perdure
+  /// are excluded.
   static bool looksLikeOne(const std::filesystem::path& path);
-  /// Throws StartupError with the mend.
+  /// Throws StartupError with the fix.
   explicit RosMessages(const std::filesystem::path& path);
 
   const RosTopics& topics() const { return topics_; }
   std::uint64_t startNs() const { return start_ns_; }
   std::uint64_t endNs() const { return end_ns_; }
-  /// For people: what was unpacked.
+  /// Notes for users about unpacked files.
   std::vector<std::string> notes() const;
   ReasonCounts reasons() const;
-  /// The last thing that was counted, for people.
+  /// The problem counted last, as text for users.
   std::string lastProblem() const;
   void rewind(const std::set<std::string>& wanted, std::uint64_t from_ns = 0);
   std::optional<RosMessage> next();
 
-  /// As the message M. Reason: "malformed".
+  /// Decodes a message as M. Reason: "malformed".
   template <class M>
   Result<M> valueOf(const RosMessage& message) const {
     return ros::messageOf<M>(message.data, topics_.at(message.topic).encoding, message.keeper);
   }
 
  private:
-  /// The next of all sources, as it was recorded.
+  /// The next message of all sources, as recorded.
   std::optional<RosMessage> nextRecorded();
-  /// Of rosbag2's `compression_mode: MESSAGE`; false where it is damaged, which is counted.
+  /// Decompresses messages of rosbag2's `compression_mode: MESSAGE`. Returns false if a message is
+  /// damaged, which is counted.
   bool unpack(RosMessage& message);
-  UnpackedFiles unpacked_;  ///< SQLite's; goes after the sources
+  UnpackedFiles unpacked_;  ///< for SQLite files; must be destroyed after the sources
   std::vector<std::unique_ptr<RosSource>> sources_;
-  std::vector<std::optional<RosMessage>> heads_;  ///< the next message of each
+  std::vector<std::optional<RosMessage>> heads_;  ///< the next message of each source
   RosTopics topics_;
   std::uint64_t start_ns_ = UINT64_MAX, end_ns_ = 0;
-  ReasonCounts reasons_;  ///< beside those of the sources
+  ReasonCounts reasons_;  ///< counts not included in those of the sources
   std::string last_problem_;
 };
 

@@ -11,13 +11,13 @@
 namespace perdure::replay {
 namespace {
 
-/// What comes, in steps. The room behind it stays from call to call: a stream of empty frames must
-/// not cost a step each.
+/// Collects decompressed data in steps. Unused capacity is retained between calls, so that a stream
+/// of empty frames does not allocate one step per frame.
 class Unpacked {
  public:
   explicit Unpacked(std::uint64_t most)
       : most_(most), step_(most < kStep ? static_cast<std::size_t>(most) + 1 : kStep) {}
-  /// Beyond what was asked for, so that a stream that has more is not taken for whole.
+  /// Allows one byte beyond the limit, so that a longer stream is detected.
   bool wantsMore() const { return used_ <= most_; }
   std::uint8_t* room() {
     if (used_ == bytes_.size()) bytes_.resize(used_ + step_);
@@ -33,7 +33,7 @@ class Unpacked {
  private:
   static constexpr std::size_t kStep = 1u << 20;
   std::uint64_t most_;
-  std::size_t step_;  ///< small ones are many, and are not given a megabyte each
+  std::size_t step_;  ///< small limits use small steps, because such calls are frequent
   std::size_t used_ = 0;
   std::vector<std::uint8_t> bytes_;
 };
@@ -44,7 +44,7 @@ std::vector<std::uint8_t> unpackedBz2(std::span<const std::uint8_t> packed, std:
   Unpacked unpacked(most);
   bz_stream stream{};
   if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) return {};
-  // The library does not write there; its interface is older than const.
+  // The library does not write to its input; its interface lacks const.
   stream.next_in = reinterpret_cast<char*>(const_cast<std::uint8_t*>(packed.data()));
   stream.avail_in = static_cast<unsigned int>(packed.size());
   int state = BZ_OK;
@@ -55,7 +55,7 @@ std::vector<std::uint8_t> unpackedBz2(std::span<const std::uint8_t> packed, std:
     state = BZ2_bzDecompress(&stream);
     const std::size_t written = room - stream.avail_out;
     unpacked.came(written);
-    if (written == 0) break;  // nothing more comes
+    if (written == 0) break;  // end of the stream
   }
   BZ2_bzDecompressEnd(&stream);
   return unpacked.take();

@@ -1,4 +1,4 @@
-// What recordings pack their chunks with.
+// Decompression of chunks in recordings.
 #pragma once
 
 #include <cstdint>
@@ -8,16 +8,17 @@
 
 namespace perdure::replay {
 
-/// What there is of a bz2 stream, of LZ4 frames or of zstd frames, `most` bytes and a step at most:
-/// a stream that is damaged or cut gives what came before. Memory is asked for by what comes, not
-/// by what a file says; frames need not tell their size (who packs as it goes cannot).
+/// Decompresses a bz2 stream, LZ4 frames or zstd frames, up to `most` bytes plus one step. A
+/// damaged or truncated stream gives the data before the error. Memory is allocated for
+/// decompressed data, not for sizes stated in the file. Frames need no stated size, because
+/// streaming compressors do not write it.
 std::vector<std::uint8_t> unpackedBz2(std::span<const std::uint8_t> packed, std::uint64_t most);
 std::vector<std::uint8_t> unpackedLz4(std::span<const std::uint8_t> packed, std::uint64_t most);
 std::vector<std::uint8_t> unpackedZstd(std::span<const std::uint8_t> packed, std::uint64_t most);
 
-/// Whether it begins as a frame of zstd does.
+/// Returns whether the bytes begin with a zstd frame.
 bool isZstd(std::span<const std::uint8_t> bytes);
-/// One frame; nothing where it is damaged, cut or larger than `most`.
+/// Decompresses one frame. Returns nothing if it is damaged, truncated or larger than `most`.
 std::optional<std::vector<std::uint8_t>> wholeOfZstd(std::span<const std::uint8_t> packed,
                                                      std::uint64_t most);
 

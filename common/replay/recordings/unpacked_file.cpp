@@ -56,13 +56,13 @@ fs::path newFolder(const fs::path& packed) {
                             to.parent_path().parent_path().string(), sizeOf(free + came)));
 }
 
-/// In steps, frame by frame.
+/// Decompresses in steps, frame by frame.
 class Unpacking {
  public:
   explicit Unpacking(OpenFile in) : in_(std::move(in)), room_(ZSTD_DStreamOutSize()) { read(); }
 
   bool empty() const { return filled_.size == 0; }
-  /// Whether it begins as a frame of zstd does, as far as it goes.
+  /// Returns whether the available bytes match the start of a zstd frame.
   bool looksPacked() const {
     constexpr std::array<std::uint8_t, 4> kFrame{0x28, 0xB5, 0x2F, 0xFD},
         kSkippable{0x50, 0x2A, 0x4D, 0x18};
@@ -74,12 +74,12 @@ class Unpacking {
     };
     return begins(kFrame, 0xFF) || begins(kSkippable, 0xF0);
   }
-  /// What the first frame says of its size; 0 where it says nothing.
+  /// Size stated in the first frame; 0 if it is not stated.
   std::uint64_t size() const {
     const auto size = ZSTD_getFrameContentSize(packed_.data(), filled_.size);
     return size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR ? 0 : size;
   }
-  /// What comes next; empty at the end, or where whole() says that there should be more.
+  /// The next data; empty at the end, or if whole() indicates that data are missing.
   std::vector<std::uint8_t> next() {
     while (true) {
       if (filled_.pos == filled_.size) read();

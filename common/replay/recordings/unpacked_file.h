@@ -1,4 +1,4 @@
-// A file that is packed by zstd as a whole: by rosbag2 with `compression_mode: FILE`, or by hand.
+// A file compressed by zstd as a whole: by rosbag2 with `compression_mode: FILE`, or manually.
 #pragma once
 
 #include <cstdint>
@@ -10,12 +10,13 @@
 
 namespace perdure::replay {
 
-/// Unpacked into a folder of its own in $TMPDIR (/tmp); both go with this object. Who is killed
-/// leaves them there.
+/// Unpacks a file into a temporary folder in $TMPDIR (/tmp). Both are deleted with this object.
+/// They remain if the process is killed.
 class UnpackedFile {
  public:
-  /// What all share that have it at a time: a recording is opened for each of its cameras. Throws
-  /// StartupError with the mend: no room, damaged or cut, empty, not packed, not readable.
+  /// Returns a shared object, because a recording is opened for each of its cameras. Throws
+  /// StartupError with the fix: no space, damaged or truncated, empty, not compressed, not
+  /// readable.
   static std::shared_ptr<const UnpackedFile> of(const std::filesystem::path& packed);
   explicit UnpackedFile(const std::filesystem::path& packed);
   ~UnpackedFile();
@@ -24,7 +25,7 @@ class UnpackedFile {
 
   const std::filesystem::path& path() const { return path_; }
   const std::filesystem::path& packed() const { return packed_; }
-  /// For people: from where to where, and how large.
+  /// A note for users: source, target and size.
   std::string note() const;
 
  private:
@@ -33,13 +34,15 @@ class UnpackedFile {
   std::uint64_t size_ = 0;
 };
 
-/// "run_0.db3.zstd" or .zst: whether it is packed, and what it holds has this extension.
+/// Returns whether a file is compressed and contains a file with this extension: "run_0.db3.zstd"
+/// or .zst.
 bool isPacked(const std::filesystem::path& file, std::string_view extension);
-/// `path` itself, or of a folder those that nobody has unpacked beside; by name.
+/// `path` itself, or the compressed files of a folder that have no unpacked file beside them;
+/// sorted by name.
 std::vector<std::filesystem::path> packedFiles(const std::filesystem::path& path,
                                                std::string_view extension);
 using UnpackedFiles = std::vector<std::shared_ptr<const UnpackedFile>>;
-/// All of packedFiles, unpacked. Throws as UnpackedFile::of.
+/// All of packedFiles(), unpacked. Throws like UnpackedFile::of.
 UnpackedFiles unpackedFiles(const std::filesystem::path& path, std::string_view extension);
 
 }  // namespace perdure::replay

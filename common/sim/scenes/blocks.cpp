@@ -1,4 +1,4 @@
-// A town of equal blocks, and a drive that passes many of them before it comes back.
+// A town of equal blocks, and a drive that passes many of them before it returns.
 #include <algorithm>
 #include <utility>
 #include <vector>
@@ -12,8 +12,8 @@ namespace perdure::sim {
 namespace {
 
 constexpr double kBlocksSeconds = 400.0;
-constexpr double kPitchX = 52.0, kPitchY = 46.0;  ///< from road to road
-/// Crossings at which the drive may turn. One more row of blocks lies around them.
+constexpr double kPitchX = 52.0, kPitchY = 46.0;  ///< distance between roads
+/// Crossings at which the drive may turn. A further row of blocks surrounds them.
 constexpr int kCrossingsX = 7, kCrossingsY = 6;
 constexpr std::size_t kBlocks = (kCrossingsX + 1) * (kCrossingsY + 1);
 constexpr std::size_t kUnmistakable = 8, kWithFewChanges = 28;
@@ -29,9 +29,9 @@ std::vector<Road> roadsOfBlocks() {
   return roads;
 }
 
-/// Along three rows; across them by three columns, back to the start; the first row again as
-/// before, and the last one from its other end. Which columns, and which corner is the first, is
-/// drawn.
+/// The route follows three rows, crosses them along three columns, and returns to the start. It
+/// then repeats the first row, and drives the last one in the opposite direction. Columns and first
+/// corner are random.
 std::vector<Eigen::Vector2d> turnsAmongBlocks(Dice& dice) {
   const int right = kCrossingsX - 1, top = kCrossingsY - 1;
   const int third = 4 + static_cast<int>(dice.below(2)),
@@ -59,7 +59,7 @@ std::vector<Eigen::Vector2d> turnsAmongBlocks(Dice& dice) {
   return points;
 }
 
-/// How many things are other than in the block that all are made from, of each block.
+/// The number of objects in each block that differ from the template of all blocks.
 std::vector<std::size_t> changesOf(Dice& dice) {
   std::vector<std::size_t> changes(kBlocks, 0);
   for (std::size_t i = 0; i < kBlocks; ++i) {
@@ -72,7 +72,7 @@ std::vector<std::size_t> changesOf(Dice& dice) {
   return changes;
 }
 
-/// A house looks down each road from beyond its end.
+/// Places a house at the end of each road, facing the road.
 void closeRoads(const std::vector<Road>& roads, SceneBuilder& builder) {
   constexpr double kDepth = 7.0, kFromEnd = 0.5 * kRoadWidth + 3.3 + 0.5 * kDepth;
   for (const Road& road : roads) {

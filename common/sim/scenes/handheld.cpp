@@ -9,7 +9,8 @@ namespace {
 
 constexpr double kStepHz = 1.8, kWalkingSpeed = 0.8;
 
-/// Steps lift and sway the hand as far as it walks; a hand that rests still trembles a little.
+/// Steps move the hand vertically and sideways, in proportion to the speed. A resting hand still
+/// trembles slightly.
 Eigen::Vector3d handAt(double t_s, double speed) {
   const double walking = std::min(1.0, speed / kWalkingSpeed), step = 2.0 * M_PI * kStepHz * t_s;
   return {0.004 * walking * std::sin(step + 0.7), 0.016 * walking * std::sin(0.5 * step),
@@ -44,7 +45,7 @@ Trajectory handheldMotion(const GroundPath& path, const Drive& drive, const Gaze
   for (std::size_t i = 0; i < drive.distance.size(); ++i) {
     const double t = drive.interval_s * static_cast<double>(i);
     const PathPoint p = path.at(drive.distance[i]);
-    // The gaze begins to wander with the walk: at first the hand is held still.
+    // The gaze starts to wander with the walk; the camera is steady at first.
     const double begun = std::clamp((t - 1.0) / 2.0, 0.0, 1.0);
     const double wanders = begun * begun * (3.0 - 2.0 * begun);
     const auto wave = [&](double period) { return wanders * std::sin(2.0 * M_PI * t / period); };

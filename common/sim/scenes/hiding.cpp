@@ -1,4 +1,5 @@
-// Rooms in which something cannot be seen for a while: behind another thing, or behind one's back.
+// Rooms in which an object is not visible for a while: behind another object, or outside the field
+// of view.
 #include <algorithm>
 #include <cmath>
 
@@ -12,7 +13,7 @@ namespace {
 
 constexpr double kHidingInterval = 0.05;
 
-/// A value at a time; in between it goes smoothly from one to the next.
+/// A value at a time, with smooth interpolation between keys.
 struct Key {
   double t_s, value;
 };
@@ -22,7 +23,7 @@ double smoothly(const std::vector<Key>& keys, double t_s) {
   while (i + 1 < keys.size() && keys[i + 1].t_s <= t_s) ++i;
   if (i + 1 == keys.size() || t_s < keys.front().t_s) return keys[i].value;
   const double s = (t_s - keys[i].t_s) / (keys[i + 1].t_s - keys[i].t_s);
-  // Quintic: velocity and acceleration are nought at each key.
+  // Quintic: velocity and acceleration are zero at each key.
   return keys[i].value +
          s * s * s * (10.0 + s * (6.0 * s - 15.0)) * (keys[i + 1].value - keys[i].value);
 }
@@ -32,7 +33,8 @@ RigidTransform standing(const SceneObject& object, const Eigen::Vector2d& point,
                         Eigen::Vector3d(point.x(), point.y(), 0.5 * object.size.z()));
 }
 
-// ---- occlusion: the camera walks past, from where the monitor hides the chair and back.
+// ---- occlusion: the camera moves sideways from the place where the monitor hides the chair, and
+// back.
 
 constexpr double kOcclusionSeconds = 32.0, kOcclusionHeight = 1.45, kWalkX = -3.2;
 
@@ -59,13 +61,13 @@ void putHiddenChair(SceneBuilder& builder) {
   monitor.size = {0.2, 0.68, 0.5};
   SceneObject chair = builder.draw("chair");
   chair.size = {0.5, 0.48, 0.82};
-  // All in a line before the camera's middle place; the screen faces the camera.
+  // All objects stand in line with the middle place of the camera; the screen faces the camera.
   builder.mustPut(table, {{kWalkX + 1.95, 0.0}, M_PI, 0.0});
   builder.mustPut(std::move(monitor), {{kWalkX + 1.9, 0.0}, M_PI, table.size.z()});
   builder.mustPut(std::move(chair), {{kWalkX + 4.2, 0.0}, builder.dice().uniform(2.7, 3.5), 0.0});
 }
 
-// ---- vanish: the camera looks, turns away, and looks again.
+// ---- vanish: the camera looks at the objects, turns away, and turns back.
 
 constexpr double kVanishSeconds = 28.0, kVanishHeight = 1.5, kGoneAt = 12.0, kMovedAt = 12.4;
 

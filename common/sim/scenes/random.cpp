@@ -1,4 +1,4 @@
-// Streets or rooms with things anywhere, and a camera that is somewhere else every second.
+// Streets or rooms with objects anywhere, and a camera that changes its place every second.
 #include <cmath>
 
 #include "common/sim/scenes/parts/rigs.h"
@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kRandomSeconds = 40.0;
 
-/// Two streets that cross, with all that stands there, and things where nobody expects them.
+/// Two crossing streets with their usual objects, and further objects at unusual places.
 Area makeOutdoors(SceneBuilder& builder) {
   Dice& dice = builder.dice();
   const double length = dice.uniform(35.0, 55.0), width = dice.uniform(8.0, 12.0);

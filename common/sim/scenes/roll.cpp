@@ -1,4 +1,4 @@
-// A camera that flies along a street and leans from side to side, as a small aircraft does.
+// A camera that flies along a street and rolls from side to side, like a small aircraft.
 #include <algorithm>
 #include <cmath>
 

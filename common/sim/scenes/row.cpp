@@ -1,4 +1,4 @@
-// Ten cars parked one behind the other, 0.8 m apart.
+// Ten cars parked in a row, 0.8 m apart.
 #include <limits>
 
 #include "common/sim/path.h"
@@ -33,12 +33,12 @@ Scene makeRow(std::uint64_t seed, const SceneOptions& options) {
   const double seconds = builder.seconds(kRowSeconds);
   const GroundPath way({{{0, -kLane}}, {{150, -kLane}}}, false);
   const SpeedLimits limits{4.5, 2.0, 1.2, 1.2};
-  // It stands again behind the row, however long one looks.
+  // The drive stops behind the row for any duration of the scene.
   const Drive driven = drive(way, limits, 0.0, 95.0, 1.2, seconds + 2.0);
   putOnWheels(builder, way, driven, seconds, options);
   parkRow(builder);
   Furnishing furnishing;
-  furnishing.free_share = 1.0;  // nobody else parks
+  furnishing.free_share = 1.0;  // no other parked vehicles
   Streets(builder, {{{-20.0, 0.0}, {130.0, 0.0}, kRoadWidth}}, furnishing).furnish();
   return builder.take();
 }

@@ -1,4 +1,4 @@
-// One function per scene: what it proves, and how it is made.
+// One function per scene: its purpose and its construction.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// A long street, driven evenly from a start at rest.
+// A long street, driven at constant speed after a start from rest.
 #include <algorithm>
 #include <cmath>
 #include <limits>

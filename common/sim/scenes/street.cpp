@@ -1,5 +1,5 @@
-// A loop of four streets around a block, driven twice, or once from rest to rest; side streets lead
-// away from its corners.
+// A loop of four streets around a block, driven twice, or once from rest to rest. Side streets
+// branch off at its corners.
 #include <algorithm>
 #include <limits>
 
@@ -15,7 +15,7 @@ constexpr double kStreetSeconds = 60.0, kStreetRest = 1.2, kSideStreet = 38.0;
 constexpr double kLapSeconds = 36.0;
 constexpr double kStreetCameraHeight = 1.6;
 
-/// Crossings of the middle lines at (0, 0), (length, 0), (length, width), (0, width).
+/// Crossings of the centre lines at (0, 0), (length, 0), (length, width), (0, width).
 struct Block {
   double length = 0.0, width = 0.0;
 };
@@ -26,11 +26,11 @@ std::vector<Road> roadsOf(const Block& block, double branch) {
           {{l, -s}, {l, w + s}, kRoadWidth},
           {{l + s, w}, {-s, w}, kRoadWidth},
           {{0, w + s}, {0, -s}, kRoadWidth},
-          // One more leads away from the middle of a long side.
+          // One more side street branches off at the middle of a long side.
           {{branch, w + 0.5 * kRoadWidth}, {branch, w + s}, kRoadWidth}};
 }
 
-/// Counter-clockwise on the right-hand lane: outside the middle lines.
+/// Counter-clockwise on the right-hand lane, outside the centre lines.
 GroundPath loopOf(const Block& block, double radius) {
   const double l = block.length + kLane, w = block.width + kLane;
   return GroundPath(
@@ -38,7 +38,7 @@ GroundPath loopOf(const Block& block, double radius) {
       true);
 }
 
-/// The calmest drive to distance `to` (infinite: on and on) that has come `far` at `by_s`.
+/// The slowest drive to distance `to` (infinite: without end) that has covered `far` at `by_s`.
 Drive calmest(const GroundPath& loop, double from, double to, double far, double by_s,
               double until_s) {
   SpeedLimits limits;
@@ -59,7 +59,8 @@ Drive twoLaps(const GroundPath& loop, double from, double until_s) {
                  kStreetSeconds - 1.0, until_s);
 }
 
-/// A drive stops within a step of the path's points: the whole of it is drawn to the lap's length.
+/// A drive stops within one step of the path's points. Its distances are therefore scaled to the
+/// length of the lap.
 Drive oneLap(const GroundPath& loop, double from, double until_s) {
   Drive lap = calmest(loop, from, from + loop.length(), loop.length() - 1e-6,
                       kLapSeconds - 2.0 * kStreetRest, until_s);
@@ -78,7 +79,7 @@ Scene makeBlock(SceneBuilder& builder, double seconds, DrivesAs drives, bool sam
   suspension.height = kStreetCameraHeight - kCameraAboveBody;
   suspension.seed = dice.seed();
   if (same_road) suspension.lap_m = loop.length();
-  const double from = dice.uniform(27.0, 33.0);  // on the first straight
+  const double from = dice.uniform(27.0, 33.0);  // start on the first straight
   builder.setBody(
       vehicleMotion(loop, drives(loop, from, std::max(seconds, kStreetSeconds) + 2.0), suspension),
       seconds, 1.15, 2.2);

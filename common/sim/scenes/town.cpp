@@ -1,4 +1,4 @@
-// A grid of streets, four kilometres in all, and a drive through nearly all of them.
+// A grid of streets, four kilometres in total, and a drive through nearly all of them.
 #include <algorithm>
 
 #include "common/sim/path.h"
@@ -13,7 +13,8 @@ constexpr double kTownSeconds = 520.0;
 constexpr int kColumns = 6, kRows = 5;
 constexpr std::size_t kVehicles = 500;
 
-/// Crossings where the way turns: along the rows to and fro, then along the columns.
+/// Crossings where the drive turns: along the rows in alternating directions, then along the
+/// columns.
 std::vector<Eigen::Vector2d> turns() {
   std::vector<Eigen::Vector2i> crossings;
   const int right = kColumns - 1, top = kRows - 1;
@@ -22,7 +23,7 @@ std::vector<Eigen::Vector2d> turns() {
     crossings.emplace_back(forth ? 0 : right, row);
     crossings.emplace_back(forth ? right : 0, row);
   }
-  // An odd number of rows ends at the top right corner.
+  // With an odd number of rows the drive ends at the top right corner.
   for (int i = 0; i < kColumns; ++i) {
     const int column = right - i;
     crossings.emplace_back(column, i % 2 == 0 ? top : 0);
@@ -36,7 +37,7 @@ std::vector<Eigen::Vector2d> turns() {
   return points;
 }
 
-/// Takes away vehicles anywhere until as many are left as the town is to have.
+/// Removes random vehicles until the planned number is left.
 void thinOut(SceneBuilder& builder) {
   auto& objects = builder.scene().objects;
   const auto isVehicle = [](const SceneObject& o) {

@@ -1,5 +1,5 @@
-// A toy car near by, in the image as large as a real one far away; seen in passing, or not at all
-// from another side.
+// A nearby toy car, as large in the image as a real car at a distance. It is seen during a sideways
+// motion, or not seen from another side.
 #include <cmath>
 
 #include "common/sim/scenes/parts/rigs.h"
@@ -11,11 +11,11 @@ namespace perdure::sim {
 namespace {
 
 constexpr double kToySeconds = 24.0, kStillSeconds = 20.0, kToyCameraHeight = 1.35;
-constexpr double kScale = 14.0;        ///< the toy is a 4.2 m car, made 0.3 m long
-constexpr double kToyDistance = 1.35;  ///< from where the camera starts
+constexpr double kScale = 14.0;        ///< the toy is a 4.2 m car, scaled to 0.3 m
+constexpr double kToyDistance = 1.35;  ///< distance from the start of the camera
 constexpr double kToyInterval = 0.05;
 
-/// Seen from where the camera starts, at the body's place.
+/// Position at this distance and bearing from the start of the camera, at the body's place.
 Eigen::Vector2d polar(double distance, double bearing) {
   return distance * Eigen::Vector2d(std::cos(bearing), std::sin(bearing)) +
          Eigen::Vector2d(kCameraBeforeBody, 0.0);
@@ -35,7 +35,7 @@ void putCars(SceneBuilder& builder) {
   builder.mustPut(car, {polar(kScale * kToyDistance, far_bearing), far_bearing + yaw, 0.0});
   builder.mustPut(carOf(builder, 4.2), {polar(29.0, -0.13), dice.uniform(-1.0, 1.0), 0.0});
   builder.mustPut(carOf(builder, 4.2), {polar(40.0, 0.02), dice.uniform(-1.0, 1.0), 0.0});
-  // The same picture: all that separates camera and car, fourteen times smaller.
+  // The same image: all distances between camera and car are fourteen times smaller.
   SceneObject toy = builder.draw("toy");
   toy.shape = "hatchback";
   toy.size = car.size / kScale;
@@ -46,7 +46,7 @@ void putCars(SceneBuilder& builder) {
   builder.mustPut(std::move(toy), {point, near_bearing + yaw, top});
 }
 
-/// To and fro across the view, and a little along it.
+/// Back and forth across the view, with a small motion along it.
 Trajectory sideways(double seconds) {
   std::vector<Look> looks;
   for (double t = 0.0; t < seconds + 2.0; t += kToyInterval) {

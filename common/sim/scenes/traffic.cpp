@@ -1,5 +1,5 @@
-// A street with traffic: a car ahead, cars that come the other way and across, two that drive off
-// from where they were parked, one that arrives and parks, and people who walk.
+// A street with traffic: a car ahead, oncoming and crossing cars, two cars that leave parking
+// places, one that arrives and parks, and pedestrians.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -15,14 +15,15 @@ namespace {
 
 constexpr double kTrafficSeconds = 40.0, kForever = 1e9;
 constexpr double kParked =
-    0.5 * kRoadWidth - 0.18 - 0.9;  ///< middle of a parked car, from the road's
+    0.5 * kRoadWidth - 0.18 - 0.9;  ///< centre of a parked car, from the road's centre line
 constexpr double kFarEnd = 420.0, kNearEnd = -60.0, kCrossing = 150.0;
 
 class Traffic {
  public:
   Traffic(SceneBuilder& builder, double seconds) : builder_(builder), seconds_(seconds) {}
 
-  /// Puts it where it drives, later by steps of half a second until it meets nobody.
+  /// Adds an object on its path. Its start is delayed by steps of half a second until it meets no
+  /// other object.
   void add(const std::string& class_name, const GroundPath& way, Drive driven) {
     SceneObject thing = builder_.draw(class_name);
     thing.moves = true;
@@ -40,7 +41,7 @@ class Traffic {
   }
 
  private:
-  /// It is there while it is on the street; beyond its ends nobody sees it come and go.
+  /// The object is present while it is on the street; it appears and disappears beyond the ends.
   void limitPresence(SceneObject& thing) const {
     const auto inside = [&](double t) {
       const Eigen::Vector3d p = thing.motion.poseAt(t).p;
@@ -80,8 +81,9 @@ Drive startingAt(double start_s, Drive driven) {
   return driven;
 }
 
-/// From the kerb on the left into the lane that comes towards the body, long before it is there;
-/// from the kerb on the right into its own lane, about fifteen metres ahead of it.
+/// The first car leaves the left kerb and enters the oncoming lane, long before the body arrives.
+/// The second leaves the right kerb and enters the body's lane, about fifteen metres ahead. The
+/// third arrives on the oncoming lane and parks.
 void addParkingManoeuvres(Traffic& traffic, double seconds) {
   const SpeedLimits limits{7.0, 1.5, 1.5, 1.5};
   const double infinity = std::numeric_limits<double>::infinity();
@@ -130,7 +132,7 @@ Scene makeTraffic(std::uint64_t seed, const SceneOptions& options) {
   const double planned = std::max(seconds, kTrafficSeconds);
   const GroundPath way({{{0, -kLane}}, {{kFarEnd, -kLane}}}, false);
   const SpeedLimits limits{6.8, 2.0, 1.4, 1.4};
-  // However long one looks, it stands again before the street ends.
+  // The drive stops before the end of the street for any duration of the scene.
   const Drive driven = drive(way, limits, 0.0, 330.0, 1.2, planned + 2.0);
   putOnWheels(builder, way, driven, seconds, options);
   addTraffic(builder, planned);

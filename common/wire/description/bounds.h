@@ -1,4 +1,5 @@
-// What a message may hold: unbounded in the IDL, bounded here, where a refusal can be counted.
+// Limits of message contents. The IDL has no bounds; they are checked here, where refusals can be
+// counted.
 #pragma once
 
 #include <cstddef>
@@ -23,7 +24,7 @@ inline constexpr Limits kLogit{-1e6, 1e6};
 inline constexpr Limits kInputScale{0.0, 1.0};  ///< 0: not known
 inline constexpr Limits kNats{-1e9, 1e9};       ///< sums of evidence
 inline constexpr Limits kNotNegative{0.0, 1e18};
-inline constexpr Limits kInset{-0.45, 0.45};  // of a box, per side
+inline constexpr Limits kInset{-0.45, 0.45};  // inset of a box, per side
 inline constexpr Limits kPositive{1e-12, 1e12};
 inline constexpr Limits kLatitudeDeg{-90.0, 90.0};
 inline constexpr Limits kLongitudeDeg{-360.0, 360.0};
@@ -37,14 +38,14 @@ inline constexpr std::size_t kCameras = 16;
 inline constexpr std::size_t kCoefficients = 8;
 inline constexpr std::size_t kClasses = 8192;
 inline constexpr std::size_t kDetections =
-    1024;  ///< inference gives at most 512; each costs the filter .8 ms
+    1024;  ///< inference sends at most 512; each costs the filter 0.8 ms
 inline constexpr std::size_t kLandmarks = 65536;
 inline constexpr std::size_t kObjects = 16384;
 inline constexpr std::size_t kReplyObjects = 100000;
-inline constexpr std::size_t kReplyAnchors = 65536;  ///< and loops between them
+inline constexpr std::size_t kReplyAnchors = 65536;  ///< also the limit of loops
 inline constexpr std::size_t kReasons = 1024;
 inline constexpr std::size_t kEvidenceKinds = 64;
-/// Of a quaternion or a unit vector, and of the sum of a PMF.
+/// Tolerance of the norm of a quaternion or a unit vector, and of the sum of a PMF.
 inline constexpr double kUnitTolerance = 1e-3;
 
 }  // namespace perdure::wire

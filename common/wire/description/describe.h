@@ -1,6 +1,6 @@
-// Each message described once, field by field with its bounds; encoding, decoding and JSON follow
-// from it. `a` is the archive, `d` the domain value, `w` the wire value. Internal to common/wire
-// and tools/python.
+// Describes each message once, field by field with its bounds. Encoding, decoding and JSON use this
+// description. `a` is the archive, `d` the domain value, `w` the wire value. Internal to
+// common/wire and tools/python.
 #pragma once
 
 #include "common/wire/description/describe_base.h"

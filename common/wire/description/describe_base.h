@@ -1,4 +1,4 @@
-// The parts of messages that several families share, as describe.h.
+// Common parts of several message families, described as in describe.h.
 #pragma once
 
 #include <concepts>

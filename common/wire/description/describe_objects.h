@@ -1,4 +1,4 @@
-// The messages about objects, as describe.h.
+// The messages about objects, described as in describe.h.
 #pragma once
 
 #include "common/wire/description/describe_base.h"
@@ -37,7 +37,7 @@ void describe(A& a, D& d, W& w) {
   a.numbers("log_odds", d.log_odds, w.log_odds, kNats, kEvidenceKinds);
 }
 
-/// Its fields are members of the belief on the wire (idl/README.md says why).
+/// The ledger's fields are members of the belief on the wire (reason: idl/README.md).
 template <class A, Is<Ledger> D, class W>
 void describe(A& a, D& d, W& w) {
   a.list("existence", d.existence, w.why_existence, kEvidenceKinds);
@@ -106,7 +106,7 @@ void describe(A& a, D& d, W& w) {
   a.value("instance", d.instance, w.source);
   a.object("world", d.world, w.reference);
   a.object("object", d.object, w.belief);
-  a.value("id", d.object.id, w.object_id);  // the key: all that a dispose carries
+  a.value("id", d.object.id, w.object_id);  // the key, the only field in a dispose
   a.ensureWire("id", "size_mismatch", [&] { return w.object_id == w.belief.object_id; });
 }
 

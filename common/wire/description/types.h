@@ -1,4 +1,4 @@
-// Which generated C type carries which domain type.
+// Maps domain types to generated C types.
 #pragma once
 
 #include "common/types/detections.h"
@@ -16,7 +16,7 @@
 
 namespace perdure::wire {
 
-/// Type<T>::Wire is the generated struct, Type<T>::descriptor() Cyclone's description of it.
+/// Type<T>::Wire is the generated struct; Type<T>::descriptor() is Cyclone's description of it.
 template <class T>
 struct Type;
 

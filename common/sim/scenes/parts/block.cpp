@@ -9,16 +9,16 @@ namespace perdure::sim {
 namespace {
 
 constexpr double kPavementWidth = 3.25, kHouseDepth = 7.0;
-constexpr double kNoParking = 3.5;  ///< from the crossing road's edge
+constexpr double kNoParking = 3.5;  ///< distance from the crossing road's edge
 constexpr double kShareParked = 0.68, kVanShare = 0.16, kReversedShare = 0.12;
 
 }  // namespace
 
 struct Block::Side {
-  Eigen::Vector2d outwards, along;  ///< along: as the traffic before it goes
+  Eigen::Vector2d outwards, along;  ///< along: the direction of the traffic on this side
   double from_middle = 0.0, half_length = 0.0;
 
-  /// `outside`: beyond the kerb, negative on the pavement.
+  /// `outside`: distance beyond the kerb towards the road, negative on the pavement.
   Place at(double forward, double outside, double yaw) const {
     return {(from_middle + outside) * outwards + forward * along,
             wrapAngle(std::atan2(along.y(), along.x()) + yaw), 0.0};
@@ -48,7 +48,7 @@ void Block::build(const Side& side, double length, Dice& dice) {
   while (0.5 * length - from > 4.0) {
     const double left = 0.5 * length - from;
     const double wide = dice.uniform(8.0, 17.0);
-    // What would be too narrow for a house of its own is a part of this one.
+    // A remainder that is too narrow for a separate house is added to this one.
     const Eigen::Vector3d size(left - wide < 6.0 ? left : wide, kHouseDepth,
                                dice.uniform(5.5, 13.0));
     add(PropKind::kFacade, size,
@@ -114,7 +114,7 @@ bool Block::add(PropKind kind, const Eigen::Vector3d& size, const Place& place) 
   return true;
 }
 
-/// At some place of some side that is free; false where none is found.
+/// Adds an object at a free place on some side. Returns false if no place is found.
 bool Block::addSomewhere(const std::string& class_name, SceneBuilder& builder) {
   constexpr int kAttempts = 40;
   Dice& dice = builder.dice();

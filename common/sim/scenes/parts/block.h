@@ -1,4 +1,4 @@
-// A block of houses with all that stands around it, drawn once to be put in many places.
+// A block of houses and the objects around it, drawn once and placed many times.
 #pragma once
 
 #include <vector>
@@ -7,14 +7,14 @@
 
 namespace perdure::sim {
 
-/// Places are relative to the block's middle. Its four kerbs are at ± `half`; vehicles stand on the
-/// road before them.
+/// Places are relative to the centre of the block. Its four kerbs are at ± `half`; vehicles stand
+/// on the road beside them.
 class Block {
  public:
   /// Draws houses, trees, poles, parked vehicles, bicycles and a person.
   Block(const Eigen::Vector2d& half, SceneBuilder& builder);
 
-  /// Takes away or adds this many things, cars, bicycles or persons.
+  /// Removes or adds this number of objects (cars, bicycles or persons).
   void alter(std::size_t changes, SceneBuilder& builder);
   void putAt(const Eigen::Vector2d& middle, SceneBuilder& builder) const;
 

@@ -1,5 +1,5 @@
-// Puts a scene together: gives ids and looks, and refuses what would stand in something else, in a
-// road's way or in the body's path.
+// Builds a scene: assigns ids and looks, and refuses objects that would intersect others or block a
+// road or the body's path.
 #pragma once
 
 #include <string>
@@ -11,12 +11,12 @@
 
 namespace perdure::sim {
 
-/// Where a thing is put: its place on the ground, its yaw and the height of its underside.
+/// The placement of an object: its position on the ground, yaw, and height of its underside.
 struct Place {
   Eigen::Vector2d point = Eigen::Vector2d::Zero();
   double yaw = 0.0, low = 0.0;
 };
-/// Of the centre of a thing of this height.
+/// Pose of the centre of an object with this height.
 RigidTransform poseOf(const Place& place, double height);
 Solid solidAt(const Place& place, const Eigen::Vector3d& size);
 
@@ -29,11 +29,12 @@ class SceneBuilder {
   const SceneOptions& options() const { return options_; }
   double seconds(double by_default) const { return options_.seconds.value_or(by_default); }
 
-  /// The body's motion; nothing that reaches under `height` is put within `clearance` of its path.
+  /// Sets the body's motion. Objects with an underside below `height` are not placed within
+  /// `clearance` of its path.
   void setBody(Trajectory motion, double seconds, double clearance, double height);
-  /// Nothing is put there from now on.
+  /// Reserves a volume, in which nothing is placed from now on.
   void reserve(const Solid& solid) { reserved_.push_back(solid); }
-  /// Where a thing that moves goes while it is watched: nothing is put in its way.
+  /// Reserves the path of a moving object during the scene, so that nothing is placed on it.
   void reserveWay(const SceneObject& object, double until_s, double margin);
 
   SceneObject draw(const std::string& class_name) {
@@ -41,13 +42,13 @@ class SceneBuilder {
   }
   std::uint64_t look() { return lookSeed(dice_, options_.look_set); }
 
-  /// False, and nothing happens, where it would meet anything by less than `margin`.
+  /// Returns false, without an effect, if the gap to any other object would be less than `margin`.
   bool put(SceneObject object, const Place& place, double margin = 0.05);
   bool put(PropKind kind, const Eigen::Vector3d& size, const Place& place, double margin = 0.02);
-  /// As `put`, for what a scene cannot do without. The last object's reference is handed back.
+  /// Places an object as put() does, but aborts on failure. Returns a reference to the new object.
   SceneObject& mustPut(SceneObject object, const Place& place);
   void mustPut(PropKind kind, const Eigen::Vector3d& size, const Place& place);
-  /// A thing with a motion of its own, checked by the caller (see reserveWay).
+  /// Adds an object with its own motion, which the caller has checked (see reserveWay).
   SceneObject& putMoving(SceneObject object, Trajectory motion);
 
   bool isFree(const Solid& solid, double margin) const;

@@ -8,7 +8,7 @@ namespace perdure::sim {
 namespace {
 
 constexpr double kHalfFieldOfView = 40.0 * M_PI / 180.0;
-constexpr double kReadout = 0.02;  ///< seconds, of a rolling shutter
+constexpr double kReadout = 0.02;  ///< readout time of the rolling shutter, s
 
 CameraCalibration makeCamera(const std::string& name, const SceneOptions& options, double left,
                              double pitch_down) {
@@ -31,7 +31,7 @@ CameraCalibration makeCamera(const std::string& name, const SceneOptions& option
   return camera;
 }
 
-/// The densities of the MEMS unit in EuRoC's vehicle (ADIS16448).
+/// Noise densities of the MEMS unit in EuRoC's vehicle (ADIS16448).
 ImuCalibration makeImu() { return {1.7e-4, 2e-5, 2e-3, 3e-3, 200.0}; }
 
 Eigen::Vector3d drawBias(Dice& dice, double sigma) {

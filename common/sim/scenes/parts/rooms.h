@@ -1,4 +1,4 @@
-// Rooms: walls, tables with chairs and monitors, couches, shelves; and how someone walks in them.
+// Rooms with walls, tables, chairs, monitors, couches and shelves; and handheld motion in them.
 #pragma once
 
 #include "common/sim/path.h"
@@ -8,19 +8,19 @@ namespace perdure::sim {
 
 inline constexpr double kWallHeight = 2.8;
 
-/// A room about the origin of W. What stands along its walls faces inwards.
+/// A room around the origin of W. Objects along its walls face the inside.
 class Room {
  public:
   Room(SceneBuilder& builder, double length, double width);
 
-  /// A table with `chairs` of 0 to 6 around it and `monitors` of 0 to 2 on it. False where there
-  /// is no room for the table; chairs that find none are left out.
+  /// A table with `chairs` of 0 to 6 around it and `monitors` of 0 to 2 on it. Returns false if
+  /// there is no space for the table; chairs without space are left out.
   bool putTable(const Eigen::Vector2d& point, double yaw, int chairs, int monitors);
-  /// A table at the wall with a monitor on it and a chair before it.
+  /// A table at the wall with a monitor on it and a chair in front.
   bool putDesk(const Eigen::Vector2d& at_wall, double inwards);
-  /// Desks, couches, shelves, crates and people along all four walls.
+  /// Places desks, couches, shelves, crates and people along all four walls.
   void furnishWalls();
-  /// Tries `count` things of the class anywhere on the floor.
+  /// Tries to place `count` objects of the class anywhere on the floor.
   void scatter(const std::string& class_name, int count);
   void scatterCrates(int count);
 
@@ -36,18 +36,18 @@ class Room {
   double length_, width_;
 };
 
-/// Where someone who walks looks: about the way's direction, to and fro.
+/// The gaze of a walking person: oscillates about the direction of the path.
 struct Gaze {
-  double swing = 1.0, period_s = 13.0;  ///< of the yaw, radians to each side
+  double swing = 1.0, period_s = 13.0;  ///< amplitude of the yaw to each side, radians
   double second_swing = 0.18, second_period_s = 4.7;
-  double middle = 0.0;                                ///< relative to the way
+  double middle = 0.0;                                ///< mean direction relative to the path
   double pitch_down = 0.12, nod = 0.07, tilt = 0.05;  ///< radians
 };
 
-/// A camera in the hand of someone who walks: steps, sway and a gaze that wanders.
+/// The motion of a camera in the hand of a walking person: steps, sway and a wandering gaze.
 Trajectory handheldMotion(const GroundPath& path, const Drive& drive, const Gaze& gaze,
                           double height);
-/// The same for someone whose way and gaze are given: one place and yaw (and pitch) every interval.
+/// One pose per interval, for a person whose path and gaze are given.
 struct Look {
   Eigen::Vector2d point = Eigen::Vector2d::Zero();
   double yaw = 0.0, pitch_down = 0.0, roll = 0.0;

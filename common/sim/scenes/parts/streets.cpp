@@ -9,7 +9,7 @@
 namespace perdure::sim {
 namespace {
 
-constexpr double kCrossingClearance = 3.5;  ///< nobody parks nearer to a crossing road's edge
+constexpr double kCrossingClearance = 3.5;  ///< parked vehicles to a crossing road's edge
 
 Solid areaOf(const Road& road) {
   const Eigen::Vector2d way = road.to - road.from;
@@ -50,8 +50,8 @@ Streets::Streets(SceneBuilder& builder, std::vector<Road> roads, const Furnishin
   builder_.scene().roads = roads_;
 }
 
-/// `across` is the distance from the road's middle line to that side; `yaw` is relative to the way
-/// that traffic takes on that side (people drive on the right).
+/// `across` is the distance from the road's centre line to that side. `yaw` is relative to the
+/// direction of the traffic on that side (right-hand traffic).
 Place Streets::placeAt(const Road& road, int side, double along, double across, double yaw) const {
   const Eigen::Vector2d way = (road.to - road.from).normalized(), left(-way.y(), way.x());
   const double heading = std::atan2(way.y(), way.x()) + (side > 0 ? M_PI : 0.0);
@@ -70,7 +70,7 @@ bool Streets::nearACrossing(const Road& road, const Solid& solid) const {
 }
 
 void Streets::furnish() {
-  // Houses first: they are the largest and everything else finds room before them.
+  // Houses first, because they are the largest; other objects use the remaining space.
   for (const Road& road : roads_) {
     for (const int side : {-1, 1}) build(road, side);
     if (furnishing_.ends) closeEnds(road);
@@ -93,7 +93,7 @@ void Streets::build(const Road& road, int side) {
     bool built = false;
     for (double length = size.x(); length >= 4.0 && !built; length *= 0.6) {
       const Eigen::Vector3d shorter(length, size.y(), size.z());
-      // The front looks at the road: −y of the house, on the side away from the traffic's yaw.
+      // The front (−y) of the house faces the road, on the side away from the traffic's yaw.
       const Place place = placeAt(road, side, along + 0.5 * length,
                                   0.5 * road.width_m + set_back + 0.5 * size.y(), M_PI);
       const Solid solid = solidAt(place, shorter);
@@ -136,7 +136,7 @@ void Streets::park(const Road& road, int side) {
         placeAt(road, side, along + 0.5 * length, across, turned + dice.uniform(-0.03, 0.03));
     const bool stands = !nearACrossing(road, solidAt(place, vehicle.size)) &&
                         builder_.put(std::move(vehicle), place, 0.25);
-    // Gaps are many small ones and few large ones.
+    // Many gaps are small, and few are large.
     const double gap = 0.6 - (furnishing_.mean_gap - 0.6) * std::log(1.0 - dice.unit());
     along += stands ? length + std::min(gap, 6.0) : 1.0;
   }
@@ -160,7 +160,7 @@ void Streets::plant(const Road& road, int side) {
   }
   for (double along = 3.0; along < lengthOf(road) - 6.0; along += 9.0) {
     if (!dice.chance(furnishing_.hedge_share)) continue;
-    // Between the cars and the pavement, or before the houses.
+    // Between the cars and the pavement, or in front of the houses.
     const bool at_kerb = dice.chance(0.4);
     const Eigen::Vector3d size(dice.uniform(2.5, 6.0), dice.uniform(0.5, 0.7),
                                dice.uniform(0.7, 1.5));

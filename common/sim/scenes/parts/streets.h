@@ -1,4 +1,4 @@
-// Fills streets: parked cars and vans, houses, trees, poles, hedges, people and bicycles.
+// Fills streets with parked cars and vans, houses, trees, poles, hedges, people and bicycles.
 #pragma once
 
 #include <vector>
@@ -8,36 +8,37 @@
 
 namespace perdure::sim {
 
-/// Which things stand along a street, and how densely. Distances in metres.
+/// The kinds and densities of objects along a street. Distances in metres.
 struct Furnishing {
-  double mean_gap = 1.6;         ///< between parked vehicles
-  double free_share = 0.22;      ///< of slots that are empty, 5 to 11 m long
-  double van_share = 0.16;       ///< of parked vehicles
-  double reversed_share = 0.12;  ///< of vehicles parked against the traffic
+  double mean_gap = 1.6;         ///< gap between parked vehicles
+  double free_share = 0.22;      ///< share of empty slots, 5 to 11 m long
+  double van_share = 0.16;       ///< share of vans among parked vehicles
+  double reversed_share = 0.12;  ///< share of vehicles parked against the traffic
   double tree_every = 15.0, pole_every = 27.0;
-  double person_every = 26.0, bicycle_every = 24.0;  ///< of pavement
-  double hedge_share = 0.3;                          ///< of the houses' fronts
+  double person_every = 26.0, bicycle_every = 24.0;  ///< spacing along the pavement
+  double hedge_share = 0.3;                          ///< share of houses with a hedge in front
   double pavement = 3.2;                             ///< width
-  bool ends = true;                                  ///< a house closes each road's end
+  bool ends = true;                                  ///< a house stands at each road's end
 };
 
 inline constexpr double kRoadWidth = 10.0;  ///< two lanes and two rows of parked cars
-inline constexpr double kLane = 1.4;        ///< of a lane's middle from the road's
+inline constexpr double kLane = 1.4;        ///< road's centre line to the centre of a lane
 
-inline constexpr double kGridX = 82.0, kGridY = 66.0;  ///< between the roads of a grid
-/// Roads in rows (along x) and columns, that go on a little beyond the outer crossings; the first
+inline constexpr double kGridX = 82.0, kGridY = 66.0;  ///< distance between roads
+/// Roads in rows (along x) and columns, which extend slightly beyond the outer crossings. The first
 /// crossing is at the origin.
 std::vector<Road> gridOfRoads(int columns, int rows);
-/// How a grid of streets is furnished: a third of the slots free, few trees and people.
+/// The furnishing of a grid of streets: a third of the slots are free, and trees and people are
+/// few.
 Furnishing furnishingOfGrid();
 
-/// Straight roads that may cross, each with both its sides.
+/// Straight roads that may cross, with objects on both sides.
 class Streets {
  public:
   Streets(SceneBuilder& builder, std::vector<Road> roads, const Furnishing& furnishing);
-  /// The body's motion is set before: nothing is put in its way.
+  /// Requires that the body's motion is already set, because nothing is placed on its path.
   void furnish();
-  /// Vehicles only, on one side (+1 left of the road's direction, -1 right) of one road.
+  /// Places vehicles only, on one side (+1 left of the road's direction, -1 right) of one road.
   void park(const Road& road, int side);
   void build(const Road& road, int side);
   void plant(const Road& road, int side);
@@ -54,12 +55,12 @@ class Streets {
   Furnishing furnishing_;
 };
 
-/// A way on the right-hand lane that turns at these crossings, the first and the last point are its
-/// ends; right turns are tighter than left ones.
+/// A path on the right-hand lane that turns at these crossings. The first and the last point are
+/// its ends. Right turns are tighter than left turns.
 GroundPath laneThrough(const std::vector<Eigen::Vector2d>& points);
-/// A light of the day: sun and sky.
+/// Draws the direction and strength of sun and sky.
 void drawDaylight(SceneBuilder& builder);
-/// The body as a car that drives so for `seconds`, with a car's sensors, by day.
+/// Sets the body as a car with this drive for `seconds`, with a car's sensors, in daylight.
 void putOnWheels(SceneBuilder& builder, const GroundPath& way, const Drive& driven, double seconds,
                  const SceneOptions& options);
 

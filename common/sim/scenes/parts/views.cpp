@@ -9,10 +9,10 @@
 namespace perdure::sim {
 namespace {
 
-constexpr double kSmallestPx = 11.0, kLargestPx = 330.0;  ///< of the longer side, 320 pixels wide
+constexpr double kSmallestPx = 11.0, kLargestPx = 330.0;  ///< longer side; width 320
 constexpr double kFocalAt320 = 190.7;
 
-/// How far its outline spans about: of a thing seen from any side.
+/// Approximate extent of the outline, seen from any side.
 double extentOf(const SceneObject& object) {
   return std::max(object.size.z(), 0.5 * (object.size.x() + object.size.y()));
 }
@@ -42,7 +42,7 @@ View ViewFinder::draw() {
     const auto view = lookAt(builder_.scene().objects[dice.pick(indices)]);
     if (view) return *view;
   }
-  // A view on nothing in particular.
+  // No object was visible; choose a random view without a target.
   for (;;) {
     const Eigen::Vector2d point(dice.uniform(area_.low.x(), area_.high.x()),
                                 dice.uniform(area_.low.y(), area_.high.y()));
@@ -54,7 +54,7 @@ View ViewFinder::draw() {
 
 std::optional<View> ViewFinder::lookAt(const SceneObject& object) {
   Dice& dice = builder_.dice();
-  // Most of what a camera meets is small in its image.
+  // Most objects in real images are small.
   const double share = std::pow(dice.unit(), 1.3);
   const double span = kSmallestPx * std::pow(kLargestPx / kSmallestPx, share);
   const double distance =
@@ -64,7 +64,7 @@ std::optional<View> ViewFinder::lookAt(const SceneObject& object) {
   if (!point) return std::nullopt;
   const Eigen::Vector3d centre = object.motion.poseAt(0.0).p;
   const Eigen::Vector2d way = centre.head<2>() - *point;
-  // Large things stay near the middle of the image, small ones are anywhere.
+  // Large objects stay near the centre of the image; small ones may be anywhere.
   const double freedom = 1.0 - 0.75 * share;
   const double yaw = std::atan2(way.y(), way.x()) + freedom * dice.uniform(-0.62, 0.62);
   const double pitch =
@@ -89,7 +89,7 @@ std::optional<Eigen::Vector2d> ViewFinder::standAt(const SceneObject& object, do
   return std::nullopt;
 }
 
-/// At least two of five points of it are in sight.
+/// Returns true if at least two of five points of the object are visible.
 bool ViewFinder::sees(const Eigen::Vector3d& eye, const SceneObject& object) const {
   const RigidTransform T_WO = object.motion.poseAt(0.0);
   int seen = 0;
@@ -122,7 +122,7 @@ View ViewFinder::viewFrom(const Eigen::Vector3d& eye, double yaw, double pitch_d
 }
 
 Trajectory throughViews(const std::vector<View>& views) {
-  constexpr int kControls = 10;  // a second's; the middle seven make the view
+  constexpr int kControls = 10;  // number per second; the middle seven form the view
   std::vector<RigidTransform> controls;
   for (const View& view : views) {
     for (int i = -kControls / 2; i < kControls / 2; ++i) {

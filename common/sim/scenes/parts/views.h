@@ -1,4 +1,4 @@
-// Views for training: where a camera could stand to see a thing as large as wanted.
+// Views for training: camera poses in which an object has a desired size in the image.
 #pragma once
 
 #include <optional>
@@ -8,12 +8,12 @@
 
 namespace perdure::sim {
 
-/// The ground on which cameras may stand.
+/// The ground area for cameras.
 struct Area {
   Eigen::Vector2d low, high;
 };
 
-/// A body's pose at a view and how it moves through it.
+/// The pose and velocity of the body at a view.
 struct View {
   RigidTransform T_WB;
   Eigen::Vector3d velocity_W = Eigen::Vector3d::Zero(), turn_rate_B = Eigen::Vector3d::Zero();
@@ -23,7 +23,7 @@ class ViewFinder {
  public:
   ViewFinder(SceneBuilder& builder, const Area& area, double top_speed);
 
-  /// A view on a thing of a class drawn evenly from those that are there.
+  /// A view of an object. Its class is drawn uniformly from the classes in the scene.
   View draw();
 
  private:
@@ -35,11 +35,11 @@ class ViewFinder {
   SceneBuilder& builder_;
   Area area_;
   double top_speed_;
-  std::vector<Solid> scenery_;  ///< what hides
+  std::vector<Solid> scenery_;  ///< possible occluders
   std::vector<std::pair<std::string, std::vector<std::size_t>>> by_class_;
 };
 
-/// Views one second apart, each passed through at its own velocity; in between it is elsewhere.
+/// Views one second apart, each with its own velocity. The motion between them is arbitrary.
 Trajectory throughViews(const std::vector<View>& views);
 
 }  // namespace perdure::sim
