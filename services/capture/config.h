@@ -1,4 +1,4 @@
-// The configuration of capture.
+// Configuration of capture.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ namespace perdure::capture {
 struct DatasetConfig {
   std::string path;
   std::string sequence;             ///< KITTI tracking only
-  std::vector<std::string> topics;  ///< of a recording of ROS: "cam0=/left/image_raw"
+  std::vector<std::string> topics;  ///< topics of a ROS recording: "cam0=/left/image_raw"
   std::string cameras = "stereo";
   double lead_s = 5.0, trail_s = 0.5;
 };
@@ -41,12 +41,12 @@ struct RunConfig {
 };
 
 struct CameraConfig {
-  std::string id, second;  ///< of cam0 and cam1; no second: one camera
+  std::string id, second;  ///< of cam0 and cam1; if `second` is empty, there is one camera
   std::string format = "auto";
   double rate_hz = 20.0, exposure_ms = 0.0, gain = 0.0;
   std::string flip = "none";
   std::string focus = "as_is";
-  double lens_dioptres = 0.0;  ///< of camera.focus: manual
+  double lens_dioptres = 0.0;  ///< for camera.focus: manual
   std::vector<double> crop;    ///< empty, or 4: x, y, width, height on the sensor
 };
 
@@ -68,10 +68,10 @@ struct SpeedConfig {
 struct GnssConfig {
   std::string source = "none", address;
   double most_sigma = 5.0, latency_s = 0.0;
-  std::vector<double> antenna;  ///< empty, or 3: in the body
+  std::vector<double> antenna;  ///< empty, or 3: position in the body
 };
 
-/// As configured, or the usual one of the source.
+/// Configured address, or the default address of the source.
 std::string addressOf(const GnssConfig& config);
 
 struct Config {
@@ -90,7 +90,7 @@ struct Config {
 
 void describe(Config& config, config::Fields& fields);
 
-/// Throws StartupError where what the source needs is not given.
+/// Throws StartupError if a setting that the source needs is missing.
 void requireSource(const Config& config);
 
 }  // namespace perdure::capture

@@ -90,7 +90,7 @@ void Playback::begin() {
 
 void Playback::feed() {
   if (!node_->wants()) return;
-  const bool ended = loader_->ended();  // asked before taking: nothing comes after
+  const bool ended = loader_->ended();  // read before taking: if true, no message follows
   if (auto message = loader_->take()) {
     if (std::holds_alternative<Frame>(*message)) {
       if (std::get<Frame>(*message).camera == "cam0") context_.health().frameIn();
@@ -111,7 +111,7 @@ void Playback::credit(const std::string& answerer, const FrameStamp& stamp) {
 void Playback::pump() {
   if (finished_ || !gate_.open(std::chrono::steady_clock::now())) return;
   if (!node_) begin();
-  constexpr int kMost = 256;  // then Health and signals have their turn
+  constexpr int kMost = 256;  // returns regularly to Health and signals
   for (int i = 0; i < kMost && !context_.stopping(); ++i) {
     if (loader_) feed();
     if (node_->tick(monotonicNs()) > Duration{0}) break;
@@ -120,8 +120,8 @@ void Playback::pump() {
   if (node_->finished()) finish();
 }
 
-/// Writes the file where it would not say the same again. Samples alone wait for the next frame:
-/// a few of them coming twice does no harm.
+/// Writes the file if its content would change. A sample alone does not cause a write until the
+/// next frame, because a few repeated samples do no harm.
 void Playback::saveState() {
   RunState state = node_->state();
   if (config_.run.state.empty() || (state.next_sequence == saved_.next_sequence &&

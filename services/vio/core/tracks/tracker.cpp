@@ -183,9 +183,8 @@ void Tracker::detect(const cv::Mat& image, const std::vector<cv::Rect2f>& masked
   std::vector<cv::KeyPoint> corners;
   for (int cell = 0; cell < columns * rows; ++cell) {
     const std::int64_t wanted = per_cell - filled[static_cast<std::size_t>(cell)];
-    if (2 * wanted <= per_cell)
-      continue;  // half-full cells are skipped, because detection costs
-                 // more than it gains
+    // Skips half-full cells, because detection costs more than it gains.
+    if (2 * wanted <= per_cell) continue;
     // FAST's circle needs three more pixels on each side.
     const cv::Rect inner(static_cast<int>(cell % columns * cell_w),
                          static_cast<int>(cell / columns * cell_h), static_cast<int>(cell_w),
