@@ -151,9 +151,8 @@ Result<NmeaReader::Said> NmeaReader::readGga(std::string_view sentence, std::int
   if (!latitude || !longitude || !above_sea) {
     return fail("nmea_malformed", "GGA says that there is a fix, and has no place or height");
   }
-  if (*latitude == 0.0 && *longitude == 0.0)
-    return noFix();  // some receivers report zeros without
-                     // a fix
+  // Some receivers report zeros without a fix.
+  if (*latitude == 0.0 && *longitude == 0.0) return noFix();
   const double height = *above_sea + wholeNumber(field(sentence, 11)).value_or(0.0);
   if (!isHeight(height)) return fail("nmea_malformed", "GGA says a height that is not on Earth");
   place_.latitude_deg = *latitude;
