@@ -1,4 +1,5 @@
-// Raw head tensors to boxes with evidence, one rule for each family of networks (eq. 6, 7).
+// Decodes raw head tensors to boxes with evidence, with one rule for each family of networks (eq.
+// 6, 7).
 #pragma once
 
 #include <array>
@@ -23,7 +24,8 @@ struct Candidate {
 };
 
 struct DecodeOptions {
-  double score_threshold = 0.05;    ///< boxes whose best wanted class scores less are left out
+  double score_threshold = 0.05;    ///< boxes with a lower score of their best wanted class are
+                                    ///< left out
   std::vector<std::size_t> wanted;  ///< indices of the model's classes to report, in order
 };
 
