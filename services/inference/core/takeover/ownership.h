@@ -41,9 +41,8 @@ class Ownership {
     } else if (!in_form_) {
       in_form_ = ++good_ >= kGoodResults && now - lost_at_ >= kLeases * lease_;
     }
-    if (in_form_ && alone)
-      spare_ = false;  // after a suspension it has not received any other
-                       // writer yet
+    // While out of form, a process that just resumed may not yet have received any other writer.
+    if (in_form_ && alone) spare_ = false;
     return strength();
   }
   /// Reports that the network gave no result. Returns true if this causes the loss of form.

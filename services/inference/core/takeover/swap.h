@@ -3,8 +3,8 @@
 // call passes the time. No third process is needed; the process that started the newcomer may have
 // ended.
 //
-//   newcomer: rehearsing ──► on probation ──► plain gives up: silent, and ends
-//   old one: plain ──► watches ──► retires takes back: stronger than the newcomer
+//   newcomer:  rehearsing ──► on probation ──► plain          gives up: silent, and ends
+//   old one:   plain ──► watches ──► retires                  takes back: outbids the newcomer
 #pragma once
 
 #include <chrono>
