@@ -41,12 +41,12 @@ struct RunConfig {
 };
 
 struct CameraConfig {
-  std::string id, second;  ///< of cam0 and cam1; if `second` is empty, there is one camera
+  std::string id, second;  ///< ids of cam0 and cam1; if `second` is empty, there is one camera
   std::string format = "auto";
   double rate_hz = 20.0, exposure_ms = 0.0, gain = 0.0;
   std::string flip = "none";
   std::string focus = "as_is";
-  double lens_dioptres = 0.0;  ///< for camera.focus: manual
+  double lens_dioptres = 0.0;  ///< lens position for camera.focus: manual
   std::vector<double> crop;    ///< empty, or 4: x, y, width, height on the sensor
 };
 

@@ -20,7 +20,7 @@
 namespace perdure::capture {
 namespace {
 
-constexpr std::size_t kMostSizes = 12;  // of a mode, in the text for people
+constexpr std::size_t kMostSizes = 12;  // listed sizes of a mode, in the text for people
 
 void addControls(const libcamera::ControlInfoMap& offered, SeenCamera& camera) {
   const auto has = [&](const auto& control) { return offered.find(control.id()) != offered.end(); };

@@ -46,7 +46,7 @@ class Loader {
   void compress(replay::Message& message);
 
   const bool mono_;
-  const int quality_;  ///< of JPEG; 0: raw
+  const int quality_;  ///< JPEG quality; 0: raw
   const bool repeats_;
   std::unique_ptr<replay::Dataset> drive_;
   TimePoint from_, until_;  ///< interval of the samples, until_ excluded

@@ -11,8 +11,8 @@ namespace {
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::chrono::seconds kLongBack{2};  // a larger jump back means a restarted recording or
                                               // another drive
-constexpr std::chrono::seconds kGap{1};  // of the sensor clock; after it, the earlier trajectory is
-                                         // not continued
+constexpr std::chrono::seconds kGap{1};  // sensor time; after a longer gap, the earlier trajectory
+                                         // is not continued
 
 }  // namespace
 

@@ -71,11 +71,11 @@ class Node {
   const ModelDescription& at() const { return sizes_[size_].description; }
 
   Config config_;
-  ModelDescription description_;  ///< at its own size
+  ModelDescription description_;  ///< description at its own size
   std::vector<Size> sizes_;       ///< its own first, then smaller ones if there is a budget
   std::size_t size_ = 0;
   std::function<double()> clock_s_;
-  double forward_s_ = 0.0;  ///< of the last frame
+  double forward_s_ = 0.0;  ///< time of the forward pass for the last frame
   DecodeOptions options_;
   ModelInfo info_;
 };

@@ -95,8 +95,8 @@ class Worker {
   std::string failure_, last_problem_;
   ReasonCounts reasons_;
   Predictions expected_;
-  double scale_ = 1.0;   ///< of the input
-  double age_ms_ = 0.0;  ///< of the last result when it was ready
+  double scale_ = 1.0;   ///< width of the input relative to its own size
+  double age_ms_ = 0.0;  ///< age of the last result when it was ready
   std::thread thread_;
 };
 

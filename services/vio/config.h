@@ -25,7 +25,7 @@ struct Config {
   double pair_tolerance_s = 0.01;   ///< largest difference between the two cameras' stamps
   double speed_wait_s = 0.12;       ///< longest wait of a frame for its speed sample
   double longest_gap_s = 2.0;       ///< a longer IMU gap ends the frame of reference
-  double longest_blackout_s = 0.8;  ///< likewise a longer gap without frames
+  double longest_blackout_s = 0.8;  ///< a longer gap without frames also ends it
   std::int64_t max_pending = 40;    ///< frames that wait for their IMU samples
   double restore_age_s = 10.0;      ///< an older saved state is not resumed
   std::string state_directory;      ///< main: directory of the saved state; empty: not saved

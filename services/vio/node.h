@@ -27,7 +27,7 @@ namespace perdure::vio {
 
 struct Outputs {
   Sink<Odometry> odometry;    ///< one for each frame of the first camera, in order
-  Sink<Landmarks> landmarks;  ///< after its odometry, once the filter has started
+  Sink<Landmarks> landmarks;  ///< sent after the odometry, once the filter has started
   /// Sent after the odometry: innovations of the image, for programs that check a calibration.
   Sink<std::vector<Innovation>> innovations = {};
 };
@@ -95,12 +95,12 @@ class Node {
   WaitingFrames waiting_;
   MovingMask moving_;
   InVain in_vain_;
-  Agreement agreement_;  ///< across starts, because a wrong rig causes repeated losses
+  Agreement agreement_;  ///< not reset at a start, because a wrong rig causes repeated losses
   SpeedDoubt speed_doubt_;
   MotionInitialiser motion_initialiser_;
   std::optional<SavedState> saved_;
   std::optional<TimePoint> last_image_, last_imu_time_;
-  std::optional<std::uint64_t> last_sequence_;  ///< of the last output with a pose
+  std::optional<std::uint64_t> last_sequence_;  ///< sequence of the last output with a pose
   std::uint64_t frame_ = 0;
   int degraded_frames_ = 0, unaided_frames_ = 0;
   std::string last_start_reason_;

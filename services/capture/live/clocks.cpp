@@ -12,7 +12,7 @@ namespace {
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::int64_t kSettles_ns = kSecond / 2;
 constexpr std::size_t kRemembered_s = 8;
-constexpr double kDrift = 5e-4;          // between two quartz clocks, with a margin
+constexpr double kDrift = 5e-4;          // drift between two quartz clocks, with a margin
 constexpr double kJump_ns = 20'000'000;  // more than delay or drift explains
 
 std::int64_t read(clockid_t clock) {
@@ -87,7 +87,8 @@ void ClockMap::observe(std::int64_t theirs_ns, std::int64_t ours_ns) {
   if (!settled_) {
     offset_ = target;
     settled_ = ours_ns - first_ns_ >= kSettles_ns;
-  } else if (target - offset_ > kJump_ns) {  // throughout the window: the remote clock was set back
+    // the delay is larger throughout the window: the remote clock was set back
+  } else if (target - offset_ > kJump_ns) {
     ++jumps_;
     offset_ = target;
   } else {

@@ -19,7 +19,7 @@ struct AnchorSettings {
 struct EarthPlace {
   std::int64_t time_ns = 0;  ///< CLOCK_BOOTTIME
   double latitude_deg = 0, longitude_deg = 0, height_m = 0;
-  double yaw = 0;      ///< of the body's x axis: radians from east, counter-clockwise
+  double yaw = 0;      ///< yaw of the body's x axis: radians from east, counter-clockwise
   double sigma_m = 0;  ///< standard deviation of each horizontal axis
 };
 

@@ -36,7 +36,7 @@ class NmeaReader {
   std::int64_t rmc_ns_ = std::numeric_limits<std::int64_t>::min() / 2;  ///< time of the last RMC
   std::optional<double> speed_, course_;
   GnssFix place_;
-  std::optional<double> stated_sigma_m_;  ///< from the last GST
+  std::optional<double> stated_sigma_m_;  ///< sigma of the last GST
 };
 
 }  // namespace perdure::capture

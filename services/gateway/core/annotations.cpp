@@ -147,7 +147,8 @@ Box boundsOf(const std::vector<Point>& points, const CameraModel& camera) {
 
 struct Said {
   double likelihood = 0.0;
-  bool asked = false;  ///< from the answer to a prediction, not from a reported box
+  bool asked = false;  ///< the likelihood comes from the answer to a prediction, not from a
+                       ///< reported box
 };
 
 /// Probability from the detections that `object` exists rather than clutter, with even prior odds.

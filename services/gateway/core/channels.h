@@ -116,7 +116,7 @@ struct PlaybackState {
   TimePoint time;
   double speed = 1.0;
   bool did_seek = false;
-  std::string id;  ///< of the answered request; empty: none
+  std::string id;  ///< id of the answered request; empty: none
 };
 /// Time range of a recording.
 struct TimeRange {

@@ -8,7 +8,7 @@
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
-#include <utility>  // before Asio, because Boost 1.74 with GCC 12 lacks the include for
+#include <utility>  // included before Asio, because Boost 1.74 with GCC 12 does not include it for
                     // std::exchange
 
 namespace perdure::gateway::web {

@@ -8,9 +8,9 @@
 namespace perdure::gateway::web {
 namespace {
 
-constexpr std::chrono::seconds kPatience{10};  // for a whole request, and for its answer
+constexpr std::chrono::seconds kPatience{10};  // time limit for a whole request, and for its answer
 constexpr std::uint32_t kLongestHeader = 8192;
-constexpr int kMostRequests = 1000;  // of one connection
+constexpr int kMostRequests = 1000;  // requests of one connection
 
 constexpr char kNoPage[] =
     "The page was not built, because npm was not there when Perdure was configured: install npm, "

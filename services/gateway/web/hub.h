@@ -75,8 +75,8 @@ class Hub {
  private:
   struct Kept {
     ChannelInfo info;
-    std::deque<Encoded> messages;  ///< for late clients: the last messages of kEach, the newest of
-                                   ///< kNewest
+    std::deque<Encoded> messages;  ///< messages for late clients: the last ones of kEach, the
+                                   ///< newest of kNewest
     std::size_t subscriptions = 0;
   };
   void handle(Viewer& viewer, const protocol::ClientMessage& message);

@@ -17,7 +17,7 @@
 namespace perdure::gateway::web {
 
 struct Content {
-  std::string name, session;  ///< for serverInfo
+  std::string name, session;  ///< arguments of serverInfo
   std::vector<ChannelInfo> channels;
   std::vector<ServiceInfo> services;
   Files files;

@@ -35,7 +35,7 @@ class Budget {
   double budget_ms_;
   std::vector<double> shares_;
   std::size_t size_ = 0;
-  std::vector<double> times_;  ///< of the last frames at this size, at most kQuick
+  std::vector<double> times_;  ///< times of the last frames at this size, at most kQuick
 };
 
 }  // namespace perdure::inference

@@ -122,10 +122,10 @@ struct ModelDescription {
   std::vector<Level> levels;
   Outputs outputs;
   bool for_onnx_runtime = false;  ///< OpenCV does not support all of its operators
-  BoxForm box_form;               ///< for `outputs` with complete boxes
+  BoxForm box_form;               ///< form of the boxes in `outputs`
   /// YOLOv8, NanoDet: a distance to a side is the mean over 0 … bins − 1; 1: the value itself
   int bins = 0;
-  bool exponents = false;    ///< for one bin: the value is the logarithm of the distance
+  bool exponents = false;    ///< with one bin, the value is the logarithm of the distance
   double cell_offset = 0.5;  ///< YOLOv8, NanoDet: the reference point of a cell is (g + offset)·s
   Azimuth azimuth;
   double reach = 0.0;         ///< perdure: cells by which a cell's centre may lie outside its box

@@ -17,7 +17,7 @@ namespace perdure::ros2 {
 /// A camera of the rig.
 struct RigCamera {
   std::string name;        ///< name in Perdure
-  std::string info_topic;  ///< for messages
+  std::string info_topic;  ///< topic for messages
   bool rectified = false;  ///< its images are rectified
 };
 

@@ -29,7 +29,7 @@ bool CameraTimeline::takes(const CameraImage& image, std::int64_t now_ns, double
   if (image.number <= number) return true;
   const double period =
       static_cast<double>(image.time_ns - *before) / static_cast<double>(image.number - number);
-  if (period > 2.0 * interval_ns) return true;  // after a gap
+  if (period > 2.0 * interval_ns) return true;  // the camera was absent
   period_ns_ += period_ns_ == 0.0 ? period : (period - period_ns_) / 8.0;
   return true;
 }

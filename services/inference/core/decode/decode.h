@@ -29,7 +29,7 @@ struct DecodeOptions {
   std::vector<std::size_t> wanted;  ///< indices of the model's classes to report, in order
 };
 
-/// Reasons: "model_output_shape", "model_output_not_finite".
+/// Fails with "model_output_shape" or "model_output_not_finite".
 Result<std::vector<Candidate>> decode(const ModelDescription& model, const DecodeOptions& options,
                                       const std::vector<Tensor>& tensors);
 

@@ -22,7 +22,8 @@ namespace perdure::inference {
 struct Expectation {
   Box box;                             ///< pixels of the network's input
   std::size_t activation = 1;          ///< index of its class in Candidate::activations
-  std::array<double, 4> side_sigma{};  ///< of the prediction, pixels of the input
+  std::array<double, 4> side_sigma{};  ///< standard deviation of the prediction, pixels of the
+                                       ///< input
 };
 
 /// Answer to an expectation without a matching reported box.

@@ -14,7 +14,7 @@ namespace perdure::inference {
 /// Maps pixels of the image to pixels of the input: x_input = x_image · scale_x + offset_x.
 struct ImageFit {
   double scale_x = 1, scale_y = 1, offset_x = 0, offset_y = 0;
-  int width = 0, height = 0;  ///< of the scaled image, without padding
+  int width = 0, height = 0;  ///< size of the scaled image, without padding
 
   Box toImage(const Box& b) const {
     return {(b.x1 - offset_x) / scale_x, (b.y1 - offset_y) / scale_y, (b.x2 - offset_x) / scale_x,

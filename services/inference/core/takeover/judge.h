@@ -36,8 +36,8 @@ class Judge {
  private:
   struct Row {
     std::size_t elder = 0, newcomer = 0;  ///< number of boxes
-    std::size_t sure = 0, found = 0;      ///< of the elder's boxes: certain ones, and those found
-                                          ///< by the newcomer
+    std::size_t sure = 0, found = 0;      ///< certain boxes of the elder, and how many of them the
+                                          ///< newcomer found
     bool told = true;                     ///< the newcomer's model is known
   };
   std::map<std::uint64_t, std::vector<std::string>> classes_;  ///< by hash

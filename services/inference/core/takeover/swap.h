@@ -31,7 +31,7 @@ class Swap {
   static constexpr std::size_t kRehearsal = 15;  ///< plausible frames in a row
   static constexpr std::size_t kPatience = 150;  ///< number of own results after which a rehearsal
                                                  ///< is too slow
-  static constexpr int kFailures = 3;            ///< of the network in a row
+  static constexpr int kFailures = 3;            ///< failures of the network in a row
   using Time = std::chrono::steady_clock::time_point;
 
   struct Actions {

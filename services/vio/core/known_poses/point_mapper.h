@@ -20,7 +20,7 @@ namespace perdure::vio {
 /// Given pose and motion of the body at one image.
 struct KnownPose {
   RigidTransform T_WB;
-  Matrix6d covariance = Matrix6d::Zero();                ///< of [θ, p], as in Odometry
+  Matrix6d covariance = Matrix6d::Zero();                ///< covariance of [θ, p], as in Odometry
   Eigen::Vector3d velocity_W = Eigen::Vector3d::Zero();  ///< m/s; used only with rolling shutters
   Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();      ///< rad/s; used only with rolling shutters
 };

@@ -11,7 +11,7 @@ namespace perdure::vio {
 /// Matches between two times, as bearings of one camera, and the rotation between them.
 struct BearingPair {
   std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> bearings;  ///< unit vectors in C
-  Eigen::Matrix3d R_B0_B1;                                            ///< with zero bias
+  Eigen::Matrix3d R_B0_B1;                                            ///< rotation with zero bias
   Eigen::Matrix3d J_bias;  ///< derivative of R_B0_B1 (right tangent) by the gyro bias
 };
 /// Gyro bias for which the epipolar normals of each pair are closest to coplanar.

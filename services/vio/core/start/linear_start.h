@@ -27,7 +27,7 @@ struct LinearView {
   Eigen::Matrix3d R_CB0;    ///< rotates B0 into this camera
   Eigen::Vector3d p_BC_B0;  ///< position of the camera relative to the body, in B0
   double t;                 ///< s since the first keyframe
-  Eigen::Vector3d dp;       ///< of the increment up to this keyframe
+  Eigen::Vector3d dp;       ///< position increment up to this keyframe
   Eigen::Vector2d normalised;
   double scale;
 };

@@ -21,7 +21,7 @@ using Eigen::VectorXd;
 constexpr double kGyroBiasPrior = 0.3;  // rad/s: prior deviation of the gyro bias
 constexpr int kIterations = 50;
 constexpr double kLittleDamping = 1e-3;
-constexpr double kLargestStretch = 1.0;  // of a step, natural logarithm
+constexpr double kLargestStretch = 1.0;  // largest scaling by a step, natural logarithm
 constexpr double kInertialCost = 6.0;    // usual upper limit of the cost of samples and biases
 constexpr double kLeastGain = 0.1;       // smallest expected gain of a step, in cost
 

@@ -53,7 +53,7 @@ MotionWindow windowOf(Estimate estimate);
 struct Inertial {
   std::vector<ImuIncrement> increments;
   std::vector<Matrix9> information;
-  std::vector<Eigen::Vector3d> rates;  // of the body in B, rad/s
+  std::vector<Eigen::Vector3d> rates;  // angular rates of the body in B, rad/s
 };
 
 /// Fails with "start_window_short" if samples are missing. Fails with "start_imu_noise_singular" if

@@ -20,8 +20,8 @@ struct SavedState {
   double time_offset_s = 0.0;
   std::vector<double> readout_s;  ///< read-out time of each camera
   Eigen::Vector3d gyro_scale = Eigen::Vector3d::Ones();
-  /// Of [nav, extrinsics, time offset, read-outs, gyroscope scale]. The last two are present only
-  /// if they are estimated.
+  /// Covariance of [nav, extrinsics, time offset, read-outs, gyroscope scale]. The last two are
+  /// present only if they are estimated.
   Eigen::MatrixXd covariance;
   std::uint64_t next_track = 1;
 };

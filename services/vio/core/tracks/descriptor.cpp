@@ -6,7 +6,7 @@
 namespace perdure::vio {
 namespace {
 
-constexpr int kReach = 13, kRadius = kReach + 2;  // of the pattern, and of the pattern with the box
+constexpr int kReach = 13, kRadius = kReach + 2;  // radius of the pattern, without and with the box
 
 // Rows are slightly longer than the patch, so that the compiler can vectorise the loops.
 constexpr std::size_t kSide = 2 * kReach + 1, kStride = 32, kOuter = 2 * kRadius + 1;

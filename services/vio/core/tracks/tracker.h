@@ -76,7 +76,8 @@ class Tracker {
   };
   std::vector<cv::Mat> pyramid(const cv::Mat& image, std::int64_t levels) const;
   struct Images {
-    std::vector<cv::Mat> half;    ///< from half size on, as built by cv::buildOpticalFlowPyramid
+    std::vector<cv::Mat> half;    ///< pyramid from half size on, as built by
+                                  ///< cv::buildOpticalFlowPyramid
     std::vector<cv::Mat> levels;  ///< the image itself first, then each half the size of the
                                   ///< previous
   };
@@ -97,8 +98,8 @@ class Tracker {
     double scale;
     cv::Point2f shift;
   };
-  std::optional<Placed> as_first_;  ///< for pixels of the second camera; empty if the sizes are
-                                    ///< equal
+  std::optional<Placed> as_first_;  ///< scale and shift for pixels of the second camera; empty if
+                                    ///< the sizes are equal
   std::vector<Point> points_;
   Eigen::Vector3d turn_ = Eigen::Vector3d::Zero();  ///< rotation of the first camera during
                                                     ///< read-out, in C

@@ -18,7 +18,7 @@ namespace perdure::vio {
 struct RestExpectation {
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();   ///< rad/s, in B
   Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< m/s², in B
-  double rate_sigma = 0.0, force_sigma = 0.0;       ///< of one axis
+  double rate_sigma = 0.0, force_sigma = 0.0;       ///< standard deviations of one axis
 };
 
 /// From the filter's attitude and biases, with their covariance.

@@ -24,7 +24,7 @@ struct Triangulated {
   Eigen::Vector3d p_W;
   Eigen::Matrix3d covariance;  ///< in W, from the pixel noise alone
   double relative_sigma;       ///< σ / depth, from the newest view
-  double rms;                  ///< of the weighted residuals
+  double rms;                  ///< RMS of the weighted residuals
 };
 
 /// Needs two rays. Fails with "triangulation_…": views, parallel, depth (behind a camera, or too

@@ -18,7 +18,7 @@ Result<void> updateSpeed(State& state, double speed, double sigma, const SpeedOp
 /// Mean inertial readings over an interval at rest, with their standard deviations.
 struct RestSample {
   Eigen::Vector3d rate, force;     ///< means of gyro and accelerometer, with bias
-  double rate_sigma, force_sigma;  ///< of the means, rad/s and m/s²
+  double rate_sigma, force_sigma;  ///< standard deviations of the means, rad/s and m/s²
 };
 RestSample restSample(const std::vector<ImuReading>& readings, const ImuNoise& noise);
 
