@@ -11,7 +11,7 @@ namespace perdure::capture {
 
 struct DatasetConfig {
   std::string path;
-  std::string sequence;             ///< KITTI tracking only
+  std::string sequence;             ///< only for KITTI tracking
   std::vector<std::string> topics;  ///< topics of a ROS recording: "cam0=/left/image_raw"
   std::string cameras = "stereo";
   double lead_s = 5.0, trail_s = 0.5;
@@ -47,14 +47,14 @@ struct CameraConfig {
   std::string flip = "none";
   std::string focus = "as_is";
   double lens_dioptres = 0.0;  ///< lens position for camera.focus: manual
-  std::vector<double> crop;    ///< empty, or 4: x, y, width, height on the sensor
+  std::vector<double> crop;    ///< empty, or 4 values: x, y, width, height on the sensor
 };
 
 struct ImuConfig {
   std::string uri = "local:";
   std::string gyro, accel, trigger;
   double rate_hz = 200.0;
-  std::vector<double> mount;  ///< empty, or 9: rows of R in v_B = R v_device
+  std::vector<double> mount;  ///< empty, or 9 values: rows of R in v_B = R v_device
 };
 
 struct SpeedConfig {
@@ -68,7 +68,7 @@ struct SpeedConfig {
 struct GnssConfig {
   std::string source = "none", address;
   double most_sigma = 5.0, latency_s = 0.0;
-  std::vector<double> antenna;  ///< empty, or 3: position in the body
+  std::vector<double> antenna;  ///< empty, or 3 values: position in the body, m
 };
 
 /// Configured address, or the default address of the source.

@@ -36,8 +36,8 @@ struct Seen {
 /// Finds devices through libcamera and through the libiio context `uri`.
 Seen lookAround(const std::string& uri);
 
-/// Text for people: the devices found, or where none were found. It includes a configuration for up
-/// to two cameras and for the first unit with both sensors.
+/// Text for people: the devices found, or the places searched if none were found. It includes a
+/// configuration for up to two cameras and for the first unit with both sensors.
 std::string describe(const Seen& seen, const std::string& uri);
 
 /// Runs `perdure-capture --list [URI]` and prints the result. Returns 69 if no device is found.

@@ -16,7 +16,7 @@ std::optional<ImageEncoding> encodingOf(const std::string& name) {
   return std::nullopt;
 }
 
-/// Works on const and on mutable messages.
+/// Returns the time of a const or mutable message.
 template <class Message>
 auto& timeOf(Message& message) {
   return std::visit(

@@ -35,8 +35,8 @@ constexpr const char* kRawTopics[] = {"imu", "speed", "odometry", "landmarks"};
 /// Requests from the server's thread to the service's loop.
 struct Mail {
   std::mutex mutex;
-  std::vector<gateway::Channels> wanted;  ///< all changes, because a client that reconnects must
-                                          ///< receive the current state again
+  std::vector<gateway::Channels> wanted;  ///< all changes, not only the last, because a client that
+                                          ///< reconnects must receive the current state again
   std::vector<gateway::Call> calls;
 };
 

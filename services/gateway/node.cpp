@@ -82,7 +82,7 @@ void Node::sendNow(std::uint32_t channel) {
     case kMap:
     case kMapScene:
       next_map_ns_ = 0;
-      map_due_ = map_due_ || !map_.empty();  // otherwise once tiles arrive
+      map_due_ = map_due_ || !map_.empty();  // otherwise the map is sent once tiles arrive
       return;
     case kMapGraph:
     case kMapGraphScene:
@@ -157,7 +157,7 @@ void Node::onFrameOfBefore(std::size_t camera, const Frame& frame) {
 void Node::onOdometry(const Odometry& odometry, std::int64_t now_ns) {
   last_.odometry_ns = now_ns;
   if (odometry.state == OdometryState::kInitialising) return;
-  // With another W, its M shows other parts of the map.
+  // With another W, other parts of the map belong to its M.
   map_due_ = map_due_ || (!map_.empty() && world() != odometry.world);
   beginAnew(odometry.stamp.time);
   odometry_ = odometry;
@@ -240,7 +240,7 @@ void Node::sendObjects() {
     if (wants(channel)) sendNow(channel);
   }
   for (std::size_t i = 0; i < config_.cameras.size(); ++i) sendAnnotations(i, false);
-  if (odometry_) return;  // odometry gives the pose of the body
+  if (odometry_) return;  // odometry messages already send these channels
   for (const std::uint32_t channel : {kTransforms, kPose}) {
     if (wants(channel)) sendNow(channel);
   }

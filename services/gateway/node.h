@@ -46,7 +46,7 @@ class Node {
   void onDetections(const Detections& detections);
   void onModel(const ModelInfo& model);
   void onObjects(const Objects& objects, std::int64_t now_ns);
-  /// The newest messages from before the first viewer, for example the last of an ended drive.
+  /// Takes the newest message from before the first viewer, for example the last of an ended drive.
   void onObjectsOfBefore(const Objects& objects);
   void onFrameOfBefore(std::size_t camera, const Frame& frame);
   void onEvent(const Event& event);
@@ -57,7 +57,7 @@ class Node {
   void onMapTile(const MapTile& tile) { map_.put(tile); }
   void onMapTileGone(const MapTile& key) { map_.erase(key); }
   void onMapReply(const MapReply& reply);
-  /// Graph that map_store sent to another program, for recordings.
+  /// Takes the graph that map_store sent to another program; used for recordings.
   void onMapGraph(const MapReply& reply);
   void onCall(const Call& call, std::int64_t now_ns);
   /// Call it about ten times a second while clients are connected, or while waits() is true.
@@ -97,7 +97,7 @@ class Node {
   void sendAwaited();
   struct Happened {
     Event event;
-    std::optional<Eigen::Vector3d> place;  ///< in W
+    std::optional<Eigen::Vector3d> place;  ///< position in W
   };
   void sendEvent(const Happened& happened, bool as_log);
   std::optional<Eigen::Vector3d> placeOf(const Event& event) const;
@@ -114,7 +114,7 @@ class Node {
   void noteReturns(const Event& event);
   void newest(TimePoint time);
   RigidTransform pose() const;
-  WorldId world() const;  ///< W
+  WorldId world() const;  ///< the current W
   void ask(const Call& call, MapQuery query, std::int64_t now_ns);
   void askForObject(const Call& call, std::int64_t now_ns);
   void askForMap(const Call& call, std::int64_t now_ns);

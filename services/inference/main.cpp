@@ -9,8 +9,8 @@ namespace {
 using namespace perdure;
 
 void run(service::Context& context, const inference::Config& config) {
-  inference::Node node(config, context.instance());  // first, so that frames do not queue up during
-                                                     // loading
+  inference::Node node(config, context.instance());  // created first, so that frames do not queue
+                                                     // up during loading
   context.log().info("network {} with {} classes, hash {}, by {}", node.model().name,
                      node.model().classes.size(), toHex(node.model().hash), node.backend());
   const auto& ownership = config.ownership;
@@ -19,7 +19,7 @@ void run(service::Context& context, const inference::Config& config) {
                                     {inference::Worker::firstStrength(ownership), lease_s});
   auto& notices = context.writer(bus::topics::kSwap);
   (void)context.writer(bus::topics::kModel).write(node.model());
-  inference::Worker* worker = nullptr;  // handlers use it only in context.run(), when it is set
+  inference::Worker* worker = nullptr;  // set before handlers use it in context.run()
   const auto& rivals =
       context.on(bus::topics::kDetections, [&](const Detections& heard) { worker->heard(heard); });
   inference::Worker the_worker(node, ownership, config.model.budget_ms,

@@ -24,7 +24,8 @@ std::vector<std::string> linesOf(const ListFile& list, JsonReader& reader) {
   std::ifstream in;
   if (regular && !error) in.open(list.path);
   for (std::string line; std::getline(in, line);) {
-    if (lines.empty() && line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);  // a byte-order mark
+    // removes a byte-order mark
+    if (lines.empty() && line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);
     while (!line.empty() && std::isspace(static_cast<unsigned char>(line.back()))) line.pop_back();
     if (!line.empty()) lines.push_back(line);
   }
@@ -36,7 +37,7 @@ std::vector<std::string> linesOf(const ListFile& list, JsonReader& reader) {
 
 namespace {
 
-constexpr std::uintmax_t kMostPriorBytes = 16U << 20U;  // 300,000 priors
+constexpr std::uintmax_t kMostPriorBytes = 16U << 20U;  // room for 300,000 priors
 
 void readAzimuth(const Json& json, JsonReader& parent, ModelDescription& model) {
   JsonReader reader(json, "azimuth.", parent.problems());

@@ -196,7 +196,7 @@ Result<std::vector<Candidate>> Node::candidatesIn(const Frame& frame, double flo
   auto candidates = decode(at(), options, *tensors);
   if (!candidates) return candidates;
   std::erase_if(*candidates, [](const Candidate& c) {
-    return c.box.width() < 1.0 || c.box.height() < 1.0;  // less than a pixel of the input
+    return c.box.width() < 1.0 || c.box.height() < 1.0;  // smaller than a pixel of the input
   });
   return candidates;
 }

@@ -22,7 +22,7 @@ class Node {
   /// Loads, warms up and tests the network. Throws StartupError with the fix.
   Node(const Config& config, InstanceId instance);
 
-  /// Description of the activations; classes are those that are reported.
+  /// Description of the activations and of the reported classes.
   const ModelInfo& model() const { return info_; }
 
   const ModelDescription& description() const { return description_; }
@@ -40,8 +40,8 @@ class Node {
   /// (unknown).
   void timeBy(std::function<double()> clock_s) { clock_s_ = std::move(clock_s); }
 
-  /// Pixels of each supported input size relative to the network's own, falling from 1. More than
-  /// one size with a time budget.
+  /// Pixels of each supported input size relative to the network's own, falling from 1. With a time
+  /// budget there is more than one size.
   std::vector<double> sizeShares() const;
   /// Selects the size for the next frames.
   void useSize(std::size_t size);

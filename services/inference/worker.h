@@ -89,8 +89,8 @@ class Worker {
   mutable std::mutex mutex_;  ///< protects all following members and the writers
   Ownership ownership_;
   Swap swap_;
-  Clock::time_point hold_until_{};  ///< results are withheld until then, after the strength was
-                                    ///< lowered
+  Clock::time_point hold_until_{};  ///< results are withheld until this time, after the strength
+                                    ///< was lowered
   bool silent_ = false;
   std::string failure_, last_problem_;
   ReasonCounts reasons_;

@@ -1,4 +1,4 @@
-// Counts consecutive frames without a result, and stores the reason that Health reports meanwhile.
+// Counts consecutive frames without a result, and stores the reason for Health.
 #pragma once
 
 #include <string>
@@ -18,7 +18,7 @@ class InVain {
   }
   /// Adds a frame with a result.
   void clear() { frames_ = 0, why_.clear(); }
-  /// Empty if there is no problem, or for the first one or two frames of one.
+  /// Empty if there is no problem, or during its first frames.
   const std::string& sentence() const { return why_; }
 
  private:

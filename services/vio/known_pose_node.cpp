@@ -110,7 +110,7 @@ std::optional<std::uint64_t> KnownPoseNode::waitsFor() const {
   return waiting_.front().first.stamp.sequence;
 }
 
-/// By more than transports reorder.
+/// Whether the time is earlier by more than transports reorder.
 bool KnownPoseNode::isBefore(TimePoint time, const std::optional<TimePoint>& newest) const {
   return newest && time < *newest - std::chrono::milliseconds(300);
 }

@@ -1,4 +1,4 @@
-// Conversion of landmarks to the published message.
+// Converts landmarks to the published message.
 #pragma once
 
 #include <opencv2/core.hpp>

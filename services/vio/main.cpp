@@ -116,7 +116,7 @@ void followGivenPoses(service::Context& context, const vio::Config& config) {
 }
 
 void serve(service::Context& context, const vio::Config& config) {
-  cv::setNumThreads(1);  // images of this size gain nothing from threads
+  cv::setNumThreads(1);  // threads do not speed up images of this size
   config.odometry == "given" ? followGivenPoses(context, config) : estimate(context, config);
 }
 

@@ -37,7 +37,7 @@ std::optional<cv::Rect2f> boundingBox(const CameraModel& camera, const Vector3d&
   const auto height = static_cast<float>(camera.calibration().height);
   float x1 = width, y1 = height, x2 = 0, y2 = 0;
   for (const Vector3d& p : seen) {
-    // Lens models are not monotonic far outside the image; a pinhole is.
+    // Lens models are not monotonic far outside the image, unlike a pinhole.
     Vector3d bounded = p / p.z();
     bounded.head<2>() = bounded.head<2>().cwiseMax(-1.5).cwiseMin(1.5);
     const auto pixel = camera.project(bounded);

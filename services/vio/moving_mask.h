@@ -1,6 +1,6 @@
 // Image regions of objects that the object filter reports as moving. Points on them give no
-// information about the motion of the camera. Off by default, so that vio does not depend on
-// programs that depend on it.
+// information about the motion of the camera. Off by default, so that vio does not depend on a
+// program that needs vio.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -22,7 +22,7 @@ class MovingMask {
  public:
   explicit MovingMask(const MovingMaskOptions& options) : options_(options) {}
 
-  /// Stores the moving ones of the newest objects.
+  /// Stores those of the newest objects that move.
   void onObjects(const Objects& objects);
   /// Bounding boxes, in pixels and clipped to the image, of the moving objects' cuboids at `now`.
   /// Each object is propagated with its velocity. T_WB: pose of the body in `world` at `now`. Empty

@@ -52,7 +52,7 @@ Result<void> WaitingFrames::addSecond(const Frame& frame) {
   return fail("stereo_unpaired");
 }
 
-/// A late frame whose partner was no longer awaited shows that the camera is back.
+/// A late frame of a missed pair shows that the camera is back.
 bool WaitingFrames::isLate(const Frame& second) {
   if (!taken_ || second.stamp.time > *taken_ + tolerance_) return false;
   trouble_ = "its images come too late";

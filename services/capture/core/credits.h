@@ -1,4 +1,4 @@
-// Follow mode: tracks the frames that are not answered yet, so that a slow reader loses none.
+// Follow mode: tracks the frames that are not answered yet, so that slow readers lose no frames.
 #pragma once
 
 #include <cstddef>

@@ -15,8 +15,8 @@ struct RunState {
   std::int64_t start_ns = 0;        ///< CLOCK_MONOTONIC at which `origin_ns` was due
   std::int64_t origin_ns = 0;       ///< sensor time of the first message
   std::int64_t last_ns = 0;         ///< sensor time of the last message sent
-  std::uint64_t next_sequence = 0;  ///< clock: after the last frame sent; follow: first frame
-                                    ///< without credit
+  std::uint64_t next_sequence = 0;  ///< clock mode: number after the last frame sent; follow mode:
+                                    ///< first frame without credit
   bool finished = false;
 };
 

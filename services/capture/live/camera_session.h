@@ -36,7 +36,7 @@ struct CameraSettings {
 struct CameraShot {
   std::uint32_t sequence = 0;  ///< counted from each opening; lost images leave a gap
   std::int64_t time_ns = 0;    ///< CLOCK_BOOTTIME, middle of the middle row's exposure
-  Result<Frame> frame;         ///< pixels alone; fails with "camera_frame_error" and the reasons of
+  Result<Frame> frame;         ///< pixels only; fails with "camera_frame_error" and the reasons of
                                ///< packed()
 };
 
@@ -63,8 +63,8 @@ class CameraSession {
   virtual std::optional<CameraShot> next(std::chrono::milliseconds longest) = 0;
 };
 
-/// Fails with "camera_absent"; the detail is a sentence with the fix. Called only without an open
-/// session.
+/// Fails with "camera_absent"; the detail is a sentence with the fix. Called only if no session is
+/// open.
 using OpenCamera = std::function<Result<std::unique_ptr<CameraSession>>()>;
 
 }  // namespace perdure::capture

@@ -13,7 +13,7 @@ constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::int64_t kSettles_ns = kSecond / 2;
 constexpr std::size_t kRemembered_s = 8;
 constexpr double kDrift = 5e-4;          // drift between two quartz clocks, with a margin
-constexpr double kJump_ns = 20'000'000;  // more than delay or drift explains
+constexpr double kJump_ns = 20'000'000;  // larger than any delay or drift
 
 std::int64_t read(clockid_t clock) {
   timespec t{};

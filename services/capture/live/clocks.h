@@ -10,7 +10,7 @@
 
 namespace perdure::capture {
 
-/// CLOCK_BOOTTIME, which cannot be set, with the offset of the wall clock at the start. Setting the
+/// CLOCK_BOOTTIME, which cannot be set, plus the offset of the wall clock at the start. Setting the
 /// wall clock later does not change the stamps.
 class HostClock {
  public:

@@ -60,7 +60,7 @@ class DeviceState {
   ReasonCounts reasons_;
 };
 
-/// Calls `flow`, which returns when the device is gone, repeatedly until `stopping`.
+/// Calls `flow` repeatedly until `stopping` is set. `flow` returns when the device is gone.
 inline void keepOpen(const std::atomic<bool>& stopping, const std::function<void()>& flow) {
   constexpr std::chrono::milliseconds kPause{500};
   while (!stopping) {

@@ -22,7 +22,7 @@ class FrameNumbers {
   std::uint64_t next_ = 0, lost_ = 0;
 };
 
-/// Compares 32-bit numbers that wrap around.
+/// Whether number a is earlier than b; 32-bit numbers wrap around.
 bool isEarlier(std::uint32_t a, std::uint32_t b);
 
 /// Checks whether images of one opening are missing before the newest one.

@@ -43,8 +43,8 @@ std::string readText(const iio_channel* channel, const char* attribute) {
   return trimmed(text);
 }
 
-/// Requests a rate and returns the rate set, because many devices support only a few rates. Empty
-/// if the device has no rate attribute.
+/// Requests a rate, and returns the rate that the device has set. Many devices support only a few
+/// rates. Empty if the device has no rate attribute.
 std::optional<double> askRate(const iio_device* device, double wanted) {
   constexpr const char* kRate = "sampling_frequency";
   if (!iio_device_find_attr(device, kRate)) return std::nullopt;
@@ -72,7 +72,7 @@ struct Axis {
     std::int64_t raw = 0;
     iio_channel_convert(channel, &raw, at);
     const auto bytes = format->length / 8;
-    if (format->is_signed && bytes < 8) {  // only the bytes of its length are filled
+    if (format->is_signed && bytes < 8) {  // the conversion fills only the bytes of its length
       const unsigned shift = 64 - 8 * bytes;
       raw = static_cast<std::int64_t>(static_cast<std::uint64_t>(raw) << shift) >> shift;
     }
@@ -254,7 +254,7 @@ class IioStream::Device {
     std::int64_t stamp = 0;
     if (stamp_) {
       iio_channel_convert(stamp_, &stamp, at(stamp_, i));
-    } else {  // counted at the rate that the device reports
+    } else {  // time by counting, at the rate that the device reports
       stamp = std::llround(1e9 * static_cast<double>(counted_ + i) / rate_hz_);
     }
     if (!stamp_ || clock_ == StampClock::kElsewhere) {
@@ -266,7 +266,7 @@ class IioStream::Device {
     return stamp;
   }
 
-  /// A block is available when its last scan is.
+  /// A block becomes available with its last scan.
   void observe(ssize_t scans, std::int64_t now_ns) {
     std::int64_t last = 0;
     if (stamp_) {

@@ -23,7 +23,7 @@ struct IioSettings {
   std::string device = {};   ///< name or id; empty: the first device with the required channels
   double rate_hz = 200.0;    ///< requested rate
   std::string trigger = {};  ///< name or id; empty: unchanged
-  /// Rows of R in v_B = R v_device. If empty, the device's own mount matrix is used, if present.
+  /// Rows of R in v_B = R v_device. If empty, the device's own mount matrix is used, if it has one.
   std::vector<double> mount = {};
   bool gyro = true, accel = true;  ///< required channels
 };

@@ -12,7 +12,7 @@
 
 namespace perdure::capture {
 
-/// One reading of three axes, with its time of CLOCK_BOOTTIME.
+/// One reading of three axes, with its CLOCK_BOOTTIME.
 struct Triad {
   std::int64_t time_ns = 0;
   Eigen::Vector3d v = Eigen::Vector3d::Zero();

@@ -5,8 +5,8 @@
 namespace perdure::capture {
 namespace {
 
-/// Silence is a number of waits without an image, not a time. After a suspension of the process,
-/// the camera may have sent images in the meantime.
+/// Silence is measured in waits without an image, not in time, because the camera may have sent
+/// images while the process was suspended.
 constexpr std::chrono::milliseconds kWait{100};
 constexpr int kSilence = 10;
 

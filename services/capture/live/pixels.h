@@ -11,7 +11,7 @@
 
 namespace perdure::capture {
 
-/// Named by the order of bytes in memory.
+/// Pixel layouts, named by the order of bytes in memory.
 enum class PixelLayout {
   kGrey,
   kBgr,

@@ -13,7 +13,7 @@ namespace {
 constexpr std::uint32_t kExtendedFlag = 0x80000000U, kStandardMask = 0x7ffU,
                         kExtendedMask = 0x1fffffffU;
 constexpr unsigned kMostBits = 64 * 8;         // bits of a CAN FD frame
-constexpr std::size_t kLongestDbcLine = 1000;  // a longer line would need too much of the stack
+constexpr std::size_t kLongestDbcLine = 1000;  // longer lines would need too much stack
 constexpr double kLargest = 1e30;              // physical value; its square is still finite
 
 /// Position of bit k of a signal, 0 being the lowest, in DBC's numbering: byte · 8 + bit.

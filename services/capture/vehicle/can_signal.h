@@ -1,4 +1,4 @@
-// Number in the frames of a CAN bus, as described by a line of a DBC file.
+// A number in the frames of a CAN bus, as described by a line of a DBC file.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ struct CanSignal {
   bool little_endian = true, is_signed = false;
   double factor = 1.0, offset = 0.0;  ///< physical = raw · factor + offset
   double low = 0.0, high = 0.0;       ///< range of the physical value; if equal, unlimited
-  std::string unit;                   ///< as written; empty: none
+  std::string unit;                   ///< unit as written; empty: none
 };
 
 /// Parses "ID LINE". ID is decimal as in a DBC file (bit 31 set for 29 bits), or hexadecimal (29

@@ -31,7 +31,7 @@ std::optional<EarthPlace> EarthAnchor::offer(const GnssFix& fix, bool backwards)
   if (!moves) return std::nullopt;
   drive_.push_back(fix);
   while (drive_.size() > 1 && fix.time_ns - drive_[1].time_ns >= kDrive_ns) drive_.pop_front();
-  // Readers may have had no pose at the time of the last position.
+  // Repeats a position, because readers may have had no pose at the time of the last one.
   const bool again = given_sigma_m_ && fix.time_ns - given_ns_ >= kAgain_ns &&
                      fix.sigma_m <= kAsGood * *given_sigma_m_;
   const bool better = !given_sigma_m_ || fix.sigma_m <= kBetter * *given_sigma_m_ || again;

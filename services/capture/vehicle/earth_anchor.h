@@ -30,7 +30,7 @@ class EarthAnchor {
  public:
   explicit EarthAnchor(AnchorSettings settings) : settings_(settings) {}
 
-  /// Returns the first position; later a position whose sigma is at most half the best sigma
+  /// Returns the first position, and later positions whose sigma is at most half the best sigma
   /// returned. After half a minute, it also returns a position with a similar sigma. `backwards`:
   /// from the wheels.
   std::optional<EarthPlace> offer(const GnssFix& fix, bool backwards);

@@ -8,8 +8,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr double kSigmasOfEph = 2.4477;  // 95 % of a circle: √(χ²₂)
-constexpr double kUnstated_m = 10.0;     // if gpsd reports no error
+constexpr double kSigmasOfEph = 2.4477;  // standard deviations of a 95 % circle: √(χ²₂)
+constexpr double kUnstated_m = 10.0;     // default if gpsd reports no error
 
 std::optional<double> number(const Json& json, const char* key) {
   const auto it = json.find(key);

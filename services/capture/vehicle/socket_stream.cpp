@@ -37,7 +37,8 @@ struct Socket {
   const int number;
 };
 
-/// A stream returns zero bytes at its end, but a datagram may be empty.
+/// Whether the socket is a stream. A stream returns zero bytes at its end, but a datagram may be
+/// empty.
 bool isStream(int socket) {
   int type = 0;
   socklen_t size = sizeof type;

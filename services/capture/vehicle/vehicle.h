@@ -27,7 +27,7 @@ void checkVehicle(const SpeedConfig& speed, const GnssConfig& gnss);
 
 class Vehicle {
  public:
-  struct Outputs {  // called on threads of this class, each by one thread at a time
+  struct Outputs {  // callbacks on threads of this class, each called by one thread at a time
     std::function<void(const SpeedReading&)> speed;
     std::function<void(const EarthPlace&)> place;
   };

@@ -18,7 +18,8 @@ struct WheelSettings {
   std::vector<CanSignal> wheels;     ///< at least one; the reading is their mean
   std::optional<CanSignal> reverse;  ///< indicates that the vehicle drives backwards
   double reverse_value = 1.0;        ///< physical value of `reverse` when driving backwards
-  double sigma = 0.05;               ///< m/s, of one wheel, in addition to its resolution
+  double sigma = 0.05;               ///< m/s, standard deviation of one wheel, without its
+                                     ///< resolution
 };
 
 /// Parses the texts of the configuration (config.h, `speed.can`). `reverse`: "ID LINE == VALUE", or
@@ -31,7 +32,7 @@ class WheelSpeed {
  public:
   explicit WheelSpeed(WheelSettings settings);
 
-  /// Takes a frame of the bus. It returns a reading once each wheel has sent a value, at the mean
+  /// Takes a frame of the bus. It returns a reading once each wheel has sent a value, with the mean
   /// of their times. If one wheel sends twice before another, the reading uses only the wheels
   /// received ("speed_can_partial"). The variance of the mean includes `sigma`, the resolution and
   /// the differences between wheels. If `reverse` was not received for three seconds,
@@ -46,7 +47,7 @@ class WheelSpeed {
   struct Wheel {
     CanSignal signal;
     double to_mps;
-    std::optional<double> speed;  ///< m/s, since the last reading
+    std::optional<double> speed;  ///< m/s, received since the last reading
     std::int64_t time_ns = 0;
   };
   bool take(Wheel& wheel, std::span<const std::uint8_t> data, std::int64_t time_ns);

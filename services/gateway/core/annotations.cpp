@@ -14,7 +14,7 @@ namespace perdure::gateway {
 namespace {
 
 using Point = Eigen::Vector2d;
-constexpr int kSamples = 8;  // samples of an edge, because distortion bends it
+constexpr int kSamples = 8;  // samples along an edge, because distortion bends it
 enum PointsType { kLineLoop = 2, kLineList = 4 };
 
 /// Adds the visible strokes of the line from a to b (in C), as pairs of end points. For a dashed
@@ -160,7 +160,7 @@ std::optional<Said> saidOf(const ObjectBelief& object, const Box& region,
   const Detection* of = nullptr;
   double best = kLeastOverlap;
   for (const Detection& one : detections.detections) {
-    if (k >= one.activations.size()) continue;  // a class that the network does not have
+    if (k >= one.activations.size()) continue;  // the network does not have this class
     const double overlap = one.primed ? (one.primed_for == object.id ? best : 0.0)
                                       : intersectionOverUnion(one.box, region);
     if (overlap >= best) of = &one, best = overlap;

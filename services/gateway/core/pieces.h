@@ -23,7 +23,7 @@ void putVector(JsonWriter& json, const Eigen::Vector3d& v);
 void putQuaternion(JsonWriter& json, const Eigen::Quaterniond& q);
 void putPose(JsonWriter& json, const RigidTransform& T);
 void putColour(JsonWriter& json, const Colour& colour);
-/// For example [1, 2, 3].
+/// Writes a list of numbers, for example [1, 2, 3].
 void putNumbers(JsonWriter& json, std::span<const double> values, int decimals = 4);
 
 /// Constants of foxglove.SceneUpdate.
@@ -34,7 +34,7 @@ void putDeletion(JsonWriter& json, TimePoint time, DeletionType type, const std:
 void beginEntity(JsonWriter& json, TimePoint time, const char* frame, const std::string& id);
 /// Ends a scene entity. `without`: primitive types that it does not contain.
 void endEntity(JsonWriter& json, std::initializer_list<const char*> without);
-/// An item of metadata.
+/// Writes an item of metadata.
 void putPair(JsonWriter& json, const char* name, const std::string& value);
 
 /// Rotation about the vertical `up`, like the objects' yaw.

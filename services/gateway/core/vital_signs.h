@@ -28,8 +28,7 @@ class VitalSigns {
 
   void onHealth(const Health& health, std::int64_t now_ns);
   bool hears(const std::string& process, std::int64_t now_ns) const;
-  /// Sets the services that do not report, each with a sentence that names the program in its
-  /// place.
+  /// Sets the services that do not report, each with a sentence on the program that replaces it.
   void setStandIns(std::map<std::string, std::string> sentences);
 
   /// "perdure.Health"

@@ -148,7 +148,7 @@ std::string compressedImage(const FrameStamp& stamp, const std::string& camera,
 }
 
 void Trajectory::add(TimePoint time, const WorldId& world, const RigidTransform& T_WB) {
-  const bool again = time + kBack < time_;  // a recording that starts again
+  const bool again = time + kBack < time_;  // the recording has restarted
   if (world != world_ || again) {
     world_ = world;
     poses_.clear();

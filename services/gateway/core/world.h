@@ -21,8 +21,7 @@ std::string cameraCalibration(const CameraCalibration& camera, TimePoint time);
 std::string compressedImage(const FrameStamp& stamp, const std::string& camera,
                             std::span<const std::uint8_t> jpeg);
 
-/// Trajectory of the body, thinned to the resolution of the display and to at most some thousands
-/// of points.
+/// Trajectory of the body, thinned to at most a few thousand points.
 class Trajectory {
  public:
   void add(TimePoint time, const WorldId& world, const RigidTransform& T_WB);

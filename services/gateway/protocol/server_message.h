@@ -1,6 +1,6 @@
 // Messages from the server of the Foxglove WebSocket protocol. time(), playbackState(),
-// serviceResponse(), assetMissing() and messageHead() return bytes of binary messages, the other
-// functions JSON texts.
+// serviceResponse(), assetMissing() and messageHead() return bytes of binary messages. The other
+// functions return JSON texts.
 #pragma once
 
 #include <array>

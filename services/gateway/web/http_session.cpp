@@ -72,7 +72,7 @@ void HttpSession::onRead(beast::error_code error) {
     return;
   }
   if (error) {
-    // A client that only closes the connection is not an error.
+    // A connection that the client closes is not counted as an error.
     const bool hung_up = error == http::error::end_of_stream || error == asio::error::eof ||
                          error.category() == asio::error::get_system_category();
     if (!hung_up) shared_->hub.reasons().add("http_malformed");

@@ -89,7 +89,7 @@ enum class Background { kNone, kFirst, kLast };
 /// (core/decode/prime.h). Posterior log-odds s of its class give `offset` + `slope`·s nats for the
 /// object. Without a candidate of score `floor` or more, the result is `nothing`.
 struct PrimedCalibration {
-  double floor = 0.0;  ///< in (0, 1), below the lax threshold; 0: not fitted, no top-down answers
+  double floor = 0.0;  ///< in (0, 1), below the score threshold; 0: not fitted, no top-down answers
   double slope = 0.0, offset = 0.0, nothing = 0.0;
 };
 

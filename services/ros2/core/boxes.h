@@ -37,7 +37,7 @@ std::vector<float> activationsOf(const std::vector<std::pair<std::size_t, double
 
 struct BoxesRead {
   std::vector<Detection> detections;
-  std::vector<Reason> refused;  ///< box_malformed, score_malformed, class_unknown
+  std::vector<Reason> refused;  ///< reasons box_malformed, score_malformed, class_unknown
 };
 /// `classes`: lower-case. A class_id is one of them, or its index.
 BoxesRead boxesOf(const ros::Detection2DArray& message, const std::vector<std::string>& classes,

@@ -14,11 +14,11 @@ namespace {
 using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
 constexpr std::size_t kKnots = 1024, kFrames = 64;
 constexpr Duration kLongestGap = std::chrono::milliseconds(500);
-constexpr double kUnknownVariance = 1e6;  ///< as written by ROS filters
+constexpr double kUnknownVariance = 1e6;  ///< value that ROS filters write for unknown variances
 
 Eigen::Vector3d vectorOf(const ros::Vector3& v) { return {v.x, v.y, v.z}; }
 
-/// Empty if the covariance contains zeros, or the value for "not known".
+/// Empty if the covariance is zero, or has the value for "not known".
 Result<std::optional<Matrix6>> covarianceOf(const std::array<double, 36>& numbers) {
   const Matrix6 given = Eigen::Map<const Matrix6>(numbers.data());
   if (!given.allFinite()) return fail("covariance", "the covariance has numbers that are none");
@@ -71,7 +71,7 @@ Result<void> PoseTrack::onOdometry(const ros::Odometry& message, TimePoint time,
   if (*given) covariance = **given;
   one.covariance.topLeftCorner<6, 6>() = J * covariance * J.transpose();
   one.covariance.diagonal().array() += 1e-12;
-  constexpr double kSigmaSpeed = 0.2;  // m/s; readers need no accurate value
+  constexpr double kSigmaSpeed = 0.2;  // m/s; its accuracy does not matter
   one.covariance.bottomRightCorner<3, 3>().diagonal().array() += kSigmaSpeed * kSigmaSpeed;
 
   Result<void> said;

@@ -17,14 +17,14 @@ namespace perdure::ros2 {
 /// A camera of the rig.
 struct RigCamera {
   std::string name;        ///< name in Perdure
-  std::string info_topic;  ///< topic for messages
+  std::string info_topic;  ///< topic named in messages
   bool rectified = false;  ///< its images are rectified
 };
 
 class Rig {
  public:
-  /// `body`: frame of the body. If empty, it is the IMU's frame; without an IMU the odometry's
-  /// child frame; without both the frame of the first camera.
+  /// `body`: frame of the body. If empty, the frame of the IMU is used, otherwise the odometry's
+  /// child frame, otherwise the frame of the first camera.
   Rig(std::vector<RigCamera> cameras, Calibration given, bool has_imu, bool has_odometry,
       std::string body);
 
@@ -35,9 +35,10 @@ class Rig {
   void onImuOf(const std::string& frame_id);
   void onOdometryOf(const std::string& child_frame_id);
 
-  /// The calibration once it is complete, and after each change; otherwise empty. Without source.
+  /// The calibration once it is complete, and after each change; otherwise empty. Its source is not
+  /// set.
   std::optional<Calibration> news();
-  /// The last complete calibration; empty before.
+  /// The last complete calibration, if any.
   const std::optional<Calibration>& complete() const { return told_; }
   /// The missing inputs, with the fix; empty if none are missing.
   std::string missing() const;

@@ -11,7 +11,7 @@ constexpr double kTracks = 2.0;        // mean number of tracks in an image that
 constexpr double kMisfit = 15.0;       // limit of the scale; inaccurate poses reach up to 8
 constexpr double kFewTracks = 0.5;     // mean number in an image that suffices if nearly all tracks
                                        // contradict
-constexpr double kNearlyAll = 10.0;    // ratio to the agreeing tracks
+constexpr double kNearlyAll = 10.0;    // ratio of contradicting to agreeing tracks
 
 }  // namespace
 

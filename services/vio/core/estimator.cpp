@@ -81,7 +81,7 @@ Result<void> Estimator::propagateTo(const FrameInput& input, const ImuBuffer& im
   return {};
 }
 
-/// True if half of the image is at rest and the IMU does not measure a turn. A lorry that fills the
+/// True if half of the points are at rest and the IMU does not measure a turn. A lorry that fills the
 /// image may also cause this.
 bool Estimator::medianRests(const FrameInput& input) const {
   const RestOptions& o = options_.rest;
@@ -98,7 +98,7 @@ bool Estimator::velocityMayBeZero() const {
 }
 
 /// Part of the image moves, but the body may stand still. A distant background also appears at rest
-/// for a slowly moving body, so the IMU must not contradict.
+/// for a slowly moving body, so the IMU must agree.
 bool Estimator::standsInTraffic(const ImuBuffer& imu, bool background_rests) {
   const bool knew = standstill_.known();
   const bool held = standstill_.holds(imu, state_->time, options_.imu);

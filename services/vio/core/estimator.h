@@ -1,5 +1,5 @@
 // The filter over tracked points. It propagates to each image, clones, updates, marginalises and
-// returns the pose of the body (paper, eq. 3 and 5). It has no images, threads or clocks.
+// returns the pose of the body (paper, eq. 3 and 5). It does not access images, threads or clocks.
 #pragma once
 
 #include <Eigen/Core>

@@ -23,7 +23,7 @@ class LiveCameras {
   LiveCameras(const std::vector<OpenCamera>& cameras, double rate_hz,
               const std::function<void(CameraImage)>& give);
 
-  /// Takes an image and returns the images to publish; with two cameras, these are pairs.
+  /// Takes an image and returns the images to publish; with two cameras, these are pairs. `now_ns`:
   /// CLOCK_BOOTTIME.
   std::vector<CameraImage> pair(CameraImage image, std::int64_t now_ns);
   /// Returns images whose wait for a partner has ended.
@@ -43,7 +43,7 @@ class LiveCameras {
   std::list<LiveCamera> cameras_;
 };
 
-/// "cam0", "cam1".
+/// Name of camera i: "cam0", "cam1".
 std::string cameraName(std::size_t i);
 
 }  // namespace perdure::capture

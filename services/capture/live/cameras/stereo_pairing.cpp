@@ -10,9 +10,10 @@
 namespace perdure::capture {
 namespace {
 
-constexpr double kMostTolerance_ns = 10e6;  // vio's stereo.pair_tolerance
+constexpr double kMostTolerance_ns = 10e6;  // equal to vio's stereo.pair_tolerance
 constexpr double kLeastInterval_ns = 2e6;
-constexpr double kSilence = 4.0;  // intervals without an image
+constexpr double kSilence = 4.0;  // intervals without an image after which a camera counts as
+                                  // silent
 constexpr std::size_t kMostSeconds = 8;
 constexpr std::size_t kJudged = 64;  // images of cam0 per judgement
 constexpr double kTold_ms = 2.0;
@@ -40,8 +41,8 @@ bool CameraTimeline::flows(std::int64_t now_ns, double longest_ns) const {
 
 StereoPairing::StereoPairing(double rate_hz) : asked_ns_(1e9 / rate_hz) {}
 
-/// The shorter interval of both cameras. If one camera has a rate of its own, two of its images
-/// must not match one image of the other.
+/// The shorter interval of both cameras, so that two images of a fast camera cannot match one image
+/// of the other.
 double StereoPairing::intervalNs() const {
   double interval = asked_ns_;
   for (const double period : {first_.period_ns(), second_.period_ns()}) {

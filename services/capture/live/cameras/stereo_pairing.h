@@ -33,7 +33,7 @@ class CameraTimeline {
 
 /// Pairs images by the nearest stamp. An image of cam0 waits for its partner no longer than the
 /// tolerance, and is then passed on alone. If cam1 sends no images, it does not wait. Images of
-/// cam1 wait until cam0 has passed them, and are then dropped.
+/// cam1 wait until later images of cam0 arrive, and are then dropped.
 class StereoPairing {
  public:
   /// `rate_hz`: requested rate.
@@ -52,7 +52,8 @@ class StereoPairing {
   const std::string& problem() const { return problem_; }
   /// A sentence if the images of a pair typically differ by more than 2 ms.
   const std::string& note() const { return note_; }
-  /// "stereo_unpaired_cam0", "stereo_unpaired_cam1", "camera_out_of_order_cam0", "…_cam1".
+  /// Counts "stereo_unpaired_cam0", "stereo_unpaired_cam1", "camera_out_of_order_cam0" and
+  /// "…_cam1".
   const ReasonCounts& reasons() const { return reasons_; }
 
  private:

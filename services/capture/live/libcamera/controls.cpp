@@ -85,8 +85,7 @@ void askManualExposure(Asking& asking) {
 void askManualGain(Asking&) {}
 #endif
 
-/// Without focus control, the images would have another focus than the rig's calibration, without
-/// any report.
+/// Without focus control, the focus could differ from the rig's calibration unnoticed.
 void askFocus(const CameraSettings& settings, Asking& asking) {
   const bool manual = settings.focus == "manual";
   if (settings.focus == "as_is") return;
@@ -113,7 +112,8 @@ libcamera::Transform transformOf(const std::string& flip) {
   return flip == "both" ? libcamera::Transform::HVFlip : libcamera::Transform::Identity;
 }
 
-// The transform relative to the upright image became the resulting orientation in libcamera 0.2.
+// Before libcamera 0.2 the configuration has a transform of the upright image; since then it has
+// the resulting orientation.
 #if __has_include(<libcamera/orientation.h>)
 libcamera::Orientation orientationOf(const std::string& flip) {
   return libcamera::Orientation::Rotate0 * transformOf(flip);

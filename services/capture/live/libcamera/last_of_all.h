@@ -6,9 +6,9 @@
 namespace perdure::capture {
 
 /// Calls `leave` and then `end` on the object's thread, and returns the result of `end`. Earlier
-/// messages of that thread are processed first. So are messages that they post, for example by
-/// queueRequest(), which libcamera processes later with raw pointers. After `leave`, the object
-/// must not post messages.
+/// messages of that thread are processed first. Messages that these post in turn are also processed
+/// first, for example by queueRequest(); libcamera processes them later, with raw pointers. After
+/// `leave`, the object must not post messages.
 template <class T, class Answer>
 Answer lastOfAll(T& object, void (T::*leave)(), Answer (T::*end)()) {
   object.invokeMethod(leave, libcamera::ConnectionTypeBlocking);

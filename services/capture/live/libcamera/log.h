@@ -10,9 +10,8 @@
 
 namespace perdure::capture {
 
-/// Returns the relevant part of a libcamera line "[time] [thread] LEVEL Category file:line words":
-/// warnings and more severe levels, from the level on. libcamera 0.0.3 cannot set this level for
-/// all categories.
+/// Returns a libcamera line "[time] [thread] LEVEL Category file:line words" from its level on, if
+/// the level is warning or more severe. libcamera 0.0.3 cannot set this level for all categories.
 std::optional<std::string> worthLogging(std::string_view line);
 
 /// Receives libcamera's log during the lifetime of this object. `log` may be called on any thread.

@@ -90,8 +90,8 @@ void RunningCamera::queue(Request* request) {
   if (!gone_ && !ending_) camera_->queueRequest(request);
 }
 
-/// Does little on this thread. A request cancelled before the end means that the camera is gone, or
-/// refuses the controls.
+/// Runs on libcamera's thread, so it does little work. A request cancelled before the end means
+/// that the camera is gone, or refuses the controls.
 void RunningCamera::completed(Request* request) {
   const bool asked = request == asking_;
   if (asked) asking_ = nullptr;

@@ -29,7 +29,8 @@ class RunningCamera final : public Unended, public libcamera::Object {
   RunningCamera& operator=(const RunningCamera&) = delete;
 
   libcamera::Camera& camera() { return *camera_; }
-  /// False if another program uses the camera, or libcamera has not released it from this one.
+  /// False if another program uses the camera, or if libcamera still counts it as used by this
+  /// process.
   bool acquire();
   /// Allocates a request for each buffer of a configured stream. Fails with "camera_absent".
   Result<void> allocate(libcamera::Stream* stream);
@@ -41,7 +42,7 @@ class RunningCamera final : public Unended, public libcamera::Object {
 
   /// Whether udev has reported to libcamera that the camera is unplugged.
   bool gone() const { return gone_; }
-  /// Whether the camera refuses the controls of its start.
+  /// Whether the camera refuses the controls given at its start.
   bool refused() const { return refused_; }
   /// Next request in the driver's order. Its image is valid until the request is returned by
   /// giveBack().

@@ -33,7 +33,7 @@ class SharedManager {
   /// Returns the manager, which exists as long as one of its cameras is used.
   Result<std::shared_ptr<libcamera::CameraManager>> manager();
   /// Reports that the manager lacks a required camera. A new manager replaces it once no camera is
-  /// used. Called by one user.
+  /// used. The caller must hold one reference to the manager.
   void missing();
   /// Reports that a camera was unplugged, with the same effect. Otherwise libcamera 0.0.3
   /// enumerates the cameras 2^n times at the nth device that is plugged in.

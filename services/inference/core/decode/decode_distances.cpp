@@ -86,7 +86,7 @@ void decodeDistances(const ModelDescription& model, const DecodeOptions& options
       candidate.box = boxOf(model, x, y, s, view, i);
       const Box& box = candidate.box;
       if (model.bins == 1 && (box.x2 <= box.x1 || box.y2 <= box.y1))
-        continue;  // negative distances
+        continue;  // the box has negative distances
       out.push_back(std::move(candidate));
     }
   }

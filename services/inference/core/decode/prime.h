@@ -56,11 +56,11 @@ Candidate fused(const Expectation& expectation, const Candidate& candidate);
 /// log P(answer | object present, unreported) / P(answer | no object), nats.
 double primedLogRatio(const PrimedCalibration& primed, const PrimedAnswer& answer);
 
-/// Time after their frame for which predictions are valid.
+/// Time for which predictions are valid after their frame.
 inline constexpr double kPrimedHorizon_s = 0.5;
 
-/// Whether the predictions match the frame's camera and source. Their frame must not be later, and
-/// at most kPrimedHorizon_s older.
+/// Whether the predictions match the frame's camera and source. Their frame must not be later than
+/// this frame, and at most kPrimedHorizon_s older.
 bool fitsFrame(const Predictions& predictions, const Frame& frame);
 
 /// Predicted box after `after` seconds.

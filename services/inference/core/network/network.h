@@ -19,7 +19,7 @@ enum class Backend {
   kOnnxRuntime,
 };
 
-/// "auto", "opencv", "onnxruntime"; precondition: one of them.
+/// Backend of a name, which must be "auto", "opencv" or "onnxruntime".
 Backend backendOf(const std::string& name);
 
 /// Whether this build includes ONNX Runtime.

@@ -6,7 +6,7 @@ namespace perdure::inference {
 namespace {
 
 constexpr std::size_t kMaxModels = 256;
-constexpr float kSure = 2.0F;       // nats of a class against clutter
+constexpr float kSure = 2.0F;       // nats of a certain class against clutter
 constexpr double kSameThing = 0.3;  // intersection over union
 constexpr std::size_t kFlood = 10;
 

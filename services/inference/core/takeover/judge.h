@@ -1,5 +1,5 @@
 // Compares a newcomer's detections with those of the process that it follows, on the same frames.
-// It detects implausible detections, not which process is better.
+// It detects implausible detections, but does not judge which process is better.
 #pragma once
 
 #include <cstdint>
@@ -23,14 +23,14 @@ class Judge {
   void learn(const ModelInfo& model);
   /// Compares one frame. Certain boxes of the elder count if the newcomer has their class.
   void compare(const Detections& elder, const Detections& newcomer);
-  /// "unknown_model", "empty" (no boxes although the elder has certain ones), "elsewhere" (boxes,
-  /// but very few at the elder's certain ones), "flood" (ten times the boxes).
+  /// Returns "unknown_model", "empty" (no boxes although the elder has certain ones), "elsewhere"
+  /// (boxes, but very few at the elder's certain ones) or "flood" (ten times the boxes).
   std::optional<Reason> complaint() const;
   /// Clears the comparison.
   void reset();
 
   std::size_t frames() const { return frames_; }
-  /// "450 frames; 97 % of 1200 sure things found", since the reset.
+  /// Text such as "450 frames; 97 % of 1200 sure things found", counted since the reset.
   std::string summary() const;
 
  private:
@@ -40,7 +40,7 @@ class Judge {
                                           ///< newcomer found
     bool told = true;                     ///< the newcomer's model is known
   };
-  std::map<std::uint64_t, std::vector<std::string>> classes_;  ///< by hash
+  std::map<std::uint64_t, std::vector<std::string>> classes_;  ///< class names by model hash
   std::deque<Row> rows_;
   std::size_t frames_ = 0, sure_ = 0, found_ = 0;
 };

@@ -6,11 +6,11 @@
 namespace perdure::inference {
 namespace {
 
-constexpr std::size_t kRemembered = 32;     // results of each side
-constexpr std::size_t kHeard = 128;         // frames
-constexpr int kSilence = 3;                 // leases, and own results, without a result of the
-                                            // newcomer
-constexpr int kWorth = 4;                   // leases for which a result is worth repeating
+constexpr std::size_t kRemembered = 32;     // stored results of each side
+constexpr std::size_t kHeard = 128;         // stored frames
+constexpr int kSilence = 3;                 // leases, and own results, after which a newcomer
+                                            // counts as silent
+constexpr int kWorth = 4;                   // leases for which a result is repeated
 constexpr std::chrono::seconds kNobody{3};  // time without others after which a newcomer assumes
                                             // that it is alone
 constexpr std::chrono::seconds kGrace{10};  // added to the probation, for the newcomer's last

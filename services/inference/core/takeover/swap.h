@@ -46,7 +46,7 @@ class Swap {
   explicit Swap(SwapOptions options);
 
   void learn(const ModelInfo& model) { judge_.learn(model); }
-  /// `in_form`: in time, and lease not expired.
+  /// `in_form`: whether the result is in time and the lease has not expired.
   void ownResult(const Detections& own, bool in_form, Time now);
   void ownFailure(const Reason& reason, Time now);
   /// Takes each message of `detections` that readers receive, including own ones.

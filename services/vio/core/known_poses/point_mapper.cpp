@@ -11,9 +11,9 @@ std::int64_t viewsOf(const Track& track) { return static_cast<std::int64_t>(trac
 
 constexpr std::size_t kViews = 24;   // stored poses
 constexpr std::size_t kRecent = 12;  // newest poses, which are always stored
-constexpr double kForget = 0.05;     // weight of a new image in the scale,
-constexpr double kMany = 10.0;       // if it has this many points or more; otherwise lower
-constexpr double kMoved = 0.05;      // m: less is rest
+constexpr double kForget = 0.05;     // weight of a new image in the scale
+constexpr double kMany = 10.0;       // points needed for this weight; with fewer points it is lower
+constexpr double kMoved = 0.05;      // m; a smaller displacement is rest
 constexpr double kTurned = 0.05;     // rad
 constexpr double kGate = 3.0;        // limit of a point's residuals, relative to those of the
                                      // others

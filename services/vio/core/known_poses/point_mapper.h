@@ -1,7 +1,7 @@
 // Maps points from tracks when another program gives the poses. Each point is triangulated from the
 // views that add a baseline. Only the agreement of the tracks with the poses is estimated, not the
-// poses. Derivation: tools/docs/maths/vio-known-poses.md. The class has no images, threads or
-// clocks.
+// poses. Derivation: tools/docs/maths/vio-known-poses.md. The class does not access images, threads
+// or clocks.
 #pragma once
 
 #include <Eigen/Core>

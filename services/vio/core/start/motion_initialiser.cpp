@@ -21,7 +21,8 @@ constexpr std::size_t kKeyframes = 8, kFewestTracks = 15, kFewestViews = 3, kMos
 constexpr double kShortestWindow = 0.2;  // s
 constexpr double kGrowth = 0.1;          // relative growth of the window between searches
 constexpr double kMostNoise = 1.25;      // ratio of the residuals to their expected size
-constexpr double kFewestInFront = 0.8;   // share of the points, of the linear solution
+constexpr double kFewestInFront = 0.8;   // share of points in front of the cameras, in the linear
+                                         // solution
 constexpr double kMostLinearPx = 3.0;    // residual of the linear solution
 constexpr double kFewestParallaxPx = 2.0;
 constexpr double kMostAcceleration = 5.0;  // m/s², mean over a window
@@ -201,8 +202,8 @@ Result<Start> MotionInitialiser::attempt(const ImuBuffer& imu,
   }
   std::vector<BearingPair> pairs;
   std::vector<double> moved;
-  for (const std::size_t span : {1u, 3u, 6u}) {  // long spans constrain the bias well, short spans
-                                                 // are numerous
+  // long spans constrain the bias well, and short spans are numerous
+  for (const std::size_t span : {1u, 3u, 6u}) {
     for (std::size_t i = 0; i + span < count; ++i) {
       const ImuIncrement x = integrate(imu.between(times[i], times[i + span]), Vector3d::Zero(),
                                        Vector3d::Zero(), options_.imu);

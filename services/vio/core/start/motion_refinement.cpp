@@ -259,7 +259,7 @@ Result<RefinedWindow> refinedBy(Minimum m, const Options& options) {
   if (!covariance.allFinite() || !(covariance.diagonal().minCoeff() > 0.0)) {
     return fail("start_unobservable");
   }
-  // Two thousand image rows hide the rows of the inertial samples in the ratio.
+  // The ratio of two thousand image rows hardly depends on the few rows of inertial samples.
   const double inertial_ratio = inertialCost(e, m.inertial, options) / kInertialCost;
   const double scale = std::max({1.0, result.noise_ratio * result.noise_ratio, inertial_ratio});
   result.covariance = scale * marginal(covariance, e.window.poses.size() - 1);

@@ -13,8 +13,8 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr double kUsualDepth = 3.0;  // m
-constexpr double kAsLikely = 9.0;    // difference in cost
-constexpr double kSame = 0.01;       // relative difference of the velocity
+constexpr double kAsLikely = 9.0;    // largest difference in cost of minima that fit about as well
+constexpr double kSame = 0.01;       // largest relative difference in velocity of equal minima
 // Part of a view's error is constant along its track, and the residuals do not show it.
 constexpr double kNoiseMargin = 1.2;
 constexpr double kLeastNoise = 0.25;  // share of vision.sigma_px

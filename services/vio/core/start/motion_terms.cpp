@@ -16,7 +16,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr double kLeastDepth = 0.1;     // m, initial depth of a point
-constexpr double kGreatestDepth = 1e4;  // m, of a point at infinity
+constexpr double kGreatestDepth = 1e4;  // m, depth given to a point at infinity
 
 }  // namespace
 

@@ -30,7 +30,8 @@ struct WindowOptions {
   std::int64_t clones = 11;           ///< poses in the sliding window
   std::int64_t slam_features = 36;    ///< points in the state
   std::int64_t msckf_features = 24;   ///< points used once, per frame
-  std::int64_t min_observations = 4;  ///< image points of a track that is used once
+  std::int64_t min_observations = 4;  ///< smallest number of image points of a track that is used
+                                      ///< once
   bool first_estimates = true;        ///< Jacobians at first estimates, which updates do not change
 };
 
@@ -38,7 +39,7 @@ struct VisionOptions {
   double sigma_px = 0.4;
   double gate_probability = 0.95;
   double min_depth_m = 0.1, max_depth_m = 75.0;
-  double max_condition = 10000.0;  ///< condition number of a triangulation's normal matrix
+  double max_condition = 10000.0;  ///< largest condition number of a triangulation's normal matrix
   /// Largest standard deviation along the ray, relative to the depth, for a point to enter the
   /// state.
   double max_relative_sigma = 0.4;
@@ -50,13 +51,13 @@ struct VisionOptions {
 /// Standard deviations of the calibration's values.
 struct CalibrationOptions {
   bool estimate_extrinsics = true, estimate_time_offset = true;
-  bool estimate_readout = true;       ///< read-out time of a rolling shutter
+  bool estimate_readout = true;       ///< for a rolling shutter
   double extrinsic_rotation = 0.005;  ///< rad
   double extrinsic_position_m = 0.01;
-  double second_camera_factor = 0.1;  ///< the stereo pair's relative pose is calibrated more
-                                      ///< precisely
+  double second_camera_factor = 0.1;  ///< factor on both, because the stereo pair's relative pose
+                                      ///< is calibrated more precisely
   double time_offset_s = 0.005;
-  double readout_s = 0.005;  ///< read-out time of a rolling shutter
+  double readout_s = 0.005;  ///< deviation of the read-out time of a rolling shutter
   double gyro_scale = 0.0;   ///< deviation of each axis from 1; 0: exact, not estimated
 };
 

@@ -49,7 +49,7 @@ struct PointState {
   int failed_gates = 0;
 };
 
-/// Position of a block of columns of a Jacobian in the error.
+/// Position of a Jacobian's column block in the error state.
 struct Block {
   int at = 0, size = 0;
 };
@@ -149,7 +149,7 @@ class State {
   void addClone(std::uint64_t frame, TimePoint image_time, const Eigen::Vector3d& rate_B,
                 bool first_estimates);
   /// Enlarges the covariance of the current pose and of the newest clone, which is the same pose.
-  /// Deviations in rad about the body's axes and in m along the world's axes.
+  /// Deviations are in rad about the body's axes and in m along the world's axes.
   void widenPose(double rotation, double position_m);
   void removeClone(std::uint64_t frame);
   /// Adds a point with its covariance and its cross-covariance (3 × size()).

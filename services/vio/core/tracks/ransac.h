@@ -19,7 +19,7 @@ std::vector<bool> twoPointRansac(const std::vector<Match>& matches,
                                  int iterations = 100);
 
 /// Distance in pixels of `now` from the epipolar line of `before`. translation: direction in the
-/// frame of `now`. If no epipolar line exists, the distance between the two points.
+/// frame of `now`. If no epipolar line exists, the result is the distance between the two points.
 double epipolarDistance(const Match& match, const Eigen::Matrix3d& R_now_before,
                         const Eigen::Vector3d& translation);
 

@@ -14,8 +14,8 @@ namespace perdure::vio {
 namespace {
 
 constexpr double kBorder = 4.0;
-constexpr double kStill = 0.5;           // px, from its position
-constexpr std::size_t kFewestStill = 8;  // points of a background
+constexpr double kStill = 0.5;           // px, largest distance from its position
+constexpr std::size_t kFewestStill = 8;  // smallest number of points of a background
 constexpr double kLeastSpreadOfStill =
     0.05;  // RMS distance from their centre, relative to the image's width
 
@@ -130,7 +130,7 @@ void Tracker::follow(const Images& now, const std::optional<Eigen::Matrix3d>& R)
     if (!seen) continue;
     const Eigen::Vector2d at_middle = atMiddle(*seen);
     matches.push_back({p.at_middle, at_middle, seen->scale});
-    p.second += found->pixel - p.pixel;  // the start of the search in the second camera moves along
+    p.second += found->pixel - p.pixel;  // moves the start of the search in the second camera
     p.pixel = found->pixel;
     p.normalised = seen->normalised;
     p.at_middle = at_middle;

@@ -71,7 +71,8 @@ class Tracker {
     Eigen::Vector2d normalised;
     Eigen::Vector2d at_middle;  ///< normalised, rotated to the camera's attitude at the middle row
     std::unique_ptr<Patch> patch;
-    cv::Point2f place = pixel;  ///< position within half a pixel of which the point has stayed
+    cv::Point2f place = pixel;  ///< position from which the point has moved by less than half a
+                                ///< pixel
     std::size_t still = 0;
   };
   std::vector<cv::Mat> pyramid(const cv::Mat& image, std::int64_t levels) const;

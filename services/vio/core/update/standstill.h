@@ -1,7 +1,8 @@
 // Decides whether the body stands still while most of the image moves, because traffic in front of
 // a body at rest looks like motion. An IMU alone cannot distinguish rest from constant velocity. It
 // therefore only confirms that a body that stood still has not moved. Zero-velocity detectors:
-// Skog, Händel, Nilsson, Rantakokko, IEEE TBME 2010. tools/docs/maths/vio-rest-and-speed.md
+// Skog, Händel, Nilsson, Rantakokko, IEEE TBME 2010. Derivation:
+// tools/docs/maths/vio-rest-and-speed.md.
 #pragma once
 
 #include <Eigen/Core>

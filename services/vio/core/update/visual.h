@@ -29,7 +29,7 @@ bool projectPoint(const RigidTransform& T_WB, const RigidTransform& T_BC,
 struct View {
   Eigen::Vector2d r;
   ProjectionJacobians J;
-  Eigen::Vector2d readout = Eigen::Vector2d::Zero();  ///< derivative by the read-out, in s
+  Eigen::Vector2d readout = Eigen::Vector2d::Zero();  ///< derivative by the read-out time
 };
 
 /// The residual uses the clone's estimate and p_W; the Jacobians use its `linear` and p_linear.
@@ -70,7 +70,7 @@ void dropPoint(PointSystem& system);
 bool passesGate(const VectorView& r, const MatrixView& S, double probability);
 
 /// The same test with S = P + I for an expensive P. P is evaluated only if rᵀ r, an upper bound of
-/// rᵀ S⁻¹ r, is not below the quantile.
+/// rᵀ S⁻¹ r, reaches the quantile.
 bool passesGateWith(const VectorView& r, const std::function<Eigen::MatrixXd()>& P,
                     double probability);
 
