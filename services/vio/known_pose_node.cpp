@@ -110,7 +110,7 @@ std::optional<std::uint64_t> KnownPoseNode::waitsFor() const {
   return waiting_.front().first.stamp.sequence;
 }
 
-/// Whether the time is earlier by more than transports reorder.
+/// Whether `time` is before `newest` by more than transports reorder.
 bool KnownPoseNode::isBefore(TimePoint time, const std::optional<TimePoint>& newest) const {
   return newest && time < *newest - std::chrono::milliseconds(300);
 }

@@ -120,17 +120,15 @@ Vehicle::Vehicle(const SpeedConfig& speed, const GnssConfig& gnss, Outputs outpu
   if (speed_socket) {
     const bool can = speed.source == "can";
     const auto lines = [this](std::string_view line, std::int64_t t) { onSpeedLine(line, t); };
-    speed_stream_ = std::make_unique<SocketStream>("speed", nameOf(speed), kSpeedSilence,
-                                                   std::move(speed_socket),
-                                                   [this, can, lines](const Packet& packet) {
-                                                     if (can) return onCan(packet);
-                                                     said_.reset();
-                                                     speed_lines_.add(packet, lines);
-                                                     speed_lines_.end(packet.time_ns, lines);
-                                                     // the readings of one datagram have one time,
-                                                     // so only the last is used
-                                                     if (said_) give(*said_);
-                                                   });
+    speed_stream_ = std::make_unique<SocketStream>(
+        "speed", nameOf(speed), kSpeedSilence, std::move(speed_socket),
+        [this, can, lines](const Packet& packet) {
+          if (can) return onCan(packet);
+          said_.reset();
+          speed_lines_.add(packet, lines);
+          speed_lines_.end(packet.time_ns, lines);
+          if (said_) give(*said_);  // a datagram gives one reading
+        });
   }
   if (gnss_socket) {
     const bool datagrams = gnss.source == "nmea";

@@ -108,7 +108,7 @@ struct PlaybackRequest {
   bool play = true;
   double speed = 1.0;
   std::optional<TimePoint> seek;
-  std::string id;  ///< returned with the answer
+  std::string id;  ///< id that is returned with the answer
 };
 struct PlaybackState {
   enum class Status : std::uint8_t { kPlaying = 0, kPaused = 1, kBuffering = 2, kEnded = 3 };

@@ -81,8 +81,8 @@ Result<void> Estimator::propagateTo(const FrameInput& input, const ImuBuffer& im
   return {};
 }
 
-/// True if half of the points are at rest and the IMU does not measure a turn. A lorry that fills the
-/// image may also cause this.
+/// True if half of the points are at rest and the IMU does not measure a turn. A lorry that fills
+/// the image may also cause this.
 bool Estimator::medianRests(const FrameInput& input) const {
   const RestOptions& o = options_.rest;
   if (!input.motion_px || *input.motion_px > o.disparity_px) return false;

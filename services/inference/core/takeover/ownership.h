@@ -14,9 +14,9 @@ namespace perdure::inference {
 /// (`losses` increased), a result older than the lease, or kFailures failures of the network in a
 /// row.
 ///
-/// Form returns after kGoodResults good results in a row, and after at least kLeases leases. A process
-/// that resumes after a suspension finds many old frames that appear new to it. It is then a spare:
-/// it does not take the topic from another process that writes.
+/// Form returns after kGoodResults good results in a row, and after at least kLeases leases. A
+/// process that resumes after a suspension finds many old frames that appear new to it. It is then
+/// a spare: it does not take the topic from another process that writes.
 class Ownership {
  public:
   static constexpr std::int64_t kOutOfForm = 0;
