@@ -53,7 +53,7 @@ class Live {
 
   service::Context& context_;
   const HostClock clock_;
-  std::map<std::string, bus::Writer<Frame>*> frames_;  ///< by camera
+  std::map<std::string, bus::Writer<Frame>*> frames_;  ///< writers by camera
   bus::Writer<Calibration>& calibrations_;
   Sink<ImuSample> imu_;
   Sink<SpeedSample> speed_;

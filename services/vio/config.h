@@ -21,7 +21,7 @@ struct Config {
   bool prefer_calibration = true;                    ///< use the calibration's IMU noise
   double imu_inflation = 3.0;       ///< factor on the inertial noise densities, in propagation
   double gyro_scale = 0.01;         ///< deviation of the gyroscope's scale from 1
-  double imu_slack_s = 0.0;         ///< wait for samples until this long after a frame
+  double imu_slack_s = 0.0;         ///< time to wait for samples after a frame
   double pair_tolerance_s = 0.01;   ///< largest difference between the two cameras' stamps
   double speed_wait_s = 0.12;       ///< longest wait of a frame for its speed sample
   double longest_gap_s = 2.0;       ///< a longer IMU gap ends the frame of reference

@@ -16,7 +16,7 @@ constexpr unsigned kMostBits = 64 * 8;         // bits of a CAN FD frame
 constexpr std::size_t kLongestDbcLine = 1000;  // longer lines would need too much stack
 constexpr double kLargest = 1e30;              // physical value; its square is still finite
 
-/// Position of bit k of a signal, 0 being the lowest, in DBC's numbering: byte · 8 + bit.
+/// Position of bit k of a signal in DBC's numbering: byte · 8 + bit. Bit 0 is the lowest.
 unsigned positionOf(const CanSignal& s, unsigned k) {
   if (s.little_endian) return s.start + k;
   // The start bit is the highest. Bits continue down each byte, and then from the top of the next

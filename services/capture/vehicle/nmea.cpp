@@ -15,7 +15,7 @@ constexpr double kUnstatedHdop = 10.0;
 constexpr std::int64_t kRmcLasts_ns = 2'000'000'000;
 constexpr std::size_t kLongest = 256;  // the standard allows 82, which many receivers exceed
 
-/// Field i of a sentence, 0 being its name; empty if it is missing.
+/// Field i of a sentence; field 0 is its name. Empty if the field is missing.
 std::string_view field(std::string_view sentence, std::size_t i) {
   for (; i > 0; --i) {
     const auto comma = sentence.find(',');

@@ -37,7 +37,7 @@ class Viewer {
   static constexpr std::size_t kMostControl = 256;
   Outbox outbox_;
   std::uint64_t id_ = 0;
-  std::map<std::uint32_t, std::uint32_t> channel_of_;  ///< by subscription
+  std::map<std::uint32_t, std::uint32_t> channel_of_;  ///< channels by subscription
   std::chrono::steady_clock::time_point second_{};
   int said_ = 0;  ///< messages in that second
 };

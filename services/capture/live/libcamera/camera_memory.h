@@ -30,7 +30,7 @@ class MappedBuffer {
     void* at = nullptr;
     std::size_t length = 0;
   };
-  std::map<int, Mapping> mappings_;  ///< by file descriptor
+  std::map<int, Mapping> mappings_;  ///< mappings by file descriptor
   std::vector<std::span<const std::uint8_t>> planes_;
 };
 

@@ -73,7 +73,7 @@ class PointMapper {
   std::vector<View> views_;  ///< oldest first; always contains the newest image
   FeatureDatabase database_;
   std::uint64_t frame_ = 0;
-  double scale_ = 1.0;  ///< scale of the residuals
+  double scale_ = 1.0;  ///< ratio of the residuals to sigma_px
   std::vector<LandmarkEstimate> landmarks_;
   Mapped mapped_;
 };

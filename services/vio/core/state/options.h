@@ -77,7 +77,7 @@ struct StartOptions {
 struct RestOptions {
   bool enabled = true;
   double disparity_px = 0.5;  ///< largest median image motion over the last frames
-  std::int64_t frames = 5;    ///< number of these frames
+  std::int64_t frames = 5;    ///< number of frames for disparity_px
   double speed_sigma = 0.02;  ///< m/s
   double position_sigma_m = 0.005;
   double rotation_sigma = 0.001;  ///< rad

@@ -34,7 +34,7 @@ struct TrackedPoint {
 };
 
 struct TrackedFrame {
-  std::vector<TrackedPoint> points;  ///< by rising id
+  std::vector<TrackedPoint> points;  ///< in order of rising id
 };
 
 struct Observation {
