@@ -134,8 +134,8 @@ class Outwards {
     }
   }
 
-  /// Publishes the frame raw and compressed, each if it has readers, whatever its encoding on the
-  /// bus.
+  /// Publishes the raw and the compressed image, if their topics have readers. The encoding on the
+  /// bus does not matter.
   void onFrame(const Frame& frame) {
     mirror_.onFrame(frame);
     const std::string image = mirror_.imageTopic(frame.camera);

@@ -45,7 +45,7 @@ class MapLayer {
   bool changed_ = false;
 };
 
-/// "perdure.MapFrame".
+/// The message "perdure.MapFrame".
 std::string mapFrameJson(const MapFrame& frame);
 
 /// Largest number of map objects that are sent.

@@ -17,7 +17,7 @@ namespace perdure::gateway {
 inline constexpr char kMapFrame[] = "map", kOdomFrame[] = "odom", kBodyFrame[] = "base_link";
 std::string opticalFrame(const std::string& camera);
 
-/// {"sec", "nsec"}; times before 1970 become 0.
+/// Writes {"sec", "nsec"}; times before 1970 become 0.
 void putTime(JsonWriter& json, TimePoint time);
 void putVector(JsonWriter& json, const Eigen::Vector3d& v);
 void putQuaternion(JsonWriter& json, const Eigen::Quaterniond& q);

@@ -31,9 +31,9 @@ class VitalSigns {
   /// Sets the services that do not report, each with a sentence on the program that replaces it.
   void setStandIns(std::map<std::string, std::string> sentences);
 
-  /// "perdure.Health"
+  /// The message "perdure.Health".
   std::string json(std::int64_t now_ns, const Silence& last) const;
-  /// {"status": "ok" or "degraded" or "silent", …}
+  /// The answer {"status": "ok" or "degraded" or "silent", …}
   std::string healthz(std::int64_t now_ns) const;
   /// Prometheus' text format, 0.0.4.
   std::string metrics(std::int64_t now_ns, const std::vector<Figure>& own,

@@ -17,7 +17,7 @@
 namespace perdure::vio {
 namespace {
 
-// Limits beyond which the filter has diverged, whatever its covariance.
+// Limits beyond which the filter has diverged, even with a small covariance.
 constexpr double kMaxSpeed = 150.0, kMaxGyroBias = 1.0, kMaxAccelBias = 5.0;
 constexpr double kMaxSpeedSigma = 10.0, kMaxScaleError = 0.3;
 

@@ -76,7 +76,7 @@ class Ownership {
   std::uint64_t losses_ = 0;
   bool in_form_ = true, spare_ = false;
   Time lost_at_{};
-  int good_ = 0;  ///< results in a row since then
+  int good_ = 0;  ///< good results in a row since lost_at_
   int failures_ = 0;
 };
 
