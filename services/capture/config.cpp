@@ -151,7 +151,7 @@ void describe(Config& c, config::Fields& fields) {
                  "without end, as one that ends how it began"});
 }
 
-/// Each by its own id: left and right must not change places.
+/// Each camera needs its own id, so that left and right are not exchanged.
 void requireTwoIds(const CameraConfig& camera) {
   if (camera.second.empty()) return;
   if (camera.id.empty()) {

@@ -1,4 +1,4 @@
-// The configuration of capture.
+// Configuration of capture.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@ namespace perdure::capture {
 
 struct DatasetConfig {
   std::string path;
-  std::string sequence;             ///< KITTI tracking only
-  std::vector<std::string> topics;  ///< of a recording of ROS: "cam0=/left/image_raw"
+  std::string sequence;             ///< only for KITTI tracking
+  std::vector<std::string> topics;  ///< topics of a ROS recording: "cam0=/left/image_raw"
   std::string cameras = "stereo";
   double lead_s = 5.0, trail_s = 0.5;
 };
@@ -41,20 +41,20 @@ struct RunConfig {
 };
 
 struct CameraConfig {
-  std::string id, second;  ///< of cam0 and cam1; no second: one camera
+  std::string id, second;  ///< ids of cam0 and cam1; if `second` is empty, there is one camera
   std::string format = "auto";
   double rate_hz = 20.0, exposure_ms = 0.0, gain = 0.0;
   std::string flip = "none";
   std::string focus = "as_is";
-  double lens_dioptres = 0.0;  ///< of camera.focus: manual
-  std::vector<double> crop;    ///< empty, or 4: x, y, width, height on the sensor
+  double lens_dioptres = 0.0;  ///< lens position for camera.focus: manual
+  std::vector<double> crop;    ///< empty, or 4 values: x, y, width, height on the sensor
 };
 
 struct ImuConfig {
   std::string uri = "local:";
   std::string gyro, accel, trigger;
   double rate_hz = 200.0;
-  std::vector<double> mount;  ///< empty, or 9: rows of R in v_B = R v_device
+  std::vector<double> mount;  ///< empty, or 9 values: rows of R in v_B = R v_device
 };
 
 struct SpeedConfig {
@@ -68,10 +68,10 @@ struct SpeedConfig {
 struct GnssConfig {
   std::string source = "none", address;
   double most_sigma = 5.0, latency_s = 0.0;
-  std::vector<double> antenna;  ///< empty, or 3: in the body
+  std::vector<double> antenna;  ///< empty, or 3 values: position in the body, m
 };
 
-/// As configured, or the usual one of the source.
+/// Configured address, or the default address of the source.
 std::string addressOf(const GnssConfig& config);
 
 struct Config {
@@ -90,7 +90,7 @@ struct Config {
 
 void describe(Config& config, config::Fields& fields);
 
-/// Throws StartupError where what the source needs is not given.
+/// Throws StartupError if a setting that the source needs is missing.
 void requireSource(const Config& config);
 
 }  // namespace perdure::capture

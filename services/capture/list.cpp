@@ -20,7 +20,7 @@
 namespace perdure::capture {
 namespace {
 
-constexpr std::size_t kMostSizes = 12;  // of a mode, for people
+constexpr std::size_t kMostSizes = 12;  // listed sizes of a mode, in the text for people
 
 void addControls(const libcamera::ControlInfoMap& offered, SeenCamera& camera) {
   const auto has = [&](const auto& control) { return offered.find(control.id()) != offered.end(); };
@@ -83,7 +83,7 @@ bool hasChannels(const iio_device* device, const char* kind) {
   return true;
 }
 
-/// An attribute of the device, or of its first channel of a kind that has it.
+/// Attribute of the device, or of its first channel of a kind that has it.
 std::string attributeOf(const iio_device* device, const char* name) {
   char text[1024] = {};
   if (iio_device_attr_read(device, name, text, sizeof text) > 0) return trimmed(text);
@@ -177,7 +177,7 @@ bool hasSize(const SeenCamera& camera, const std::pair<std::uint32_t, std::uint3
   });
 }
 
-/// The largest size of at most a megapixel that both have: what vio needs no more than.
+/// Largest size that both cameras have, up to a megapixel; vio needs no more.
 std::string sizeFor(const SeenCamera& camera, const SeenCamera& other) {
   std::pair<std::uint32_t, std::uint32_t> best{0, 0};
   for (const auto& mode : camera.modes) {
@@ -190,7 +190,7 @@ std::string sizeFor(const SeenCamera& camera, const SeenCamera& other) {
   return best.first > 0 ? fmt::format("{}x{}", best.first, best.second) : "its size";
 }
 
-/// That both have; of a camera without a control of it, the usual one.
+/// Rate that both cameras support; the usual rate if a camera has no control for it.
 double rateFor(const SeenCamera& camera, const SeenCamera& other) {
   double rate = 20.0;
   for (const SeenCamera* of : {&camera, &other}) {
@@ -202,7 +202,7 @@ double rateFor(const SeenCamera& camera, const SeenCamera& other) {
 
 std::string nameOf(const SeenImu& imu) { return imu.name.empty() ? imu.id : imu.name; }
 
-/// In quotes, as YAML has them: ids hold backslashes and colons.
+/// Quotes a text for YAML, because ids contain backslashes and colons.
 std::string quoted(const std::string& text) {
   std::string result = "'";
   for (const char c : text) result += c == '\'' ? "''" : std::string(1, c);

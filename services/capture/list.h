@@ -1,5 +1,5 @@
-// `perdure-capture --list`: the cameras and inertial units that are here, with what they can do,
-// and a configuration to paste.
+// `perdure-capture --list`: lists the connected cameras and inertial units, their capabilities, and
+// a configuration to copy.
 #pragma once
 
 #include <cstdint>
@@ -12,35 +12,35 @@ struct SeenCamera {
   std::string id, model;
   struct Mode {
     std::string format;
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> sizes;  ///< width, height; rising
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> sizes;  ///< width, height; in rising order
   };
   std::vector<Mode> modes;
-  double slowest_hz = 0.0, fastest_hz = 0.0;  ///< 0: it does not say
+  double slowest_hz = 0.0, fastest_hz = 0.0;  ///< 0: not reported
   std::vector<std::string> settable;          ///< keys of the configuration
 };
 
 struct SeenImu {
   std::string id, name;
   bool gyro = false, accel = false;
-  std::string rates;  ///< as the device says them; empty: it does not
+  std::string rates;  ///< as reported by the device; empty: not reported
   double rate_hz = 0.0;
-  std::vector<std::string> triggers;  ///< of the context
+  std::vector<std::string> triggers;  ///< triggers of the context
 };
 
 struct Seen {
   std::vector<SeenCamera> cameras;
   std::vector<SeenImu> imus;
-  std::vector<std::string> problems;  ///< why something could not be looked at, with the mend
+  std::vector<std::string> problems;  ///< why a device could not be read, with the fix
 };
 
-/// Looks at libcamera and at the context `uri` of libiio.
+/// Finds devices through libcamera and through the libiio context `uri`.
 Seen lookAround(const std::string& uri);
 
-/// For people: what is there, or what was looked for and is not; and a configuration of the first
-/// camera, or the first two, and the first unit that has both.
+/// Text for people: the devices found, or the places searched if none were found. It includes a
+/// configuration for up to two cameras and for the first unit with both sensors.
 std::string describe(const Seen& seen, const std::string& uri);
 
-/// The whole of `perdure-capture --list [URI]`; 69 where there is nothing. Prints.
+/// Runs `perdure-capture --list [URI]` and prints the result. Returns 69 if no device is found.
 int listSensors(const std::vector<std::string>& arguments);
 
 }  // namespace perdure::capture

@@ -15,7 +15,7 @@ bool isUsed(const CameraCalibration& camera, const Config& config) {
   return camera.name == cameraName(0) || (camera.name == cameraName(1) && camerasOf(config) > 1);
 }
 
-/// `unused` gets a sentence where the rig has a camera that is not used.
+/// `unused` receives a sentence if the rig has a camera that is not used.
 Calibration rigOf(const Config& config, InstanceId source, std::string& unused) {
   requireSource(config);
   Calibration rig = replay::readRig(config.rig);
@@ -111,10 +111,10 @@ void Live::openImu(const ImuConfig& config) {
   open(settings);
 }
 
-/// On a stream's thread.
+/// Called on a stream's thread.
 void Live::scanned(const IioScan& scan) {
   const std::lock_guard lock(pairing_mutex_);
-  // Of one device both are of one time: the acceleration first, and the pair is complete.
+  // Readings of one device have one time. With the acceleration first, the pair is complete.
   if (scan.accel) {
     for (const auto& pair : pairing_.accel({scan.time_ns, *scan.accel})) offer(pair);
   }

@@ -1,5 +1,5 @@
-// Live sensors on the bus: one camera or two, an IMU, the vehicle's speed, and the rig's
-// calibration.
+// Publishes live sensors on the bus: one or two cameras, an IMU, the vehicle's speed, and the
+// calibration of the rig.
 #pragma once
 
 #include <functional>
@@ -22,14 +22,14 @@
 
 namespace perdure::capture {
 
-/// Those that open the cameras of these settings, and what their lines go to.
+/// Returns the functions that open the cameras of these settings. `log` receives their log lines.
 using CameraOpeners = std::function<std::vector<OpenCamera>(
     const std::vector<CameraSettings>& cameras, std::function<void(const std::string&)> log)>;
 
 class Live {
  public:
-  /// Reads the rig and publishes it; opens the sensors beside, and again whenever they are gone.
-  /// Throws StartupError where the rig is not given, cannot be read, or lacks a camera.
+  /// Reads the rig and publishes it. Opens the sensors in the background, and reopens them after a
+  /// loss. Throws StartupError if the rig is not given, cannot be read, or lacks a camera.
   Live(service::Context& context, const Config& config, const CameraOpeners& openers);
 
  private:
@@ -45,7 +45,7 @@ class Live {
   void write(std::vector<CameraImage> images);
   void publish(const InertialPair& sample);
   void publish(const SpeedReading& reading);
-  /// The calibration again, with where on Earth the body stood.
+  /// Publishes the calibration again, with the position of the body on Earth.
   void publish(const EarthPlace& place);
   void updateHealth();
   std::string imuYield();
@@ -53,27 +53,28 @@ class Live {
 
   service::Context& context_;
   const HostClock clock_;
-  std::map<std::string, bus::Writer<Frame>*> frames_;  ///< by camera
+  std::map<std::string, bus::Writer<Frame>*> frames_;  ///< writers by camera
   bus::Writer<Calibration>& calibrations_;
   Sink<ImuSample> imu_;
   Sink<SpeedSample> speed_;
-  std::string unused_;  ///< what the rig has and the configuration does not use
+  std::string unused_;  ///< cameras of the rig that the configuration does not use
   Calibration rig_;
-  BoundedQueue<Message> queue_{1024, Overflow::kDropOldest};  // seconds of an IMU
-  /// Apart: a sender in the network that says too much costs no images.
+  BoundedQueue<Message> queue_{1024, Overflow::kDropOldest};  // holds several seconds of IMU
+                                                              // samples
+  /// A separate queue, so that a network sender that sends too much causes no loss of images.
   BoundedQueue<Message> from_vehicle_{256, Overflow::kDropOldest};
   std::uint64_t samples_ = 0;
-  std::int64_t last_ns_ = 0;  ///< of the last inertial sample
+  std::int64_t last_ns_ = 0;  ///< stamp of the last inertial sample
   std::uint64_t speeds_ = 0;
   std::int64_t last_speed_ns_ = 0;
   ReasonCounts reasons_;
-  std::string said_;   ///< names of the sensors, as logged last
-  std::string noted_;  ///< what the cameras do not do as asked, as logged last
+  std::string said_;   ///< names of the sensors, as last logged
+  std::string noted_;  ///< settings that the cameras do not follow, as last logged
   ImuYield yield_;
   mutable std::mutex pairing_mutex_;
   ImuPairing pairing_;
-  std::uint64_t readings_ = 0;  ///< of the gyroscope
-  // The threads of these use all of the above: they go first.
+  std::uint64_t readings_ = 0;  ///< number of gyroscope readings
+  // Their threads use all members above, so these members are destroyed first.
   std::vector<std::unique_ptr<IioStream>> imus_;
   std::unique_ptr<LiveCameras> cameras_;
   Vehicle vehicle_;

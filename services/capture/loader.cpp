@@ -16,7 +16,7 @@ std::optional<ImageEncoding> encodingOf(const std::string& name) {
   return std::nullopt;
 }
 
-/// Works on a message that is to be changed, too.
+/// Returns the time of a const or mutable message.
 template <class Message>
 auto& timeOf(Message& message) {
   return std::visit(
@@ -30,7 +30,7 @@ auto& timeOf(Message& message) {
       message);
 }
 
-/// A drive without a single readable image is not worth starting.
+/// Throws if a drive has no readable image.
 void requireImages(replay::Dataset& drive, const std::string& path) {
   for (auto message = drive.next(); message; message = drive.next()) {
     const auto* frame = std::get_if<Frame>(&*message);
@@ -90,7 +90,8 @@ Loader::Loader(const Config& config, std::unique_ptr<replay::Dataset> drive, std
     const auto pauses = static_cast<Duration::rep>(std::max<std::uint64_t>(frame_count_, 2) - 1);
     length_ = end - begin + (end - begin) / pauses;
     until_ = begin + length_;
-    // From the frame before on: the samples after the last one of a lap are that lap's.
+    // Starts at the previous frame, because the samples after the last frame of a lap belong to
+    // that lap.
     first -= std::min<std::uint64_t>(first, 1);
     lap_ = first / frame_count_;
     first %= frame_count_;
@@ -119,7 +120,7 @@ void Loader::moveToLap(replay::Message& message) const {
   if (auto* frame = std::get_if<Frame>(&message)) frame->stamp.sequence += lap_ * frame_count_;
 }
 
-/// What cannot be compressed goes as it is, and is counted.
+/// A frame that cannot be compressed is sent as it is, and counted.
 void Loader::compress(replay::Message& message) {
   auto* frame = std::get_if<Frame>(&message);
   if (!frame || !frame->data) return;

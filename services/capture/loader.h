@@ -1,4 +1,4 @@
-// Reads and decodes a drive ahead of its pacing, on a thread of its own.
+// Reads and decodes a drive in advance, on its own thread.
 #pragma once
 
 #include <functional>
@@ -14,25 +14,26 @@
 
 namespace perdure::capture {
 
-/// Opens the configured drive. Throws StartupError: what is missing, and the mend.
+/// Opens the configured drive. Throws StartupError with the cause and the fix.
 std::unique_ptr<replay::Dataset> openDrive(const Config& config, InstanceId source);
 
 class Loader {
  public:
-  /// From frame `first` on. `notify` is called on the loader's thread after each message. With
-  /// run.on_end "repeat" the drive has no end: frame n·frameCount() + i is its frame i, later by n
-  /// times its length (of all frames and the pause between two); it then begins one frame early,
-  /// with the samples that go with that one.
+  /// Begins at frame `first`. `notify` is called on the loader's thread after each message. With
+  /// run.on_end "repeat" the drive repeats without end. Frame n·frameCount() + i is then its frame
+  /// i, later by n lap lengths (all frames and the interval between laps). Reading then begins one
+  /// frame early, with the samples of that frame.
   Loader(const Config& config, std::unique_ptr<replay::Dataset> drive, std::uint64_t first,
          std::function<void()> notify);
   ~Loader();
   Loader(const Loader&) = delete;
   Loader& operator=(const Loader&) = delete;
 
-  /// The next message if it is ready; ended() tells whether there will be more.
+  /// Next message if it is ready; ended() is true after the last one.
   std::optional<replay::Message> take();
   bool ended() const;
-  /// What was left out so far (image_truncated, imu_gap, …), and the last problem for people.
+  /// Counts of omitted data so far (image_truncated, imu_gap, …), and the last problem as text for
+  /// people.
   ReasonCounts reasons() const;
   std::string lastProblem() const;
 
@@ -45,12 +46,12 @@ class Loader {
   void compress(replay::Message& message);
 
   const bool mono_;
-  const int quality_;  ///< of JPEG; 0: raw
+  const int quality_;  ///< JPEG quality; 0: raw
   const bool repeats_;
   std::unique_ptr<replay::Dataset> drive_;
-  TimePoint from_, until_;  ///< of the samples, the latter excluded
-  TimePoint begin_;         ///< of the first frame
-  Duration length_{0};      ///< of a lap
+  TimePoint from_, until_;  ///< interval of the samples, until_ excluded
+  TimePoint begin_;         ///< time of the first frame
+  Duration length_{0};      ///< length of a lap
   const std::uint64_t frame_count_;
   std::uint64_t lap_ = 0;
   std::function<void()> notify_;

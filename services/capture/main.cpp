@@ -1,4 +1,5 @@
-// perdure-capture: a drive, or live sensors, as frames, inertial samples, speed and calibration.
+// perdure-capture: publishes a drive or live sensors as frames, inertial samples, speed and
+// calibration.
 #include <string_view>
 
 #include "services/capture/list.h"

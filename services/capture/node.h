@@ -1,4 +1,4 @@
-// A drive handed out message by message, by its own clock or as fast as its readers answer.
+// Publishes a drive message by message, by its own clock or at the speed of its readers.
 #pragma once
 
 #include <cstdint>
@@ -21,16 +21,16 @@ struct Outputs {
   Sink<Frame> frame;
 };
 
-/// Single-threaded. `now_ns` is CLOCK_MONOTONIC as its caller reads it; it never goes back.
+/// Single-threaded. `now_ns` is CLOCK_MONOTONIC as read by the caller; it never decreases.
 class Node {
  public:
-  /// `period` is the usual time between frames. `resume` is the state of the same run, if it had
-  /// begun: what was given is not given again; frames whose time went by meanwhile are counted as
-  /// missed_while_away (clock), inertial samples of that time are given late.
+  /// `period`: usual time between frames. `resume`: state of an interrupted run, whose messages are
+  /// not sent again. In clock mode, frames due in the meantime are counted as missed_while_away,
+  /// and the inertial samples of that time are sent late.
   Node(const Config& config, Duration period, const std::optional<RunState>& resume,
        Outputs outputs);
 
-  /// Follow mode: frames are credited by answers of this name ("odometry", "detections").
+  /// Follow mode: answers of this name ("odometry", "detections") credit frames.
   void expect(const std::string& answerer) { credits_.expect(answerer); }
   void onAnswer(const std::string& answerer, const FrameStamp& stamp);
 
@@ -38,11 +38,11 @@ class Node {
   void offer(replay::Message message) { pending_ = std::move(message); }
   void end() { ended_ = true; }
 
-  /// Gives the pending message where it is due; says how long nothing will be. Duration::max():
+  /// Sends the pending message if it is due. Returns the time until the next call; Duration::max():
   /// until the next offer or answer.
   Duration tick(std::int64_t now_ns);
 
-  /// All is given.
+  /// Whether all messages have been sent.
   bool finished() const { return ended_ && !pending_; }
   const RunState& state() const { return state_; }
   std::uint64_t framesGiven() const { return frames_given_; }
@@ -64,7 +64,7 @@ class Node {
   const RunState resumed_;
   bool begun_ = false, catching_up_ = false, ended_ = false;
   Credits credits_;
-  std::optional<std::uint64_t> current_;  ///< sequence number of the last frame given
+  std::optional<std::uint64_t> current_;  ///< sequence number of the last frame sent
   std::optional<std::int64_t> waiting_since_;
   std::optional<replay::Message> pending_;
   std::uint64_t frames_given_ = 0;

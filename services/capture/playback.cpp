@@ -90,7 +90,8 @@ void Playback::begin() {
 
 void Playback::feed() {
   if (!node_->wants()) return;
-  const bool ended = loader_->ended();  // asked before taking: nothing comes after
+  const bool ended = loader_->ended();  // read before take(), so that true means that no message
+                                        // follows
   if (auto message = loader_->take()) {
     if (std::holds_alternative<Frame>(*message)) {
       if (std::get<Frame>(*message).camera == "cam0") context_.health().frameIn();
@@ -111,7 +112,7 @@ void Playback::credit(const std::string& answerer, const FrameStamp& stamp) {
 void Playback::pump() {
   if (finished_ || !gate_.open(std::chrono::steady_clock::now())) return;
   if (!node_) begin();
-  constexpr int kMost = 256;  // then Health and signals have their turn
+  constexpr int kMost = 256;  // limit per call, so that Health and signals are served
   for (int i = 0; i < kMost && !context_.stopping(); ++i) {
     if (loader_) feed();
     if (node_->tick(monotonicNs()) > Duration{0}) break;
@@ -120,8 +121,8 @@ void Playback::pump() {
   if (node_->finished()) finish();
 }
 
-/// Writes the file where it would not say the same again. Samples alone wait for the next frame:
-/// a few of them coming twice does no harm.
+/// Writes the file if its content would change. A sample alone does not cause a write until the
+/// next frame, because a few repeated samples do no harm.
 void Playback::saveState() {
   RunState state = node_->state();
   if (config_.run.state.empty() || (state.next_sequence == saved_.next_sequence &&
@@ -141,7 +142,7 @@ void Playback::finish() {
   saveState();
   context_.log().info("end of drive after {} frames", node_->framesGiven());
   if (config_.run.on_end != "exit") return;
-  constexpr double kLongest = 0.5;  // SIGTERM ends a service within a second
+  constexpr double kLongest = 0.5;  // limit, because SIGTERM must end a service within a second
   for (const auto& [camera, writer] : frames_) writer->waitForAcknowledgement(kLongest);
   context_.stop();
 }

@@ -1,5 +1,5 @@
-// A drive on the bus: waits for readers, loads ahead, gives messages at their time, keeps the
-// state of the run, and says in Health where it is.
+// Plays a drive on the bus. It waits for readers, loads in advance, sends messages at their times,
+// saves the state of the run, and reports progress in Health.
 #pragma once
 
 #include <map>
@@ -31,7 +31,7 @@ class Playback {
 
   service::Context& context_;
   const Config config_;
-  std::unique_ptr<replay::Dataset> drive_;  ///< until the loader takes it
+  std::unique_ptr<replay::Dataset> drive_;  ///< owned until the loader takes it
   std::size_t frame_count_ = 0;
   Duration period_{0};
   std::optional<RunState> resume_;

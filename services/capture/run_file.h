@@ -1,4 +1,4 @@
-// The file that says where a run is (run.state), written whole or not at all.
+// File of the run state (run.state), written atomically.
 #pragma once
 
 #include <optional>
@@ -9,16 +9,15 @@
 
 namespace perdure::capture {
 
-/// Identity of a run: drive, pace and rate, so that another one is not taken for it.
+/// Identity of a run, from drive, pace and rate.
 std::string driveOf(const Config& config);
-/// Changes with each start of the machine.
+/// Identity of the machine's current boot.
 std::string bootId();
 
-/// The state of the same run on the same boot; nothing where there is none, or where `config`
-/// names no file.
+/// State of the same run on the same boot. Empty if there is none, or if `config` names no file.
 std::optional<RunState> readRunState(const Config& config);
 
-/// Replaces the file. False where it cannot be written.
+/// Replaces the file. False if the file cannot be written.
 bool writeRunState(const std::string& file, const RunState& state);
 
 }  // namespace perdure::capture

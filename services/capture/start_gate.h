@@ -1,4 +1,4 @@
-// Waits for the readers that must not miss the first frame.
+// Waits for the readers that must receive the first frame.
 #pragma once
 
 #include <chrono>
@@ -11,16 +11,16 @@
 
 namespace perdure::capture {
 
-/// A process reads when it has a reader of frame/cam0 (vio, inference) or of any topic (others).
+/// A process counts as present if it reads frame/cam0 (vio, inference), or any topic (others).
 class StartGate {
  public:
   using Clock = std::chrono::steady_clock;
   StartGate(const bus::Participant& participant, const StartConfig& config, Clock::time_point now);
 
-  /// Open when all are there, and half a second more so that they know of us too; or when the
-  /// time is up. Stays open.
+  /// Opens half a second after all readers are present, so that they discover this process too, or
+  /// after the timeout. It then stays open.
   bool open(Clock::time_point now);
-  /// Names of those that are not there yet.
+  /// Names of the absent readers.
   const std::vector<std::string>& missing() const { return missing_; }
 
  private:

@@ -1,4 +1,4 @@
-// What can be set about the gateway.
+// Configuration of the gateway.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ struct Config {
 };
 
 void describe(Config& config, config::Fields& fields);
-/// Between fields. Throws StartupError (78).
+/// Checks conditions between fields. Throws StartupError (78).
 void verify(const Config& config);
 
 }  // namespace perdure::gateway

@@ -1,4 +1,4 @@
-// perdure-gateway: what is on the bus, for browsers, Foxglove and Prometheus.
+// perdure-gateway: publishes the data of the bus for browsers, Foxglove and Prometheus.
 #include <chrono>
 #include <functional>
 #include <memory>
@@ -29,13 +29,14 @@ std::int64_t monotonicNs() {
   return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
 }
 
-/// Topics of @final types, which readers of CDR decode by their IDL.
+/// Topics of @final types, which CDR readers decode by their IDL.
 constexpr const char* kRawTopics[] = {"imu", "speed", "odometry", "landmarks"};
 
-/// What the server's thread tells the loop's.
+/// Requests from the server's thread to the service's loop.
 struct Mail {
   std::mutex mutex;
-  std::vector<gateway::Channels> wanted;  ///< each: who leaves and comes again is told anew
+  std::vector<gateway::Channels> wanted;  ///< all changes, not only the last, because a client that
+                                          ///< reconnects must receive the current state again
   std::vector<gateway::Call> calls;
 };
 
@@ -66,8 +67,8 @@ void listenAlways(service::Context& context, gateway::Node& node) {
   context.on(topics::kMapReply, [&](const MapReply& m) { node.onMapReply(m); });
 }
 
-/// To who begins to look where nobody did, the newest is told as soon as it is heard; what was
-/// heard before, where nothing comes.
+/// For the first viewer, waits briefly for the newest stored messages, and then sends the current
+/// state. If none arrive in time, it sends the state received before.
 class Beginning {
  public:
   explicit Beginning(gateway::Node& node) : node_(node) {}
@@ -87,7 +88,7 @@ class Beginning {
     if (const auto wanted = std::exchange(awaited_, std::nullopt)) node_.setWanted(*wanted);
     for (const auto& work : std::exchange(later_, {})) work();
   }
-  /// At once, or as soon as the node knows that somebody looks.
+  /// Runs `work` at once, or after the node has received the viewers' channels.
   void afterwards(std::function<void()> work) {
     if (!awaited_) return work();
     later_.push_back(std::move(work));
@@ -105,7 +106,7 @@ class Beginning {
   std::int64_t until_ns_ = 0;
 };
 
-/// What nearly all channels rest on.
+/// Reads objects and their related topics, which nearly all channels use.
 void listenToObjects(service::Context& context, gateway::Node& node, Beginning& beginning,
                      const gateway::Config& config,
                      std::vector<std::unique_ptr<OnDemand>>& readers) {
@@ -172,7 +173,7 @@ void listenToRaw(service::Context& context, web::Server& server,
   }
 }
 
-/// Services that others stand in for: the bridge to ROS 2, a driver of one's own.
+/// Services whose work another program does: the bridge to ROS 2, or a custom driver.
 std::map<std::string, std::string> standIns(const bus::Participant& participant,
                                             bus::Discovery& discovery,
                                             const gateway::VitalSigns& heard) {

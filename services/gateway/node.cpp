@@ -9,8 +9,10 @@ namespace perdure::gateway {
 namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr std::chrono::seconds kLongBack{2};  // a recording begins again, or another drive does
-constexpr std::chrono::seconds kGap{1};  // of the sensor clock; what was before is not the way here
+constexpr std::chrono::seconds kLongBack{2};  // a larger jump back means a restarted recording or
+                                              // another drive
+constexpr std::chrono::seconds kGap{1};  // sensor time; after a longer gap, the earlier trajectory
+                                         // is not continued
 
 }  // namespace
 
@@ -25,7 +27,7 @@ Node::Node(const Config& config, const std::string& vehicle, InstanceId instance
       pose_pace_{config.scene_rate_hz} {}
 
 bool Node::Pace::due(TimePoint time) {
-  // A little early counts: stamps jitter around the rate.
+  // A slightly early message passes, because stamps jitter around the rate.
   const auto least = durationFromSeconds(0.9 / rate_hz);
   if (last && time >= *last && time - *last < least) return false;
   last = time;
@@ -38,7 +40,7 @@ void Node::send(std::uint32_t channel, std::string payload) {
 
 void Node::newest(TimePoint time) {
   if (time <= time_ && time_ - time < kLongBack) return;
-  time_ = time;  // a little late is late; much earlier is another drive
+  time_ = time;  // slightly earlier messages are late; much earlier ones belong to another drive
   if (!wanted_.empty()) outputs_.time(time);
 }
 
@@ -64,7 +66,7 @@ void Node::setWanted(const Channels& wanted) {
   }
 }
 
-/// As it is now, to the first who looks.
+/// Sends the current state to the first viewer.
 void Node::sendNow(std::uint32_t channel) {
   const bool placed = odometry_ || objects_;
   switch (channel) {
@@ -80,7 +82,7 @@ void Node::sendNow(std::uint32_t channel) {
     case kMap:
     case kMapScene:
       next_map_ns_ = 0;
-      map_due_ = map_due_ || !map_.empty();  // else as soon as tiles come
+      map_due_ = map_due_ || !map_.empty();  // otherwise the map is sent once tiles arrive
       return;
     case kMapGraph:
     case kMapGraphScene:
@@ -146,7 +148,7 @@ void Node::onFrame(std::size_t camera, const Frame& frame) {
                         compressedImage(frame.stamp, config_.cameras[camera], *jpeg->data))});
 }
 
-/// The newest of live ones is newer.
+/// Ignored if a live frame is newer.
 void Node::onFrameOfBefore(std::size_t camera, const Frame& frame) {
   const auto& last = image_pace_[camera].last;
   if (!last || frame.stamp.time > *last) onFrame(camera, frame);
@@ -155,7 +157,7 @@ void Node::onFrameOfBefore(std::size_t camera, const Frame& frame) {
 void Node::onOdometry(const Odometry& odometry, std::int64_t now_ns) {
   last_.odometry_ns = now_ns;
   if (odometry.state == OdometryState::kInitialising) return;
-  // Other parts of it are in the M of another W.
+  // With another W, other parts of the map belong to its M.
   map_due_ = map_due_ || (!map_.empty() && world() != odometry.world);
   beginAnew(odometry.stamp.time);
   odometry_ = odometry;
@@ -190,7 +192,7 @@ void Node::onModel(const ModelInfo& model) {
   if (wants(kModel)) sendNow(kModel);
 }
 
-/// After a while in which nobody looked, way and histories begin where somebody looks again.
+/// After a time without viewers, trajectory and histories begin at the next viewer.
 void Node::beginAnew(TimePoint time) {
   if (!std::exchange(away_, false) || (time >= time_ && time - time_ < kGap)) return;
   trajectory_.clear();
@@ -203,7 +205,8 @@ void Node::beginAnew(TimePoint time) {
 void Node::onObjects(const Objects& objects, std::int64_t now_ns) {
   last_.objects_ns = now_ns;
   const double latency = 1e-6 * static_cast<double>(now_ns - objects.stamp.captured_ns);
-  constexpr double kLongest = 1e4;  // ms; beyond it is another host's clock, or a recording
+  constexpr double kLongest = 1e4;  // ms; a longer latency comes from another host's clock, or from
+                                    // a recording
   latency_ms_ = objects.stamp.captured_ns > 0 && latency >= 0 && latency < kLongest ? latency : -1;
   take(objects);
 }
@@ -237,14 +240,14 @@ void Node::sendObjects() {
     if (wants(channel)) sendNow(channel);
   }
   for (std::size_t i = 0; i < config_.cameras.size(); ++i) sendAnnotations(i, false);
-  if (odometry_) return;  // it tells where the body is
+  if (odometry_) return;  // odometry messages already send these channels
   for (const std::uint32_t channel : {kTransforms, kPose}) {
     if (wants(channel)) sendNow(channel);
   }
   if (wants(kTrajectory) && trajectory_pace_.due(objects_->stamp.time)) sendNow(kTrajectory);
 }
 
-/// Of one frame the detections may be heard after the objects: they are waited for.
+/// The detections of a frame may arrive after the objects, so the annotations wait for them.
 void Node::sendAnnotations(std::size_t camera, bool now) {
   const bool wanted =
       wants(cameraChannel(camera, kAnnotations)) || wants(cameraChannel(camera, kLikelihood));
@@ -267,7 +270,7 @@ void Node::sendAnnotations(std::size_t camera, bool now) {
   };
   if (wants(cameraChannel(camera, kAnnotations)))
     say(kAnnotations, imageAnnotations(*objects_, *cameras_[camera], detections));
-  // Where no detections were heard it is not known what the network says.
+  // Without received detections, the likelihood is not known.
   if (wants(cameraChannel(camera, kLikelihood)) && found != detections_.end())
     say(kLikelihood,
         likelihoodRegions(*objects_, *cameras_[camera], detections, model_ ? &*model_ : nullptr));
@@ -316,7 +319,7 @@ void Node::tick(std::int64_t now_ns) {
   map_due_ = map_.takeChanged() || map_due_;
   if (wantsTiles() && map_due_ && now_ns >= next_map_ns_) {
     map_due_ = false;
-    // A large map more seldom: about as many bytes a second whatever it holds.
+    // A large map is sent less often, so that the bytes per second are about constant.
     constexpr std::size_t kASecond = 200;
     next_map_ns_ = now_ns + kSecond * static_cast<std::int64_t>(1 + sendMap() / kASecond);
   }

@@ -1,5 +1,5 @@
-// The gateway without bus and sockets: messages in, channels' messages out. What nobody looks at is
-// not made; what is made is made once.
+// The gateway without bus and sockets. It converts messages of the bus to messages of channels.
+// Only channels with viewers are computed, and each message only once.
 #pragma once
 
 #include <map>
@@ -26,17 +26,17 @@ namespace perdure::gateway {
 
 struct Outputs {
   Sink<Encoded> message;
-  Sink<TimePoint> time;  ///< of the newest message
+  Sink<TimePoint> time;  ///< time of the newest message
   Sink<Answer> answer;
   Sink<MapQuery> query;
 };
 
-/// Times `now_ns` are of CLOCK_MONOTONIC.
+/// Times `now_ns` are on CLOCK_MONOTONIC.
 class Node {
  public:
   Node(const Config& config, const std::string& vehicle, InstanceId instance, Outputs outputs);
 
-  /// The channels that somebody looks at. What is new among them is told as it is now.
+  /// Sets the channels that clients view. New channels receive the current state.
   void setWanted(const Channels& wanted);
 
   void onCalibration(const Calibration& calibration);
@@ -46,7 +46,7 @@ class Node {
   void onDetections(const Detections& detections);
   void onModel(const ModelInfo& model);
   void onObjects(const Objects& objects, std::int64_t now_ns);
-  /// The newest of before somebody looked: the last of a drive that has ended, among others.
+  /// Takes the newest message from before the first viewer, for example the last of an ended drive.
   void onObjectsOfBefore(const Objects& objects);
   void onFrameOfBefore(std::size_t camera, const Frame& frame);
   void onEvent(const Event& event);
@@ -57,10 +57,10 @@ class Node {
   void onMapTile(const MapTile& tile) { map_.put(tile); }
   void onMapTileGone(const MapTile& key) { map_.erase(key); }
   void onMapReply(const MapReply& reply);
-  /// The graph as map_store told it to whoever asked: of recordings.
+  /// Takes the graph that map_store sent to another program; used for recordings.
   void onMapGraph(const MapReply& reply);
   void onCall(const Call& call, std::int64_t now_ns);
-  /// About ten times a second while somebody looks, or waits() for an answer.
+  /// Call it about ten times a second while clients are connected, or while waits() is true.
   void tick(std::int64_t now_ns);
   bool waits() const { return !pending_.empty(); }
 
@@ -69,7 +69,7 @@ class Node {
   }
   const VitalSigns& vitalSigns() const { return vital_signs_; }
   std::size_t objects() const { return objects_ ? objects_->objects.size() : 0; }
-  /// The last of objects and odometry is older than that, or there was none.
+  /// Whether the last objects and odometry are older than `longest_ns`, or there were none.
   bool hearsNothing(std::int64_t now_ns, std::int64_t longest_ns) const;
   const ReasonCounts& reasons() const { return reasons_; }
 
@@ -79,7 +79,7 @@ class Node {
     MapQuery query;
     std::int64_t until_ns = 0, next_ns = 0;
   };
-  /// Lets something through at most so often, by the sensor clock.
+  /// Limits a rate, by the sensor clock.
   struct Pace {
     double rate_hz = 0;
     std::optional<TimePoint> last = {};
@@ -97,16 +97,16 @@ class Node {
   void sendAwaited();
   struct Happened {
     Event event;
-    std::optional<Eigen::Vector3d> place;  ///< in W
+    std::optional<Eigen::Vector3d> place;  ///< position in W
   };
   void sendEvent(const Happened& happened, bool as_log);
   std::optional<Eigen::Vector3d> placeOf(const Event& event) const;
   std::optional<TimePoint> timeOfPose() const;
   void placeEvents();
   bool wantsTiles() const { return wants(kMap) || wants(kMapScene); }
-  std::size_t sendMap();  ///< how many objects it told
+  std::size_t sendMap();  ///< number of objects sent
   bool wantsGraph() const { return wants(kMapGraph) || wants(kMapGraphScene); }
-  // In node_graph.cpp.
+  // Defined in node_graph.cpp.
   void lookAtGraph(bool looked_before);
   void followGraph(std::int64_t now_ns);
   void onNoGraph(const std::string& why);
@@ -114,7 +114,7 @@ class Node {
   void noteReturns(const Event& event);
   void newest(TimePoint time);
   RigidTransform pose() const;
-  WorldId world() const;  ///< W
+  WorldId world() const;  ///< the current W
   void ask(const Call& call, MapQuery query, std::int64_t now_ns);
   void askForObject(const Call& call, std::int64_t now_ns);
   void askForMap(const Call& call, std::int64_t now_ns);
@@ -127,16 +127,17 @@ class Node {
   VitalSigns vital_signs_;
   Silence last_;
   TimePoint time_;
-  bool away_ = false;  ///< nobody has looked, so that what is known may be of long ago
+  bool away_ = false;  ///< there were no viewers, so the stored state may be old
 
   std::optional<Calibration> calibration_;
   std::vector<std::optional<CameraModel>> cameras_;
   std::optional<Odometry> odometry_;
   std::optional<Objects> objects_;
   std::optional<ModelInfo> model_;
-  std::map<std::string, Detections> detections_;  ///< newest, by camera
-  std::set<std::size_t> awaited_;  ///< cameras whose annotations wait for those of objects_' frame
-  bool unplaced_ = false;          ///< an event of the whole map came before the first pose
+  std::map<std::string, Detections> detections_;  ///< newest detections, by camera
+  std::set<std::size_t> awaited_;  ///< cameras whose annotations wait for the detections of
+                                   ///< objects_' frame
+  bool unplaced_ = false;          ///< an event of the whole map was received before the first pose
   std::deque<Happened> events_;
   std::map<ObjectId, Event> returns_;
   MapLayer map_;

@@ -1,4 +1,4 @@
-// What clients ask: everything about one object, and what is on the map.
+// Service calls of clients: the full state of one object, and queries of the map.
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -35,7 +35,7 @@ std::optional<Eigen::Vector3d> placeOf(const Json& request, const char* name) {
   return place.allFinite() ? std::optional(place) : std::nullopt;
 }
 
-/// Nothing where it asks for nothing that there is.
+/// Empty if the request has no valid query.
 std::optional<MapQuery> queryOf(const Json& request) {
   MapQuery query;
   constexpr double kMost = 1000;

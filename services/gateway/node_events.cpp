@@ -1,11 +1,12 @@
-// Events, and where they happened.
+// Events and their positions.
 #include "services/gateway/node.h"
 
 namespace perdure::gateway {
 namespace {
 
 constexpr std::size_t kMostEvents = 256;
-constexpr std::chrono::seconds kThen{1};  // the body's pose is that of an event so far from it
+constexpr std::chrono::seconds kThen{1};  // largest time difference at which a pose counts as that
+                                          // of an event
 
 }  // namespace
 
@@ -22,7 +23,8 @@ void Node::onEvent(const Event& event) {
   if (wants(kLog)) sendEvent(events_.back(), true);
 }
 
-/// An event may be heard before the first pose of its W. Who asks later is told where it was.
+/// An event may arrive before the first pose of its W. Its position is then added for later
+/// clients.
 void Node::placeEvents() {
   if (!unplaced_) return;
   unplaced_ = false;
@@ -38,7 +40,8 @@ std::optional<TimePoint> Node::timeOfPose() const {
   return objects_ ? std::optional(objects_->stamp.time) : std::nullopt;
 }
 
-/// Of an object: where it is believed to be; of the whole map: where the vehicle was then.
+/// Position of an object's event: the estimate of the object. Position of an event of the whole
+/// map: the vehicle at that time.
 std::optional<Eigen::Vector3d> Node::placeOf(const Event& event) const {
   if (event.world != world() || !(odometry_ || objects_)) return std::nullopt;
   if (event.object_id == 0) {
@@ -60,7 +63,7 @@ void Node::sendEvent(const Happened& happened, bool as_log) {
        std::make_shared<const std::string>(as_log ? eventLog(event) : eventJson(event, place))});
 }
 
-/// A prediction holds until the object is seen again, or is no more.
+/// A prediction is valid until the object is detected again or removed.
 void Node::noteReturns(const Event& event) {
   if (event.kind == EventKind::kPredictedReturn) {
     returns_[event.object_id] = event;

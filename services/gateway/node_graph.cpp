@@ -1,18 +1,18 @@
-// The graph of the map: asked of map_store while somebody looks, and told.
+// Graph of the map: queried from map_store and sent while there are viewers.
 #include <utility>
 
 #include "services/gateway/node.h"
 
 namespace perdure::gateway {
 
-/// To who begins to look it is told as it is then.
+/// A new viewer receives the current graph.
 void Node::lookAtGraph(bool looked_before) {
   if (wantsGraph() == looked_before) return;
   graph_pace_.begin();
   if (!wantsGraph()) graph_.reset();
 }
 
-/// Nothing is asked for nobody.
+/// Without viewers, no query is sent.
 void Node::followGraph(std::int64_t now_ns) {
   if (!wantsGraph() || !graph_pace_.due(now_ns)) return;
   MapQuery query;
@@ -30,7 +30,7 @@ void Node::onMapGraph(const MapReply& reply) {
   }
 }
 
-/// What is known of it stays: a recording has it, and no map store.
+/// The known graph stays, because a recording has it without a map store.
 void Node::onNoGraph(const std::string& why) {
   if (graph_ || why == why_no_graph_) return;
   why_no_graph_ = why;

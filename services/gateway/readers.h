@@ -1,4 +1,4 @@
-// Readers that are there while somebody looks: for nobody nothing is sent to this process.
+// Readers that exist only while clients need them, so that no unused data is sent to this process.
 #pragma once
 
 #include <functional>
@@ -18,7 +18,7 @@ class OnDemand {
   virtual ~OnDemand() = default;
   OnDemand(const OnDemand&) = delete;
   OnDemand& operator=(const OnDemand&) = delete;
-  /// Not from a handler of messages.
+  /// Must not be called from a handler of messages.
   void follow(const Channels& wanted) {
     tidy();
     bool now = false;
@@ -75,7 +75,7 @@ class ReaderOnDemand : public OnDemand {
   ReasonCounts before_;
 };
 
-/// The same of a topic's bytes as they come.
+/// The same for the unparsed bytes of a topic.
 class BytesOnDemand : public OnDemand {
  public:
   using Handler = std::function<void(const bus::CdrMessage&)>;
@@ -99,8 +99,9 @@ class BytesOnDemand : public OnDemand {
   std::unique_ptr<bus::CdrReader> reader_;
 };
 
-/// The newest message of before, which writers keep (bus::Qos::kept), to who begins to look. Its
-/// reader goes as soon as that was heard; from writers that keep none nothing comes.
+/// Delivers the newest earlier message, which writers store (bus::Qos::kept), to new viewers. The
+/// reader is closed after the first message. From writers without stored messages, it receives
+/// none.
 template <class T>
 class NewestOfBefore : public OnDemand {
  public:
@@ -115,7 +116,7 @@ class NewestOfBefore : public OnDemand {
         std::make_unique<bus::Reader<T>>(context_.participant(), topic_, bus::ReadFrom::kKept);
     context_.loop().on(*reader_, [this](const T& message) {
       if (!std::exchange(heard_, true)) handler_(message);
-      context_.loop().wake();  // no reader goes while messages are handed over
+      context_.loop().wake();  // a reader must not be closed while messages are delivered
     });
   }
   void tidy() override {

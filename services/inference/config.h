@@ -1,4 +1,4 @@
-// The configuration of inference.
+// Configuration of inference.
 #pragma once
 
 #include <cstdint>
@@ -11,10 +11,10 @@ namespace perdure::inference {
 
 struct ModelConfig {
   std::string path;         ///< .onnx, or .cfg with its .weights
-  std::string description;  ///< "" = look for it
+  std::string description;  ///< "": search for it
   std::string backend = "auto";
   std::int64_t threads = 1;
-  double budget_ms = 0.0;  ///< of a frame; 0 = none, always the network's own input size
+  double budget_ms = 0.0;  ///< per frame; 0: no budget, always the network's own input size
 };
 
 struct DetectionConfig {
@@ -22,7 +22,7 @@ struct DetectionConfig {
   double score_threshold = 0.05;
   double merge_iou = 0.5;
   std::int64_t limit = 100;
-  std::vector<std::string> classes;  ///< empty = all of the network's
+  std::vector<std::string> classes;  ///< empty: all classes of the network
   bool prime = true;                 ///< answer predictions (core/decode/prime.h)
 };
 
@@ -41,7 +41,7 @@ struct Config {
 
 void describe(Config& config, config::Fields& fields);
 
-/// The lease of `detections`: at least three periods, and never under 100 ms.
+/// Lease of `detections`: at least three periods, and at least 100 ms.
 double leaseSeconds(const OwnershipConfig& ownership);
 
 }  // namespace perdure::inference

@@ -1,4 +1,4 @@
-// One JSON object read key by key; what is wrong with it is collected, unknown keys included.
+// Reads one JSON object key by key, and collects all errors, including unknown keys.
 #pragma once
 
 #include <cmath>
@@ -14,7 +14,7 @@ namespace perdure::inference {
 
 using Json = nlohmann::json;
 
-/// `where` goes before the keys in what is told; `problems` must outlive the reader.
+/// `where`: prefix of the keys in messages. `problems` must outlive the reader.
 class JsonReader {
  public:
   JsonReader(const Json& json, std::string where, std::vector<std::string>& problems)
@@ -58,7 +58,7 @@ class JsonReader {
     target = value->get<int>();
   }
 
-  /// Left as it is where it is absent.
+  /// The target does not change if the key is absent.
   void integer(const std::string& key, int& target, int low, int high) {
     const Json* value = find(key);
     if (!value) return;
@@ -123,7 +123,7 @@ class JsonReader {
   std::set<std::string> known_;
 };
 
-/// The numbers of a list; empty where it is something else.
+/// Numbers of a list; empty if the value is not a list of numbers.
 inline std::vector<double> numbersOf(const Json& json) {
   std::vector<double> numbers;
   if (!json.is_array()) return {};

@@ -1,4 +1,4 @@
-// perdure-inference: frames to detections.
+// perdure-inference: computes detections from frames.
 #include "common/bus/gaps.h"
 #include "common/service/service.h"
 #include "common/vision/jpeg.h"
@@ -9,7 +9,8 @@ namespace {
 using namespace perdure;
 
 void run(service::Context& context, const inference::Config& config) {
-  inference::Node node(config, context.instance());  // first: frames must not pile up meanwhile
+  inference::Node node(config, context.instance());  // created first, so that frames do not queue
+                                                     // up during loading
   context.log().info("network {} with {} classes, hash {}, by {}", node.model().name,
                      node.model().classes.size(), toHex(node.model().hash), node.backend());
   const auto& ownership = config.ownership;
@@ -18,7 +19,7 @@ void run(service::Context& context, const inference::Config& config) {
                                     {inference::Worker::firstStrength(ownership), lease_s});
   auto& notices = context.writer(bus::topics::kSwap);
   (void)context.writer(bus::topics::kModel).write(node.model());
-  inference::Worker* worker = nullptr;  // handlers run when it is there: in context.run()
+  inference::Worker* worker = nullptr;  // set before handlers use it in context.run()
   const auto& rivals =
       context.on(bus::topics::kDetections, [&](const Detections& heard) { worker->heard(heard); });
   inference::Worker the_worker(node, ownership, config.model.budget_ms,
@@ -44,7 +45,7 @@ void run(service::Context& context, const inference::Config& config) {
   context.countReasons([&]() -> const ReasonCounts& { return lost; });
   context.on(bus::topics::kPredictions, [&](const Predictions& m) { worker->expect(m); });
   context.every(durationFromSeconds(lease_s / 5), [&] { worker->assertAlive(); });
-  constexpr std::chrono::seconds kHangs{10};  // no network takes so long for a frame
+  constexpr std::chrono::seconds kHangs{10};  // longer than any network needs for a frame
   context.watch([&] { return worker->goesOn(kHangs); });
   context.countReasons([&](ReasonCounts& counts) { worker->report(counts); });
   context.onHealth([&] {

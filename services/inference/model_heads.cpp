@@ -12,7 +12,7 @@ std::vector<std::string> linesOf(const ListFile& list, JsonReader& reader) {
   namespace fs = std::filesystem;
   std::vector<std::string> lines;
   std::error_code error;
-  // Devices and pipes have no end, or none that is known.
+  // Devices and pipes have no known end.
   const bool regular = fs::is_regular_file(list.path, error);
   const auto bytes = regular ? fs::file_size(list.path, error) : 0;
   if (!error && bytes > list.most_bytes) {
@@ -24,7 +24,8 @@ std::vector<std::string> linesOf(const ListFile& list, JsonReader& reader) {
   std::ifstream in;
   if (regular && !error) in.open(list.path);
   for (std::string line; std::getline(in, line);) {
-    if (lines.empty() && line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);  // a byte-order mark
+    // removes a byte-order mark
+    if (lines.empty() && line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);
     while (!line.empty() && std::isspace(static_cast<unsigned char>(line.back()))) line.pop_back();
     if (!line.empty()) lines.push_back(line);
   }
@@ -36,7 +37,7 @@ std::vector<std::string> linesOf(const ListFile& list, JsonReader& reader) {
 
 namespace {
 
-constexpr std::uintmax_t kMostPriorBytes = 16U << 20U;  // 300,000 priors
+constexpr std::uintmax_t kMostPriorBytes = 16U << 20U;  // room for 300,000 priors
 
 void readAzimuth(const Json& json, JsonReader& parent, ModelDescription& model) {
   JsonReader reader(json, "azimuth.", parent.problems());
@@ -94,7 +95,7 @@ void readOutputs(const Json& json, JsonReader& parent, ModelDescription& model) 
   reader.rejectUnknown();
 }
 
-/// A prior a line: x and y of its centre, width and height, in shares of the input.
+/// Reads one prior a line: x and y of its centre, width and height, as shares of the input.
 void readPriors(JsonReader& reader, const std::string& file, BoxForm& form) {
   const std::string name = reader.text("priors_file", true);
   if (name.empty()) return;
@@ -226,7 +227,7 @@ void readWhole(JsonReader& reader, const std::string& file, ModelDescription& mo
 void readHeads(JsonReader& reader, const std::string& file, ModelDescription& model) {
   const bool distances = model.family == Family::kYolov8 || model.family == Family::kNanoDet;
   if (model.family == Family::kPerdure) {
-    model.class_softmax = true;  // over background and classes: nothing is to be chosen
+    model.class_softmax = true;  // over background and classes; not configurable
     model.background = Background::kFirst;
     if (const Json* azimuth = reader.find("azimuth")) readAzimuth(*azimuth, reader, model);
     reader.number("reach", model.reach, 0, 10);

@@ -1,4 +1,4 @@
-// The part of a model.json that says where the network's answers are and what their numbers mean.
+// The part of a model.json that describes the network's outputs and their numbers.
 #pragma once
 
 #include <cstdint>
@@ -11,20 +11,20 @@
 
 namespace perdure::inference {
 
-/// activation, levels, outputs, boxes and the keys of single families, into `model`, whose family,
-/// input and classes are known. Files that are named are beside `file`.
+/// Reads activation, levels, outputs, boxes and the keys of single families into `model`. Its
+/// family, input and classes must be set. File names are relative to the folder of `file`.
 void readHeads(JsonReader& reader, const std::string& file, ModelDescription& model);
 
-/// A list in a file of its own, named by `key`.
+/// A list in a separate file, named by `key`.
 struct ListFile {
   std::string key;
   std::filesystem::path path;
-  std::string what;           ///< of which it has one a line, for people
-  std::uintmax_t most_bytes;  ///< no list is longer; a file that is was named by mistake
+  std::string what;           ///< content of a line, for people
+  std::uintmax_t most_bytes;  ///< size limit; a larger file was probably named by mistake
 };
 
-/// Its lines that are not empty, without white space at their ends. Complains of `key` where there
-/// are none, or the file is larger.
+/// Non-empty lines, without trailing white space. Reports an error for `key` if there are none, or
+/// if the file is too large.
 std::vector<std::string> linesOf(const ListFile& list, JsonReader& reader);
 
 }  // namespace perdure::inference

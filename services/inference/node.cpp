@@ -44,7 +44,7 @@ std::unique_ptr<Network> networkOf(const Config& config, const ModelFile& file) 
                     ".weights."));
 }
 
-/// A grey ramp: nothing is in it, and no value is special.
+/// A grey ramp, without objects and without special values.
 Frame testImage(const Input& input) {
   Frame frame;
   frame.width = static_cast<std::uint32_t>(input.width);
@@ -66,8 +66,8 @@ Detection inImage(const Candidate& candidate, const ImageFit& fit) {
   return detection;
 }
 
-/// The part of a box that lies in the image; nothing where that is under a quarter of it, or too
-/// small to be told from nothing.
+/// The part of a box inside the image. Empty if it is less than a quarter of the box, or too small
+/// to detect.
 std::optional<Box> partInside(const Box& box, const ImageFit& fit) {
   constexpr double kLeastSide = 3.0, kLeastShare = 0.25;
   const double left = fit.offset_x, top = fit.offset_y;
@@ -110,10 +110,10 @@ Node::Node(const Config& config, InstanceId instance, ModelFile file)
   if (config_.model.budget_ms > 0.0) addSmallerSizes(file);
 }
 
-/// Each has a network of its own, because OpenCV sets one up anew when its input changes. A size
-/// that the network does not take is left out.
+/// Each size has its own network, because OpenCV initialises one again when its input changes.
+/// Sizes that the network does not accept are left out.
 void Node::addSmallerSizes(const ModelFile& file) {
-  constexpr int kMultiple = 32;  // of all strides there are
+  constexpr int kMultiple = 32;  // multiple of all strides
   const Input& full = description_.input;
   for (const double scale : {0.85, 0.7, 0.6, 0.5}) {
     Size size{description_, networkOf(config_, file)};
@@ -129,7 +129,7 @@ void Node::addSmallerSizes(const ModelFile& file) {
     size_ = sizes_.size() - 1;
     const Frame image = testImage(input);
     bool works = true;
-    for (int round = 0; round < 2 && works; ++round) {  // the first one allocates
+    for (int round = 0; round < 2 && works; ++round) {  // the first round allocates
       works = candidatesIn(image, options_.score_threshold).has_value();
     }
     size_ = 0;
@@ -174,7 +174,7 @@ void Node::chooseClasses() {
 
 void Node::testItself() {
   const Frame image = testImage(description_.input);
-  for (int round = 0; round < 2; ++round) {  // the first one allocates
+  for (int round = 0; round < 2; ++round) {  // the first round allocates
     if (const auto result = candidatesIn(image, options_.score_threshold); !result) {
       throw StartupError(
           ExitCode::kConfiguration,
@@ -196,7 +196,7 @@ Result<std::vector<Candidate>> Node::candidatesIn(const Frame& frame, double flo
   auto candidates = decode(at(), options, *tensors);
   if (!candidates) return candidates;
   std::erase_if(*candidates, [](const Candidate& c) {
-    return c.box.width() < 1.0 || c.box.height() < 1.0;  // less than a pixel of input
+    return c.box.width() < 1.0 || c.box.height() < 1.0;  // smaller than a pixel of the input
   });
   return candidates;
 }
@@ -235,8 +235,8 @@ Result<Detections> Node::infer(const Frame& frame, const Predictions& expected) 
   return out;
 }
 
-/// In the order of the predictions. What lies outside the image, is smaller than the network can
-/// tell, or is of a class that it does not report is not asked for: its activation is 0.
+/// Expectations in the order of the predictions. The activation is 0 for those outside the image,
+/// too small for the network, or of a class that is not reported.
 std::vector<Expectation> Node::expectationsOf(const Predictions& expected,
                                               const Frame& frame) const {
   const ImageFit fit =
@@ -274,7 +274,7 @@ void Node::addPrimed(const Predictions& expected, const Frame& frame,
     Detection detection;
     detection.box = fit.toImage(place.box);
     detection.side_sigma = fit.toImage(place.side_sigma);
-    // Evidence for the object, whatever its class: the same for all.
+    // The evidence is for the object, independent of its class, so all classes have the same value.
     const double nats = primedLogRatio(description_.calibration.primed, answer);
     detection.activations.assign(info_.classes.size() + 1, static_cast<float>(nats));
     detection.activations[0] = 0.0F;

@@ -1,4 +1,4 @@
-// Frames in, evidence out: the likelihood of eq. 6 and 7, by a network.
+// Computes evidence from frames with a network: the likelihood of eq. 6 and 7.
 #pragma once
 
 #include <cstddef>
@@ -19,36 +19,37 @@ namespace perdure::inference {
 
 class Node {
  public:
-  /// Loads, warms and tests the network. Throws StartupError with the mend.
+  /// Loads, warms up and tests the network. Throws StartupError with the fix.
   Node(const Config& config, InstanceId instance);
 
-  /// What the activations mean; classes are those that are reported.
+  /// Description of the activations and of the reported classes.
   const ModelInfo& model() const { return info_; }
 
   const ModelDescription& description() const { return description_; }
-  /// What computes the network, for people.
+  /// Backend of the network, for people.
   std::string backend() const;
 
-  /// Boxes in pixels of the frame, as the network extrapolates them (not clipped to the image).
-  /// An empty list is a result: nothing is there. `expected` says where objects should be: each
-  /// that no box meets gets a primed answer (core/decode/prime.h), where the model is calibrated
-  /// for it and the predictions fit the frame. Reasons: "frame_malformed", "model_failed",
-  /// "model_output_shape", "model_output_not_finite".
+  /// Boxes in pixels of the frame, not clipped to the image. An empty list is a valid result.
+  /// `expected`: predicted objects. Each one without a matching box gets a top-down answer
+  /// (core/decode/prime.h), if the model is calibrated for it and the predictions match the frame.
+  /// Fails with "frame_malformed", "model_failed", "model_output_shape" or
+  /// "model_output_not_finite".
   Result<Detections> infer(const Frame& frame, const Predictions& expected = {});
 
-  /// Seconds of a steady clock, for Detections::forward_s; without one it stays 0, not known.
+  /// Sets a steady clock in seconds, for Detections::forward_s; without a clock, forward_s stays 0
+  /// (unknown).
   void timeBy(std::function<double()> clock_s) { clock_s_ = std::move(clock_s); }
 
-  /// Pixels of each input size that the network takes over those of its own, falling from 1. More
-  /// than one where there is a time budget.
+  /// Pixels of each supported input size relative to the network's own, falling from 1. With a time
+  /// budget there is more than one size.
   std::vector<double> sizeShares() const;
-  /// Which of them to look with from now on.
+  /// Selects the size for the next frames.
   void useSize(std::size_t size);
-  /// Input width over the network's own.
+  /// Input width relative to the network's own.
   double inputScale() const;
 
-  /// Every box whose best reported class scores `floor` or more, in pixels of the network's input,
-  /// before overlaps are merged. Reasons as of infer().
+  /// All boxes whose best reported class scores `floor` or more, in pixels of the network's input,
+  /// before overlaps are merged. Fails like infer().
   Result<std::vector<Candidate>> candidatesIn(const Frame& frame, double floor);
 
  private:
@@ -70,11 +71,11 @@ class Node {
   const ModelDescription& at() const { return sizes_[size_].description; }
 
   Config config_;
-  ModelDescription description_;  ///< at its own size
-  std::vector<Size> sizes_;       ///< its own first, smaller ones where there is a budget
+  ModelDescription description_;  ///< description at its own size
+  std::vector<Size> sizes_;       ///< its own first, then smaller ones if there is a budget
   std::size_t size_ = 0;
   std::function<double()> clock_s_;
-  double forward_s_ = 0.0;  ///< of the last frame
+  double forward_s_ = 0.0;  ///< time of the forward pass for the last frame
   DecodeOptions options_;
   ModelInfo info_;
 };

@@ -5,7 +5,7 @@
 namespace perdure::inference {
 namespace {
 
-constexpr std::int32_t kAbove = 10;  // by which one that leads is stronger than all others
+constexpr std::int32_t kAbove = 10;  // margin of the leader's strength above all others
 constexpr std::int32_t kMostStrength = 1'000'000'000;
 
 Ownership firstOwnership(const OwnershipConfig& config, Duration lease) {
@@ -99,7 +99,7 @@ void Worker::learn(const ModelInfo& model) {
   swap_.learn(model);
 }
 
-/// A process that was stopped cannot have said that it lives; DDS may not yet have told it so.
+/// A suspended process cannot assert liveliness, and DDS may not yet have reported the loss.
 void Worker::noteLapse(Clock::time_point now) {
   if (now - last_alive_.load() > lease_) ++lapses_;
 }
@@ -136,12 +136,12 @@ void Worker::noteFailure(const Reason& reason) {
   const std::lock_guard lock(mutex_);
   reasons_.add(reason);
   last_problem_ = reason.code + ": " + reason.detail;
-  if (reason.code == "frame_malformed") return;  // capture's fault, not the network's
+  if (reason.code == "frame_malformed") return;  // the error is in capture, not in the network
   const auto now = Clock::now();
   if (ownership_.noteFailure(now)) {
     reasons_.add("form_lost");
     adoptStrength(now);
-    bus_.detections.release();  // it may be long until the next result, which would tell readers
+    bus_.detections.release();  // the next result, which would inform readers, may be far off
   }
   swap_.ownFailure(reason, now);
   obey();
@@ -150,7 +150,7 @@ void Worker::noteFailure(const Reason& reason) {
 void Worker::adoptStrength(Clock::time_point now) {
   const auto strength = static_cast<std::int32_t>(ownership_.strength());
   if (strength == bus_.detections.strength()) return;
-  // A change of strength travels apart from the data: what is written with it may overtake it.
+  // A change of strength travels separately from the data, so data written with it may overtake it.
   if (strength < bus_.detections.strength() && bus_.rivals.matched() > 1)
     hold_until_ = now + lease_;
   bus_.detections.setStrength(strength);
@@ -173,7 +173,7 @@ void Worker::publish(const Detections& detections, Duration age) {
   if (silent_) return;
   if (now < hold_until_) return reasons_.add("held_back");
   if (bus_.detections.write(detections)) health_.frameOut();
-  last_alive_ = Clock::now();  // a write says "I live" too
+  last_alive_ = Clock::now();  // a write also asserts liveliness
 }
 
 void Worker::obey() {
@@ -205,7 +205,7 @@ void Worker::report(ReasonCounts& counts) const {
   for (const auto& [reason, n] : swap_.reasons().all()) counts.add(reason, n);
 }
 
-/// What the time budget has made of the input; empty where nothing.
+/// Reduction of the input by the time budget; empty without a reduction.
 std::string Worker::reducedInput() const {
   if (scale_ == 1.0) return "";
   return fmt::format(

@@ -1,5 +1,6 @@
-// The thread that runs the network, behind a queue of one, and what it may write: the newest frame
-// counts, results carry the strength that this process deserves, and a newcomer may follow it.
+// Thread that runs the network, behind a queue of one frame, and the rules for writing results. The
+// newest frame replaces a waiting one, results carry the current strength of this process, and a
+// newcomer may take over.
 #pragma once
 
 #include <atomic>
@@ -18,17 +19,17 @@
 
 namespace perdure::inference {
 
-/// Where a worker speaks and listens.
+/// Writers and readers of a worker.
 struct WorkerBus {
   bus::Writer<Detections>& detections;
-  /// Reads `detections`: it matches our own writer, and those of other processes.
+  /// Reader of `detections`, matched with writers of this and of other processes.
   const bus::RawReader& rivals;
   bus::Writer<SwapNotice>& notices;
 };
 
 class Worker {
  public:
-  /// `end` ends the process; it is called from any thread. `budget_ms` of a frame, 0: none.
+  /// `end` ends the process; it may be called from any thread. `budget_ms` per frame, 0: none.
   Worker(Node& node, const OwnershipConfig& ownership, double budget_ms, WorkerBus bus,
          service::HealthMeter& health, std::function<void()> end);
   /// Ends within the time of one frame.
@@ -36,25 +37,25 @@ class Worker {
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  /// The strength to begin with.
+  /// Initial strength.
   static std::int32_t firstStrength(const OwnershipConfig& ownership);
 
-  /// A frame to look at; one that still waits is dropped and counted.
+  /// Adds a frame. A frame that still waits is dropped and counted.
   void offer(const Frame& frame);
-  /// Where objects should be seen, for the frames that follow.
+  /// Sets the predicted objects for the following frames.
   void expect(const Predictions& predictions);
-  /// To be called several times in a lease: says "I live", unless the network is stuck.
+  /// Asserts liveliness, unless the network is stuck. Call it several times in a lease.
   void assertAlive();
-  /// No frame has kept the network for longer than `longest`.
+  /// Whether no frame has occupied the network for longer than `longest`.
   bool goesOn(Duration longest) const;
   void heard(const Detections& detections);
   void told(const SwapNotice& notice);
   void learn(const ModelInfo& model);
 
   void report(ReasonCounts& counts) const;
-  /// What Health says of it: a sentence where something is to be told.
+  /// State and message for Health; the message is empty if there is nothing to report.
   std::pair<HealthState, std::string> state() const;
-  /// Why this process was in vain; empty where it was not.
+  /// Why this process failed; empty if it did not.
   std::string failure() const;
 
  private:
@@ -70,13 +71,13 @@ class Worker {
   void noteFailure(const Reason& reason);
   void noteLapse(Clock::time_point now);
   void adoptStrength(Clock::time_point now);
-  /// Does what the swap asks for.
+  /// Executes the actions of the swap.
   void obey();
   std::string reducedInput() const;
 
   Node& node_;
   const double budget_ms_;
-  Budget budget_;  ///< of the worker's thread
+  Budget budget_;  ///< used by the worker's thread only
   const Duration lease_;
   WorkerBus bus_;
   service::HealthMeter& health_;
@@ -85,16 +86,17 @@ class Worker {
   std::atomic<Clock::time_point> last_alive_{Clock::now()};
   std::atomic<Clock::time_point> busy_since_{Clock::time_point::max()};
   std::atomic<std::uint64_t> lapses_{0};
-  mutable std::mutex mutex_;  ///< of all that follows, and of the writers
+  mutable std::mutex mutex_;  ///< protects all following members and the writers
   Ownership ownership_;
   Swap swap_;
-  Clock::time_point hold_until_{};  ///< results are kept back after the strength was lowered
+  Clock::time_point hold_until_{};  ///< results are withheld until this time, after the strength
+                                    ///< was lowered
   bool silent_ = false;
   std::string failure_, last_problem_;
   ReasonCounts reasons_;
   Predictions expected_;
-  double scale_ = 1.0;   ///< of the input
-  double age_ms_ = 0.0;  ///< of the last result when it was ready
+  double scale_ = 1.0;   ///< width of the input relative to its own size
+  double age_ms_ = 0.0;  ///< age of the last result when it was ready
   std::thread thread_;
 };
 

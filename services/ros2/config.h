@@ -1,4 +1,4 @@
-// What can be set about the bridge to ROS 2.
+// Configuration of the bridge to ROS 2.
 #pragma once
 
 #include <cstdint>
@@ -9,17 +9,17 @@
 
 namespace perdure::ros2 {
 
-/// "same": its stamps are of the vehicle's common clock. "own": they are of another one, and are
-/// placed by when they come.
+/// "same": stamps are on the vehicle's common clock. "own": they are on another clock, and are
+/// converted by their times of arrival.
 inline constexpr char kSameClock[] = "same", kOwnClock[] = "own";
 
 struct CameraInput {
-  std::string name;  ///< Perdure's: "cam0"
+  std::string name;  ///< name in Perdure, for example "cam0"
   std::string image, info = {}, type = "auto", clock = kSameClock;
   std::int64_t bits = 0;
   bool given() const { return !image.empty(); }
   bool compressed() const;
-  std::string infoTopic() const;  ///< beside the image where none is given
+  std::string infoTopic() const;  ///< `info`, or the default topic beside the image
 };
 
 struct StreamInput {
@@ -60,12 +60,12 @@ struct Config {
   double apart_s = 5.0;
   bool reliable = false;
 
-  std::vector<CameraInput> cameras() const;  ///< those that are given; cam0 first
+  std::vector<CameraInput> cameras() const;  ///< configured cameras; cam0 first
   bool anyInput() const;
 };
 
 void describe(Config& config, config::Fields& fields);
-/// Between fields. Throws StartupError (78).
+/// Checks conditions between fields. Throws StartupError (78).
 void verify(const Config& config);
 
 }  // namespace perdure::ros2

@@ -1,4 +1,5 @@
-// perdure-ros2: Perdure's topics for ROS 2, and drivers of ROS 2 for Perdure, without ROS.
+// perdure-ros2: publishes Perdure's topics in ROS 2, and reads drivers of ROS 2, without ROS
+// libraries.
 #include <chrono>
 #include <functional>
 #include <memory>
@@ -22,7 +23,7 @@ std::int64_t monotonicNs() {
   return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
 }
 
-/// A reader of the bus that is there while somebody of ROS wants what is made of it.
+/// A reader of the bus that exists only while ROS has readers of its output.
 class Follower {
  public:
   virtual ~Follower() = default;
@@ -64,7 +65,7 @@ class FollowerOf : public Follower {
   ReasonCounts before_;
 };
 
-/// Outwards: what is on the bus, as ROS has it.
+/// Output side: publishes the data of the bus in ROS.
 class Outwards {
  public:
   Outwards(service::Context& context, const ros2::Config& config, ros2::RosSide& ros)
@@ -90,7 +91,7 @@ class Outwards {
  private:
   std::string topic(const char* name) const { return config_.prefix + "/" + name; }
 
-  /// What is latched, and what others need: small, and seldom.
+  /// Reads topics that are latched or needed by others; their messages are small and infrequent.
   void listenAlways() {
     context_.on(topics::kCalibration, [this](const Calibration& m) { mirror_.onCalibration(m); });
     context_.on(topics::kModel, [this](const ModelInfo& m) { mirror_.onModel(m); });
@@ -111,7 +112,7 @@ class Outwards {
   }
 
   void followWhatIsWanted() {
-    // The rate of turn is in the odometry's twist.
+    // The angular rate is part of the odometry's twist.
     add<ImuSample>(topics::kImu, {topic("imu"), topic("odometry")},
                    [this](const ImuSample& m) { mirror_.onImu(m); });
     add<Landmarks>(topics::kLandmarks, {topic("landmarks")},
@@ -122,7 +123,7 @@ class Outwards {
     if (!config_.tracked_objects.empty()) of_objects.push_back(config_.tracked_objects);
     add<Objects>(topics::kObjects, std::move(of_objects), [this](const Objects& m) {
       mirror_.onObjects(m);
-      // Of a bridge that takes images its rate is theirs: `perdure status` reads it there.
+      // If the bridge reads images, its rate in Health is theirs, for `perdure status`.
       if (!config_.cam0.given()) context_.health().frameOut();
     });
     for (const std::string& camera : config_.shown_cameras) {
@@ -133,7 +134,8 @@ class Outwards {
     }
   }
 
-  /// Raw and compressed, each where it is wanted, whatever travels on the bus.
+  /// Publishes the raw and the compressed image, if their topics have readers. The encoding on the
+  /// bus does not matter.
   void onFrame(const Frame& frame) {
     mirror_.onFrame(frame);
     const std::string image = mirror_.imageTopic(frame.camera);
@@ -156,7 +158,7 @@ class Outwards {
   ReasonCounts reasons_;
 };
 
-/// Inwards: what drivers of ROS say, as Perdure's topics.
+/// Input side: publishes the data of ROS drivers as Perdure's topics.
 class Inwards {
  public:
   Inwards(service::Context& context, const ros2::Config& config, ros2::RosSide& ros)
@@ -200,7 +202,7 @@ class Inwards {
     if (config_.imu.given()) to.imu = context_.sink(topics::kImu);
     if (config_.odometry.given()) to.odometry = context_.sink(topics::kOdometry);
     if (config_.detections.given()) {
-      constexpr double kLease = 1.0;  // s; detectors of ROS have no rate that is known
+      constexpr double kLease = 1.0;  // s; the rate of ROS detectors is not known
       auto& detections = context_.writer(
           topics::kDetections,
           {.strength = static_cast<std::int32_t>(config_.detections.strength), .lease_s = kLease});
@@ -210,7 +212,7 @@ class Inwards {
     return to;
   }
 
-  /// A reader whose messages go to `take` as structs; bytes that are none are counted.
+  /// Adds a reader that passes parsed messages to `take`, and counts malformed ones.
   template <class M>
   void read(const std::string& input, const std::string& topic, int depth,
             std::function<void(const M&)> take, bool latched = false) {
@@ -277,7 +279,7 @@ class Inwards {
     }
   }
 
-  /// Poses and boxes of frames that Perdure's capture takes.
+  /// Reads the frames of Perdure's capture, for the poses and boxes that belong to them.
   void listenToOwnFrames() {
     if (config_.cam0.given() || !(config_.odometry.given() || config_.detections.given())) return;
     context_.on(topics::frame(config_.detections.camera), [this](const Frame& m) {

@@ -1,5 +1,5 @@
-// Inwards, without DDS: messages of ROS in, messages of Perdure out, what is wrong counted with the
-// mend. Times `now_ns` are of CLOCK_MONOTONIC, when a message came.
+// Input side of the bridge, without DDS. It converts messages of ROS to messages of Perdure, and
+// counts problems, each with its fix. Times `now_ns` are arrival times on CLOCK_MONOTONIC.
 #pragma once
 
 #include <map>
@@ -33,13 +33,13 @@ struct Outputs {
 
 class Node {
  public:
-  /// `rig`: what the file in.rig has; empty without it.
+  /// `rig`: content of the file in.rig; empty without a file.
   Node(const Config& config, Calibration rig, InstanceId instance, Outputs outputs);
 
-  /// Tells the detector's classes.
+  /// Publishes the detector's classes.
   void start();
 
-  // Of ROS. `camera`: index in Config::cameras().
+  // Messages of ROS. `camera`: index in Config::cameras().
   void onImage(std::size_t camera, const ros::Image& image, std::int64_t now_ns);
   void onImage(std::size_t camera, const ros::CompressedImage& image, std::int64_t now_ns);
   void onInfo(std::size_t camera, const ros::CameraInfo& info, std::int64_t now_ns);
@@ -47,16 +47,16 @@ class Node {
   void onImu(const ros::Imu& imu, std::int64_t now_ns);
   void onOdometry(const ros::Odometry& odometry, std::int64_t now_ns);
   void onDetections(const ros::Detection2DArray& detections, std::int64_t now_ns);
-  /// A message whose bytes are not of its type.
+  /// Counts a message whose bytes do not match its type.
   void onMalformed(const std::string& input, const Reason& reason, std::int64_t now_ns) {
     troubles_.add(input, reason, now_ns);
   }
 
-  /// A frame of Perdure's own capture, where the cameras are not ROS'.
+  /// Takes a frame of Perdure's own capture, if the cameras are not those of ROS.
   void onOwnFrame(const Frame& frame, std::int64_t now_ns);
 
   const Troubles& troubles() const { return troubles_; }
-  /// What Health says, and the sentence.
+  /// State and message for Health.
   std::pair<HealthState, std::string> health(std::int64_t now_ns) const;
 
  private:
@@ -86,7 +86,7 @@ class Node {
   ModelInfo model_;
   std::vector<int> bits_;
   std::uint64_t next_frame_ = 0, next_sample_ = 0;
-  /// Detections whose frame has not come yet.
+  /// Detections whose frame has not arrived yet.
   std::deque<ros::Detection2DArray> early_;
 };
 

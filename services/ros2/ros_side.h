@@ -1,5 +1,5 @@
-// Where ROS is: a participant, as ROS 2's own middlewares have one, with topics, types and quality
-// of service as they expect them.
+// Connection to ROS: a DDS participant with the topics, types and quality of service of ROS 2's own
+// middlewares.
 #pragma once
 
 #include <map>
@@ -21,18 +21,19 @@ std::string wireType(const std::string& type);
 
 class RosSide {
  public:
-  /// On the bus's own domain, or on one of its own. Throws StartupError: a closed bus is no place
-  /// for ROS (78), DDS refuses (69).
+  /// Joins the bus's own domain, or a separate one. Throws StartupError: a secured bus cannot
+  /// include ROS (78), or DDS fails (69).
   RosSide(service::Context& context, const Config& config);
 
   void advertise(const ros::Outlet& outlet);
-  /// Somebody reads it.
+  /// Whether the topic has a reader.
   bool wants(const std::string& topic) const;
   void write(const ros::Outlet& outlet, std::vector<std::uint8_t> cdr);
-  /// `input` names its counts. Best effort, so that any driver is heard, unless `reliable`.
+  /// Adds a reader. `input`: prefix of its counts. Without `reliable` it is best effort, which is
+  /// compatible with all drivers.
   void read(const std::string& input, const std::string& topic, const std::string& type,
             bool reliable, bool latched, int depth, bus::ForeignReader::Handler handler);
-  /// An input that nobody writes, with the mend; empty where all have a writer.
+  /// A sentence with the fix if an input has no writer; otherwise empty.
   std::string unheard() const;
 
  private:

@@ -1,4 +1,4 @@
-// What exists once the cameras are known.
+// Objects that exist once the cameras are known.
 #pragma once
 
 #include <vector>
@@ -11,7 +11,7 @@
 
 namespace perdure::vio {
 
-/// One or two cameras, the first leads, with the tracker and the filter that are made for them.
+/// One or two cameras, the first of which leads, with their tracker and filter.
 struct Cameras {
   Cameras(const Config& config, const Options& options, const std::vector<CameraModel>& all);
 
@@ -20,18 +20,19 @@ struct Cameras {
   std::vector<CameraModel> models;
 };
 
-/// Those whose frames are read, in the order of the configuration: the first one leads, and the
-/// second one is there where it is wanted. The calibration's first where it knows none of them.
+/// Cameras whose frames are read, in the order of the configuration. The first one leads; the
+/// second is used only if stereo is enabled. If the calibration has none of them, its first camera
+/// is used.
 std::vector<CameraModel> usedCameras(const Config& config, const Calibration& calibration);
-/// A sentence where the configuration names a camera that is not there; empty otherwise, or where
-/// it names none but the default's.
+/// A sentence if the configuration names a camera that does not exist. Otherwise empty; also empty
+/// if only the default cameras are named.
 std::string unknownCamera(const Config& config, const Calibration& calibration);
 
-/// What the estimators know of cameras: where on the body, and how long an image is read out, s.
+/// Camera parameters of the estimators: the mounting on the body, and the read-out time in s.
 std::vector<RigidTransform> extrinsics(const std::vector<CameraModel>& all);
 std::vector<double> readouts(const std::vector<CameraModel>& all);
 
-/// The same cameras in the same order, to the last digit.
+/// Whether both calibrations have exactly the same cameras in the same order.
 bool sameCameras(const Calibration& a, const Calibration& b);
 
 }  // namespace perdure::vio

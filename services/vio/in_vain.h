@@ -1,4 +1,4 @@
-// Frames in a row of which nothing comes, and why: what Health says as long as that lasts.
+// Counts consecutive frames without a result, and stores the reason for Health.
 #pragma once
 
 #include <string>
@@ -10,14 +10,15 @@ namespace perdure::vio {
 
 class InVain {
  public:
-  /// One more frame. why: a sentence with the mend; it is said from the `from`-th frame on.
+  /// Adds a frame without a result. why: a sentence with the fix, reported from the `from`-th frame
+  /// on.
   void add(std::string why, int from) {
     ++frames_;
     why_ = frames_ >= from ? std::move(why) : std::string();
   }
-  /// A frame that was of use.
+  /// Adds a frame with a result.
   void clear() { frames_ = 0, why_.clear(); }
-  /// Empty while all is well, or a frame or two are nothing to speak of.
+  /// Empty if there is no problem, or during its first frames.
   const std::string& sentence() const { return why_; }
 
  private:
@@ -25,13 +26,13 @@ class InVain {
   std::string why_;
 };
 
-/// From which frame on Health speaks of it, in general; and of frames of another size, of which one
-/// may be left from an earlier setting.
+/// Number of frames after which Health reports the reason. For frames of another size it is lower,
+/// but above one, because one such frame may remain from an earlier setting.
 inline constexpr int kInVain = 10;
 inline constexpr int kOtherSizes = 2;
 inline constexpr char kNoImage[] = "images cannot be read; mend the camera";
 
-/// A sentence with both sizes where the frame has not that of its calibration; else empty.
+/// A sentence with both sizes if the frame's size differs from its calibration; otherwise empty.
 std::string otherSize(const Frame& frame, const CameraModel& model);
 
 }  // namespace perdure::vio

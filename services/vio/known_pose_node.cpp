@@ -13,7 +13,7 @@
 namespace perdure::vio {
 namespace {
 
-constexpr std::size_t kPoses = 256;  // that wait for their frames
+constexpr std::size_t kPoses = 256;  // poses that wait for their frames
 
 constexpr char kNoPose[] =
     "frames have no pose; start what publishes odometry, with the stamps of the frames";
@@ -110,12 +110,12 @@ std::optional<std::uint64_t> KnownPoseNode::waitsFor() const {
   return waiting_.front().first.stamp.sequence;
 }
 
-/// By more than any transport reorders.
+/// Whether `time` is before `newest` by more than transports reorder.
 bool KnownPoseNode::isBefore(TimePoint time, const std::optional<TimePoint>& newest) const {
   return newest && time < *newest - std::chrono::milliseconds(300);
 }
 
-/// A new run of the same clock, or a stamp that was far ahead: nothing that came before helps.
+/// The clock restarted, or one stamp was far ahead. Earlier data cannot be used.
 void KnownPoseNode::clockJumpedBack() {
   reasons_.add("clock_jumped_back");
   waiting_.clear();
@@ -189,7 +189,7 @@ void KnownPoseNode::drain(bool all) {
   while (cameras_ && !waiting_.empty()) {
     const FramePair& front = waiting_.front();
     const Odometry* pose = poseOf(front.first);
-    // Poses come in order: a later one says that this frame has none.
+    // Poses arrive in order, so a later pose shows that this frame has none.
     if (!pose && (poses_.empty() || poses_.back().stamp.time <= front.first.stamp.time)) return;
     if (pose && !all && cameras_->models.size() == 2 && waiting_.frontMayBePaired()) return;
     const FramePair frames = waiting_.take();

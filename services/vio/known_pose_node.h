@@ -1,5 +1,6 @@
-// vio where another program gives the poses (`input.odometry: given`): its odometry and the frames
-// in, landmarks out. Waits until a frame has its pose; pairs stereo frames.
+// Node of vio if another program gives the poses (`input.odometry: given`). It reads that odometry
+// and the frames, and publishes landmarks. It waits for the pose of each frame and pairs stereo
+// frames.
 #pragma once
 
 #include <deque>
@@ -22,16 +23,16 @@ namespace perdure::vio {
 
 class KnownPoseNode {
  public:
-  /// landmarks: one for each frame of the first camera that has a pose, in order.
+  /// landmarks: one message for each frame of the first camera that has a pose, in order.
   KnownPoseNode(const Config& config, InstanceId instance, Sink<Landmarks> landmarks);
   ~KnownPoseNode();
 
   void onCalibration(const Calibration& calibration);
-  /// In order of their stamps. Poses of other frames than those of the first camera are of no use.
+  /// Takes poses in order of their stamps. Only poses of the first camera's frames are used.
   void onOdometry(const Odometry& odometry);
   void onFrame(const Frame& frame);
   void onObjects(const Objects& objects) { moving_.onObjects(objects); }
-  /// End of data: what waits for a second image is taken without.
+  /// End of data: frames that wait for a second image are processed without it.
   void flush() { drain(true); }
 
   /// The oldest frame whose landmarks may still come.
@@ -39,9 +40,9 @@ class KnownPoseNode {
 
   const ReasonCounts& reasons() const;
   HealthState health() const;
-  /// One sentence: what it waits for, or what is wrong; empty when all is well.
+  /// One sentence: what the node waits for, or what is wrong. Empty if there is no problem.
   std::string status() const;
-  /// The same of the poses alone: where they contradict the images.
+  /// The same for the poses alone: a sentence if they contradict the images.
   std::string statusOfPoses() const;
 
  private:
@@ -63,12 +64,12 @@ class KnownPoseNode {
   std::unique_ptr<Cameras> cameras_;
   WaitingFrames waiting_;
   std::deque<Odometry> poses_;    ///< oldest first, of frames that may still come
-  std::optional<Odometry> last_;  ///< of the last image that was used
+  std::optional<Odometry> last_;  ///< odometry of the last image that was used
   std::optional<TimePoint> last_image_;
-  std::optional<TimePoint> newest_frame_;  ///< that has been heard
+  std::optional<TimePoint> newest_frame_;  ///< newest frame received
   Agreement agreement_;
   InVain other_size_;
-  InVain in_vain_;  ///< frames that gave no landmarks
+  InVain in_vain_;  ///< frames without landmarks
   mutable ReasonCounts all_reasons_;
   ReasonCounts reasons_;
 };

@@ -1,4 +1,4 @@
-// Landmarks as they are published.
+// Converts landmarks to the published message.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -9,7 +9,7 @@
 
 namespace perdure::vio {
 
-/// Of one image (CV_8UC1) that `camera` took; estimates that are not finite are left out.
+/// Landmarks of one image (CV_8UC1) of `camera`. Estimates that are not finite are left out.
 Landmarks landmarksMessage(const FrameStamp& stamp, InstanceId instance, const WorldId& world,
                            const std::string& camera,
                            const std::vector<LandmarkEstimate>& estimates, const cv::Mat& image);

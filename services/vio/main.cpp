@@ -1,4 +1,4 @@
-// perdure-vio: where the body is, from camera, IMU and speed.
+// perdure-vio: estimates the pose of the body from camera, IMU and speed.
 #include <chrono>
 #include <functional>
 #include <opencv2/core/utility.hpp>
@@ -16,7 +16,7 @@ namespace {
 using namespace perdure;
 namespace topics = bus::topics;
 
-/// Frames of the configured cameras, decoded, each once.
+/// Delivers each frame of the configured cameras once, decoded.
 class FrameInput {
  public:
   FrameInput(service::Context& context, const vio::Config& config, ReasonCounts& reasons,
@@ -34,7 +34,7 @@ class FrameInput {
         const auto missed = gaps_[i].before(m.stamp.source, m.stamp.sequence);
         if (missed > 0) reasons_.add("frames_missed", missed);
         if (i == 0) context.health().frameIn();
-        // An image that cannot be decoded is none: nothing goes out for it.
+        // An image that cannot be decoded is dropped without output.
         if (hand(m) && i == 0) frames.heard();
       });
     }
@@ -54,7 +54,7 @@ class FrameInput {
   std::vector<bus::Gaps> gaps_;
 };
 
-/// What both nodes hear and say alike. `own`: reasons of the process.
+/// Inputs and outputs that both nodes share. `own`: reasons of the process.
 template <class Node>
 void connect(service::Context& context, const vio::Config& config, Node& node,
              const ReasonCounts& own) {
@@ -116,7 +116,7 @@ void followGivenPoses(service::Context& context, const vio::Config& config) {
 }
 
 void serve(service::Context& context, const vio::Config& config) {
-  cv::setNumThreads(1);  // images of this size are not worth the threads
+  cv::setNumThreads(1);  // threads do not speed up images of this size
   config.odometry == "given" ? followGivenPoses(context, config) : estimate(context, config);
 }
 

@@ -11,10 +11,10 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kNear = 0.2;    // m: edges are cut there
-constexpr float kMargin = 4.0F;  // px: patches reach out of their point
+constexpr double kNear = 0.2;    // m: edges are clipped at this depth
+constexpr float kMargin = 4.0F;  // px: patches extend beyond their point
 
-/// Bounding box of a cuboid whose centre is at p_C with half axes `axes` (columns, in C).
+/// Bounding box of a cuboid with its centre at p_C and the half axes `axes` (columns, in C).
 std::optional<cv::Rect2f> boundingBox(const CameraModel& camera, const Vector3d& p_C,
                                       const Eigen::Matrix3d& axes) {
   std::vector<Vector3d> seen;
@@ -37,7 +37,7 @@ std::optional<cv::Rect2f> boundingBox(const CameraModel& camera, const Vector3d&
   const auto height = static_cast<float>(camera.calibration().height);
   float x1 = width, y1 = height, x2 = 0, y2 = 0;
   for (const Vector3d& p : seen) {
-    // Lens models fold back far outside the image; a pinhole does not.
+    // Lens models are not monotonic far outside the image, unlike a pinhole.
     Vector3d bounded = p / p.z();
     bounded.head<2>() = bounded.head<2>().cwiseMax(-1.5).cwiseMin(1.5);
     const auto pixel = camera.project(bounded);

@@ -1,5 +1,6 @@
-// Where in an image things are that the object filter calls moving: points on them say nothing of
-// the camera's own motion. Off by default: vio then depends on nothing that depends on it.
+// Image regions of objects that the object filter reports as moving. Points on them give no
+// information about the motion of the camera. Off by default, so that vio does not depend on a
+// program that needs vio.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -13,19 +14,19 @@ namespace perdure::vio {
 
 struct MovingMaskOptions {
   bool enabled = false;
-  double probability = 0.5;  ///< of moving, and of existing, at least
-  double longest_s = 1.0;    ///< objects that are older are not believed
+  double probability = 0.5;  ///< lowest probability of moving, and of existing
+  double longest_s = 1.0;    ///< largest age of the objects, s
 };
 
 class MovingMask {
  public:
   explicit MovingMask(const MovingMaskOptions& options) : options_(options) {}
 
-  /// Keeps what moves of the newest objects.
+  /// Stores those of the newest objects that move.
   void onObjects(const Objects& objects);
-  /// Bounding boxes, in pixels and within the image, of the moving objects' cuboids at `now`, each
-  /// gone on with its velocity. T_WB: the body in `world` then. None where the objects are of
-  /// another world, too old, or of the future.
+  /// Bounding boxes, in pixels and clipped to the image, of the moving objects' cuboids at `now`.
+  /// Each object is propagated with its velocity. T_WB: pose of the body in `world` at `now`. Empty
+  /// if the objects belong to another world, are too old, or have a later time.
   std::vector<cv::Rect2f> boxes(const CameraModel& camera, const WorldId& world,
                                 const RigidTransform& T_WB, TimePoint now) const;
 

@@ -9,7 +9,7 @@
 namespace perdure::vio {
 namespace {
 
-constexpr int kUnaidedFrames = 5;  // without an image's help
+constexpr int kUnaidedFrames = 5;  // frames without an update from the image
 
 constexpr char kLate[] =
     "frames are older than those before them; the camera's clock jumped back and the IMU's did "
@@ -116,7 +116,7 @@ std::string Node::status() const {
                               : "sees no points; it goes by inertia (and speed)";
 }
 
-/// A new run of the same clock: nothing that came before helps.
+/// The clock restarted. Earlier data cannot be used.
 void Node::clockJumpedBack() {
   if (!started()) reasons_.add("clock_jumped_back");
   imu_.clear();
@@ -130,14 +130,14 @@ void Node::clockJumpedBack() {
 }
 
 void Node::onImu(const ImuSample& sample) {
-  // No transport reorders by so much.
+  // Transports reorder by less than this.
   if (!imu_.empty() && sample.time < imu_.last() - std::chrono::milliseconds(300)) {
     clockJumpedBack();
   }
   const auto added = imu_.add({sample.time, sample.gyro, sample.accel});
   if (!added) reasons_.add(added.error());
   if (!last_imu_time_) {
-    // Before the first frame only the last seconds matter.
+    // Before the first frame, only the last seconds are needed.
     imu_.dropBefore(sample.time - std::chrono::seconds(5));
   }
   drain(false);
@@ -192,7 +192,7 @@ double Node::longestReadout() const {
 
 bool Node::waitsForPair() const {
   if (cameras_->models.size() < 2 || !waiting_.frontMayBePaired()) return false;
-  // Half a second of samples says that none will come.
+  // After half a second of later samples, no partner is expected.
   return imu_.empty() ||
          imu_.last() < waiting_.front().first.stamp.time + std::chrono::milliseconds(500);
 }
@@ -200,12 +200,12 @@ bool Node::waitsForPair() const {
 bool Node::ready() const {
   TimePoint now = imuTime(waiting_.front().first.stamp.time);
   if (imu_.empty()) return false;
-  // To the last row: an image does not come before it has been read out.
+  // Up to the last row, because an image arrives only after its read-out.
   if (const double readout_s = longestReadout(); readout_s > 0.0) {
     now += durationFromSeconds(0.5 * readout_s);
   }
-  // The last sample may be held for a quarter of a period: a capture that waits for this frame's
-  // answer sends no sample beyond the next frame.
+  // The last sample may be extrapolated by a quarter of a period. A capture that waits for this
+  // frame's answer sends no sample beyond the next frame.
   if (const auto period = imu_.period()) now -= *period / 4;
   if (imu_.last() < now + durationFromSeconds(config_.imu_slack_s)) return false;
   if (waitsForPair()) return false;
@@ -229,7 +229,7 @@ void Node::noteGaps(TimePoint now) {
   degraded_frames_ = kDegradedFrames;
   if (!started()) return;
   if (gap > config_.longest_gap_s) return lose({"imu_gap_too_long", ""});
-  // Neither images nor samples: either the clock jumped, or the body moved on unseen.
+  // Neither images nor samples arrived: the clock jumped, or the body moved unobserved.
   if (std::min(gap, seconds(now - from)) > config_.longest_blackout_s) {
     lose({"clock_jumped_or_blackout", ""});
   }
@@ -244,7 +244,8 @@ TrackedFrame Node::trackImages(const cv::Mat& first, const cv::Mat& second, Time
   }
   const Eigen::Vector3d turn = cameras_->estimator.turnOfReadout(imu_, now);
   if (!started()) {
-    // Traffic before a body at rest: with the rotation known it does not outvote what rests.
+    // Traffic in front of a body at rest. With a known rotation, traffic cannot outvote the points
+    // at rest.
     const auto motion = cameras_->tracker.motionSince(1, 0.8);
     constexpr std::chrono::milliseconds kEven{500};
     if (motion && *motion > config_.core.rest.disparity_px &&

@@ -1,5 +1,5 @@
-// vio's node: inertial samples, speed and frames in; odometry and landmarks out. Waits until a
-// frame's time is covered by inertial samples, pairs stereo frames, starts, resets, resumes.
+// Node of vio. Input: inertial samples, speed and frames; output: odometry and landmarks. It waits
+// until inertial samples cover a frame's time, pairs stereo frames, starts, resets and resumes.
 #pragma once
 
 #include <memory>
@@ -27,12 +27,13 @@ namespace perdure::vio {
 
 struct Outputs {
   Sink<Odometry> odometry;    ///< one for each frame of the first camera, in order
-  Sink<Landmarks> landmarks;  ///< after its odometry, once there is a start
-  /// After its odometry: how the image met the predictions. For who judges a calibration.
+  Sink<Landmarks> landmarks;  ///< sent after the odometry, once the filter has started
+  /// Sent after the odometry: innovations of the image, for programs that check a calibration.
   Sink<std::vector<Innovation>> innovations = {};
 };
 
-inline constexpr int kDegradedFrames = 20;  ///< after a gap or a resumption
+inline constexpr int kDegradedFrames = 20;  ///< number of degraded frames after a gap or a
+                                            ///< resumption
 
 class Node {
  public:
@@ -43,23 +44,23 @@ class Node {
   void onImu(const ImuSample& sample);
   void onSpeed(const SpeedSample& sample);
   void onFrame(const Frame& frame);
-  /// What the object filter says of things that move; of use where input.moving_mask is on.
+  /// Objects of the object filter; used only with input.moving_mask.
   void onObjects(const Objects& objects) { moving_.onObjects(objects); }
-  /// End of data: processes what still waits, with the last inertial sample held.
+  /// End of data: processes the waiting frames and repeats the last inertial sample.
   void flush();
 
-  /// Names the frame of reference; before the first output.
+  /// Sets the frame of reference; call before the first output.
   void setWorld(WorldId world) { world_ = world; }
-  /// Text for restoreState of another process; empty before there is a start.
+  /// Text for restoreState() in another process; empty before a start.
   std::string saveState() const;
-  /// Resumes at the next frame, if that is not too far away. Fails with "state_malformed" or
+  /// Resumes at the next frame, unless the saved state is too old. Fails with "state_malformed" or
   /// "state_other_cameras".
   Result<void> restoreState(const std::string& text);
 
   const ReasonCounts& reasons() const;
   bool started() const;
   HealthState health() const;
-  /// One sentence: what it waits for, or what is wrong; empty when all is well.
+  /// One sentence: what the node waits for, or what is wrong. Empty if there is no problem.
   std::string status() const;
 
  private:
@@ -94,12 +95,12 @@ class Node {
   WaitingFrames waiting_;
   MovingMask moving_;
   InVain in_vain_;
-  Agreement agreement_;  ///< over starts: a rig that is wrong loses them
+  Agreement agreement_;  ///< not reset at a start, because a wrong rig causes repeated losses
   SpeedDoubt speed_doubt_;
   MotionInitialiser motion_initialiser_;
   std::optional<SavedState> saved_;
   std::optional<TimePoint> last_image_, last_imu_time_;
-  std::optional<std::uint64_t> last_sequence_;  ///< of the last output with a pose
+  std::optional<std::uint64_t> last_sequence_;  ///< sequence of the last output with a pose
   std::uint64_t frame_ = 0;
   int degraded_frames_ = 0, unaided_frames_ = 0;
   std::string last_start_reason_;

@@ -1,4 +1,4 @@
-// How a node begins: with a saved state, at rest, with speed, or in motion.
+// Start of a node: from a saved state, at rest, with speed, or in motion.
 #include <algorithm>
 #include <cmath>
 
@@ -35,8 +35,8 @@ std::size_t Node::framesIn(double seconds) const {
   return static_cast<std::size_t>(std::max(2L, std::lround(seconds * rate) - 1));
 }
 
-/// Where the IMU is at rest, one camera says nothing of a speed: then it needs a background that
-/// rests, too. A part of one is waited for.
+/// If the IMU is at rest, one camera cannot observe a speed, so the start also needs a background
+/// at rest. If the background has been at rest only briefly, the start waits.
 Result<Start> Node::startWithoutSpeed(TimePoint now) {
   const Options& options = cameras_->estimator.options();
   const StartOptions& o = options.start;
@@ -65,13 +65,13 @@ void Node::begin(TimePoint now, const FrameInput& input) {
   const auto frames = std::min(framesIn(options.start.rest_window_s),
                                static_cast<std::size_t>(config_.tracker.memory));
   const std::optional<double> rest_motion = cameras_->tracker.motionSince(frames);
-  // Rest takes a window to show; motion shows as soon as points have moved by more than that
-  // allows.
+  // Rest needs a whole window; motion is detected once points have moved further than rest allows.
   const auto moved = rest_motion ? rest_motion : cameras_->tracker.motionSince(framesIn(0.25));
   const bool moves = moved && *moved >= options.start.rest_disparity_px;
   const bool slow = !input.speed || std::abs(input.speed->speed) < 0.1;
   Result<Start> start = fail("start_waits");
-  // Older samples would say where the body was, and the next frame would end it again.
+  // With older samples the start would have an old pose, and the next frame would end the filter
+  // again.
   constexpr std::chrono::milliseconds kFresh{300};
   const bool fresh =
       !imu_.empty() && toSeconds(imu_.longestGap(now - kFresh, now)) <= config_.core.imu.gap_from_s;

@@ -1,4 +1,4 @@
-// Whether the speed has been refused for most of the last second or more: what Health says then.
+// Checks whether the speed was refused for most of the last second or more. Health then reports it.
 #pragma once
 
 #include <algorithm>
@@ -10,14 +10,14 @@ namespace perdure::vio {
 
 class SpeedDoubt {
  public:
-  /// The next image. refused: by the gate; nothing: there was no speed.
+  /// Adds the next image. refused: whether the gate refused the speed; empty without a speed.
   void add(TimePoint now, std::optional<bool> refused) {
     const double passed_s = last_ ? toSeconds(now - *last_) : 0.0;
     last_ = now;
     const double forgets = std::clamp(passed_s / kMemory_s, 0.0, 1.0);
     share_ += forgets * ((refused.value_or(false) ? 1.0 : 0.0) - share_);
   }
-  /// Empty while all is well.
+  /// Empty if there is no problem.
   const char* sentence() const {
     if (share_ < kMost) return "";
     return "the speed contradicts camera and IMU and is refused: see its unit (m/s), its sign "
@@ -25,7 +25,7 @@ class SpeedDoubt {
   }
 
  private:
-  static constexpr double kMemory_s = 1.0, kMost = 0.6;  // reached after .9 s of refusals alone
+  static constexpr double kMemory_s = 1.0, kMost = 0.6;  // exceeded after 0.9 s of refusals alone
   double share_ = 0.0;
   std::optional<TimePoint> last_;
 };

@@ -1,4 +1,4 @@
-// The saved state on disk: written whole or not at all.
+// File of the saved state, written atomically.
 #pragma once
 
 #include <optional>
@@ -10,11 +10,12 @@ namespace perdure::vio {
 
 class StateFile {
  public:
-  /// An empty directory keeps nothing. Makes the directory; throws StartupError where it cannot.
+  /// Creates the directory, and throws StartupError if it cannot. If `directory` is empty, nothing
+  /// is saved.
   explicit StateFile(const std::string& directory);
-  /// Nothing where there is no file.
+  /// Empty if there is no file.
   std::optional<std::string> read() const;
-  /// Writes beside the file and renames. Fails with "state_not_written".
+  /// Writes a temporary file and renames it. Fails with "state_not_written".
   Result<void> write(const std::string& text) const;
 
  private:

@@ -7,8 +7,9 @@ namespace perdure::vio {
 namespace {
 
 constexpr std::size_t kUnpaired = 4;
-constexpr std::size_t kAlone = 10;  // frames in a row, from which on the second camera is absent
-constexpr std::chrono::milliseconds kReordered{300};  // by transports, at most
+constexpr std::size_t kAlone = 10;  // frames in a row after which the second camera counts as
+                                    // absent
+constexpr std::chrono::milliseconds kReordered{300};  // largest reordering by transports
 
 }  // namespace
 
@@ -51,7 +52,7 @@ Result<void> WaitingFrames::addSecond(const Frame& frame) {
   return fail("stereo_unpaired");
 }
 
-/// Where it is of a frame that was not awaited, the camera is back.
+/// A late frame of a missed pair shows that the camera is back.
 bool WaitingFrames::isLate(const Frame& second) {
   if (!taken_ || second.stamp.time > *taken_ + tolerance_) return false;
   trouble_ = "its images come too late";

@@ -1,5 +1,4 @@
-// Frames in order of their stamps, each with its partner of the second camera, until somebody
-// takes them.
+// Queue of frames in order of their stamps, each with its partner of the second camera.
 #pragma once
 
 #include <deque>
@@ -21,24 +20,24 @@ class WaitingFrames {
   explicit WaitingFrames(double pair_tolerance_s)
       : tolerance_(durationFromSeconds(pair_tolerance_s)) {}
 
-  /// Of the first camera. Refuses "frame_duplicate"; "frame_reordered": it is in, before others;
-  /// "frame_of_earlier_run": it is in, and those that are ahead of it by more than any transport
-  /// reorders are given up.
+  /// Adds a frame of the first camera. Refuses it with "frame_duplicate". With "frame_reordered" it
+  /// is inserted before others. With "frame_of_earlier_run" it is inserted, and frames that are
+  /// further ahead than transports reorder are dropped.
   Result<void> addFirst(const Frame& frame);
-  /// Of the second. "stereo_unpaired": the oldest one that found no partner has been given up;
-  /// "frame_late": its time is over.
+  /// Adds a frame of the second camera. Fails with "stereo_unpaired" if the oldest unpaired frame
+  /// was dropped, and with "frame_late" if its pair was already taken.
   Result<void> addSecond(const Frame& frame);
-  /// One of the second that could not be used; why: a sentence.
+  /// Reports an unusable frame of the second camera; why: a sentence.
   void refuseSecond(std::string why) { trouble_ = std::move(why); }
 
   bool empty() const { return pairs_.empty(); }
   std::size_t size() const { return pairs_.size(); }
   const FramePair& front() const { return pairs_.front(); }
   FramePair take();
-  /// The oldest one has no partner and one may still come: no later frame of either camera is here,
-  /// and not so many were taken alone that none is awaited until one comes.
+  /// Whether the oldest frame has no partner and may still receive one. False if a later frame of
+  /// either camera has arrived. Also false after many frames without a partner, until one arrives.
   bool frontMayBePaired() const;
-  /// One sentence with the mend where some frames in a row found no partner; else empty.
+  /// One sentence with the fix if several frames in a row found no partner; otherwise empty.
   std::string whyAlone() const;
   void clear();
 
@@ -47,11 +46,12 @@ class WaitingFrames {
   bool isLate(const Frame& second);
   Duration tolerance_;
   std::deque<FramePair> pairs_;
-  std::deque<Frame> seconds_;       ///< unpaired yet
-  std::optional<TimePoint> taken_;  ///< the last one
-  int alone_ = 0;                   ///< taken in a row
-  std::deque<TimePoint> missed_;    ///< of these, since an image of the second camera came for one
-  std::string trouble_;  ///< of the second camera's last image; empty: all is well, or none
+  std::deque<Frame> seconds_;       ///< not paired yet
+  std::optional<TimePoint> taken_;  ///< stamp of the last frame taken
+  int alone_ = 0;                   ///< frames taken in a row without a partner
+  std::deque<TimePoint> missed_;    ///< stamps of these frames, since an image of the second camera
+                                    ///< arrived for one of them
+  std::string trouble_;             ///< problem of the second camera's last image; empty: none
 };
 
 }  // namespace perdure::vio

@@ -1,4 +1,4 @@
-// Follow mode: which frames are still on their way, so that none is lost to a slow reader.
+// Follow mode: tracks the frames that are not answered yet, so that slow readers lose no frames.
 #pragma once
 
 #include <cstddef>
@@ -9,15 +9,16 @@
 
 namespace perdure::capture {
 
-/// Each configured answerer ("odometry", "detections") credits frames up to a sequence number; a
-/// frame is on its way until all have.
+/// Each configured answerer ("odometry", "detections") credits frames up to a sequence number. A
+/// frame stays open until all answerers have credited it.
 class Credits {
  public:
   explicit Credits(std::size_t window) : window_(window) {}
 
   void expect(const std::string& answerer) { answered_.emplace(answerer, 0); }
   void sent(std::uint64_t sequence) { on_the_way_.push_back(sequence); }
-  /// An answer for a frame is one for all before it: its reader will not go back.
+  /// An answer for a frame also credits all earlier frames, because readers process frames in
+  /// order.
   void credit(const std::string& answerer, std::uint64_t sequence) {
     const auto it = answered_.find(answerer);
     if (it == answered_.end()) return;
@@ -25,11 +26,11 @@ class Credits {
     while (!on_the_way_.empty() && on_the_way_.front() < creditedByAll()) on_the_way_.pop_front();
   }
   bool maySend() const { return answered_.empty() || on_the_way_.size() < window_; }
-  /// Nobody answers: the oldest frame is given up.
+  /// Drops the oldest open frame if no answer arrives.
   void giveUp() {
     if (!on_the_way_.empty()) on_the_way_.pop_front();
   }
-  /// The first sequence number that is still on its way, or `next` where none is.
+  /// Sequence number of the first open frame, or `next` if none is open.
   std::uint64_t firstOpen(std::uint64_t next) const {
     return on_the_way_.empty() ? next : on_the_way_.front();
   }
@@ -42,7 +43,8 @@ class Credits {
   }
 
   std::size_t window_;
-  std::map<std::string, std::uint64_t> answered_;  ///< the first sequence not yet answered
+  std::map<std::string, std::uint64_t> answered_;  ///< first sequence number not answered, by
+                                                   ///< answerer
   std::deque<std::uint64_t> on_the_way_;
 };
 

@@ -1,4 +1,4 @@
-// A camera that runs, whoever drives it: libcamera, or a test.
+// A running camera, driven by libcamera or by a test.
 #pragma once
 
 #include <chrono>
@@ -15,51 +15,56 @@
 namespace perdure::capture {
 
 struct CameraSettings {
-  std::string id;                       ///< of libcamera, or a part of it; empty: the first one
-  bool id_alone = false;                ///< no other camera may have it in its id
-  std::uint32_t width = 0, height = 0;  ///< pixels, as the rig was calibrated for
-  std::string format = "auto";          ///< libcamera's name, as "YUYV"; auto: the best it has
+  std::string id;                       ///< libcamera's id, or a part of it; empty: the first
+                                        ///< camera
+  bool id_alone = false;                ///< the id must match one camera only
+  std::uint32_t width = 0, height = 0;  ///< pixels, as in the calibration of the rig
+  std::string format = "auto";          ///< libcamera's name, for example "YUYV"; auto: the best
+                                        ///< format available
   double rate_hz = 20.0;
   double exposure_ms = 0.0, gain = 0.0;  ///< 0: automatic
-  std::string focus = "as_is";           ///< as_is, auto, manual: at lens_dioptres
-  double lens_dioptres = 0.0;            ///< 1/m; 0: far away
+  std::string focus = "as_is";           ///< as_is, auto, or manual (at lens_dioptres)
+  double lens_dioptres = 0.0;            ///< 1/m; 0: infinity
   std::string flip = "none";             ///< none, horizontal, vertical, both
   std::vector<double> crop = {};         ///< x, y, width, height, pixels of the sensor; empty: all
-  double readout_s = 0.0;                ///< first to last row
-  int jpeg_quality = 0;                  ///< 1 … 100: images travel as JPEG; 0: raw
+  double readout_s = 0.0;                ///< s, from first to last row
+  int jpeg_quality = 0;                  ///< 1 … 100: images are sent as JPEG; 0: raw
   std::string encoding = "as_is";        ///< as_is, mono8, bgr8
 };
 
-/// An image as the driver counts it.
+/// An image with the numbering of the driver.
 struct CameraShot {
-  std::uint32_t sequence = 0;  ///< from each opening on; what the driver lost leaves a gap
+  std::uint32_t sequence = 0;  ///< counted from each opening; lost images leave a gap
   std::int64_t time_ns = 0;    ///< CLOCK_BOOTTIME, middle of the middle row's exposure
-  Result<Frame> frame;         ///< pixels alone; "camera_frame_error" and the reasons of packed()
+  Result<Frame> frame;         ///< pixels only; fails with "camera_frame_error" and the reasons of
+                               ///< packed()
 };
 
-/// An image as it is given on.
+/// An image as it is passed on.
 struct CameraImage {
   std::int64_t time_ns = 0;  ///< CLOCK_BOOTTIME, middle of the middle row's exposure
-  std::uint64_t number = 0;  ///< goes on over openings; frames that were lost leave a gap
+  std::uint64_t number = 0;  ///< continues over openings; lost images leave a gap
   Frame frame;               ///< pixels, and the camera's name
 };
 
 class CameraSession {
  public:
   virtual ~CameraSession() = default;
-  /// For people.
+  /// Name for people.
   virtual std::string name() const = 0;
-  /// What it does not do as asked, and why; empty where it does.
+  /// Settings that the camera does not follow, and why; empty if it follows all.
   virtual std::string note() const = 0;
-  /// Unplugged; next() may still have images of before, and does not wait for more.
+  /// Whether the camera is unplugged. next() may still return earlier images, and does not wait for
+  /// more.
   virtual bool gone() const = 0;
-  /// It is well, and is to be closed and opened again for the sake of another camera.
+  /// Whether the camera works but must be closed and reopened because of another camera.
   virtual bool stepsAside() const { return false; }
-  /// The next one; nothing where none came within so long, or it is gone.
+  /// Next image. Empty if none arrives within `longest`, or if the camera is gone.
   virtual std::optional<CameraShot> next(std::chrono::milliseconds longest) = 0;
 };
 
-/// Reasons: "camera_absent"; the detail is a sentence with the mend. Called when no session is.
+/// Fails with "camera_absent"; the detail is a sentence with the fix. Called only if no session is
+/// open.
 using OpenCamera = std::function<Result<std::unique_ptr<CameraSession>>()>;
 
 }  // namespace perdure::capture

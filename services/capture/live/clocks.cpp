@@ -12,8 +12,8 @@ namespace {
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::int64_t kSettles_ns = kSecond / 2;
 constexpr std::size_t kRemembered_s = 8;
-constexpr double kDrift = 5e-4;          // of quartz against quartz, with a margin
-constexpr double kJump_ns = 20'000'000;  // no delay and no drift explains more
+constexpr double kDrift = 5e-4;          // drift between two quartz clocks, with a margin
+constexpr double kJump_ns = 20'000'000;  // larger than any delay or drift
 
 std::int64_t read(clockid_t clock) {
   timespec t{};
@@ -71,7 +71,7 @@ void ClockMap::observe(std::int64_t theirs_ns, std::int64_t ours_ns) {
   const std::int64_t lateness = ours_ns - theirs_ns;
   if (buckets_.empty()) begin(ours_ns);
   const bool early = static_cast<double>(lateness) < offset_ - kJump_ns;
-  if (settled_ && early) {  // sooner than it was made: their clock was set forward
+  if (settled_ && early) {  // the message arrives before its time: the remote clock was set forward
     ++jumps_;
     begin(ours_ns);
   }
@@ -87,7 +87,8 @@ void ClockMap::observe(std::int64_t theirs_ns, std::int64_t ours_ns) {
   if (!settled_) {
     offset_ = target;
     settled_ = ours_ns - first_ns_ >= kSettles_ns;
-  } else if (target - offset_ > kJump_ns) {  // for all remembered seconds: it was set back
+    // the delay is larger throughout the window: the remote clock was set back
+  } else if (target - offset_ > kJump_ns) {
     ++jumps_;
     offset_ = target;
   } else {

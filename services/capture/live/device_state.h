@@ -1,4 +1,4 @@
-// How a live device is, told by its own thread and asked by others.
+// State of a live device, written by its own thread and read by others.
 #pragma once
 
 #include <atomic>
@@ -12,21 +12,21 @@
 
 namespace perdure::capture {
 
-/// Both, with what is between them where both are.
+/// Joins two texts, with a separator if both are not empty.
 inline std::string joined(const std::string& a, const std::string& b, const char* between = " ") {
   return a + (a.empty() || b.empty() ? "" : between) + b;
 }
 
-/// Safe from any thread.
+/// Thread-safe.
 class DeviceState {
  public:
   explicit DeviceState(std::string problem) : problem_(std::move(problem)) {}
 
-  /// A sentence with the mend; empty where it flows.
+  /// A sentence with the fix; empty while the device sends data.
   std::string problem() const { return locked(problem_); }
-  /// What it is, for people; empty while there is none.
+  /// Name for people; empty without a device.
   std::string name() const { return locked(name_); }
-  /// What it does not do as asked while it flows; empty where it does.
+  /// Settings that the device does not follow; empty if it follows all.
   std::string note() const { return locked(note_); }
   ReasonCounts reasons() const { return locked(reasons_); }
 
@@ -60,7 +60,7 @@ class DeviceState {
   ReasonCounts reasons_;
 };
 
-/// Calls `flow`, which returns when the device is gone, again and again until it is to stop.
+/// Calls `flow` repeatedly until `stopping` is set. `flow` returns when the device is gone.
 inline void keepOpen(const std::atomic<bool>& stopping, const std::function<void()>& flow) {
   constexpr std::chrono::milliseconds kPause{500};
   while (!stopping) {

@@ -7,14 +7,14 @@
 
 namespace perdure::capture {
 
-/// Numbers that go on when the camera is opened again: with the source they are a frame's identity.
+/// Frame numbers that continue when the camera is reopened. Number and source identify a frame.
 class FrameNumbers {
  public:
-  /// The driver counts anew from the next one on.
+  /// The driver's numbers restart with the next frame.
   void reopened() { last_.reset(); }
-  /// Of the frame that the driver gave this number, in 32 bits.
+  /// Number of the frame for the driver's 32-bit number.
   std::uint64_t of(std::uint32_t sequence);
-  /// Frames that were lost just before that one.
+  /// Frames lost just before the last one.
   std::uint64_t lost() const { return lost_; }
 
  private:
@@ -22,10 +22,10 @@ class FrameNumbers {
   std::uint64_t next_ = 0, lost_ = 0;
 };
 
-/// Of numbers in 32 bits that go round.
+/// Whether number a is earlier than b; 32-bit numbers wrap around.
 bool isEarlier(std::uint32_t a, std::uint32_t b);
 
-/// Whether images of one opening seem to be missing before the one that has come.
+/// Checks whether images of one opening are missing before the newest one.
 class SequenceWatch {
  public:
   bool skips(std::uint32_t sequence) const;
@@ -35,14 +35,13 @@ class SequenceWatch {
   std::optional<std::uint32_t> last_;
 };
 
-/// Whether a camera gives the rate that it is asked for: over five seconds, once after each
-/// opening.
+/// Checks whether a camera delivers the requested rate: over five seconds, once after each opening.
 class RateWatch {
  public:
   explicit RateWatch(double asked_hz) : asked_hz_(asked_hz) {}
   void reopened();
   void frame(std::uint64_t number, std::int64_t time_ns);
-  /// A sentence where the rate is another one by more than a tenth; empty before it is known.
+  /// A sentence if the rate differs by more than a tenth; empty before it is known.
   const std::string& note() const { return note_; }
 
  private:

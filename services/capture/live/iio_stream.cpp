@@ -14,8 +14,9 @@
 namespace perdure::capture {
 namespace {
 
-constexpr double kBlock_s = 0.01;       // of samples in one read: what it adds to their age
-constexpr unsigned kTimeout_ms = 1000;  // without a sample: gone
+constexpr double kBlock_s = 0.01;       // duration of the samples in one read, which adds to their
+                                        // age
+constexpr unsigned kTimeout_ms = 1000;  // without a sample for this long, the device counts as lost
 
 std::string sayError(ssize_t code) {
   char text[128];
@@ -23,8 +24,8 @@ std::string sayError(ssize_t code) {
   return text;
 }
 
-/// The first of an attribute's values, read from the device or else from its first channel of a
-/// kind ("shared by type").
+/// First value of an attribute, from the device, otherwise from its first channel of a kind
+/// ("shared by type").
 std::optional<double> readNumber(const iio_channel* channel, const char* attribute) {
   double value = 0.0;
   if (iio_channel_attr_read_double(channel, attribute, &value) < 0) return std::nullopt;
@@ -42,7 +43,8 @@ std::string readText(const iio_channel* channel, const char* attribute) {
   return trimmed(text);
 }
 
-/// Asks for a rate; what was made of it: many know a few only. Nothing where there is none to set.
+/// Requests a rate, and returns the rate that the device has set. Many devices support only a few
+/// rates. Empty if the device has no rate attribute.
 std::optional<double> askRate(const iio_device* device, double wanted) {
   constexpr const char* kRate = "sampling_frequency";
   if (!iio_device_find_attr(device, kRate)) return std::nullopt;
@@ -60,7 +62,7 @@ std::optional<double> askRate(const iio_channel* channel, double wanted) {
   return is && *is > 0.0 ? is : std::nullopt;
 }
 
-/// One axis as its integers are to be read.
+/// One axis, with the conversion of its integers.
 struct Axis {
   iio_channel* channel = nullptr;
   double scale = 1.0, offset = 0.0;
@@ -70,7 +72,7 @@ struct Axis {
     std::int64_t raw = 0;
     iio_channel_convert(channel, &raw, at);
     const auto bytes = format->length / 8;
-    if (format->is_signed && bytes < 8) {  // it fills the bytes of its length alone
+    if (format->is_signed && bytes < 8) {  // the conversion fills only the bytes of its length
       const unsigned shift = 64 - 8 * bytes;
       raw = static_cast<std::int64_t>(static_cast<std::uint64_t>(raw) << shift) >> shift;
     }
@@ -92,7 +94,7 @@ std::optional<Axes> axesOf(const iio_device* device, const std::string& kind) {
   return axes;
 }
 
-/// Of a local device the clock can be chosen; one in the network has a clock of its own.
+/// Selects the clock of a local device. A device in the network has its own clock.
 StampClock clockOf(const iio_context* context, const iio_device* device) {
   if (std::strcmp(iio_context_get_name(context), "local") != 0) return StampClock::kElsewhere;
   (void)!iio_device_attr_write(device, "current_timestamp_clock", "boottime");
@@ -108,10 +110,10 @@ struct BufferDeleter {
 
 }  // namespace
 
-/// An open device. Buffers go before their context.
+/// An open device. Buffers are destroyed before their context.
 class IioStream::Device {
  public:
-  /// Reasons: "imu_absent"; the detail is a sentence with the mend.
+  /// Fails with "imu_absent"; the detail is a sentence with the fix.
   static Result<std::unique_ptr<Device>> open(const IioSettings& settings) {
     auto device = std::unique_ptr<Device>(new Device);
     for (const auto& step : {&Device::connect, &Device::choose, &Device::setUp, &Device::start}) {
@@ -129,7 +131,7 @@ class IioStream::Device {
     return fmt::format("{} at {:g} Hz", name ? name : iio_device_get_id(device_), rate_hz_);
   }
 
-  /// Waits for a block and gives what is in it; how many scans, or a negative error.
+  /// Waits for a block and passes on its scans. Returns the number of scans, or a negative error.
   ssize_t read(const std::function<void(const IioScan&)>& give) {
     const ssize_t bytes = iio_buffer_refill(buffer_.get());
     if (bytes < 0) return bytes;
@@ -211,7 +213,7 @@ class IioStream::Device {
                                           named, sayError(code)));
   }
 
-  /// libiio takes a matrix that is one for all channels, "in_mount_matrix", for a channel "mount".
+  /// libiio attributes a matrix shared by all channels, "in_mount_matrix", to a channel "mount".
   std::string mountText() const {
     if (const auto text = readText(device_, "mount_matrix"); !text.empty()) return text;
     const iio_channel* shared = iio_device_find_channel(device_, "mount", false);
@@ -219,7 +221,7 @@ class IioStream::Device {
     return readText((gyro_ ? *gyro_ : *accel_)[0].channel, "mount_matrix");
   }
 
-  /// The device's own, and that of the trigger, which is what scans come at.
+  /// Sets the device's own rate, and that of the trigger, which determines when scans occur.
   void setRate(double wanted) {
     rate_hz_ = askRate(device_, wanted).value_or(wanted);
     for (const auto& axes : {gyro_, accel_}) {
@@ -247,12 +249,12 @@ class IioStream::Device {
     return {};
   }
 
-  /// Of scan i of a block of so many.
+  /// Time of scan i in a block of `scans`.
   std::optional<std::int64_t> timeOf(ssize_t i, ssize_t scans, std::int64_t now_ns) {
     std::int64_t stamp = 0;
     if (stamp_) {
       iio_channel_convert(stamp_, &stamp, at(stamp_, i));
-    } else {  // by counting, at the rate that the device says it has
+    } else {  // time by counting, at the rate that the device reports
       stamp = std::llround(1e9 * static_cast<double>(counted_ + i) / rate_hz_);
     }
     if (!stamp_ || clock_ == StampClock::kElsewhere) {
@@ -264,7 +266,7 @@ class IioStream::Device {
     return stamp;
   }
 
-  /// A block is there when its last scan is.
+  /// A block becomes available with its last scan.
   void observe(ssize_t scans, std::int64_t now_ns) {
     std::int64_t last = 0;
     if (stamp_) {
@@ -322,7 +324,7 @@ IioStream::~IioStream() {
 }
 
 void IioStream::run() {
-  // libiio writes to sockets that may be gone: it says so, and needs no signal.
+  // Writing to a closed socket must return an error instead of a signal.
   sigset_t pipe;
   sigemptyset(&pipe);
   sigaddset(&pipe, SIGPIPE);

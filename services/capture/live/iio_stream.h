@@ -1,5 +1,5 @@
-// One IIO device's triggered buffer, local or of an iiod in the network: opened, read on a thread
-// of its own, and opened again when it was gone.
+// Triggered buffer of one IIO device, local or of an iiod in the network. A thread of its own reads
+// it, and reopens it after a loss.
 #pragma once
 
 #include <array>
@@ -20,15 +20,15 @@ namespace perdure::capture {
 
 struct IioSettings {
   std::string uri = "local:";
-  std::string device = {};   ///< name or id; empty: the first one that has what is wanted
-  double rate_hz = 200.0;    ///< asked of the device
-  std::string trigger = {};  ///< name or id; empty: as it is
-  /// Rows of R in v_B = R v_device; empty: the device's own mount matrix, where it has one.
+  std::string device = {};   ///< name or id; empty: the first device with the required channels
+  double rate_hz = 200.0;    ///< requested rate
+  std::string trigger = {};  ///< name or id; empty: unchanged
+  /// Rows of R in v_B = R v_device. If empty, the device's own mount matrix is used, if it has one.
   std::vector<double> mount = {};
-  bool gyro = true, accel = true;  ///< what is wanted of it
+  bool gyro = true, accel = true;  ///< required channels
 };
 
-/// What one scan of the device says.
+/// Values of one scan of the device.
 struct IioScan {
   std::int64_t time_ns = 0;                    ///< CLOCK_BOOTTIME
   std::optional<Eigen::Vector3d> gyro, accel;  ///< rad/s and m/s²
@@ -42,7 +42,7 @@ class IioStream {
   IioStream(const IioStream&) = delete;
   IioStream& operator=(const IioStream&) = delete;
 
-  /// Counts "imu_absent" (a try to open it), "imu_lost" (it flowed), "imu_clock_jump".
+  /// Counts "imu_absent" (failed openings), "imu_lost" (data stopped) and "imu_clock_jump".
   const DeviceState& state() const { return state_; }
 
  private:
@@ -54,7 +54,7 @@ class IioStream {
   const std::function<void(const IioScan&)> give_;
   std::atomic<bool> stopping_{false};
   std::mutex mutex_;
-  iio_buffer* open_ = nullptr;  ///< to be cancelled when it is to stop
+  iio_buffer* open_ = nullptr;  ///< cancelled when the stream must stop
   DeviceState state_{"the IMU has not been opened yet"};
   std::thread thread_;
 };

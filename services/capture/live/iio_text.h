@@ -1,4 +1,4 @@
-// What IIO says in texts of sysfs, read.
+// Parses the texts of IIO's sysfs files.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,16 +8,17 @@
 
 namespace perdure::capture {
 
-/// Without the white space around it: a file of sysfs ends in a newline.
+/// Removes surrounding white space; sysfs files end in a newline.
 std::string trimmed(std::string_view text);
 
-/// Whose time a device stamps by. kElsewhere: none that the host could be asked for.
+/// Clock of a device's stamps. kElsewhere: a clock that the host cannot read.
 enum class StampClock { kBoot, kMonotonic, kRealtime, kElsewhere };
 
-/// Of `current_timestamp_clock`.
+/// Parses `current_timestamp_clock`.
 StampClock stampClockNamed(std::string_view text);
 
-/// Of a mount matrix, "1, 0, 0; 0, 1, 0; 0, 0, 1", row by row; nothing where it is none.
+/// Parses a mount matrix, "1, 0, 0; 0, 1, 0; 0, 0, 1", row by row. Empty if the text is not a
+/// matrix.
 std::optional<Eigen::Matrix3d> parseMount(std::string text);
 
 }  // namespace perdure::capture

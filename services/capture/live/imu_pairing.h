@@ -1,4 +1,4 @@
-// Samples of an accelerometer and a gyroscope that tick apart, as inertial samples.
+// Combines readings of an accelerometer and a gyroscope with different times into inertial samples.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,7 +12,7 @@
 
 namespace perdure::capture {
 
-/// One reading of three axes; time of CLOCK_BOOTTIME.
+/// One reading of three axes, with its CLOCK_BOOTTIME.
 struct Triad {
   std::int64_t time_ns = 0;
   Eigen::Vector3d v = Eigen::Vector3d::Zero();
@@ -23,12 +23,12 @@ struct InertialPair {
   Eigen::Vector3d gyro, accel;
 };
 
-/// At each reading of the gyroscope, the acceleration between the readings around it.
+/// Interpolates the acceleration at each reading of the gyroscope.
 class ImuPairing {
  public:
-  /// What can be given after this reading, in order of time. Readings that go back in time are
-  /// left out: "imu_out_of_order"; those of the gyroscope without accelerations around them within
-  /// a tenth of a second: "imu_unpaired".
+  /// Returns the samples that this reading completes, in order of time. Readings with decreasing
+  /// time are dropped: "imu_out_of_order". Gyroscope readings without accelerations on both sides
+  /// within a tenth of a second are dropped: "imu_unpaired".
   std::vector<InertialPair> gyro(const Triad& reading);
   std::vector<InertialPair> accel(const Triad& reading);
   const ReasonCounts& reasons() const { return reasons_; }
@@ -38,7 +38,7 @@ class ImuPairing {
   std::vector<InertialPair> pairs();
 
   std::deque<Triad> gyro_, accel_;
-  /// Of the last readings.
+  /// Times of the last readings.
   std::int64_t gyro_ns_ = std::numeric_limits<std::int64_t>::min(), accel_ns_ = gyro_ns_;
   ReasonCounts reasons_;
 };

@@ -1,4 +1,5 @@
-// Whether what an IMU says becomes samples: where its stamps are wrong it flows, and gives nothing.
+// Checks whether the readings of an IMU become samples. With wrong stamps, data arrive but give no
+// samples.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +9,8 @@ namespace perdure::capture {
 
 class ImuYield {
  public:
-  /// Totals of readings and of samples made of them, as they stand now. A sentence where fewer than
-  /// half of the readings since the last look became samples; else empty.
+  /// Takes the current totals of readings and of samples made from them. Returns a sentence if
+  /// fewer than half of the readings since the last call became samples; otherwise empty.
   std::string look(std::uint64_t read, std::uint64_t given);
 
  private:

@@ -5,8 +5,8 @@
 namespace perdure::capture {
 namespace {
 
-/// Silence is so many waits in which nothing came, not a second by the clock: who was stopped for
-/// that long has heard nothing, and the camera may have said much.
+/// Silence is measured in waits without an image, not in time, because the camera may have sent
+/// images while the process was suspended.
 constexpr std::chrono::milliseconds kWait{100};
 constexpr int kSilence = 10;
 
@@ -37,7 +37,7 @@ void LiveCamera::flow(CameraSession& session) {
   while (!stopping_ && !session.stepsAside() && silent < kSilence) {
     auto shot = session.next(kWait);
     silent = shot ? 0 : silent + 1;
-    if (!shot && session.gone()) break;  // what it gave before it went was given on
+    if (!shot && session.gone()) break;  // all earlier images have been passed on
     if (!shot) continue;
     take(*std::move(shot));
     state_.flows(session.name(), joined(session.note(), rate_.note()));

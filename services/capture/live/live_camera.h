@@ -1,4 +1,4 @@
-// A camera that is read on a thread of its own, and opened again when it was gone.
+// A camera that is read on its own thread, and reopened after a loss.
 #pragma once
 
 #include <atomic>
@@ -14,15 +14,15 @@ namespace perdure::capture {
 
 class LiveCamera {
  public:
-  /// Both are called on the camera's thread. `rate_hz`: what is asked for.
+  /// Both functions are called on the camera's thread. `rate_hz`: requested rate.
   LiveCamera(OpenCamera open, double rate_hz, std::function<void(CameraImage)> give);
   ~LiveCamera();
   LiveCamera(const LiveCamera&) = delete;
   LiveCamera& operator=(const LiveCamera&) = delete;
 
-  /// Counts "camera_absent" (a try to open it), "camera_lost", "camera_silent" (it flowed),
-  /// "camera_frame_lost", "camera_frame_error", "camera_reopened" (for another one), and the
-  /// reasons of packed().
+  /// Counts "camera_absent" (failed openings), "camera_lost", "camera_silent" (images stopped),
+  /// "camera_frame_lost", "camera_frame_error", "camera_reopened" (because of another camera), and
+  /// the reasons of packed().
   const DeviceState& state() const { return state_; }
 
  private:

@@ -27,7 +27,7 @@ std::size_t bytesPerPixel(PixelLayout layout) {
   }
 }
 
-/// OpenCV takes bytes that it does not change as bytes that it may change.
+/// OpenCV's constructor takes mutable bytes, although they are only read here.
 cv::Mat view(const ImagePlane& plane, int rows, int columns, int channels) {
   return {rows, columns, CV_8UC(channels), const_cast<std::uint8_t*>(plane.bytes.data()),
           plane.stride};

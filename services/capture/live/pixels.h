@@ -1,4 +1,4 @@
-// The buffers of cameras as packed grey or colour pixels.
+// Converts camera buffers to packed grey or colour pixels.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace perdure::capture {
 
-/// By the order of bytes in memory.
+/// Pixel layouts, named by the order of bytes in memory.
 enum class PixelLayout {
   kGrey,
   kBgr,
@@ -28,12 +28,13 @@ enum class PixelLayout {
 
 struct ImagePlane {
   std::span<const std::uint8_t> bytes;
-  std::size_t stride = 0;  ///< bytes from row to row; not used of JPEG
+  std::size_t stride = 0;  ///< bytes from row to row; unused for JPEG
 };
 
-/// `planes`: Y and the two half planes of kNv12, kNv21 (together) and kYuv420 (apart); one of the
-/// others. `wanted`: "as_is" (grey stays grey, the rest is bgr8), "mono8", "bgr8".
-/// Reasons: "image_truncated" where a plane is too short, "image_corrupt" of JPEG, "image_size".
+/// `planes`: Y and the two half-size planes for kNv12, kNv21 (interleaved) and kYuv420 (separate);
+/// one plane for the other layouts. `wanted`: "as_is" (grey stays grey, all else becomes bgr8),
+/// "mono8", "bgr8". Fails with "image_truncated" if a plane is too short, with "image_corrupt" for
+/// invalid JPEG, or with "image_size".
 Result<Frame> packed(PixelLayout layout, std::uint32_t width, std::uint32_t height,
                      const std::vector<ImagePlane>& planes, const std::string& wanted);
 

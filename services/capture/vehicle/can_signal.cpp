@@ -12,14 +12,15 @@ namespace {
 
 constexpr std::uint32_t kExtendedFlag = 0x80000000U, kStandardMask = 0x7ffU,
                         kExtendedMask = 0x1fffffffU;
-constexpr unsigned kMostBits = 64 * 8;         // of a CAN FD frame
-constexpr std::size_t kLongestDbcLine = 1000;  // a longer one would need too much of the stack
-constexpr double kLargest = 1e30;              // physical: its square is still a number
+constexpr unsigned kMostBits = 64 * 8;         // bits of a CAN FD frame
+constexpr std::size_t kLongestDbcLine = 1000;  // longer lines would need too much stack
+constexpr double kLargest = 1e30;              // physical value; its square is still finite
 
-/// Bit k of a signal, 0 the lowest, in DBC's numbers: byte · 8 + bit.
+/// Position of bit k of a signal in DBC's numbering: byte · 8 + bit. Bit 0 is the lowest.
 unsigned positionOf(const CanSignal& s, unsigned k) {
   if (s.little_endian) return s.start + k;
-  // The first bit is the highest: from there down each byte, and on in the next one from its top.
+  // The start bit is the highest. Bits continue down each byte, and then from the top of the next
+  // byte.
   const unsigned from_top = s.length - 1 - k;
   const unsigned sequential = s.start / 8 * 8 + (7 - s.start % 8) + from_top;
   return sequential / 8 * 8 + (7 - sequential % 8);

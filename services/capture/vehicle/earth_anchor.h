@@ -1,4 +1,4 @@
-// Chooses, of the fixes of a receiver, the one that says where on Earth the vehicle stood.
+// Selects the fix of a GNSS receiver that gives the vehicle's position on Earth.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,27 +11,28 @@
 namespace perdure::capture {
 
 struct AnchorSettings {
-  double most_sigma_m = 5.0;                          ///< a fix that states more is not used
-  Eigen::Vector3d antenna = Eigen::Vector3d::Zero();  ///< in the body, metres
+  double most_sigma_m = 5.0;                          ///< largest accepted sigma of a fix
+  Eigen::Vector3d antenna = Eigen::Vector3d::Zero();  ///< position in the body, m
 };
 
-/// Where the origin of the body was, in degrees and metres as GnssFix, and its yaw.
+/// Position of the body's origin, in degrees and metres as in GnssFix, and its yaw.
 struct EarthPlace {
   std::int64_t time_ns = 0;  ///< CLOCK_BOOTTIME
   double latitude_deg = 0, longitude_deg = 0, height_m = 0;
-  double yaw = 0;      ///< of the body's x axis: radians from east, counter-clockwise
-  double sigma_m = 0;  ///< one deviation of each horizontal axis
+  double yaw = 0;      ///< yaw of the body's x axis: radians from east, counter-clockwise
+  double sigma_m = 0;  ///< standard deviation of each horizontal axis
 };
 
-/// A place with a heading. Its heading is the course over ground of a drive that is straight: of
-/// fixes over two seconds, faster than 2 m/s, whose courses differ by no more than 2°. A vehicle
-/// that goes backwards has none. Single-threaded.
+/// Position with a heading. The heading is the course over ground on a straight drive. This needs
+/// fixes over two seconds, faster than 2 m/s, with courses within 2°. A vehicle that drives
+/// backwards has no heading. Single-threaded.
 class EarthAnchor {
  public:
   explicit EarthAnchor(AnchorSettings settings) : settings_(settings) {}
 
-  /// A place where the fix gives the first one, one at most half as uncertain as the best that was
-  /// given, or after half a minute one that is about as good. `backwards`: as the wheels say.
+  /// Returns the first position, and later positions whose sigma is at most half the best sigma
+  /// returned. After half a minute, it also returns a position with a similar sigma. `backwards`:
+  /// from the wheels.
   std::optional<EarthPlace> offer(const GnssFix& fix, bool backwards);
 
  private:
@@ -40,8 +41,8 @@ class EarthAnchor {
 
   const AnchorSettings settings_;
   std::deque<GnssFix> drive_;
-  std::optional<double> given_sigma_m_;  ///< the least
-  std::int64_t given_ns_ = 0;            ///< the last
+  std::optional<double> given_sigma_m_;  ///< smallest sigma returned
+  std::int64_t given_ns_ = 0;            ///< time of the last position returned
 };
 
 }  // namespace perdure::capture

@@ -8,8 +8,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr double kSigmasOfEph = 2.4477;  // 95 % of a circle: √(χ²₂)
-constexpr double kUnstated_m = 10.0;     // where it says nothing of its error
+constexpr double kSigmasOfEph = 2.4477;  // standard deviations of a 95 % circle: √(χ²₂)
+constexpr double kUnstated_m = 10.0;     // default if gpsd reports no error
 
 std::optional<double> number(const Json& json, const char* key) {
   const auto it = json.find(key);
@@ -18,7 +18,7 @@ std::optional<double> number(const Json& json, const char* key) {
   return std::isfinite(value) ? std::optional(value) : std::nullopt;
 }
 
-/// gpsd's statuses of dead reckoning, of a receiver that was told its place, of a simulator.
+/// False for gpsd's statuses of dead reckoning, of a fixed position, and of a simulator.
 bool isMeasured(const Json& json) {
   const double status = number(json, "status").value_or(0.0);
   return status != 5.0 && status != 7.0 && status != 8.0;

@@ -1,4 +1,4 @@
-// Reports of gpsd, one JSON object a line. Source: gpsd_json(5), protocol 3.
+// Reads reports of gpsd, one JSON object a line. Source: gpsd_json(5), protocol 3.
 #pragma once
 
 #include <cstdint>
@@ -10,11 +10,11 @@
 
 namespace perdure::capture {
 
-/// What is sent once, after which gpsd reports by itself.
+/// Request that is sent once; gpsd then sends reports without further requests.
 inline constexpr std::string_view kGpsdWatch = "?WATCH={\"enable\":true,\"json\":true};\n";
 
-/// A fix of a TPV report; nothing of other reports. Its height is altHAE, or (before protocol 3.14)
-/// alt. Reasons: "gpsd_malformed"; "gpsd_no_fix": gpsd says that there is none in three dimensions.
+/// Fix of a TPV report; empty for other reports. The height is altHAE, or alt before protocol 3.14.
+/// Fails with "gpsd_malformed", or with "gpsd_no_fix" if gpsd reports no three-dimensional fix.
 Result<std::optional<GnssFix>> readGpsd(std::string_view line, std::int64_t time_ns);
 
 }  // namespace perdure::capture

@@ -13,9 +13,9 @@ namespace {
 constexpr double kKnot = 1852.0 / 3600.0;
 constexpr double kUnstatedHdop = 10.0;
 constexpr std::int64_t kRmcLasts_ns = 2'000'000'000;
-constexpr std::size_t kLongest = 256;  // 82 by the standard, which many exceed
+constexpr std::size_t kLongest = 256;  // the standard allows 82, which many receivers exceed
 
-/// Field i of a sentence, 0 being its name; empty where there is none.
+/// Field i of a sentence; field 0 is its name. Empty if the field is missing.
 std::string_view field(std::string_view sentence, std::size_t i) {
   for (; i > 0; --i) {
     const auto comma = sentence.find(',');
@@ -25,7 +25,7 @@ std::string_view field(std::string_view sentence, std::size_t i) {
   return sentence.substr(0, sentence.find(','));
 }
 
-/// ddmm.mmmm or dddmm.mmmm with its hemisphere, in degrees.
+/// Converts ddmm.mmmm or dddmm.mmmm and its hemisphere to degrees.
 std::optional<double> angle(std::string_view text, std::string_view hemisphere, double most) {
   const auto value = wholeNumber(text);
   if (!value || *value < 0.0 || hemisphere.size() != 1) return std::nullopt;
@@ -38,12 +38,13 @@ std::optional<double> angle(std::string_view text, std::string_view hemisphere, 
   return negative ? -degrees : degrees;
 }
 
-/// Four digits before the point of a latitude, five of a longitude: degrees alone have fewer.
+/// Whether the text has minutes: a latitude then has four digits before the point, a longitude
+/// five.
 bool hasMinutes(std::string_view text, std::size_t digits) {
   return text.substr(0, text.find('.')).size() == digits;
 }
 
-/// What stands between $ and *, where the sum behind it is right.
+/// Text between $ and *, if the checksum is correct.
 Result<std::string_view> sentenceOf(std::string_view line) {
   while (!line.empty() && std::isspace(static_cast<unsigned char>(line.back()))) {
     line.remove_suffix(1);
@@ -62,14 +63,15 @@ Result<std::string_view> sentenceOf(std::string_view line) {
   return line.substr(1, star - 1);
 }
 
-/// Deviation of a range for GGA's quality: of a horizontal place after times HDOP.
+/// Standard deviation of a range, by GGA's quality. Multiplied by HDOP, it is that of a horizontal
+/// position.
 double rangeSigma(double quality) {
   if (quality == 4) return 0.02;    // RTK, fixed
   if (quality == 5) return 0.3;     // RTK, float
-  return quality == 2 ? 1.0 : 3.0;  // differential; alone
+  return quality == 2 ? 1.0 : 3.0;  // differential; autonomous
 }
 
-/// Of GGA and RMC: estimated without satellites, entered by hand, simulated.
+/// Modes of GGA and RMC without measurement: estimated, entered manually, simulated.
 constexpr double kLastMeasured = 5;
 constexpr std::string_view kNotMeasured = "NSM";
 
@@ -116,7 +118,7 @@ Result<NmeaReader::Said> NmeaReader::readRmc(std::string_view sentence, std::int
   return said;
 }
 
-/// Beside RMC, which is of the same moment, it says nothing new.
+/// VTG is ignored after an RMC of the same time, because it adds nothing.
 Result<NmeaReader::Said> NmeaReader::readVtg(std::string_view sentence, std::int64_t time_ns) {
   if (time_ns - rmc_ns_ < kRmcLasts_ns) return Said{};
   if (field(sentence, 9) == "N") return noFix();
@@ -149,7 +151,8 @@ Result<NmeaReader::Said> NmeaReader::readGga(std::string_view sentence, std::int
   if (!latitude || !longitude || !above_sea) {
     return fail("nmea_malformed", "GGA says that there is a fix, and has no place or height");
   }
-  if (*latitude == 0.0 && *longitude == 0.0) return noFix();  // a receiver's zeros
+  // Some receivers report zeros without a fix.
+  if (*latitude == 0.0 && *longitude == 0.0) return noFix();
   const double height = *above_sea + wholeNumber(field(sentence, 11)).value_or(0.0);
   if (!isHeight(height)) return fail("nmea_malformed", "GGA says a height that is not on Earth");
   place_.latitude_deg = *latitude;
@@ -162,7 +165,7 @@ Result<NmeaReader::Said> NmeaReader::readGga(std::string_view sentence, std::int
   return whole(time_ns);
 }
 
-/// Deviations of latitude and longitude, as the receiver computes them.
+/// Standard deviations of latitude and longitude, as computed by the receiver.
 void NmeaReader::readGst(std::string_view sentence) {
   const auto north = wholeNumber(field(sentence, 6)), east = wholeNumber(field(sentence, 7));
   const double sigma_m = north && east ? std::hypot(*north, *east) / std::numbers::sqrt2 : 0.0;

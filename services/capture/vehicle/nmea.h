@@ -1,5 +1,5 @@
-// Sentences of NMEA 0183: RMC, VTG, GGA, GST of any talker. Source: NMEA 0183 4.10 as receivers'
-// makers describe it (u-blox M8 protocol, 31).
+// Reads sentences of NMEA 0183: RMC, VTG, GGA and GST of any talker. Source: NMEA 0183 4.10 as
+// described by receiver manufacturers (u-blox M8 protocol, 31).
 #pragma once
 
 #include <cstdint>
@@ -13,16 +13,16 @@
 
 namespace perdure::capture {
 
-/// What one sentence adds. Single-threaded.
+/// Collects the content of sentences. Single-threaded.
 class NmeaReader {
  public:
   struct Said {
-    std::optional<double> speed;  ///< m/s over ground, of RMC, or of VTG where there is no RMC
-    std::optional<GnssFix> fix;   ///< once RMC and GGA of one second's fraction have come
+    std::optional<double> speed;  ///< m/s over ground, from RMC; from VTG if there is no RMC
+    std::optional<GnssFix> fix;   ///< set once RMC and GGA with the same time have arrived
   };
-  /// One line without or with its end. Sentences of other kinds say nothing. Reasons:
-  /// "nmea_malformed" (no sentence), "nmea_checksum", "nmea_no_fix" (it says itself that it has
-  /// none). The fix has the time of its last sentence.
+  /// Reads one line, with or without its line end. Sentences of other kinds give an empty result.
+  /// Fails with "nmea_malformed" (not a sentence), "nmea_checksum", or "nmea_no_fix" (the sentence
+  /// reports no fix). The fix has the time of its last sentence.
   Result<Said> read(std::string_view line, std::int64_t time_ns);
 
  private:
@@ -33,10 +33,10 @@ class NmeaReader {
   Said whole(std::int64_t time_ns);
 
   std::string rmc_utc_, gga_utc_;
-  std::int64_t rmc_ns_ = std::numeric_limits<std::int64_t>::min() / 2;  ///< of the last RMC
+  std::int64_t rmc_ns_ = std::numeric_limits<std::int64_t>::min() / 2;  ///< time of the last RMC
   std::optional<double> speed_, course_;
   GnssFix place_;
-  std::optional<double> stated_sigma_m_;  ///< of the last GST
+  std::optional<double> stated_sigma_m_;  ///< sigma of the last GST
 };
 
 }  // namespace perdure::capture

@@ -15,10 +15,10 @@
 namespace perdure::capture {
 namespace {
 
-constexpr int kPoll_ms = 100;  // how long a stop waits at most
+constexpr int kPoll_ms = 100;  // longest delay of a stop
 constexpr std::size_t kLongestLine = 4096;
 
-/// The kernel's stamp of arrival, where it gave one; else now.
+/// The kernel's stamp of arrival if present; otherwise the current time.
 std::int64_t arrivalOf(msghdr& message) {
   for (cmsghdr* c = CMSG_FIRSTHDR(&message); c; c = CMSG_NXTHDR(&message, c)) {
     if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SCM_TIMESTAMPNS) continue;
@@ -37,7 +37,8 @@ struct Socket {
   const int number;
 };
 
-/// A stream at its end reads as nothing; a datagram may be empty.
+/// Whether the socket is a stream. A stream returns zero bytes at its end, but a datagram may be
+/// empty.
 bool isStream(int socket) {
   int type = 0;
   socklen_t size = sizeof type;
@@ -82,7 +83,7 @@ void SocketStream::flow() {
     if (now_silent && !silent) {
       fails("silent",
             fmt::format("{} is open and says nothing; is the sender on, and set to it?", name_));
-      if (isStream(socket.number)) return;  // the other side may be gone without a word
+      if (isStream(socket.number)) return;  // the other side may have vanished without closing
     }
     silent = now_silent;
   }

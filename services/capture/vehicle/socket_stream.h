@@ -1,4 +1,4 @@
-// What a socket says, read on a thread of its own, and opened again when it was gone.
+// Reads a socket on its own thread, and reopens it after a loss.
 #pragma once
 
 #include <atomic>
@@ -16,25 +16,26 @@ namespace perdure::capture {
 
 struct Packet {
   std::span<const std::uint8_t> bytes;
-  std::int64_t time_ns = 0;  ///< CLOCK_BOOTTIME; the kernel's time of arrival where it tells it
+  std::int64_t time_ns = 0;  ///< CLOCK_BOOTTIME; the kernel's time of arrival, if available
 };
 
-/// A socket to read. The detail of a failure is a sentence with the mend; its code is not used.
+/// Opens a socket for reading. On failure, the detail is a sentence with the fix; the code is not
+/// used.
 using OpenSocket = std::function<Result<int>()>;
 
-/// Raw frames of these ids of a CAN interface (SocketCAN), classic and FD: a packet is the kernel's
-/// `can_frame` or `canfd_frame`. An extended id has the kernel's flag CAN_EFF_FLAG.
+/// Raw frames with these ids on a CAN interface (SocketCAN), classic and FD. A packet is the
+/// kernel's `can_frame` or `canfd_frame`. An extended id has the kernel's flag CAN_EFF_FLAG.
 OpenSocket canSocket(std::string interface, std::vector<std::uint32_t> ids);
-/// Datagrams that come to HOST:PORT.
+/// Datagrams sent to HOST:PORT.
 OpenSocket udpSocket(std::string address);
-/// A connection to HOST:PORT; `greeting` is sent once. A packet is any piece of what comes.
+/// Connection to HOST:PORT; `greeting` is sent once. A packet is any piece of the received data.
 OpenSocket tcpSocket(std::string address, std::string greeting);
 
 class SocketStream {
  public:
-  /// `kind`: begins its reasons, as "speed": "speed_absent" (a try to open it), "speed_lost" (it
-  /// could be read, and no longer), "speed_silent" (open, and nothing for `silence`; a connection
-  /// is then opened anew). `name`: for people. `give` is called on the stream's thread.
+  /// `kind`: prefix of the reasons, for example "speed". The reasons are "speed_absent" (failed
+  /// openings), "speed_lost" (it can no longer be read) and "speed_silent" (no data for `silence`;
+  /// a connection is then reopened). `name`: for people. `give` is called on the stream's thread.
   SocketStream(std::string kind, std::string name, std::chrono::nanoseconds silence,
                OpenSocket open, std::function<void(const Packet&)> give);
   ~SocketStream();
@@ -45,7 +46,7 @@ class SocketStream {
 
  private:
   void flow();
-  /// False where the socket is at its end.
+  /// False at the end of the stream.
   bool readOne(int socket);
   bool fails(const char* what, const std::string& why);
 
@@ -59,11 +60,12 @@ class SocketStream {
   std::thread thread_;
 };
 
-/// Lines of packets: each whole one once, without its end. A line of more than 4096 bytes is none.
+/// Splits packets into lines. Each complete line is returned once, without its end. A line of more
+/// than 4096 bytes is dropped.
 class Lines {
  public:
   void add(const Packet& packet, const std::function<void(std::string_view, std::int64_t)>& give);
-  /// Of datagrams, each of which ends its last line.
+  /// Ends the last line of a datagram, which has no line end.
   void end(std::int64_t time_ns, const std::function<void(std::string_view, std::int64_t)>& give);
 
  private:

@@ -1,4 +1,4 @@
-// The sockets that a vehicle's speed and place come from.
+// Opens the sockets for a vehicle's speed and position.
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -34,7 +34,7 @@ struct AddressDeleter {
 };
 using Addresses = std::unique_ptr<addrinfo, AddressDeleter>;
 
-/// HOST:PORT, also [HOST]:PORT.
+/// Resolves HOST:PORT, also [HOST]:PORT.
 Result<Addresses> resolve(const std::string& address, int type) {
   const auto colon = address.rfind(':');
   if (colon == std::string::npos || colon + 1 == address.size()) {
@@ -52,7 +52,7 @@ Result<Addresses> resolve(const std::string& address, int type) {
   return Addresses(list);
 }
 
-/// Within two seconds.
+/// Connects within two seconds.
 bool connects(int socket, const addrinfo& to) {
   if (::connect(socket, to.ai_addr, to.ai_addrlen) == 0) return true;
   if (errno != EINPROGRESS) return false;

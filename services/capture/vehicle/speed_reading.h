@@ -1,4 +1,4 @@
-// One reading of how fast the vehicle is.
+// One reading of the vehicle's speed.
 #pragma once
 
 #include <cstdint>
@@ -10,11 +10,12 @@ namespace perdure::capture {
 
 struct SpeedReading {
   std::int64_t time_ns = 0;  ///< CLOCK_BOOTTIME
-  double speed = 0.0;        ///< m/s along the body's x axis; backwards below 0
-  double sigma = 0.0;        ///< m/s, one deviation
+  double speed = 0.0;        ///< m/s along the body's x axis; negative backwards
+  double sigma = 0.0;        ///< m/s, standard deviation
 };
 
-/// What a unit is in m/s: m/s, km/h, mph, kn and their usual other names. Reason "speed_unit".
+/// Factor from a unit to m/s: m/s, km/h, mph, kn and their usual other names. Fails with
+/// "speed_unit".
 Result<double> metresPerSecond(const std::string& unit);
 
 }  // namespace perdure::capture

@@ -77,7 +77,7 @@ Result<SpeedReading> readSpeedLine(std::string_view line, double sigma, std::int
     return text.empty() || text.find_first_of(" \t,") == 0;
   };
   constexpr double kFastest = 200.0;  // m/s
-  // 5,2 may be 5.2, or 5 with a deviation of 2.
+  // Ambiguous: 5,2 may mean 5.2, or 5 with a deviation of 2.
   if (line.find(',') != std::string_view::npos && line.find_first_of(" \t.") == line.npos) {
     return fail("speed_malformed",
                 "a line of speed has a comma between two whole numbers; write a decimal point, and "
@@ -127,7 +127,7 @@ Vehicle::Vehicle(const SpeedConfig& speed, const GnssConfig& gnss, Outputs outpu
           said_.reset();
           speed_lines_.add(packet, lines);
           speed_lines_.end(packet.time_ns, lines);
-          if (said_) give(*said_);  // lines of one datagram are of one moment
+          if (said_) give(*said_);  // a datagram gives one reading
         });
   }
   if (gnss_socket) {
@@ -144,7 +144,7 @@ Vehicle::Vehicle(const SpeedConfig& speed, const GnssConfig& gnss, Outputs outpu
 }
 
 void Vehicle::onCan(const Packet& packet) {
-  // A classic frame begins like one of CAN FD: id, length, data from byte 8 on.
+  // A classic frame has the same layout as a CAN FD frame: id, length, data from byte 8 on.
   canfd_frame frame{};
   if (packet.bytes.size() != CAN_MTU && packet.bytes.size() != CANFD_MTU) {
     return count(Of::kSpeed, {"speed_malformed", "what came of the CAN bus is no frame"});
@@ -220,7 +220,7 @@ void Vehicle::count(Of what, const Reason& reason) {
   (what == Of::kSpeed ? speed_trouble_ : gnss_trouble_) = reason.detail;
 }
 
-/// Where something comes, and nothing comes of it.
+/// A sentence if data arrive, but give no reading.
 std::string Vehicle::silence() const {
   const std::int64_t now_ns = HostClock::nowNs();
   const auto flows = [](const std::unique_ptr<SocketStream>& stream) {

@@ -1,5 +1,4 @@
-// How fast the vehicle is, and where on Earth: from a CAN bus, lines of UDP, a receiver of
-// satellites.
+// Speed of the vehicle and its position on Earth, from a CAN bus, UDP lines or a GNSS receiver.
 #pragma once
 
 #include <atomic>
@@ -19,28 +18,28 @@
 
 namespace perdure::capture {
 
-/// A line of UDP: "SPEED" or "SPEED SIGMA" in m/s, apart by blanks or a comma. Reason
+/// Parses a UDP line: "SPEED" or "SPEED SIGMA" in m/s, separated by blanks or a comma. Fails with
 /// "speed_malformed".
 Result<SpeedReading> readSpeedLine(std::string_view line, double sigma, std::int64_t time_ns);
 
-/// Throws StartupError where a signal or an address of the configuration is none.
+/// Throws StartupError if the configuration has an invalid signal or address.
 void checkVehicle(const SpeedConfig& speed, const GnssConfig& gnss);
 
 class Vehicle {
  public:
-  struct Outputs {  // called on threads of this class, one at a time each
+  struct Outputs {  // callbacks on threads of this class, each called by one thread at a time
     std::function<void(const SpeedReading&)> speed;
     std::function<void(const EarthPlace&)> place;
   };
-  /// Opens what the configuration names, and again whenever it is gone. Throws StartupError.
+  /// Opens the configured sources, and reopens them after a loss. Throws StartupError.
   Vehicle(const SpeedConfig& speed, const GnssConfig& gnss, Outputs outputs);
-  /// With sockets of its caller's in place of those; a null one is not opened. For tests.
+  /// Uses the caller's sockets instead, for tests. An empty function opens no socket.
   Vehicle(const SpeedConfig& speed, const GnssConfig& gnss, Outputs outputs,
           OpenSocket speed_socket, OpenSocket gnss_socket);
 
-  /// A sentence with the mend; empty where all that is configured flows.
+  /// A sentence with the fix; empty while all configured sources send data.
   std::string problem() const;
-  /// What gives, for people.
+  /// Names of the active sources, for people.
   std::string name() const;
   void report(ReasonCounts& counts) const;
 
@@ -59,15 +58,16 @@ class Vehicle {
   const Outputs outputs_;
   Lines speed_lines_, gnss_lines_;
   NmeaReader speed_nmea_, gnss_nmea_;
-  std::optional<SpeedReading> said_;  ///< the last of a datagram's lines
+  std::optional<SpeedReading> said_;  ///< last reading of a datagram's lines
   EarthAnchor anchor_;
   std::atomic<bool> backwards_{false};
-  std::atomic<std::int64_t> speed_ns_, fix_ns_;  ///< when there was one last, or the beginning
-  mutable std::mutex mutex_;                     // of what follows
+  std::atomic<std::int64_t> speed_ns_, fix_ns_;  ///< time of the last one; initially the time of
+                                                 ///< the start
+  mutable std::mutex mutex_;                     // protects the members below
   std::optional<WheelSpeed> wheels_;
   ReasonCounts reasons_;
   std::string speed_trouble_, gnss_trouble_;
-  // The threads of these use all of the above: they go first.
+  // Their threads use all members above, so these members are destroyed first.
   std::unique_ptr<SocketStream> speed_stream_, gnss_stream_;
 };
 

@@ -1,4 +1,4 @@
-// Numbers of configurations and of lines that a socket brings: read to their end, or not at all.
+// Parses numbers of configurations and of lines from sockets; the whole text must be a number.
 #pragma once
 
 #include <charconv>
@@ -8,7 +8,7 @@
 
 namespace perdure::capture {
 
-/// A finite number and nothing else but blanks around it; nothing where it is none.
+/// A finite number, with only blanks around it; empty for other texts.
 inline std::optional<double> wholeNumber(std::string_view text) {
   const auto first = text.find_first_not_of(' '), last = text.find_last_not_of(' ');
   if (first == std::string_view::npos) return std::nullopt;

@@ -14,11 +14,11 @@ namespace perdure::gateway {
 namespace {
 
 using Point = Eigen::Vector2d;
-constexpr int kSamples = 8;  // of an edge, which distortion bends
+constexpr int kSamples = 8;  // samples along an edge, because distortion bends it
 enum PointsType { kLineLoop = 2, kLineList = 4 };
 
-/// Pairs of ends of the strokes that can be seen of the line from a to b (in C). Of a dashed line
-/// every other sample.
+/// Adds the visible strokes of the line from a to b (in C), as pairs of end points. For a dashed
+/// line, every other stroke is left out.
 void addStrokes(const CameraModel& camera, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                 bool dashed, std::vector<Point>& strokes) {
   const int samples = dashed ? 2 * kSamples + 1 : kSamples;
@@ -68,7 +68,7 @@ void putLabel(JsonWriter& json, TimePoint time, const Label& label) {
   json.end('}');
 }
 
-/// The strokes of its cuboid in the image.
+/// Strokes of the object's cuboid in the image.
 std::vector<Point> projected(const Objects& objects, const ObjectBelief& object,
                              const CameraModel& camera) {
   const RigidTransform T_CW = (objects.T_WB * camera.T_BC()).inverse();
@@ -83,7 +83,7 @@ std::vector<Point> projected(const Objects& objects, const ObjectBelief& object,
   return strokes;
 }
 
-/// Draws an object's cuboid; its label where it is in the image.
+/// Draws an object's cuboid. Returns its label if the cuboid is in the image.
 std::optional<Label> putObject(JsonWriter& json, const Objects& objects, const ObjectBelief& object,
                                const CameraModel& camera) {
   const std::vector<Point> strokes = projected(objects, object, camera);
@@ -99,7 +99,7 @@ std::optional<Label> putObject(JsonWriter& json, const Objects& objects, const O
   return Label{corner, nameOf(object) + hidden, colour.withAlpha(isHidden(object) ? 0.45 : 0.75)};
 }
 
-/// Of being there rather than clutter, by its likeliest class, with even odds before.
+/// Probability of an object against clutter, by the most probable class, with even prior odds.
 double likelihood(const Detection& detection) {
   if (detection.activations.size() < 2) return 0.0;
   const float best =
@@ -116,7 +116,7 @@ void putDetection(JsonWriter& json, TimePoint time, const Detection& detection) 
            {1, 1, 1, bright}, 1);
 }
 
-/// By Andrew's chain.
+/// Andrew's monotone chain.
 std::vector<Point> convexHull(std::vector<Point> points) {
   std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) {
     return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
@@ -147,10 +147,11 @@ Box boundsOf(const std::vector<Point>& points, const CameraModel& camera) {
 
 struct Said {
   double likelihood = 0.0;
-  bool asked = false;  ///< the answer to a prediction, by no box of its own
+  bool asked = false;  ///< the likelihood comes from the answer to a prediction, not from a
+                       ///< reported box
 };
 
-/// What the network says of `object` being there rather than clutter, with even odds before.
+/// Probability from the detections that `object` exists rather than clutter, with even prior odds.
 std::optional<Said> saidOf(const ObjectBelief& object, const Box& region,
                            const Detections& detections, const ModelInfo& model) {
   constexpr double kLeastOverlap = 0.3;
@@ -159,7 +160,7 @@ std::optional<Said> saidOf(const ObjectBelief& object, const Box& region,
   const Detection* of = nullptr;
   double best = kLeastOverlap;
   for (const Detection& one : detections.detections) {
-    if (k >= one.activations.size()) continue;  // a class that the network does not know
+    if (k >= one.activations.size()) continue;  // the network does not have this class
     const double overlap = one.primed ? (one.primed_for == object.id ? best : 0.0)
                                       : intersectionOverUnion(one.box, region);
     if (overlap >= best) of = &one, best = overlap;
@@ -210,7 +211,7 @@ std::string likelihoodRegions(const Objects& objects, const CameraModel& camera,
     if (auto region = regionOf(objects, object, camera, detections, model))
       regions.push_back(*std::move(region));
   }
-  // What is nearer is drawn over what is farther.
+  // Nearer regions are drawn over farther ones.
   std::sort(regions.begin(), regions.end(),
             [](const Region& a, const Region& b) { return a.distance > b.distance; });
   JsonWriter json(1024 + 2048 * regions.size());

@@ -1,6 +1,7 @@
-// What is drawn over a camera's image, as foxglove.ImageAnnotations: the projected cuboids (dashed
-// where something hides the object), and the detections, as bright as they are likely (the paper's
-// figure 1); and the objects as regions that are as bright as their class is likely.
+// Overlays of a camera's image, as foxglove.ImageAnnotations. One overlay has the projected
+// cuboids, dashed if the object is occluded, and the detections, with brightness by likelihood (the
+// paper's figure 1). The other has the objects as regions, with brightness by the likelihood of
+// their class.
 #pragma once
 
 #include <string>
@@ -14,9 +15,10 @@ namespace perdure::gateway {
 std::string imageAnnotations(const Objects& objects, const CameraModel& camera,
                              const Detections* detections);
 
-/// The objects in sight as filled regions, as bright as their class is likely under the image (the
-/// paper's figure 1, middle): by the box that meets the region, or by inference's answer to the
-/// filter's prediction. Black: the network says nothing of it. `model`: of the detections.
+/// The visible objects as filled regions, with brightness by the likelihood of their class given
+/// the image (the paper's figure 1, middle). The likelihood comes from the box that overlaps the
+/// region, or from inference's answer to the filter's prediction. Black: no likelihood is known.
+/// `model`: of the detections.
 std::string likelihoodRegions(const Objects& objects, const CameraModel& camera,
                               const Detections* detections, const ModelInfo* model);
 

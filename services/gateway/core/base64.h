@@ -1,4 +1,4 @@
-// Bytes as base64 (RFC 4648, with padding), for the bytes in JSON.
+// Encodes bytes as base64 (RFC 4648, with padding), for JSON.
 #pragma once
 
 #include <cstdint>

@@ -15,7 +15,7 @@ constexpr double kSampleEvery = 0.5;       // s
 constexpr std::size_t kMostSamples = 600;  // five minutes
 constexpr std::size_t kMostHistories = 4000;
 
-/// Centre, yaw, size and how well they are known, in the keys of the schema.
+/// Writes centre, yaw, size and their standard deviations, with the keys of the schema.
 void putState(JsonWriter& json, const Vector7d& mean, const Matrix7d& P) {
   const Eigen::Vector3d size = mean.tail<3>().array().exp();
   const Eigen::Vector3d size_sigma = size.array() * P.diagonal().tail<3>().array().max(0.0).sqrt();
@@ -119,7 +119,7 @@ std::string thing(const Event& event) {
   return fmt::format("{} {}", name, event.object_id);
 }
 
-/// A sentence of an event.
+/// Describes an event in a sentence.
 std::string sentenceOf(const Event& e) {
   const std::string what = thing(e);
   const std::string other = e.other_id == 0 ? "" : fmt::format("{}", e.other_id);
@@ -262,7 +262,7 @@ void History::add(const Objects& objects) {
     samples.push_back({now, object.existence, object.best().probability, object.visible_fraction});
     if (samples.size() > kMostSamples) samples.pop_front();
   }
-  // Ids grow: the smallest is the oldest.
+  // Ids increase, so the smallest is the oldest.
   while (samples_.size() > kMostHistories) samples_.erase(samples_.begin());
 }
 

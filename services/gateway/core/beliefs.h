@@ -1,4 +1,4 @@
-// Perdure's own JSON: all objects at a glance for each frame, and everything about one of them.
+// Perdure's own JSON: a summary of all objects for each frame, and the full state of one object.
 #pragma once
 
 #include <deque>
@@ -15,17 +15,17 @@ namespace perdure::gateway {
 
 /// "perdure.Objects". latency_ms below 0: not known.
 std::string objectsAtAGlance(const Objects& objects, double latency_ms);
-/// "perdure.Event", and the same in words as "foxglove.Log". `place`: where it happened, in W.
+/// "perdure.Event", and its text as "foxglove.Log". `place`: position of the event in W.
 std::string eventJson(const Event& event, const std::optional<Eigen::Vector3d>& place = {});
 std::string eventLog(const Event& event);
-/// "perdure.Detections"; without the model the classes have no names.
+/// "perdure.Detections"; without the model, classes have no names.
 std::string detectionsJson(const Detections& detections, const ModelInfo* model);
 std::string modelJson(const ModelInfo& model);
 
-/// "perdure.MapReply" of what the store answered. `map`: M; what lies in another is "elsewhere".
+/// "perdure.MapReply" from the map store's answer. `map`: M; objects of other maps are "elsewhere".
 std::string mapReplyJson(const MapReply& reply, const WorldId& map);
 
-/// How an object's existence, class and visibility were, twice a second, for some minutes.
+/// History of the objects' existence, class and visibility, twice a second, for some minutes.
 class History {
  public:
   void add(const Objects& objects);
@@ -39,11 +39,11 @@ class History {
   std::map<ObjectId, std::deque<Sample>> samples_;
 };
 
-/// "perdure.Object": its belief, why, when it should be seen again, and its history.
+/// "perdure.Object": its belief, the reasons, the predicted reappearance, and its history.
 std::string objectInFull(const ObjectBelief& object, const std::optional<Event>& returns,
                          const std::deque<History::Sample>* history);
 
-/// "perdure.Map", in M. `view`: what is known of it; `shown`: of these the ones that are told.
+/// "perdure.Map", in M. `view`: all known objects; `shown`: the objects that are sent.
 std::string mapJson(const MapLayer::View& view, const std::vector<MapObject>& shown,
                     TimePoint time);
 

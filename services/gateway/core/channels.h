@@ -1,5 +1,5 @@
-// What the gateway offers: one table of channels and services, from which `advertise`, the
-// schemas, the queues and the README come.
+// Channels and services of the gateway, in one table. `advertise`, the schemas, the queues and the
+// README are derived from it.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace perdure::gateway {
 
-/// Of each camera besides: kCamera + kPerCamera · index + one of CameraPart.
+/// In addition, each camera has channels kCamera + kPerCamera · index + one of CameraPart.
 enum Channel : std::uint32_t {
   kTransforms = 1,
   kScene,
@@ -31,7 +31,7 @@ enum Channel : std::uint32_t {
   kMapScene,
   kMapGraph,
   kMapGraphScene,
-  kRaw = 50,  ///< and on: topics of the bus as they are
+  kRaw = 50,  ///< first id of the bus's topics that are passed on unchanged
   kCamera = 100,
 };
 enum CameraPart : std::uint32_t {
@@ -46,35 +46,36 @@ constexpr std::uint32_t cameraChannel(std::size_t camera, CameraPart part) {
   return kCamera + kPerCamera * static_cast<std::uint32_t>(camera) + part;
 }
 
-/// What a client that is slow loses, and what one gets that comes late.
+/// Which messages slow clients lose, and which ones late clients receive.
 enum class Delivery {
-  kNewest,  ///< the newest replaces what has not been sent; who comes late gets it
-  kEach,    ///< a queue; the oldest are lost, counted and told; who comes late gets the last ones
+  kNewest,  ///< the newest message replaces an unsent one; late clients receive it
+  kEach,    ///< a queue that drops, counts and reports the oldest messages; late clients receive
+            ///< the last messages
 };
 
 struct ChannelInfo {
   std::uint32_t id = 0;
-  std::string topic;  ///< "/scene"
+  std::string topic;  ///< for example "/scene"
   std::string encoding, schema_name, schema_encoding, schema;
   Delivery delivery = Delivery::kNewest;
 };
 
 std::vector<ChannelInfo> channelTable(const std::vector<std::string>& cameras);
-/// A topic of the bus as it is, CDR with its IDL: "/raw/imu". For @final types alone, which go as
-/// XCDR1: the readers of others do not know XCDR2's delimiters.
+/// A topic of the bus that is passed on unchanged, as CDR with its IDL: "/raw/imu". Only for @final
+/// types, which use XCDR1, because readers of other types may not support XCDR2's delimiters.
 ChannelInfo rawChannel(std::uint32_t id, const std::string& topic, const std::string& type,
                        std::string idl);
 
-/// One message of a channel, encoded once for all who look.
+/// One message of a channel, encoded once for all clients.
 struct Encoded {
   std::uint32_t channel = 0;
   TimePoint time;
   std::shared_ptr<const std::string> payload;
 };
 
-/// What clients may ask for (the protocol's services), with JSON both ways.
+/// Services for clients (in the protocol's sense), with JSON in both directions.
 enum Service : std::uint32_t {
-  kGraphOfTheMap = 0,  ///< no service: the gateway asks for itself
+  kGraphOfTheMap = 0,  ///< not a service: a query of the gateway itself
   kObjectService = 1,
   kMapQueryService,
   kNextEventService
@@ -84,10 +85,10 @@ struct ServiceInfo {
   std::string name, type, request_schema, response_schema;
 };
 std::vector<ServiceInfo> serviceTable();
-/// To go on to the next event; of recordings alone.
+/// Continues to the next event; only for recordings.
 ServiceInfo nextEventService();
 
-/// A question of a client to one of them; answered by `client` and `call`.
+/// Service call of a client; `client` and `call` identify the answer.
 struct Call {
   std::uint64_t client = 0;
   std::uint32_t service = 0, call = 0;
@@ -97,17 +98,17 @@ struct Answer {
   std::uint64_t client = 0;
   std::uint32_t service = 0, call = 0;
   bool ok = true;
-  std::string payload;  ///< JSON; a sentence where !ok
+  std::string payload;  ///< JSON; a sentence if !ok
 };
 
 using Channels = std::set<std::uint32_t>;
 
-/// What a client wants of a recording that is played (capability playbackControl).
+/// Request of a client to control the playback of a recording (capability playbackControl).
 struct PlaybackRequest {
   bool play = true;
   double speed = 1.0;
   std::optional<TimePoint> seek;
-  std::string id;  ///< goes back with the answer
+  std::string id;  ///< id that is returned with the answer
 };
 struct PlaybackState {
   enum class Status : std::uint8_t { kPlaying = 0, kPaused = 1, kBuffering = 2, kEnded = 3 };
@@ -115,9 +116,9 @@ struct PlaybackState {
   TimePoint time;
   double speed = 1.0;
   bool did_seek = false;
-  std::string id;  ///< of the request that this answers; empty: none
+  std::string id;  ///< id of the answered request; empty: none
 };
-/// What a recording covers.
+/// Time range of a recording.
 struct TimeRange {
   TimePoint first, last;
 };

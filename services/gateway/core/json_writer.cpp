@@ -5,7 +5,7 @@
 namespace perdure::gateway {
 namespace {
 
-/// Bytes of the UTF-8 character at the front; 0 where there is none.
+/// Length in bytes of the first UTF-8 character; 0 if invalid.
 std::size_t characterAt(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned char first = byte(0);

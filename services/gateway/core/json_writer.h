@@ -1,4 +1,4 @@
-// JSON as text, appended piece by piece: what goes out twenty times a second builds no tree first.
+// Writes JSON as text piece by piece. Messages that are sent twenty times a second need no tree.
 #pragma once
 
 #include <charconv>
@@ -11,7 +11,7 @@
 
 namespace perdure::gateway {
 
-/// Puts the commas. Objects and arrays must be closed by the caller, keys come before values.
+/// Inserts commas. The caller closes objects and arrays, and writes keys before values.
 class JsonWriter {
  public:
   explicit JsonWriter(std::size_t expected = 1024) { out_.reserve(expected); }
@@ -32,7 +32,8 @@ class JsonWriter {
     out_ += "\":";
     return *this;
   }
-  /// With so many decimals; what is not finite becomes 0, since JSON has no word for it.
+  /// Writes a number with `decimals` decimals. A value that is not finite becomes 0, because JSON
+  /// cannot represent it.
   JsonWriter& number(double value, int decimals = 4) {
     comma();
     char buffer[64];
@@ -64,15 +65,15 @@ class JsonWriter {
     out_ += "null";
     return *this;
   }
-  /// Escaped; bytes that are no UTF-8 become '?'.
+  /// Writes escaped text; bytes that are not UTF-8 become '?'.
   JsonWriter& text(std::string_view value);
-  /// A key that is not ours, hence to be escaped.
+  /// Writes a key from outside, which must be escaped.
   JsonWriter& textKey(std::string_view name) {
     text(name);
     out_ += ':';
     return *this;
   }
-  /// Text that is JSON already.
+  /// Writes text that is already JSON.
   JsonWriter& raw(std::string_view json) {
     comma();
     out_ += json;

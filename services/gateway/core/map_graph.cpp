@@ -19,7 +19,7 @@ constexpr std::int64_t kRefused_ns = 5'000'000'000;
 
 const char* wordOf(MapLoopKind kind) { return kind == MapLoopKind::kTie ? "tie" : "loop"; }
 
-/// The page has the same in words.js.
+/// The page has the same colours in words.js.
 Colour colourOf(const MapLoop& loop) {
   if (loop.state == MapLoopState::kWithdrawn) return {1.0, 0.56, 0.53, 0.9};
   if (loop.state == MapLoopState::kTentative) return {0.96, 0.75, 0.25, 0.9};
@@ -31,7 +31,7 @@ std::string sessionOf(const MapAnchor& anchor) {
   return fmt::format("{}/{}", toHex(anchor.session.world), anchor.session.epoch);
 }
 
-/// Empty where it is not known.
+/// Writes an empty list if sigma is not known.
 void putSigma(JsonWriter& json, const Eigen::Vector4d& sigma, bool known) {
   json.key("sigma");
   putNumbers(json, {sigma.data(), known ? 4U : 0U}, 4);
@@ -60,7 +60,7 @@ void putLoop(JsonWriter& json, const MapLoop& loop) {
   json.end(']').key("landmarks").integer(loop.landmarks).end('}');
 }
 
-/// [p, yaw] for people.
+/// Text of [p, yaw] for people.
 std::string metresAndDegrees(const Eigen::Vector4d& v) {
   return fmt::format("{:.3f} {:.3f} {:.3f} m, {:.2f} deg", v[0], v[1], v[2],
                      v[3] * 180.0 / std::numbers::pi);
@@ -133,7 +133,7 @@ void putWay(JsonWriter& json, TimePoint time, const MapReply& graph, const Ancho
   putLine(json, LineType::kSegments, 1.5, ends, {0.44, 0.58, 0.72, 0.6});
 }
 
-/// Raised between its ends: both may lie on the way.
+/// Draws a raised arch between the ends of the loop, because both may lie on the trajectory.
 void putArch(JsonWriter& json, TimePoint time, const MapLoop& loop, const Eigen::Vector3d& a,
              const Eigen::Vector3d& b) {
   const Eigen::Vector3d top =

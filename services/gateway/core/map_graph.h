@@ -1,4 +1,4 @@
-// The graph of the map, for who looks at it: its anchors and loops in M, as map_store answered.
+// Graph of the map for display: anchors and loops in M, as answered by map_store.
 #pragma once
 
 #include <cstdint>
@@ -8,19 +8,19 @@
 
 namespace perdure::gateway {
 
-/// So many anchors are asked for, nearest to the body first.
+/// Largest number of anchors requested, nearest to the body first.
 inline constexpr std::uint32_t kMostOfGraph = 2000;
 
-/// When map_store is asked: where somebody looks, at once and then where the graph has changed, but
-/// seldom. A large graph more seldom: about as many bytes a second whatever it holds.
+/// Decides when map_store is queried: at once for a new client, then after changes, at a low rate.
+/// A large graph is queried less often, so that the bytes per second are about constant.
 class GraphPace {
  public:
-  /// It may be another one than was told last.
+  /// The graph may differ from the last answer.
   void changed() { stale_ = true; }
-  /// Whether to ask now. `now_ns`: a monotonic time.
+  /// Whether to query now. `now_ns`: a monotonic time.
   bool due(std::int64_t now_ns);
   void answered(const MapReply& reply, std::int64_t now_ns);
-  /// It is asked again, where somebody looks still.
+  /// Repeats the query later, if clients still need it.
   void refused(std::int64_t now_ns);
   void begin() { stale_ = true, waits_ = false, next_ns_ = 0; }
 
@@ -29,15 +29,15 @@ class GraphPace {
   std::int64_t next_ns_ = 0;
 };
 
-/// What of a reply lies on the map that is looked at.
+/// The part of a reply that lies on the displayed map.
 MapReply graphOn(const WorldId& map, MapReply reply);
 
-/// "perdure.MapGraph", in M. `why_none`: a sentence where there is none.
+/// "perdure.MapGraph", in M. `why_none`: a sentence if there is no graph.
 std::string mapGraphJson(const MapReply& graph, const std::string& why_none, TimePoint time);
 
-/// The same as foxglove.SceneUpdate in the frame `map`: anchors as spheres, the way between them as
-/// a line, loops as raised lines in the colour of their state. Metadata say what each is. Each
-/// message is the whole of it and clears what was before.
+/// The graph as foxglove.SceneUpdate in the frame `map`. Anchors are spheres, the trajectory
+/// between them is a line, and loops are arches in the colour of their state. Metadata describe
+/// each entity. Each message is complete and replaces the previous one.
 std::string mapGraphScene(const MapReply& graph, TimePoint time);
 
 }  // namespace perdure::gateway

@@ -1,5 +1,5 @@
-// The durable map as it lies over the working set: its tiles are in M, the working set is in W, and
-// T_MW of `map/frame` is between the two.
+// The durable map in relation to the working set. Its tiles are in M, the working set is in W, and
+// T_MW of `map/frame` connects them.
 #pragma once
 
 #include <map>
@@ -14,27 +14,28 @@ namespace perdure::gateway {
 
 class MapLayer {
  public:
-  /// `map/frame`.
+  /// Takes a message of `map/frame`.
   void follow(const MapFrame& frame);
   void put(const MapTile& tile);
   void erase(const MapTile& key);
-  /// Tiles are no longer heard.
+  /// Clears the tiles, because they are no longer received.
   void clear() { tiles_.clear(); }
   bool empty() const { return tiles_.empty(); }
-  /// Whether tiles or T_MW have changed since this was asked last.
+  /// Whether tiles or T_MW have changed since the last call.
   bool takeChanged();
 
-  /// The newest frame, where it is of this W.
+  /// The newest frame if it belongs to this W; otherwise nullptr.
   const MapFrame* frameOf(const WorldId& world) const;
-  /// Maps points of W into M. Identity where no frame of this W came: the map store then publishes
-  /// what lies in W as it is.
+  /// Transforms points from W to M. Identity if no frame of this W was received; the map store then
+  /// publishes objects of W unchanged.
   RigidTransform T_MW(const WorldId& world) const;
-  /// M, of this W.
+  /// M of this W.
   WorldId mapOf(const WorldId& world) const;
 
   struct View {
     std::vector<MapObject> here;  ///< in the M of this W
-    std::size_t elsewhere = 0;    ///< objects of maps whose place in this M is not known
+    std::size_t elsewhere = 0;    ///< number of objects of maps whose transform to this M is
+                                  ///< unknown
   };
   View viewFrom(const WorldId& world) const;
 
@@ -44,12 +45,12 @@ class MapLayer {
   bool changed_ = false;
 };
 
-/// "perdure.MapFrame".
+/// The message "perdure.MapFrame".
 std::string mapFrameJson(const MapFrame& frame);
 
-/// So many objects of the map are told.
+/// Largest number of map objects that are sent.
 inline constexpr std::size_t kMostOfMap = 2000;
-/// The nearest kMostOfMap of `objects`, nearest first. `p_MB`: the body in M.
+/// The nearest kMostOfMap of `objects`, nearest first. `p_MB`: position of the body in M.
 std::vector<MapObject> nearestTo(const Eigen::Vector3d& p_MB, std::vector<MapObject> objects);
 
 }  // namespace perdure::gateway

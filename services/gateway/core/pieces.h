@@ -1,4 +1,4 @@
-// The small pieces of which Foxglove's JSON messages are made.
+// Parts that several of Foxglove's JSON messages share.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,31 +13,31 @@
 
 namespace perdure::gateway {
 
-/// The frames of REP-105 and REP-103; the camera's is <name>_optical. The odometry's W is `odom`.
+/// Frames of REP-105 and REP-103; a camera's frame is <name>_optical. The odometry's W is `odom`.
 inline constexpr char kMapFrame[] = "map", kOdomFrame[] = "odom", kBodyFrame[] = "base_link";
 std::string opticalFrame(const std::string& camera);
 
-/// {"sec", "nsec"}; before 1970 is 0.
+/// Writes {"sec", "nsec"}; times before 1970 become 0.
 void putTime(JsonWriter& json, TimePoint time);
 void putVector(JsonWriter& json, const Eigen::Vector3d& v);
 void putQuaternion(JsonWriter& json, const Eigen::Quaterniond& q);
 void putPose(JsonWriter& json, const RigidTransform& T);
 void putColour(JsonWriter& json, const Colour& colour);
-/// [1, 2, 3]
+/// Writes a list of numbers, for example [1, 2, 3].
 void putNumbers(JsonWriter& json, std::span<const double> values, int decimals = 4);
 
-/// Of foxglove.SceneUpdate.
+/// Constants of foxglove.SceneUpdate.
 enum class DeletionType { kMatching = 0, kAll = 1 };
 enum class LineType { kStrip = 0, kLoop = 1, kSegments = 2 };
 void putDeletion(JsonWriter& json, TimePoint time, DeletionType type, const std::string& id);
-/// A scene entity up to its metadata.
+/// Begins a scene entity, up to its metadata.
 void beginEntity(JsonWriter& json, TimePoint time, const char* frame, const std::string& id);
-/// `without`: the lists of primitives that it does not have.
+/// Ends a scene entity. `without`: primitive types that it does not contain.
 void endEntity(JsonWriter& json, std::initializer_list<const char*> without);
-/// An item of metadata.
+/// Writes an item of metadata.
 void putPair(JsonWriter& json, const char* name, const std::string& value);
 
-/// About the vertical `up`, as the objects' yaw is.
+/// Rotation about the vertical `up`, like the objects' yaw.
 Eigen::Quaterniond rotationOfYaw(double yaw);
 
 }  // namespace perdure::gateway

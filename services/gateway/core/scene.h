@@ -1,5 +1,5 @@
 // The objects as foxglove.SceneUpdate: a cuboid, its 2-sigma ellipsoid and its name for each
-// confirmed object; edges are dashed where something hides it, faint where it is out of view.
+// confirmed object. Edges are dashed if the object is occluded, and faint if it is out of view.
 #pragma once
 
 #include <deque>
@@ -15,8 +15,8 @@ namespace perdure::gateway {
 
 class Scene {
  public:
-  /// The whole scene in one message, so that a client may lose any of them; what has gone is told
-  /// again in the next hundred.
+  /// The whole scene in one message, so that a client may lose messages. Deletions are repeated in
+  /// the next hundred messages.
   std::string update(const Objects& objects);
 
  private:
@@ -27,12 +27,12 @@ class Scene {
   std::optional<WorldId> world_;
   std::set<ObjectId> shown_;
   std::deque<Gone> gone_;
-  int clear_ = 0;  ///< messages that still say that all before is to be deleted
+  int clear_ = 0;  ///< remaining messages that delete the whole previous scene
 };
 
 /// The durable map as foxglove.SceneUpdate in the frame `map`: pale cuboids with their names,
-/// dashed where provisional. Each message is the whole of it and clears what was before. `objects`
-/// are in M; those in `working`, which `Scene` shows, are left out.
+/// dashed if provisional. Each message is complete and replaces the previous one. `objects` are in
+/// M. Those in `working` are left out, because `Scene` shows them.
 std::string mapScene(const std::vector<MapObject>& objects, const std::set<ObjectId>& working,
                      TimePoint time);
 

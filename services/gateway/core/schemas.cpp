@@ -116,7 +116,7 @@ Json entity() {
                  {"models", listOf(model3d())}});
 }
 
-/// Of one object, as `objects` and the map have it in common.
+/// Schema of one object, common to `objects` and the map.
 Json glance() {
   return object({{"id", natural()},
                  {"class", text()},

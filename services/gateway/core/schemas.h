@@ -1,5 +1,5 @@
-// JSON schemas of what the gateway sends: Foxglove's well-known ones, by their public field lists,
-// and Perdure's own. As text.
+// JSON schemas of the gateway's messages, as text: Foxglove's well-known schemas, from their public
+// field lists, and Perdure's own.
 #pragma once
 
 #include <string>
@@ -28,7 +28,7 @@ std::string objectRequest();
 std::string mapRequest();
 std::string mapReply();
 
-/// Of foxglove::CompressedImage, which goes as CDR: its bytes need no base64.
+/// IDL of foxglove::CompressedImage, which is sent as CDR, because its bytes then need no base64.
 std::string compressedImageIdl();
 
 }  // namespace perdure::gateway::schemas

@@ -1,4 +1,4 @@
-// How the services are, for the page ("perdure.Health"), for /healthz and for Prometheus.
+// State of the services, for the page ("perdure.Health"), for /healthz and for Prometheus.
 #pragma once
 
 #include <cstdint>
@@ -10,14 +10,14 @@
 
 namespace perdure::gateway {
 
-/// A figure of the gateway's own, for /metrics.
+/// A metric of the gateway, for /metrics.
 struct Figure {
   std::string name, help;
-  bool counts = false;  ///< a counter; else a gauge
+  bool counts = false;  ///< a counter; otherwise a gauge
   double value = 0;
 };
 
-/// Times are of CLOCK_MONOTONIC in ns; 0: never.
+/// Last times of messages, on CLOCK_MONOTONIC in ns; 0: never.
 struct Silence {
   std::int64_t objects_ns = 0, odometry_ns = 0;
 };
@@ -28,12 +28,12 @@ class VitalSigns {
 
   void onHealth(const Health& health, std::int64_t now_ns);
   bool hears(const std::string& process, std::int64_t now_ns) const;
-  /// Services that are not heard, and in a sentence who does their work instead.
+  /// Sets the services that do not report, each with a sentence on the program that replaces it.
   void setStandIns(std::map<std::string, std::string> sentences);
 
-  /// "perdure.Health"
+  /// The message "perdure.Health".
   std::string json(std::int64_t now_ns, const Silence& last) const;
-  /// {"status": "ok" or "degraded" or "silent", …}
+  /// The answer {"status": "ok" or "degraded" or "silent", …}
   std::string healthz(std::int64_t now_ns) const;
   /// Prometheus' text format, 0.0.4.
   std::string metrics(std::int64_t now_ns, const std::vector<Figure>& own,
@@ -43,7 +43,7 @@ class VitalSigns {
   struct Service {
     Health health;
     std::int64_t heard_ns = 0;
-    double cpu = -1.0;  ///< of one core, between the last two; below 0: not known
+    double cpu = -1.0;  ///< share of one core between the last two messages; below 0: not known
   };
   const std::string vehicle_;
   std::map<std::string, Service> services_;

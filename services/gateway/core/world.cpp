@@ -31,7 +31,7 @@ void putHeader(JsonWriter& json, TimePoint time, const std::string& frame) {
   json.key("frame_id").text(frame);
 }
 
-/// Little-endian CDR without alignment beyond four bytes, which is all that the image needs.
+/// Little-endian CDR with alignment up to four bytes, which suffices for the image.
 class Cdr {
  public:
   explicit Cdr(std::size_t expected) {
@@ -119,7 +119,7 @@ std::string cameraCalibration(const CameraCalibration& camera, TimePoint time) {
                                  camera.cy, 0, 0,         0, 1, 0};
   std::vector<double> D = camera.distortion_coefficients;
   const bool fisheye = camera.distortion == DistortionModel::kEquidistant;
-  if (!fisheye) D.resize(5, 0.0);  // plumb_bob has five
+  if (!fisheye) D.resize(5, 0.0);  // plumb_bob has five coefficients
   JsonWriter json;
   putHeader(json, time, opticalFrame(camera.name));
   json.key("width").integer(camera.width).key("height").integer(camera.height);
@@ -148,7 +148,7 @@ std::string compressedImage(const FrameStamp& stamp, const std::string& camera,
 }
 
 void Trajectory::add(TimePoint time, const WorldId& world, const RigidTransform& T_WB) {
-  const bool again = time + kBack < time_;  // a recording that begins again
+  const bool again = time + kBack < time_;  // the recording has restarted
   if (world != world_ || again) {
     world_ = world;
     poses_.clear();

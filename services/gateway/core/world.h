@@ -1,4 +1,4 @@
-// Where things are, for Foxglove: frames, the body's pose and way, landmarks, the camera.
+// Geometry for Foxglove: frames, the pose and trajectory of the body, landmarks, the camera.
 #pragma once
 
 #include <string>
@@ -13,16 +13,15 @@ namespace perdure::gateway {
 std::string frameTransforms(TimePoint time, const RigidTransform& T_MW, const RigidTransform& T_WB,
                             const Calibration* calibration);
 std::string poseInFrame(TimePoint time, const RigidTransform& T_WB);
-/// x, y, z, sigma as 32-bit floats.
+/// Points with x, y, z and sigma as 32-bit floats.
 std::string landmarksAsPoints(const Landmarks& landmarks);
 std::string cameraCalibration(const CameraCalibration& camera, TimePoint time);
 
-/// foxglove::CompressedImage as CDR (XCDR1, little-endian). `jpeg` are the bytes.
+/// foxglove::CompressedImage as CDR (XCDR1, little-endian). `jpeg`: the image's bytes.
 std::string compressedImage(const FrameStamp& stamp, const std::string& camera,
                             std::span<const std::uint8_t> jpeg);
 
-/// The way of the body, thinned: a point at least every so often as it matters to the eye, and
-/// never more than some thousands.
+/// Trajectory of the body, thinned to at most a few thousand points.
 class Trajectory {
  public:
   void add(TimePoint time, const WorldId& world, const RigidTransform& T_WB);

@@ -14,7 +14,7 @@ tl::unexpected<Reason> malformed(const std::string& member, const std::string& i
   return fail("member_malformed", "\"" + member + "\" has to be " + is);
 }
 
-/// A natural number of 32 bits; nothing where it is none.
+/// A natural number of 32 bits; empty for other values.
 std::optional<std::uint32_t> naturalOf(const Json& value) {
   if (!value.is_number_integer()) return std::nullopt;
   if (!value.is_number_unsigned() && value.get<std::int64_t>() < 0) return std::nullopt;
@@ -74,7 +74,7 @@ Result<ClientMessage> fetchAsset(const Json& message) {
   return FetchAsset{*request, textOf(message, "uri")};
 }
 
-/// Little-endian numbers and texts from the front of some bytes.
+/// Reads little-endian numbers and texts from the front of a byte range.
 class Take {
  public:
   explicit Take(std::span<const std::uint8_t> bytes) : rest_(bytes) {}

@@ -1,5 +1,5 @@
-// What a client of the Foxglove WebSocket protocol may say (subprotocols foxglove.sdk.v1 and
-// foxglove.websocket.v1), parsed and bounded: whatever bytes come, there is a value or a reason.
+// Messages from clients of the Foxglove WebSocket protocol (subprotocols foxglove.sdk.v1 and
+// foxglove.websocket.v1). They are parsed and bounded: any bytes give a value or a reason.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace perdure::gateway::protocol {
 
-/// At most so many in one message.
+/// Largest number of subscriptions in one message.
 inline constexpr std::size_t kMostSubscriptions = 256;
 
 struct Subscription {
@@ -37,9 +37,10 @@ struct ServiceCall {
   std::uint32_t service = 0, call = 0;
   std::string encoding, payload;
 };
-/// Sound, and of no consequence here: connection graph, updates of parameters.
+/// Valid messages without effect: connection graph, updates of parameters.
 struct Ignored {};
-/// Sound, and refused: this gateway only shows ("advertise", "setParameters", messages).
+/// Valid messages that are refused, because this gateway only displays: "advertise",
+/// "setParameters", messages.
 struct NotOffered {
   std::string what;
 };
@@ -47,9 +48,9 @@ struct NotOffered {
 using ClientMessage = std::variant<Subscribe, Unsubscribe, GetParameters, FetchAsset, ServiceCall,
                                    PlaybackRequest, Ignored, NotOffered>;
 
-/// Reasons: json_malformed, op_missing, op_unknown, member_malformed, too_many_subscriptions.
+/// Fails with json_malformed, op_missing, op_unknown, member_malformed or too_many_subscriptions.
 Result<ClientMessage> parseText(std::string_view text);
-/// Reasons: binary_empty, binary_unknown, binary_short, playback_malformed.
+/// Fails with binary_empty, binary_unknown, binary_short or playback_malformed.
 Result<ClientMessage> parseBinary(std::span<const std::uint8_t> bytes);
 
 }  // namespace perdure::gateway::protocol

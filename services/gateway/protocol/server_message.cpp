@@ -63,7 +63,7 @@ std::string serverInfo(const std::string& name, const std::string& session,
   json.begin('{').key("op").text("serverInfo").key("name").text(name);
   json.key("capabilities").begin('[').text("time").text("services");
   if (range)
-    json.text("playbackControl").text("rangedPlayback");  // as newer and older SDKs call it
+    json.text("playbackControl").text("rangedPlayback");  // names in newer and in older SDKs
   json.end(']');
   if (range) {
     json.key("dataStartTime");

@@ -1,5 +1,6 @@
-// What the server of the Foxglove WebSocket protocol says. Text where it returns a text, else the
-// bytes of a binary message.
+// Messages from the server of the Foxglove WebSocket protocol. time(), playbackState(),
+// serviceResponse(), assetMissing() and messageHead() return bytes of binary messages. The other
+// functions return JSON texts.
 #pragma once
 
 #include <array>
@@ -15,12 +16,12 @@ namespace perdure::gateway::protocol {
 /// The newest first; a client that offers none of them is refused.
 inline constexpr std::array<std::string_view, 2> kSubprotocols{"foxglove.sdk.v1",
                                                                "foxglove.websocket.v1"};
-/// The one to be spoken, of a Sec-WebSocket-Protocol header; empty where there is none.
+/// Selects the subprotocol from a Sec-WebSocket-Protocol header; empty if none is supported.
 std::string_view chooseSubprotocol(std::string_view offered);
 
 enum class StatusLevel { kInfo = 0, kWarning = 1, kError = 2 };
 
-/// `range`: of a recording that clients control; nothing where it is live.
+/// `range`: time range of a recording that clients control; empty for live data.
 std::string serverInfo(const std::string& name, const std::string& session,
                        const std::optional<TimeRange>& range = std::nullopt);
 std::string advertise(const std::vector<ChannelInfo>& channels);
@@ -34,7 +35,7 @@ std::string playbackState(const PlaybackState& state);
 std::string serviceResponse(std::uint32_t service, std::uint32_t call, std::string_view json);
 std::string assetMissing(std::uint32_t request, std::string_view message);
 
-/// What goes before a channel's payload.
+/// Header before a channel's payload.
 using MessageHead = std::array<std::uint8_t, 13>;
 MessageHead messageHead(std::uint32_t subscription, TimePoint time);
 

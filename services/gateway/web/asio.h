@@ -1,4 +1,4 @@
-// Boost.Asio and Beast, as this service uses them.
+// Includes and names of Boost.Asio and Beast for this service.
 #pragma once
 
 #include <boost/asio/io_context.hpp>
@@ -8,7 +8,8 @@
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
-#include <utility>  // before Asio: Boost 1.74 with GCC 12 misses std::exchange
+#include <utility>  // included before Asio, because Boost 1.74 with GCC 12 does not include it for
+                    // std::exchange
 
 namespace perdure::gateway::web {
 

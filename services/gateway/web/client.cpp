@@ -1,4 +1,5 @@
-// One WebSocket client: reads what it says, writes what waits for it, one message at a time.
+// One WebSocket client. It reads the client's messages, and writes the waiting messages one at a
+// time.
 #include <array>
 
 #include "services/gateway/web/shared.h"
@@ -6,8 +7,8 @@
 namespace perdure::gateway::web {
 namespace {
 
-/// Ends a connection without waiting until the client has closed its side as well. Beast's own
-/// teardown waits, for as long as a handshake may take, and then forgets what the client did wrong.
+/// Closes a connection without waiting until the client has closed its side. Beast's own teardown
+/// waits up to the timeout of a handshake, and then loses the client's error.
 class Wire : public beast::tcp_stream {
  public:
   explicit Wire(beast::tcp_stream stream) : beast::tcp_stream(std::move(stream)) {}
@@ -100,7 +101,7 @@ void Client::onRead(beast::error_code error) {
   if (!cut_) read();
 }
 
-/// The first of read and write that fails takes the client off the hub; the other finds it gone.
+/// The first failure of read or write removes the client from the hub; the second has no effect.
 void Client::noteEnd(beast::error_code error) {
   if (!joined_) return;
   joined_ = false;
@@ -150,8 +151,8 @@ void Client::onWritten(beast::error_code error, std::size_t bytes) {
   flush();
 }
 
-/// At once: a close frame would wait behind what the client does not read. Its own read then fails
-/// and takes it off the hub.
+/// Closes without a close frame, which would wait behind data that the client does not read. The
+/// client's read then fails, which removes it from the hub.
 void Client::cut(const std::string&) {
   if (cut_) return;
   cut_ = true;

@@ -73,7 +73,7 @@ void Files::replaceIn(const std::string& path, const std::string& from, const st
   for (auto at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size())) {
     text.replace(at, from.size(), to);
   }
-  changed->packed.clear();  // it is of what was there before
+  changed->packed.clear();  // was compressed from the previous content
   changed->tag = '"' + toHex(digest(text)) + '"';
   found->second = std::move(changed);
 }

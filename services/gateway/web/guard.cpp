@@ -13,7 +13,7 @@ std::string lower(std::string_view text) {
   return result;
 }
 
-/// Takes as long for every text of one length.
+/// Compares in a time that depends only on the length of `a`.
 bool sameSecret(std::string_view a, std::string_view b) {
   unsigned differs = a.size() == b.size() ? 0U : 1U;
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -23,7 +23,7 @@ bool sameSecret(std::string_view a, std::string_view b) {
   return differs == 0;
 }
 
-/// The value of token= in a query; percent signs are left alone, a token needs none.
+/// Value of token= in a query. Percent signs are not decoded, because tokens do not need them.
 std::string_view tokenIn(std::string_view target) {
   constexpr std::string_view kName = "token=";
   const std::size_t question = target.find('?');
@@ -47,7 +47,7 @@ bool isNumber(std::string_view text, int most) {
   return value <= most;
 }
 
-/// Four numbers, of which the first is 127: "127.0.0.1.evil.example" is none.
+/// True for four numbers of which the first is 127; "127.0.0.1.evil.example" is not one.
 bool isLoopback4(std::string_view address) {
   if (!address.starts_with("127.")) return false;
   int parts = 0;
@@ -81,7 +81,7 @@ Result<void> Guard::checkHost(std::string_view host) const {
   const auto& allowed = options_.allowed_hosts;
   const bool listed = std::any_of(allowed.begin(), allowed.end(),
                                   [&](const auto& one) { return lower(one) == name; });
-  // Behind a name that leads here from a page elsewhere there is no token.
+  // A foreign page whose name resolves to this host does not have the token.
   const bool guarded = !options_.token.empty() && !name.empty();
   if (guarded || isLoopback(name) || name == options_.address || listed) return {};
   return fail("host_refused", "the Host header names \"" + name.substr(0, 64) +

@@ -1,5 +1,6 @@
-// Who may talk to the gateway: its Host and Origin, against pages that were not meant (any page in
-// a browser may open ws://127.0.0.1, and a name that leads there), and the token.
+// Access control of the gateway. Host and Origin are checked against foreign pages, because any
+// page in a browser may open ws://127.0.0.1 or a name that resolves to it. The token is checked as
+// well.
 #pragma once
 
 #include <string>
@@ -10,28 +11,30 @@
 
 namespace perdure::gateway::web {
 
-/// 127.0.0.0/8, ::1 or localhost.
+/// True for 127.0.0.0/8, ::1 and localhost.
 bool isLoopback(std::string_view address);
 
-/// Of a Host header, without its port; "[::1]:80" → "::1". Lower-case.
+/// Name in a Host header, without its port and in lower case; "[::1]:80" → "::1".
 std::string hostName(std::string_view header);
 
 class Guard {
  public:
   explicit Guard(const Options& options) : options_(options) {}
 
-  /// Reason host_refused: the name in the Host header is none of ours.
+  /// Fails with host_refused if the Host header does not name this gateway.
   Result<void> checkHost(std::string_view host) const;
-  /// Reason origin_refused. An empty one is no browser's; one of the same host and port is ours.
+  /// Fails with origin_refused. An empty origin does not come from a browser; an origin with the
+  /// same host and port is the gateway's own page.
   Result<void> checkOrigin(std::string_view origin, std::string_view host) const;
-  /// Reason token_wrong. In the target's query, or as "Bearer …"; in constant time.
+  /// Fails with token_wrong. The token is in the target's query, or given as "Bearer …"; the
+  /// comparison takes constant time.
   Result<void> checkToken(std::string_view target, std::string_view authorization) const;
 
  private:
   const Options options_;
 };
 
-/// The path of a target, without its query.
+/// Path of a target, without its query.
 std::string_view pathOf(std::string_view target);
 
 }  // namespace perdure::gateway::web

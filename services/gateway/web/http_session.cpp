@@ -1,4 +1,4 @@
-// Requests of one connection, one after the other; a WebSocket takes the connection over.
+// Processes the requests of one connection in order. A WebSocket upgrade ends the HTTP session.
 #include <functional>
 #include <optional>
 
@@ -8,9 +8,9 @@
 namespace perdure::gateway::web {
 namespace {
 
-constexpr std::chrono::seconds kPatience{10};  // for a whole request, and for its answer
+constexpr std::chrono::seconds kPatience{10};  // time limit for a whole request, and for its answer
 constexpr std::uint32_t kLongestHeader = 8192;
-constexpr int kMostRequests = 1000;  // of one connection
+constexpr int kMostRequests = 1000;  // requests of one connection
 
 constexpr char kNoPage[] =
     "The page was not built, because npm was not there when Perdure was configured: install npm, "
@@ -62,7 +62,7 @@ std::string_view view(beast::string_view text) { return {text.data(), text.size(
 
 void HttpSession::onRead(beast::error_code error) {
   if (error == beast::error::timeout) {
-    // A connection that only waits, as browsers hold some, is ended without a word.
+    // Browsers keep idle connections open; closing one is not counted.
     if (parser_->got_some()) shared_->hub.reasons().add("http_too_slow");
     return;
   }
@@ -72,7 +72,7 @@ void HttpSession::onRead(beast::error_code error) {
     return;
   }
   if (error) {
-    // Who only hangs up says nothing wrong.
+    // A connection that the client closes is not counted as an error.
     const bool hung_up = error == http::error::end_of_stream || error == asio::error::eof ||
                          error.category() == asio::error::get_system_category();
     if (!hung_up) shared_->hub.reasons().add("http_malformed");
@@ -192,7 +192,7 @@ void HttpSession::send(std::shared_ptr<Response> response, std::shared_ptr<const
       http::to_status_class(response->result()) != http::status_class::client_error;
   response->keep_alive(goes_on);
   stream_.expires_after(kPatience);
-  // The serializer must outlive the write; HEAD and 304 tell a length without a body.
+  // The serializer must outlive the write. Answers to HEAD and 304 have a length without a body.
   using Serializer = http::response_serializer<typename Response::body_type>;
   auto serializer = std::make_shared<Serializer>(*response);
   const bool bare = parser_->get().method() == http::verb::head;

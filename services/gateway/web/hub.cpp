@@ -7,14 +7,14 @@ namespace perdure::gateway::web {
 namespace {
 
 constexpr int kMostASecond = 200;        // messages of one client
-constexpr std::size_t kMostOfOne = 512;  // subscriptions
+constexpr std::size_t kMostOfOne = 512;  // subscriptions of one client
 
 template <class... F>
 struct Overloaded : F... {
   using F::operator()...;
 };
 template <class... F>
-Overloaded(F...) -> Overloaded<F...>;  // clang 14 does not find it by itself
+Overloaded(F...) -> Overloaded<F...>;  // clang 14 does not deduce this itself
 
 }  // namespace
 
@@ -151,7 +151,8 @@ void Hub::unsubscribe(Viewer& viewer, std::uint32_t subscription) {
   viewer.outbox_.forget(subscription);
 }
 
-/// What nobody looks at is not made any more, so what was kept of it grows old.
+/// A channel without viewers is no longer computed, so its stored messages are cleared before they
+/// become old.
 void Hub::release(std::uint32_t channel) {
   Kept& kept = channels_.at(channel);
   if (--kept.subscriptions == 0) kept.messages.clear();
@@ -181,7 +182,7 @@ void Hub::callService(Viewer& viewer, const protocol::ServiceCall& call) {
 
 void Hub::answer(const Answer& answer) {
   const auto viewer = viewers_.find(answer.client);
-  if (viewer == viewers_.end()) return;  // it has left meanwhile
+  if (viewer == viewers_.end()) return;  // the client has left in the meantime
   if (answer.ok) {
     say(*viewer->second, protocol::serviceResponse(answer.service, answer.call, answer.payload),
         false);
@@ -205,7 +206,7 @@ void Hub::complain(Viewer& viewer, const std::string& sentence) {
 
 void Hub::publish(const Encoded& message) {
   const auto channel = channels_.find(message.channel);
-  // Nobody looks any more: this was made before that was heard.
+  // The last viewer has left; the message was made before this was known.
   if (channel == channels_.end() || channel->second.subscriptions == 0) return;
   Kept& kept = channel->second;
   ++published_;

@@ -1,5 +1,5 @@
-// Who looks at what: subscriptions of all clients, what late ones get, and the calls of services.
-// Knows no sockets; used by one thread.
+// Subscriptions of all clients, messages for late clients, and service calls. The hub has no
+// sockets; one thread uses it.
 #pragma once
 
 #include <chrono>
@@ -19,7 +19,7 @@
 
 namespace perdure::gateway::web {
 
-/// One client, whatever carries its bytes.
+/// One client, independent of its transport.
 class Viewer {
  public:
   explicit Viewer(std::size_t most_events) : outbox_(most_events, kMostControl) {}
@@ -27,9 +27,9 @@ class Viewer {
   Outbox& outbox() { return outbox_; }
   std::uint64_t id() const { return id_; }
 
-  /// Something waits in the outbox.
+  /// Called if a message waits in the outbox.
   virtual void flush() = 0;
-  /// To be ended, with the reason in words.
+  /// Closes the client; `why` is the reason as text.
   virtual void cut(const std::string& why) = 0;
 
  private:
@@ -37,7 +37,7 @@ class Viewer {
   static constexpr std::size_t kMostControl = 256;
   Outbox outbox_;
   std::uint64_t id_ = 0;
-  std::map<std::uint32_t, std::uint32_t> channel_of_;  ///< by subscription
+  std::map<std::uint32_t, std::uint32_t> channel_of_;  ///< channels by subscription
   std::chrono::steady_clock::time_point second_{};
   int said_ = 0;  ///< messages in that second
 };
@@ -45,19 +45,19 @@ class Viewer {
 class Hub {
  public:
   struct Told {
-    std::function<void(const Channels&)> wanted;  ///< channels that somebody looks at; on change
+    std::function<void(const Channels&)> wanted;  ///< channels with viewers; called on change
     std::function<void(Call)> call;
-    std::function<void(PlaybackRequest)> playback = {};  ///< empty: it is live
+    std::function<void(PlaybackRequest)> playback = {};  ///< empty for live data
   };
   Hub(std::string name, std::string session, std::size_t most_events, Told told);
 
   void join(Viewer& viewer);
   void leave(Viewer& viewer);
-  /// What a client said; `now` bounds how often.
+  /// Handles a message of a client; `now` limits their rate.
   void hear(Viewer& viewer, std::string_view bytes, bool text,
             std::chrono::steady_clock::time_point now);
 
-  /// The channels must not be empty; once.
+  /// Sets the channels and services, once; `channels` must not be empty.
   void offer(std::vector<ChannelInfo> channels, std::vector<ServiceInfo> services,
              std::optional<TimeRange> range = std::nullopt);
   void publish(const Encoded& message);
@@ -67,7 +67,7 @@ class Hub {
 
   std::size_t clients() const { return viewers_.size(); }
   std::uint64_t published() const { return published_; }
-  /// Messages that slow clients lost, those that have left included.
+  /// Messages that slow clients lost, including clients that have left.
   std::uint64_t dropped() const;
   const ReasonCounts& reasons() const { return reasons_; }
   ReasonCounts& reasons() { return reasons_; }
@@ -75,7 +75,8 @@ class Hub {
  private:
   struct Kept {
     ChannelInfo info;
-    std::deque<Encoded> messages;  ///< for who comes late: the last events, else the newest one
+    std::deque<Encoded> messages;  ///< messages for late clients: the last ones of kEach, the
+                                   ///< newest of kNewest
     std::size_t subscriptions = 0;
   };
   void handle(Viewer& viewer, const protocol::ClientMessage& message);
@@ -94,8 +95,8 @@ class Hub {
   std::map<std::uint32_t, Kept> channels_;
   std::vector<ServiceInfo> services_;
   std::optional<TimeRange> range_;
-  std::string playback_;           ///< the newest state, for who comes late
-  std::optional<TimePoint> time_;  ///< the newest one, while somebody looks
+  std::string playback_;           ///< the newest state, for late clients
+  std::optional<TimePoint> time_;  ///< the newest time while there are viewers
   std::map<std::uint64_t, Viewer*> viewers_;
   std::uint64_t next_id_ = 1, published_ = 0, dropped_by_gone_ = 0;
   Channels wanted_;

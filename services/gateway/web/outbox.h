@@ -1,5 +1,5 @@
-// What waits to be sent to one client: bounded whatever the client does. Of a channel with
-// Delivery::kNewest the newest message replaces the one that waits; of kEach the oldest are lost.
+// Bounded queue of messages to one client. For Delivery::kNewest, a new message replaces the
+// waiting one; for kEach, the oldest messages are dropped.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ namespace perdure::gateway::web {
 
 struct Outgoing {
   bool text = false;
-  std::uint32_t subscription = 0;  ///< 0 bytes of head where this is the protocol's own message
+  std::uint32_t subscription = 0;  ///< 0 for a message of the protocol itself
   bool has_head = false;
   protocol::MessageHead head{};
   std::shared_ptr<const std::string> payload;
@@ -25,22 +25,23 @@ struct Outgoing {
 
 class Outbox {
  public:
-  /// At most so many events of one subscription, and so many messages of the protocol itself.
+  /// most_events: limit for each subscription. most_control: limit for messages of the protocol
+  /// itself.
   Outbox(std::size_t most_events, std::size_t most_control)
       : most_events_(most_events), most_control_(most_control) {}
 
   void put(const Encoded& message, std::uint32_t subscription, Delivery delivery);
-  /// False where the client has let too many wait: it does not read.
+  /// False if too many messages wait, because the client does not read.
   bool putControl(std::string message, bool text);
-  /// The time of the newest message; replaces one that waits.
+  /// Adds the time of the newest message, which replaces a waiting one.
   void putTime(std::string message);
-  /// What waits for this subscription is not wanted any more.
+  /// Removes the waiting messages of this subscription.
   void forget(std::uint32_t subscription);
 
   std::optional<Outgoing> take();
   std::size_t size() const { return waiting_.size(); }
   std::uint64_t dropped() const { return dropped_; }
-  /// Events that were lost since it was asked last.
+  /// Number of events lost since the last call.
   std::uint64_t takeLostEvents();
 
  private:
@@ -53,7 +54,7 @@ class Outbox {
 
   const std::size_t most_events_, most_control_;
   std::deque<Waiting> waiting_;
-  std::map<std::uint32_t, std::size_t> events_;  ///< that wait, by subscription
+  std::map<std::uint32_t, std::size_t> events_;  ///< number of waiting events, by subscription
   std::size_t control_ = 0;
   std::uint64_t dropped_ = 0, lost_events_ = 0;
 };

@@ -66,7 +66,7 @@ class Server::Impl {
 
   std::uint16_t port() const { return port_; }
 
-  /// Runs it in the server's thread; false where that is far behind.
+  /// Runs `work` in the server's thread. False if that thread is far behind.
   template <class Work>
   bool post(Work work) {
     if (posted_ >= kMostPosted) return false;
@@ -108,7 +108,7 @@ class Server::Impl {
     acceptor_.async_accept([this](beast::error_code error, tcp::socket socket) {
       if (!acceptor_.is_open()) return;
       if (error) {
-        // Out of descriptors: others have to end first.
+        // Without free descriptors, other connections must end first.
         shared_->hub.reasons().add("accept_failed");
         constexpr std::chrono::milliseconds kPause{100};
         auto pause = std::make_shared<asio::steady_timer>(io_, kPause);

@@ -1,5 +1,5 @@
-// The one port: HTTP for the page, /healthz and /metrics, and the Foxglove WebSocket protocol. One
-// thread serves all clients; everything here may be called from any thread.
+// Server of the only port: HTTP for the page, /healthz and /metrics, and the Foxglove WebSocket
+// protocol. One thread serves all clients. All functions may be called from any thread.
 #pragma once
 
 #include <cstdint>
@@ -17,23 +17,24 @@
 namespace perdure::gateway::web {
 
 struct Content {
-  std::string name, session;  ///< of serverInfo
+  std::string name, session;  ///< arguments of serverInfo
   std::vector<ChannelInfo> channels;
   std::vector<ServiceInfo> services;
   Files files;
-  std::optional<TimeRange> range = std::nullopt;  ///< of a recording that clients control
+  std::optional<TimeRange> range = std::nullopt;  ///< time range of a recording that clients
+                                                  ///< control
 };
 
 struct Stats {
   std::size_t clients = 0, connections = 0;
   std::uint64_t bytes_sent = 0, messages_sent = 0, published = 0, dropped = 0, requests = 0;
-  ReasonCounts reasons;  ///< of what was refused or cut
+  ReasonCounts reasons;  ///< reasons of refused or closed connections
 };
 
 class Server {
  public:
-  /// `told` is called in the server's thread. Throws StartupError (69) where the port cannot be
-  /// had.
+  /// `told` is called in the server's thread. Throws StartupError (69) if the port is not
+  /// available.
   Server(const Options& options, Content content, Hub::Told told);
   /// Ends all connections.
   ~Server();
@@ -45,10 +46,10 @@ class Server {
   void tellTime(TimePoint time);
   void answer(Answer answer);
   void tellPlayback(PlaybackState state);
-  /// What /healthz and /metrics answer from now on.
+  /// Sets the answers of /healthz and /metrics.
   void setTexts(std::string healthz, std::string metrics);
   Stats stats() const;
-  /// False where its thread has not turned for some seconds.
+  /// False if its thread has not run for some seconds.
   bool goesOn() const;
 
  private:

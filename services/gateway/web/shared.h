@@ -1,4 +1,4 @@
-// What all connections of the server have in common; of its one thread.
+// Data that all connections of the server share; used by its one thread.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace perdure::gateway::web {
 
-/// Ended with the server.
+/// A connection, closed when the server ends.
 class Connection {
  public:
   virtual ~Connection() = default;
@@ -27,14 +27,14 @@ struct Shared {
   Files files;
   Hub hub;
   std::string healthz, metrics;
-  std::chrono::steady_clock::time_point texts_at{};  ///< when the service's loop gave them
+  std::chrono::steady_clock::time_point texts_at{};  ///< last update by the service's loop
   std::uint64_t bytes_sent = 0, messages_sent = 0, requests = 0;
   std::set<Connection*> connections;
 };
 
-/// Reads requests, answers them, and hands a socket over to a client where it is upgraded.
+/// Reads and answers requests, and passes the socket to a client after an upgrade.
 void serveHttp(tcp::socket socket, std::shared_ptr<Shared> shared);
-/// Takes over from HTTP. `protocol` is the subprotocol that was agreed on.
+/// Takes over from HTTP. `protocol`: the negotiated subprotocol.
 void serveClient(beast::tcp_stream stream, Request request, std::string protocol,
                  std::shared_ptr<Shared> shared);
 

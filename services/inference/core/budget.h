@@ -1,5 +1,6 @@
-// The size of the network's input that keeps a frame within a time budget: smaller at once where
-// frames take too long, larger only after many that leave room, so that it does not swing.
+// Selects the input size of the network that keeps a frame within a time budget. The size decreases
+// at once if frames take too long. It increases only after many frames below the budget, so that it
+// does not oscillate.
 #pragma once
 
 #include <cstddef>
@@ -9,17 +10,19 @@ namespace perdure::inference {
 
 class Budget {
  public:
-  static constexpr std::size_t kSlow = 5;    ///< frames whose median must be too long
-  static constexpr std::size_t kQuick = 30;  ///< frames whose median must leave room
+  static constexpr std::size_t kSlow = 5;    ///< number of frames whose median must exceed the
+                                             ///< budget
+  static constexpr std::size_t kQuick = 30;  ///< number of frames whose median must be below the
+                                             ///< budget
   static constexpr double kRoom = 0.8;       ///< share of the budget that a larger size may take
 
-  /// `shares`: pixels of each size over those of the first one, falling from 1; the time of a frame
-  /// goes with them. `budget_ms` 0: always the first size.
+  /// `shares`: pixels of each size relative to the first one, falling from 1. The time of a frame
+  /// is proportional to them. `budget_ms` 0: always the first size.
   Budget(double budget_ms, std::vector<double> shares);
 
-  /// The size to look with.
+  /// Index of the current size.
   std::size_t size() const { return size_; }
-  /// A frame took so long with it; whether the size is another one now.
+  /// Adds the time of a frame at the current size. Returns whether the size has changed.
   bool took(double ms);
 
  private:
@@ -32,7 +35,7 @@ class Budget {
   double budget_ms_;
   std::vector<double> shares_;
   std::size_t size_ = 0;
-  std::vector<double> times_;  ///< of the last frames at this size, at most kQuick
+  std::vector<double> times_;  ///< times of the last frames at this size, at most kQuick
 };
 
 }  // namespace perdure::inference

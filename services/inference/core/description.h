@@ -1,4 +1,4 @@
-// What a network expects and what its raw outputs mean: the contents of model.json.
+// Description of a network's input and of its raw outputs: the contents of model.json.
 #pragma once
 
 #include <array>
@@ -11,21 +11,21 @@
 
 namespace perdure::inference {
 
-/// How the network's heads are laid out; one decode rule each (core/decode/decode.cpp).
+/// Layout of the network's heads. Each family has a decode rule (core/decode/decode.cpp).
 enum class Family {
   kYolox,
   kYoloFastest,
   kFastestDet,
   kPerdure,
-  kYolov5,   ///< and v7
-  kYolov8,   ///< and v9 to v12, YOLO26, RTMDet
-  kNanoDet,  ///< and PicoDet
+  kYolov5,   ///< also v7
+  kYolov8,   ///< also v9 to v12, YOLO26, RTMDet
+  kNanoDet,  ///< also PicoDet
   kSsd,
-  kDetr,  ///< and its relatives with sigmoids (RT-DETR)
+  kDetr,  ///< also related networks with sigmoids (RT-DETR)
   kYoloFastestV2,
 };
 
-/// How an image is brought to the input size.
+/// How an image is fitted to the input size.
 enum class Fit {
   kLetterboxTopLeft,  ///< one scale, image in the top left corner, rest padded (YOLOX)
   kLetterboxCentre,   ///< one scale, image in the middle, rest padded
@@ -35,75 +35,78 @@ enum class Fit {
 struct Input {
   int width = 0, height = 0;  ///< pixels, multiples of every stride
   Fit fit = Fit::kResize;
-  bool rgb = false;  ///< colour order that the network was trained with
+  bool rgb = false;  ///< colour order used in the training of the network
   double pad = 0.0;  ///< value of padding, before mean and scale
   /// input = (pixel - mean) * scale, both in the network's colour order
   std::array<double, 3> scale = {1.0, 1.0, 1.0};
   std::vector<double> mean = {0.0, 0.0, 0.0};
 };
 
-/// One resolution of the head, by the names of its raw (pre-activation) tensors.
+/// One resolution of the head, with the names of its raw (pre-activation) tensors.
 struct Level {
   int stride = 0;  ///< pixels of input per cell
   /// YOLOX and FastestDet: three tensors (1,4,H,W), (1,1,H,W), (1,K,H,W). YOLO-FastestV2: for A
   /// anchors (1,4·A,H,W), (1,A,H,W), and one (1,K,H,W) for all of them.
   std::string box, objectness, classes;
   /// YOLO-Fastest: one tensor (1,H,W,A·(5+K)) and A anchors (width, height, pixels of input).
-  /// YOLOv5: (1,A·(5+K),H,W) or (1,A,H,W,5+K), and anchors. YOLOv8: (1,4·bins+K,H,W), or `box`
-  /// and `classes` for its two parts. NanoDet: (1,K+4·bins,H,W), classes first.
+  /// YOLOv5: (1,A·(5+K),H,W) or (1,A,H,W,5+K), and anchors. YOLOv8: (1,4·bins+K,H,W), or `box` and
+  /// `classes` as two tensors. NanoDet: (1,K+4·bins,H,W), classes first.
   std::string tensor;
   std::vector<std::pair<double, double>> anchors;
-  /// Perdure: `box` (1,4,H,W) and logits (1,1+K,H,W), background first; azimuth (1,2·bins,H,W)
-  /// and spread (1,4,H,W) where the model has them.
+  /// Perdure: `box` (1,4,H,W) and logits (1,1+K,H,W), background first. If the model has them,
+  /// azimuth (1,2·bins,H,W) and spread (1,4,H,W).
   std::string logits, azimuth, spread;
 };
 
-/// What a network answers for all of its levels at once, by the names of its tensors: either
-/// `predictions`, or `boxes` and `scores`. With it, levels have no tensors of their own.
+/// Outputs for all levels at once, by the names of the tensors: either `predictions`, or `boxes`
+/// and `scores`. Levels then have no tensors of their own.
 struct Outputs {
   std::string predictions;    ///< YOLOv5 (1,N,5+K), YOLOv8 (1,4+K,N), NanoDet (1,N,K+4·bins)
   std::string boxes, scores;  ///< (1,N,4) and (1,N,C); YOLOv8 (1,4,N) and (1,K,N)
   bool any() const { return !predictions.empty() || !boxes.empty(); }
 };
 
-/// What the four numbers of a whole box are.
+/// Meaning of the four numbers of a complete box.
 struct BoxForm {
   enum class Kind {
     kCentre,   ///< centre x, y, width, height
     kCorners,  ///< x1, y1, x2, y2
-    kOffsets,  ///< of a prior: centre in sizes of the prior, logarithm of the ratio of sizes
+    kOffsets,  ///< relative to a prior: centre in sizes of the prior, logarithm of the ratio of
+               ///< sizes
   };
   Kind kind = Kind::kCentre;
   bool y_first = false;                          ///< each pair is (y, x)
-  bool shares = false;                           ///< of the input's sides; else pixels of input
+  bool shares = false;                           ///< relative to the input's sides; otherwise in
+                                                 ///< pixels of the input
   std::vector<std::array<double, 4>> priors;     ///< centre x, y, width, height, in shares
   std::array<double, 2> variances = {0.1, 0.2};  ///< factors of the offsets of centre and size
 };
 
-/// Which of the columns of the scores says "nothing is here".
+/// Which score column, if any, is the background.
 enum class Background { kNone, kFirst, kLast };
 
-/// What the best candidate near a predicted place says where no box was reported
-/// (core/decode/prime.h): posterior log-odds s of its class give `offset` + `slope`·s nats for the
-/// object, and no candidate of score `floor` or more gives `nothing`.
+/// Calibration of the best candidate near a predicted place without a reported box
+/// (core/decode/prime.h). Posterior log-odds s of its class give `offset` + `slope`·s nats for the
+/// object. Without a candidate of score `floor` or more, the result is `nothing`.
 struct PrimedCalibration {
-  double floor = 0.0;  ///< in (0, 1), below the lax threshold; 0: not fitted, nothing is primed
+  double floor = 0.0;  ///< in (0, 1), below the score threshold; 0: not fitted, no top-down answers
   double slope = 0.0, offset = 0.0, nothing = 0.0;
 };
 
-/// From the network's score to a log-likelihood ratio against clutter (core/decode/evidence.h).
+/// Calibration from the network's score to a log-likelihood ratio against clutter
+/// (core/decode/evidence.h).
 struct Calibration {
-  double temperature = 1.0;   ///< > 0; above 1 the network was overconfident
-  double clutter_rate = 0.5;  ///< in (0, 1): share of the emitted boxes that are clutter
+  double temperature = 1.0;   ///< > 0; above 1 the network is overconfident
+  double clutter_rate = 0.5;  ///< in (0, 1): share of the reported boxes that are clutter
   double bias = 0.0;          ///< nats, added to the posterior log-odds of every class
   PrimedCalibration primed = {};
 };
 
-/// Azimuth as the likeliest of `bins` equal parts of the circle and a residual.
+/// Azimuth as the most probable of `bins` equal parts of the circle, with a residual.
 struct Azimuth {
   int bins = 0;                      ///< 0: the network has no azimuth
-  double sigma = 0.35;               ///< radians, what remains where one bin is certain
-  std::vector<std::string> classes;  ///< whose azimuth is reported
+  double sigma = 0.35;               ///< radians, error that remains if one bin is certain
+  std::vector<std::string> classes;  ///< classes whose azimuth is reported
 };
 
 struct ModelDescription {
@@ -112,22 +115,23 @@ struct ModelDescription {
   Input input;
   std::vector<std::string> classes;  ///< lower-case, unique, in the order of the network
   bool class_softmax = false;        ///< class activation: soft-max, or independent sigmoids
-  bool applied = false;              ///< the network's scores are probabilities already
+  bool applied = false;              ///< the network's scores are already probabilities
   Background background = Background::kNone;
   double objectness_exponent = 1.0;  ///< score = objectness^a · class^b
   double class_exponent = 1.0;
   std::vector<Level> levels;
   Outputs outputs;
-  bool for_onnx_runtime = false;  ///< OpenCV does not have all of its operators
-  BoxForm box_form;               ///< of `outputs` with whole boxes
+  bool for_onnx_runtime = false;  ///< OpenCV does not support all of its operators
+  BoxForm box_form;               ///< form of the boxes in `outputs`
   /// YOLOv8, NanoDet: a distance to a side is the mean over 0 … bins − 1; 1: the value itself
   int bins = 0;
-  bool exponents = false;    ///< of one bin: the value is the distance's logarithm
-  double cell_offset = 0.5;  ///< YOLOv8, NanoDet: a cell's point is (g + offset)·s
+  bool exponents = false;    ///< with one bin, the value is the logarithm of the distance
+  double cell_offset = 0.5;  ///< YOLOv8, NanoDet: the reference point of a cell is (g + offset)·s
   Azimuth azimuth;
-  double reach = 0.0;         ///< perdure: cells that a cell's centre may lie outside its box
-  double spread_scale = 0.0;  ///< perdure: spread to standard deviation; 0: the network has none
-  double box_sigma = 0.0;  ///< standard deviation of a side relative to the box's size; 0 unknown
+  double reach = 0.0;         ///< perdure: cells by which a cell's centre may lie outside its box
+  double spread_scale = 0.0;  ///< perdure: factor from spread to standard deviation; 0: the network
+                              ///< has no spread
+  double box_sigma = 0.0;  ///< standard deviation of a side relative to the box's size; 0: unknown
   BoxExtent boxes = BoxExtent::kCuboid;
   std::map<std::string, std::array<double, 4>> side_insets;  ///< by class; see ModelInfo
   Calibration calibration;

@@ -33,7 +33,7 @@ std::optional<Box> boxOf(const ros::BoundingBox2D& bbox) {
   const double w = bbox.size_x, h = bbox.size_y;
   constexpr double kMost = 1e5;  // px
   const bool fine = std::abs(x) < kMost && std::abs(y) < kMost && w > 0.0 && h > 0.0 && w < kMost &&
-                    h < kMost;  // false with NaN
+                    h < kMost;  // false for NaN
   if (!fine || !(std::abs(bbox.center.theta) < 1e-3)) return std::nullopt;
   return Box{x - w / 2, y - h / 2, x + w / 2, y + h / 2};
 }
@@ -69,7 +69,8 @@ std::vector<float> activationsOf(const std::vector<std::pair<std::size_t, double
   for (const double one : p) sum += one;
   const auto unnamed = static_cast<double>(std::count(p.begin() + 1, p.end(), 0.0));
   if (sum >= 1.0 - kLeast) {
-    // Scores of classes one by one, or certainty: each against its own contrary.
+    // The scores are independent, or a class is certain: each class is compared with its
+    // complement.
     std::vector<float> ratios(classes + 1, 0.0F);
     for (std::size_t k = 1; k <= classes; ++k) {
       const double one = std::clamp(p[k], kLeast, 1.0 - kLeast);

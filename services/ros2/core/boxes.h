@@ -1,4 +1,5 @@
-// Detection2DArray of ROS as detections: to which frame it belongs, and scores as evidence.
+// Converts Detection2DArray of ROS to detections. It finds their frame, and converts scores to
+// evidence.
 #pragma once
 
 #include <deque>
@@ -11,11 +12,12 @@
 
 namespace perdure::ros2 {
 
-/// The frames that went by, by the stamp under which ROS knows them.
+/// Recent frames, by their stamps in ROS.
 class FrameBook {
  public:
   void add(TimePoint ros_stamp, const FrameStamp& stamp);
-  /// Within a millisecond, for detectors that keep stamps as seconds; nullptr where there is none.
+  /// Frame within a millisecond of the stamp, for detectors that store stamps as seconds; nullptr
+  /// if there is none.
   const FrameStamp* find(TimePoint ros_stamp) const;
   bool isAfterAll(TimePoint ros_stamp) const;
 
@@ -27,17 +29,17 @@ class FrameBook {
   std::deque<Entry> frames_;
 };
 
-/// Of one box: log-probabilities of clutter and of each of `classes` classes, with the same scores
-/// behind a soft-max where they sum to at most 1. `named`: class and score, 0 < score ≤ 1. Of what
-/// scores leave, `other_share` is for classes that are not named, and the rest for clutter.
+/// Activations of one box: log-probabilities of clutter and of `classes` classes. A soft-max gives
+/// the same scores if they sum to at most 1. `named`: class and score, 0 < score ≤ 1. Of the
+/// remaining probability, `other_share` goes to classes without a score, and the rest to clutter.
 std::vector<float> activationsOf(const std::vector<std::pair<std::size_t, double>>& named,
                                  std::size_t classes, double other_share);
 
 struct BoxesRead {
   std::vector<Detection> detections;
-  std::vector<Reason> refused;  ///< box_malformed, score_malformed, class_unknown
+  std::vector<Reason> refused;  ///< reasons box_malformed, score_malformed, class_unknown
 };
-/// `classes`: lower-case. A class_id is one of them, or its number.
+/// `classes`: lower-case. A class_id is one of them, or its index.
 BoxesRead boxesOf(const ros::Detection2DArray& message, const std::vector<std::string>& classes,
                   double other_share);
 

@@ -10,7 +10,8 @@ namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::size_t kSeconds = 10;
-constexpr char kElsewhere[] = "perdure";  ///< frames that did not come through the bridge
+constexpr char kElsewhere[] = "perdure";  ///< input name for frames that did not come through the
+                                          ///< bridge
 
 std::string spanText(std::int64_t ns) {
   return fmt::format("{:.6g} s", static_cast<double>(std::llabs(ns)) * 1e-9);
@@ -34,7 +35,7 @@ void LeastDelay::observe(std::int64_t stamp_ns, std::int64_t now_ns) {
   const auto least = std::min_element(seconds_.begin(), seconds_.end(),
                                       [](auto& a, auto& b) { return a.least < b.least; });
   if (settled_) {
-    // So slowly that the times of one input keep rising.
+    // The offset changes slowly, so that the times of one input keep increasing.
     constexpr double kSlew = 1e-3;
     const double step = kSlew * static_cast<double>(now_ns - last_ns_);
     used_ += std::clamp(static_cast<double>(least->least) - used_, -step, step);
@@ -120,7 +121,7 @@ Result<void> Clocks::requireCommon(const std::string& name, std::int64_t offset_
     return {};
   }
   if (common_ns_) return tl::unexpected(elsewhere(name, offset_ns, now_ns));
-  return fail("clock_unknown");  // for a moment: nothing to tell a person
+  return fail("clock_unknown");  // temporary, so without a sentence
 }
 
 Result<std::int64_t> Clocks::onCommon(const std::string& name, Input& input, std::int64_t stamp_ns,
@@ -162,7 +163,7 @@ Result<TimePoint> Clocks::place(const std::string& name, const ros::Time& stamp,
   const auto time_ns = onCommon(name, input, stamp_ns, now_ns);
   if (!time_ns) return tl::unexpected(time_ns.error());
   const TimePoint time = fromNanoseconds(*time_ns);
-  // A driver that is started again, or a recording that is, begins anew.
+  // A restarted driver or recording may start at an earlier time.
   const bool anew = input.last && *input.last - time > Duration(kSecond);
   if (input.last && time <= *input.last && !anew) {
     return fail("stamp_not_newer", "a stamp of " + name + " is " +

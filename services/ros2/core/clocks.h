@@ -1,4 +1,4 @@
-// The stamps of several drivers on one clock: that which most of them keep to.
+// Converts the stamps of several drivers to one clock, which is the clock that most of them use.
 #pragma once
 
 #include <cstdint>
@@ -14,12 +14,12 @@
 
 namespace perdure::ros2 {
 
-/// The least of arrival − stamp in the last ten seconds: what comes late by a varying time was at
-/// times not late.
+/// Smallest arrival − stamp in the last ten seconds. It estimates the clock offset, because some
+/// messages have almost no delay.
 class LeastDelay {
  public:
   void observe(std::int64_t stamp_ns, std::int64_t now_ns);
-  /// Nothing in the first half second.
+  /// Empty in the first half second.
   std::optional<std::int64_t> offset() const;
   std::uint64_t jumps() const { return jumps_; }
 
@@ -36,48 +36,48 @@ class LeastDelay {
 
 class Clocks {
  public:
-  /// `apart`: stamps that are of one clock come no further apart than that.
+  /// `apart`: largest difference of arrival − stamp on one clock.
   explicit Clocks(Duration apart) : apart_ns_(apart.count()) {}
 
-  /// `shared`: its stamps are of the common clock. Each input once, before its stamps.
+  /// Adds an input, once and before its stamps. `shared`: its stamps are on the common clock.
   void addInput(const std::string& input, bool shared);
 
-  /// The stamp on the common clock; `now_ns` is when it came. Times of one input rise. Reasons:
-  /// stamp_missing, stamp_malformed, stamp_elsewhere (of another clock than the others'),
-  /// stamp_not_newer, clock_unknown (no common clock yet, or an own clock that cannot be placed
-  /// yet).
+  /// Converts a stamp to the common clock; `now_ns` is its time of arrival. Times of one input
+  /// increase. Fails with stamp_missing, stamp_malformed, stamp_elsewhere (on another clock than
+  /// the other inputs) or stamp_not_newer. It fails with clock_unknown if there is no common clock
+  /// yet, or if the offset of an own clock is not known yet.
   ///
-  /// A clock becomes the common one when two inputs keep to it, or one for half a second or without
-  /// others, and fewer keep to that which was. So one wrong stamp, first or later, moves nothing.
+  /// A clock becomes the common one if two inputs agree on it, if one input keeps it for half a
+  /// second, or if there is only one input. More inputs must agree on it than on the previous
+  /// clock. A single wrong stamp, first or later, therefore has no effect.
   Result<TimePoint> place(const std::string& input, const ros::Time& stamp, std::int64_t now_ns);
-  /// A time of the common clock itself, from another source.
+  /// Adds a time of the common clock from another source.
   void observeCommon(TimePoint time, std::int64_t now_ns);
 
  private:
   struct Input {
     bool shared = true;
     LeastDelay delay;
-    std::int64_t offset_ns = 0;                 ///< arrival − stamp, of the last stamp
-    std::optional<std::int64_t> heard_ns = {};  ///< when it came
-    /// What two stamps in a row agree on, and since when.
+    std::int64_t offset_ns = 0;                 ///< arrival − stamp of the last stamp
+    std::optional<std::int64_t> heard_ns = {};  ///< arrival of the last stamp
+    /// Offset that two successive stamps agree on, and the start of the agreement.
     std::optional<std::int64_t> kept_ns = {};
     std::int64_t kept_since_ns = 0;
-    std::optional<TimePoint> last = {};  ///< on the common clock
+    std::optional<TimePoint> last = {};  ///< last time, on the common clock
   };
   Result<std::int64_t> onCommon(const std::string& name, Input& input, std::int64_t stamp_ns,
                                 std::int64_t now_ns);
   Result<void> requireCommon(const std::string& name, std::int64_t offset_ns, std::int64_t now_ns);
   void hear(Input& input, std::int64_t offset_ns, std::int64_t now_ns) const;
   bool near(std::int64_t a_ns, std::int64_t b_ns) const;
-  /// The shared inputs, heard in the last second, that keep to this offset.
+  /// Shared inputs received in the last second that agree on this offset.
   std::vector<std::string> keepersOf(std::int64_t offset_ns, std::int64_t now_ns) const;
   Reason elsewhere(const std::string& name, std::int64_t offset_ns, std::int64_t now_ns) const;
 
   std::int64_t apart_ns_;
   std::map<std::string, Input> inputs_;
-  std::optional<std::int64_t>
-      common_ns_;          ///< arrival − stamp by the common clock, the last there is
-  std::string reference_;  ///< the input whose delay tells where the common clock is
+  std::optional<std::int64_t> common_ns_;  ///< last arrival − stamp on the common clock
+  std::string reference_;  ///< input whose delay gives the offset of the common clock
 };
 
 }  // namespace perdure::ros2

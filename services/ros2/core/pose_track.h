@@ -1,4 +1,4 @@
-// Odometry of ROS at the times of images: poses between two messages.
+// Interpolates odometry of ROS at the times of images.
 #pragma once
 
 #include <deque>
@@ -12,7 +12,7 @@
 namespace perdure::ros2 {
 
 struct PoseTrackOptions {
-  double sigma_position = 0.05, sigma_rotation = 0.01;  ///< where messages say none; m, rad
+  double sigma_position = 0.05, sigma_rotation = 0.01;  ///< used if messages have none; m, rad
   double jump_m = 3.0;
 };
 
@@ -20,14 +20,16 @@ class PoseTrack {
  public:
   PoseTrack(const PoseTrackOptions& options, WorldId world) : options_(options), world_(world) {}
 
-  /// `T_child_body`: the body in the message's child. Reasons: not_finite, no_rotation, covariance,
-  /// jumped (it is taken, in a new epoch). Times that go back begin a new epoch, too.
+  /// Adds an odometry message. `T_child_body`: pose of the body in the message's child frame. Fails
+  /// with not_finite, no_rotation or covariance. With jumped, the message is used, in a new epoch.
+  /// Decreasing times also begin a new epoch.
   Result<void> onOdometry(const ros::Odometry& message, TimePoint time,
                           const RigidTransform& T_child_body);
-  /// A frame whose pose is wanted. Reason: frames_waiting (too many wait; the oldest is let go).
+  /// Adds a frame that needs a pose. Fails with frames_waiting if too many frames wait; the oldest
+  /// is then dropped.
   Result<void> onFrame(const FrameStamp& stamp);
-  /// The poses of frames that can be told now, in order of the frames. Frames before the first
-  /// message, or in a gap of half a second, get none; `untold` counts them.
+  /// Poses of the frames that can be interpolated now, in order of the frames. Frames before the
+  /// first message, or in a gap of half a second, get no pose; `untold` counts them.
   std::vector<Odometry> take();
   std::uint64_t untold() const { return untold_; }
 

@@ -6,7 +6,7 @@
 namespace perdure::ros2 {
 namespace {
 
-constexpr std::size_t kIntervals = 5;  ///< of images, for the camera's rate
+constexpr std::size_t kIntervals = 5;  ///< intervals between images, for the camera's rate
 
 double rateOf(std::vector<double> intervals) {
   std::nth_element(intervals.begin(), intervals.begin() + kIntervals / 2, intervals.end());

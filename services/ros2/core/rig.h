@@ -1,5 +1,5 @@
-// The vehicle's calibration out of what drivers say: CameraInfo of each camera, /tf_static between
-// their frames; a rig file goes before both.
+// Calibration of the vehicle from its drivers: the CameraInfo of each camera, and /tf_static
+// between their frames. A rig file takes precedence over both.
 #pragma once
 
 #include <array>
@@ -14,34 +14,36 @@
 
 namespace perdure::ros2 {
 
-/// What the rig is made for.
+/// A camera of the rig.
 struct RigCamera {
-  std::string name;        ///< Perdure's
-  std::string info_topic;  ///< for sentences
-  bool rectified = false;  ///< its images are
+  std::string name;        ///< name in Perdure
+  std::string info_topic;  ///< topic named in messages
+  bool rectified = false;  ///< its images are rectified
 };
 
 class Rig {
  public:
-  /// `body`: the body's frame; empty: the IMU's, without one the odometry's child, without both
-  /// that of the first camera.
+  /// `body`: frame of the body. If empty, the frame of the IMU is used, otherwise the odometry's
+  /// child frame, otherwise the frame of the first camera.
   Rig(std::vector<RigCamera> cameras, Calibration given, bool has_imu, bool has_odometry,
       std::string body);
 
   void onTransforms(const ros::TFMessage& message);
-  /// Reasons: lens, not_finite, uncalibrated (infos that cannot be used).
+  /// Adds a CameraInfo. Fails with lens, not_finite or uncalibrated if it cannot be used.
   Result<void> onInfo(std::size_t camera, const ros::CameraInfo& info);
   void onImageOf(std::size_t camera, const std::string& frame_id, TimePoint time);
   void onImuOf(const std::string& frame_id);
   void onOdometryOf(const std::string& child_frame_id);
 
-  /// Once all is known; again whenever it changed. Without source.
+  /// The calibration once it is complete, and after each change; otherwise empty. Its source is not
+  /// set.
   std::optional<Calibration> news();
-  /// What is known in full.
+  /// The last complete calibration, if any.
   const std::optional<Calibration>& complete() const { return told_; }
-  /// What it still waits for, with the mend; empty where nothing is missing.
+  /// The missing inputs, with the fix; empty if none are missing.
   std::string missing() const;
-  /// The body in the odometry's child; nothing where no way between the two is known.
+  /// Pose of the body in the odometry's child frame; empty if no transform between the two is
+  /// known.
   std::optional<RigidTransform> bodyIn(const std::string& child_frame_id) const;
 
  private:
@@ -50,7 +52,7 @@ class Rig {
     std::optional<ros::CameraInfo> info = {};
     std::optional<CameraCalibration> lens = {};
     std::string frame_id = {};
-    std::vector<double> intervals = {};  ///< s, of the first images
+    std::vector<double> intervals = {};  ///< s, between the first images
     std::optional<TimePoint> last = {};
   };
   std::string body() const;

@@ -1,4 +1,5 @@
-// Gives the second camera's images the stamps of the first's: both of a pair are one frame.
+// Gives the second camera's images the stamps of the first camera's images, because both images of
+// a pair are one frame.
 #pragma once
 
 #include <chrono>
@@ -12,9 +13,9 @@ namespace perdure::ros2 {
 
 class Stereo {
  public:
-  static constexpr Duration kTolerance = std::chrono::milliseconds(10);  ///< vio's, too
+  static constexpr Duration kTolerance = std::chrono::milliseconds(10);  ///< as in vio
 
-  /// A frame of the first camera went out; those of the second that waited for it.
+  /// Adds a frame of the first camera, and returns the waiting frames of the second that match it.
   std::vector<Frame> onFirst(const FrameStamp& stamp) {
     firsts_.push_back(stamp);
     if (firsts_.size() > kKept) firsts_.pop_front();
@@ -27,7 +28,8 @@ class Stereo {
     });
     return paired;
   }
-  /// A frame of the second, stamped by its own time: with its pair's stamp, where that is there.
+  /// Adds a frame of the second camera with its own stamp. Returns it with the stamp of its pair,
+  /// if that has arrived.
   std::optional<Frame> onSecond(Frame frame) {
     for (const FrameStamp& first : firsts_) {
       if (std::chrono::abs(frame.stamp.time - first.time) > kTolerance) continue;
@@ -37,7 +39,7 @@ class Stereo {
     waiting_.push_back(std::move(frame));
     return std::nullopt;
   }
-  /// Whether one that waited had to give up.
+  /// Drops the oldest waiting frame if too many wait, and returns whether it did.
   bool overflowed() {
     if (waiting_.size() <= kKept) return false;
     waiting_.pop_front();

@@ -1,4 +1,4 @@
-// What is wrong with what comes, counted by input and reason, with the sentence that says the mend.
+// Problems with the inputs, counted by input and reason, with a sentence on the fix.
 #pragma once
 
 #include <cstdint>
@@ -18,9 +18,9 @@ class Troubles {
     if (!reason.detail.empty()) last_ = reason.detail, last_ns_ = now_ns, any_ = true;
   }
   const ReasonCounts& counts() const { return counts_; }
-  /// The sentence of the first of each kind.
+  /// The first sentence for each reason.
   const std::map<std::string, std::string>& sentences() const { return first_; }
-  /// The newest sentence, where it is at most this old; else nothing.
+  /// The newest sentence if it is at most `longest_ns` old; otherwise empty.
   std::string newest(std::int64_t now_ns, std::int64_t longest_ns) const {
     return any_ && now_ns - last_ns_ <= longest_ns ? last_ : std::string();
   }

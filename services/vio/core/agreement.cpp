@@ -5,12 +5,13 @@
 namespace perdure::vio {
 namespace {
 
-constexpr double kForgets = 1.0 / 40;  // with each image
-constexpr std::size_t kFewest = 40;    // images, until there is a verdict
-constexpr double kTracks = 2.0;        // in an image, at least, that a verdict rests on
-constexpr double kMisfit = 15.0;       // scale; rough poses have up to 8
-constexpr double kFewTracks = 0.5;     // in an image: enough where nearly all contradict
-constexpr double kNearlyAll = 10.0;    // for each that is sure
+constexpr double kForgets = 1.0 / 40;  // weight of each new image
+constexpr std::size_t kFewest = 40;    // images before the first verdict
+constexpr double kTracks = 2.0;        // mean number of tracks in an image that a verdict needs
+constexpr double kMisfit = 15.0;       // limit of the scale; inaccurate poses reach up to 8
+constexpr double kFewTracks = 0.5;     // mean number in an image that suffices if nearly all tracks
+                                       // contradict
+constexpr double kNearlyAll = 10.0;    // ratio of contradicting to agreeing tracks
 
 }  // namespace
 

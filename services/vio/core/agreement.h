@@ -1,27 +1,28 @@
-// Whether poses (given, or the filter's own) agree with what is seen: over the last images, how
-// many tracks with parallax have a place, and how many none that the poses allow.
-// Derivation: tools/docs/maths/vio-known-poses.md.
+// Checks whether poses, given or estimated by the filter, agree with the images. Over the last
+// images it counts the tracks with parallax that have a position, and those that the poses
+// contradict. Derivation: tools/docs/maths/vio-known-poses.md.
 #pragma once
 
 #include <cstddef>
 
 namespace perdure::vio {
 
-/// What became of the tracks of one image.
+/// Counts of the tracks of one image, by the result of their triangulation.
 struct Mapped {
-  std::size_t contradicted = 0;  ///< their rays do not meet before the cameras, or fail the gate
-  std::size_t far = 0;           ///< they meet beyond VisionOptions::max_depth_m
-  std::size_t sure = 0;          ///< landmarks, or what an update has used
+  std::size_t contradicted = 0;  ///< rays that do not meet in front of the cameras, or that fail
+                                 ///< the gate
+  std::size_t far = 0;           ///< points beyond VisionOptions::max_depth_m
+  std::size_t sure = 0;          ///< landmarks, and tracks that an update has used
 };
 
 class Agreement {
  public:
   enum class Verdict { kGood, kContradicted, kFar };
 
-  /// The next image. scale: residuals in those of exact poses, at least 1; moved: the poses have,
-  /// lately. Where they have not, what moves is something else.
+  /// Adds the next image. scale: residuals relative to those of exact poses, at least 1. moved:
+  /// whether the poses have moved recently. If they have not, the image is ignored.
   void add(const Mapped& mapped, double scale, bool moved);
-  /// Of the last two seconds of motion or so, at 20 Hz.
+  /// Verdict on about the last two seconds of motion, at 20 Hz.
   Verdict verdict() const;
   void clear() { *this = {}; }
 

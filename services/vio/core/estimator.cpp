@@ -17,7 +17,7 @@
 namespace perdure::vio {
 namespace {
 
-// Beyond these a filter is lost, whatever it believes.
+// Limits beyond which the filter has diverged, even with a small covariance.
 constexpr double kMaxSpeed = 150.0, kMaxGyroBias = 1.0, kMaxAccelBias = 5.0;
 constexpr double kMaxSpeedSigma = 10.0, kMaxScaleError = 0.3;
 
@@ -49,7 +49,8 @@ Eigen::Vector3d Estimator::turnOfReadout(const ImuBuffer& imu, TimePoint time) {
   return readout_s * rowMotion(nav, imu, time, half, options_.gravity, readings_, scale).rate;
 }
 
-/// What the newest clone's rows are seen from; again after an update, with its velocity and biases.
+/// Computes the row motion of the newest clone. Repeated after an update, with the new velocity and
+/// biases.
 void Estimator::measureRows(const ImuBuffer& imu) {
   const double readout_s = state_->longestReadout();
   if (readout_s == 0.0) return;
@@ -80,7 +81,8 @@ Result<void> Estimator::propagateTo(const FrameInput& input, const ImuBuffer& im
   return {};
 }
 
-/// Half of the picture does; a picture that a lorry fills does, too, whatever the body does.
+/// True if half of the points are at rest and the IMU does not measure a turn. A lorry that fills
+/// the image may also cause this.
 bool Estimator::medianRests(const FrameInput& input) const {
   const RestOptions& o = options_.rest;
   if (!input.motion_px || *input.motion_px > o.disparity_px) return false;
@@ -95,8 +97,8 @@ bool Estimator::velocityMayBeZero() const {
   return passesGate(state_->nav.v_WB, S, 0.99);
 }
 
-/// A part of the picture moves, and yet the body may stand. A background far away rests before a
-/// body that creeps, too: the IMU must not contradict.
+/// Part of the image moves, but the body may stand still. A distant background also appears at rest
+/// for a slowly moving body, so the IMU must agree.
 bool Estimator::standsInTraffic(const ImuBuffer& imu, bool background_rests) {
   const bool knew = standstill_.known();
   const bool held = standstill_.holds(imu, state_->time, options_.imu);
@@ -151,7 +153,7 @@ std::vector<const Track*> Estimator::onceUsed(std::uint64_t frame, bool window_f
     if (goes_on && !(window_full && track.observations.front().frame == oldest)) continue;
     candidates.push_back({goes_on, views, &track});
   }
-  // Those that have ended first, for they have no other chance; then the longest.
+  // Ended tracks come first, because they cannot be used later; then the longest tracks.
   std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
     return std::tuple(a.goes_on, b.views, a.track->id) <
            std::tuple(b.goes_on, a.views, b.track->id);
@@ -190,7 +192,7 @@ Result<void> Estimator::admitPoints(std::uint64_t frame, bool window_full) {
   const std::uint64_t oldest = state_->clones.front().frame;
   const auto room = options_.window.slam_features - asInt(state_->points.size());
   if (room <= 0) return {};
-  std::vector<std::pair<std::size_t, const Track*>> candidates;  // with its views
+  std::vector<std::pair<std::size_t, const Track*>> candidates;  // number of views, track
   for (const auto& [id, track] : database_.tracks()) {
     if (state_->point(id) || !track.seenAt(frame)) continue;
     if (track.observations.front().frame != oldest) continue;
@@ -231,7 +233,8 @@ Result<void> Estimator::visionUpdate(const FrameInput& input, FrameEstimate& out
 
 void Estimator::report(const FrameInput& input, FrameEstimate& out) {
   const auto P = state_->P();
-  // The pose at the image is the newest clone's: unlike nav's it knows the time offset's error.
+  // The pose at the image is that of the newest clone. Unlike nav, it includes the error of the
+  // time offset.
   const Clone& newest = state_->clones.back();
   out.nav = state_->nav;
   out.covariance << P.block<6, 6>(newest.at, newest.at), P.block<6, 3>(newest.at, kVelocity),
@@ -239,8 +242,8 @@ void Estimator::report(const FrameInput& input, FrameEstimate& out) {
   const Clone* previous = previous_frame_ ? state_->clone(*previous_frame_) : nullptr;
   const Matrix6d P_now = P.block<6, 6>(newest.at, newest.at);
   if (previous) {
-    // E[e_now e_prevᵀ] is that with the clone's error after the update, too: what the update
-    // took from the clone is uncorrelated with what is left of the present error.
+    // E[e_now e_prevᵀ] equals the cross-covariance with the clone's error after the update. The
+    // update's correction of the clone is uncorrelated with the remaining present error.
     const Matrix6d cross = P.block<6, 6>(newest.at, previous->at);
     Matrix6d P_before = previous_pose_covariance_;
     P_before.diagonal().array() += 1e-12;
@@ -257,7 +260,8 @@ void Estimator::report(const FrameInput& input, FrameEstimate& out) {
 void Estimator::marginalise(bool at_rest) {
   const std::size_t n = state_->clones.size();
   if (at_rest && n >= 2) {
-    // The newest pose repeats the one before: keep the newest and the window's baseline.
+    // The newest pose repeats the previous one. Removing the previous one preserves the newest pose
+    // and the window's baseline.
     const std::uint64_t frame = state_->clones[n - 2].frame;
     database_.removeFrame(frame);
     state_->removeClone(frame);

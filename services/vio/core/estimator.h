@@ -1,5 +1,5 @@
-// The filter over tracked points: propagates to each image, clones, updates, marginalises, and
-// says where the body is (paper, eq. 3 and 5). Knows no images, threads or clocks.
+// The filter over tracked points. It propagates to each image, clones, updates, marginalises and
+// returns the pose of the body (paper, eq. 3 and 5). It does not access images, threads or clocks.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,7 +20,7 @@
 
 namespace perdure::vio {
 
-/// Where a filter begins: at `time` of the IMU clock.
+/// State at which a filter begins, at `time` of the IMU clock.
 struct Start {
   TimePoint time;
   Nav nav;
@@ -33,13 +33,14 @@ struct SpeedReading {
 };
 
 struct FrameInput {
-  std::uint64_t frame = 0;  ///< counts up
+  std::uint64_t frame = 0;  ///< increases from frame to frame
   TimePoint image_time;
   TrackedFrame tracked;
   std::optional<double> motion_px;  ///< median image motion over the last frames
   std::optional<SpeedReading> speed;
-  std::optional<double> most_motion_px = {};  ///< the same of four fifths of the points
-  double still_share = 0.0;  ///< of the points: those that have kept their place for a second
+  std::optional<double> most_motion_px = {};  ///< image motion that four fifths of the points do
+                                              ///< not exceed
+  double still_share = 0.0;  ///< share of the points that have stayed in place for a second
 };
 
 struct FrameEstimate {
@@ -49,45 +50,50 @@ struct FrameEstimate {
   std::uint64_t increment_from = 0;
   Matrix6d transition = Matrix6d::Identity(), increment_covariance = Matrix6d::Zero();
   bool at_rest = false;
-  std::optional<bool> speed_refused;    ///< by the gate; nothing where there was no speed
-  int points_used = 0;                  ///< of this image, by all updates
-  int points_refused = 0;               ///< gated, or of rays that do not meet before the cameras
-  std::vector<Innovation> innovations;  ///< where they are kept
+  std::optional<bool> speed_refused;    ///< whether the gate refused the speed; empty without a
+                                        ///< speed
+  int points_used = 0;                  ///< points of this image used by all updates
+  int points_refused = 0;               ///< points that failed the gate, or whose rays do not meet
+                                        ///< in front of the cameras
+  std::vector<Innovation> innovations;  ///< filled after keepInnovations()
 };
 
 class Estimator {
  public:
-  /// One or two cameras. readout_s: of each, 0 where all rows are exposed at once; none: all are.
+  /// Takes one or two cameras. readout_s: read-out time of each camera, 0 for a global shutter. If
+  /// empty, all cameras have a global shutter.
   Estimator(const Options& options, const std::vector<RigidTransform>& T_BC, double time_offset_s,
             const std::vector<double>& readout_s = {});
 
-  /// Begins (anew) at a start; the window is empty.
+  /// Begins at a start, with an empty window. A running filter is reset.
   void start(const Start& start);
   /// Begins with a saved state of the same cameras.
   void restore(const SavedState& saved);
-  /// As many cameras, the same shutters, the same things estimated. Fails with what differs:
-  /// state_other_cameras, state_other_shutter, state_other_gyro_scale, state_other_readout.
+  /// Checks that a saved state has the same number of cameras, the same shutters and the same
+  /// estimated quantities. Fails with state_other_cameras, state_other_shutter,
+  /// state_other_gyro_scale or state_other_readout.
   Result<void> fits(const SavedState& saved) const;
-  /// What restore takes; world and next_track are the caller's. Needs started().
+  /// Returns the state that restore() takes. The caller fills world and next_track. Needs
+  /// started().
   SavedState save() const;
   bool started() const { return state_.has_value(); }
   void stop() { state_.reset(); }
-  /// From now on estimates carry the innovations of the state's points.
+  /// After this call, estimates carry the innovations of the state's points.
   void keepInnovations() { keeps_innovations_ = true; }
 
-  /// Propagates over `imu` to the frame and updates. Fails with "frame_not_after_state",
-  /// "imu_missing", or, where the numbers have gone bad, with "numbers_…": then the estimator has
-  /// stopped.
+  /// Propagates over `imu` to the frame and updates. Fails with "frame_not_after_state" or
+  /// "imu_missing". If the state has become invalid, it fails with "numbers_…" and the estimator
+  /// stops.
   Result<FrameEstimate> process(const FrameInput& input, const ImuBuffer& imu);
 
-  /// The rotation R_B1_B0 of the body from the newest frame to an IMU time, by the gyroscope.
+  /// Rotation R_B1_B0 of the body from the newest frame to an IMU time, from the gyroscope.
   Eigen::Matrix3d predictRotation(const ImuBuffer& imu, TimePoint to);
 
-  /// How far the body turns while the first camera reads out an image of an IMU time: a rotation
-  /// vector in B. Before a start by the raw rate. Zero where all rows are exposed at once.
+  /// Rotation of the body, a rotation vector in B, while the first camera reads out an image taken
+  /// at an IMU time. Before a start it uses the raw rate. Zero for a global shutter.
   Eigen::Vector3d turnOfReadout(const ImuBuffer& imu, TimePoint time);
 
-  /// Points seen in the newest image whose position is known.
+  /// Points of the newest image whose position is known.
   std::vector<LandmarkEstimate> landmarks() const;
 
   const State& state() const { return *state_; }
@@ -122,10 +128,11 @@ class Estimator {
   Standstill standstill_;
   FeatureDatabase database_;
   TrackedFrame newest_;
-  std::vector<ImuReading> readings_;  ///< of one interval; kept for its memory
-  std::vector<ImuReading> rows_;      ///< the same about one image
+  std::vector<ImuReading> readings_;  ///< readings of one interval; a member so that its memory is
+                                      ///< reused
+  std::vector<ImuReading> rows_;      ///< readings around one image; a member for the same reason
   ReasonCounts reasons_;
-  bool agreed_ = false;  ///< most points of the last image met their predictions
+  bool agreed_ = false;  ///< most points of the last image agreed with their predictions
   std::optional<std::uint64_t> previous_frame_;
   Matrix6d previous_pose_covariance_ = Matrix6d::Zero();
 };

@@ -41,7 +41,7 @@ std::string LiveCameras::problem() const {
   for (const auto& camera : cameras_) {
     text = joined(text, named(i++, camera.state().problem(), ": "));
   }
-  // Where one is away, nothing is to be said of pairs.
+  // While a camera is missing, pairs are not judged.
   return text.empty() && pairing_ ? pairing_->problem() : text;
 }
 

@@ -1,4 +1,4 @@
-// One live camera, or two whose images are paired, with what Health says of them.
+// One live camera, or two with paired images, and their status for Health.
 #pragma once
 
 #include <cstdint>
@@ -14,25 +14,26 @@
 
 namespace perdure::capture {
 
-/// Each camera has a thread of its own; all of this is for one other thread, which hands over the
-/// images that they give.
+/// Each camera has its own thread. All members are called from one other thread, which passes on
+/// the cameras' images.
 class LiveCameras {
  public:
-  /// One or two: cam0, cam1. `give` is called on their threads, with the camera's name in the
-  /// frame.
+  /// One or two cameras: cam0, cam1. `give` is called on their threads, with the camera's name in
+  /// the frame.
   LiveCameras(const std::vector<OpenCamera>& cameras, double rate_hz,
               const std::function<void(CameraImage)>& give);
 
-  /// What goes out now that this one has been given; with two cameras, pairs. CLOCK_BOOTTIME.
+  /// Takes an image and returns the images to publish; with two cameras, these are pairs. `now_ns`:
+  /// CLOCK_BOOTTIME.
   std::vector<CameraImage> pair(CameraImage image, std::int64_t now_ns);
-  /// What has waited long enough for a partner.
+  /// Returns images whose wait for a partner has ended.
   std::vector<CameraImage> due(std::int64_t now_ns);
 
-  /// As DeviceState; of two cameras with the name of the one that it is of.
+  /// As in DeviceState; with two cameras, each text begins with the camera's name.
   std::string problem() const;
   std::string name() const;
   std::string note() const;
-  /// Of two cameras the counts end in the camera's name.
+  /// With two cameras, the names of counts end in the camera's name.
   void report(ReasonCounts& counts) const;
 
  private:
@@ -42,7 +43,7 @@ class LiveCameras {
   std::list<LiveCamera> cameras_;
 };
 
-/// "cam0", "cam1".
+/// Name of camera i: "cam0", "cam1".
 std::string cameraName(std::size_t i);
 
 }  // namespace perdure::capture

@@ -10,11 +10,12 @@
 namespace perdure::capture {
 namespace {
 
-constexpr double kMostTolerance_ns = 10e6;  // vio's stereo.pair_tolerance
+constexpr double kMostTolerance_ns = 10e6;  // equal to vio's stereo.pair_tolerance
 constexpr double kLeastInterval_ns = 2e6;
-constexpr double kSilence = 4.0;  // intervals
+constexpr double kSilence = 4.0;  // intervals without an image after which a camera counts as
+                                  // silent
 constexpr std::size_t kMostSeconds = 8;
-constexpr std::size_t kJudged = 64;  // images of cam0
+constexpr std::size_t kJudged = 64;  // images of cam0 per judgement
 constexpr double kTold_ms = 2.0;
 
 }  // namespace
@@ -29,7 +30,7 @@ bool CameraTimeline::takes(const CameraImage& image, std::int64_t now_ns, double
   if (image.number <= number) return true;
   const double period =
       static_cast<double>(image.time_ns - *before) / static_cast<double>(image.number - number);
-  if (period > 2.0 * interval_ns) return true;  // it was away
+  if (period > 2.0 * interval_ns) return true;  // the camera was absent
   period_ns_ += period_ns_ == 0.0 ? period : (period - period_ns_) / 8.0;
   return true;
 }
@@ -40,7 +41,8 @@ bool CameraTimeline::flows(std::int64_t now_ns, double longest_ns) const {
 
 StereoPairing::StereoPairing(double rate_hz) : asked_ns_(1e9 / rate_hz) {}
 
-/// The shorter one: of a camera that keeps a rate of its own, two images must not both fit.
+/// The shorter interval of both cameras, so that two images of a fast camera cannot match one image
+/// of the other.
 double StereoPairing::intervalNs() const {
   double interval = asked_ns_;
   for (const double period : {first_.period_ns(), second_.period_ns()}) {
@@ -124,7 +126,7 @@ void StereoPairing::dropSeconds(std::size_t n) {
   seconds_.erase(seconds_.begin(), seconds_.begin() + static_cast<std::ptrdiff_t>(n));
 }
 
-/// No image of cam0 that comes now can be near these.
+/// Drops images that are older than all images of cam0 still to come.
 void StereoPairing::dropPassed() {
   const auto oldest = firsts_.empty() ? first_.last_ns() : firsts_.front().image.time_ns;
   std::size_t passed = 0;
@@ -157,7 +159,8 @@ void StereoPairing::judge() {
   alone_ = late_ = 0;
 }
 
-/// Told again where it has changed much: phases of free-running cameras drift.
+/// Reports the difference again if it has changed much, because the phases of free-running cameras
+/// drift.
 void StereoPairing::judgeDifference() {
   if (apart_ms_.empty()) return note_.clear();
   const auto middle = apart_ms_.begin() + static_cast<std::ptrdiff_t>(apart_ms_.size() / 2);

@@ -1,4 +1,4 @@
-// Images of two cameras that were taken at one moment.
+// Pairs images of two cameras that were taken at the same time.
 #pragma once
 
 #include <array>
@@ -13,16 +13,16 @@
 
 namespace perdure::capture {
 
-/// The stamps of one camera.
+/// Stamps of one camera.
 class CameraTimeline {
  public:
-  /// False where the stamp goes back, or lies ahead of `now_ns` by more than `interval_ns`.
+  /// False if the stamp decreases, or is ahead of `now_ns` by more than `interval_ns`.
   bool takes(const CameraImage& image, std::int64_t now_ns, double interval_ns);
-  /// Of the last image that came in order, or went back; nothing before.
+  /// Stamp of the last image, including one out of order; empty before the first image.
   std::optional<std::int64_t> last_ns() const { return last_ns_; }
-  /// Between images, smoothed; 0: not known.
+  /// Smoothed time between images; 0: not known.
   double period_ns() const { return period_ns_; }
-  /// Whether an image came in the last `longest_ns`.
+  /// Whether an image arrived in the last `longest_ns`.
   bool flows(std::int64_t now_ns, double longest_ns) const;
 
  private:
@@ -31,28 +31,29 @@ class CameraTimeline {
   double period_ns_ = 0.0;
 };
 
-/// Pairs by the nearest stamp. An image of cam0 waits for its partner no longer than the tolerance,
-/// and then goes alone; where cam1 gives nothing it does not wait. Those of cam1 wait until one of
-/// cam0 is past them, and are dropped.
+/// Pairs images by the nearest stamp. An image of cam0 waits for its partner no longer than the
+/// tolerance, and is then passed on alone. If cam1 sends no images, it does not wait. Images of
+/// cam1 wait until later images of cam0 arrive, and are then dropped.
 class StereoPairing {
  public:
-  /// `rate_hz`: what is asked for.
+  /// `rate_hz`: requested rate.
   explicit StereoPairing(double rate_hz);
 
-  /// What goes out now that an image of cam0 or of cam1 has come: cam0 first, cam1 with its number.
-  /// `now_ns`: CLOCK_BOOTTIME.
+  /// Takes an image of cam0 or cam1 and returns the images to publish: cam0 first, then cam1 with
+  /// the same number. `now_ns`: CLOCK_BOOTTIME.
   std::vector<CameraImage> first(CameraImage image, std::int64_t now_ns);
   std::vector<CameraImage> second(CameraImage image, std::int64_t now_ns);
-  /// What has waited long enough.
+  /// Returns images whose wait has ended.
   std::vector<CameraImage> due(std::int64_t now_ns);
 
-  /// A third of the time between two images, and no more than vio pairs by itself: 10 ms.
+  /// A third of the time between two images, at most vio's own pairing tolerance of 10 ms.
   std::int64_t toleranceNs() const;
-  /// A sentence with the mend where most images of cam0 go alone though cam1 gives images.
+  /// A sentence with the fix if most images of cam0 have no partner although cam1 sends images.
   const std::string& problem() const { return problem_; }
-  /// A sentence where the images of a pair are typically more than 2 ms apart.
+  /// A sentence if the images of a pair typically differ by more than 2 ms.
   const std::string& note() const { return note_; }
-  /// "stereo_unpaired_cam0", "stereo_unpaired_cam1", "camera_out_of_order_cam0", "…_cam1".
+  /// Counts "stereo_unpaired_cam0", "stereo_unpaired_cam1", "camera_out_of_order_cam0" and
+  /// "…_cam1".
   const ReasonCounts& reasons() const { return reasons_; }
 
  private:
@@ -77,8 +78,8 @@ class StereoPairing {
   CameraTimeline first_, second_;
   std::deque<Waiting> firsts_;
   Seconds seconds_;
-  std::optional<std::int64_t> alone_ns_;  ///< stamp of the last one of cam0 that went alone
-  // Since the last judgement, while both give images:
+  std::optional<std::int64_t> alone_ns_;  ///< stamp of cam0's last image without a partner
+  // Statistics since the last judgement, while both cameras send images:
   std::vector<double> apart_ms_;
   std::size_t alone_ = 0, late_ = 0;
   double told_ms_ = 0.0;

@@ -1,4 +1,4 @@
-// Which of the cameras that are there an id of the configuration names.
+// Finds the camera that an id of the configuration names.
 #pragma once
 
 #include <cstddef>
@@ -9,9 +9,9 @@
 
 namespace perdure::capture {
 
-/// The place in `ids` of the one that is `wanted`, else of the first with it in its id. With
-/// `alone` no other may have it: left and right must not change places. "camera_absent" with the
-/// mend.
+/// Index in `ids` of the id equal to `wanted`, otherwise of the first id that contains it. With
+/// `alone`, only one id may contain it, so that left and right are not exchanged. Fails with
+/// "camera_absent" and the fix.
 Result<std::size_t> chooseCamera(const std::vector<std::string>& ids, const std::string& wanted,
                                  bool alone);
 

@@ -1,4 +1,4 @@
-// The memory of a libcamera frame buffer, as planes of an image.
+// Memory of a libcamera frame buffer, as planes of an image.
 #pragma once
 
 #include <libcamera/libcamera.h>
@@ -12,7 +12,7 @@
 
 namespace perdure::capture {
 
-/// Mapped for reading as long as it lives.
+/// Maps the buffer for reading during the lifetime of this object.
 class MappedBuffer {
  public:
   explicit MappedBuffer(const libcamera::FrameBuffer& buffer);
@@ -21,8 +21,8 @@ class MappedBuffer {
   MappedBuffer& operator=(const MappedBuffer&) = delete;
 
   const std::vector<std::span<const std::uint8_t>>& planes() const { return planes_; }
-  /// Makes visible what the device wrote; before and after reading. Memory that is no DMA buffer
-  /// needs none, and says so.
+  /// Makes the device's writes visible; call it before and after reading. Memory other than DMA
+  /// buffers does not need it and returns an error, which is ignored.
   void sync(bool begin) const;
 
  private:
@@ -30,11 +30,11 @@ class MappedBuffer {
     void* at = nullptr;
     std::size_t length = 0;
   };
-  std::map<int, Mapping> mappings_;  ///< by file descriptor
+  std::map<int, Mapping> mappings_;  ///< mappings by file descriptor
   std::vector<std::span<const std::uint8_t>> planes_;
 };
 
-/// Planes as packed() wants them, also where a driver gives all of them as one.
+/// Planes as packed() needs them, even if a driver returns all of them as one.
 std::vector<ImagePlane> imagePlanes(const libcamera::StreamConfiguration& stream,
                                     PixelLayout layout, const MappedBuffer& memory,
                                     const libcamera::FrameMetadata& metadata);

@@ -15,8 +15,8 @@ namespace {
 namespace controls = libcamera::controls;
 namespace formats = libcamera::formats;
 
-/// The best first: the least to convert, and all the colour there is. libcamera names the bytes of
-/// a pixel from the last one in memory on.
+/// The best format first, with the least conversion and full colour. libcamera names the bytes of a
+/// pixel from the last one in memory to the first.
 const std::array<KnownFormat, 11> kFormats = {{
     {formats::RGB888, PixelLayout::kBgr},
     {formats::BGR888, PixelLayout::kRgb},
@@ -39,7 +39,7 @@ class Asking {
   bool offers(const libcamera::Control<T>& control) const {
     return offered_.find(control.id()) != offered_.end();
   }
-  /// `key`: what in the configuration goes without it.
+  /// `key`: setting of the configuration that has no effect without the control.
   template <class T, class V>
   void set(const libcamera::Control<T>& control, const V& value, const char* key) {
     if (offers(control)) return list_.set(control, value);
@@ -63,8 +63,8 @@ class Asking {
   std::string missing_, refused_;
 };
 
-// From 0.5 on each of the two is automatic or not by itself, and ignored while it is. A camera
-// without an automatic gain then has no AeEnable.
+// From libcamera 0.5 on, exposure time and gain each have their own automatic mode, which ignores
+// the manual value. A camera without automatic gain then has no AeEnable.
 #if LIBCAMERA_VERSION_MAJOR > 0 || LIBCAMERA_VERSION_MINOR >= 5
 void askManualExposure(Asking& asking) {
   if (!asking.offers(controls::ExposureTimeMode)) {
@@ -85,7 +85,7 @@ void askManualExposure(Asking& asking) {
 void askManualGain(Asking&) {}
 #endif
 
-/// Without it the images would be of another lens than the rig's, and nobody would see why.
+/// Without focus control, the focus could differ from the rig's calibration unnoticed.
 void askFocus(const CameraSettings& settings, Asking& asking) {
   const bool manual = settings.focus == "manual";
   if (settings.focus == "as_is") return;
@@ -112,7 +112,8 @@ libcamera::Transform transformOf(const std::string& flip) {
   return flip == "both" ? libcamera::Transform::HVFlip : libcamera::Transform::Identity;
 }
 
-// What was a change of the upright image became the orientation that comes of it in libcamera 0.2.
+// Before libcamera 0.2 the configuration has a transform of the upright image; since then it has
+// the resulting orientation.
 #if __has_include(<libcamera/orientation.h>)
 libcamera::Orientation orientationOf(const std::string& flip) {
   return libcamera::Orientation::Rotate0 * transformOf(flip);

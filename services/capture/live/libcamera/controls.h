@@ -1,4 +1,4 @@
-// What is asked of a camera by libcamera's controls.
+// Controls that are requested from a libcamera camera.
 #pragma once
 
 #include <libcamera/camera.h>
@@ -16,24 +16,25 @@ namespace perdure::capture {
 
 struct AskedControls {
   libcamera::ControlList list;
-  std::string missing;  ///< a sentence of what is configured and not offered; empty where all is
-  std::string refused;  ///< why it is not to be used at all, with the mend; empty where it may be
+  std::string missing;  ///< a sentence on settings that the camera does not offer; empty if it
+                        ///< offers all
+  std::string refused;  ///< why the camera must not be used, with the fix; empty if it may be used
 };
 
-/// The rate is asked for where there is a control of it; what comes of it is seen in the frames.
+/// The rate is requested if the camera has a control for it. The frames show the actual rate.
 AskedControls controlsFor(const CameraSettings& settings, const libcamera::ControlInfoMap& offered);
 
 using KnownFormat = std::pair<libcamera::PixelFormat, PixelLayout>;
-/// The best first.
+/// Known formats, the best first.
 std::span<const KnownFormat> knownFormats();
 
-/// Asks for `camera.flip`; validate() takes back what the camera cannot do.
+/// Requests `camera.flip`; validate() removes it if the camera does not support it.
 void askFlip(libcamera::CameraConfiguration& configuration, const std::string& flip);
-/// Whether it is still asked for.
+/// Whether the configuration still contains the flip.
 bool flips(const libcamera::CameraConfiguration& configuration, const std::string& flip);
-/// Why its images are not as `camera.flip` says, with the mend; empty where they are. With none
-/// they are as they come: of a camera that is mounted at 90° they stay turned, and so they are
-/// calibrated.
+/// Why images do not follow `camera.flip`, with the fix; empty if they do. With "none", images are
+/// left as delivered. Those of a camera mounted at 90° stay rotated, and are calibrated in this
+/// orientation.
 std::string flipRefused(const libcamera::CameraConfiguration& configuration,
                         const std::string& flip);
 

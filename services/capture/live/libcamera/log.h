@@ -1,4 +1,4 @@
-// libcamera's own lines, without colours, in our log.
+// Passes libcamera's log lines, without colours, to this program's log.
 #pragma once
 
 #include <functional>
@@ -10,11 +10,11 @@
 
 namespace perdure::capture {
 
-/// What is worth saying of a line of libcamera's, "[time] [thread] LEVEL Category file:line words":
-/// warnings and worse, from the level on. libcamera 0.0.3 cannot be told so for all categories.
+/// Returns a libcamera line "[time] [thread] LEVEL Category file:line words" from its level on, if
+/// the level is warning or more severe. libcamera 0.0.3 cannot set this level for all categories.
 std::optional<std::string> worthLogging(std::string_view line);
 
-/// libcamera's target as long as it lives; none after that. `log` is called on any thread.
+/// Receives libcamera's log during the lifetime of this object. `log` may be called on any thread.
 class LibcameraLog {
  public:
   explicit LibcameraLog(std::function<void(const std::string&)> log);
@@ -23,7 +23,8 @@ class LibcameraLog {
   LibcameraLog& operator=(const LibcameraLog&) = delete;
 
  private:
-  /// libcamera writes a line at once, and from several threads: nothing is kept between writes.
+  /// libcamera writes a whole line at once, from several threads, so nothing is stored between
+  /// writes.
   class Lines : public std::streambuf {
    public:
     explicit Lines(std::function<void(const std::string&)> log) : log_(std::move(log)) {}

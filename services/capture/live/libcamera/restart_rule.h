@@ -1,4 +1,4 @@
-// When the cameras that run are closed for a moment, so that libcamera looks for all of them anew.
+// Decides when running cameras are briefly closed, so that libcamera enumerates all cameras again.
 #pragma once
 
 #include <cstddef>
@@ -8,15 +8,15 @@
 
 namespace perdure::capture {
 
-/// libcamera finds what is plugged in by itself, but not what came before udev had let this user
-/// have its nodes; and it looks twice as often at each device that is plugged in.
+/// libcamera detects plugged-in cameras itself, except those that appear before udev has granted
+/// access to their nodes. Its enumerations double with each device that is plugged in.
 class RestartRule {
  public:
-  /// libcamera looked for cameras when these nodes were there.
+  /// libcamera enumerated the cameras while these nodes existed.
   void started(std::set<std::string> nodes);
   void unplugged() { ++unplugged_; }
-  /// A camera is missing though libcamera runs, and these nodes are there: whether it is to look
-  /// anew. Once for the same nodes.
+  /// A camera is missing while libcamera runs and these nodes exist. Returns whether libcamera
+  /// should enumerate again, once for the same nodes.
   bool missed(const std::set<std::string>& nodes);
 
  private:
@@ -24,7 +24,8 @@ class RestartRule {
   std::size_t misses_ = 0, unplugged_ = 0;
 };
 
-/// The video nodes that this user may open. One that went and came again is another one.
+/// Video nodes that this user may open. A node that was removed and created again counts as another
+/// node.
 std::set<std::string> readableVideoNodes(const std::filesystem::path& folder = "/dev");
 
 }  // namespace perdure::capture

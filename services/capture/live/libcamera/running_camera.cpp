@@ -28,12 +28,13 @@ RunningCamera::RunningCamera(std::shared_ptr<libcamera::CameraManager> manager,
 
 bool RunningCamera::over() { return lastOfAll(*this, &RunningCamera::leave, &RunningCamera::end); }
 
-/// Stopping a camera that the kernel alone knows to be gone would end the process, over requests
-/// that are not given back.
+/// If only the kernel has noticed the removal, stopping the camera would abort the process because
+/// of unreturned requests.
 bool RunningCamera::end() {
-  const bool told = gone_ || !running_;  // who was gone before it ran is not told here
+  const bool told = gone_ || !running_;  // the signal is not connected if the camera vanished
+                                         // before it ran
   if (!told && openVideoNodeVanished()) return false;
-  if (running_) camera_->stop();  // else it may be another one's
+  if (running_) camera_->stop();  // otherwise another program may be running it
   camera_->requestCompleted.disconnect(this);
   camera_->disconnected.disconnect(this);
   requests_.clear();
@@ -89,8 +90,8 @@ void RunningCamera::queue(Request* request) {
   if (!gone_ && !ending_) camera_->queueRequest(request);
 }
 
-/// No work here. A request that is cancelled before the end found the camera gone, or controls that
-/// it refuses.
+/// Runs on libcamera's thread, so it does little work. A request cancelled before the end means
+/// that the camera is gone, or refuses the controls.
 void RunningCamera::completed(Request* request) {
   const bool asked = request == asking_;
   if (asked) asking_ = nullptr;
@@ -102,8 +103,9 @@ void RunningCamera::completed(Request* request) {
   }
 }
 
-/// udev names a node, not a camera. Where it is late, and another camera has that node by now, the
-/// one that libcamera takes for gone still gives images, and the next one would end the process.
+/// udev reports a node, not a camera. If its report is late, another camera may already have that
+/// node. The camera that libcamera then treats as gone still sends images, and the next one would
+/// abort the process.
 void RunningCamera::disconnected() {
   gone_ = true;
   done_.close();
@@ -127,9 +129,10 @@ void RunningCamera::giveBack(Request* request) {
   invokeMethod(&RunningCamera::queue, libcamera::ConnectionTypeQueued, request);
 }
 
-/// libcamera completes requests in the order in which they were queued. The driver of UVC uses the
-/// buffer of a broken image again, behind the others: their images are held back until that one has
-/// its own, which is the newest and comes first. All of them come in one go on libcamera's thread.
+/// libcamera completes requests in the order in which they were queued. The UVC driver reuses the
+/// buffer of a broken image after the other buffers. Their images are delayed until that buffer has
+/// an image, which is the newest but completes first. They then complete together on libcamera's
+/// thread.
 void RunningCamera::takeTheRest() {
   invokeMethod(&RunningCamera::settle, libcamera::ConnectionTypeBlocking);
   while (const auto more = done_.tryPop()) in_hand_.push_back(*more);

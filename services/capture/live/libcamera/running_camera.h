@@ -1,4 +1,4 @@
-// A camera of libcamera that was taken, and its requests.
+// An acquired libcamera camera and its requests.
 #pragma once
 
 #include <libcamera/libcamera.h>
@@ -16,10 +16,9 @@
 
 namespace perdure::capture {
 
-/// libcamera's thread calls slots and looks at requests by bare pointers, and a call of
-/// queueRequest() only reaches it some time later. So all that touches requests and signals is done
-/// on that thread: nothing can be unplugged in between, and once it is over() that thread knows of
-/// none of them.
+/// libcamera's thread calls slots and reads requests through raw pointers, and calls of
+/// queueRequest() reach it later. Therefore all access to requests and signals is on that thread.
+/// No camera can be unplugged in between, and after over() that thread has no pointers to them.
 class RunningCamera final : public Unended, public libcamera::Object {
  public:
   static constexpr std::size_t kBuffers = 4;
@@ -30,31 +29,33 @@ class RunningCamera final : public Unended, public libcamera::Object {
   RunningCamera& operator=(const RunningCamera&) = delete;
 
   libcamera::Camera& camera() { return *camera_; }
-  /// False where another program has it, or libcamera thinks that we still do.
+  /// False if another program uses the camera, or if libcamera still counts it as used by this
+  /// process.
   bool acquire();
-  /// "camera_absent". A request for each buffer of a stream that is configured.
+  /// Allocates a request for each buffer of a configured stream. Fails with "camera_absent".
   Result<void> allocate(libcamera::Stream* stream);
   const std::vector<std::unique_ptr<libcamera::FrameBuffer>>& buffers(libcamera::Stream* s) const {
     return allocator_->buffers(s);
   }
-  /// Some pipelines take controls as they start, that of UVC takes them from requests alone.
+  /// Some pipelines take controls at the start; the UVC pipeline takes them only from requests.
   bool start(const libcamera::ControlList& asked);
 
-  /// Unplugged, as libcamera was told by udev.
+  /// Whether udev has reported to libcamera that the camera is unplugged.
   bool gone() const { return gone_; }
-  /// It does not take the controls that it was started with.
+  /// Whether the camera refuses the controls given at its start.
   bool refused() const { return refused_; }
-  /// The next one in the driver's order, whose image is there until it is given back.
+  /// Next request in the driver's order. Its image is valid until the request is returned by
+  /// giveBack().
   libcamera::Request* next(std::chrono::milliseconds longest);
   void giveBack(libcamera::Request* request);
 
-  /// False where the kernel has removed the camera and udev has not told libcamera of that yet.
+  /// False if the kernel has removed the camera, but udev has not yet reported this to libcamera.
   bool over() override;
 
  private:
   void takeTheRest();
 
-  // On libcamera's thread:
+  // Members that run on libcamera's thread:
   bool begin();
   void queue(libcamera::Request* request);
   void settle() {}
@@ -63,16 +64,16 @@ class RunningCamera final : public Unended, public libcamera::Object {
   void leave() { ending_ = true; }
   bool end();
 
-  const std::shared_ptr<libcamera::CameraManager> manager_;  // goes after its camera
+  const std::shared_ptr<libcamera::CameraManager> manager_;  // destroyed after its camera
   const std::shared_ptr<libcamera::Camera> camera_;
   libcamera::Thread* const home_;
   std::unique_ptr<libcamera::FrameBufferAllocator> allocator_;
   std::vector<std::unique_ptr<libcamera::Request>> requests_;
-  std::vector<int> nodes_;  ///< descriptors of its own video nodes, which libcamera opened
+  std::vector<int> nodes_;  ///< descriptors of the camera's video nodes, which libcamera opened
   libcamera::ControlList asked_;
-  const libcamera::Request* asking_ = nullptr;  ///< carries the controls, until it is back
+  const libcamera::Request* asking_ = nullptr;  ///< carries the controls, until it completes
   BoundedQueue<libcamera::Request*> done_{2 * kBuffers, Overflow::kDropOldest};  // never full
-  std::deque<libcamera::Request*> in_hand_;  ///< taken out of done_, in the driver's order
+  std::deque<libcamera::Request*> in_hand_;  ///< taken from done_, in the driver's order
   SequenceWatch watch_;
   std::atomic<bool> gone_{false}, refused_{false};
   bool acquired_ = false, running_ = false, ending_ = false;

@@ -98,7 +98,7 @@ Result<void> Session::choose() {
   for (const auto& camera : there) ids.push_back(camera->id());
   const auto chosen = chooseCamera(ids, settings_.id, settings_.id_alone);
   if (!chosen) {
-    // One that came before udev had let this user have its nodes is left out by libcamera for good.
+    // libcamera never adds a camera that appeared before udev granted access to its nodes.
     shared_->missing();
     return tl::unexpected(chosen.error());
   }
@@ -196,7 +196,8 @@ Result<Frame> Session::frameOf(const FrameBuffer& buffer) {
   return vision::compressed(*frame, settings_.jpeg_quality);
 }
 
-/// Without the sensor's own time: when the driver had the image, which was exposed before that.
+/// Time of the image. Without the sensor's own time, it is derived from the driver's time, which is
+/// later than the exposure.
 std::int64_t Session::timeOf(Request& request, const libcamera::FrameMetadata& metadata) const {
   const auto exposure_us = request.metadata().get(controls::ExposureTime).value_or(0);
   const auto start = request.metadata().get(controls::SensorTimestamp);

@@ -1,4 +1,4 @@
-// Cameras of libcamera.
+// Sessions of libcamera's cameras.
 #pragma once
 
 #include <functional>
@@ -9,8 +9,8 @@
 
 namespace perdure::capture {
 
-/// Opens the cameras of these settings, one opener for each. `log` gets libcamera's lines, on any
-/// thread, as long as one of the results or of their sessions lives. Once for the process.
+/// Returns one opener for each camera of these settings. `log` receives libcamera's lines, on any
+/// thread, during the lifetime of the openers and their sessions. Call it once per process.
 std::vector<OpenCamera> libcameraOpeners(const std::vector<CameraSettings>& cameras,
                                          std::function<void(const std::string&)> log);
 

@@ -9,7 +9,8 @@
 
 namespace perdure::capture {
 
-/// What is not over then is left as it is: libcamera's thread still knows it.
+/// Cameras that have not ended within kLongest are leaked, because libcamera's thread still
+/// references them.
 SharedManager::~SharedManager() {
   constexpr std::chrono::milliseconds kLongest{2000}, kPause{50};
   for (auto left = kLongest; keeps() && left.count() > 0; left -= kPause) {
@@ -51,7 +52,7 @@ Result<std::shared_ptr<libcamera::CameraManager>> SharedManager::manager() {
 }
 
 void SharedManager::missing() {
-  constexpr long kOurs = 2;  // this one and the caller's
+  constexpr long kOurs = 2;  // references of this object and of the caller
   stale_ = true;
   if (manager_.use_count() <= kOurs) return;
   for (unsigned n = unplugged_.exchange(0); n > 0; --n) rule_.unplugged();

@@ -1,4 +1,4 @@
-// libcamera's manager, of which a process has one at a time, for all of its cameras.
+// libcamera's manager for all cameras of the process, which may have only one at a time.
 #pragma once
 
 #include <libcamera/camera_manager.h>
@@ -20,7 +20,7 @@ namespace perdure::capture {
 
 class SharedManager {
  public:
-  /// `devices`: where the video nodes are.
+  /// `devices`: folder of the video nodes.
   explicit SharedManager(std::function<void(const std::string&)> log,
                          std::filesystem::path devices = "/dev")
       : log_(std::move(log)), devices_(std::move(devices)) {}
@@ -28,28 +28,28 @@ class SharedManager {
   SharedManager(const SharedManager&) = delete;
   SharedManager& operator=(const SharedManager&) = delete;
 
-  /// Cameras are opened one after the other. Held while one calls manager() or missing().
+  /// Cameras are opened one after the other. Hold this lock while calling manager() or missing().
   std::unique_lock<std::mutex> opening() { return std::unique_lock(mutex_); }
-  /// Kept as long as one of its cameras is used.
+  /// Returns the manager, which exists as long as one of its cameras is used.
   Result<std::shared_ptr<libcamera::CameraManager>> manager();
-  /// It does not have a camera that is looked for: the next one is another one, as soon as nobody
-  /// uses this one. Called by one user.
+  /// Reports that the manager lacks a required camera. A new manager replaces it once no camera is
+  /// used. The caller must hold one reference to the manager.
   void missing();
-  /// The same: a camera was unplugged. libcamera 0.0.3 looks for cameras twice as often at each
-  /// device that is plugged in, 2^n times at the nth.
+  /// Reports that a camera was unplugged, with the same effect. Otherwise libcamera 0.0.3
+  /// enumerates the cameras 2^n times at the nth device that is plugged in.
   void unplugged();
-  /// A camera of which udev has not told yet that it is gone: it goes with a later manager(), when
-  /// it is over; at the end of this, within two seconds or never.
+  /// Keeps a camera whose removal udev has not reported yet. A later manager() destroys it once
+  /// over() is true. The destructor waits for it for two seconds, and otherwise leaks it.
   void keepUntilOver(std::unique_ptr<Unended> camera);
-  /// Whether there is one.
+  /// Whether a camera is kept.
   bool keeps() const;
-  /// Grows where the cameras that were opened before are to be closed for a moment.
+  /// Increases if the open cameras must be closed briefly.
   unsigned restarts() const { return restarts_; }
 
  private:
   void endKept();
 
-  const LibcameraLog log_;  // goes after the manager, whose thread writes to it
+  const LibcameraLog log_;  // destroyed after the manager, whose thread writes to it
   const std::filesystem::path devices_;
   std::mutex mutex_;
   std::shared_ptr<libcamera::CameraManager> manager_;

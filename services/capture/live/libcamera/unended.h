@@ -1,4 +1,4 @@
-// What libcamera cannot let go of yet.
+// Object that libcamera still references.
 #pragma once
 
 namespace perdure::capture {
@@ -6,7 +6,7 @@ namespace perdure::capture {
 class Unended {
  public:
   virtual ~Unended() = default;
-  /// Tries to end it. Once it is true it may be destroyed, and not before.
+  /// Tries to end the object. It may be destroyed only after this returns true.
   virtual bool over() = 0;
 };
 

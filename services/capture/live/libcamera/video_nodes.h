@@ -1,4 +1,4 @@
-// The video nodes that libcamera has open in this process, which it does not tell.
+// Video nodes that libcamera has open in this process. libcamera has no function that lists them.
 #pragma once
 
 #include <filesystem>
@@ -6,15 +6,15 @@
 
 namespace perdure::capture {
 
-/// Whether one is there no more. `descriptors`: links to what is open.
+/// Whether an open video node no longer exists. `descriptors`: folder of links to the open files.
 bool openVideoNodeVanished(const std::filesystem::path& descriptors = "/proc/self/fd");
 
-/// The descriptors of those that give images into buffers now: a camera has them from when it
-/// starts to when it stops.
+/// Descriptors of the nodes that stream into buffers now. A camera has them between its start and
+/// its stop.
 std::set<int> videoNodesWithBuffers(const std::filesystem::path& descriptors = "/proc/self/fd");
 
-/// Gives the descriptor to a file that never has anything to read and refuses what is asked of a
-/// video node. Who has the descriptor still closes it.
+/// Replaces the file of the descriptor by one that never has data and refuses video requests. The
+/// owner of the descriptor still closes it.
 void takeAway(int descriptor);
 
 }  // namespace perdure::capture

@@ -39,8 +39,8 @@ void decodePlanes(const ModelDescription& model, const DecodeOptions& options, c
   }
 }
 
-/// YOLO-Fastest (YOLOv3 heads): rows of A·(x, y, w, h, objectness, K classes) for each cell;
-/// centre (gx + σ(x))·s, size anchor·exp(w).
+/// YOLO-Fastest (YOLOv3 heads): rows of A·(x, y, w, h, objectness, K classes) for each cell. Centre
+/// (gx + σ(x))·s, size anchor·exp(w).
 void decodeAnchors(const ModelDescription& model, const DecodeOptions& options, const Level& level,
                    const Tensor& tensor, std::vector<Candidate>& out) {
   const int columns = model.input.width / level.stride, rows = model.input.height / level.stride;

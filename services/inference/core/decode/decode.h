@@ -1,4 +1,5 @@
-// Raw head tensors to boxes with evidence, one rule for each family of networks (eq. 6, 7).
+// Decodes raw head tensors to boxes with evidence, with one rule for each family of networks (eq.
+// 6, 7).
 #pragma once
 
 #include <array>
@@ -23,11 +24,12 @@ struct Candidate {
 };
 
 struct DecodeOptions {
-  double score_threshold = 0.05;    ///< boxes whose best wanted class scores less are left out
+  double score_threshold = 0.05;    ///< boxes with a lower score of their best wanted class are
+                                    ///< left out
   std::vector<std::size_t> wanted;  ///< indices of the model's classes to report, in order
 };
 
-/// Reasons: "model_output_shape", "model_output_not_finite".
+/// Fails with "model_output_shape" or "model_output_not_finite".
 Result<std::vector<Candidate>> decode(const ModelDescription& model, const DecodeOptions& options,
                                       const std::vector<Tensor>& tensors);
 

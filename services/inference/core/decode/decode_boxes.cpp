@@ -18,7 +18,7 @@ struct Rows {
 struct Views {
   std::size_t count;
   Rows boxes, scores;
-  bool objectness;  ///< the column before the scores
+  bool objectness;  ///< objectness is in the column before the scores
 };
 
 Views viewsOf(const ModelDescription& model, const std::vector<Tensor>& tensors) {

@@ -1,4 +1,4 @@
-// Whole boxes with scores, one row each: YOLOv5 and v8 as they are exported, SSD, DETR.
+// Decodes complete boxes with scores, one row each: exported YOLOv5 and YOLOv8, SSD, DETR.
 #pragma once
 
 #include <vector>
@@ -8,10 +8,10 @@
 
 namespace perdure::inference {
 
-/// `tensors`: those of tensorNames(), shapes checked. The four numbers of a box are read as
-/// `box_form` says; a share is one of the input's width or height. With priors and variances v:
+/// `tensors`: those of tensorNames(), with checked shapes. `box_form` defines the four numbers of a
+/// box; a share is relative to the input's width or height. With priors and variances v:
 ///   centre = prior + t·v₀·size of the prior, size = size of the prior · exp(t·v₁)
-/// Reasons: "model_output_shape" where boxes, scores and priors are not as many.
+/// Fails with "model_output_shape" if the numbers of boxes, scores and priors differ.
 Result<void> decodeBoxes(const ModelDescription& model, const DecodeOptions& options,
                          const std::vector<Tensor>& tensors, std::vector<Candidate>& out);
 

@@ -11,7 +11,7 @@
 namespace perdure::inference {
 namespace {
 
-/// The values of one cell: channel i is at data[i * step].
+/// Values of one cell: channel i is at data[i * step].
 struct Cell {
   const float* data;
   std::size_t step;

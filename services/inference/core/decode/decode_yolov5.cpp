@@ -8,7 +8,7 @@ namespace {
 
 double square(double x) { return x * x; }
 
-/// A box of anchor `a` in cell (gx, gy): `raw` are x, y, w and h, `step` apart.
+/// Box of anchor `a` in cell (gx, gy): `raw` holds x, y, w and h, `step` apart.
 Box anchoredBox(const Level& level, std::size_t a, int gx, int gy, const float* raw,
                 std::size_t step) {
   const double s = level.stride;

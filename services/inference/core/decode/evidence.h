@@ -1,7 +1,7 @@
 // Scores as log-likelihood ratios (eq. 7: activations before the soft-max, one of them clutter).
-// Clutter is the reference: activations[0] = 0, and for a score p of class k
+// Clutter is the reference: activations[0] = 0. For a score p of class k,
 //   activations[k] = logit(p) / T + b + logit(c),
-// T the temperature, b the bias, and c the share of clutter among the emitted boxes; README,
+// with the temperature T, the bias b, and the share c of clutter among the reported boxes; README,
 // "Clutter".
 #pragma once
 
@@ -21,7 +21,7 @@ inline double sigmoid(double x) { return std::exp(logSigmoid(x)); }
 
 inline double logit(double p) { return std::log(p) - std::log1p(-p); }
 
-/// Activations are kept within ±kMaxLogit, so that no single look is certain.
+/// Limit ±kMaxLogit of activations, so that no single detection is certain.
 inline constexpr double kMaxLogit = 30.0;
 
 /// logit(p) from log p ≤ 0, exact for p near 0 and near 1.
@@ -35,19 +35,18 @@ inline double logScore(const ModelDescription& model, double log_objectness, dou
   return model.objectness_exponent * log_objectness + model.class_exponent * log_class;
 }
 
-/// The calibrated log-likelihood ratio of "class k is here" against clutter, from the network's own
-/// log-odds.
+/// Calibrated log-likelihood ratio of class k against clutter, from the network's own log-odds.
 inline float evidenceOf(const Calibration& calibration, double log_odds) {
   return static_cast<float>(log_odds / calibration.temperature + calibration.bias +
                             logit(calibration.clutter_rate));
 }
 
-/// The network's own log-odds, from the evidence: the way back.
+/// Inverse of evidenceOf(): the network's own log-odds from the evidence.
 inline double oddsOf(const Calibration& calibration, double evidence) {
   return (evidence - calibration.bias - logit(calibration.clutter_rate)) * calibration.temperature;
 }
 
-/// The same from a score.
+/// evidenceOf() for the logarithm of a score.
 inline float activation(const Calibration& calibration, double log_score) {
   return evidenceOf(calibration, logitFromLog(log_score));
 }

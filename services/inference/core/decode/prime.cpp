@@ -9,14 +9,14 @@
 namespace perdure::inference {
 namespace {
 
-constexpr double kMostNats = 5.0;  // of one primed answer
+constexpr double kMostNats = 5.0;  // limit for one top-down answer
 
 struct Overlap {
   double iou = 0.0;
   std::size_t index = 0;
 };
 
-/// The one that overlaps the box most.
+/// Finds the box with the largest overlap.
 template <class Boxes>
 Overlap mostOverlapping(const Box& box, const Boxes& others) {
   Overlap most;
@@ -27,7 +27,7 @@ Overlap mostOverlapping(const Box& box, const Boxes& others) {
   return most;
 }
 
-/// Which expectations are met, and which reported boxes meet one.
+/// Which expectations and which reported boxes have a match.
 struct Meetings {
   std::vector<bool> met, used;
 };
@@ -49,7 +49,7 @@ Meetings meet(const std::vector<Expectation>& expected, const std::vector<Candid
   return result;
 }
 
-/// Variances of the sides of a box near an expectation, as networks place them.
+/// Variances of a network's box sides near an expectation.
 std::array<double, 4> ownVariances(const Box& expected) {
   constexpr double kRelative = 0.07, kPixels = 1.0;
   const double x = kPixels + kRelative * expected.width();
@@ -59,7 +59,7 @@ std::array<double, 4> ownVariances(const Box& expected) {
 
 std::array<double, 4> sidesOf(const Box& b) { return {b.x1, b.y1, b.x2, b.y2}; }
 
-/// Squared, of the sides, in deviations of prediction and box together.
+/// Squared distance of the sides, relative to the variances of prediction and box together.
 double distance2(const Box& box, const Expectation& expectation) {
   const auto own = ownVariances(expectation.box), a = sidesOf(box), b = sidesOf(expectation.box);
   double sum = 0.0;
@@ -109,7 +109,8 @@ Candidate fused(const Expectation& expectation, const Candidate& candidate) {
   Candidate result = candidate;
   for (std::size_t i = 0; i < 4; ++i) {
     const double variance = expectation.side_sigma[i] * expectation.side_sigma[i];
-    const double share = variance > 0.0 ? own[i] / (own[i] + variance) : 0.0;  // of the prediction
+    const double share = variance > 0.0 ? own[i] / (own[i] + variance) : 0.0;  // weight of the
+                                                                               // prediction
     sides[i] = share * predicted[i] + (1.0 - share) * box[i];
     result.side_sigma[i] = std::sqrt((1.0 - share) * own[i]);
   }

@@ -1,10 +1,10 @@
-// Top-down: what the network says at the places where objects are expected and no box was reported
-// (eq. 7 takes the likelihood at the predicted projection; README, "Top-down").
+// Top-down likelihood: the network's output at places where objects are predicted but no box was
+// reported (eq. 7 takes the likelihood at the predicted projection; README, "Top-down").
 //
-// The best of many candidates is a selection: near any place one of them says a little. Its
-// likelihood ratio is therefore not the candidate's own, but that of "the best near a place where
-// the thing is" against "the best near a place where nothing is", both where no box was reported
-// (PrimedCalibration, fitted by `perdure model calibrate` through this same selection).
+// The best of many candidates is a selection, because near any place some candidate has a low
+// score. The likelihood ratio therefore compares two cases in which no box was reported: the best
+// candidate near a place with the object, and near a place without one. PrimedCalibration holds
+// this ratio; `perdure model calibrate` fits it with the same selection.
 #pragma once
 
 #include <array>
@@ -18,49 +18,52 @@
 
 namespace perdure::inference {
 
-/// Where a box should be: a Gaussian in its four sides.
+/// Predicted box: a Gaussian in its four sides.
 struct Expectation {
   Box box;                             ///< pixels of the network's input
-  std::size_t activation = 1;          ///< position of its class in Candidate::activations
-  std::array<double, 4> side_sigma{};  ///< of the prediction, pixels of the input
+  std::size_t activation = 1;          ///< index of its class in Candidate::activations
+  std::array<double, 4> side_sigma{};  ///< standard deviation of the prediction, pixels of the
+                                       ///< input
 };
 
-/// The answer to an expectation that no reported box meets.
+/// Answer to an expectation without a matching reported box.
 struct PrimedAnswer {
   std::size_t expectation = 0;
-  std::optional<std::size_t> candidate;  ///< the best near it; nothing where there is none
-  double odds = 0.0;  ///< what it says: log-odds of the class, less ½ of its squared distance
+  std::optional<std::size_t> candidate;  ///< the best candidate near it; empty if there is none
+  double odds = 0.0;  ///< log-odds of the class, minus ½ of the candidate's squared distance
 };
 
-/// IoU from which a reported box meets an expectation, and from which a candidate is near it.
+/// Smallest IoU at which a reported box matches an expectation, and at which a candidate is near
+/// it.
 inline constexpr double kMet = 0.6, kNear = 0.4;
 
-/// Reported boxes meet expectations one to one, those that overlap most first. Of a row of things
-/// in line the boxes are often merged into one; the candidates know them apart. So a candidate
-/// speaks for the expectation that it overlaps most, whatever it was merged into, unless it
-/// overlaps a reported box more that meets no expectation: then it is that one's. Of an
-/// expectation's candidates the one wins that is likeliest by its activation and its place:
-/// the highest log-odds of the class − ½ Σ d² / σ², σ of the prediction and of the box together.
-/// In order of the expectations.
+/// Matches reported boxes and expectations one to one, by falling overlap. The boxes of several
+/// objects in a row are often merged into one, but their candidates are separate. A candidate
+/// therefore belongs to the expectation that it overlaps most, independent of merging. If it
+/// overlaps an unmatched reported box more, it belongs to that box.
+///
+/// Each expectation takes its best candidate by activation and position: the highest log-odds of
+/// the class − ½ Σ d² / σ², with σ of the prediction and of the box together. The result is in the
+/// order of the expectations.
 std::vector<PrimedAnswer> prime(const Calibration& calibration,
                                 const std::vector<Expectation>& expected,
                                 const std::vector<Candidate>& reported,
                                 const std::vector<Candidate>& candidates);
 
-/// Where the thing is, by prediction and box together, each side weighed by its variance.
+/// Combines prediction and box; each side is weighted by its variance.
 Candidate fused(const Expectation& expectation, const Candidate& candidate);
 
-/// log P(answer | it is there, unreported) / P(answer | nothing is there), nats.
+/// log P(answer | object present, unreported) / P(answer | no object), nats.
 double primedLogRatio(const PrimedCalibration& primed, const PrimedAnswer& answer);
 
-/// How long after their frame predictions are of use.
+/// Time for which predictions are valid after their frame.
 inline constexpr double kPrimedHorizon_s = 0.5;
 
-/// Whether the predictions are of this frame's camera and source, and of a frame not later than it
-/// and not older than kPrimedHorizon_s.
+/// Whether the predictions match the frame's camera and source. Their frame must not be later than
+/// this frame, and at most kPrimedHorizon_s older.
 bool fitsFrame(const Predictions& predictions, const Frame& frame);
 
-/// The predicted box `after` seconds.
+/// Predicted box after `after` seconds.
 Box movedOn(const Prediction& prediction, double after);
 
 }  // namespace perdure::inference

@@ -8,9 +8,9 @@
 namespace perdure::inference {
 namespace {
 
-/// Mean of the boxes that took part in a kept one.
+/// Weighted mean of the boxes merged into a kept one.
 struct Vote {
-  Box first;  ///< of the candidate that was kept
+  Box first;  ///< box of the kept candidate
   Box sum;
   std::array<double, 4> sigma_sum{};
   double weight = 0.0;
@@ -21,7 +21,7 @@ struct Vote {
     for (std::size_t i = 0; i < 4; ++i) sigma_sum[i] += w * candidate.side_sigma[i];
     weight += w;
   }
-  /// The votes saw the same pixels: their mean is as sure as they are, not surer.
+  /// The votes come from the same pixels, so their mean has the same uncertainty as each of them.
   void decide(Candidate& candidate) const {
     if (weight <= 0.0) return;
     candidate.box = {sum.x1 / weight, sum.y1 / weight, sum.x2 / weight, sum.y2 / weight};
@@ -43,7 +43,7 @@ double covered(const Box& box, const Box& by) {
   return width > 0.0 && height > 0.0 && area > 0.0 ? width * height / area : 0.0;
 }
 
-/// Takes from `weaker` what `better` says better already; see suppress.h.
+/// Subtracts evidence from `weaker` for the area where it covers `better`; see suppress.h.
 void discount(const Candidate& better, Candidate& weaker) {
   const double share = covered(better.box, weaker.box);
   if (share <= 0.0) return;

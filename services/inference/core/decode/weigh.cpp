@@ -9,7 +9,7 @@
 namespace perdure::inference {
 namespace {
 
-/// The column of class k, of the scores of one box.
+/// Access to the column of class k in the scores of one box.
 class Columns {
  public:
   Columns(const ModelDescription& model, const RawScores& raw)
@@ -59,18 +59,18 @@ float evidence(const Calibration& calibration, double log_odds) {
   return evidenceOf(calibration, std::clamp(log_odds, -kMaxLogit, kMaxLogit));
 }
 
-/// σ(o)·σ(c_k): most networks.
+/// Whether the score is σ(o)·σ(c_k), as in most networks.
 bool isPlainProduct(const ModelDescription& model) {
   return !model.class_softmax && model.objectness_exponent == 1.0 && model.class_exponent == 1.0;
 }
 
-/// logit(σ(o) σ(c)) = −log(u + e^−c (1 + u)) with u = e^−o: one logarithm for
-/// each of the K classes of a box, and exact, as all terms are positive.
+/// logit(σ(o) σ(c)) = −log(u + e^−c (1 + u)) with u = e^−o. It needs one logarithm for each of a
+/// box's K classes, and is exact, because all terms are positive.
 double logitOfProduct(double u, double c) {
   return u == 0.0 ? c : -std::log(u + std::exp(-c) * (1.0 + u));
 }
 
-/// Objectness and classes, or classes alone.
+/// Score from objectness and classes, or from classes alone.
 std::optional<std::size_t> weighAlone(const ModelDescription& model, const DecodeOptions& options,
                                       const RawScores& raw, Candidate& candidate) {
   const double log_threshold = std::log(options.score_threshold);
@@ -104,7 +104,7 @@ std::optional<std::size_t> weighAlone(const ModelDescription& model, const Decod
   return best;
 }
 
-/// A soft-max over classes and background.
+/// Score from a soft-max over classes and background.
 std::optional<std::size_t> weighAgainstBackground(const ModelDescription& model,
                                                   const DecodeOptions& options,
                                                   const RawScores& raw, Candidate& candidate) {

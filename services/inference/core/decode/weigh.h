@@ -1,5 +1,5 @@
-// The raw values of one box to its score and its evidence for each class (eq. 6, 7; README,
-// "Clutter"): with objectness, with classes alone, or with a background among them.
+// Converts the raw values of one box to its score and its evidence for each class (eq. 6, 7;
+// README, "Clutter"). It handles objectness, classes alone, and a background among the classes.
 #pragma once
 
 #include <cstddef>
@@ -10,31 +10,31 @@
 
 namespace perdure::inference {
 
-/// Where a network gives probabilities only, they are kept within [p, 1 − p] of this p before their
-/// logit is taken: float32 has no finer steps below 1. That is evidence within ±16.1.
+/// Probabilities of networks without logits are limited to [p, 1 − p] with this p before the logit,
+/// because float32 has no finer steps below 1. The evidence is then within ±16.1.
 inline constexpr double kLeastProbability = 1e-7;
 
-/// What the network says of one box: column k of the scores is at scores[k * step].
+/// Raw scores of one box; column k is at scores[k * step].
 struct RawScores {
   std::optional<float> objectness;
   const float* scores;
   std::size_t step;
 };
 
-/// Fills score and activations and returns the best wanted class; nothing where the box is below
-/// the threshold. Class k is column k, or k + 1 where the background is first.
+/// Fills score and activations and returns the best wanted class; empty if the box is below the
+/// threshold. Class k is column k, or k + 1 if the background is first.
 ///   p_k = σ(o)^a · q_k^b, q_k sigmoid or soft-max of the classes; without objectness σ(o) = 1
 ///   activations[k] = logit(p_k) / T + logit(c)
 /// With a soft-max over classes and background:
 ///   p = softmax(o); activations[k] = (o_k − o_background) / T + logit(c), within ±kMaxLogit
-/// `applied` probabilities are first taken back to raw values: logit(p), or log p of a soft-max.
+/// `applied` probabilities are first converted to raw values: logit(p), or log p of a soft-max.
 std::optional<std::size_t> weigh(const ModelDescription& model, const DecodeOptions& options,
                                  const RawScores& raw, Candidate& candidate);
 
 /// Soft-max of `count` values, `step` apart.
 std::vector<double> softMax(const float* values, std::size_t step, std::size_t count);
 
-/// A box by its centre and size.
+/// Box from its centre and size.
 inline Box centred(double cx, double cy, double width, double height) {
   return {cx - width / 2, cy - height / 2, cx + width / 2, cy + height / 2};
 }

@@ -16,12 +16,13 @@ Result<cv::Mat> viewOf(const Frame& frame) {
     return fail("frame_malformed", "the image's size and its data do not agree");
   }
   const int type = frame.encoding == ImageEncoding::kBgr8 ? CV_8UC3 : CV_8UC1;
-  // OpenCV has no view of constant data; nothing here writes to it.
+  // OpenCV has no view of constant data; this code does not write to it.
   auto* data = const_cast<std::uint8_t*>(frame.data->data());
   return cv::Mat(static_cast<int>(frame.height), static_cast<int>(frame.width), type, data);
 }
 
-/// Interleaved 8-bit BGR of the input's size to planes of float, in the network's colour order.
+/// Converts interleaved 8-bit BGR of the input's size to float planes in the network's colour
+/// order.
 cv::Mat toPlanes(const Input& input, const cv::Mat& bgr) {
   const int sizes[] = {1, 3, input.height, input.width};
   cv::Mat blob(4, sizes, CV_32F);

@@ -1,4 +1,4 @@
-// An image brought to the network's input, and the way back for boxes.
+// Fits an image to the network's input, and maps boxes back to the image.
 #pragma once
 
 #include <array>
@@ -11,10 +11,10 @@
 
 namespace perdure::inference {
 
-/// Pixels of the image to pixels of the input: x_input = x_image · scale_x + offset_x.
+/// Maps pixels of the image to pixels of the input: x_input = x_image · scale_x + offset_x.
 struct ImageFit {
   double scale_x = 1, scale_y = 1, offset_x = 0, offset_y = 0;
-  int width = 0, height = 0;  ///< of the scaled image, without padding
+  int width = 0, height = 0;  ///< size of the scaled image, without padding
 
   Box toImage(const Box& b) const {
     return {(b.x1 - offset_x) / scale_x, (b.y1 - offset_y) / scale_y, (b.x2 - offset_x) / scale_x,
@@ -31,11 +31,11 @@ struct ImageFit {
 
 ImageFit fitOf(const Input& input, int image_width, int image_height);
 
-/// Which share of the input shows no image; 0 where nothing is letterboxed.
+/// Share of the input outside the image; 0 without letterbox.
 double paddedShare(const Input& input, int image_width, int image_height);
 
-/// The blob (1,3,H,W) of float32 for the network. Mono images are repeated in all three channels.
-/// Reasons: "frame_malformed" where the frame's size and its data do not agree.
+/// Input blob (1,3,H,W) of float32. Mono images are repeated in all three channels. Fails with
+/// "frame_malformed" if the frame's size does not match its data.
 Result<cv::Mat> makeBlob(const Input& input, const Frame& frame);
 
 }  // namespace perdure::inference

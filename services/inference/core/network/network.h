@@ -1,5 +1,5 @@
-// A network of a file, asked for named raw tensors: OpenCV's DNN module computes it, or ONNX
-// Runtime where this build has it.
+// A network from a file, evaluated for named raw tensors. OpenCV's DNN module runs it, or ONNX
+// Runtime if this build includes it.
 #pragma once
 
 #include <memory>
@@ -13,43 +13,43 @@
 namespace perdure::inference {
 
 enum class Backend {
-  kAuto,  ///< ONNX Runtime for a file that is for it; else OpenCV, and where it does not take the
-          ///< file ONNX Runtime
+  kAuto,  ///< ONNX Runtime if the description requires it; otherwise OpenCV, or ONNX Runtime if
+          ///< OpenCV rejects the file
   kOpenCv,
   kOnnxRuntime,
 };
 
-/// "auto", "opencv", "onnxruntime"; precondition: one of them.
+/// Backend of a name, which must be "auto", "opencv" or "onnxruntime".
 Backend backendOf(const std::string& name);
 
-/// Whether this build has ONNX Runtime.
+/// Whether this build includes ONNX Runtime.
 bool hasOnnxRuntime();
 
 struct NetworkFile {
-  std::string bytes;              ///< of an .onnx, or of a Darknet .cfg
-  std::string darknet_weights;    ///< bytes of its .weights; empty: ONNX
-  bool for_onnx_runtime = false;  ///< as its description says
+  std::string bytes;              ///< contents of an .onnx, or of a Darknet .cfg
+  std::string darknet_weights;    ///< contents of its .weights; empty: ONNX
+  bool for_onnx_runtime = false;  ///< set by its description
 };
 
 class Network {
  public:
   virtual ~Network() = default;
 
-  /// `blob` is (1,3,H,W), float32. The tensors live until the next call.
-  /// Reasons: "model_failed" where the network could not be computed, "model_output_shape".
+  /// `blob` is (1,3,H,W), float32. The tensors are valid until the next call. Fails with
+  /// "model_failed" if the network could not be evaluated, or with "model_output_shape".
   virtual Result<std::vector<Tensor>> forward(const cv::Mat& blob) = 0;
-  /// What computes it, with its version, for people.
+  /// Name and version of the backend, for people.
   virtual std::string backend() const = 0;
 };
 
-/// `threads` are those of ONNX Runtime; OpenCV's are the process's (cv::setNumThreads).
-/// Reasons: "model_unreadable", "model_without_tensor", "backend_absent"; the detail is a clause
-/// that says who does not take it and why.
+/// `threads`: threads of ONNX Runtime; OpenCV uses those of the process (cv::setNumThreads). Fails
+/// with "model_unreadable", "model_without_tensor" or "backend_absent". The detail is a clause that
+/// names the backend and the cause.
 Result<std::unique_ptr<Network>> loadNetwork(const NetworkFile& file,
                                              const std::vector<std::string>& tensors,
                                              Backend backend = Backend::kAuto, int threads = 1);
 
-/// Of one backend each, for loadNetwork().
+/// Loaders of single backends, for loadNetwork().
 Result<std::unique_ptr<Network>> loadWithOpenCv(const NetworkFile& file,
                                                 const std::vector<std::string>& tensors);
 Result<std::unique_ptr<Network>> loadWithOnnxRuntime(const NetworkFile& file,

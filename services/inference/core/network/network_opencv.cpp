@@ -7,7 +7,7 @@
 namespace perdure::inference {
 namespace {
 
-/// OpenCV prints what it also throws; while one of these lives it only throws.
+/// Stops OpenCV from printing the errors that it also throws.
 class QuietOpenCv {
  public:
   QuietOpenCv() : before_(cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT)) {}
@@ -19,8 +19,8 @@ class QuietOpenCv {
   cv::utils::logging::LogLevel before_;
 };
 
-/// What OpenCV throws, in one line: the operator that it does not take where it names one
-/// ("> Node [Where@ai.onnx]:(onnx_node!Where_2) parse error …"), else its first line.
+/// Summarises an OpenCV exception in one line. It is the unsupported operator if the text has one
+/// ("> Node [Where@ai.onnx]:(onnx_node!Where_2) parse error …"), otherwise the first line.
 std::string gist(const std::string& text) {
   const std::size_t begin = text.find("Node ["), end = text.find_first_of("@]", begin);
   if (begin != std::string::npos && end != std::string::npos) {
@@ -37,7 +37,8 @@ std::string lastOf(const std::vector<std::string>& names, std::size_t count) {
   return text;
 }
 
-/// OpenCV reads on past the end of a short .weights file without a word: count what it needs.
+/// OpenCV reads past the end of a short .weights file without an error, so its required size is
+/// checked here.
 Result<void> checkWeights(cv::dnn::Net& net, std::size_t bytes) {
   std::size_t needed = 0;
   for (const std::string& name : net.getLayerNames()) {
@@ -93,7 +94,7 @@ Result<std::unique_ptr<Network>> loadWithOpenCv(const NetworkFile& file,
     net = weights.empty() ? cv::dnn::readNetFromONNX(file.bytes.data(), file.bytes.size())
                           : cv::dnn::readNetFromDarknet(file.bytes.data(), file.bytes.size(),
                                                         weights.data(), weights.size());
-  } catch (const std::exception& e) {  // cv::Exception, and what protobuf and std throw
+  } catch (const std::exception& e) {  // cv::Exception, and exceptions of protobuf and std
     return fail("model_unreadable", gist(e.what()));
   }
   if (net.empty()) return fail("model_unreadable", "it has no layers");

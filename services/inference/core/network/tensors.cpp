@@ -21,7 +21,7 @@ bool isAnchored(Family family) {
 
 bool hasDistances(Family family) { return family == Family::kYolov8 || family == Family::kNanoDet; }
 
-/// The other layout of a YOLOv5 head, (1,A,H,W,5+K); nothing for all else.
+/// The other layout of a YOLOv5 head, (1,A,H,W,5+K); empty for all other networks.
 Shape otherLayout(const ModelDescription& model, const Shape& shape) {
   if (model.family != Family::kYolov5 || shape.size() != 4) return {};
   const int row = 5 + static_cast<int>(model.classes.size());

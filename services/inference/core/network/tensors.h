@@ -1,4 +1,4 @@
-// The tensors that a network is asked for: their names, and the shapes that they must have.
+// Names and shapes of the tensors that are requested from a network.
 #pragma once
 
 #include <span>
@@ -20,21 +20,21 @@ struct Tensor {
 /// A length in expectedShapes() that the network chooses.
 inline constexpr int kAnyLength = -1;
 
-/// Names of the tensors to ask the network for, in the order that decode() takes them.
+/// Names of the tensors to request from the network, in the order of decode()'s argument.
 std::vector<std::string> tensorNames(const ModelDescription& model);
 
-/// Columns and rows of a level's cells. Those of the families perdure and nanodet may reach beyond
-/// the input's border: 240 / 32 is 8 rows.
+/// Columns and rows of a level's cells. For the families perdure and nanodet they may extend beyond
+/// the input's border: 240 / 32 gives 8 rows.
 std::pair<int, int> cellsOf(const ModelDescription& model, const Level& level);
 
-/// Columns of the scores: the classes and, where there is one, the background.
+/// Number of score columns: the classes, and the background if present.
 std::size_t scoreColumns(const ModelDescription& model);
 
-/// What the tensors must look like, in the order of tensorNames(). The heads of YOLOv5 may also
-/// be (1,A,H,W,5+K).
+/// Required shapes of the tensors, in the order of tensorNames(). YOLOv5 heads may also have the
+/// shape (1,A,H,W,5+K).
 std::vector<std::vector<int>> expectedShapes(const ModelDescription& model);
 
-/// Reasons: "model_output_shape", "model_output_not_finite".
+/// Fails with "model_output_shape" or "model_output_not_finite".
 Result<void> validate(const ModelDescription& model, const std::vector<Tensor>& tensors);
 
 }  // namespace perdure::inference

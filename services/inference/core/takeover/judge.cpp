@@ -6,11 +6,11 @@ namespace perdure::inference {
 namespace {
 
 constexpr std::size_t kMaxModels = 256;
-constexpr float kSure = 2.0F;       // nats for a class against clutter
+constexpr float kSure = 2.0F;       // nats of a certain class against clutter
 constexpr double kSameThing = 0.3;  // intersection over union
 constexpr std::size_t kFlood = 10;
 
-/// Position of the likeliest class, where the box is sure to be one.
+/// Index of the most probable class, if the box is certain.
 std::optional<std::size_t> sureClass(const Detection& d) {
   if (d.activations.size() < 2) return std::nullopt;
   const auto best = std::max_element(d.activations.begin() + 1, d.activations.end());
@@ -28,7 +28,8 @@ bool hasBoxAt(const Detections& list, const Box& box) {
   });
 }
 
-/// Boxes that it found by itself: an answer to a prediction shows little of how it sees.
+/// Counts boxes without top-down answers, because an answer to a prediction says little about the
+/// network.
 std::size_t boxesOf(const Detections& list) {
   return static_cast<std::size_t>(std::count_if(list.detections.begin(), list.detections.end(),
                                                 [](const Detection& d) { return !d.primed; }));

@@ -1,6 +1,5 @@
-// Which strength a result may be written with: a process that was taken for dead, or that comes
-// late, must not take the topic back with old results: it writes with the strength of a standby
-// first.
+// Strength with which a result may be written. A process that was considered dead, or that is late,
+// must not take the topic back with old results. It first writes with a strength below the others.
 #pragma once
 
 #include <chrono>
@@ -10,11 +9,14 @@
 
 namespace perdure::inference {
 
-/// Owner: `strength`; standby: one less; out of form: kOutOfForm, so that any healthy one is heard.
-/// Form is lost by a missed lease (`losses` went up), a result older than the lease, or kFailures
-/// of the network in a row. It comes back after kGoodResults in a row that are none of these, and
-/// not before kLeases have passed: a process that wakes finds a heap of old frames that all look
-/// new to it. Then it is a spare: it does not take the topic from another one that is heard.
+/// The strength is `strength` for the owner and one less for the standby. After a loss of form it
+/// is kOutOfForm, so that any healthy process takes precedence. Form is lost by a missed lease
+/// (`losses` increased), a result older than the lease, or kFailures failures of the network in a
+/// row.
+///
+/// Form returns after kGoodResults good results in a row, and after at least kLeases leases. A
+/// process that resumes after a suspension finds many old frames that appear new to it. It is then
+/// a spare: it does not take the topic from another process that writes.
 class Ownership {
  public:
   static constexpr std::int64_t kOutOfForm = 0;
@@ -25,11 +27,12 @@ class Ownership {
 
   Ownership(std::int64_t strength, bool standby, Duration lease)
       : full_(strength - (standby ? 1 : 0)), lease_(lease) {}
-  /// Of one that rehearses: below all others, whatever happens.
+  /// Ownership of a rehearsing process: always below all others.
   static Ownership unheard(Duration lease) { return {kOutOfForm - 1, false, lease}; }
 
-  /// To be asked before each write. `age`: since this process got the frame; `losses`: how often
-  /// its writer was taken for dead since the start; `alone`: nobody else is heard.
+  /// Returns the strength; call it before each write. `age`: time since this process received the
+  /// frame. `losses`: number of expired leases of its writer since the start. `alone`: no other
+  /// writer is received.
   std::int64_t strengthFor(Time now, Duration age, std::uint64_t losses, bool alone) {
     failures_ = 0;
     if (losses > losses_ || age > lease_) {
@@ -38,16 +41,17 @@ class Ownership {
     } else if (!in_form_) {
       in_form_ = ++good_ >= kGoodResults && now - lost_at_ >= kLeases * lease_;
     }
-    if (in_form_ && alone) spare_ = false;  // one that just woke has heard nobody yet
+    // While out of form, a process that just resumed may not yet have received any other writer.
+    if (in_form_ && alone) spare_ = false;
     return strength();
   }
-  /// The network gave no result. True where form is lost by it.
+  /// Reports that the network gave no result. Returns true if this causes the loss of form.
   bool noteFailure(Time now) {
     const bool lost = ++failures_ >= kFailures && in_form_;
     if (failures_ >= kFailures) loseForm(now);
     return lost;
   }
-  /// From now on above all others, by a decision of the swap.
+  /// Sets a strength above all others, as the swap decides.
   void lead(std::int64_t strength) {
     full_ = strength;
     spare_ = false;
@@ -56,7 +60,7 @@ class Ownership {
     return in_form_ && !spare_ ? full_ : full_ < kOutOfForm ? full_ : kOutOfForm;
   }
   bool inForm() const { return in_form_; }
-  /// In form, but another one is heard, and stays so.
+  /// In form, but another process writes and continues to do so.
   bool spare() const { return spare_; }
 
  private:
@@ -72,7 +76,7 @@ class Ownership {
   std::uint64_t losses_ = 0;
   bool in_form_ = true, spare_ = false;
   Time lost_at_{};
-  int good_ = 0;  ///< results in a row since then
+  int good_ = 0;  ///< good results in a row since lost_at_
   int failures_ = 0;
 };
 

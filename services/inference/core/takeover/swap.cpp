@@ -6,12 +6,15 @@
 namespace perdure::inference {
 namespace {
 
-constexpr std::size_t kRemembered = 32;  // results of each side
-constexpr std::size_t kHeard = 128;      // frames
-constexpr int kSilence = 3;              // leases, and own results, without one of the newcomer's
-constexpr int kWorth = 4;                // leases, for which a result is worth saying again
-constexpr std::chrono::seconds kNobody{3};  // until a newcomer believes that it is alone
-constexpr std::chrono::seconds kGrace{10};  // beyond a probation, for its last word
+constexpr std::size_t kRemembered = 32;     // stored results of each side
+constexpr std::size_t kHeard = 128;         // stored frames
+constexpr int kSilence = 3;                 // leases, and own results, after which a newcomer
+                                            // counts as silent
+constexpr int kWorth = 4;                   // leases for which a result is repeated
+constexpr std::chrono::seconds kNobody{3};  // time without others after which a newcomer assumes
+                                            // that it is alone
+constexpr std::chrono::seconds kGrace{10};  // added to the probation, for the newcomer's last
+                                            // notice
 
 template <class T>
 void keep(std::deque<T>& list, T value, std::size_t most) {
@@ -90,12 +93,13 @@ void Swap::heard(const Detections& detections, Time now) {
   other_at_ = now;
   if (watch_ && watch_->newcomer == other_) watch_->silent_results = 0;
   const auto before = findFrame(others_, detections.stamp, [](const auto& d) { return d.stamp; });
-  if (before != others_.rend() && before->instance == other_) return;  // said again
+  if (before != others_.rend() && before->instance == other_) return;  // a repetition
   keep(others_, detections, kRemembered);
   const auto own = findFrame(own_, detections.stamp, stampOfMade);
   if (own != own_.rend()) compare(own->detections, detections);
   judgeNow(now);
-  // The frame has been heard from the other: from the next one on it may be ours.
+  // The other's result for this frame has been received, so this process may take over from the
+  // next frame on.
   if (role_ == Role::kRehearsing && good_ >= kRehearsal) return takeOver(now);
   const bool outbid = role_ == Role::kProbation && now - since_ > 2 * options_.lease &&
                       now - self_at_ > 2 * options_.lease;
@@ -145,7 +149,7 @@ void Swap::giveUp(const Reason& reason, bool tell) {
   if (tell) notify(SwapStep::kRolledBack, 0, reason);
 }
 
-/// Words from outside are not counted by their own name.
+/// Reasons received from outside are counted as "other" unless they are known.
 void Swap::countRollBack(const std::string& reason) {
   static const std::set<std::string> known = {
       "fails", "late", "slow", "silent", "empty", "flood", "elsewhere", "outbid", "unknown_model"};
@@ -159,7 +163,7 @@ void Swap::told(const SwapNotice& notice, Time now) {
   if (notice.step == SwapStep::kPassed && about_us) return retire(notice, now);
   if (notice.step != SwapStep::kRolledBack) return;
   if (about_us && role_ != Role::kPlain) giveUp({notice.reason, notice.detail}, false);
-  if (watch_ && notice.instance == watch_->newcomer) {  // it gave up by itself
+  if (watch_ && notice.instance == watch_->newcomer) {  // the newcomer gave up by itself
     watch_.reset();
     message_ = notice.model + " was rolled back, " + notice.reason + ": " + notice.detail;
     countRollBack(notice.reason);
@@ -170,7 +174,7 @@ void Swap::watch(const SwapNotice& notice, Time now) {
   watch_ = Watch{notice.instance, notice.model,
                  now + durationFromSeconds(std::min(notice.probation_s, 1e6)) + kGrace};
   judge_.reset();
-  other_at_ = now;  // it has a lease's time to be heard
+  other_at_ = now;  // the newcomer has one lease to send a result
   message_ = "watches " + notice.model + ", which took over";
 }
 
@@ -199,7 +203,7 @@ void Swap::retire(const SwapNotice& notice, Time now) {
   actions_.end = true;
 }
 
-/// Results since `from` may reach us and not yet others: the tick says them once more.
+/// Results since `from` may have reached this process, but not yet others. tick() repeats them.
 void Swap::sayAgain(Time from, Time now) {
   again_.clear();
   for (const Made& made : own_) {
@@ -214,8 +218,8 @@ void Swap::sayAgain(Time from, Time now) {
 }
 
 void Swap::tick(Time now) {
-  // Readers learn of a new owner a little apart from each other: what was written meanwhile is said
-  // once more.
+  // Readers learn of a new owner at slightly different times, so results written in the meantime
+  // are repeated.
   if (again_at_ != Time{} && now >= again_at_) {
     again_at_ = Time{};
     for (const Made& made : own_) {

@@ -1,9 +1,10 @@
-// How one inference process follows another while frames go on, as each of the two sees it: a state
-// machine over what it infers, what it hears, and what it is told. No clock: time comes with each
-// call. Nobody else is needed; whoever started the newcomer may be gone.
+// Takeover of one inference process by another while frames arrive, seen from each of the two. It
+// is a state machine over own results, received results and received notices. It has no clock: each
+// call passes the time. No third process is needed; the process that started the newcomer may have
+// ended.
 //
 //   newcomer:  rehearsing ──► on probation ──► plain          gives up: silent, and ends
-//   old one:   plain ──► watches ──► retires                  takes back: louder than the newcomer
+//   old one:   plain ──► watches ──► retires                  takes back: outbids the newcomer
 #pragma once
 
 #include <chrono>
@@ -20,47 +21,48 @@ namespace perdure::inference {
 
 struct SwapOptions {
   InstanceId self = 0;
-  std::string model;         ///< its name, for people
+  std::string model;         ///< name of the model, for people
   double probation_s = 0.0;  ///< above 0: a newcomer; 0: plain
   Duration lease{};
 };
 
 class Swap {
  public:
-  static constexpr std::size_t kRehearsal = 15;  ///< frames in a row that make sense
-  static constexpr std::size_t kPatience = 150;  ///< own results, before a rehearsal is too slow
-  static constexpr int kFailures = 3;            ///< of the network in a row
+  static constexpr std::size_t kRehearsal = 15;  ///< plausible frames in a row
+  static constexpr std::size_t kPatience = 150;  ///< number of own results after which a rehearsal
+                                                 ///< is too slow
+  static constexpr int kFailures = 3;            ///< failures of the network in a row
   using Time = std::chrono::steady_clock::time_point;
 
   struct Actions {
-    bool lead = false;   ///< be heard: a strength above all others
-    bool yield = false;  ///< be silent from now on
-    bool end = false;    ///< end the process, `failure` says whether in vain
+    bool lead = false;   ///< write with a strength above all others
+    bool yield = false;  ///< stop writing
+    bool end = false;    ///< end the process; `failure` is empty on success
     std::string failure;
-    std::vector<Detections> again;  ///< write these again: readers may have missed them
+    std::vector<Detections> again;  ///< write these again, because readers may have missed them
     std::vector<SwapNotice> notices;
   };
 
   explicit Swap(SwapOptions options);
 
   void learn(const ModelInfo& model) { judge_.learn(model); }
-  /// `in_form`: in time, and not taken for dead.
+  /// `in_form`: whether the result is in time and the lease has not expired.
   void ownResult(const Detections& own, bool in_form, Time now);
   void ownFailure(const Reason& reason, Time now);
-  /// What readers of `detections` hear, our own included.
+  /// Takes each message of `detections` that readers receive, including own ones.
   void heard(const Detections& detections, Time now);
   void told(const SwapNotice& notice, Time now);
-  /// Several times in a lease.
+  /// Call it several times in a lease.
   void tick(Time now);
-  /// What is to be done since the last call.
+  /// Returns the actions since the last call.
   Actions take() { return std::exchange(actions_, {}); }
 
-  /// Nobody else was heard for a lease.
+  /// Whether no other writer was received for a lease.
   bool alone(Time now) const { return now - other_at_ > options_.lease; }
   bool rehearsing() const { return role_ == Role::kRehearsing; }
-  /// What happened last, for people; empty where nothing did.
+  /// Last event, for people; empty if there was none.
   const std::string& message() const { return message_; }
-  /// Roll-backs by reason, taken back or given up.
+  /// Counts of roll-backs by reason.
   const ReasonCounts& reasons() const { return reasons_; }
 
  private:
@@ -73,7 +75,7 @@ class Swap {
     InstanceId newcomer = 0;
     std::string model;
     Time until;
-    int silent_results = 0;  ///< of our own since it was last heard
+    int silent_results = 0;  ///< own results since the newcomer was last received
   };
 
   void rehearse(bool in_form, Time now);
@@ -96,19 +98,20 @@ class Swap {
   Actions actions_;
   std::string message_;
   ReasonCounts reasons_;
-  std::deque<Made> own_;           ///< results of ours, the newest last
-  std::deque<Detections> others_;  ///< heard from others
+  std::deque<Made> own_;           ///< own results, the newest last
+  std::deque<Detections> others_;  ///< received from others
   std::deque<FrameStamp> frames_heard_;
-  InstanceId other_ = 0;  ///< whom we heard last beside ourselves
+  InstanceId other_ = 0;  ///< last writer received other than this process
   Time other_at_{}, self_at_{};
   bool hearing_self_ = false;
-  Time since_{};  ///< of the role; of the first result while rehearsing
+  Time since_{};  ///< start of the role; while rehearsing, time of the first result
   std::size_t results_ = 0, good_ = 0;
   int failures_ = 0;
-  InstanceId follows_ = 0;  ///< whose topic a newcomer took
+  InstanceId follows_ = 0;  ///< process whose topic a newcomer took
   std::optional<Watch> watch_;
   std::vector<Detections> again_;
-  Time again_at_{}, again_from_{};  ///< when; and results since when besides
+  Time again_at_{}, again_from_{};  ///< time of the repetition, and the start of the results to
+                                    ///< repeat
 };
 
 }  // namespace perdure::inference

@@ -9,16 +9,17 @@ namespace {
 
 std::int64_t viewsOf(const Track& track) { return static_cast<std::int64_t>(track.views()); }
 
-constexpr std::size_t kViews = 24;   // poses that are kept
-constexpr std::size_t kRecent = 12;  // of which the newest, in any case
-constexpr double kForget = 0.05;     // of the scale that was, with each image of
-constexpr double kMany = 10.0;       // points or more; with fewer it is less
-constexpr double kMoved = 0.05;      // m: less is rest
+constexpr std::size_t kViews = 24;   // stored poses
+constexpr std::size_t kRecent = 12;  // newest poses, which are always stored
+constexpr double kForget = 0.05;     // weight of a new image in the scale
+constexpr double kMany = 10.0;       // points needed for this weight; with fewer points it is lower
+constexpr double kMoved = 0.05;      // m; a smaller displacement is rest
 constexpr double kTurned = 0.05;     // rad
-constexpr double kGate = 3.0;        // residuals of a point, in those of the others
+constexpr double kGate = 3.0;        // limit of a point's residuals, relative to those of the
+                                     // others
 
 double lackOfFit(const Triangulated& point, std::size_t rays) {
-  // rms² is of 2n residuals, and three of their degrees of freedom went into the point.
+  // rms² averages 2n residuals, and the point uses three of their degrees of freedom.
   const auto n = static_cast<double>(rays);
   return point.rms * point.rms * 2.0 * n / (2.0 * n - 3.0);
 }
@@ -38,7 +39,7 @@ void PointMapper::clear() {
   mapped_ = {};
 }
 
-/// Tracks that have ended go, and the poses from before the first view of all others.
+/// Removes tracks that have ended, and poses older than the first view of every remaining track.
 void PointMapper::forgetEnded() {
   std::vector<std::uint64_t> ended;
   std::uint64_t oldest = frame_;
@@ -53,8 +54,8 @@ void PointMapper::forgetEnded() {
   std::erase_if(views_, [&](const View& view) { return view.frame < oldest; });
 }
 
-/// The newest poses stay: most tracks are young. Of those between them and the oldest, that which
-/// adds least baseline goes.
+/// Removes the pose that adds the least baseline, among those between the oldest and the newest
+/// ones. The newest poses stay, because most tracks are short.
 void PointMapper::forgetOne() {
   std::size_t least = 1;
   double shortest = std::numeric_limits<double>::infinity();
@@ -91,13 +92,13 @@ std::vector<Ray> PointMapper::raysOf(const Track& track) const {
   return rays;
 }
 
-/// Points are found, and the scale is learnt, without it: a scale that some bad poses have raised
-/// would leave too few points to learn that they have become good.
+/// Triangulation and the estimate of the scale do not use this test. Otherwise a scale raised by
+/// some bad poses would reject too many points, and could not decrease again.
 bool PointMapper::isSure(const Triangulated& point) const {
   return point.rms <= kGate * scale_ && point.relative_sigma * scale_ < options_.max_relative_sigma;
 }
 
-/// Why a track has no place.
+/// Counts why a track has no position.
 void PointMapper::note(const Reason& why) {
   if (why.code == "triangulation_depth") ++mapped_.contradicted;
   if (why.code == "triangulation_far") ++mapped_.far;

@@ -1,6 +1,7 @@
-// Points from tracks whose poses somebody else knows: each is triangulated from the views that add
-// a baseline. Nothing is estimated of the poses but how well the tracks agree with them.
-// Derivation: tools/docs/maths/vio-known-poses.md. Knows no images, threads or clocks.
+// Maps points from tracks when another program gives the poses. Each point is triangulated from the
+// views that add a baseline. Only the agreement of the tracks with the poses is estimated, not the
+// poses. Derivation: tools/docs/maths/vio-known-poses.md. The class does not access images, threads
+// or clocks.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,35 +17,36 @@
 
 namespace perdure::vio {
 
-/// The body at one image, by who knows it.
+/// Given pose and motion of the body at one image.
 struct KnownPose {
   RigidTransform T_WB;
-  Matrix6d covariance = Matrix6d::Zero();                ///< of [θ, p], as in Odometry
-  Eigen::Vector3d velocity_W = Eigen::Vector3d::Zero();  ///< m/s; of use with rolling shutters
-  Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();      ///< rad/s; likewise
+  Matrix6d covariance = Matrix6d::Zero();                ///< covariance of [θ, p], as in Odometry
+  Eigen::Vector3d velocity_W = Eigen::Vector3d::Zero();  ///< m/s; used only with rolling shutters
+  Eigen::Vector3d rate_B = Eigen::Vector3d::Zero();      ///< rad/s; used only with rolling shutters
 };
 
 class PointMapper {
  public:
-  /// readout_s: of each camera, 0 where all rows are exposed at once; empty: all are.
+  /// readout_s: read-out time of each camera, 0 for a global shutter. If empty, all cameras have a
+  /// global shutter.
   PointMapper(const VisionOptions& options, const WindowOptions& window,
               std::vector<RigidTransform> T_BC, std::vector<double> readout_s = {});
 
-  /// The next image, and what was tracked in it.
+  /// Adds the next image's pose and tracked points.
   void add(const KnownPose& pose, const TrackedFrame& tracked);
-  /// Points seen in the newest image whose position is known, by rising id. Those that do not fit
-  /// their poses as the others do are left out: they move, or were followed wrongly.
+  /// Points of the newest image whose position is known, by rising id. Points that fit the poses
+  /// much worse than the others are left out, because they move or were tracked wrongly.
   const std::vector<LandmarkEstimate>& landmarks() const { return landmarks_; }
-  /// Of the newest image.
+  /// Counts for the newest image.
   const Mapped& mapped() const { return mapped_; }
-  /// How much worse tracks agree with the poses than VisionOptions::sigma_px says; at least 1.
+  /// Ratio of the tracks' residuals to VisionOptions::sigma_px, at least 1.
   double scale() const { return scale_; }
-  /// Between the oldest and the newest pose that are kept.
+  /// Whether the body moved between the oldest and the newest stored pose.
   bool moved() const;
-  /// Deviation of a tracked point from where pose and place put it, in pixels: at least
-  /// VisionOptions::sigma_px; more where the poses have errors of their own.
+  /// Standard deviation of a tracked point from its projection, in pixels. It is at least
+  /// VisionOptions::sigma_px and grows with the errors of the poses.
   double noisePx() const { return scale_ * options_.sigma_px; }
-  /// Forgets poses and views: another frame of reference begins.
+  /// Clears poses and views, because another frame of reference begins.
   void clear();
 
  private:
@@ -68,10 +70,10 @@ class PointMapper {
   WindowOptions window_;
   std::vector<RigidTransform> T_BC_;
   std::vector<double> readout_s_;
-  std::vector<View> views_;  ///< oldest first; the newest image is always there
+  std::vector<View> views_;  ///< oldest first; always contains the newest image
   FeatureDatabase database_;
   std::uint64_t frame_ = 0;
-  double scale_ = 1.0;  ///< of the residuals
+  double scale_ = 1.0;  ///< ratio of the residuals to sigma_px
   std::vector<LandmarkEstimate> landmarks_;
   Mapped mapped_;
 };

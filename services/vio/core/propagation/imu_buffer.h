@@ -1,5 +1,5 @@
-// Inertial samples in time order, with linear interpolation at the ends of an interval and over
-// what was saturated.
+// Inertial samples in time order. Values are interpolated linearly at the ends of an interval and
+// across saturated samples.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,28 +16,28 @@ struct ImuReading {
   TimePoint time;
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero();   ///< rad/s, with bias
   Eigen::Vector3d accel = Eigen::Vector3d::Zero();  ///< m/s², with bias
-  /// Time between the two true values that the interval up to this reading is interpolated from;
-  /// 0: the interval itself is between two.
+  /// Time between the two valid samples from which the interval up to this reading is interpolated.
+  /// 0 if the interval itself lies between two valid samples.
   double gyro_span_s = 0.0, accel_span_s = 0.0;
 };
 
 class ImuBuffer {
  public:
-  /// Refuses "imu_not_finite", "imu_duplicate" and "imu_out_of_order". "imu_gyro_saturated" and
-  /// "imu_accel_saturated" (the same large value twice on an axis): the sample is in, those values
-  /// and the ones before are not.
+  /// Refuses a sample with "imu_not_finite", "imu_duplicate" or "imu_out_of_order". With
+  /// "imu_gyro_saturated" or "imu_accel_saturated" (the same large value twice on an axis) the
+  /// sample is stored, but its saturated value and the one before are not used.
   Result<void> add(const ImuReading& reading);
   bool empty() const { return raw_.empty(); }
   TimePoint first() const { return raw_.front().time; }
   TimePoint last() const { return raw_.back().time; }
-  /// Readings at from, at all samples between, and at to (from < to). Outside of the samples the
-  /// nearest one is held. Empty when there are no samples.
+  /// Readings at `from`, at all samples between, and at `to` (from < to). Outside the samples the
+  /// nearest one is used. Empty if the buffer is empty.
   std::vector<ImuReading> between(TimePoint from, TimePoint to) const;
-  /// The same into `readings`, whose memory is used again.
+  /// Writes the same readings into `readings` and reuses its memory.
   void between(TimePoint from, TimePoint to, std::vector<ImuReading>& readings) const;
-  /// The longest time without a sample inside [from, to].
+  /// Longest time without a sample inside [from, to].
   Duration longestGap(TimePoint from, TimePoint to) const;
-  /// The median distance of the newest samples; nothing before there are three.
+  /// Median interval of the newest samples; empty for fewer than three samples.
   std::optional<Duration> period() const;
   void dropBefore(TimePoint time);
   void clear();
@@ -53,8 +53,8 @@ class ImuBuffer {
   ImuReading reading(TimePoint time) const;
   static void dropBefore(Values& values, TimePoint time);
 
-  std::deque<ImuReading> raw_;  ///< as they came
-  Values rates_, forces_;       ///< without what was saturated
+  std::deque<ImuReading> raw_;  ///< samples as received
+  Values rates_, forces_;       ///< values without the saturated ones
 };
 
 }  // namespace perdure::vio

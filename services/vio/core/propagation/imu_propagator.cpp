@@ -11,12 +11,12 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// Over `dt`, with the rate going linearly from w0 to w1 (second-order Magnus).
+/// Rotation over `dt` if the rate changes linearly from w0 to w1 (second-order Magnus).
 Vector3d turned(const Vector3d& w0, const Vector3d& w1, double dt) {
   return 0.5 * (w0 + w1) * dt + w0.cross(w1) * (dt * dt / 12.0);
 }
 
-/// That rotation, and its derivatives by what both rates contain.
+/// That rotation, and its derivatives by bias and scale, which affect both rates.
 struct Turn {
   Matrix3d R, J_bias, J_scale;  ///< J: right tangent of R by the bias, by the scale
 };
@@ -26,30 +26,30 @@ Turn turn(const Vector3d& w0, const Vector3d& w1, double dt, const Vector3d& sca
   const Matrix3d half = 0.5 * dt * Matrix3d::Identity(), J = rightJacobianSo3(theta);
   const double c = dt * dt / 12.0;
   const Matrix3d J0 = J * (half - c * skew(w1)), J1 = J * (half + c * skew(w0));
-  const Vector3d by = -scale.cwiseInverse();  // d w / d bias; d w / d scale is w times that
+  const Vector3d by = -scale.cwiseInverse();  // d w / d bias; d w / d scale is this times w
   return {expSo3(theta), (J0 + J1) * by.asDiagonal(),
           (J0 * w0.asDiagonal() + J1 * w1.asDiagonal()) * by.asDiagonal()};
 }
 
-/// Time in which the velocity of linearisation follows the estimated one, s.
+/// Time constant with which the linearisation velocity follows the estimated one, s.
 constexpr double kFollow = 1.0;
 
 struct Densities {
   double gyro2, accel2;
 };
 
-/// Added to a square density where values are interpolated over `span`, and they differ by
-/// `change` over `dt` of it.
+/// Square density added if values are interpolated over `span` and change by `change` over `dt` of
+/// it.
 double interpolationDensity(double span, double dt, double change2, double floor, double gap,
                             const ImuNoise& noise) {
   if (span <= noise.interpolation_from_s) return 0.0;
-  const double whole = span / dt;  // the change over all of the span
+  const double whole = span / dt;  // ratio of the whole span to dt
   double variance = floor * floor + whole * whole * change2 / 12.0;
   if (span > noise.gap_from_s) variance += gap * gap;
   return span * variance;
 }
 
-/// Square noise densities of one step, with the error of interpolation where samples are sparse.
+/// Square noise densities of one step, including the interpolation error of sparse samples.
 Densities densities(const ImuReading& a, const ImuReading& b, double dt, const ImuNoise& noise) {
   const auto added = [&](double span, const Vector3d& change, double floor, double gap) {
     return interpolationDensity(std::max(span, dt), dt, change.squaredNorm(), floor, gap, noise);
@@ -70,7 +70,8 @@ void step(ImuIncrement& x, const ImuReading& a, const ImuReading& b, const Vecto
   const Turn half = turn(w0, wm, 0.5 * dt, scale), whole = turn(w0, w1, dt, scale);
   const Matrix3d R0 = x.dq.toRotationMatrix(), Rm = R0 * half.R, R1 = R0 * whole.R;
 
-  // d (R f) by the rotation error at the start, by gyro bias and scale, at start, middle and end.
+  // d (R f) by the rotation error at the start, by gyro bias and by scale; at start, middle and
+  // end.
   const Matrix3d A0 = -R0 * skew(f0), Am = -Rm * skew(fm), A1 = -R1 * skew(f1);
   const Matrix3d Am_t = Am * half.R.transpose(), A1_t = A1 * whole.R.transpose();
   const Matrix3d Am_b = Am * half.J_bias, A1_b = A1 * whole.J_bias;
@@ -187,7 +188,7 @@ Matrix15d transition(const Nav& from, const Nav& to, const ImuIncrement& x, cons
 
 namespace {
 
-/// How the errors of navigation follow from those before, and from the scale's where that is
+/// Transition of the navigation error, and its derivative by the scale's error if that is
 /// estimated.
 struct Moves {
   const Matrix15d& Phi;
@@ -195,7 +196,7 @@ struct Moves {
   std::optional<int> scale_at;
 };
 
-/// The covariance of navigation afterwards.
+/// Covariance of the navigation error after the step.
 Matrix15d movedNav(const State& state, const Moves& m, const Matrix15d& Q) {
   const auto P = state.P();
   Matrix15d result = m.Phi * P.topLeftCorner<kNavSize, kNavSize>() * m.Phi.transpose() + Q;
@@ -238,7 +239,7 @@ void propagate(State& state, const ImuIncrement& x, TimePoint to, double gravity
   const Eigen::Index rest = state.size() - kNavSize;
   const Matrix15d P_nav = movedNav(state, moves, G * x.Q * G.transpose());
   P.topLeftCorner<kNavSize, kNavSize>() = 0.5 * (P_nav + P_nav.transpose());
-  // In pieces that fit on the stack.
+  // Processed in blocks that fit on the stack.
   constexpr int kPiece = 32;
   for (Eigen::Index at = 0; at < rest; at += kPiece) {
     auto cross = P.block(0, kNavSize + at, kNavSize, std::min<Eigen::Index>(kPiece, rest - at));

@@ -14,7 +14,7 @@ using Eigen::Vector3d;
 
 namespace {
 
-/// Smallest eigenvalue of Σ n nᵀ, n the epipolar normals: zero where R is right.
+/// Smallest eigenvalue of Σ n nᵀ over the epipolar normals n. It is zero for the true R.
 double coplanarity(const BearingPair& pair, const Matrix3d& R_C0_C1) {
   Matrix3d M = Matrix3d::Zero();
   for (const auto& [f0, f1] : pair.bearings) {

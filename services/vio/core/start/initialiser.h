@@ -1,5 +1,6 @@
-// Where a filter begins. At rest: gravity from the mean force, gyro bias from the mean rate. With
-// a speed sensor: at once, in motion. With images alone: motion_initialiser.h.
+// Initial state of the filter. At rest, gravity follows from the mean force and the gyro bias from
+// the mean rate. With a speed sensor, the filter starts at once in motion. Starts from images
+// alone: motion_initialiser.h.
 #pragma once
 
 #include <optional>
@@ -17,19 +18,20 @@ struct TimedSpeed {
   double speed = 0.0, sigma = 0.1;
 };
 
-/// A start at rest at `now` from the samples of the window before it. Yaw 0, position 0.
+/// Start at rest at `now`, from the samples of the window before it, with yaw 0 and position 0.
 /// Fails with "start_window_short", "start_force_not_gravity" or "start_turning".
 Result<Start> startAtRest(const ImuBuffer& imu, TimePoint now, const Options& options);
 
-/// A start at `now` with the speed there (body x); `speeds` around it give the acceleration.
-/// Fails with "start_window_short" or "start_force_not_gravity".
+/// Start at `now` with the speed along body x. `speeds` around `now` give the acceleration. Fails
+/// with "start_window_short" or "start_force_not_gravity".
 Result<Start> startWithSpeed(const ImuBuffer& imu, TimePoint now, const SpeedReading& speed,
                              const std::vector<TimedSpeed>& speeds, const Options& options);
 
-/// The attitude with yaw 0 in which `up_B` (not zero) points along z of W.
+/// Attitude with yaw 0 that aligns `up_B` (not zero) with z of W.
 Eigen::Quaterniond levelAttitude(const Eigen::Vector3d& up_B);
 
-/// Covariance of a start: tilt, yaw and position known as a gauge, the others given.
+/// Covariance of a start. Yaw and position define W and are nearly exact. The other deviations are
+/// arguments.
 Eigen::Matrix<double, 15, 15> startCovariance(const Nav& nav, double tilt, double gyro_bias,
                                               double accel_bias, const Eigen::Vector3d& velocity_B);
 

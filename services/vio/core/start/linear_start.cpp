@@ -120,8 +120,8 @@ LinearStart solveOnce(const Views& views, std::map<std::uint64_t, PointEstimate>
 }
 
 Vector3d solveOnSphere(const Matrix3d& M, const Vector3d& d, double length) {
-  // Stationary: (M + λ I) g = d; the minimum has λ above the negated smallest eigenvalue, where
-  // |g(λ)| falls from infinity to zero.
+  // Stationary points satisfy (M + λ I) g = d. The minimum has λ above the negated smallest
+  // eigenvalue, an interval on which |g(λ)| falls from infinity to zero.
   const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(M);
   const Vector3d e = eigen.eigenvalues(), c = eigen.eigenvectors().transpose() * d;
   const auto g = [&](double lambda) -> Vector3d {

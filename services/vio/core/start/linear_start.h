@@ -1,5 +1,5 @@
-// Velocity and gravity of a window, linearly with the points eliminated (Dong-Si & Mourikis, IROS
-// 2012), the length of gravity being known. Derivation: tools/docs/maths/vio-starts.md.
+// Linear estimate of velocity and gravity over a window, with the points eliminated (Dong-Si &
+// Mourikis, IROS 2012) and the length of gravity known. Derivation: tools/docs/maths/vio-starts.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,47 +12,48 @@
 
 namespace perdure::vio {
 
-/// An image of the window, and the increment of the inertial samples until then, in B0.
+/// An image of the window, and the inertial increment from the first image to it, in B0.
 struct Keyframe {
-  double t = 0.0;     ///< since the first
+  double t = 0.0;     ///< s since the first keyframe
   Eigen::Matrix3d R;  ///< R_B0_Bi
   Eigen::Vector3d dp, dv;
   const TrackedFrame* tracked = nullptr;
-  Eigen::Vector3d rate = Eigen::Vector3d::Zero();  ///< of the body, where a shutter rolls
+  Eigen::Vector3d rate = Eigen::Vector3d::Zero();  ///< angular rate of the body, used only for a
+                                                   ///< rolling shutter
 };
 
 /// A point as one camera saw it from one keyframe.
 struct LinearView {
   Eigen::Matrix3d R_CB0;    ///< rotates B0 into this camera
-  Eigen::Vector3d p_BC_B0;  ///< the camera relative to the body, in B0
-  double t;                 ///< since the first keyframe
-  Eigen::Vector3d dp;       ///< of the increment until then
+  Eigen::Vector3d p_BC_B0;  ///< position of the camera relative to the body, in B0
+  double t;                 ///< s since the first keyframe
+  Eigen::Vector3d dp;       ///< position increment up to this keyframe
   Eigen::Vector2d normalised;
   double scale;
 };
 using Views = std::map<std::uint64_t, std::vector<LinearView>>;
 
-/// Of the points that two thirds of the keyframes saw, by id.
+/// Views of the points that two thirds of the keyframes saw, by id.
 Views viewsOf(const std::vector<Keyframe>& keyframes, const std::vector<CameraModel>& cameras);
 
 struct LinearStart {
   Eigen::Matrix<double, 6, 1> x;  ///< v0, g in B0
   Eigen::Matrix<double, 6, 6> information;
   double rms_px = 0.0;
-  double in_front = 0.0;  ///< share of points in front of all their cameras
+  double in_front = 0.0;  ///< share of points in front of all cameras that saw them
 };
 
-/// In B0.
+/// Estimated position of a point in B0.
 struct PointEstimate {
   Eigen::Vector3d f = Eigen::Vector3d::Zero();
   bool known = false;
 };
 
-/// One weighted linear solution; depths of the last one weigh this one's rows.
+/// One weighted linear solution. The depths of the previous solution give the weights of the rows.
 LinearStart solveOnce(const Views& views, std::map<std::uint64_t, PointEstimate>& points,
                       const Eigen::Matrix<double, 6, 1>& x_before, double gravity);
 
-/// The argmin of ½ gᵀ M g − dᵀ g with |g| = length; M symmetric, positive semidefinite.
+/// Minimises ½ gᵀ M g − dᵀ g with |g| = length; M is symmetric, positive semidefinite.
 Eigen::Vector3d solveOnSphere(const Eigen::Matrix3d& M, const Eigen::Vector3d& d, double length);
 
 }  // namespace perdure::vio

@@ -19,27 +19,29 @@ using Eigen::Vector3d;
 
 constexpr std::size_t kKeyframes = 8, kFewestTracks = 15, kFewestViews = 3, kMostPoints = 120;
 constexpr double kShortestWindow = 0.2;  // s
-constexpr double kGrowth = 0.1;          // of a window before it is searched again
-constexpr double kMostNoise = 1.25;      // of the residuals, relative to what they should be
-constexpr double kFewestInFront = 0.8;   // share of the points, of the linear solution
-constexpr double kMostLinearPx = 3.0;    // its residual
+constexpr double kGrowth = 0.1;          // relative growth of the window between searches
+constexpr double kMostNoise = 1.25;      // ratio of the residuals to their expected size
+constexpr double kFewestInFront = 0.8;   // share of points in front of the cameras, in the linear
+                                         // solution
+constexpr double kMostLinearPx = 3.0;    // residual of the linear solution
 constexpr double kFewestParallaxPx = 2.0;
-constexpr double kMostAcceleration = 5.0;  // m/s², of the mean over a window
+constexpr double kMostAcceleration = 5.0;  // m/s², mean over a window
 
-/// The bearing from where the camera was at the middle row, by rotation alone: the way of the body
-/// between the rows lies in the epipolar plane. turn_C: of the camera, first to last row.
+/// Bearing of the point, rotated to the camera's attitude at the middle row. The translation
+/// between the rows lies in the epipolar plane. turn_C: rotation of the camera from the first to
+/// the last row.
 Vector3d bearing(const ImagePoint& seen, const Vector3d& turn_C) {
   const Vector3d ray = seen.normalised.homogeneous().normalized();
   return turn_C.isZero(0.0) ? ray : Vector3d(expQuaternion(seen.row * turn_C) * ray);
 }
 
-/// A keyframe's points, and how far the first camera turned while it was read out.
+/// Points of a keyframe, and the rotation of the first camera during read-out.
 struct Bearings {
   const TrackedFrame* tracked = nullptr;
   Vector3d turn_C = Vector3d::Zero();
 };
 
-/// Of the body while the rows of a rolling shutter were read out; zero where none rolls.
+/// Angular rates of the body during the read-out of a rolling shutter; zero for a global shutter.
 std::vector<Vector3d> ratesAt(const std::vector<TimePoint>& times, const ImuBuffer& imu,
                               const std::vector<CameraModel>& cameras, const Vector3d& gyro_bias) {
   std::vector<Vector3d> rates(times.size(), Vector3d::Zero());
@@ -58,7 +60,7 @@ std::vector<Vector3d> ratesAt(const std::vector<TimePoint>& times, const ImuBuff
   return rates;
 }
 
-/// Matches of points seen in both frames; distances in pixels are added to `moved`.
+/// Matches of points seen in both frames. Their displacements in pixels are appended to `moved`.
 BearingPair pairOf(const Bearings& from, const Bearings& to, const ImuIncrement& x,
                    std::vector<double>& moved) {
   const TrackedFrame &first = *from.tracked, &second = *to.tracked;
@@ -79,7 +81,7 @@ BearingPair pairOf(const Bearings& from, const Bearings& to, const ImuIncrement&
 }  // namespace
 
 void MotionInitialiser::add(const FrameInput& input, TimePoint imu_time) {
-  // Another run of the clock: its frames and those before have no common window.
+  // The clock restarted: its frames and the earlier ones have no common window.
   if (!frames_.empty() && imu_time <= frames_.back().time) clear();
   frames_.push_back({imu_time, input.tracked});
   const Duration window = durationFromSeconds(options_.start.motion_window_s * 1.05);
@@ -114,8 +116,9 @@ std::vector<WindowPoint> windowPoints(const std::vector<const TrackedFrame*>& tr
   return points;
 }
 
-/// The state at the newest pose from the error [θ, v, gravity, b_g, b_a] of a window, in the W that
-/// is turned the least against a level one. Not in one of yaw 0: that leaps where x points up.
+/// State at the newest pose, from the error [θ, v, gravity, b_g, b_a] of a window. Its W is the
+/// level frame that is rotated least. A frame of yaw 0 is not used, because it is discontinuous if
+/// x points up.
 Nav navOf(const MotionWindow& w, const Eigen::Matrix<double, kWindowError, 1>& error,
           const Eigen::Quaterniond& level) {
   const WindowPose& last = w.poses.back();
@@ -147,7 +150,7 @@ Start startOf(const RefinedWindow& refined, const Options& options) {
         a.gyro_bias - b.gyro_bias, a.accel_bias - b.accel_bias;
   }
   J /= 2.0 * kStep;
-  // Yaw and position are W's own. The camera's mounting turns the velocity.
+  // Yaw and position define W. The error of the camera's mounting rotates the velocity.
   const double turned = options.calibration.extrinsic_rotation * start.nav.v_WB.norm();
   start.covariance = startCovariance(start.nav, 1e-4, 1e-4, 1e-4, Vector3d::Constant(turned));
   start.covariance += J * refined.covariance * J.transpose();
@@ -159,13 +162,13 @@ Start startOf(const RefinedWindow& refined, const Options& options) {
 
 Result<Start> MotionInitialiser::start(const ImuBuffer& imu,
                                        const std::vector<CameraModel>& cameras) {
-  // No increment reaches a frame from before the samples.
+  // Increments need samples at the frame, so frames older than the first sample are removed.
   while (!imu.empty() && !frames_.empty() && frames_.front().time < imu.first()) {
     frames_.pop_front();
   }
   if (frames_.empty()) return fail("start_window_short");
   const TimePoint now = frames_.back().time;
-  // A search costs as much as some frames, and another view of the same says little more.
+  // A search takes as long as several frames, and another view of the same scene adds little.
   if (failed_ && now < next_attempt_) return tl::unexpected(*failed_);
   Result<Start> result = attempt(imu, cameras);
   failed_.reset();
@@ -199,7 +202,8 @@ Result<Start> MotionInitialiser::attempt(const ImuBuffer& imu,
   }
   std::vector<BearingPair> pairs;
   std::vector<double> moved;
-  for (const std::size_t span : {1u, 3u, 6u}) {  // long ones weigh the bias, short ones are many
+  // long spans constrain the bias well, and short spans are numerous
+  for (const std::size_t span : {1u, 3u, 6u}) {
     for (std::size_t i = 0; i + span < count; ++i) {
       const ImuIncrement x = integrate(imu.between(times[i], times[i + span]), Vector3d::Zero(),
                                        Vector3d::Zero(), options_.imu);
@@ -234,7 +238,8 @@ Result<Start> MotionInitialiser::attempt(const ImuBuffer& imu,
   s.x.setZero();
   for (int i = 0; i < 4; ++i) s = solveOnce(views, estimates, s.x, options_.gravity);
   if (!s.x.allFinite() || s.in_front < kFewestInFront || s.rms_px > kMostLinearPx) {
-    // Nothing near the truth: the search begins at rest, and gravity against the mean force.
+    // The solution is far from the truth. The search begins at rest, with gravity opposite to the
+    // mean force.
     s.x.setZero();
     s.x.tail<3>() = -options_.gravity * keyframes.back().dv.normalized();
   }

@@ -1,6 +1,6 @@
-// A start in motion from images and inertial samples alone, with one or two cameras: the gyro bias
-// (epipolar_bias.h), then velocity and gravity (linear_start.h), then all of it together
-// (motion_refinement.h).
+// Start in motion from images and inertial samples alone, with one or two cameras. It estimates the
+// gyro bias (epipolar_bias.h), then velocity and gravity (linear_start.h), then all quantities
+// jointly (motion_refinement.h).
 #pragma once
 
 #include <deque>
@@ -16,12 +16,12 @@ class MotionInitialiser {
  public:
   explicit MotionInitialiser(const Options& options) : options_(options) {}
 
-  /// A time that is not later than the last one begins the window anew.
+  /// Adds a frame. If its time is not later than the last one, a new window begins.
   void add(const FrameInput& input, TimePoint imu_time);
   void clear() { frames_.clear(), failed_.reset(); }
-  /// A start at the newest frame, where the window has grown enough since the last search. Fails
-  /// with "start_window_short", "start_few_tracks", "start_no_parallax",
-  /// "start_force_not_gravity", "start_unobservable" or "start_inconsistent".
+  /// Start at the newest frame, once the window has grown enough since the last search. Fails with
+  /// "start_window_short", "start_few_tracks", "start_no_parallax", "start_force_not_gravity",
+  /// "start_unobservable" or "start_inconsistent".
   Result<Start> start(const ImuBuffer& imu, const std::vector<CameraModel>& cameras);
 
  private:
@@ -33,7 +33,7 @@ class MotionInitialiser {
 
   Options options_;
   std::deque<Seen> frames_;
-  std::optional<Reason> failed_;  ///< why the last search gave nothing
+  std::optional<Reason> failed_;  ///< why the last search failed
   TimePoint next_attempt_{};
 };
 

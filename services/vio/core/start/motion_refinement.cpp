@@ -18,19 +18,19 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr double kGyroBiasPrior = 0.3;  // rad/s: what a bias may be before anything is known
+constexpr double kGyroBiasPrior = 0.3;  // rad/s: prior deviation of the gyro bias
 constexpr int kIterations = 50;
 constexpr double kLittleDamping = 1e-3;
-constexpr double kLargestStretch = 1.0;  // of a step, natural logarithm
-constexpr double kInertialCost = 6.0;    // of samples and biases, as much as it usually is at most
-constexpr double kLeastGain = 0.1;       // of the cost, below which no step is taken
+constexpr double kLargestStretch = 1.0;  // largest scaling by a step, natural logarithm
+constexpr double kInertialCost = 6.0;    // usual upper limit of the cost of samples and biases
+constexpr double kLeastGain = 0.1;       // smallest expected gain of a step, in cost
 
 double huber(double deviations) {
   return deviations <= kHuber ? deviations * deviations : kHuber * (2.0 * deviations - kHuber);
 }
 
-/// Information on an inverse depth: nothing is nearer than the least depth. Without it images fit
-/// as well where all motion and all depths are nothing.
+/// Information on an inverse depth, from the least depth of a point. Without it, images also fit if
+/// all motion and all depths vanish.
 double nearness(const Options& o) { return o.vision.min_depth_m * o.vision.min_depth_m; }
 
 double priorCost(const MotionWindow& w, const Options& o) {
@@ -40,7 +40,7 @@ double priorCost(const MotionWindow& w, const Options& o) {
              (o.calibration.time_offset_s * o.calibration.time_offset_s);
 }
 
-/// Of the increments, the biases and the time offset.
+/// Cost of the increments, the biases and the time offset.
 double inertialCost(const Estimate& e, const Inertial& inertial, const Options& o) {
   double cost = priorCost(e.window, o);
   for (std::size_t i = 0; i < inertial.increments.size(); ++i) {
@@ -56,18 +56,19 @@ double costOf(const Estimate& e, const Inertial& inertial, const Options& o) {
     cost += e.rays[j].abr[2] * e.rays[j].abr[2] * nearness(o);
     for (const WindowView& v : e.window.points[j].views) {
       const auto term = viewTerm(e, j, v, inertial, o.vision.sigma_px);
-      // A point behind a camera counts as one far off: a step may put it back.
+      // A point behind a camera counts as a distant outlier, because a step may bring it back.
       cost += term ? huber(term->r.norm()) : huber(1000.0);
     }
   }
   return cost;
 }
 
-/// The normal equations, points eliminated, and what a step needs to find their part again.
+/// Normal equations with the points eliminated, and the values that recover the points' part of a
+/// step.
 struct Normal {
-  MatrixXd H;  ///< its lower half counts
+  MatrixXd H;  ///< only the lower half is valid
   VectorXd b;
-  MatrixXd eliminated;  ///< three rows for each point: H is less by their square
+  MatrixXd eliminated;  ///< three rows for each point; their square has been subtracted from H
   struct Point {
     Matrix3d F_inverse;
     Eigen::Matrix<double, 3, Eigen::Dynamic> F_x;
@@ -139,7 +140,7 @@ Normal normalOf(const Estimate& e, const Inertial& inertial, const Options& o, d
   return n;
 }
 
-/// The share of a step that makes the whole window larger: of positions, of points, of velocities.
+/// Share of a step that scales the whole window: positions, points and velocities.
 double stretchOf(const MotionWindow& w, const VectorXd& dx) {
   double along = 0.0, square = 1e-12;
   for (std::size_t k = 1; k < w.poses.size(); ++k) {
@@ -149,8 +150,9 @@ double stretchOf(const MotionWindow& w, const VectorXd& dx) {
   return std::clamp(along / square, -kLargestStretch, kLargestStretch);
 }
 
-/// Adds a step. Scale is what images leave open, and the cost is even along it: its part of the
-/// step is a factor, so that images fit after it as before. To first order it is the same step.
+/// Adds a step. Images do not constrain the scale, and their cost is constant along it. The scale
+/// part of the step is therefore applied as a factor, which preserves the fit to the images. To
+/// first order the step is the same.
 void move(Estimate& e, const VectorXd& dx, const Normal& n) {
   const double stretch = stretchOf(e.window, dx), factor = std::exp(stretch);
   VectorXd rest = dx;
@@ -170,7 +172,7 @@ void move(Estimate& e, const VectorXd& dx, const Normal& n) {
   }
 }
 
-/// Of what the newest pose and the window say, from the covariance of all.
+/// Covariance of the newest pose and of the window's parameters, from the covariance of all.
 WindowCovariance marginal(const MatrixXd& covariance, std::size_t last) {
   std::vector<Index> at;
   for (Index i = 0; i < 3; ++i) at.push_back(poseAt(last) + i);
@@ -201,7 +203,7 @@ Result<Minimum> minimise(Estimate e, const ImuBuffer& imu, const Options& option
     if (expected < kLeastGain) {
       settled = damping < kLittleDamping;
       if (settled) break;
-      damping *= 0.01;  // it may be the damping alone that makes the step small
+      damping *= 0.01;  // the step may be small only because of the damping
       growth = 2.0;
       continue;
     }
@@ -225,8 +227,8 @@ Result<Minimum> minimise(Estimate e, const ImuBuffer& imu, const Options& option
   return Minimum{std::move(e), std::move(*inertial), cost};
 }
 
-/// Root mean square of what views are off, in deviations; for each degree of freedom that they have
-/// beside the poses and points.
+/// Root mean square of the views' residuals, in deviations, per degree of freedom left by the poses
+/// and points.
 double imageNoise(const Minimum& m, double sigma_px) {
   double sum = 0.0, freedom = -6.0 * static_cast<double>(m.estimate.window.poses.size());
   for (std::size_t j = 0; j < m.estimate.rays.size(); ++j) {
@@ -240,7 +242,7 @@ double imageNoise(const Minimum& m, double sigma_px) {
   return std::sqrt(sum / std::max(1.0, freedom));
 }
 
-/// With the covariance there.
+/// Result with the covariance at the minimum.
 Result<RefinedWindow> refinedBy(Minimum m, const Options& options) {
   const Estimate& e = m.estimate;
   std::size_t rows = 9 * m.inertial.increments.size() + 7;
@@ -257,7 +259,7 @@ Result<RefinedWindow> refinedBy(Minimum m, const Options& options) {
   if (!covariance.allFinite() || !(covariance.diagonal().minCoeff() > 0.0)) {
     return fail("start_unobservable");
   }
-  // Beside two thousand rows of images, those of the samples do not show in the ratio.
+  // The ratio of two thousand image rows hardly depends on the few rows of inertial samples.
   const double inertial_ratio = inertialCost(e, m.inertial, options) / kInertialCost;
   const double scale = std::max({1.0, result.noise_ratio * result.noise_ratio, inertial_ratio});
   result.covariance = scale * marginal(covariance, e.window.poses.size() - 1);

@@ -1,7 +1,7 @@
-// The maximum a posteriori of a window in motion: poses, velocities, direction of gravity, both
-// biases, the time offset and the points, from images and inertial samples together
-// (Levenberg-Marquardt, points eliminated). Its covariance is that of the start. Derivation:
-// tools/docs/maths/vio-starts.md.
+// Maximum a posteriori estimate of a window in motion, from images and inertial samples
+// (Levenberg-Marquardt with the points eliminated). It estimates poses, velocities, the direction
+// of gravity, both biases, the time offset and the points. Its covariance becomes the covariance of
+// the start. Derivation: tools/docs/maths/vio-starts.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,11 +20,12 @@ struct WindowView {
   Eigen::Vector3d p_BC;
   Eigen::Vector2d normalised;
   Eigen::Matrix2d to_pixels;  ///< ∂pixel / ∂normalised
-  double row_s = 0.0;         ///< of a rolling shutter: its row is later than the pose by so much
+  double row_s = 0.0;         ///< delay of the point's row after the pose, in s, for a rolling
+                              ///< shutter
 };
 
 struct WindowPoint {
-  Eigen::Vector3d p_B0;  ///< in the first body frame, where the search begins
+  Eigen::Vector3d p_B0;  ///< initial value, in the first body frame
   std::vector<WindowView> views;
 };
 
@@ -34,31 +35,35 @@ struct WindowPose {
   Eigen::Vector3d p_B0 = Eigen::Vector3d::Zero(), v_B0 = Eigen::Vector3d::Zero();
 };
 
-/// What is estimated. The first pose is the frame of reference: rotation and position stay.
+/// Estimated quantities. Rotation and position of the first pose are fixed, because it is the frame
+/// of reference.
 struct MotionWindow {
   std::vector<WindowPose> poses;
   std::vector<WindowPoint> points;
-  Eigen::Vector3d gravity_B0 = Eigen::Vector3d::Zero();  ///< of known length
+  Eigen::Vector3d gravity_B0 = Eigen::Vector3d::Zero();  ///< fixed length
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = Eigen::Vector3d::Zero();
-  double time_offset_s = 0.0;  ///< of the images, beside what `poses` have already
+  double time_offset_s = 0.0;  ///< s, of the images, in addition to the offset already applied to
+                               ///< `poses`
 };
 
-/// Errors of the newest pose and what belongs to the window: [θ, v (B0), gravity (2), b_g, b_a].
+/// Error of the newest pose and of the window's parameters: [θ, v (B0), gravity (2), b_g, b_a].
 inline constexpr int kWindowError = 14;
 using WindowCovariance = Eigen::Matrix<double, kWindowError, kWindowError>;
-/// Two directions across gravity, times its length: gravity's error in B0 is this times its two.
+/// Two directions perpendicular to gravity, scaled by its length. The product with gravity's two
+/// error components is its error in B0.
 Eigen::Matrix<double, 3, 2> acrossGravity(const Eigen::Vector3d& gravity_B0);
 
 struct RefinedWindow {
   MotionWindow window;
-  WindowCovariance covariance;  ///< scaled up where the residuals are larger than they should be
-  double cost = 0.0;            ///< twice the negative logarithm of the posterior, robust
-  double image_noise = 1.0;     ///< of the views, in deviations; 1 where they are as expected
-  double noise_ratio = 1.0;     ///< root of the cost for each degree of freedom; 1 where all fits
+  WindowCovariance covariance;  ///< enlarged if the residuals are larger than expected
+  double cost = 0.0;            ///< twice the negative logarithm of the posterior, with robust
+                                ///< terms
+  double image_noise = 1.0;     ///< RMS of the views' residuals, in deviations; 1 if as expected
+  double noise_ratio = 1.0;     ///< root of the cost per degree of freedom; 1 if all terms fit
 };
 
-/// Fails with "start_inconsistent" where no minimum is found, "start_unobservable" where the
-/// information is singular, and as the inertial samples do (motion_terms.h).
+/// Fails with "start_inconsistent" if it finds no minimum, and with "start_unobservable" if the
+/// information is singular. The failures of inertialOf() (motion_terms.h) are passed on.
 Result<RefinedWindow> refine(MotionWindow window, const ImuBuffer& imu, const Options& options);
 
 }  // namespace perdure::vio

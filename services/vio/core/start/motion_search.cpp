@@ -13,13 +13,13 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr double kUsualDepth = 3.0;  // m
-constexpr double kAsLikely = 9.0;    // of the cost
-constexpr double kSame = 0.01;       // of the velocity
-// A share of a view's error stays as long as its track does, and no residual shows that share.
+constexpr double kAsLikely = 9.0;    // largest difference in cost of minima that fit about as well
+constexpr double kSame = 0.01;       // largest relative difference in velocity of equal minima
+// Part of a view's error is constant along its track, and the residuals do not show it.
 constexpr double kNoiseMargin = 1.2;
-constexpr double kLeastNoise = 0.25;  // of vision.sigma_px
+constexpr double kLeastNoise = 0.25;  // share of vision.sigma_px
 
-/// All points `depth` m from the first pose, in the direction of their first view.
+/// Places all points `depth` m from the first pose, in the direction of their first view.
 void placeAt(MotionWindow& window, double depth) {
   for (WindowPoint& point : window.points) {
     const WindowView& v = point.views.front();
@@ -35,7 +35,7 @@ bool apart(const RefinedWindow& a, const RefinedWindow& b, double share) {
          share * std::max(velocity(a).norm(), velocity(b).norm());
 }
 
-/// The least costly first. Fails where there is none.
+/// Refines all, the lowest cost first. Fails if no refinement succeeds.
 using Minima = std::vector<RefinedWindow>;
 Result<Minima> refineAll(std::vector<MotionWindow> beginnings, const ImuBuffer& imu,
                          const Options& options) {
@@ -55,7 +55,7 @@ Result<Minima> refineAll(std::vector<MotionWindow> beginnings, const ImuBuffer& 
   return minima;
 }
 
-/// Leaves the least costly of those that are the same.
+/// Keeps the lowest cost of each group of equal minima.
 void keepApart(Minima& minima) {
   std::stable_sort(minima.begin(), minima.end(),
                    [](const auto& a, const auto& b) { return a.cost < b.cost; });
@@ -65,8 +65,8 @@ void keepApart(Minima& minima) {
   }
 }
 
-/// Whether a camera moves by the turn of the body alone about as far as the body moves. Then the
-/// body may rest: a third search begins there.
+/// Whether the rotation of the body moves a camera about as far as the translation does. Then the
+/// body may be at rest, and a third search begins there.
 bool turnMovesCameras(const MotionWindow& window) {
   constexpr double kShare = 0.3;
   double by_turn = 0.0, by_body = 0.0;
@@ -100,8 +100,8 @@ void placePoints(MotionWindow& window) {
 
 Result<RefinedWindow> searchMinimum(MotionWindow window, const ImuBuffer& imu,
                                     const Options& options) {
-  // The linear solution may be near nothing at all: no motion, no depth. Another search begins
-  // where all points are as far as things usually are.
+  // The linear solution may be degenerate, without motion and depth. A second search begins with
+  // all points at the usual depth.
   MotionWindow usual = window;
   placeAt(usual, kUsualDepth);
   MotionWindow resting = window;

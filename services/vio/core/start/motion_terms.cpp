@@ -15,8 +15,8 @@ using Eigen::Index;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kLeastDepth = 0.1;     // m, of a point at the beginning
-constexpr double kGreatestDepth = 1e4;  // m, of a point that is left at infinity
+constexpr double kLeastDepth = 0.1;     // m, initial depth of a point
+constexpr double kGreatestDepth = 1e4;  // m, depth given to a point at infinity
 
 }  // namespace
 
@@ -89,7 +89,7 @@ std::optional<ViewTerm> viewTerm(const Estimate& e, std::size_t point, const Win
   const Vector3d p = pose.p_B0 + pose.v_B0 * later_s;
   const Ray& ray = e.rays[point];
   const double inverse = ray.abr[2];
-  // The point relative to the body, and to the camera, times the inverse depth.
+  // Position of the point relative to the body and to the camera, multiplied by the inverse depth.
   const Vector3d q = R.transpose() * (ray.R_B0_C * Vector3d(ray.abr[0], ray.abr[1], 1.0) +
                                       inverse * (ray.origin - p));
   const Vector3d p_C = v.R_BC.transpose() * (q - inverse * v.p_BC);

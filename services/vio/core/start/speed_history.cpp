@@ -7,7 +7,7 @@ namespace perdure::vio {
 namespace {
 
 constexpr std::size_t kSamples = 512;
-constexpr double kSpeedChange = 2.0;  // m/s², unknown
+constexpr double kSpeedChange = 2.0;  // m/s², assumed unknown acceleration
 
 }  // namespace
 

@@ -1,4 +1,4 @@
-// The speed sensor's last samples, and its reading at any time.
+// Recent samples of the speed sensor, and the speed at a given time.
 #pragma once
 
 #include <cstddef>
@@ -14,13 +14,14 @@ namespace perdure::vio {
 
 class SpeedHistory {
  public:
-  /// `max_age_s`: a sample is used for times no further away.
+  /// `max_age_s`: largest distance in time at which a sample is used.
   explicit SpeedHistory(double max_age_s) : max_age_s_(max_age_s) {}
 
   /// Refuses "speed_not_finite" and "speed_out_of_order".
   Result<void> add(const TimedSpeed& sample);
-  /// Between two samples that are at most two ages apart, else the nearest one with what the
-  /// vehicle may have done since; nothing where that is too far away.
+  /// Interpolates between two samples that are at most two ages apart. Otherwise it returns the
+  /// nearest sample, with a sigma enlarged for possible acceleration. Empty if the nearest sample
+  /// is too old.
   std::optional<SpeedReading> at(TimePoint time) const;
   bool reaches(TimePoint time) const { return !samples_.empty() && samples_.back().time >= time; }
   std::vector<TimedSpeed> samples() const { return {samples_.begin(), samples_.end()}; }

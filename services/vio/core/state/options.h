@@ -1,4 +1,4 @@
-// What the filter's core can be told. Defaults suit a 20 Hz camera with a 200 Hz MEMS IMU.
+// Options of the filter's core. Defaults suit a 20 Hz camera with a 200 Hz MEMS IMU.
 #pragma once
 
 #include <cstdint>
@@ -11,15 +11,16 @@ struct ImuNoise {
   double gyro_walk = 2.0e-5;   ///< rad/s²/√Hz
   double accel = 2.0e-3;       ///< m/s²/√Hz
   double accel_walk = 3.0e-3;  ///< m/s³/√Hz
-  /// On all four where the state is propagated: errors that a unit at rest does not show. Whether
-  /// the body rests is judged without it.
+  /// Factor on all four densities in propagation, for errors that a unit at rest does not show. The
+  /// rest tests do not apply it.
   double inflation = 1.0;
-  /// Samples further apart than this are treated as sampled, not averaged: the error of the
-  /// linear interpolation between them joins the noise.
+  /// Samples with a longer interval are treated as momentary values, not averages. The error of
+  /// linear interpolation between them is added to the noise.
   double interpolation_from_s = 0.02;
-  double interpolation_gyro = 0.005;  ///< rad/s per sample, floor of that error
-  double interpolation_accel = 0.1;   ///< m/s² per sample, floor of that error
-  /// A longer time without samples is a gap, in which the body may have done this:
+  double interpolation_gyro = 0.005;  ///< rad/s per sample, lower limit of that error
+  double interpolation_accel = 0.1;   ///< m/s² per sample, lower limit of that error
+  /// A longer time without samples is a gap. Noise is added for the motion of the body during the
+  /// gap.
   double gap_from_s = 0.2;
   double gap_gyro = 0.3;   ///< rad/s
   double gap_accel = 1.5;  ///< m/s²
@@ -27,44 +28,47 @@ struct ImuNoise {
 
 struct WindowOptions {
   std::int64_t clones = 11;           ///< poses in the sliding window
-  std::int64_t slam_features = 36;    ///< points kept in the state
+  std::int64_t slam_features = 36;    ///< points in the state
   std::int64_t msckf_features = 24;   ///< points used once, per frame
-  std::int64_t min_observations = 4;  ///< of a track that is used once
-  bool first_estimates = true;        ///< Jacobians on a path that no update moves
+  std::int64_t min_observations = 4;  ///< smallest number of image points of a track that is used
+                                      ///< once
+  bool first_estimates = true;        ///< Jacobians at first estimates, which updates do not change
 };
 
 struct VisionOptions {
   double sigma_px = 0.4;
   double gate_probability = 0.95;
   double min_depth_m = 0.1, max_depth_m = 75.0;
-  double max_condition = 10000.0;  ///< of a triangulation's normal matrix
-  /// Largest standard deviation along the ray, relative to the depth, at which a point may enter
-  /// the state.
+  double max_condition = 10000.0;  ///< largest condition number of a triangulation's normal matrix
+  /// Largest standard deviation along the ray, relative to the depth, for a point to enter the
+  /// state.
   double max_relative_sigma = 0.4;
-  /// Where nearly all points of a frame contradict the prediction, the pose may have jumped so far.
+  /// Possible jump of the pose, assumed if nearly all points of a frame contradict the prediction.
   double jump_position_m = 0.3;
   double jump_rotation = 0.03;  ///< rad
 };
 
-/// Standard deviations of what the calibration says.
+/// Standard deviations of the calibration's values.
 struct CalibrationOptions {
   bool estimate_extrinsics = true, estimate_time_offset = true;
-  bool estimate_readout = true;       ///< of a rolling shutter
+  bool estimate_readout = true;       ///< for a rolling shutter
   double extrinsic_rotation = 0.005;  ///< rad
   double extrinsic_position_m = 0.01;
-  double second_camera_factor = 0.1;  ///< a stereo pair is calibrated better among itself
+  double second_camera_factor = 0.1;  ///< factor on both, because the stereo pair's relative pose
+                                      ///< is calibrated more precisely
   double time_offset_s = 0.005;
-  double readout_s = 0.005;  ///< of a rolling shutter
-  double gyro_scale = 0.0;   ///< of each axis, from 1; 0: exact, not estimated
+  double readout_s = 0.005;  ///< deviation of the read-out time of a rolling shutter
+  double gyro_scale = 0.0;   ///< deviation of each axis from 1; 0: exact, not estimated
 };
 
 struct StartOptions {
-  double rest_window_s = 0.5;      ///< time at rest before a start at rest
-  double rest_disparity_px = 0.7;  ///< median image motion over that window
-  double still_window_s = 2.0;     ///< the same while traffic moves past a background at rest
-  double rest_accel_m_s2 = 1.0;    ///< largest difference of the mean force from gravity
-  double motion_window_s = 2.0;    ///< of a start in motion, at most
-  double tilt_sigma = 0.03;        ///< rad, at a start with speed
+  double rest_window_s = 0.5;      ///< duration of rest before a start at rest
+  double rest_disparity_px = 0.7;  ///< largest median image motion over that window
+  double still_window_s = 2.0;     ///< duration of rest if traffic moves in front of a background
+                                   ///< at rest
+  double rest_accel_m_s2 = 1.0;    ///< largest difference between the mean force and gravity
+  double motion_window_s = 2.0;    ///< longest window of a start in motion
+  double tilt_sigma = 0.03;        ///< rad, at a start with a speed sensor
   double gyro_bias_sigma = 0.02;   ///< rad/s
   double accel_bias_sigma = 0.1;   ///< m/s²
   double velocity_sigma = 0.3;     ///< m/s
@@ -72,21 +76,21 @@ struct StartOptions {
 
 struct RestOptions {
   bool enabled = true;
-  double disparity_px = 0.5;  ///< median image motion over the last frames
-  std::int64_t frames = 5;    ///< how many of them
+  double disparity_px = 0.5;  ///< largest median image motion over the last frames
+  std::int64_t frames = 5;    ///< number of frames for disparity_px
   double speed_sigma = 0.02;  ///< m/s
   double position_sigma_m = 0.005;
   double rotation_sigma = 0.001;  ///< rad
-  /// Of the points, that keep their place for a second while the others move: the background of a
-  /// body that stands in traffic.
+  /// Smallest share of points that stay in place for a second while the others move. They are the
+  /// background of a body that stands in traffic.
   double still_share = 0.15;
   double max_rate = 0.15;  ///< rad/s, mean over a frame, bias removed
-  double max_speed = 0.5;  ///< m/s: the filter's own belief must not exceed it
+  double max_speed = 0.5;  ///< m/s, largest estimated speed at which rest is accepted
 };
 
 struct SpeedOptions {
   bool enabled = true;
-  double sigma_factor = 1.0;  ///< on the sigma that comes with each sample
+  double sigma_factor = 1.0;  ///< factor on the sigma of each sample
   double min_sigma = 0.05;    ///< m/s
   bool planar = false;        ///< lateral and vertical velocity are about zero
   double lateral_sigma = 0.15, vertical_sigma = 0.15;  ///< m/s

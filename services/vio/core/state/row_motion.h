@@ -1,8 +1,8 @@
-// Where a camera is while one row of a rolling shutter's image is exposed, seen from the body at
-// the middle row (Li, Kim, Mourikis, ICRA 2013; Li & Mourikis, IJRR 2014: the motion within an
-// image is the inertial unit's). We differ: it is given in the body's frame and taken as known, so
-// that a row's camera is a camera that is mounted elsewhere on the body, and what cannot be
-// observed stays so. Derivation: tools/docs/maths/vio-rolling-shutter.md.
+// Pose of a camera while one row of a rolling-shutter image is exposed, relative to the body at the
+// middle row. As in Li, Kim, Mourikis (ICRA 2013) and Li & Mourikis (IJRR 2014), the IMU gives the
+// motion within an image. Here this motion is expressed in the body's frame and treated as exact.
+// The camera of a row is then a camera with another mounting on the body, and the unobservable
+// directions are preserved. Derivation: tools/docs/maths/vio-rolling-shutter.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,25 +11,26 @@
 
 namespace perdure::vio {
 
-/// The body's motion about an image, in B at its middle row: even accelerations.
+/// Motion of the body during an image, in B at its middle row. Accelerations are constant.
 struct RowMotion {
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();          ///< w_WB, rad/s
   Eigen::Vector3d rate_change = Eigen::Vector3d::Zero();   ///< rad/s²
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();      ///< m/s
-  Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  ///< m/s², gravity is none
+  Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  ///< m/s², without gravity
 
-  /// The turn of the body from the middle row until `s` later, as a rotation vector.
+  /// Rotation of the body from the middle row until `s` later, as a rotation vector.
   Eigen::Vector3d turn(double s) const { return s * rate + 0.5 * s * s * rate_change; }
 };
 
 struct RowCamera {
-  RigidTransform T_BC;        ///< B at the middle row, C at this one
-  Eigen::Matrix3d R_BR;       ///< R: the body at this row. Turns an error of the mounted p_BC
-  Eigen::Vector3d theta_dot;  ///< right tangent of T_BC's rotation by s, rad/s
-  Eigen::Vector3d p_dot;      ///< of T_BC's position by s, m/s in B
+  RigidTransform T_BC;        ///< B at the middle row, C at this row
+  Eigen::Matrix3d R_BR;       ///< R: body frame at this row. Rotates an error of the mounted p_BC
+                              ///< into B.
+  Eigen::Vector3d theta_dot;  ///< derivative of T_BC's rotation (right tangent) by s, rad/s
+  Eigen::Vector3d p_dot;      ///< derivative of T_BC's position by s, m/s in B
 };
 
-/// The camera that is mounted at T_BC, `s` seconds after the middle row (|s| of some hundredths).
+/// Camera mounted at T_BC, `s` seconds after the middle row. |s| is a few hundredths of a second.
 RowCamera rowCamera(const RowMotion& motion, const RigidTransform& T_BC, double s);
 
 }  // namespace perdure::vio

@@ -8,9 +8,9 @@ namespace perdure::vio {
 namespace {
 
 constexpr const char* kMagic = "perdure-vio-state-3";
-// What a vehicle may do unobserved: turn, accelerate.
+// Assumed unobserved turn rate and acceleration of a vehicle.
 constexpr double kTurnRate = 0.3, kAcceleration = 1.5;
-// A restart loses the correlations with the window.
+// Factor for the lost correlations with the window.
 constexpr double kInflation = 1.5;
 
 void put(std::string& out, double value) {
@@ -134,7 +134,7 @@ void coast(SavedState& s, double gap_s) {
   const double gap = std::max(gap_s, 0.0);
   s.time += durationFromSeconds(gap);
   s.nav.p_WB += gap * s.nav.v_WB;
-  // δp grows with δv; correlations follow.
+  // The error in v adds to the error in p, and correlations follow.
   s.covariance.middleRows(kPosition, 3) += gap * s.covariance.middleRows(kVelocity, 3).eval();
   s.covariance.middleCols(kPosition, 3) += gap * s.covariance.middleCols(kVelocity, 3).eval();
   s.covariance *= kInflation;

@@ -1,4 +1,5 @@
-// The part of the filter that outlives its process, as text: navigation, calibration, covariance.
+// The part of the filter that is saved across restarts, as text: navigation, calibration,
+// covariance.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,18 +18,21 @@ struct SavedState {
   Nav nav;
   std::vector<RigidTransform> T_BC;
   double time_offset_s = 0.0;
-  std::vector<double> readout_s;  ///< of each camera
+  std::vector<double> readout_s;  ///< read-out time of each camera
   Eigen::Vector3d gyro_scale = Eigen::Vector3d::Ones();
-  /// Of [nav, extrinsics, time offset, read-outs and scale where they are estimated].
+  /// Covariance of [nav, extrinsics, time offset, read-outs, gyroscope scale]. The last two are
+  /// present only if they are estimated.
   Eigen::MatrixXd covariance;
   std::uint64_t next_track = 1;
 };
 
 std::string toText(const SavedState& saved);
-/// Fails with "state_malformed": cut off, altered, of another version, or not finite.
+/// Fails with "state_malformed" if the text is truncated, altered, of another version or not
+/// finite.
 Result<SavedState> fromText(const std::string& text);
 
-/// Moves a saved state on by `gap` at constant velocity, and widens it for what may have happened.
+/// Propagates a saved state over `gap` at constant velocity, and enlarges its covariance for
+/// unobserved motion.
 void coast(SavedState& saved, double gap_s);
 
 }  // namespace perdure::vio

@@ -10,7 +10,7 @@
 namespace perdure::vio {
 namespace {
 
-/// What an update with m rows of a state of n needs of the workspace.
+/// Size of the workspace for an update with m rows of a state of size n.
 Eigen::Index roomOfUpdate(Eigen::Index n, Eigen::Index m) {
   return 2 * Workspace::need(n, m) + Workspace::need(m, m) + Workspace::need(m, 1) +
          Workspace::need(n, 1);
@@ -41,7 +41,8 @@ State::State(const std::vector<RigidTransform>& cameras, double offset, int max_
   size_ = calibrationEnd();
   const int capacity = size_ + 6 * (max_clones + 2) + 3 * max_points;
   P_ = Eigen::MatrixXd::Zero(capacity, capacity);
-  // The largest updates: of all points, and of compressed rows by calibration and clones.
+  // The largest updates: one with all points, and one with compressed rows of calibration and
+  // clones.
   const int count = static_cast<int>(cameras.size());
   workspace_.begin(roomOfUpdate(
       capacity, std::max(2 * count * max_points, 6 * (count + max_clones + 2) + readoutCount())));
@@ -80,8 +81,8 @@ int State::append(int size) {
 }
 
 void State::remove(int at, int size) {
-  // Column by column, so that nothing has to be copied aside: what moves up or left never lands
-  // on what is still to be moved.
+  // Moves column by column without a temporary copy. Values that move up or left never overwrite
+  // values that are still to be moved.
   const int tail = size_ - at - size;
   for (int column = 0; column < size_; ++column) {
     if (column >= at && column < at + size) continue;
@@ -219,7 +220,7 @@ Result<void> State::update(std::span<const Measurement> measurements) {
     }
     row += rows;
   }
-  S.setIdentity();  // the lower triangle counts
+  S.setIdentity();  // only the lower triangle is used
   row = 0;
   for (const Measurement& z : measurements) {
     const Eigen::Index rows = z.r.size();

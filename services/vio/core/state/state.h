@@ -1,8 +1,8 @@
-// The filter's state: navigation, camera-IMU calibration, a window of past poses and points, and
+// State of the filter: navigation, camera-IMU calibration, a window of past poses and points, and
 // the joint covariance of their errors. Paper, eq. 3; MSCKF: Mourikis & Roumeliotis, ICRA 2007.
-// Order of the error: nav [θ, p, v, b_g, b_a], per camera [θ_BC, p_BC], time offset, read-outs and
-// gyroscope scale where they are estimated, then clones and points in the order in which they came.
-// Rotations err on the right, R = R̂ Exp(θ).
+// Order of the error: nav [θ, p, v, b_g, b_a]; [θ_BC, p_BC] of each camera; time offset; read-outs
+// and gyroscope scale if estimated; then clones and points in order of insertion. Rotation errors
+// are right multiplied, R = R̂ Exp(θ).
 #pragma once
 
 #include <Eigen/Core>
@@ -32,13 +32,14 @@ struct Nav {
   RigidTransform T_WB() const { return RigidTransform(q_WB, p_WB); }
 };
 
-/// The body's pose at an image. `linear`: where Jacobians are taken, on nav_linear's path.
+/// Pose of the body at an image. `linear`: linearisation point of the Jacobians, taken from
+/// nav_linear.
 struct Clone {
   std::uint64_t frame = 0;
   TimePoint image_time;
   RigidTransform T_WB, linear;
-  int at = 0;      ///< where its error begins
-  RowMotion rows;  ///< of use where a shutter rolls
+  int at = 0;      ///< index of its error
+  RowMotion rows;  ///< used only for rolling shutters
 };
 
 struct PointState {
@@ -48,21 +49,21 @@ struct PointState {
   int failed_gates = 0;
 };
 
-/// Where a block of columns of a Jacobian lies in the error.
+/// Position of a Jacobian's column block in the error state.
 struct Block {
   int at = 0, size = 0;
 };
 
-/// r = H·error + noise of unit covariance; H's columns are those of `blocks`, one after another.
-/// A view: the owner of the numbers must outlive it.
+/// r = H·error + noise of unit covariance. The columns of H are those of `blocks`, in that order. A
+/// non-owning view: the data must outlive it.
 struct Measurement {
   MatrixView H;
   std::span<const Block> blocks;
   VectorView r;
 };
 
-/// Memory for matrices that are needed for a moment: it grows to the largest need and is kept, so
-/// that a filter that runs allocates nothing. No part of a value: copies begin without any.
+/// Temporary memory for matrices. It grows to the largest size needed and is reused, so that a
+/// running filter does not allocate. It is not part of the value: copies start without memory.
 class Workspace {
  public:
   using Matrix = Eigen::Map<Eigen::MatrixXd, Eigen::Aligned16>;
@@ -71,16 +72,16 @@ class Workspace {
   Workspace(const Workspace&) {}
   Workspace& operator=(const Workspace&) { return *this; }
 
-  /// Room for `size` numbers in all; what was taken before is void.
+  /// Reserves room for `size` numbers in all. Matrices taken before become invalid.
   void begin(Eigen::Index size) {
     if (memory_.size() < size) memory_.resize(size);
     taken_ = 0;
   }
-  /// How much of begin()'s room a matrix takes.
+  /// Share of begin()'s room that a matrix takes.
   static Eigen::Index need(Eigen::Index rows, Eigen::Index columns) {
     return (rows * columns + 1) / 2 * 2;
   }
-  /// Not initialised.
+  /// The matrix is not initialised.
   Matrix take(Eigen::Index rows, Eigen::Index columns);
 
  private:
@@ -93,20 +94,21 @@ inline constexpr int kTheta = 0, kPosition = 3, kVelocity = 6, kGyroBias = 9, kA
 
 class State {
  public:
-  /// readout_s: of each camera, 0 where all rows are exposed at once; none given: all are. Those
-  /// that are not 0 are in the error where estimate_readout says so, the gyroscope's scale where
-  /// estimate_scale does.
+  /// readout_s: read-out time of each camera, 0 for a global shutter. If empty, all cameras have a
+  /// global shutter. estimate_readout adds the non-zero read-outs to the error; estimate_scale adds
+  /// the gyroscope's scale.
   State(const std::vector<RigidTransform>& T_BC, double time_offset_s, int max_clones,
         int max_points, const std::vector<double>& readout_s = {}, bool estimate_readout = false,
         bool estimate_scale = false);
 
-  /// nav_linear: q as predicted, p and v on a path that no update moves: where Jacobians are taken.
+  /// nav_linear: linearisation point of the Jacobians. It holds the predicted q, and a p and v that
+  /// updates do not change.
   Nav nav, nav_linear;
   TimePoint time;                    ///< IMU clock
   std::vector<RigidTransform> T_BC;  ///< one for each camera
   double time_offset_s = 0.0;        ///< t_imu = t_image + time_offset_s
-  std::vector<double> readout_s;     ///< of each camera: first to last row; 0: all at once
-  /// Of each axis: a reading without its bias is so many times the rate.
+  std::vector<double> readout_s;     ///< s from first to last row of each camera; 0: global shutter
+  /// Ratio of a reading without its bias to the true rate, for each axis.
   Eigen::Vector3d gyro_scale = Eigen::Vector3d::Ones();
   std::vector<Clone> clones;  ///< oldest first
   std::vector<PointState> points;
@@ -114,25 +116,25 @@ class State {
   int size() const { return size_; }
   int extrinsicsAt(int camera) const { return kNavSize + 6 * camera; }
   int timeOffsetAt() const { return kNavSize + 6 * static_cast<int>(T_BC.size()); }
-  /// Where the error of a camera's read-out is; nothing where that is not estimated.
+  /// Index of the error of a camera's read-out; empty if it is not estimated.
   std::optional<int> readoutAt(std::size_t camera) const;
   int readoutCount() const;
-  /// Where the error of the gyroscope's scale is; nothing where that is not estimated.
+  /// Index of the error of the gyroscope's scale; empty if it is not estimated.
   std::optional<int> scaleAt() const {
     return estimates_scale_ ? std::optional(timeOffsetAt() + 1 + readoutCount()) : std::nullopt;
   }
-  /// What comes before clones and points.
+  /// Size of the error without clones and points.
   int calibrationEnd() const {
     return timeOffsetAt() + 1 + readoutCount() + (estimates_scale_ ? kScaleSize : 0);
   }
   bool rolls(std::size_t camera) const { return readout_s[camera] != 0.0; }
-  /// Of all cameras; 0 where none rolls.
+  /// Longest read-out of all cameras; 0 if none has a rolling shutter.
   double longestReadout() const {
-    double longest = 0.0;  // an estimate may be below 0
+    double longest = 0.0;  // an estimate may be negative
     for (const double s : readout_s) longest = std::max(longest, std::abs(s));
     return longest;
   }
-  /// The camera when it saw a row. `row`: −½ … ½, first to last.
+  /// The camera at the time it exposed a row. `row`: −½ … ½, first to last.
   RowCamera rowCamera(const Clone& clone, std::size_t camera, double row) const {
     return vio::rowCamera(clone.rows, T_BC[camera], row * readout_s[camera]);
   }
@@ -142,11 +144,12 @@ class State {
   const Clone* clone(std::uint64_t frame) const;
   const PointState* point(std::uint64_t id) const;
 
-  /// Adds a clone of the present pose. rate_B: angular rate, which ties it to the time offset.
+  /// Adds a clone of the current pose. rate_B: angular rate, which correlates it with the time
+  /// offset.
   void addClone(std::uint64_t frame, TimePoint image_time, const Eigen::Vector3d& rate_B,
                 bool first_estimates);
-  /// Adds to the covariance of the present pose, and of the newest clone, which is the same.
-  /// Deviations in rad and m, about the body's and along the world's axes.
+  /// Enlarges the covariance of the current pose and of the newest clone, which is the same pose.
+  /// Deviations are in rad about the body's axes and in m along the world's axes.
   void widenPose(double rotation, double position_m);
   void removeClone(std::uint64_t frame);
   /// Adds a point with its covariance and its cross-covariance (3 × size()).
@@ -156,31 +159,32 @@ class State {
 
   /// x ← x ⊞ dx.
   void apply(const VectorView& dx);
-  /// EKF update with residual r = H·error + noise of unit covariance; H's columns are those of
-  /// `blocks`, one after another. Fails with "update_not_positive" or "update_not_finite", and
-  /// then leaves the state as it was.
+  /// EKF update with residual r = H·error + noise of unit covariance. The columns of H are those of
+  /// `blocks`, in that order. Fails with "update_not_positive" or "update_not_finite" and then does
+  /// not change the state.
   Result<void> update(const Eigen::MatrixXd& H, const std::vector<Block>& blocks,
                       const Eigen::VectorXd& r);
-  /// The same with measurements that each touch few blocks: their zeros cost nothing.
+  /// The same update with measurements that each depend on few blocks. Zero columns are not
+  /// computed.
   Result<void> update(std::span<const Measurement> measurements);
-  /// H P Hᵀ for such an H.
+  /// Returns H P Hᵀ for an H with the columns of `blocks`.
   Eigen::MatrixXd project(const MatrixView& H, std::span<const Block> blocks) const;
-  /// The covariance of the error of `blocks`.
+  /// Returns the covariance of the error of `blocks`.
   Eigen::MatrixXd covarianceOf(std::span<const Block> blocks) const;
   Eigen::MatrixXd covarianceOf(std::initializer_list<Block> blocks) const {
     return covarianceOf(std::span(blocks.begin(), blocks.size()));
   }
-  /// All numbers finite and all variances positive.
+  /// True if all numbers are finite and all variances positive.
   bool healthy() const;
 
  private:
   int append(int size);
   void remove(int at, int size);
 
-  std::vector<int> readout_at_;  ///< of each camera; −1: not estimated
+  std::vector<int> readout_at_;  ///< index for each camera; −1: not estimated
   bool estimates_scale_;
   int size_;
-  Eigen::MatrixXd P_;  ///< capacity; the upper left size_ × size_ counts
+  Eigen::MatrixXd P_;  ///< allocated to capacity; only the upper left size_ × size_ block is valid
   Workspace workspace_;
 };
 

@@ -6,9 +6,9 @@
 namespace perdure::vio {
 namespace {
 
-constexpr int kReach = 13, kRadius = kReach + 2;  // of the pattern, and with the box around it
+constexpr int kReach = 13, kRadius = kReach + 2;  // radius of the pattern, without and with the box
 
-// Rows are a little longer than the patch, so that the compiler has loops of whole registers.
+// Rows are slightly longer than the patch, so that the compiler can vectorise the loops.
 constexpr std::size_t kSide = 2 * kReach + 1, kStride = 32, kOuter = 2 * kRadius + 1;
 using Smooth = std::array<std::uint16_t, kSide * kStride>;
 
@@ -16,12 +16,13 @@ constexpr std::uint16_t index(int x, int y) {
   return static_cast<std::uint16_t>((y + kReach) * static_cast<int>(kStride) + x + kReach);
 }
 
-/// Where in Smooth the two values of a bit lie.
+/// Indices in Smooth of the two values of a bit.
 struct Pair {
   std::uint16_t first, second;
 };
 
-/// Pairs about normally distributed in the patch: sums of uniform draws of a fixed generator.
+/// Pairs with an approximately normal distribution in the patch: sums of uniform draws of a fixed
+/// generator.
 std::array<Pair, 256> makePattern() {
   std::uint64_t seed = 20111129;
   const auto draw = [&seed] {
@@ -42,8 +43,8 @@ std::array<Pair, 256> makePattern() {
   return pattern;
 }
 
-/// The patch under a 5×5 box, rounded to whole grey levels: first sums along rows, then down. The
-/// box looks out of the patch into the image around it.
+/// Smooths the patch with a 5×5 box, rounded to whole grey levels; sums along rows first, then
+/// along columns. The box extends beyond the patch into the image.
 Smooth smoothAround(const cv::Mat& image, int x, int y) {
   std::array<std::uint16_t, kOuter * kStride> sums{};
   for (std::size_t r = 0; r < kOuter; ++r) {

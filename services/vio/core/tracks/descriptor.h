@@ -1,5 +1,5 @@
-// 256-bit BRIEF of a patch (Calonder et al., ECCV 2010): the attribute that lets a landmark be
-// found again. Upright, smoothed by a 5×5 box, with a fixed pattern of our own.
+// 256-bit BRIEF descriptor of a patch (Calonder et al., ECCV 2010), by which a landmark is
+// recognised again. It is upright, smoothed by a 5×5 box, and uses a fixed pattern of this project.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,7 +12,7 @@ namespace perdure::vio {
 
 using Descriptor = std::array<std::uint8_t, 32>;
 
-/// Of a CV_8UC1 image. Nothing nearer than 16 pixels to the border.
+/// Takes a CV_8UC1 image. Empty if the pixel is nearer than 16 pixels to the border.
 std::optional<Descriptor> descriptorAt(const cv::Mat& image, const Eigen::Vector2d& pixel);
 
 }  // namespace perdure::vio

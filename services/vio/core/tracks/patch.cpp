@@ -11,15 +11,15 @@ namespace {
 
 constexpr int kSteps = 10;
 constexpr float kSettled = 0.01F;        // px
-constexpr float kLeastDeviation = 2.0F;  // grey levels: a plainer patch is noise
+constexpr float kLeastDeviation = 2.0F;  // grey levels; below it, the texture is noise
 constexpr float kFarthest = 4.0F;        // px from the seed
-// Of the affine terms, in grey levels² per (pixel at the patch's rim)²: a plain patch keeps the
-// warp that it had.
+// Damping of the affine terms, in grey levels² per (pixel at the patch's rim)². A patch with little
+// texture then keeps its previous warp.
 constexpr float kAffineDamping = 600.0F;
 
 using Values = Eigen::Matrix<float, Patch::kPixels, 1>;
 
-/// False where the warped patch reaches out of the image.
+/// Samples the warped patch; false if it exceeds the image.
 bool sample(const cv::Mat& image, const Eigen::Matrix2f& warp, const Eigen::Vector2f& centre,
             Values& out) {
   constexpr float h = Patch::kHalf, kRounding = 0.01F;
@@ -29,8 +29,8 @@ bool sample(const cv::Mat& image, const Eigen::Matrix2f& warp, const Eigen::Vect
       !(centre.y() + reach.y() < static_cast<float>(image.rows - 1))) {
     return false;
   }
-  // All rows go side by side, a column at a time: so the compiler has loops of a fixed length over
-  // them. Rows beyond the patch repeat its last one.
+  // All rows are processed together, one column at a time, so that the compiler has loops of fixed
+  // length. Rows beyond the patch repeat its last row.
   constexpr std::size_t kRows = 16;
   static_assert(kRows >= Patch::kSide);
   std::array<float, kRows> px, py, a, b;
@@ -70,7 +70,7 @@ bool sample(const cv::Mat& image, const Eigen::Matrix2f& warp, const Eigen::Vect
   return true;
 }
 
-/// Takes the mean off; the norm of what is left.
+/// Subtracts the mean, and returns the norm of the result.
 float centre(Values& values) {
   values.array() -= values.mean();
   return values.norm();
@@ -95,12 +95,12 @@ std::optional<Patch> Patch::cut(const cv::Mat& image, const cv::Point2f& pixel) 
   for (int y = -kHalf; y <= kHalf; ++y) {
     for (int x = -kHalf; x <= kHalf; ++x, ++i) {
       const float gx = 0.5F * (right[i] - left[i]), gy = 0.5F * (down[i] - up[i]);
-      // By the rim's displacement, so that all six are pixels.
+      // Affine terms are expressed as displacements at the rim, so that all six are in pixels.
       const float u = static_cast<float>(x) / kHalf, v = static_cast<float>(y) / kHalf;
       p.steepest_.row(i) << gx, gy, gx * u, gx * v, gy * u, gy * v;
     }
   }
-  // An offset of brightness is nothing to be explained.
+  // An offset of brightness must not affect the fit.
   p.steepest_.rowwise() -= p.steepest_.colwise().mean().eval();
   Eigen::Matrix<float, 6, 6> H = p.steepest_.transpose() * p.steepest_;
   H.diagonal().tail<4>().array() += kAffineDamping;
@@ -114,7 +114,8 @@ float Patch::growth() const { return std::sqrt(std::abs(warp_.determinant())); }
 
 std::optional<Patch::Found> Patch::find(const std::vector<cv::Mat>& levels,
                                         const cv::Point2f& seed) {
-  // A patch that has grown is sought in a smaller image, where it has the grain of its first sight.
+  // A patch that has grown is searched for in a smaller image, at the scale of its first
+  // observation.
   const int last = static_cast<int>(levels.size()) - 1;
   const int level =
       std::clamp(static_cast<int>(std::lround(std::log2(std::max(growth(), 1.0F)))), 0, last);

@@ -1,7 +1,7 @@
-// What a corner looked like when it was first seen, and how that has turned, grown and leant since:
-// an affine warp with gain and offset of brightness, found by inverse-compositional Gauss-Newton
-// (Baker & Matthews, "Lucas-Kanade 20 years on", IJCV 2004). Because each image is compared with
-// the first one, errors do not add up along a track.
+// Appearance of a corner at its first observation, and the change since then: an affine warp with
+// gain and offset of brightness. Inverse-compositional Gauss-Newton estimates the warp (Baker &
+// Matthews, "Lucas-Kanade 20 years on", IJCV 2004). Each image is compared with the first one, so
+// that errors do not accumulate along a track.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,27 +17,29 @@ class Patch {
 
   struct Found {
     cv::Point2f pixel;
-    float similarity = 0;  ///< −1 … 1: normalised cross-correlation with the first sight
+    float similarity = 0;  ///< −1 … 1: normalised cross-correlation with the first observation
   };
 
-  /// Around `pixel` of a CV_8UC1 image; nothing where that reaches out of the image or is too
-  /// plain to be found again.
+  /// Cuts a patch around `pixel` of a CV_8UC1 image. Empty if the patch exceeds the image or has
+  /// too little texture.
   static std::optional<Patch> cut(const cv::Mat& image, const cv::Point2f& pixel);
 
-  /// Where it is now, sought from `seed` on. Each of `levels` is half the size of the one
-  /// before. Nothing where it leaves the image or does not settle; the warp is then as before.
+  /// Finds the patch, starting from `seed`. Each of `levels` has half the size of the previous one.
+  /// Empty if the patch leaves the image or the search does not converge; the warp is then
+  /// unchanged.
   std::optional<Found> find(const std::vector<cv::Mat>& levels, const cv::Point2f& seed);
 
-  /// Pixels now per pixel at first sight.
+  /// Current size in pixels relative to the first observation.
   float growth() const;
 
  private:
   Patch() = default;
-  Eigen::Matrix<float, kPixels, 1> value_;     ///< of mean 0
-  Eigen::Matrix<float, kPixels, 6> steepest_;  ///< by [x, y, a_xx, a_xy, a_yx, a_yy]
+  Eigen::Matrix<float, kPixels, 1> value_;     ///< zero mean
+  Eigen::Matrix<float, kPixels, 6> steepest_;  ///< derivatives by [x, y, a_xx, a_xy, a_yx, a_yy]
   Eigen::Matrix<float, 6, 6> inverse_hessian_;
   float norm_ = 0;
-  Eigen::Matrix2f warp_ = Eigen::Matrix2f::Identity();  ///< from first sight to now
+  Eigen::Matrix2f warp_ = Eigen::Matrix2f::Identity();  ///< warp from the first observation to the
+                                                        ///< current image
 };
 
 }  // namespace perdure::vio

@@ -7,7 +7,7 @@
 namespace perdure::vio {
 namespace {
 
-/// Distance in pixels from the line through the turned point along the translation.
+/// Distance in pixels from the line through the rotated point along the translation.
 double lineDistance(const Eigen::Vector3d& turned, const Match& m, const Eigen::Vector3d& t) {
   const Eigen::Vector3d line = t.cross(turned);
   const double norm = line.head<2>().norm();

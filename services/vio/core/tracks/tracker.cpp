@@ -14,10 +14,10 @@ namespace perdure::vio {
 namespace {
 
 constexpr double kBorder = 4.0;
-constexpr double kStill = 0.5;           // px, from its place
-constexpr std::size_t kFewestStill = 8;  // points of a background
+constexpr double kStill = 0.5;           // px, largest distance from its position
+constexpr std::size_t kFewestStill = 8;  // smallest number of points of a background
 constexpr double kLeastSpreadOfStill =
-    0.05;  // rms distance from their centre, of the image's width
+    0.05;  // RMS distance from their centre, relative to the image's width
 
 Eigen::Vector2d toEigen(const cv::Point2f& p) { return {p.x, p.y}; }
 cv::Point2f toCv(const Eigen::Vector2d& p) {
@@ -28,7 +28,7 @@ cv::TermCriteria criteria(std::int64_t iterations) {
   return {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, static_cast<int>(iterations), 0.01};
 }
 
-/// By response; of equal ones the later in reading order is the worse.
+/// Compares by response; equal responses are ordered by rows, then columns.
 bool worse(const cv::KeyPoint& a, const cv::KeyPoint& b) {
   return std::tuple(-a.response, a.pt.y, a.pt.x) > std::tuple(-b.response, b.pt.y, b.pt.x);
 }
@@ -72,7 +72,7 @@ std::vector<cv::Point2f> Tracker::seeds(const std::optional<Eigen::Matrix3d>& R)
   return result;
 }
 
-/// The way of the body between the rows leads along the epipolar line.
+/// The translation of the body between the rows moves the point along the epipolar line.
 Eigen::Vector2d Tracker::atMiddle(const ImagePoint& seen) const {
   if (turn_.isZero(0.0)) return seen.normalised;
   const Eigen::Vector3d ray = expQuaternion(seen.row * turn_) * seen.normalised.homogeneous();
@@ -130,7 +130,7 @@ void Tracker::follow(const Images& now, const std::optional<Eigen::Matrix3d>& R)
     if (!seen) continue;
     const Eigen::Vector2d at_middle = atMiddle(*seen);
     matches.push_back({p.at_middle, at_middle, seen->scale});
-    p.second += found->pixel - p.pixel;  // the second camera's seed moves along
+    p.second += found->pixel - p.pixel;  // moves the start of the search in the second camera
     p.pixel = found->pixel;
     p.normalised = seen->normalised;
     p.at_middle = at_middle;
@@ -150,7 +150,7 @@ void Tracker::follow(const Images& now, const std::optional<Eigen::Matrix3d>& R)
     const bool grown = kept[i].patch->growth() > options_.growth;
     (grown ? renewed : points_).push_back(std::move(kept[i]));
   }
-  // Behind the others: points are in order of their ids.
+  // Appended after the others, because points are in order of their ids.
   for (Point& p : renewed) {
     const auto patch = Patch::cut(now.levels.front(), p.pixel);
     if (!patch) continue;
@@ -183,8 +183,9 @@ void Tracker::detect(const cv::Mat& image, const std::vector<cv::Rect2f>& masked
   std::vector<cv::KeyPoint> corners;
   for (int cell = 0; cell < columns * rows; ++cell) {
     const std::int64_t wanted = per_cell - filled[static_cast<std::size_t>(cell)];
-    if (2 * wanted <= per_cell) continue;  // half full: seeking costs more than it brings
-    // Three pixels more on each side: FAST's circle.
+    // Skips half-full cells, because detection costs more than it gains.
+    if (2 * wanted <= per_cell) continue;
+    // FAST's circle needs three more pixels on each side.
     const cv::Rect inner(static_cast<int>(cell % columns * cell_w),
                          static_cast<int>(cell / columns * cell_h), static_cast<int>(cell_w),
                          static_cast<int>(cell_h));
@@ -192,7 +193,7 @@ void Tracker::detect(const cv::Mat& image, const std::vector<cv::Rect2f>& masked
         (inner + cv::Size(6, 6) - cv::Point(3, 3)) & cv::Rect(0, 0, image.cols, image.rows);
     cv::FAST(image(roi), corners, static_cast<int>(options_.fast_threshold), true);
     if (corners.empty()) cv::FAST(image(roi), corners, 7, true);
-    // The best first; only a few are asked for.
+    // Takes the strongest corners first; a heap suffices, because only a few are needed.
     std::make_heap(corners.begin(), corners.end(), worse);
     std::int64_t added = 0;
     for (auto end = corners.end(); end != corners.begin(); --end) {
@@ -223,7 +224,7 @@ cv::Mat Tracker::asFirst(const cv::Mat& second) const {
   const auto size =
       cv::Size(static_cast<int>(cameras_[0].width()), static_cast<int>(cameras_[0].height()));
   cv::Mat smooth = second, image;
-  if (scale < 0.75) cv::GaussianBlur(second, smooth, {}, 0.4 / scale);  // against aliases
+  if (scale < 0.75) cv::GaussianBlur(second, smooth, {}, 0.4 / scale);  // against aliasing
   const cv::Matx23d to(scale, 0, shift.x, 0, scale, shift.y);
   cv::warpAffine(smooth, image, to, size, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
   return image;
@@ -258,7 +259,7 @@ void Tracker::followIntoSecond(const std::vector<cv::Mat>& first,
     if (!seen) continue;
     const Match match{p.normalised, seen->normalised, seen->scale};
     if (epipolarDistance(match, T_10.R(), T_10.p) > options_.stereo_px) continue;
-    // In front of both: the disparity points along the baseline.
+    // In front of both cameras, the disparity points along the baseline.
     const Eigen::Vector3d turned = T_10.R() * p.normalised.homogeneous();
     const Eigen::Vector3d d = seen->normalised.homogeneous() - turned / turned.z();
     const Eigen::Vector3d along(T_10.p.x() - turned.x() / turned.z() * T_10.p.z(),
@@ -320,7 +321,7 @@ std::optional<double> Tracker::motionSince(std::size_t frames, double quantile) 
   const auto& before = history_[history_.size() - 1 - frames];
   std::vector<float> motion;
   auto it = before.begin();
-  for (const auto& [id, pixel] : history_.back()) {  // both by rising id
+  for (const auto& [id, pixel] : history_.back()) {  // both in order of rising id
     while (it != before.end() && it->first < id) ++it;
     if (it == before.end()) break;
     if (it->first == id) motion.push_back(static_cast<float>(cv::norm(pixel - it->second)));

@@ -1,6 +1,7 @@
-// Corners followed from image to image by pyramidal Lucas-Kanade at half size, seeded with the
-// gyroscope's prediction, and then placed by their first sight (patch.h); into the second camera by
-// Lucas-Kanade alone. New corners (FAST) where the grid is empty.
+// Tracks corners from image to image. Pyramidal Lucas-Kanade at half size starts from the
+// gyroscope's prediction; comparison with the first observation (patch.h) then refines the
+// position. Points of the second camera come from Lucas-Kanade alone. New corners (FAST) fill empty
+// cells of a grid.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,39 +25,40 @@ namespace perdure::vio {
 struct TrackerOptions {
   std::int64_t max_points = 130;
   std::int64_t grid_columns = 8, grid_rows = 6;
-  std::int64_t pyramid_levels = 3;  ///< above the image itself; 1 at least
+  std::int64_t pyramid_levels = 3;  ///< levels above the image itself, at least 1
   std::int64_t stereo_levels = 4;
   std::int64_t window_px = 11;
   std::int64_t iterations = 20;
   std::int64_t fast_threshold = 15;
   double min_distance_px = 12.0;
   double ransac_px = 1.5;
-  double stereo_px = 2.0;    ///< from the epipolar line of the calibration
-  double similarity = 0.75;  ///< with the first sight of a point, at least
-  double growth = 1.7;       ///< of a patch since its first sight; grown more it is a new point
-  std::int64_t memory = 10;  ///< frames over which motion can be asked
+  double stereo_px = 2.0;    ///< largest distance from the calibration's epipolar line
+  double similarity = 0.75;  ///< smallest similarity to the first observation of a point
+  double growth = 1.7;       ///< largest growth of a patch; above it, a new point begins
+  std::int64_t memory = 10;  ///< number of frames over which motion can be queried
 };
 
 class Tracker {
  public:
   Tracker(const TrackerOptions& options, const std::vector<CameraModel>& cameras);
 
-  /// Images CV_8UC1; `second` may be empty. R_now_before: rotation of the body, where it is known.
-  /// masked: boxes in the first image without points. turn_of_readout: of the body in its frame,
-  /// from the first row of the first image to the last; epipolar lines are between middle rows.
+  /// Images are CV_8UC1; `second` may be empty. R_now_before: rotation of the body, if known.
+  /// masked: boxes of the first image in which no points are used. turn_of_readout: rotation of the
+  /// body, in its frame, from the first to the last row of the first image. Epipolar lines refer to
+  /// middle rows.
   TrackedFrame track(const cv::Mat& first, const cv::Mat& second,
                      const std::optional<Eigen::Matrix3d>& R_now_before,
                      const std::vector<cv::Rect2f>& masked = {},
                      const Eigen::Vector3d& turn_of_readout = Eigen::Vector3d::Zero());
-  /// Image motion in pixels from `frames` ago to now, of which the share `quantile` of the points
-  /// has less; nothing where too little is known.
+  /// Quantile of the points' image motion in pixels over the last `frames` frames. Empty if too few
+  /// points are known.
   std::optional<double> motionSince(std::size_t frames, double quantile = 0.5) const;
-  /// Share of the points that have kept their place for the last `frames` images, to half a pixel;
-  /// 0 where those are few or in one place: too little to be a background.
+  /// Share of the points that have stayed within half a pixel for the last `frames` images. 0 if
+  /// these points are few or close together, because they are then no background.
   double stillShare(std::size_t frames) const;
-  /// Forgets all tracks; ids go on.
+  /// Clears all tracks. Ids continue.
   void reset();
-  /// No id below this will be given.
+  /// Sets the lowest id for new tracks.
   void continueIdsFrom(std::uint64_t id) { next_id_ = std::max(next_id_, id); }
   std::uint64_t nextId() const { return next_id_; }
   const ReasonCounts& reasons() const { return reasons_; }
@@ -64,18 +66,21 @@ class Tracker {
  private:
   struct Point {
     std::uint64_t id = 0;
-    cv::Point2f pixel, second;  ///< second: in the second camera, when has_second
+    cv::Point2f pixel, second;  ///< second: position in the second camera, valid if has_second
     bool has_second = false;
     Eigen::Vector2d normalised;
-    Eigen::Vector2d at_middle;  ///< the same, turned to where the camera was at the middle row
+    Eigen::Vector2d at_middle;  ///< normalised, rotated to the camera's attitude at the middle row
     std::unique_ptr<Patch> patch;
-    cv::Point2f place = pixel;  ///< where it has been to half a pixel, in the last images:
+    cv::Point2f place = pixel;  ///< position from which the point has moved by less than half a
+                                ///< pixel
     std::size_t still = 0;
   };
   std::vector<cv::Mat> pyramid(const cv::Mat& image, std::int64_t levels) const;
   struct Images {
-    std::vector<cv::Mat> half;    ///< from half size on, as of cv::buildOpticalFlowPyramid
-    std::vector<cv::Mat> levels;  ///< the image itself first, each half the one before
+    std::vector<cv::Mat> half;    ///< pyramid from half size on, as built by
+                                  ///< cv::buildOpticalFlowPyramid
+    std::vector<cv::Mat> levels;  ///< the image itself first, then each half the size of the
+                                  ///< previous
   };
   void follow(const Images& now, const std::optional<Eigen::Matrix3d>& R);
   Eigen::Vector2d atMiddle(const ImagePoint& seen) const;
@@ -84,7 +89,7 @@ class Tracker {
                             const std::optional<Eigen::Matrix3d>& R);
   void detect(const cv::Mat& image, const std::vector<cv::Rect2f>& masked);
   void followIntoSecond(const std::vector<cv::Mat>& first, const std::vector<cv::Mat>& second);
-  /// The second image in the first one's size and scale, where their sizes differ.
+  /// Returns the second image with the size and scale of the first, if their sizes differ.
   cv::Mat asFirst(const cv::Mat& second) const;
   TrackedFrame result() const;
 
@@ -94,9 +99,11 @@ class Tracker {
     double scale;
     cv::Point2f shift;
   };
-  std::optional<Placed> as_first_;  ///< of the second camera's pixels; nothing for equal sizes
+  std::optional<Placed> as_first_;  ///< scale and shift for pixels of the second camera; empty if
+                                    ///< the sizes are equal
   std::vector<Point> points_;
-  Eigen::Vector3d turn_ = Eigen::Vector3d::Zero();  ///< of the first camera in C, while read out
+  Eigen::Vector3d turn_ = Eigen::Vector3d::Zero();  ///< rotation of the first camera during
+                                                    ///< read-out, in C
   std::vector<cv::Mat> previous_;
   std::deque<std::vector<std::pair<std::uint64_t, cv::Point2f>>> history_;  ///< newest last
   std::uint64_t next_id_ = 1;

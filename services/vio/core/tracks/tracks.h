@@ -1,4 +1,4 @@
-// What the tracker hands to the filter, and the memory of which image saw which point where.
+// Output of the tracker for the filter, and a database of the points seen in each image.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,22 +18,23 @@ inline constexpr std::size_t kMaxCameras = 2;
 struct ImagePoint {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();       ///< as seen, distorted
   Eigen::Vector2d normalised = Eigen::Vector2d::Zero();  ///< x/z, y/z, undistorted
-  double scale = 1.0;  ///< pixels per unit of the normalised image, there, on average
-  Eigen::Matrix2d to_pixels = Eigen::Matrix2d::Identity();  ///< ∂pixel / ∂normalised, there
-  double row = 0.0;  ///< −½ … ½, first to last: the share of a read-out since the middle row
+  double scale = 1.0;  ///< mean number of pixels per unit of the normalised image at this point
+  Eigen::Matrix2d to_pixels = Eigen::Matrix2d::Identity();  ///< ∂pixel / ∂normalised at this point
+  double row = 0.0;  ///< −½ … ½, first to last row: time since the middle row as a share of the
+                     ///< read-out
 };
 
-/// Undistorts; nothing where that is impossible.
+/// Undistorts a pixel. Empty if the lens model has no inverse there.
 std::optional<ImagePoint> imagePoint(const CameraModel& camera, const Eigen::Vector2d& pixel);
 
-/// One tracked point at one time, in the cameras that see it. The first camera always does.
+/// One tracked point at one time, in the cameras that see it. The first camera always sees it.
 struct TrackedPoint {
   std::uint64_t id = 0;
   std::array<std::optional<ImagePoint>, kMaxCameras> seen;
 };
 
 struct TrackedFrame {
-  std::vector<TrackedPoint> points;  ///< by rising id
+  std::vector<TrackedPoint> points;  ///< in order of rising id
 };
 
 struct Observation {
@@ -54,7 +55,7 @@ struct Track {
 class FeatureDatabase {
  public:
   void add(std::uint64_t frame, const TrackedFrame& tracked);
-  /// Forgets what was seen at a frame, and tracks that are then empty.
+  /// Removes the observations of a frame, and tracks that become empty.
   void removeFrame(std::uint64_t frame);
   void erase(std::uint64_t id);
   void clear() { tracks_.clear(); }
@@ -63,10 +64,10 @@ class FeatureDatabase {
 
  private:
   using Tracks = std::map<std::uint64_t, Track>;
-  Tracks::iterator forget(Tracks::iterator track);  ///< the one after it
+  Tracks::iterator forget(Tracks::iterator track);  ///< returns the next track
 
   Tracks tracks_;
-  std::vector<Tracks::node_type> spare_;  ///< of forgotten tracks, with the memory they had
+  std::vector<Tracks::node_type> spare_;  ///< nodes of removed tracks, whose memory is reused
 };
 
 }  // namespace perdure::vio

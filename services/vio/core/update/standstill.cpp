@@ -8,11 +8,11 @@
 namespace perdure::vio {
 namespace {
 
-// What a window may gain beside its noise: a body at rest rocks a little.
+// Gain over a window, in addition to noise, because a body at rest rocks slightly.
 constexpr double kSpeedGain = 0.02, kTurnGain = 0.002;  // m/s, rad
-constexpr double kDeviations = 3.8;                     // χ² of three axes at .998
+constexpr double kDeviations = 3.8;                     // χ² of three axes at 0.998
 constexpr std::chrono::milliseconds kShort{500}, kLong{2000};
-// Shorter than kLong: whoever drives off evenly has the push in the long window till then.
+// Shorter than kLong. At a smooth departure, the long window then still contains the acceleration.
 constexpr std::chrono::milliseconds kLongestPush{1000};
 constexpr std::chrono::seconds kLongestUnseen{120};
 
@@ -79,7 +79,7 @@ bool Standstill::holds(const ImuBuffer& imu, TimePoint now, const ImuNoise& nois
     forget();
     return false;
   }
-  // Before this rest there was motion.
+  // The window must not include the motion before this standstill.
   const auto rests = [&](Duration window) {
     return imuRests(imu, now, std::min(window, now - begun_), reference_.expected,
                     now - reference_.time, noise);

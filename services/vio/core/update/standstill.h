@@ -1,7 +1,8 @@
-// Whether the body stands, where most of the picture moves: traffic before a body at rest looks
-// like motion. An IMU alone cannot tell rest from an even drive, so it never says by itself that
-// the body stands; it says whether a body that stood stands still. Detectors of zero velocity:
-// Skog, Händel, Nilsson, Rantakokko, IEEE TBME 2010. tools/docs/maths/vio-rest-and-speed.md
+// Decides whether the body stands still while most of the image moves, because traffic in front of
+// a body at rest looks like motion. An IMU alone cannot distinguish rest from constant velocity. It
+// therefore only confirms that a body that stood still has not moved. Zero-velocity detectors:
+// Skog, Händel, Nilsson, Rantakokko, IEEE TBME 2010. Derivation:
+// tools/docs/maths/vio-rest-and-speed.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,42 +15,47 @@
 
 namespace perdure::vio {
 
-/// What the IMU says of a body at rest, bias included.
+/// Expected IMU values of a body at rest, bias included.
 struct RestExpectation {
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();   ///< rad/s, in B
   Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< m/s², in B
-  double rate_sigma = 0.0, force_sigma = 0.0;       ///< of an axis
+  double rate_sigma = 0.0, force_sigma = 0.0;       ///< standard deviations of one axis
 };
 
-/// By the filter's attitude and biases, with their covariance.
+/// From the filter's attitude and biases, with their covariance.
 RestExpectation restExpectation(const State& state, double gravity);
 
-/// Whether the means over `window` before `now` agree with the expectation. `age`: time since it
-/// was right, in which the biases walked. False where the samples do not reach back so far.
+/// Whether the means over `window` before `now` agree with the expectation. `age`: time since the
+/// expectation was taken, during which the biases drift. False if the samples do not cover the
+/// window.
 bool imuRests(const ImuBuffer& imu, TimePoint now, Duration window, const RestExpectation& expected,
               Duration age, const ImuNoise& noise);
 
-/// Whether neither rate nor force changed over `window` before `now`; that is so at rest, and on an
-/// even drive. False where the samples do not reach back so far.
+/// Whether rate and force were constant over `window` before `now`, as at rest and at constant
+/// velocity. False if the samples do not cover the window.
 bool imuIsEven(const ImuBuffer& imu, TimePoint now, Duration window, const ImuNoise& noise);
 
-/// The memory of having stood.
+/// Stores when the body last stood still, and the IMU values expected at rest.
 class Standstill {
  public:
-  /// Nothing is known: a start, or motion.
+  /// Clears the memory, at a start or after motion.
   void forget() { confirmed_.reset(); }
   bool known() const { return confirmed_.has_value(); }
-  /// Images say that the body stands at `now`.
+  /// The images show that the body stands still at `now`.
   void confirm(TimePoint now, const RestExpectation& expected);
-  /// Whether the body, known to have stood, has stood since then by the IMU. A push of up to a
-  /// second that takes back all that it gave (somebody gets in) interrupts that, and no more.
+  /// Whether the IMU shows that a body that stood still has not moved since. A disturbance of up to
+  /// a second without net velocity change, for example a person getting in, only interrupts the
+  /// standstill.
   bool holds(const ImuBuffer& imu, TimePoint now, const ImuNoise& noise);
 
  private:
-  std::optional<TimePoint> confirmed_;    ///< when images said so last
-  std::optional<TimePoint> interrupted_;  ///< since when the IMU contradicts
-  TimePoint begun_;                       ///< when images said so first, of this rest
-  /// The filter takes a slow push for a bias: what it expects must be older than the push.
+  std::optional<TimePoint> confirmed_;    ///< last time at which the images confirmed the
+                                          ///< standstill
+  std::optional<TimePoint> interrupted_;  ///< time since which the IMU contradicts it
+  TimePoint begun_;                       ///< first time at which the images confirmed this
+                                          ///< standstill
+  /// Expectation with its time. The filter attributes a slow acceleration to a bias, so the
+  /// expectation must be older than the acceleration.
   struct Reference {
     TimePoint time;
     RestExpectation expected;

@@ -1,5 +1,6 @@
-// A point from its rays: linear least squares of the distances to the rays, then Gauss-Newton on
-// the reprojection error in the inverse-depth coordinates of the newest view.
+// Position of a point from its rays. Linear least squares minimises the distances to the rays.
+// Gauss-Newton then minimises the reprojection error in inverse-depth coordinates of the newest
+// view.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,16 +22,16 @@ struct Ray {
 
 struct Triangulated {
   Eigen::Vector3d p_W;
-  Eigen::Matrix3d covariance;  ///< in W, of the pixel noise alone
-  double relative_sigma;       ///< of the depth from the newest view, σ / depth
-  double rms;                  ///< of the weighted residuals
+  Eigen::Matrix3d covariance;  ///< in W, from the pixel noise alone
+  double relative_sigma;       ///< σ / depth, from the newest view
+  double rms;                  ///< RMS of the weighted residuals
 };
 
-/// Needs two rays. Fails with "triangulation_…": views, parallel, depth (behind a camera, or
-/// too near), far, condition.
+/// Needs two rays. Fails with "triangulation_…": views, parallel, depth (behind a camera, or too
+/// near), far, condition.
 Result<Triangulated> triangulate(const std::vector<Ray>& rays, const VisionOptions& options);
 
-/// The rays of a track from the clones that saw it.
+/// Rays of a track from the clones that saw it.
 std::vector<Ray> raysOf(const Track& track, const State& state, double sigma_px);
 
 }  // namespace perdure::vio

@@ -1,5 +1,5 @@
-// The update with points that are used once: their tracks have ended, or their oldest view leaves
-// the window (Mourikis & Roumeliotis, ICRA 2007).
+// Update with points that are used once, because their tracks have ended or their oldest view
+// leaves the window (Mourikis & Roumeliotis, ICRA 2007).
 #pragma once
 
 #include <cstdint>
@@ -14,12 +14,12 @@ namespace perdure::vio {
 
 struct UpdateCounts {
   int used = 0, not_triangulated = 0, gated = 0;
-  int behind = 0;       ///< of those not triangulated: their rays do not meet before the cameras
-  bool jumped = false;  ///< the pose was widened
+  int behind = 0;       ///< not triangulated because the rays do not meet in front of the cameras
+  bool jumped = false;  ///< the pose covariance was enlarged
 };
 
-/// Triangulates each track, gates it, and updates the state with all that pass at once. Counts
-/// failures under their reasons. Fails only where the update itself does.
+/// Triangulates and gates each track, and updates the state once with all tracks that pass.
+/// Failures are counted under their reasons. Fails only if the update fails.
 Result<UpdateCounts> updateMsckf(State& state, const std::vector<const Track*>& tracks,
                                  const VisionOptions& options, ReasonCounts& reasons);
 

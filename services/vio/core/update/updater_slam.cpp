@@ -15,7 +15,8 @@ constexpr int kFailuresToLeave = 3;
 constexpr int kFewestJumped = 8;
 constexpr double kFarOff = 25.0;  ///< mean square of the rows, in variances of a pixel
 
-/// The newest clone's views of one point: rows × [extrinsics, read-outs, clone, point].
+/// Rows of one point in the newest clone's views; columns are [extrinsics, read-outs, clone,
+/// point].
 struct PointRows {
   static constexpr int kRows = 2 * kMaxCameras, kColumns = 7 * kMaxCameras + 9;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kRows, kColumns> H;
@@ -63,7 +64,7 @@ Result<PointRows> rowsOf(const State& state, const PointState& point, const Obse
 
 /// A point of the state that the newest image sees.
 struct Seen {
-  std::size_t point;  ///< of state.points
+  std::size_t point;  ///< index in state.points
   const ImagePoint* pixel;
   PointRows rows;
   bool passes = false;
@@ -72,13 +73,13 @@ struct Seen {
     const auto of_views = [&] { return state.project(rows.H, rows.measurement().blocks); };
     passes = passesGateWith(rows.r, of_views, probability);
   }
-  /// Its views are further off than the pixels' noise can be, even if the prediction were exact.
+  /// The views differ by more than the pixels' noise explains, even with an exact prediction.
   bool isFarOff() const {
     return !passes && rows.r.squaredNorm() > kFarOff * static_cast<double>(rows.r.size());
   }
 };
 
-/// Those behind the camera are added to `leaving`.
+/// Points behind the camera are added to `leaving`.
 std::vector<Seen> seenPoints(const State& state, const FeatureDatabase& database,
                              const VisionOptions& options, ReasonCounts& reasons,
                              std::vector<std::uint64_t>& leaving) {
@@ -100,14 +101,14 @@ std::vector<Seen> seenPoints(const State& state, const FeatureDatabase& database
   return seen;
 }
 
-/// Not one thing that moves: nearly all that is seen is somewhere else at once.
+/// True if nearly all points differ by much at once, which a single moving object cannot cause.
 bool haveJumped(const std::vector<Seen>& seen) {
   const auto far =
       std::count_if(seen.begin(), seen.end(), [](const Seen& s) { return s.isFarOff(); });
   return far >= kFewestJumped && 4 * far > 3 * static_cast<std::ptrdiff_t>(seen.size());
 }
 
-/// The first two rows are the first camera's: it always sees.
+/// The first two rows belong to the first camera, which sees every tracked point.
 Innovation innovationOf(const State& state, const PointRows& rows, const ImagePoint& seen,
                         double sigma_px, bool used) {
   const Measurement m = rows.measurement();

@@ -1,4 +1,4 @@
-// Updates that are not vision: speed along the body's x axis, planar motion, and standing still.
+// Updates without images: speed along the body's x axis, planar motion, and rest.
 #pragma once
 
 #include "common/base/result.h"
@@ -8,17 +8,17 @@
 
 namespace perdure::vio {
 
-/// The velocity in the body frame and its derivative by [θ, v].
+/// Velocity in the body frame and its derivative by [θ, v].
 Eigen::Vector3d bodyVelocity(const Nav& nav, Eigen::Matrix<double, 3, 6>* J = nullptr);
 
-/// Speed along body x (m/s, σ > 0); with options.planar also no lateral and vertical velocity.
-/// Fails with "speed_gated".
+/// Speed along body x (m/s, σ > 0). With options.planar, lateral and vertical velocity are also
+/// constrained to about zero. Fails with "speed_gated".
 Result<void> updateSpeed(State& state, double speed, double sigma, const SpeedOptions& options);
 
-/// What the inertial samples of an interval at rest say, as means, with the deviation of samples.
+/// Mean inertial readings over an interval at rest, with their standard deviations.
 struct RestSample {
   Eigen::Vector3d rate, force;     ///< means of gyro and accelerometer, with bias
-  double rate_sigma, force_sigma;  ///< of the means, rad/s and m/s²
+  double rate_sigma, force_sigma;  ///< standard deviations of the means, rad/s and m/s²
 };
 RestSample restSample(const std::vector<ImuReading>& readings, const ImuNoise& noise);
 
@@ -26,11 +26,12 @@ RestSample restSample(const std::vector<ImuReading>& readings, const ImuNoise& n
 Eigen::Matrix<double, 6, 1> restPrediction(const Nav& nav, double gravity,
                                            Eigen::Matrix<double, 6, 9>* J = nullptr);
 
-/// No velocity, no rotation, force against gravity only. Fails with "rest_gated".
+/// Constrains velocity and rotation rate to zero, and the force to gravity. Fails with
+/// "rest_gated".
 Result<void> updateRest(State& state, const RestSample& sample, const RestOptions& options,
                         double gravity, bool gated = true);
 
-/// The pose of clone `frame` equals that of clone `before`, to the options' deviations.
+/// Constrains the pose of clone `frame` to that of clone `before`, within the options' deviations.
 Result<void> updateNoMotion(State& state, std::uint64_t before, std::uint64_t frame,
                             const RestOptions& options);
 

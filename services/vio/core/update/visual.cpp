@@ -11,7 +11,7 @@
 namespace perdure::vio {
 namespace {
 
-/// Quantiles are looked up: they are asked for hundreds of times a frame.
+/// Quantiles are cached, because they are needed hundreds of times a frame.
 double gate(int dof, double probability) {
   constexpr int kTable = 128;
   thread_local std::array<double, kTable> table{};

@@ -1,5 +1,5 @@
-// Reprojection of a point of W into the clones that saw it: residual and Jacobians, projection on
-// the left null space of the point (Mourikis & Roumeliotis 2007, eq. 24), χ² gates.
+// Reprojection of a point of W into the clones that saw it: residuals and Jacobians, projection on
+// the left null space of the point (Mourikis & Roumeliotis 2007, eq. 24), and χ² gates.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,26 +19,26 @@ struct ProjectionJacobians {
   Eigen::Matrix<double, 2, 3> point;      ///< by p_W
 };
 
-/// The normalised image point of p_W; false when it is not in front of the camera.
+/// Projects p_W to the normalised image. False if p_W is not in front of the camera.
 bool projectPoint(const RigidTransform& T_WB, const RigidTransform& T_BC,
                   const Eigen::Vector3d& p_W, Eigen::Vector2d& normalised,
                   ProjectionJacobians* J = nullptr);
 
-/// A point seen in one image, whitened: r = pose δT_WB + extrinsic δT_BC + readout δt_r +
-/// point δp_W + n, n ~ N(0, I). The camera is where it was when it saw the point's row.
+/// A point seen in one image, whitened: r = pose δT_WB + extrinsic δT_BC + readout δt_r + point
+/// δp_W + n, n ~ N(0, I). The camera pose is that at the exposure of the point's row.
 struct View {
   Eigen::Vector2d r;
   ProjectionJacobians J;
-  Eigen::Vector2d readout = Eigen::Vector2d::Zero();  ///< by the read-out, s
+  Eigen::Vector2d readout = Eigen::Vector2d::Zero();  ///< derivative by the read-out time
 };
 
-/// The residual is at the clone's estimate and p_W, the Jacobians at its `linear` and p_linear.
-/// Nothing where the point is behind the camera.
+/// The residual uses the clone's estimate and p_W; the Jacobians use its `linear` and p_linear.
+/// Empty if the point is behind the camera.
 std::optional<View> viewOf(const State& state, const Clone& clone, std::size_t camera,
                            const ImagePoint& seen, const Eigen::Vector3d& p_W,
                            const Eigen::Vector3d& p_linear, double sigma_px);
 
-/// A point's measurements, whitened: r = H_x δx + H_f δf + n, n ~ N(0, I).
+/// Measurements of a point, whitened: r = H_x δx + H_f δf + n, n ~ N(0, I).
 struct PointSystem {
   Eigen::MatrixXd H_x;  ///< columns of `blocks`
   Eigen::MatrixXd H_f;  ///< rows × 3
@@ -48,33 +48,33 @@ struct PointSystem {
 /// Blocks of all extrinsics, of the estimated read-outs, and of the clones.
 std::vector<Block> calibrationAndClones(const State& state);
 
-/// Where a point of the estimates lies among the poses of linearisation: it moves along with the
-/// track's newest clone.
+/// Position of an estimated point for linearisation. The point moves rigidly with the track's
+/// newest clone.
 Eigen::Vector3d linearisationPoint(const State& state, const Track& track,
                                    const Eigen::Vector3d& p_W);
 
-/// Stacks all views of `track` whose clones are in the state; H_x has the columns of
-/// calibrationAndClones. The residual is at the estimates, the Jacobians at `linear`.
-/// Empty r when a view lies behind its camera.
+/// Stacks all views of `track` whose clones are in the state. H_x has the columns of
+/// calibrationAndClones. The residual uses the estimates; the Jacobians use `linear`. r is empty if
+/// the point lies behind a camera.
 PointSystem stackViews(const Track& track, const State& state, const Eigen::Vector3d& p_W,
                        double sigma_px);
 
-/// Rotates the system so that H_f is upper triangular: its first three rows carry the point, the
-/// others do not depend on it.
+/// Transforms the system so that H_f is upper triangular. Only the first three rows then depend on
+/// the point.
 void separatePoint(PointSystem& system);
 
-/// The last rows only: what the views say about the state alone. Needs separatePoint before.
+/// Keeps the rows that depend on the state alone. Needs separatePoint before.
 void dropPoint(PointSystem& system);
 
-/// True when rᵀ S⁻¹ r is below the χ² quantile; S = H P Hᵀ + I.
+/// True if rᵀ S⁻¹ r is below the χ² quantile; S = H P Hᵀ + I.
 bool passesGate(const VectorView& r, const MatrixView& S, double probability);
 
-/// The same with S = P + I, where P is costly: it is only asked for when rᵀ r, which bounds
-/// rᵀ S⁻¹ r from above, is not below.
+/// The same test with S = P + I for an expensive P. P is evaluated only if rᵀ r, an upper bound of
+/// rᵀ S⁻¹ r, reaches the quantile.
 bool passesGateWith(const VectorView& r, const std::function<Eigen::MatrixXd()>& P,
                     double probability);
 
-/// Keeps no more rows than columns, by QR, without loss.
+/// Reduces the system by QR to at most as many rows as columns, without loss.
 void compress(Eigen::MatrixXd& H, Eigen::VectorXd& r);
 
 }  // namespace perdure::vio
