@@ -12,9 +12,9 @@ namespace perdure::calibrate {
 
 /// Views of one camera.
 struct CameraViews {
-  CameraCalibration prior;  ///< from the drive or from the rig file; for pictures, with name and
-                            ///< size only
-  std::size_t images = 0;   ///< images searched
+  CameraCalibration
+      prior;               ///< from the drive or the rig file; for pictures, only the name and size
+  std::size_t images = 0;  ///< images searched
   std::vector<View> views;  ///< views with the board
 };
 

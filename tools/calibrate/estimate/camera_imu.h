@@ -59,8 +59,7 @@ struct CameraImu {
   double from_s = 0.0, to_s = 0.0;        ///< limits of the stretch, since the first view
   double knot_interval_s = 0.0;
   Eigen::Vector3d rate_rms_B = gyro_bias, accel_rms_B = gyro_bias;  ///< RMS motion along each axis
-  double sigma_px = 0.0;                                            ///< standard deviation,
-                                                                    ///< estimated
+  double sigma_px = 0.0;                                            ///< estimated from residuals
   std::size_t views = 0, corners = 0, outliers = 0, samples = 0;
   NoiseCheck gyro, accel;
   std::vector<CornerResidual> residuals;

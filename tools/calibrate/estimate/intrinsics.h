@@ -31,8 +31,7 @@ struct IntrinsicsOptions {
 struct Intrinsics {
   CameraCalibration camera;                ///< only name, size and lens are set
   Matrix8d covariance = Matrix8d::Zero();  ///< of fx, fy, cx, cy and the coefficients
-  double sigma_px = 0.0;                   ///< standard deviation of a coordinate, from the
-                                           ///< residuals
+  double sigma_px = 0.0;                   ///< of a coordinate, estimated from the residuals
   std::size_t views = 0, corners = 0, outliers = 0;
   std::vector<RigidTransform> T_CT;  ///< board in camera, for each used view
   std::vector<CornerResidual> residuals;
