@@ -8,10 +8,10 @@
 
 namespace perdure::tools {
 
-/// Middle and upper quantile of a sample by linear interpolation; q in [0, 1]; 0 when empty.
+/// Quantile of a sample by linear interpolation; q in [0, 1]; 0 for an empty sample.
 double quantile(std::vector<double> values, double q);
 
-/// A stage that is timed within another is none of the outer one's time.
+/// Measures stages; the time of a nested stage does not count for the outer one.
 class StageTimer {
  public:
   /// Runs `work` and adds its CPU time (of all threads of the process) and wall time to `stage` as
@@ -21,7 +21,7 @@ class StageTimer {
     const Span span(*this, stage);
     return work();
   }
-  /// Runs `work`, whose times are part of the stage's next call: inertial samples between frames.
+  /// Runs `work` and adds its times to the next call of the stage: inertial samples between frames.
   template <class Work>
   auto timeTowardsNext(const std::string& stage, Work&& work) {
     const Span span(*this, stage, false);
