@@ -1,4 +1,4 @@
-// A road vehicle's wheel: tyre, rim, spokes, hub.
+// Wheel of a road vehicle: tyre, rim, spokes, hub.
 #pragma once
 
 #include "tools/simulate/shapes/mesh_builder.h"
@@ -10,7 +10,7 @@ struct WheelLook {
   int spokes = 5;                     ///< 0: a closed disc
   float rim_share = 0.66F;            ///< of the radius
 };
-/// The axle points to +y (outside) before the builder's placing.
+/// The axle points to +y (outside), before the builder's transform.
 void addWheel(MeshBuilder& builder, const Vec3& centre, float radius, float width,
               const WheelLook& look);
 
