@@ -13,7 +13,7 @@ namespace perdure::calibrate {
 /// Views of one camera.
 struct CameraViews {
   CameraCalibration
-      prior;               ///< from the drive or the rig file; for pictures, only the name and size
+      prior;               ///< source: the drive or the rig file; for pictures, name and size only.
   std::size_t images = 0;  ///< images searched
   std::vector<View> views;  ///< views with the board
 };

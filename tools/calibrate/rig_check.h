@@ -16,7 +16,7 @@ namespace perdure::calibrate {
 
 struct RigCheckOptions {
   std::filesystem::path data, rig;  ///< rig: empty for the drive's own calibration
-  std::string sequence = {};        ///< for KITTI tracking or 7-Scenes
+  std::string sequence = {};        ///< sequence of KITTI tracking or 7-Scenes
   double seconds = 60.0;            ///< largest duration of the drive that is used
   bool until_sure = false;          ///< ends when everything is good and vio is certain
   vio::Config vio = {};
@@ -35,9 +35,9 @@ struct RigCheck {
   Eigen::Vector3d turned = Eigen::Vector3d::Zero();   ///< rad, right of R_BC
   Eigen::Vector3d shifted = Eigen::Vector3d::Zero();  ///< m, in B
   double later_s = 0.0;                               ///< estimated time offset minus the rig's
-  Eigen::Matrix<double, 7, 1> sigma = Eigen::Matrix<double, 7, 1>::Zero();  ///< of these three
+  Eigen::Matrix<double, 7, 1> sigma = Eigen::Matrix<double, 7, 1>::Zero();  ///< standard deviation
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = gyro_bias;
-  double gyro_bias_change = 0.0, accel_bias_change = 0.0;  ///< over the second half of the drive
+  double gyro_bias_change = 0.0, accel_bias_change = 0.0;  ///< changes in the second half
 };
 
 /// Whether everything is good and vio is certain: standard deviations are at most half of the good

@@ -117,7 +117,7 @@ bool axesSurelyAgree(const std::vector<Turn>& turns, const std::vector<ImuSample
 replay::DataFindings judgeAxisChanges(const std::vector<Turn>& turns,
                                       const std::vector<ImuSample>& samples,
                                       const CameraCalibration& camera) {
-  constexpr double kSurely = 4.0;  // in standard deviations of a chance correlation
+  constexpr double kSurely = 4.0;  // limit, in standard deviations of a chance correlation
   constexpr double kSeen = 0.4, kUnseen = 0.2;
   const AxisChanges changes = axisChangesOf(turns, samples, camera);
   if (changes.images.size() < kFewestChanges) return {};

@@ -29,7 +29,7 @@ bool isCentral(double x, double y) {
 }
 
 void checkIntrinsics(const CameraCalibration& camera, DataFindings& findings) {
-  constexpr double kLeastFocal = 0.1;  // of the width: a fisheye over 180 degrees has 0.3
+  constexpr double kLeastFocal = 0.1;  // share of the width; a fisheye over 180 degrees has 0.3
   constexpr double kApart = 1.5;       // ratio of fx and fy
   if (camera.width == 0 || camera.height == 0) return;
   const double width = camera.width, height = camera.height;

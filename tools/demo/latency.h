@@ -29,7 +29,7 @@ class LatencyMeter {
     double age_ms = -1.0;      ///< below 0: no objects yet
     double forward_ms = -1.0;  ///< below 0: unknown
   };
-  std::map<std::uint64_t, Frame> frames_;  ///< by sequence number
+  std::map<std::uint64_t, Frame> frames_;  ///< key: sequence number
   double last_ms_ = 0.0;
 };
 

@@ -16,14 +16,14 @@ struct DemoOptions {
   std::string model;  ///< empty: the network in ROOT/models, only for that drive
   std::string sequence, out, rate = "1";
   std::string rig;                  ///< empty: the drive's own calibration
-  std::vector<std::string> topics;  ///< for a ROS recording: "cam0=/left/image_raw"
+  std::vector<std::string> topics;  ///< topics of a ROS recording: "cam0=/left/image_raw"
   std::string cache;       ///< folder of rendered drives; empty: ROOT/out, or the user's cache
   std::string root = ".";  ///< contains config/ and models/
   std::string programs;    ///< folder of the services; empty: that of this program
   std::string truth;       ///< root of KITTI tracking; empty: searched beside the data
   std::string truth_sequence;
-  double seconds = 0.0;      ///< of the drive; 0: all of it
-  int shared_memory_mb = 0;  ///< for images; 0: none
+  double seconds = 0.0;      ///< part of the drive; 0: all of it
+  int shared_memory_mb = 0;  ///< shared memory for images; 0: none
   bool headless = false;
   bool keep = false;  ///< keeps everything running after the drive, until interrupted
 };
@@ -35,7 +35,7 @@ inline constexpr const char* kServices[] = {"capture", "inference", "vio", "sema
 inline constexpr const char kGateway[] = "gateway";
 
 struct ServicePlan {
-  std::string name;                  ///< for example "semantic_filter"
+  std::string name;                  ///< service name, such as "semantic_filter"
   std::vector<std::string> command;  ///< program and arguments
   std::string log;                   ///< path of the log file
 };

@@ -15,13 +15,13 @@ namespace perdure::tools {
 
 struct DetectOptions {
   std::filesystem::path data, out;
-  std::string sequence;  ///< for KITTI tracking, and for a 7-Scenes folder with several
+  std::string sequence;  ///< sequence of KITTI tracking, or of a 7-Scenes folder
   inference::Config inference;
 };
 
 struct DetectSummary {
   std::uint64_t frames = 0, failed = 0, boxes = 0;
-  double cpu_ms_median = 0.0;  ///< for each frame, all threads: image to detections
+  double cpu_ms_median = 0.0;  ///< time for each frame, all threads: image to detections
 };
 
 /// Columns: frame,class,x1,y1,x2,y2,score,azimuth,sigma_azimuth,logit:<class>…. Class and score are

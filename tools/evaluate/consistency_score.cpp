@@ -211,7 +211,7 @@ std::pair<double, double> RunAnees::band() const {
 
 ConsistencyScore scoreConsistency(const std::vector<MapBelief>& beliefs, const sim::Truth& truth,
                                   const RigidTransform& T_WT, double within) {
-  std::map<std::size_t, std::pair<double, const MapBelief*>> nearest;  // by true object
+  std::map<std::size_t, std::pair<double, const MapBelief*>> nearest;  // key: true object
   ConsistencyScore score;
   std::uint64_t asked = 0;
   for (const auto& belief : beliefs) {

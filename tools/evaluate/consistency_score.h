@@ -38,7 +38,7 @@ struct Anees {
   std::vector<double> nees;
 
   double mean() const;                     ///< per degree of freedom: 1 if consistent; 0 if empty
-  double median() const;                   ///< of nees, not per degree of freedom
+  double median() const;                   ///< median of nees, not per degree of freedom
   double within3Sigma() const;             ///< share within 3 standard deviations
   std::pair<double, double> band() const;  ///< 95 % band of mean(), independent objects
 };
@@ -48,11 +48,11 @@ struct Anees {
 struct RunAnees {
   std::string what;
   int dof = 1;
-  std::vector<double> means;  ///< of each run, per degree of freedom
+  std::vector<double> means;  ///< mean of each run, per degree of freedom
 
   void add(const Anees& run);  ///< ignores a run without objects
   double mean() const;
-  double standardError() const;            ///< of mean(), from the spread of the runs
+  double standardError() const;            ///< standard error of the mean, from the runs
   std::pair<double, double> band() const;  ///< 95 % band of mean(), one object in each run
 };
 
@@ -62,7 +62,7 @@ struct OdometryRow {
   std::uint64_t epoch = 0;
   RigidTransform T_WB;
   Eigen::Vector3d v_WB = Eigen::Vector3d::Zero();
-  Matrix9d covariance = Matrix9d::Zero();  ///< of [θ, p, v]: θ on the right, p and v in W
+  Matrix9d covariance = Matrix9d::Zero();  ///< order [θ, p, v]: θ on the right, p and v in W
 };
 /// Throws StartupError: kUnavailable if the file is missing, kData if a row is invalid.
 std::vector<OdometryRow> readOdometry(const std::filesystem::path& file);

@@ -29,9 +29,9 @@ struct Mishap {
   std::uint64_t frame = 0;
   bool miss = false;
   std::int64_t id = 0;
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< in the camera frame
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< position in the camera frame
   double nearest_m =
-      0.0;  ///< to the nearest estimate (a miss) or label of any kind (a false alarm)
+      0.0;  ///< distance to the nearest estimate (a miss) or any label (a false alarm)
 };
 
 struct ObjectScore {
@@ -42,7 +42,7 @@ struct ObjectScore {
   std::uint64_t interruptions = 0;  ///< counted frames without match between matched frames
   std::uint64_t ids_matched = 0;    ///< distinct ids, summed over true objects
   std::uint64_t ids_near = 0;       ///< the same, including the ids of duplicates
-  double minutes = 0.0;             ///< of counted ground truth, summed over objects
+  double minutes = 0.0;             ///< duration of counted ground truth, summed over objects
   double position_error_m = 0.0;    ///< mean of the matched ones
   double mean_object_recall = 0.0;
   std::uint64_t objects = 0, objects_found = 0;  ///< true objects; those matched at least once
@@ -64,7 +64,7 @@ struct Estimate {
   std::string class_name;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double heading = 0;
-  Box box;  ///< of the cuboid's corners, clipped to the image
+  Box box;  ///< box of the cuboid's corners, clipped to the image
 };
 
 /// One frame with its ground truth and estimates.

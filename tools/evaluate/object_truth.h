@@ -18,7 +18,7 @@ struct TruthLabel {
   std::string class_name;  ///< class required of an estimate; empty: any
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double heading = 0;  ///< radians, about the vertical
-  Box box;             ///< in the image
+  Box box;             ///< outline in the image
 };
 
 /// Ground truth of one frame. For KITTI: in rectified camera 0, boxes in image 2, heading

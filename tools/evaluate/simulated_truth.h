@@ -19,7 +19,7 @@ struct SimulatedTruth {
   sim::Truth truth;
   replay::PoseFile body{replay::PoseFormat::kTum, {}};  ///< T_WB by time, W of the ground truth
   CameraModel camera;
-  std::vector<TimePoint> frames;  ///< of cam0, by index
+  std::vector<TimePoint> frames;  ///< times of cam0, by index
 
   double frameInterval() const;  ///< mean in seconds; 0.1 if there are fewer than two frames
 };
@@ -39,7 +39,7 @@ SimulatedTruth readSimulatedTruth(const std::filesystem::path& folder);
 struct SimulatedRun {
   std::map<std::uint64_t, ScoredFrame> frames;
   std::uint64_t estimates = 0;  ///< rows examined
-  std::uint64_t outside = 0;    ///< of these, centre outside the image or frame without a pose
+  std::uint64_t outside = 0;    ///< part of these: centre outside the image, or no pose
   std::uint64_t poses = 0;      ///< frames with a pose
 };
 SimulatedRun pairWithTruth(const SimulatedTruth& truth, const std::vector<EstimateRow>& rows,

@@ -85,7 +85,7 @@ struct Compared {
   double coverage = 0.0;
   std::size_t expected = 0;
   std::size_t left_out = 0;  ///< frames that the run skipped
-  std::size_t untold = 0;    ///< without a pose between poses, for unknown reasons
+  std::size_t untold = 0;    ///< frames between poses that lack one, for unknown reasons
 };
 
 /// Removes the times of frames that the run skipped, and returns their number. Removes nothing if a

@@ -34,11 +34,11 @@ struct SegmentError {
 
 struct TrajectoryScore {
   std::size_t poses = 0;
-  double length_m = 0.0;                     ///< of the ground truth
-  double ate_rmse_m = 0.0, ate_max_m = 0.0;  ///< after alignment
+  double length_m = 0.0;                     ///< length of the ground truth
+  double ate_rmse_m = 0.0, ate_max_m = 0.0;  ///< ATE after alignment
   double ate_rotation_deg = 0.0;             ///< RMSE after alignment
   double rpe_m = 0.0, rpe_deg = 0.0;         ///< RMSE over one second
-  double end_drift_m = 0.0;  ///< of the last pose, after the first poses are aligned
+  double end_drift_m = 0.0;  ///< error of the last pose, after alignment of the first ones
   SegmentError segments;
 };
 

@@ -7,7 +7,7 @@
 #include "idl/detections.h"
 #include "idl/sensors.h"
 
-constexpr uint64_t kHash = 0x1a3b, kInstance = 0x57ab;  // of the model; of this process
+constexpr uint64_t kHash = 0x1a3b, kInstance = 0x57ab;  // digests of the model and of this process
 
 void look(const perdure_msg_Frame& frame, dds_entity_t writer) {
   const uint32_t pixels = frame.width * frame.height, bytes = frame.pixels._length;

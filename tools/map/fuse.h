@@ -22,7 +22,7 @@ struct FuseRequest {
 /// An input map; the maps are listed in the order in which they were merged.
 struct FusedFile {
   std::string path;
-  std::size_t sessions = 0, objects = 0;  ///< in the file, without history
+  std::size_t sessions = 0, objects = 0;  ///< counts in the file, without history
   mapping::FusionReport report;           ///< the first map is the reference of the others
 };
 
@@ -34,7 +34,7 @@ struct FuseOutcome {
   /// Sessions of each part of the map; the parts after the first one are not yet connected to it.
   std::vector<std::vector<WorldId>> parts;
   std::vector<std::size_t> objects_of_part;
-  std::size_t objects = 0;  ///< after fusion, without history
+  std::size_t objects = 0;  ///< count after fusion, without history
 
   std::size_t objectsBefore() const, loops() const, merges() const;
   std::vector<mapping::Change> changes() const;

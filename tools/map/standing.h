@@ -31,8 +31,8 @@ struct Standing {
   struct Loop {
     mapping::EdgeId id = 0;
     mapping::AnchorId a = 0, b = 0;
-    bool by_tracking = false;  ///< from re-identified objects; otherwise from a constellation
-    double weight = 0.0;       ///< in [0, 1]
+    bool by_tracking = false;  ///< source: re-identified objects; false: a constellation
+    double weight = 0.0;       ///< range [0, 1]
   };
   std::vector<Loop> loops;
 };

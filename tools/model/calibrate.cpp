@@ -39,7 +39,7 @@ struct Target {
 struct Seen {
   std::vector<Candidate> candidates;
   std::vector<Target> targets;
-  double width = 0.0, height = 0.0;  ///< of the image within the input
+  double width = 0.0, height = 0.0;  ///< size of the image within the input
   bool sides_known = true;
 };
 

@@ -32,7 +32,7 @@ struct Reliability {
     double confidence = 0.0, right = 0.0;  ///< means
     std::size_t count = 0;
   };
-  std::vector<Bin> bins;    ///< of the best class's probability, 15 of equal width
+  std::vector<Bin> bins;    ///< 15 bins of equal width, over the best probability
   double error = 0.0;       ///< expected calibration error: Σ share · |confidence − right|
   double likelihood = 0.0;  ///< mean negative log-likelihood of the labels, nats for each box
   std::size_t boxes = 0;

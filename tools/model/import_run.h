@@ -11,7 +11,7 @@ struct ImportOptions {
   std::filesystem::path network, out, image;  ///< out: a folder; empty: the network's
   double threshold = 0.25;
   bool unchecked = false;
-  std::vector<std::string> arguments{};  ///< for the Python part
+  std::vector<std::string> arguments{};  ///< options of the Python part
 };
 
 /// Prints the results. Throws StartupError, or CLI::RuntimeError with the status of the Python

@@ -18,7 +18,7 @@ struct KnownFile {
 struct KnownUse {
   std::string name;  ///< street, room
   std::vector<std::string> classes;
-  nlohmann::json calibration;  ///< for model.json; null if none was measured
+  nlohmann::json calibration;  ///< content for model.json; null if none was measured
   std::string measured;        ///< data of the measurement
 };
 

@@ -21,7 +21,7 @@ struct TrueBox {
   Box box;                  ///< complete outline in pixels, clipped to the image
   std::string class_name;   ///< canonical; empty: an unlabelled region
   bool ignored = false;     ///< neither a miss nor a false alarm
-  std::optional<Box> hull;  ///< of its cuboid's image, if completely visible and known
+  std::optional<Box> hull;  ///< box of the cuboid's image, if fully visible and known
 };
 
 struct LabelledFrame {
@@ -31,7 +31,7 @@ struct LabelledFrame {
 
 struct LabelRequest {
   std::filesystem::path data;
-  std::string sequence;  ///< of KITTI tracking
+  std::string sequence;  ///< sequence of KITTI tracking
   /// label_02/SEQUENCE.txt (found automatically in KITTI tracking), or OUT of a run.
   std::filesystem::path labels;
   std::uint64_t every = 1;  ///< uses each N-th frame
@@ -39,7 +39,7 @@ struct LabelRequest {
 
 struct LabelledData {
   std::unique_ptr<replay::Dataset> dataset;
-  std::vector<LabelledFrame> frames;  ///< in order
+  std::vector<LabelledFrame> frames;  ///< sorted by index
   /// Classes with complete labels; empty: all classes.
   std::set<std::string> judged;
   bool sides_known = true;  ///< the sides of a box are from the image, not from a prediction

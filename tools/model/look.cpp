@@ -30,7 +30,7 @@ Sight sightOf(const Detection& detection, const ModelInfo& model,
 }
 
 cv::Mat pixelsOf(const Frame& frame) {
-  auto* data = const_cast<std::uint8_t*>(frame.data->data());  // only read
+  auto* data = const_cast<std::uint8_t*>(frame.data->data());  // the pixels are only read
   return cv::Mat(static_cast<int>(frame.height), static_cast<int>(frame.width), CV_8UC3, data)
       .clone();
 }

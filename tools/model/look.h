@@ -23,7 +23,7 @@ Frame readPicture(const std::filesystem::path& file);
 Frame greyRamp(int width, int height);
 
 struct Look {
-  std::vector<Sight> sights;  ///< by decreasing score, one for each box with its best class
+  std::vector<Sight> sights;  ///< sorted by decreasing score; one for each box, its best class
   int input_width = 0, input_height = 0;
 };
 

@@ -20,7 +20,7 @@ constexpr std::size_t kLeastViews = 20;
 
 struct View {
   const EstimateRow* row = nullptr;
-  Box whole, inside;  ///< not clipped, and clipped to the image
+  Box whole, inside;  ///< the complete box, and its part in the image
   double depth = 0.0;
 };
 

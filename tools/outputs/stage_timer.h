@@ -43,7 +43,7 @@ class StageTimer {
     bool whole_;
     Span* outer_;
     double cpu_start_ms_, wall_start_ms_;
-    double cpu_within_ms_ = 0.0, wall_within_ms_ = 0.0;  ///< of stages inside this one
+    double cpu_within_ms_ = 0.0, wall_within_ms_ = 0.0;  ///< times of stages in this one
   };
   struct Samples {
     std::vector<double> cpu_ms, wall_ms;

@@ -24,7 +24,7 @@ class Subscription {
   /// (topic, message, whether it was disposed), in the order of arrival; None after the time
   /// (without a value: no limit) or after close().
   pybind11::object next(std::optional<double> seconds);
-  /// From any thread; ends a wait.
+  /// Ends a wait; may be called from any thread.
   void close();
   bool closed() const { return loop_.stopped(); }
   /// Number of matched writers of all its topics.

@@ -31,7 +31,7 @@ class GatewayReplay {
   gateway::TimeRange range() const { return {sensorTime(first_.log_ns), sensorTime(last_.log_ns)}; }
   /// Runs until stop().
   void run();
-  void stop();  ///< from any thread
+  void stop();  ///< may be called from any thread
 
  private:
   using Clock = std::chrono::steady_clock;

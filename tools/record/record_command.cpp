@@ -76,7 +76,7 @@ void runRecord(RecordOptions& options) {
   if (options.out.empty()) {
     throw StartupError(ExitCode::kUsage, "perdure record needs --out DIR, the recordings' folder");
   }
-  const DumpSignal dump;  // before other threads start
+  const DumpSignal dump;  // must exist before other threads
   const service::BlockedSignals blocked;
   options.recorder.fault =
       options.fault == "failed" ? HealthState::kFailed : HealthState::kDegraded;

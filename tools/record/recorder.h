@@ -15,8 +15,8 @@
 namespace perdure::tools {
 
 struct RecorderOptions {
-  std::vector<std::string> topics;  ///< empty: the topics that the table records
-  bool images = false;              ///< without `topics`: also images of all cameras that appear
+  std::vector<std::string> topics;           ///< empty: the topics that the table records
+  bool images = false;                       ///< topics of all cameras too, unless `topics` is set
   HealthState fault = HealthState::kFailed;  ///< the first state that is a fault
 };
 

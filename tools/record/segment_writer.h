@@ -27,7 +27,7 @@ struct PackedChunk {
   replay::mcap::Chunk chunk;
   CatalogueNow catalogue;
   LatchedNow latched;
-  std::int64_t steady_ns = 0;  ///< of its first message, by the steady clock
+  std::int64_t steady_ns = 0;  ///< steady time of its first message
 };
 
 class SegmentWriter {

@@ -16,7 +16,7 @@ namespace perdure::tools {
 
 struct StoreOptions {
   double segment_s = 60.0;
-  double last_s = 0.0;                ///<   0: length of a black box that is written only at faults
+  double last_s = 0.0;                ///< length of the black box for faults; 0: no black box
   double after_s = 10.0;              ///< seconds after the fault in its file
   std::uint64_t memory = 512u << 20;  ///< size limit of the black box, bytes
 };
@@ -24,8 +24,8 @@ struct StoreOptions {
 /// Counts of the messages since the start.
 struct StoreReport {
   std::uint64_t chunks = 0;    ///< received
-  std::uint64_t messages = 0;  ///< in files, or kept for a fault
-  std::uint64_t lost = 0;      ///< while the disk was full or failed
+  std::uint64_t messages = 0;  ///< number in files, or stored for a fault
+  std::uint64_t lost = 0;      ///< number lost while the disk was full or failed
   std::uint64_t bytes = 0, files = 0, removed = 0, folder_bytes = 0, dumps = 0;
   std::uint64_t overrun = 0;    ///< chunks lost to a slow disk
   std::uint64_t cut_short = 0;  ///< chunks dropped because the black box was full

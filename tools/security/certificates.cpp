@@ -35,7 +35,7 @@ Time timeOf(TimePoint at) {
 }
 
 Integer randomSerial() {
-  constexpr int kBits = 159;  // at most 20 octets, and positive
+  constexpr int kBits = 159;  // limits: at most 20 octets, and positive
   const Number number(BN_new());
   require(number && BN_rand(number.get(), kBits, BN_RAND_TOP_ONE, BN_RAND_BOTTOM_ANY) == 1,
           "draw a serial number");

@@ -37,8 +37,7 @@ Findings checkBus(const bus::Options& options, double seconds);
 struct Drive {
   std::string data;
   std::string rig = {};       ///< calibration file that replaces the recording's own
-  std::string sequence = {};  ///< for KITTI tracking, and for a 7-Scenes folder with several
-                              ///< sequences
+  std::string sequence = {};  ///< sequence of KITTI tracking, or of a 7-Scenes folder with several
   std::string poses = {};     ///< file with poses of another program, to be checked too
 };
 

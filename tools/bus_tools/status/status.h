@@ -82,8 +82,8 @@ struct HostSeen {
 
 struct StatusSeen {
   std::string vehicle;
-  std::map<std::string, ServiceSeen> services;  ///< by process name
-  std::map<std::string, TopicSeen> topics;      ///< by topic name, including "frame/cam0"
+  std::map<std::string, ServiceSeen> services;  ///< key: process name
+  std::map<std::string, TopicSeen> topics;      ///< key: topic name, including "frame/cam0"
   std::optional<Calibration> calibration;
   std::optional<MapHeader> map_header;
   std::optional<MapFrame> map_frame;  ///< includes the state of the map's graph

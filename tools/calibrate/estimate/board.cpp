@@ -122,7 +122,7 @@ bool Board::black(const Eigen::Vector2d& point) const {
   const double x = point.x() / size_m, y = point.y() / size_m, step = 1.0 + gap;
   if (!within(x, -gap, columns * step) || !within(y, -gap, rows * step)) return false;
   const double column = std::floor((x + gap) / step), row = std::floor((y + gap) / step);
-  const double u = x - column * step, v = y - row * step;  // from -gap to 1
+  const double u = x - column * step, v = y - row * step;  // range -gap … 1
   if (u < 0 && v < 0) return true;                         // square between four tags
   if (u < 0 || v < 0 || column >= columns || row >= rows) return false;
   const auto tag = static_cast<std::size_t>(row * columns + column);

@@ -39,7 +39,7 @@ using Matrix15d = Eigen::Matrix<double, 15, 15>;
 /// Residuals of a sensor's samples, as a multiple of the declared white noise.
 struct NoiseCheck {
   double ratio = 0.0;
-  double correlation = 0.0;  ///< of neighbouring residuals, -1 … 1; 0 for white noise
+  double correlation = 0.0;  ///< correlation of neighbours, -1 … 1; 0 for white noise
 };
 
 struct ImuResidual {

@@ -69,7 +69,7 @@ class CameraImuProblem {
   bool hasDistortion() const { return model_ != DistortionModel::kNone; }
   double delayOf(const Corner& corner) const;
   std::vector<int> clusterOfRows() const;
-  std::vector<double*> calibrationBlocks();  ///< in the order of the covariance
+  std::vector<double*> calibrationBlocks();  ///< same order as in the covariance
   Eigen::Vector2d residualOf(const Sighting& sighting, std::size_t i) const;
 
   const Board& board_;

@@ -19,7 +19,7 @@ using Matrix8d = Eigen::Matrix<double, 8, 8>;
 /// Residual of a detected corner against its predicted position.
 struct CornerResidual {
   std::uint64_t frame = 0;
-  double time_s = 0.0;  ///< since the first view
+  double time_s = 0.0;  ///< time since the first view
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero(), residual = Eigen::Vector2d::Zero();  ///< px
 };
 
@@ -29,9 +29,9 @@ struct IntrinsicsOptions {
 };
 
 struct Intrinsics {
-  CameraCalibration camera;                ///< only name, size and lens are set
-  Matrix8d covariance = Matrix8d::Zero();  ///< of fx, fy, cx, cy and the coefficients
-  double sigma_px = 0.0;                   ///< of a coordinate, estimated from the residuals
+  CameraCalibration camera;                ///< name, size and lens only
+  Matrix8d covariance = Matrix8d::Zero();  ///< order: fx, fy, cx, cy, coefficients
+  double sigma_px = 0.0;                   ///< standard deviation of a coordinate
   std::size_t views = 0, corners = 0, outliers = 0;
   std::vector<RigidTransform> T_CT;  ///< board in camera, for each used view
   std::vector<CornerResidual> residuals;

@@ -113,7 +113,7 @@ std::string namesOf(const std::vector<const Reading*>& readings) {
 }
 
 struct Wrong {
-  std::vector<const Reading*> likely;  ///< in order of likelihood
+  std::vector<const Reading*> likely;  ///< sorted by likelihood
   DataFinding finding;
 };
 

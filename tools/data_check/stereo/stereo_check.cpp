@@ -132,7 +132,7 @@ class StereoJudge {
     const auto &name0 = first_.calibration().name, &name1 = second_.calibration().name;
     const StereoMatches by_rig = matchesOf(pairs_, first_, second_, T_C1C0_.R());
     StereoMatches best = by_rig;
-    if (by_rig.share() < kMostMatch) {  // as if the viewing directions were equal
+    if (by_rig.share() < kMostMatch) {  // assumes equal viewing directions
       const auto alike = matchesOf(pairs_, first_, second_, Matrix3d::Identity());
       if (alike.matches.size() > 1.5 * static_cast<double>(best.matches.size())) best = alike;
     }

@@ -54,8 +54,8 @@ LoopJudgement judgeLoops(const mapping::SavedMap& map, const replay::PoseFile& t
 /// position and yaw. Parts with one anchor are omitted.
 struct AnchorErrors {
   std::uint64_t anchors = 0;  ///< anchors with a true pose
-  double odometry_m = 0.0;    ///< from chained odometry increments, one part for each session
-  double map_m = 0.0;         ///< from T_MA, one part for all anchors that accepted edges connect
+  double odometry_m = 0.0;    ///< ATE of chained odometry increments, a part for each session
+  double map_m = 0.0;         ///< ATE of T_MA, a part for all anchors that accepted edges connect
 };
 AnchorErrors scoreAnchors(const mapping::SavedMap& map, const replay::PoseFile& truth);
 

@@ -113,7 +113,7 @@ void scoreSightings(const std::vector<MemoryFrame>& frames, MemoryScore& score) 
 
 void scoreIds(const std::vector<Visit>& visits, MemoryScore& score) {
   std::set<std::uint64_t> ids;
-  std::vector<std::uint64_t> reported;  // on each visit
+  std::vector<std::uint64_t> reported;  // reports on each visit
   for (const auto& visit : visits) {
     for (const auto& [id, times] : visit.ids) ids.insert(id);
     if (const auto id = visit.id()) reported.push_back(*id);
@@ -266,7 +266,7 @@ ReturnScore scoreReturn(const std::vector<MemoryFrame>& before, const std::vecto
     score.first = {toSeconds(now[first].time - now.front().time), now[first].way_m,
                    objectsIn(now, first + 1).size()};
   }
-  std::map<std::uint64_t, Counts> ids;  // by object, after the first known one is reported
+  std::map<std::uint64_t, Counts> ids;  // key: object; after the first known one is reported
   for (std::size_t i = first; i < now.size(); ++i) {
     for (const auto& sighting : now[i].sightings) {
       auto& counts = ids[sighting.object];

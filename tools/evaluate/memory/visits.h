@@ -56,7 +56,7 @@ std::map<std::uint64_t, std::vector<Visit>> visitsOf(const std::vector<MemoryFra
 
 struct MemoryScore {
   std::uint64_t frames = 0, sightings = 0, matched = 0;
-  std::uint64_t late_sightings = 0, late_matched = 0;  ///< in the second half of the frames
+  std::uint64_t late_sightings = 0, late_matched = 0;  ///< counts in the second half of frames
   std::uint64_t objects = 0, seen_twice = 0;
   /// Objects reported on at least two visits; of these, those with the same id on the first and the
   /// last visit.
@@ -78,10 +78,10 @@ MemoryScore scoreMemory(const SimulatedTruth& truth, const std::vector<MemoryFra
 struct ReturnScore {
   std::uint64_t ids = 0;    ///< ids that the earlier run reported
   std::uint64_t known = 0;  ///< objects that the earlier run reported and this run sees
-  /// Of these: visible, and reported, after the first known id was reported.
+  /// Counts of these objects, visible and reported, after the first report of a known id.
   std::uint64_t seen = 0, reported = 0;
-  std::uint64_t kept = 0;   ///< with the id of the last earlier visit
-  std::uint64_t wrong = 0;  ///< with an id of another object
+  std::uint64_t kept = 0;   ///< objects with the id of the last earlier visit
+  std::uint64_t wrong = 0;  ///< objects with an id of another object
   /// Time and place of the first report of a known id.
   struct First {
     double seconds = 0.0, way_m = 0.0;
@@ -89,7 +89,7 @@ struct ReturnScore {
   };
   std::optional<First> first;
 
-  double keptShare() const;  ///< of the known objects; 1 if there are none
+  double keptShare() const;  ///< share of the known objects; 1 if there are none
 };
 ReturnScore scoreReturn(const std::vector<MemoryFrame>& before, const std::vector<MemoryFrame>& now,
                         const MemoryOptions& options);

@@ -163,7 +163,7 @@ def imported(args, request, graph):
     size = other_size(args, graph, found, size, request)
     outputs = list(found.cuts.values())
     given = input_of(found, request)
-    if args.reference:  # from the original graph, to detect wrong repairs too
+    if args.reference:  # uses the original graph, to detect wrong repairs too
         why = write_reference(args, graph, size, given, found, inside)
         found.notes += [why] if why else []
     repaired = {} if inside else Repair(graph).run()  # repairs for OpenCV deviate from the standard

@@ -26,7 +26,7 @@ class Finding:
     family: str
     classes: int
     cuts: dict = field(default_factory=dict)     # tensor of the graph: its name in model.json
-    keys: dict = field(default_factory=dict)     # for model.json: activation, levels, outputs …
+    keys: dict = field(default_factory=dict)     # content of model.json: activation, levels …
     notes: list = field(default_factory=list)    # sentences for people
     compared: str = ""                           # result of the comparison with its own decoding
     disagreement: float = None

@@ -55,7 +55,7 @@ for _name, _function in {"Max": np.maximum, "Min": np.minimum}.items():
 
 
 def axes_of(x, a, where=1):
-    """From the attribute, or from an input in newer opsets."""
+    """Axes from the attribute, or from an input in newer opsets."""
     if len(x) > where and x[where] is not None:
         return tuple(int(i) for i in np.atleast_1d(x[where]))
     return tuple(a["axes"]) if "axes" in a else None

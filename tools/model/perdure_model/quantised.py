@@ -165,7 +165,7 @@ def to_float(graph):
             for output in node.outputs:
                 floats.kinds[output] = node.kind
     graph.nodes = floats.nodes
-    for kept in (graph.types, graph.shapes):  # of removed tensors
+    for kept in (graph.types, graph.shapes):  # deletes entries of removed tensors
         for name in floats.same:
             kept.pop(name, None)
     return f"its eight-bit operators ({', '.join(found)}) were taken apart to float: it is as fast as the float network"

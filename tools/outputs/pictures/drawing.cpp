@@ -155,7 +155,7 @@ cv::Rect placeFor(const cv::Size& size, const cv::Point& at, const cv::Rect& are
   };
   const cv::Rect wanted = inside(at.x, at.y - size.height);
   constexpr int kTries = 12;
-  for (int step = 0; step < kTries; ++step) {  // at the place, above, below, farther above …
+  for (int step = 0; step < kTries; ++step) {  // tries the place, above, below, farther above …
     const int away = (step + 1) / 2 * (step % 2 == 1 ? -1 : 1) * (size.height + 1);
     const cv::Rect place = inside(at.x, at.y - size.height + away);
     if (isFree(place)) return place;

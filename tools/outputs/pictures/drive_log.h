@@ -32,7 +32,7 @@ ObjectGlance glanceAt(const ObjectBelief& object);
 
 struct DetectionGlance {
   Box box;
-  double probability = 0.0;  ///< of the best class against clutter and the other classes
+  double probability = 0.0;  ///< probability of the best class against clutter and others
 };
 
 struct FrameGlance {

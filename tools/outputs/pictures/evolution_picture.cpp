@@ -24,7 +24,7 @@ struct Seen {
 };
 struct Candidate {
   Evolution evolution;
-  std::vector<Seen> seen;  ///< while visible
+  std::vector<Seen> seen;  ///< frames in which it is visible
   bool confirmed = false;
 };
 

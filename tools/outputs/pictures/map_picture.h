@@ -18,7 +18,7 @@ namespace perdure::tools {
 /// All content is in one frame, M or W.
 struct MapContent {
   bool in_M = false;                  ///< false: in W
-  std::vector<Eigen::Vector3d> path;  ///< of the body
+  std::vector<Eigen::Vector3d> path;  ///< trajectory of the body
   std::vector<ObjectGlance> objects;  ///< estimates at the end
   std::vector<Eigen::Vector3f> landmarks;
   std::vector<Eigen::Vector3d> anchors;
@@ -33,7 +33,7 @@ struct MapView {
   Eigen::Vector2d low = Eigen::Vector2d::Zero(), high = Eigen::Vector2d::Ones();  ///< metres
   double scale = 1.0;  ///< pixels for each metre
   double text = 1.0;   ///< size of letters and lines, in proportion to the picture
-  cv::Rect area;       ///< of the map in the picture
+  cv::Rect area;       ///< area of the map in the picture
   double bar_m = 1.0;  ///< length of the scale bar
   cv::Point bar;       ///< its left end
 

@@ -16,7 +16,7 @@ namespace {
 constexpr int kHeader = 30;
 constexpr double kDimmed = 0.88;            // dims the image, so that lines are visible
 constexpr double kLeastProbability = 0.15;  // boxes with less are not drawn
-constexpr int kSamples = 16;                // of an edge, which lenses may bend
+constexpr int kSamples = 16;                // samples of an edge, which lenses may bend
 const Colour kWhite(255, 255, 255), kGrey(165, 165, 165), kNight(38, 34, 30);
 
 int even(double value) { return static_cast<int>(value) / 2 * 2; }

@@ -12,7 +12,7 @@
 namespace perdure::tools {
 
 struct OverlaySettings {
-  double reach_m = 30.0;  ///< from the body to the upper edge of the plan
+  double reach_m = 30.0;  ///< distance from the body to the upper edge of the plan
   int max_width = 1280;   ///< larger images are scaled down to this width
 };
 
@@ -37,7 +37,7 @@ class OverlayPicture {
 
   CameraModel camera_;
   OverlaySettings settings_;
-  double scale_;  ///< of the image in the picture
+  double scale_;  ///< scale of the image in the picture
 };
 
 /// Range of the plan: the distance in m from the body that includes nine tenths of the visible

@@ -23,7 +23,7 @@ struct TruthTrack {
   std::string class_name;
   Eigen::Vector3d size = Eigen::Vector3d::Ones();  ///< length, width, height
   bool moves = false;
-  std::vector<Key> keys;  ///< at least one, sorted by time
+  std::vector<Key> keys;  ///< never empty; sorted by time
   TimePoint present_from = TimePoint::min(), present_until = TimePoint::max();
 
   /// State at a time. Static objects: the last key until then, or the first one. Moving objects:
@@ -32,7 +32,7 @@ struct TruthTrack {
 };
 
 struct PictureTruth {
-  std::map<std::uint64_t, Eigen::Vector3d> path;  ///< of the body by frame; may be empty
+  std::map<std::uint64_t, Eigen::Vector3d> path;  ///< trajectory by frame; may be empty
   std::vector<TruthTrack> objects;
 };
 

@@ -39,9 +39,9 @@ Held<AVCodecContext> openCodec(const AVCodec* codec, const cv::Size& size, doubl
   context->framerate = av_d2q(rate_hz, 60000);
   context->time_base = av_inv_q(context->framerate);
   context->gop_size = 50;
-  context->colorspace = AVCOL_SPC_SMPTE170M;  // as in OpenCV's conversion
+  context->colorspace = AVCOL_SPC_SMPTE170M;  // same as in OpenCV's conversion
   context->color_range = AVCOL_RANGE_MPEG;
-  context->thread_count = 1;  // for the same bytes on every machine
+  context->thread_count = 1;  // gives the same bytes on every machine
   if (codec->id == AV_CODEC_ID_H264) {
     av_opt_set(context->priv_data, "preset", "superfast", 0);
     av_opt_set(context->priv_data, "crf", "24", 0);

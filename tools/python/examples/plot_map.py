@@ -13,7 +13,7 @@ if len(sys.argv) < 2:
     sys.exit(__doc__)
 out = sys.argv[2] if len(sys.argv) > 2 else None
 if out:
-    matplotlib.use("Agg")  # without a screen
+    matplotlib.use("Agg")  # needs no screen
 import matplotlib.pyplot as plt
 from matplotlib.patches import Ellipse, Polygon
 

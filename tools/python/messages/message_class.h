@@ -16,7 +16,7 @@
 namespace perdure::python {
 
 struct MessageClass {
-  std::string name;               ///< for example "ObjectBelief"
+  std::string name;               ///< struct name, such as "ObjectBelief"
   PyTypeObject* type = nullptr;   ///< never released
   std::vector<PyObject*> fields;  ///< interned, in the order of the description
 

@@ -10,7 +10,7 @@ namespace perdure::python {
 /// Raises perdure.errors.`name` with a sentence that contains the fix.
 [[noreturn]] void raise(const char* name, const std::string& sentence);
 
-/// To be called once in each module. Converts a StartupError to the exception for its exit status.
+/// Converts a StartupError to the exception for its exit status. Call it once in each module.
 void translateStartupErrors();
 
 }  // namespace perdure::python

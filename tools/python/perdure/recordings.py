@@ -11,7 +11,7 @@ from .errors import Missing, OtherVersion, Unavailable, Unusable
 class Recorded(NamedTuple):
     """One message of a recording."""
 
-    topic: str  #: for example "objects", "frame/cam0"
+    topic: str  #: topic name, such as "frame/cam0"
     time_ns: int  #: time of reception by the recorder, ns since 1970; never decreases
     message: Any  #: an instance of the topic's class
 

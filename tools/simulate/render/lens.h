@@ -38,7 +38,7 @@ class Lens {
   CameraModel model_;
   int width_, height_;
   float pixel_angle_;
-  double max_radius_;  ///< of the normalised image; limit of project()
+  double max_radius_;  ///< largest radius in the normalised image for project()
   std::vector<Eigen::Vector3f>
       rays_;  ///< (x, y, 1), or z = 0 if invalid; with a border of one pixel
 };

@@ -19,7 +19,7 @@ namespace perdure::tools {
 /// Outline of an object without occluders.
 struct Outline {
   double area = 0.0;  ///< pixels² of the enlarged plane
-  Box box;            ///< of its corners, within the enlarged plane
+  Box box;            ///< box of its corners, within the enlarged plane
   /// Box of the part within the image; set if the border truncates the object.
   std::optional<Box> inside;
 };

@@ -31,7 +31,7 @@ Shot shotAt(const sim::Scene& scene, std::size_t camera, double time_s);
 struct Picture {
   int width = 0, height = 0;
   std::vector<Eigen::Vector4f> radiance;  ///< linear RGB and padding, for vector instructions
-  std::vector<std::uint32_t> instance;    ///< at the pixel's centre; see World::instances, kNothing
+  std::vector<std::uint32_t> instance;    ///< index at the pixel centre; see World::instances
   std::size_t index(int column, int row) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
            static_cast<std::size_t>(column);
@@ -45,13 +45,13 @@ class Renderer {
 
   /// Moves the world to the shot's time and renders it.
   void render(const Lens& lens, const Shot& shot, Picture& picture);
-  /// Only identifies the visible instances, in each `step`-th pixel of each `step`-th row:
-  /// picture.instance, with picture.width = ceil(lens.width() / step).
+  /// Identifies the visible instances without shading, in each `step`-th pixel of each `step`-th
+  /// row: picture.instance, with picture.width = ceil(lens.width() / step).
   void identify(const Lens& lens, const Shot& shot, int step, Picture& picture);
 
  private:
   struct Eye {
-    Eigen::Matrix3f R;  ///< of C in W
+    Eigen::Matrix3f R;  ///< rotation of C in W
     Eigen::Vector3f p;
   };
   struct Packet {

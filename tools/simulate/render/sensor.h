@@ -16,7 +16,7 @@ namespace perdure::tools {
 /// State of a sensor between images.
 struct SensorState {
   std::uint64_t frames = 0;   ///< number of images so far
-  double log_exposure = 0.0;  ///< of the factor to the desired brightness
+  double log_exposure = 0.0;  ///< logarithm of the factor to the desired brightness
   double log_gain = 0.0;      ///< random-walk error of the gain
 };
 
@@ -46,7 +46,7 @@ class Sensor {
 
   SensorOptions options_;
   SensorState state_;
-  std::vector<float> fading_;  ///< for each pixel
+  std::vector<float> fading_;  ///< factor for each pixel
   std::vector<std::uint8_t> gamma_;
   float scale_ = 1.0F;
 };

@@ -8,7 +8,7 @@
 namespace perdure::tools {
 namespace {
 
-constexpr int kSize = 768;  ///< of the sky map
+constexpr int kSize = 768;  ///< side of the sky map
 constexpr float kCeilingHeight = 3.2F, kCeilingTile = 0.6F;
 
 float lattice(std::uint64_t seed, int x, int y) {
@@ -101,7 +101,7 @@ Eigen::Vector3f Sky::ceiling(const Eigen::Vector3f& origin, const Eigen::Vector3
   const float edge = std::min(std::min(x - std::floor(x), std::ceil(x) - x),
                               std::min(y - std::floor(y), std::ceil(y) - y));
   const float tone = 0.92F + 0.08F * lattice(0x7117, column, row);
-  // At a distance, a pixel is wider than a line, and averages it.
+  // Averages lines that are narrower than a pixel at this distance.
   const float blur = 0.0025F * (at - origin).norm() / (d.z() * kCeilingTile) + 1e-3F;
   const float line =
       std::clamp((0.03F + 0.5F * blur - edge) / blur, 0.0F, 1.0F) * std::min(1.0F, 0.06F / blur);

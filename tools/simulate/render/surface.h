@@ -15,7 +15,7 @@ namespace perdure::tools {
 struct Facet {
   std::array<Eigen::Vector3f, 3> normals;
   std::array<Eigen::Vector2f, 3> uvs;
-  float repeats_per_metre = 0.0F;  ///< of the texture
+  float repeats_per_metre = 0.0F;  ///< density of the texture
   std::uint32_t material = 0;
 };
 
@@ -23,7 +23,7 @@ struct Facet {
 struct Surface {
   std::vector<Eigen::Vector3f> positions;
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  std::vector<Facet> facets;  ///< for each triangle
+  std::vector<Facet> facets;  ///< data of each triangle
   std::vector<Material> materials;
 
   /// Adds `mesh`, placed by T_SM. Throws std::invalid_argument if its lists have inconsistent
@@ -33,7 +33,7 @@ struct Surface {
 
 /// A hit point on a surface, interpolated between the triangle's corners.
 struct SurfacePoint {
-  Eigen::Vector3f normal;  ///< in the surface's frame, not of unit length
+  Eigen::Vector3f normal;  ///< surface frame; not normalised
   Eigen::Vector2f uv;
   float repeats_per_metre = 0.0F;
   const Material* material = nullptr;

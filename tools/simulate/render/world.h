@@ -25,7 +25,7 @@ struct Instance {
   Eigen::Vector3f p = Eigen::Vector3f::Zero();
   Eigen::Vector3f velocity = Eigen::Vector3f::Zero();   ///< W, m/s
   Eigen::Vector3f turn_rate = Eigen::Vector3f::Zero();  ///< W, rad/s
-  bool moves = false;                                   ///< at the current time
+  bool moves = false;                                   ///< moving at the current time
   bool present = true;
 };
 
@@ -68,7 +68,7 @@ class World {
 
   sim::Scene scene_;
   std::vector<Instance> instances_;
-  std::vector<RTCGeometry> geometries_;  ///< of moving instances; null for the others
+  std::vector<RTCGeometry> geometries_;  ///< geometry of moving instances; else null
   RTCDevice device_ = nullptr;
   RTCScene fixed_ = nullptr, top_ = nullptr;  ///< top_: fixed_ and the moving instances
   std::optional<double> time_s_;

@@ -25,7 +25,7 @@ struct Mesh {
   std::vector<Eigen::Vector3f> positions, normals;  ///< equal lengths; normals have unit length
   std::vector<Eigen::Vector2f> uvs;                 ///< equal length; in units of texture repeats
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  std::vector<std::uint16_t> material_of;  ///< for each triangle, index into materials
+  std::vector<std::uint16_t> material_of;  ///< index into materials of each triangle
   std::vector<Material> materials;
 };
 

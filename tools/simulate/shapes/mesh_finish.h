@@ -16,7 +16,7 @@ struct LooseFace {
   std::array<Eigen::Vector2f, 3> uvs;
   bool has_uvs = false;
   std::uint16_t material = 0;
-  std::uint32_t part = 0;  ///< only faces of one part are smoothed together
+  std::uint32_t part = 0;  ///< faces of different parts are not smoothed together
   float repeat_m = 1.0F, crease_deg = 40.0F;
 };
 

@@ -5,7 +5,7 @@ from PIL import Image
 
 from .settings import HEIGHT, WIDTH
 
-MIN_SIDE = 10.0  # of the longer side, in pixels; smaller objects are ignored
+MIN_SIDE = 10.0  # longer side in pixels; smaller objects are ignored
 
 
 def crop(image, truth, rng):

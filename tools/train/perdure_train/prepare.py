@@ -10,7 +10,7 @@ import numpy as np
 from .progress import Progress
 from .simulated import read_folder
 
-VIEWS = 40  # of one random scene
+VIEWS = 40  # views of one random scene
 SETS = {  # look set and first seed; the sets are disjoint
     "train": ("train", 1000),
     "calibration": ("train", 500_000),

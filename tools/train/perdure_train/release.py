@@ -15,7 +15,7 @@ from .training import settle_statistics
 
 NAME = f"perdure_{WIDTH}x{HEIGHT}"
 DEMO_SIZE = (480, 360)  # same weights; the demo has small people
-SCENES = 12  # of the calibration set
+SCENES = 12  # scenes of the calibration set
 THRESHOLD = 0.05
 
 

@@ -5,7 +5,7 @@ CLASSES = ["car", "van", "person", "bicycle", "chair", "dining table", "monitor"
 AZIMUTH_CLASSES = ["car", "van", "bicycle", "chair", "monitor", "couch"]
 WIDTH, HEIGHT = 320, 240
 STRIDES = [8, 16, 32]
-BINS = 12  # of azimuth, 30 degrees each
+BINS = 12  # azimuth bins of 30 degrees each
 # Largest distance of a cell outside its object, in strides. Objects smaller than a cell often
 # contain no cell centre.
 REACH = 0.5

@@ -10,7 +10,7 @@ from PIL import Image
 
 from .settings import CLASSES, HEIGHT, WIDTH
 
-MIN_SIDE = 10.0  # of the longer side in pixels of the input; smaller ones are ignored
+MIN_SIDE = 10.0  # longer side in pixels of the input; smaller objects are ignored
 HIDDEN = 0.05  # visible share of the outline within the image below which an object is invisible
 IGNORED = 0.25  # visible share below which an object counts neither as a miss nor as a false alarm
 

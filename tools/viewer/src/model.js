@@ -15,7 +15,7 @@ export class Model {
     this.health = null;
     this.heardAt = 0; // performance.now() of the newest objects
     this.firstTime = null;
-    this.arrivals = []; // of objects in the last seconds
+    this.arrivals = []; // arrival times of the last seconds
   }
 
   takeObjects(message, now) {
@@ -78,7 +78,7 @@ export class Model {
   /** Position of an object's centre in W; objects only on the map are in M. Null: unknown. */
   placeInW(o) {
     if (o.elsewhere) return null;
-    if (o.memory === undefined) return o.c; // in the working set
+    if (o.memory === undefined) return o.c; // an object of the working set
     const [x, y, z, a, b, c, w] = this.T_MW();
     return turned([-a, -b, -c, w], [o.c[0] - x, o.c[1] - y, o.c[2] - z]);
   }

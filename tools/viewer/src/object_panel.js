@@ -45,7 +45,7 @@ export class ObjectPanel {
     this.note = '';
     this.shown = performance.now();
     if (id === 0) return this.clear();
-    this.render(); // at once, from the known data
+    this.render(); // shows the known data at once
     this.ask();
   }
 

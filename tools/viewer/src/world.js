@@ -221,7 +221,7 @@ export class World {
     const ahead = new THREE.Vector3(1, 0, 0).applyQuaternion(this.vehicle.quaternion);
     const heading = Math.atan2(ahead.y, ahead.x);
     if (this.follow) {
-      // At a distance ahead of the vehicle, rotated with it.
+      // Places the target ahead of the vehicle and rotates it with the vehicle.
       const turned = this.heading === null || this.heading === undefined ? 0 : Math.atan2(Math.sin(heading - this.heading), Math.cos(heading - this.heading));
       if (this.heading === null || this.heading === undefined) this.orbit.azimuth = heading + Math.PI;
       else this.orbit.azimuth += turned;
@@ -338,7 +338,7 @@ export class World {
       pixels. */
   keepPace(now) {
     if (this.drewAt === undefined) return;
-    const took = now - this.drewAt; // until the next frame
+    const took = now - this.drewAt; // time until the next frame
     this.drewAt = undefined;
     this.took = took;
     if (took < SLOW_MS) {

@@ -8,8 +8,8 @@ namespace perdure::tools::shapes {
 namespace {
 
 constexpr std::size_t kHalf = 9;               // points from the keel to the roof's middle
-constexpr std::size_t kAll = 2 * (kHalf - 1);  // of a whole ring
-constexpr float kSeam = 0.0022F;               // of the length
+constexpr std::size_t kAll = 2 * (kHalf - 1);  // points of a whole ring
+constexpr float kSeam = 0.0022F;               // share of the length
 
 class Body {
  public:

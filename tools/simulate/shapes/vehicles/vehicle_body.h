@@ -21,10 +21,10 @@ struct BodyProfile {
   std::vector<Vec2> belt;  ///< lower edge of the windows
   Span windscreen, rear_glass;
   std::vector<Span> side_glass;
-  std::vector<float> seams;  ///< of doors
+  std::vector<float> seams;  ///< seams of doors
   float front_axle = 0.18F, rear_axle = 0.8F;
-  float wheel_radius = 0.22F, sill = 0.15F;  ///< of the height
-  float roof_width = 0.76F;                  ///< of the width
+  float wheel_radius = 0.22F, sill = 0.15F;  ///< shares of the height
+  float roof_width = 0.76F;                  ///< share of the width
   float nose_taper = 0.18F, tail_taper = 0.1F;
   bool rear_doors_with_glass = false;  ///< vertical rear end of vans
   bool split_grille = true;
@@ -34,8 +34,8 @@ struct BodyMaterials {
   int paint, trim, glass, headlight, taillight, plate, dark;
 };
 
-/// From x = +length/2 (front) to −length/2, with the wheels on the ground at z = 0. `size` in
-/// metres.
+/// Adds the body from x = +length/2 (front) to −length/2, with the wheels on the ground at z = 0.
+/// `size` in metres.
 void addBody(MeshBuilder& builder, const BodyProfile& profile, const Vec3& size,
              const BodyMaterials& materials);
 
