@@ -36,7 +36,7 @@ class Watched {
   }
 
   void run(replay::Dataset& dataset, const RigCheckOptions& options) {
-    constexpr std::size_t kEvery = 20;  // images
+    constexpr std::size_t kEvery = 20;  // every so many images
     std::optional<TimePoint> first;
     std::size_t images = 0;
     replay::ReadAhead ahead(dataset);
@@ -89,8 +89,8 @@ std::vector<CornerResidual> residualsOf(const std::vector<vio::Innovation>& inno
 /// RMS in px of the residual pattern that both halves of the drive share; 0 if it is not
 /// significant. The residuals of a track are correlated, so that one half alone proves nothing.
 double patternOf(const CameraCalibration& camera, const std::vector<CornerResidual>& residuals) {
-  constexpr std::size_t kEnough = 20;  // corners in a half
-  constexpr double kSure = 3.0;        // standard deviations
+  constexpr std::size_t kEnough = 20;  // least corners in a half
+  constexpr double kSure = 3.0;        // least standard deviations
   const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
   const auto before = cellsOf(camera, {residuals.begin(), middle});
   const auto after = cellsOf(camera, {middle, residuals.end()});

@@ -60,7 +60,7 @@ std::string textOf(const SignedAxes& axes) {
 
 /// Image rotation that a change of axes does not explain.
 struct Left {
-  double of_changed;  ///< share, averaged over the axes that change
+  double of_changed;  ///< mean share over the axes that change
   double of_all;      ///< share of the whole rotation
 };
 

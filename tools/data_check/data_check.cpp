@@ -72,7 +72,7 @@ replay::DataFindings checkDrive(const replay::Recording& recording, const replay
   add("the rig", findings, [&] { return checkRigNumbers(recording.calibration); });
   if (!use.images || recording.calibration.cameras.empty()) return findings;
   for (const auto& finding : findings) {
-    if (finding.grade == Grade::kFatal) return findings;  // rotations would fail likewise
+    if (finding.grade == Grade::kFatal) return findings;  // rotations would fail as well
   }
   add("what belongs together", findings, [&] { return checkPairs(recording); });
   add("the two cameras", findings, [&] { return checkStereo(recording); });

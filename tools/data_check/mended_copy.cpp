@@ -152,7 +152,7 @@ void writeSamples(const Recording& recording, const fs::path& mav0) {
   if (!recording.speed.empty()) write(mav0 / "speed0" / "data.csv", speed);
 }
 
-/// Refuses folders of the source. The images of a fixed drive may be behind links.
+/// Refuses a target inside the source. Resolves links, because a fixed drive links its images.
 void refuseSource(const Recording& recording, const fs::path& copy) {
   std::set<fs::path> folders;
   for (const auto& frame : recording.frames) {

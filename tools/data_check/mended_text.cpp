@@ -273,7 +273,7 @@ bool mendColumns(Table& table, std::vector<std::string>& mends) {
                     table.file.string(), columns, kSeven));
   }
   for (auto& row : table.rows) {
-    if (row.size() != columns) continue;  // the reader reports it
+    if (row.size() != columns) continue;  // the reader reports this row
     std::vector<std::string> kept = {row[0]};
     for (const std::size_t i : *six) kept.push_back(row[i]);
     row = std::move(kept);

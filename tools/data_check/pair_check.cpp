@@ -16,7 +16,7 @@ using replay::DataFinding;
 using replay::Recording;
 using Grade = DataFinding::Grade;
 
-constexpr double kMostLost = 0.1;  // share; every recording loses some
+constexpr double kMostLost = 0.1;  // share; recordings always lose some
 
 void checkFiles(const Recording& recording, std::size_t camera, replay::DataFindings& findings) {
   std::size_t all = 0, missing = 0;

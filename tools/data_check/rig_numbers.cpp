@@ -60,8 +60,8 @@ void checkIntrinsics(const CameraCalibration& camera, DataFindings& findings) {
                       : "whether they are of images of another size, or of images that were cut")});
 }
 
-/// Share of the pixels of a grid that no direction in front of the camera projects to, because the
-/// distorted radius decreases again.
+/// Share of the pixels that no direction in front of the camera reaches, because the distorted
+/// radius decreases again. The pixels are on a grid.
 double shareOfFolds(const CameraCalibration& calibration) {
   constexpr int kGrid = 24;
   const CameraModel camera(calibration);
@@ -110,7 +110,7 @@ void checkOffset(const CameraCalibration& camera, DataFindings& findings) {
 }
 
 void checkNoise(const ImuCalibration& imu, DataFindings& findings) {
-  constexpr double kGyro = 5e-3, kAccel = 0.3;  // the cheapest units have a fifth
+  constexpr double kGyro = 5e-3, kAccel = 0.3;  // the cheapest units have a fifth of these
   constexpr double kRadians = M_PI / 180.0;
   for (const auto& [value, name] :
        {std::pair(imu.gyro_noise, "gyroscope"), std::pair(imu.accel_noise, "accelerometer")}) {

@@ -1,6 +1,6 @@
-// Checks whether covariances are consistent: normalised estimation errors squared of the map's
-// objects against exact ground truth, and their mean (ANEES) with its χ² band (Bar-Shalom et al.,
-// "Estimation with Applications to Tracking and Navigation", 5.4).
+// Checks whether covariances are consistent, by normalised estimation errors squared of the map's
+// objects against exact ground truth. Their mean (ANEES) is compared with its χ² band (Bar-Shalom
+// et al., "Estimation with Applications to Tracking and Navigation", 5.4).
 #pragma once
 
 #include <Eigen/Core>
@@ -83,7 +83,7 @@ OdometryScore scoreOdometry(const std::vector<OdometryRow>& rows, const replay::
 struct ConsistencyScore {
   Anees position{"position", 3, {}}, yaw{"yaw", 1, {}},
       half_yaw{"yaw but for its half turns", 1, {}}, size{"size", 3, {}};
-  std::uint64_t objects = 0, left_out = 0;  ///< compared; without a partner or moving
+  std::uint64_t objects = 0, left_out = 0;  ///< left_out: without a partner, or moving
 };
 
 /// Compares each static object with existence above one half and a class name. Its partner is the

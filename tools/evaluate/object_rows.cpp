@@ -31,7 +31,8 @@ std::optional<EstimateRow> readRow(const std::string& text) {
   return row;
 }
 
-using Ties = std::vector<std::pair<std::size_t, std::uint64_t>>;  // row of the trajectory, frame
+using Ties = std::vector<std::pair<std::size_t, std::uint64_t>>;  // pairs of trajectory row and
+                                                                  // frame
 
 Ties tieLines(const std::vector<replay::StampedPose>& poses, const std::vector<EstimateRow>& rows) {
   std::map<TimePoint, std::uint64_t> frame_at;

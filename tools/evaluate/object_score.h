@@ -18,10 +18,10 @@ inline constexpr std::array<double, 3> kAngles_deg{30.0, 45.0, 180.0};  ///< las
 
 struct Cell {
   std::uint64_t matched = 0, truth = 0, false_alarms = 0;
-  double distance_m = 0.0;       ///< sum over the matched ones
+  double distance_m = 0.0;       ///< sum over the matches
   double recall() const;         ///< 1 if there is no ground truth
   double precision() const;      ///< 1 if there are no estimates
-  double positionError() const;  ///< metres, mean of the matched ones
+  double positionError() const;  ///< metres, mean over the matches
 };
 
 /// A false alarm (with the estimate's id) or a miss (with the true track), at 1.5 m, any angle.
@@ -35,7 +35,7 @@ struct Mishap {
 };
 
 struct ObjectScore {
-  std::array<std::array<Cell, 3>, 3> cells{};  ///< [distance][angle]
+  std::array<std::array<Cell, 3>, 3> cells{};  ///< indices [distance][angle]
   // Within 1.5 m, any orientation:
   std::uint64_t id_switches = 0;    ///< matches with another id than the object's last match
   std::uint64_t duplicates = 0;     ///< unmatched estimates close to a counted true object
@@ -43,7 +43,7 @@ struct ObjectScore {
   std::uint64_t ids_matched = 0;    ///< distinct ids, summed over true objects
   std::uint64_t ids_near = 0;       ///< the same, including the ids of duplicates
   double minutes = 0.0;             ///< duration of counted ground truth, summed over objects
-  double position_error_m = 0.0;    ///< mean of the matched ones
+  double position_error_m = 0.0;    ///< mean over the matches
   double mean_object_recall = 0.0;
   std::uint64_t objects = 0, objects_found = 0;  ///< true objects; those matched at least once
   std::uint64_t neutral = 0, outside = 0;        ///< excluded estimates (1.5 m, any angle)

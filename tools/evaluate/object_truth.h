@@ -33,9 +33,9 @@ inline constexpr double kMinHeight_px = 25.0;  ///< least height of a counted bo
 
 using PosesByFrame = std::map<std::uint64_t, RigidTransform>;  ///< T_WB
 
-/// Tracks that are static in the world. The medians of their first and last fifth are less than 1.5
-/// m apart, and no point is more than 2 m from the overall median. Frames without a pose are
-/// omitted; a track without any pose is not static.
+/// Tracks that are static in the world: the medians of their first and last fifth are less than 1.5
+/// m apart. No point is more than 2 m from the overall median. Frames without a pose are omitted; a
+/// track without any pose is not static.
 std::set<std::int64_t> staticTracks(const std::vector<replay::KittiLabel>& labels,
                                     const RigidTransform& T_RI, const PosesByFrame& poses);
 

@@ -32,13 +32,13 @@ SimulatedTruth readSimulatedTruth(const std::filesystem::path& folder);
 /// the exact state, rows by the trajectory, and headings are about the vertical relative to the
 /// body.
 ///
-/// Counted objects have any class except `toy` (or `class_name`, if given), never move, are at
-/// least nine tenths visible, are completely in the image, and are at least 25 px tall. Other
-/// objects are ignored, except toys: an estimate at a toy is a false alarm. Rows of class `other`
-/// state no class and are omitted, as are rows of classes other than `class_name`.
+/// Counted objects have any class except `toy` (or `class_name`, if given) and never move. They are
+/// at least nine tenths visible, completely in the image, and at least 25 px tall. Other objects
+/// are ignored, except toys: an estimate at a toy is a false alarm. Rows of class `other` state no
+/// class and are omitted, as are rows of classes other than `class_name`.
 struct SimulatedRun {
   std::map<std::uint64_t, ScoredFrame> frames;
-  std::uint64_t estimates = 0;  ///< rows examined
+  std::uint64_t estimates = 0;  ///< number of examined rows
   std::uint64_t outside = 0;    ///< part of these: centre outside the image, or no pose
   std::uint64_t poses = 0;      ///< frames with a pose
 };

@@ -14,14 +14,14 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 constexpr double kDegrees = 180.0 / std::numbers::pi;
-constexpr std::size_t kMostNamed = 6;  // objects of a loop
+constexpr std::size_t kMostNamed = 6;  // most objects named of a loop
 
 struct Figures {
   std::set<WorldId> sessions;
   double way_m = 0.0;
   std::size_t unknown = 0;            ///< anchors with unknown σ
-  const MapAnchor* worst = nullptr;   ///< largest σ in the plane
-  std::map<MapLoopState, int> loops;  ///< count by state
+  const MapAnchor* worst = nullptr;   ///< anchor with the largest σ in the plane
+  std::map<MapLoopState, int> loops;  ///< counts by state
   int ties = 0;
 };
 

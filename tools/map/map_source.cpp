@@ -36,7 +36,7 @@ Result<map_store::Found> findInM(const map_store::MapReader& reader, const MapQu
   const auto graph = reader.graph();
   if (!graph) return tl::unexpected<Reason>(graph.error());
   const auto& records = graph->map.records;
-  constexpr double kTile_m = 32.0;  // no tiles are requested
+  constexpr double kTile_m = 32.0;  // any value, because no tiles are requested
   map_store::MapInM map(reader, kTile_m, [&records](ObjectId id) {
     const auto at = records.find(id);
     return at == records.end() ? nullptr : &at->second;

@@ -17,8 +17,8 @@ namespace perdure::tools {
 struct Station {
   mapping::AnchorId anchor = 0;
   WorldId session;
-  TimePoint time;      ///< time of the body there
-  double way_m = 0.0;  ///< distance travelled in the session until there
+  TimePoint time;      ///< time of the body at the anchor
+  double way_m = 0.0;  ///< distance travelled in the session up to the anchor
 };
 
 struct Standing {

@@ -206,7 +206,7 @@ std::vector<BoxOutcome> Study::outcomes(const Calibration& calibration) const {
       if (taken[i] >= 0) {
         outcome.label = frames_[f].targets[static_cast<std::size_t>(taken[i])].k;
       } else if (!judged(static_cast<std::size_t>(best))) {
-        continue;  // may be correct, because this class is not labelled
+        continue;  // may be correct, as the class has no labels
       }
       result.push_back(std::move(outcome));
     }

@@ -27,11 +27,13 @@ struct CalibrationResult {
   Reliability reliability_after;   ///< reliability of all boxes, each with a fit to other frames
   std::size_t frames = 0, boxes = 0, targets = 0, targets_found = 0;
   double false_boxes = 0.0;                          ///< mean per frame, above the low threshold
-  std::size_t asked_there = 0, asked_elsewhere = 0;  ///< places of the top-down fit
-  double primed_nats_there = 0.0, primed_nats_elsewhere = 0.0;  ///< means; the second is < 0
+  std::size_t asked_there = 0, asked_elsewhere = 0;  ///< places in the top-down fit
+  double primed_nats_there = 0.0, primed_nats_elsewhere = 0.0;  ///< mean nats; the second value is
+                                                                ///< < 0
   bool has_primed = false;
   double box_sigma = 0.0;                                    ///< 0: too few clear boxes
-  std::map<std::string, std::array<double, 4>> side_insets;  ///< classes with enough boxes only
+  std::map<std::string, std::array<double, 4>> side_insets;  ///< insets of classes with enough
+                                                             ///< boxes
 };
 
 /// Runs the service's own node. Throws StartupError if the network, the data or the labels cannot

@@ -15,7 +15,7 @@ using Json = nlohmann::ordered_json;
 double rounded(double value) { return std::round(value * 1000.0) / 1000.0; }
 
 std::vector<cv::Point2d> curveOf(const Reliability& reliability) {
-  constexpr std::size_t kFew = 10;  // boxes; below it, a share is not significant
+  constexpr std::size_t kFew = 10;  // boxes; a share of fewer is not significant
   std::vector<cv::Point2d> points;
   for (const auto& bin : reliability.bins) {
     if (bin.count >= kFew) points.emplace_back(bin.confidence, bin.right);

@@ -21,10 +21,10 @@ struct Softening {
   double temperature = 1.0, bias = 0.0;
 };
 
-/// The T, and b if it is significant, that maximise the likelihood of the labels (Guo et al., "On
-/// calibration of modern neural networks", ICML 2017). The cost is convex in β = 1/T and b, and is
-/// minimised by Newton's method. b is used if it improves the Bayesian information criterion. T is
-/// within [0.05, 20]. Returns no change unless there are boxes of both kinds.
+/// The T, and b if it is significant, that maximise the likelihood of the labels. Source: Guo et
+/// al., "On calibration of modern neural networks", ICML 2017. The cost is convex in β = 1/T and b,
+/// and is minimised by Newton's method. b is used if it improves the Bayesian information
+/// criterion. T is within [0.05, 20]. Returns no change unless there are boxes of both kinds.
 Softening fitSoftening(const std::vector<BoxOutcome>& boxes);
 
 struct Reliability {

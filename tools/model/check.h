@@ -15,7 +15,7 @@ inline constexpr double kMostDifference = 1e-3;
 struct Answers {
   double difference = 0.0;  ///< the largest, relative to the tensor's largest value or to 1
   std::string tensor;       ///< tensor with this difference
-  std::string by;           ///< the library that computes: OpenCV or ONNX Runtime
+  std::string by;           ///< the computing library: OpenCV or ONNX Runtime
 };
 
 /// `reference`: the folder that the import wrote. Throws StartupError (78) if the network cannot be

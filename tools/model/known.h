@@ -16,10 +16,10 @@ struct KnownFile {
 
 /// The reported classes for a kind of scene, and the calibration that was measured in it.
 struct KnownUse {
-  std::string name;  ///< street, room
+  std::string name;  ///< kind of scene: street, room
   std::vector<std::string> classes;
   nlohmann::json calibration;  ///< content for model.json; null if none was measured
-  std::string measured;        ///< data of the measurement
+  std::string measured;        ///< data used for the measurement
 };
 
 struct KnownNetwork {

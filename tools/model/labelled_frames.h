@@ -42,7 +42,7 @@ struct LabelledData {
   std::vector<LabelledFrame> frames;  ///< sorted by index
   /// Classes with complete labels; empty: all classes.
   std::set<std::string> judged;
-  bool sides_known = true;  ///< the sides of a box are from the image, not from a prediction
+  bool sides_known = true;  ///< false: the sides of a box are predictions, not measured
 };
 
 /// Box around the images of a cuboid's corners, not clipped; empty if a corner has no image.

@@ -60,7 +60,7 @@ bus::Options serviceOptionsOf(const BusSettings& settings, const std::string& pr
 
 bus::Domain openDomain(const bus::Options& options) {
   static std::mutex mutex;
-  static auto& open = *new std::map<std::int64_t, bus::Domain*>;  // exists as long as the process
+  static auto& open = *new std::map<std::int64_t, bus::Domain*>;  // the map is never deleted
   const std::lock_guard lock(mutex);
   const auto at = open.find(options.domain);
   if (at == open.end()) {

@@ -79,7 +79,7 @@ class InferenceService {
     detections.model_hash = model_.hash;
     const std::lock_guard lock(mutex_);
     busy_since_.reset();
-    if (detections_.livelinessLost() > lost_) {  // its lease expired: not the owner any more
+    if (detections_.livelinessLost() > lost_) {  // the lease expired: not the owner any more
       lost_ = detections_.livelinessLost();
       if (detections_.strength() == options_.strength) {
         detections_.setStrength(options_.strength - 1);

@@ -143,7 +143,7 @@ std::unique_ptr<gateway::Node> GatewayReplay::freshNode() {
     reply.request = query.request;
     reply.ok = false;
     reply.error = "a recording has no map store; perdure map --db FILE asks a map";
-    refusals_.push_back(reply);  // queued, because the node is making the request
+    refusals_.push_back(reply);  // queues the reply, because the node is making the request
   };
   return std::make_unique<gateway::Node>(
       config_, "recording", 1,

@@ -78,11 +78,11 @@ class GatewayReplay {
   gateway::Channels wanted_;
   std::optional<Calibration> calibration_;
   std::optional<ModelInfo> model_;
-  std::optional<MapReply> graph_;  ///< the last one, of the map
+  std::optional<MapReply> graph_;  ///< newest graph of the map
   std::optional<replay::RecordedMessage> next_;
   /// Newest messages of topics without history, for clients that open a channel.
   std::map<std::string, replay::RecordedMessage> newest_;
-  std::uint64_t at_ns_ = 0;  ///< displayed log time
+  std::uint64_t at_ns_ = 0;  ///< log time of the display
   bool playing_ = true, stopped_ = false, ended_ = false;
   double speed_ = 1.0;
   std::uint64_t clock_log_ns_ = 0;
@@ -93,7 +93,8 @@ class GatewayReplay {
   std::mutex mutex_;
   std::condition_variable something_;
   Mail mail_;
-  std::unique_ptr<gateway::web::Server> server_;  // last, because its thread uses the members above
+  std::unique_ptr<gateway::web::Server> server_;  // last member, because its thread uses those
+                                                  // above
 };
 
 }  // namespace perdure::tools

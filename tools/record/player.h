@@ -15,7 +15,7 @@ namespace perdure::tools {
 
 struct PlayOptions {
   std::vector<std::string> topics;  ///< empty: all recorded topics except health and conversations
-  std::string for_service;          ///< instead of topics: the inputs of that service
+  std::string for_service;          ///< service whose inputs replace `topics`
   double rate = 1.0;                ///< seconds of the recording in one second
   double start_s = 0.0, seconds = 0.0;  ///< start and duration; 0: to the end
   double wait_s = 2.0;                  ///< longest wait for a reader of each topic

@@ -42,7 +42,7 @@ class SegmentFolder {
   std::filesystem::path folder_;
   std::uint64_t quota_, keep_free_, removed_ = 0, next_number_ = 1;
   int lock_ = -1;
-  std::map<std::filesystem::path, std::uint64_t> sizes_;  // sorted by name, and therefore by time
+  std::map<std::filesystem::path, std::uint64_t> sizes_;  // order by name is order by time
   std::vector<std::string> repaired_;
 };
 

@@ -61,7 +61,7 @@ class SegmentWriter {
   const std::string word_;
   std::optional<replay::mcap::Writer> file_;
   std::int64_t began_ns_ = 0;
-  std::vector<std::filesystem::path> left_over_;  // unfinished, because the disk was full
+  std::vector<std::filesystem::path> left_over_;  // files that a full disk left unfinished
   std::string problem_;
   bool disk_full_ = false;
   std::uint64_t bytes_ = 0, files_ = 0;

@@ -23,7 +23,7 @@ struct StoreOptions {
 
 /// Counts of the messages since the start.
 struct StoreReport {
-  std::uint64_t chunks = 0;    ///< received
+  std::uint64_t chunks = 0;    ///< number of received chunks
   std::uint64_t messages = 0;  ///< number in files, or stored for a fault
   std::uint64_t lost = 0;      ///< number lost while the disk was full or failed
   std::uint64_t bytes = 0, files = 0, removed = 0, folder_bytes = 0, dumps = 0;
@@ -67,7 +67,7 @@ class Store {
   std::optional<BlackBox> black_box_;
   std::optional<std::int64_t> dump_until_ns_;
   std::atomic<bool> fault_ = false;
-  StoreReport now_;  // used by the thread only
+  StoreReport now_;  // only for the recorder's thread
   mutable std::mutex mutex_;
   StoreReport report_;
   BoundedQueue<Job> queue_;

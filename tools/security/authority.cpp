@@ -104,7 +104,7 @@ Authority Authority::create(const fs::path& folder, const std::string& vehicle, 
   writePrivate(own / kRevoked, toPem(made.revoked_.get()), kForOwner);
   writePrivate(own / kGovernance, signedDocument(made.signer(), governanceXml()), kForOwner);
   made.save();
-  writePrivate(own / kKey, toPem(made.key_.get()), kForOwner);  // last, as a sign of completeness
+  writePrivate(own / kKey, toPem(made.key_.get()), kForOwner);  // last, because it marks completion
   return made;
 }
 

@@ -151,7 +151,7 @@ class Run {
     sensor.errors = scene_.rig.cameras.at(camera);
     sensor.encoding = options_.world.mono8 ? ImageEncoding::kMono8 : ImageEncoding::kBgr8;
     sensor.noise = options_.world.noise;
-    sensor.adapt = scene_.name != "random";  // independent views
+    sensor.adapt = scene_.name != "random";  // views of random are independent
     sensor.interval_s = static_cast<double>(options_.every) /
                         scene_.rig.true_calibration.cameras.at(camera).rate_hz;
     sensor.seed = mixBits(scene_.seed, 0xca3 + camera);

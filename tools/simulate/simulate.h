@@ -24,8 +24,8 @@ struct SimulateOptions {
 };
 
 struct SimulateProgress {
-  std::size_t frame = 0, frames = 0;  ///< completed, total
-  std::size_t resumed = 0;            ///< completed by an earlier run
+  std::size_t frame = 0, frames = 0;  ///< completed frames and their total
+  std::size_t resumed = 0;            ///< frames from an earlier run
 };
 
 /// Returns false if the folder was already complete. Throws StartupError for invalid options, an

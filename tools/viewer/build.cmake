@@ -15,7 +15,7 @@ if(changed)
   file(COPY_FILE ${SOURCE}/package-lock.json ${fetched})
 endif()
 file(REMOVE_RECURSE ${PAGE})
-if(MESHES)  # not run for another architecture; the page then shows boxes
+if(MESHES)  # unset for another architecture; the page then shows boxes
   execute_process(COMMAND ${MESHES} ${PAGE}/meshes COMMAND_ERROR_IS_FATAL ANY)
 endif()
 execute_process(COMMAND ${NODE} ${SOURCE}/build.mjs ${PAGE} ${WORK}/node_modules

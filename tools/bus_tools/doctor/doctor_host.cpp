@@ -31,7 +31,7 @@ class Socket {
 };
 
 Finding checkReceiveBuffer() {
-  constexpr long kEnough = 4 << 20;  // three colour images of a recording
+  constexpr long kEnough = 4 << 20;  // size of three colour images
   std::ifstream file("/proc/sys/net/core/rmem_max");
   long bytes = 0;
   if (!(file >> bytes)) return {Verdict::kWarn, "net.core.rmem_max cannot be read"};

@@ -49,7 +49,7 @@ struct TopicSeen {
   double rate_hz = 0.0;
   std::optional<double> age_s;            ///< empty if no message arrived
   std::optional<double> latency_ms;       ///< median from capture to arrival, on one host only
-  std::set<std::string> written_by = {};  ///< names of the writing processes that have one
+  std::set<std::string> written_by = {};  ///< processes with a known name
 };
 
 struct DiskSeen {

@@ -11,7 +11,7 @@
 namespace perdure::calibrate {
 namespace {
 
-constexpr double kLongestPair = 0.25;  ///< s, between two views whose rotation is compared
+constexpr double kLongestPair = 0.25;  ///< s, longest time between two compared views
 constexpr double kTimeStep = 0.0025;   ///< s, step of the search for the time offset
 constexpr double kLeastSpread = 0.02;  ///< rad/s, least rotation about a second axis
 

@@ -53,7 +53,7 @@ struct CameraImu {
   /// Factor by which the covariance is larger than with independent residuals. Residuals that are
   /// close in time are correlated, because a corner errs together with its neighbours.
   double widened = 1.0;
-  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = gyro_bias;  ///< means
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = gyro_bias;  ///< mean biases
   Eigen::Vector3d gyro_bias_sigma = gyro_bias, accel_bias_sigma = gyro_bias;
   Eigen::Vector3d gravity_T = gyro_bias;  ///< m/s², in the board's frame
   double from_s = 0.0, to_s = 0.0;        ///< limits of the stretch, since the first view

@@ -55,7 +55,7 @@ class CameraImuProblem {
   struct Certainty {
     Matrix15d calibration = Matrix15d::Zero();
     double widened = 1.0;                   ///< see CameraImu::widened
-    Eigen::Vector3d gyro_bias, accel_bias;  ///< standard deviations in the middle of the time
+    Eigen::Vector3d gyro_bias, accel_bias;  ///< standard deviations at mid-time
   };
   /// Fails with calibrate_not_observable.
   Result<Certainty> certainty();

@@ -25,7 +25,7 @@ double brightness(const cv::Mat& grey, const cv::Point2f& at) {
 /// Whether the corners start at the wrong end of the board: OpenCV may start at either end, but the
 /// square after the first corner must be black.
 bool isUpsideDown(const Board& board, const cv::Mat& grey, const std::vector<cv::Point2f>& found) {
-  double difference = 0.0;  // between squares expected black and expected white
+  double difference = 0.0;  // expected black minus expected white squares
   for (int row = 0; row + 1 < board.rows; ++row) {
     for (int column = 0; column + 1 < board.columns; ++column) {
       const auto at = static_cast<std::size_t>(row * board.columns + column);

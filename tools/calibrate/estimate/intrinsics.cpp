@@ -15,7 +15,7 @@ namespace perdure::calibrate {
 namespace {
 
 constexpr std::size_t kLeastCorners = 8, kLeastViews = 5;
-constexpr double kOutlierSigma = 5.0, kLeastOutlier = 0.5;  // px
+constexpr double kOutlierSigma = 5.0, kLeastOutlier = 0.5;  // limits; the second in px
 
 struct CornerCost {
   DistortionModel model;

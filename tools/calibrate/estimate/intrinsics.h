@@ -1,6 +1,6 @@
-// Estimates focal lengths, principal point and distortion from views of a board. It is a
-// least-squares problem over the poses of the views and the lens (Zhang, "A Flexible New Technique
-// for Camera Calibration", PAMI 2000), with any lens model of common/camera.
+// Estimates focal lengths, principal point and distortion from views of a board. The least-squares
+// problem covers the poses of the views and the lens (Zhang, "A Flexible New Technique for Camera
+// Calibration", PAMI 2000). It supports each lens model of common/camera.
 #pragma once
 
 #include <Eigen/Core>

@@ -226,7 +226,7 @@ DataFindings judgePoseTurning(const Poses& poses, const std::vector<Eigen::Vecto
   for (const StampedPose& pose : poses) {
     if (angleBetween(poses.front(), pose) > kSame_rad) return {};
   }
-  const TurnPairs turns(gyro_turns, gyro_turns);  // the mean may be a bias
+  const TurnPairs turns(gyro_turns, gyro_turns);  // ignores the mean, which may be a bias
   if (turns.turning() < kTurns_rad) return {};
   const double most = turns.reference.colwise().norm().maxCoeff();
   return {{Grade::kFatal, "poses_without_turning",

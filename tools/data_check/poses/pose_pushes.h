@@ -35,7 +35,7 @@ struct Scale {
   std::size_t steps;
 
   bool fits(double unit) const {
-    constexpr double kSystematic = 1.05;  // scale of the accelerometer, clocks, smoothed poses
+    constexpr double kSystematic = 1.05;  // errors of scale, clocks and smoothing
     return least < kSystematic * unit && most > unit / kSystematic;
   }
 };

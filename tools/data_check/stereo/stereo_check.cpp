@@ -46,7 +46,7 @@ std::optional<Vector3d> planeOf(const StereoMatch& match, const RigidTransform& 
 struct Fit {
   std::size_t count = 0;               ///< number of matches away from the baseline
   double off_px = 0.0;                 ///< median distance from the epipolar line
-  std::size_t before = 0, behind = 0;  ///< the cameras, of matches with parallax
+  std::size_t before = 0, behind = 0;  ///< numbers of matches with parallax
   bool isBehind() const { return behind > kFewestMatches && behind > 2 * before; }
   bool isBefore() const { return before > 2 * behind; }
 };
@@ -76,7 +76,7 @@ struct Turned {
 /// The small rotation of cam1 that minimises the distances from the epipolar lines. Gauss-Newton
 /// with Cauchy weights; the baseline stays constant.
 Turned turnOf(const std::vector<StereoMatch>& matches, const RigidTransform& T_C1C0) {
-  constexpr double kFinest = 2e-4;  // rad; corners are not more accurate
+  constexpr double kFinest = 2e-4;  // rad; accuracy of corners
   Turned turned;
   for (int round = 0; round < 20; ++round) {
     RigidTransform T = T_C1C0;
@@ -253,7 +253,8 @@ class StereoJudge {
 DataFindings checkStereo(const Recording& recording) {
   const auto& cameras = recording.calibration.cameras;
   if (cameras.size() < 2) return {};
-  if (hasPlaceInMm(cameras[0]) || hasPlaceInMm(cameras[1])) return {};  // has its own finding
+  if (hasPlaceInMm(cameras[0]) || hasPlaceInMm(cameras[1])) return {};  // the distance has its own
+                                                                        // finding
   const auto pairs = someStereoImages(recording);
   if (pairs.empty()) return {};
   if (areSameImages(pairs)) {

@@ -1,6 +1,6 @@
 // Checks whether the images of two cameras match their calibration. A point of one camera must be
-// on its epipolar line in the other, and in front of both (Hartley & Zisserman, Multiple View
-// Geometry, 2nd ed., chapter 9).
+// on its epipolar line in the other, and in front of both. Source: Hartley & Zisserman, Multiple
+// View Geometry, 2nd ed., chapter 9.
 #pragma once
 
 #include "common/replay/data_check.h"

@@ -1,6 +1,6 @@
-// Checks whether the loops of a map are correct: the error of each against the exact relation of
-// its anchors, their effect on the trajectory, and the distance travelled among known objects
-// before the first one closed.
+// Checks whether the loops of a map are correct. Measures the error of each loop against the exact
+// relation of its anchors, and the effect of the loops on the trajectory. Also measures the
+// distance travelled among known objects before the first loop closed.
 #pragma once
 
 #include <cstdint>
@@ -34,7 +34,7 @@ struct JudgedLoop {
   TimePoint from, to;    ///< stamps of its anchors, the earlier one first
   double off_m = 0.0;    ///< error in the plane
   double off_rad = 0.0;  ///< error in yaw, ≥ 0
-  double sigma_m = 0.0;  ///< stated by the edge, along its error
+  double sigma_m = 0.0;  ///< standard deviation that the edge states, along its error
   double weight = 1.0;   ///< weight in the graph
   bool believed = false, wrong = false;
 };

@@ -24,7 +24,7 @@ struct EvolutionPoint {
 
 struct Evolution {
   ObjectId id = 0;
-  std::string class_name;  ///< the last one
+  std::string class_name;  ///< the class at the end
   std::vector<EvolutionPoint> points;
 };
 

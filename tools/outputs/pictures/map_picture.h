@@ -17,7 +17,7 @@ namespace perdure::tools {
 
 /// All content is in one frame, M or W.
 struct MapContent {
-  bool in_M = false;                  ///< false: in W
+  bool in_M = false;                  ///< false: the content is in W
   std::vector<Eigen::Vector3d> path;  ///< trajectory of the body
   std::vector<ObjectGlance> objects;  ///< estimates at the end
   std::vector<Eigen::Vector3f> landmarks;
@@ -35,7 +35,7 @@ struct MapView {
   double text = 1.0;   ///< size of letters and lines, in proportion to the picture
   cv::Rect area;       ///< area of the map in the picture
   double bar_m = 1.0;  ///< length of the scale bar
-  cv::Point bar;       ///< its left end
+  cv::Point bar;       ///< left end of the scale bar
 
   cv::Point2d at(const Eigen::Vector2d& p) const {
     return {area.x + scale * (p.x() - low.x()), area.y + scale * (high.y() - p.y())};

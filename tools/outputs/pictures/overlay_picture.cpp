@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kHeader = 30;
 constexpr double kDimmed = 0.88;            // dims the image, so that lines are visible
-constexpr double kLeastProbability = 0.15;  // boxes with less are not drawn
+constexpr double kLeastProbability = 0.15;  // less probable boxes are not drawn
 constexpr int kSamples = 16;                // samples of an edge, which lenses may bend
 const Colour kWhite(255, 255, 255), kGrey(165, 165, 165), kNight(38, 34, 30);
 
@@ -213,13 +213,14 @@ void OverlayPicture::drawObjects(cv::Mat& image, const FrameGlance& frame) const
   const RigidTransform T_CW = (frame.T_WB * camera_.T_BC()).inverse();
   const auto objects = fartherFirst(frame);
   std::vector<cv::Rect> boxes(objects.size()), taken;
-  for (const bool hidden : {false, true}) {  // occluded objects last, so that they are visible
+  for (const bool hidden : {false, true}) {  // draws occluded objects last, so that they are
+                                             // visible
     for (std::size_t i = 0; i < objects.size(); ++i) {
       if (objects[i].hidden() != hidden) continue;
       boxes[i] = drawBox(image, objects[i], T_CW, camera_, scale_);
     }
   }
-  for (std::size_t i = objects.size(); i-- > 0;) {  // nearest objects place their labels first
+  for (std::size_t i = objects.size(); i-- > 0;) {  // places labels of near objects first
     if (!boxes[i].empty()) drawLabel(image, objects[i], boxes[i], taken);
   }
 }

@@ -20,7 +20,8 @@ bool MessageClass::isOne(py::handle object) const {
 }
 
 MessageClass& messageClass(const std::string& name) {
-  static auto& classes = *new std::map<std::string, MessageClass>;  // outlives the interpreter
+  static auto& classes = *new std::map<std::string, MessageClass>;  // the map outlives the
+                                                                    // interpreter
   MessageClass& it = classes[name];
   it.name = name;
   return it;

@@ -12,7 +12,7 @@ from . import messages
 from .bus import Publisher, Subscription
 from .errors import Missing, Unavailable, Unusable
 
-_MOST = 100_000  # most objects in a reply
+_MOST = 100_000  # limit of objects in a reply
 
 
 def _files():

@@ -40,7 +40,7 @@ class Lens {
   float pixel_angle_;
   double max_radius_;  ///< largest radius in the normalised image for project()
   std::vector<Eigen::Vector3f>
-      rays_;  ///< (x, y, 1), or z = 0 if invalid; with a border of one pixel
+      rays_;  ///< (x, y, 1), or z = 0 if invalid; has a border of one pixel
 };
 
 }  // namespace perdure::tools

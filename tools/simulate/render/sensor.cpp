@@ -8,7 +8,7 @@
 namespace perdure::tools {
 namespace {
 
-constexpr double kMiddleGrey = 0.16;    ///< desired mean of the linear image, of full scale
+constexpr double kMiddleGrey = 0.16;    ///< desired mean of the image, of full scale
 constexpr double kAdaptation_s = 0.4;   ///< time constant of the exposure
 constexpr double kGainReturn_s = 10.0;  ///< time constant of the gain's return
 constexpr int kGammaSteps = 4096;

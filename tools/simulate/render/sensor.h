@@ -23,10 +23,10 @@ struct SensorState {
 struct SensorOptions {
   sim::CameraErrors errors;
   ImageEncoding encoding = ImageEncoding::kBgr8;
-  bool noise = true;  ///< shot and read noise, and the random-walk gain
+  bool noise = true;  ///< includes shot noise, read noise and random-walk gain
   bool adapt = true;  ///< false: exposes each image separately, for independent views
   double interval_s = 0.05;
-  std::uint64_t seed = 0;  ///< different for each camera
+  std::uint64_t seed = 0;  ///< seed, different for each camera
 };
 
 class Sensor {

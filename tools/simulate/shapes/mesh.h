@@ -14,11 +14,11 @@
 namespace perdure::tools {
 
 struct Material {
-  Eigen::Vector3f colour{0.5F, 0.5F, 0.5F};  ///< linear RGB reflectance, times the texture's
+  Eigen::Vector3f colour{0.5F, 0.5F, 0.5F};  ///< linear RGB reflectance; the texture multiplies it
   std::shared_ptr<const Texture> texture;    ///< may be null
   float gloss = 0.0F;  ///< 0 matt … 1 mirror-like: share of the sky's reflection at grazing angles
   float emission = 0.0F;   ///< emitted light (screens, lamps)
-  bool two_sided = false;  ///< leaves, sheets
+  bool two_sided = false;  ///< true for leaves and sheets
 };
 
 struct Mesh {

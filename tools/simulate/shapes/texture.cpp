@@ -17,7 +17,7 @@ namespace {
 using Eigen::Vector3f;
 
 constexpr float kWidest = 1e6F;  // texels; wider footprints also give the mean
-constexpr float kBlend = 1e-3F;  // closer to one level than this: the other one is not read
+constexpr float kBlend = 1e-3F;  // distance to a level at which only that level is read
 
 const std::array<float, 256>& decoding() {
   static const std::array<float, 256> table = [] {

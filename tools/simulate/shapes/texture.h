@@ -46,7 +46,7 @@ class Texture {
   Eigen::Vector3f sample(const Eigen::Vector2f& uv, float footprint) const;
 
  private:
-  using Texel = std::array<std::uint8_t, 4>;  ///< square root of RGB, for resolution in dark tones
+  using Texel = std::array<std::uint8_t, 4>;  ///< square root of RGB, for dark tones
   struct Level {
     int size = 0;
     std::vector<Texel> texels;

@@ -32,7 +32,7 @@ def inside(centres, boxes, margin):
 def assign(probabilities, boxes, centres, strides, truth):
     """Quality (N, A) in [0, 1] and object index (N, A); quality 0 is background."""
     wanted = truth["mask"] & ~truth["ignored"]
-    overlap = iou(truth["boxes"][:, :, None], boxes[:, None])  # N, G, A
+    overlap = iou(truth["boxes"][:, :, None], boxes[:, None])  # shape (N, G, A)
     classes = (truth["classes"] + 1)[:, :, None].expand(-1, -1, boxes.shape[1])
     score = probabilities.transpose(1, 2).gather(1, classes)
     candidate = inside(centres, truth["boxes"], REACH * strides) & wanted[:, :, None]

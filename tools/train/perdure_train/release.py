@@ -81,7 +81,7 @@ def robust_sigma(values, floor, ceiling):
 
 
 def azimuth_sigma_of(frames):
-    """Standard deviation of the azimuth, without errors of front and back."""
+    """Standard deviation of the azimuth; excludes errors of 180°."""
     errors = np.concatenate(
         [scores.azimuth_errors(frames, CLASSES.index(name))[0] for name in AZIMUTH_CLASSES]
     )

@@ -8,7 +8,8 @@ import numpy as np
 
 from .settings import CLASSES
 
-SIZES = {"small": (10, 24), "medium": (24, 64), "large": (64, 1e9)}  # square root of the area, px
+SIZES = {"small": (10, 24), "medium": (24, 64), "large": (64, 1e9)}  # range of the square root of
+                                                                     # the area, px
 
 
 def overlaps(a, b):
@@ -61,8 +62,8 @@ def sizes_of(boxes):
 
 
 def match(boxes, scores, truth, wanted, minimum=0.5):
-    """Matches greedily by decreasing score. Returns the index of the true object for each box, -1
-    for a false alarm, -2 if the box covers an object that does not count."""
+    """Matches greedily by decreasing score. Returns the index of the true object for each box. The
+    index is -1 for a false alarm, and -2 if the box covers an object that does not count."""
     result = np.full(len(boxes), -1)
     if len(boxes) == 0 or len(truth) == 0:
         return result
@@ -185,7 +186,7 @@ def calibration_error(p, labels, bins=15):
 
 CLEAR = 0.8  # least probability of the best class; half-hidden objects have other errors
 LARGE = 40.0  # pixels of the input; below it, pixel quantisation dominates
-FULL = 12.0  # pixels; a median over many is robust to them
+FULL = 12.0  # pixels; the median suppresses their quantisation
 
 
 def matches(frames, at_least=0.0):

@@ -44,7 +44,7 @@ def settle_statistics(network, pictures, batches=100, batch=32, seed=1):
     momenta = [m.momentum for m in norms]
     for m in norms:
         m.reset_running_stats()
-        m.momentum = None  # mean of all batches
+        m.momentum = None  # means the average of all batches
     network.train()
     rng = np.random.default_rng(seed)
     for _ in range(batches):
@@ -86,7 +86,7 @@ class Trainer:
         self.checkpoint.parent.mkdir(parents=True, exist_ok=True)
         part = self.checkpoint.with_suffix(".part")
         torch.save(state, part)
-        part.replace(self.checkpoint)  # atomic
+        part.replace(self.checkpoint)  # replaces the file atomically
 
     def rate(self):
         """Learning rate: warm-up, then a cosine over the completed share of the training."""

@@ -1,7 +1,7 @@
 // The camera image with annotations of the same frame, matched by their time.
 import { readImage, seconds } from './connection.js';
 
-const KEPT = 12; // images without annotations yet
+const KEPT = 12; // limit of images without annotations
 const PATIENCE_MS = 250;
 
 const css = (c) => `rgba(${Math.round(255 * c.r)},${Math.round(255 * c.g)},${Math.round(255 * c.b)},${c.a})`;

@@ -59,7 +59,7 @@ export class Graph {
     if (line.material.isLineDashedMaterial) line.computeLineDistances();
   }
 
-  /** Takes a message of /map/graph. */
+  /** Processes a message of /map/graph. */
   set(message) {
     this.anchors = new Map(message.anchors.map((a) => [a.id, { ...a, place: new THREE.Vector3().fromArray(a.at) }]));
     this.loops = new Map();

@@ -165,7 +165,7 @@ const toggles = {
   g: () => {
     const on = world?.toggle('graph');
     if (on) connection.on('/map/graph', takeGraph);
-    else connection.off('/map/graph'); // hidden: unsubscribe
+    else connection.off('/map/graph'); // a hidden view needs no data
     showLegendOfGraph();
     return on;
   },
@@ -174,7 +174,7 @@ const toggles = {
     $('camera').hidden = !showsCamera;
     if (showsCamera) lookThroughCamera();
     else if (cameraTopic) {
-      connection.off(cameraTopic); // hidden: unsubscribe
+      connection.off(cameraTopic); // a hidden view needs no data
       connection.off(overlayTopic());
       cameraTopic = '';
     }
@@ -235,7 +235,7 @@ document.addEventListener('keydown', (e) => {
 function figures(now) {
   const frame = model.frame, items = [];
   const stands = connection.range && connection.playback?.status !== 'playing';
-  const since = connection.range?.first ?? model.firstTime; // the bar of a recording shows the same
+  const since = connection.range?.first ?? model.firstTime; // equals the bar of a recording
   if (frame) items.push(['time', `${Math.max(0, model.time - since).toFixed(1)} s`, ''], ['objects', [...model.objects.values()].filter((o) => o.confirmed).length, '']);
   const map = model.mapFrame;
   if (frame && map) items.push(['sessions', map.sessions, 'minor'], ['loops', map.loops, 'minor'], ['σ in map', wordsOfPlace(map.body_sigma), 'minor']);

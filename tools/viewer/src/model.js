@@ -23,14 +23,14 @@ export class Model {
     const time = frame.timestamp.sec + 1e-9 * frame.timestamp.nsec;
     const world = `${frame.world}/${frame.epoch}`;
     if (this.world !== undefined && this.world !== world) this.history.clear();
-    const another = this.frame && time < this.time - 2; // a recording starts again
+    const another = this.frame && time < this.time - 2; // whether a recording starts again
     if (another) this.history.clear();
     if (another || this.firstTime === null) this.firstTime = time;
     this.world = world;
     this.time = time;
     this.frame = frame;
     this.objects = new Map(objects.map((o) => [o.id, o]));
-    if (this.heardAt > 0) this.live = true; // the first one may be old
+    if (this.heardAt > 0) this.live = true; // ignores the first one, which may be old
     this.heardAt = now;
     this.arrivals.push(now);
     while (this.arrivals[0] < now - RATE_MS) this.arrivals.shift();

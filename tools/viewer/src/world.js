@@ -12,7 +12,7 @@ export class World {
   constructor(canvas, labels, onPick, onPart) {
     this.canvas = canvas;
     this.labels = labels;
-    this.toolbar = document.getElementById('tools'); // names must not overlap it
+    this.toolbar = document.getElementById('tools'); // obstacle for the names
     this.onPick = onPick;
     this.onPart = onPart;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: 'low-power' });

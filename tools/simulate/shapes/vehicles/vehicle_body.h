@@ -26,7 +26,7 @@ struct BodyProfile {
   float wheel_radius = 0.22F, sill = 0.15F;  ///< shares of the height
   float roof_width = 0.76F;                  ///< share of the width
   float nose_taper = 0.18F, tail_taper = 0.1F;
-  bool rear_doors_with_glass = false;  ///< vertical rear end of vans
+  bool rear_doors_with_glass = false;  ///< vans with a vertical rear end
   bool split_grille = true;
 };
 

@@ -6,7 +6,7 @@
 namespace perdure::tools::shapes {
 
 struct WheelLook {
-  int rubber = 0, rim = 0, dark = 0;  ///< materials
+  int rubber = 0, rim = 0, dark = 0;  ///< indices of materials
   int spokes = 5;                     ///< 0: a closed disc
   float rim_share = 0.66F;            ///< share of the radius
 };
