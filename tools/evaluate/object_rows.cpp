@@ -31,8 +31,7 @@ std::optional<EstimateRow> readRow(const std::string& text) {
   return row;
 }
 
-using Ties = std::vector<std::pair<std::size_t, std::uint64_t>>;  // pairs of trajectory row and
-                                                                  // frame
+using Ties = std::vector<std::pair<std::size_t, std::uint64_t>>;  // trajectory row and frame
 
 Ties tieLines(const std::vector<replay::StampedPose>& poses, const std::vector<EstimateRow>& rows) {
   std::map<TimePoint, std::uint64_t> frame_at;

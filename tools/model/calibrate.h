@@ -28,12 +28,10 @@ struct CalibrationResult {
   std::size_t frames = 0, boxes = 0, targets = 0, targets_found = 0;
   double false_boxes = 0.0;                          ///< mean per frame, above the low threshold
   std::size_t asked_there = 0, asked_elsewhere = 0;  ///< places in the top-down fit
-  double primed_nats_there = 0.0, primed_nats_elsewhere = 0.0;  ///< mean nats; the second value is
-                                                                ///< < 0
+  double primed_nats_there = 0.0, primed_nats_elsewhere = 0.0;  ///< mean nats; second < 0
   bool has_primed = false;
   double box_sigma = 0.0;                                    ///< 0: too few clear boxes
-  std::map<std::string, std::array<double, 4>> side_insets;  ///< insets of classes with enough
-                                                             ///< boxes
+  std::map<std::string, std::array<double, 4>> side_insets;  ///< insets of frequent classes
 };
 
 /// Runs the service's own node. Throws StartupError if the network, the data or the labels cannot

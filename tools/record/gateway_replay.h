@@ -93,8 +93,7 @@ class GatewayReplay {
   std::mutex mutex_;
   std::condition_variable something_;
   Mail mail_;
-  std::unique_ptr<gateway::web::Server> server_;  // last member, because its thread uses those
-                                                  // above
+  std::unique_ptr<gateway::web::Server> server_;  // its thread uses the members above
 };
 
 }  // namespace perdure::tools

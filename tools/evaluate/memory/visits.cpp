@@ -113,7 +113,7 @@ void scoreSightings(const std::vector<MemoryFrame>& frames, MemoryScore& score) 
 
 void scoreIds(const std::vector<Visit>& visits, MemoryScore& score) {
   std::set<std::uint64_t> ids;
-  std::vector<std::uint64_t> reported;  // reports on each visit
+  std::vector<std::uint64_t> reported;  // main id of each visit
   for (const auto& visit : visits) {
     for (const auto& [id, times] : visit.ids) ids.insert(id);
     if (const auto id = visit.id()) reported.push_back(*id);

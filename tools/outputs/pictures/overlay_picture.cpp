@@ -213,8 +213,7 @@ void OverlayPicture::drawObjects(cv::Mat& image, const FrameGlance& frame) const
   const RigidTransform T_CW = (frame.T_WB * camera_.T_BC()).inverse();
   const auto objects = fartherFirst(frame);
   std::vector<cv::Rect> boxes(objects.size()), taken;
-  for (const bool hidden : {false, true}) {  // draws occluded objects last, so that they are
-                                             // visible
+  for (const bool hidden : {false, true}) {  // draws occluded objects last
     for (std::size_t i = 0; i < objects.size(); ++i) {
       if (objects[i].hidden() != hidden) continue;
       boxes[i] = drawBox(image, objects[i], T_CW, camera_, scale_);

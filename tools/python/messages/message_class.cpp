@@ -20,8 +20,7 @@ bool MessageClass::isOne(py::handle object) const {
 }
 
 MessageClass& messageClass(const std::string& name) {
-  static auto& classes = *new std::map<std::string, MessageClass>;  // the map outlives the
-                                                                    // interpreter
+  static auto& classes = *new std::map<std::string, MessageClass>;  // outlives the interpreter
   MessageClass& it = classes[name];
   it.name = name;
   return it;

@@ -79,7 +79,7 @@ void World::makeSurfaces(int threads) {
   Workers workers(threads);
   instances_[0].surface = sceneryOf(scene_, workers);
   std::map<Look, std::size_t> known;
-  std::vector<std::size_t> first;  // index of the first surface of each look
+  std::vector<std::size_t> first;  // first object with each look
   for (std::size_t i = 0; i < scene_.objects.size(); ++i) {
     if (known.try_emplace(lookOf(scene_.objects[i]), i).second) first.push_back(i);
   }

@@ -38,8 +38,7 @@ def _detect(program, data, model, threshold, clutter_rate, work):
 def _folder_of(program, cache, kind, seed, threads):
     """The simulated folder in the cache, for `perdure detect`."""
     folder = Path(cache) / f"{kind}-folders" / str(seed)
-    prepare.simulate(program, kind, seed, folder, threads)  # returns at once if the folder is
-                                                            # complete
+    prepare.simulate(program, kind, seed, folder, threads)  # returns at once if complete
     return folder
 
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from .settings import CLASSES
 
-SIZES = {"small": (10, 24), "medium": (24, 64), "large": (64, 1e9)}  # range of the square root of
-                                                                     # the area, px
+SIZES = {"small": (10, 24), "medium": (24, 64), "large": (64, 1e9)}  # √area in px
 
 
 def overlaps(a, b):
