@@ -52,8 +52,8 @@ DemoFolders prepareFolders(const DemoOptions& options);
 /// StartupError if that configuration or its class priors cannot be used.
 std::map<std::string, std::vector<Eigen::Vector3d>> shapesFor(const DemoOptions& options);
 
-/// Plans in the order of kServices. Throws StartupError if a program is missing or --rate is
-/// invalid.
+/// Plans the services in the order of kServices. Throws StartupError if a program is missing or
+/// --rate is invalid.
 std::vector<ServicePlan> planServices(const DemoOptions& options, const DemoFolders& folders);
 
 /// perdure-gateway on this port of the loopback interface; empty if it is not installed.

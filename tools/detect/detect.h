@@ -24,8 +24,9 @@ struct DetectSummary {
   double cpu_ms_median = 0.0;  ///< time for each frame, all threads: image to detections
 };
 
-/// Columns: frame,class,x1,y1,x2,y2,score,azimuth,sigma_azimuth,logit:<class>…. Class and score are
-/// the largest soft-max value of the K+1 activations, without clutter.
+/// Columns: frame,class,x1,y1,x2,y2,score,azimuth,sigma_azimuth,logit:<class>…. The class is the
+/// one with the largest soft-max value of the K+1 activations, without clutter. The score is that
+/// value.
 void writeDetectionHeader(std::ostream& out, const ModelInfo& model);
 void writeDetection(std::ostream& out, const ModelInfo& model, std::uint64_t frame,
                     const Detection& detection);

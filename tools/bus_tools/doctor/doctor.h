@@ -62,7 +62,7 @@ std::int64_t configuredSharedMemory(const std::string& folder);
 
 struct ReportOptions {
   bus::Options bus;
-  double seconds = 5.0;  ///< how long Health is recorded
+  double seconds = 5.0;  ///< duration of the Health record
   std::string file;      ///< NAME.tar.gz
   std::string configuration;
   bool images = false;  ///< include one image of each camera

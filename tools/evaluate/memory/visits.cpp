@@ -266,7 +266,7 @@ ReturnScore scoreReturn(const std::vector<MemoryFrame>& before, const std::vecto
     score.first = {toSeconds(now[first].time - now.front().time), now[first].way_m,
                    objectsIn(now, first + 1).size()};
   }
-  std::map<std::uint64_t, Counts> ids;  // key: object; after the first known one is reported
+  std::map<std::uint64_t, Counts> ids;  // key: object; counts after the first known id
   for (std::size_t i = first; i < now.size(); ++i) {
     for (const auto& sighting : now[i].sightings) {
       auto& counts = ids[sighting.object];

@@ -23,9 +23,10 @@ class VideoFile {
   VideoFile& operator=(VideoFile&&) noexcept;
   ~VideoFile();  ///< finishes the film
 
-  /// CV_8UC3 (blue, green, red) of the film's size. Reason video_not_written: the disk is full.
+  /// Appends a picture: CV_8UC3 (blue, green, red) of the film's size. Fails with video_not_written
+  /// if the disk is full.
   Result<void> write(const cv::Mat& picture);
-  /// Finishes the film; same reason.
+  /// Finishes the film. Fails with video_not_written if the disk is full.
   Result<void> finish();
   std::size_t frames() const;
   const std::string& codec() const;  ///< "H.264" or "MPEG-4"

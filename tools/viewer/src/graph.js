@@ -34,7 +34,7 @@ export class Graph {
     this.way = this.line(WAY, 0.7, false);
     this.lines = Object.fromEntries(Object.entries(LOOPS).map(([look, { colour, dashed }]) => [look, this.line(colour, 0.95, dashed)]));
     this.chosenLine = this.line('#ffffff', 1, false);
-    this.chosenLine.renderOrder = 6; // drawn over the line of its loop
+    this.chosenLine.renderOrder = 6; // drawn after the line of its loop
     this.chosenLine.material.depthTest = false;
     this.ball = new THREE.SphereGeometry(0.3, 12, 8);
     this.ballMaterial = new THREE.MeshBasicMaterial({ fog: false });

@@ -235,7 +235,7 @@ document.addEventListener('keydown', (e) => {
 function figures(now) {
   const frame = model.frame, items = [];
   const stands = connection.range && connection.playback?.status !== 'playing';
-  const since = connection.range?.first ?? model.firstTime; // equals the bar of a recording
+  const since = connection.range?.first ?? model.firstTime; // start of the recording's bar
   if (frame) items.push(['time', `${Math.max(0, model.time - since).toFixed(1)} s`, ''], ['objects', [...model.objects.values()].filter((o) => o.confirmed).length, '']);
   const map = model.mapFrame;
   if (frame && map) items.push(['sessions', map.sessions, 'minor'], ['loops', map.loops, 'minor'], ['σ in map', wordsOfPlace(map.body_sigma), 'minor']);
