@@ -227,7 +227,7 @@ bool Demo::over() {
 void Demo::checkServices() {
   const auto states = supervisor_->states();
   if (!states) {
-    if (supervisor_->alive()) return;  // busy; the next check asks again
+    if (supervisor_->alive()) return;  // busy; retried at the next check
     throw StartupError(ExitCode::kFailure,
                        "supervisord has ended; see " + (folders_.run / "supervisord.log").string());
   }

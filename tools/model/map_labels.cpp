@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kSure = 0.9;     // least score of an object that counts as true
 constexpr double kInImage = 0.9;  // least share of a box within the image if it is not truncated
-constexpr double kHidden = 0.25;  // share of a box behind nearer ones
+constexpr double kHidden = 0.25;  // largest occluded share of a box
 constexpr double kBeside = 0.25;  // margin for errors of the map, as a share of a box
 constexpr double kSameTime_s = 1e-3;
 constexpr std::size_t kLeastViews = 20;

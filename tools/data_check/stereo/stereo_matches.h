@@ -36,7 +36,7 @@ struct StereoMatches {
   }
 };
 
-/// How the second image is mirrored before the comparison.
+/// Mirroring of the second image before the comparison.
 enum class Flip { kNone, kSideways, kUpright, kBoth };
 
 /// R rotates a ray of C0 into C1.
