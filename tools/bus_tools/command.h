@@ -1,5 +1,4 @@
-// `perdure topics`, `hz`, `echo`, `env`, `doctor`, `status`: what people expect of a DDS system's
-// command line.
+// Subcommands for the bus: `perdure topics`, `hz`, `echo`, `env`, `doctor`, `status`.
 #pragma once
 
 namespace CLI {
@@ -15,7 +14,7 @@ void addEnvCommand(CLI::App& app);
 void addDoctorCommand(CLI::App& app);
 void addStatusCommand(CLI::App& app);
 
-/// All of them.
+/// Adds all of them.
 void addBusCommands(CLI::App& app);
 
 }  // namespace perdure::tools

@@ -1,4 +1,4 @@
-// What the subcommands share: the bus's options, and waiting with an end by time or by signal.
+// Shared by the subcommands: bus options, and a loop that ends after a time or on a signal.
 #pragma once
 
 #include <functional>
@@ -13,17 +13,17 @@ class App;
 
 namespace perdure::tools {
 
-/// --interface, --domain, --vehicle, --security, --identity; what they do not say is said by
-/// bus.yaml, where the services' configuration is.
+/// Adds --interface, --peers, --domain, --vehicle, --security and --identity. The defaults come
+/// from bus.yaml in the services' configuration folder.
 void addBusOptions(CLI::App& command, bus::Options& options);
 
-/// Runs the loop until it is stopped, a signal comes, or the seconds (0 = for ever) are over.
+/// Runs the loop until it is stopped, a signal arrives, or `seconds` have passed (0: no limit).
 void runLoop(bus::WaitLoop& loop, double seconds);
 
-/// CLOCK_MONOTONIC.
+/// Time of CLOCK_MONOTONIC, in s.
 double steadySeconds();
 
-/// The five, as their Health and their participants call them.
+/// The five services, named as in Health and in discovery.
 inline constexpr const char* kUsualServices[] = {"capture", "vio", "inference", "semantic_filter",
                                                  "map_store"};
 

@@ -9,7 +9,7 @@
 namespace perdure::tools {
 namespace {
 
-/// For a POSIX shell.
+/// Quotes a text for a POSIX shell.
 std::string singleQuoted(const std::string& text) {
   std::string out = "'";
   for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);

@@ -7,15 +7,16 @@
 namespace perdure::tools {
 
 struct RateSummary {
-  std::size_t messages = 0;                               ///< in the window
-  double rate_hz = 0;                                     ///< 0 with fewer than two messages
-  double shortest_s = 0, longest_s = 0, deviation_s = 0;  ///< of the intervals
+  std::size_t messages = 0;                               ///< messages in the window
+  double rate_hz = 0;                                     ///< 0 if the window has fewer than two
+                                                          ///< messages
+  double shortest_s = 0, longest_s = 0, deviation_s = 0;  ///< statistics of the intervals
 };
 
 class RateMeter {
  public:
   explicit RateMeter(double window_s = 10.0) : window_s_(window_s) {}
-  /// Times do not go back.
+  /// Adds an arrival; `time_s` must not decrease.
   void arrived(double time_s);
   RateSummary summary(double now_s);
 

@@ -24,8 +24,8 @@ bus::Options servicesOptions() {
 
 bus::Options listenersOptions() {
   bus::Options options = servicesOptions();
-  options.shared_memory_mb = 0;  // what listens needs none
-  options.identity.clear();      // that of the services
+  options.shared_memory_mb = 0;  // readers do not need shared memory
+  options.identity.clear();      // the configured identity belongs to the services
   return options;
 }
 

@@ -1,4 +1,4 @@
-// Where the services' settings of this host are, and what they say of the bus.
+// Location and content of the services' bus settings on this host.
 #pragma once
 
 #include <string>
@@ -7,16 +7,17 @@
 
 namespace perdure::tools {
 
-/// The services' configuration files: of the installation (/etc/perdure) or of config/ here.
-/// Empty where there is none.
+/// The folder of the services' configuration files: /etc/perdure of an installation, or config/ in
+/// the working directory. Empty if neither exists.
 std::string configurationFolder();
 
-/// What bus.yaml there says, or the file that the variable PERDURE_BUS names. Throws StartupError.
+/// The options in bus.yaml of that folder, or in the file that PERDURE_BUS names. Throws
+/// StartupError.
 bus::Options servicesOptions();
-/// The same for what only listens: without shared memory and the services' identity.
+/// The same options for readers: without shared memory and without the services' identity.
 bus::Options listenersOptions();
 
-/// The names that exist, for the error message of an unknown one.
+/// The existing topic names, for the error message about an unknown topic.
 std::string knownTopics();
 
 }  // namespace perdure::tools

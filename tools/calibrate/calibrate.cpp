@@ -11,19 +11,20 @@ namespace {
 
 DistortionModel modelOf(const CalibrateOptions& options, const CameraCalibration& prior) {
   const bool tells = prior.fx > 0.0 && prior.distortion != DistortionModel::kNone;
-  // The rational lens is read, but not estimated: Brown's model stands for it.
+  // The rational lens can be read but not estimated; Brown's model replaces it.
   const bool radial = !tells || prior.distortion == DistortionModel::kRational;
   return options.lens.value_or(radial ? DistortionModel::kRadialTangential : prior.distortion);
 }
 
-/// A recording that says nothing of its IMU's noise has that of vio's configuration.
+/// The IMU noise of the recording, or that of vio's default configuration if the recording has
+/// none.
 ImuCalibration noiseOf(const CalibrationDrive& drive) {
   constexpr ImuCalibration kUsual{1.7e-4, 2e-5, 2e-3, 3e-3, 200.0};
   const bool tells = drive.imu && drive.imu->gyro_noise > 0.0 && drive.imu->accel_noise > 0.0;
   return tells ? *drive.imu : kUsual;
 }
 
-/// Throws where `result` has failed.
+/// Returns the value of `result`. Throws StartupError if `result` failed.
 template <class T>
 T must(Result<T> result, const std::string& camera) {
   if (!result) {

@@ -1,4 +1,5 @@
-// `perdure calibrate` as a function: from what was read to a rig, its report and its pictures.
+// `perdure calibrate` as a function: from the data of a recording to a rig, its report and its
+// pictures.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +13,7 @@ namespace perdure::calibrate {
 
 struct CalibrateOptions {
   Board board;
-  /// Not given: as the drive's own calibration says; radial-tangential where it says nothing.
+  /// Default: the model of the drive's own calibration, or radial-tangential if it has none.
   std::optional<DistortionModel> lens;
   bool intrinsics_only = false;
   CameraImuOptions place;
@@ -23,7 +24,7 @@ struct CalibratedCamera {
   Intrinsics lens;
   std::optional<CameraImu> place;
   Judgements judgements;
-  /// The lens as it was estimated last, and the place where there is one.
+  /// The lens of the last estimate, and the camera's pose on the IMU if it was estimated.
   CameraCalibration result() const;
 };
 
@@ -34,14 +35,14 @@ struct Calibrated {
   Judgements all() const;
 };
 
-/// Throws StartupError(kUnavailable) with the reason and its mend.
+/// Throws StartupError(kUnavailable) with the reason and the fix.
 Calibrated calibrate(const CalibrationDrive& drive, const CalibrateOptions& options);
 
-/// rig.yaml, calibration.json, residuals_<camera>.png.
+/// Writes rig.yaml, calibration.json and residuals_<camera>.png.
 void writeCalibrated(const Calibrated& calibrated, const std::filesystem::path& folder);
 std::string reportText(const Calibrated& calibrated);
 
-/// The residuals over the image and over time, and those of the IMU.
+/// Draws the residuals over the image and over time, and the residuals of the IMU.
 void drawResiduals(const CalibratedCamera& camera, const std::filesystem::path& file);
 
 }  // namespace perdure::calibrate

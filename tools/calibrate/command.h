@@ -8,7 +8,7 @@ class App;
 namespace perdure::tools {
 
 void addCalibrateCommand(CLI::App& app);
-/// Its part `import`.
+/// Adds the subcommand `import`.
 void addCalibrateImport(CLI::App& calibrate);
 
 }  // namespace perdure::tools

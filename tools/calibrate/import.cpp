@@ -113,8 +113,8 @@ class Import {
 
   std::vector<RigidTransform> places_;
   std::size_t given_ = 0;
-  std::vector<bool> in_body_;  ///< by camera: its file says where it is in EuRoC's body
-  RigidTransform T_B_I_;       ///< of EuRoC's sensor.yaml; our body is the IMU
+  std::vector<bool> in_body_;  ///< one per camera: its file gives the pose in EuRoC's body
+  RigidTransform T_B_I_;       ///< IMU pose in EuRoC's sensor.yaml; our body is the IMU
   ImportedRig result_;
 };
 

@@ -1,4 +1,4 @@
-// `perdure calibrate import`: what Kalibr, ROS or EuRoC have calibrated, as a rig of our own.
+// `perdure calibrate import`: converts calibrations of Kalibr, ROS or EuRoC to a rig file.
 #pragma once
 
 #include <filesystem>
@@ -12,17 +12,17 @@ namespace perdure::calibrate {
 
 struct ImportedRig {
   Calibration rig;
-  std::vector<std::string> found;    ///< what each file was, for people
-  std::vector<std::string> ignored;  ///< keys that are not known
+  std::vector<std::string> found;    ///< the kind of each file, for people
+  std::vector<std::string> ignored;  ///< unknown keys
 };
 
-/// Kalibr's camchain and imu files, ROS' camera_info, EuRoC's sensor.yaml, a rig of ours: cameras
-/// in the order in which they come. `T_BC`: the place of cameras whose file does not say it, in
-/// that order. Throws StartupError with the file, the key and the mend.
+/// Imports Kalibr's camchain and imu files, ROS camera_info, EuRoC's sensor.yaml, or a rig file of
+/// Perdure. Cameras keep the order of the files. `T_BC`: poses of the cameras whose file has none,
+/// in that order. Throws StartupError with the file, the key and the fix.
 ImportedRig importRig(const std::vector<std::filesystem::path>& files,
                       const std::vector<RigidTransform>& T_BC = {});
 
-/// Of 16 numbers, row by row, with commas or blanks between. Throws StartupError(kUsage).
+/// Parses 16 numbers, row by row, separated by commas or blanks. Throws StartupError(kUsage).
 RigidTransform transformOf(const std::string& text);
 
 }  // namespace perdure::calibrate

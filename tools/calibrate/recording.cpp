@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 using Progress = std::function<void(std::size_t, std::size_t)>;
 
-constexpr std::size_t kBatch = 16;  ///< images whose corners are sought side by side
+constexpr std::size_t kBatch = 16;  ///< images whose corners are detected in parallel
 
 struct Picture {
   std::size_t camera = 0;
@@ -27,7 +27,7 @@ struct Picture {
   cv::Mat grey;
 };
 
-/// Seeks corners in pictures as they come, several at a time.
+/// Detects corners in arriving images, several images in parallel.
 class Finder {
  public:
   Finder(const Board& board, CalibrationDrive& drive) : board_(board), drive_(drive) {}

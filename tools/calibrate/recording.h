@@ -1,4 +1,4 @@
-// Reads what is to be calibrated: a drive in front of a board, or a folder of pictures.
+// Reads the data for a calibration: a drive in front of a board, or a folder of pictures.
 #pragma once
 
 #include <filesystem>
@@ -10,28 +10,28 @@
 
 namespace perdure::calibrate {
 
-/// What one camera saw.
+/// Views of one camera.
 struct CameraViews {
   CameraCalibration
-      prior;               ///< as the drive (or the rig file) says; of pictures: name and size only
-  std::size_t images = 0;  ///< looked at
-  std::vector<View> views;  ///< with the board in them
+      prior;               ///< source: the drive or the rig file; for pictures, name and size only.
+  std::size_t images = 0;  ///< images searched
+  std::vector<View> views;  ///< views with the board
 };
 
 struct CalibrationDrive {
   std::vector<CameraViews> cameras;
   std::vector<ImuSample> samples;
   std::optional<ImuCalibration> imu;
-  std::string problem;  ///< the last thing that could not be read
+  std::string problem;  ///< the last read error
 };
 
 struct ReadOptions {
-  std::filesystem::path data, rig;  ///< rig: goes before the drive's own calibration
+  std::filesystem::path data, rig;  ///< rig: overrides the drive's own calibration
   std::string sequence;
-  std::size_t every = 1;  ///< each N-th image
+  std::size_t every = 1;  ///< uses each N-th image
 };
 
-/// Throws StartupError(kUnavailable) with the mend: nothing to read, or no board in any image.
+/// Throws StartupError(kUnavailable) with the fix: nothing to read, or no board in any image.
 CalibrationDrive readDrive(const Board& board, const ReadOptions& options,
                            const std::function<void(std::size_t, std::size_t)>& progress);
 

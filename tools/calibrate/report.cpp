@@ -1,4 +1,4 @@
-// calibration.json: everything that was estimated, how sure it is, and what is said of it.
+// Writes calibration.json: all estimates, their uncertainty and their judgements.
 #include <cmath>
 #include <nlohmann/json.hpp>
 

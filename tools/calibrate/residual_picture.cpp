@@ -1,4 +1,4 @@
-// drawResiduals of calibrate.h.
+// Implements drawResiduals of calibrate.h.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -20,7 +20,8 @@ constexpr int kImageWidth = 720, kChartWidth = 760, kMargin = 70, kTop = 50;
 const Colour kSmall(190, 160, 60), kLarge(40, 60, 220);
 const Colour kFirst(200, 120, 30), kSecond(40, 150, 60), kThird(50, 60, 210);
 
-/// Each corner as a dot, redder the further off, and the mean of each cell as an arrow.
+/// Draws each corner as a dot whose redness grows with its residual, and the mean of each cell as
+/// an arrow.
 void drawImage(cv::Mat& picture, const cv::Rect& area, const CameraCalibration& camera,
                const std::vector<CornerResidual>& residuals, double sigma) {
   const double scale = static_cast<double>(area.width) / camera.width;
@@ -32,7 +33,7 @@ void drawImage(cv::Mat& picture, const cv::Rect& area, const CameraCalibration& 
     cv::circle(picture, at, 1, tools::mixed(kSmall, kLarge, share), cv::FILLED, cv::LINE_AA);
   }
   const auto cells = cellsOf(camera, residuals);
-  constexpr double kEnlarged = 200.0;  // pixels of the picture for one of residual
+  constexpr double kEnlarged = 200.0;  // pixels of the picture for a residual of 1 px
   for (std::size_t i = 0; i < cells.size(); ++i) {
     if (cells[i].corners == 0) continue;
     const auto column = static_cast<double>(i % kCellColumns);
@@ -67,7 +68,7 @@ void drawChart(cv::Mat& picture, const cv::Rect& area, const std::string& title,
   tools::drawText(picture, title, {area.x, area.y - 10}, kInk);
 }
 
-/// Root mean square of each image's corners.
+/// RMS of the corner residuals of each image.
 Points rmsByImage(const std::vector<CornerResidual>& residuals) {
   Points points;
   for (std::size_t i = 0; i < residuals.size();) {

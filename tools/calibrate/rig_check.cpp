@@ -17,9 +17,9 @@ namespace perdure::calibrate {
 namespace {
 
 constexpr double kDegrees = 180.0 / M_PI;
-constexpr std::size_t kFewest = 500;  // innovations, to judge a rig by
+constexpr std::size_t kFewest = 500;  // least innovations to judge a rig by
 
-/// Vio over the drive, in one thread.
+/// Runs vio over the drive, in one thread.
 class Watched {
  public:
   Watched(const RigCheckOptions& options, const replay::Dataset& dataset)
@@ -36,7 +36,7 @@ class Watched {
   }
 
   void run(replay::Dataset& dataset, const RigCheckOptions& options) {
-    constexpr std::size_t kEvery = 20;  // images
+    constexpr std::size_t kEvery = 20;  // every so many images
     std::optional<TimePoint> first;
     std::size_t images = 0;
     replay::ReadAhead ahead(dataset);
@@ -77,7 +77,7 @@ Judgement judged(Grade grade, std::string text, const std::string& mend) {
   return {grade, std::move(text)};
 }
 
-/// Innovations that passed, as residuals of corners over the image.
+/// Accepted innovations as corner residuals over the image.
 std::vector<CornerResidual> residualsOf(const std::vector<vio::Innovation>& innovations) {
   std::vector<CornerResidual> all;
   for (const auto& i : innovations) {
@@ -86,11 +86,11 @@ std::vector<CornerResidual> residualsOf(const std::vector<vio::Innovation>& inno
   return all;
 }
 
-/// What stays of the residuals over the image from one half of the drive to the other, px; 0 where
-/// it may be chance. A track's residuals are alike, so that those of one half prove nothing.
+/// RMS in px of the residual pattern that both halves of the drive share; 0 if it is not
+/// significant. The residuals of a track are correlated, so that one half alone proves nothing.
 double patternOf(const CameraCalibration& camera, const std::vector<CornerResidual>& residuals) {
-  constexpr std::size_t kEnough = 20;  // in a half
-  constexpr double kSure = 3.0;        // deviations
+  constexpr std::size_t kEnough = 20;  // least corners in a half
+  constexpr double kSure = 3.0;        // least standard deviations
   const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
   const auto before = cellsOf(camera, {residuals.begin(), middle});
   const auto after = cellsOf(camera, {middle, residuals.end()});
@@ -106,17 +106,18 @@ double patternOf(const CameraCalibration& camera, const std::vector<CornerResidu
   return mean > kSure * sigma ? std::sqrt(mean) : 0.0;
 }
 
-/// Up to which a camera's place and time are good, and from which they are bad.
+/// Limits for a camera's pose and time offset: good up to `good`, bad above `bad`.
 struct Bars {
   double good, bad;
 };
 constexpr Bars kTurned{0.4 / kDegrees, 1.0 / kDegrees}, kShifted_m{0.015, 0.04},
     kLater_s{2e-3, 8e-3};
 
-/// How far vio moved a quantity, in deviations that a well calibrated rig has.
+/// Judges how far vio moved a quantity, compared with the standard deviation of vio.
 Judgement judgeMove(const char* what, double moved, double sigma, const Bars& bars,
                     const std::string& shown, const std::string& mend) {
-  // A move that vio itself is not sure of says nothing, nor one that may be within what is good.
+  // A move is ignored if vio is not certain of it, or if the true value may be within the good
+  // range.
   const bool sure = moved > 3.0 * sigma && moved - sigma > bars.good;
   return judged(sure ? gradeOf(moved, bars.good, bars.bad) : Grade::kGood,
                 fmt::format("vio sees the {} {} off the rig", what, shown), mend);
@@ -124,7 +125,7 @@ Judgement judgeMove(const char* what, double moved, double sigma, const Bars& ba
 
 constexpr char kNoMend[] = "no mend before what is said above is excluded";
 
-/// Of the camera's place and time; `sole`: nothing else explains what they are off by.
+/// Judges the camera's pose and time offset; `sole`: nothing else explains their deviation.
 Judgements judgePlaceOf(const RigCheck& check, bool lens_fits, bool sole) {
   Judgements all;
   const char* again =
@@ -167,7 +168,8 @@ double againstOf(const RigCheck& check) {
 
 constexpr double kFewAgainst = 0.05, kManyAgainst = 0.2;
 
-/// What is off at once: one cause moves it all, and a number for each is none of it.
+/// Reports several deviations as one. They have one common cause, so that their separate values are
+/// meaningless.
 void judgeAllAtOnce(const Judgements& place, const Judgement& gravity, Judgements& all) {
   const auto isOff = [](const Judgement& one) { return one.grade != Grade::kGood; };
   const auto off = std::count_if(place.begin(), place.end(), isOff) + (isOff(gravity) ? 1 : 0);
@@ -228,7 +230,7 @@ RigCheck RigWatch::check(const ReasonCounts& of_vio) const {
 }
 
 bool isSurelyGood(const RigCheck& check) {
-  constexpr double kHalf = 0.5;  // what is bad is then five deviations off
+  constexpr double kHalf = 0.5;  // a bad value is then at least five deviations off
   const bool sure = check.believed && check.sigma.head<3>().norm() < kHalf * kTurned.good &&
                     check.sigma.segment<3>(3).norm() < kHalf * kShifted_m.good &&
                     check.sigma[6] < kHalf * kLater_s.good;

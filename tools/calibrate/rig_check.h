@@ -1,5 +1,5 @@
-// Judges a rig file by a recording of any place: vio runs with it, and how images meet its
-// predictions says what the rig is worth.
+// Judges a rig file by a recording of any scene. Vio runs with the rig, and its innovations show
+// how accurate the rig is.
 #pragma once
 
 #include <filesystem>
@@ -16,41 +16,42 @@ namespace perdure::calibrate {
 
 struct RigCheckOptions {
   std::filesystem::path data, rig;  ///< rig: empty for the drive's own calibration
-  std::string sequence = {};        ///< of KITTI tracking or 7-Scenes
-  double seconds = 60.0;            ///< of the drive, at most
-  bool until_sure = false;          ///< ends where all is good and vio is sure of it
+  std::string sequence = {};        ///< sequence of KITTI tracking or 7-Scenes
+  double seconds = 60.0;            ///< largest duration of the drive that is used
+  bool until_sure = false;          ///< ends when everything is good and vio is certain
   vio::Config vio = {};
 };
 
-/// What vio came to believe of the first camera's place, against the rig; and how it fared.
+/// Vio's estimate of the first camera's pose relative to the rig, and the quality of the run.
 struct RigCheck {
   CameraCalibration camera;
   std::size_t cameras = 1;
   std::size_t frames = 0, tracked = 0, resets = 0;
-  std::size_t holes = 0;  ///< of the resets: stamps jumped, or samples were missing
+  std::size_t holes = 0;  ///< resets after a jump of stamps or missing samples
   std::size_t speed_refused = 0;
-  std::size_t contradicted = 0;  ///< frames at which most of the last seconds' points were refused
+  std::size_t contradicted = 0;  ///< frames at which most points of the last seconds were rejected
   std::vector<vio::Innovation> innovations;
-  bool believed = false;  ///< vio had a start and the following four say something
+  bool believed = false;  ///< vio started, so that the following four are valid
   Eigen::Vector3d turned = Eigen::Vector3d::Zero();   ///< rad, right of R_BC
   Eigen::Vector3d shifted = Eigen::Vector3d::Zero();  ///< m, in B
-  double later_s = 0.0;                               ///< time offset less the rig's
-  Eigen::Matrix<double, 7, 1> sigma = Eigen::Matrix<double, 7, 1>::Zero();  ///< of these
+  double later_s = 0.0;                               ///< estimated time offset minus the rig's
+  Eigen::Matrix<double, 7, 1> sigma = Eigen::Matrix<double, 7, 1>::Zero();  ///< standard deviation
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = gyro_bias;
-  double gyro_bias_change = 0.0, accel_bias_change = 0.0;  ///< over the second half of the drive
+  double gyro_bias_change = 0.0, accel_bias_change = 0.0;  ///< changes in the second half
 };
 
-/// All is good, and what is bad would be told: deviations are at most half of what is good.
+/// Whether everything is good and vio is certain: standard deviations are at most half of the good
+/// limits, so that a bad value would be detected.
 bool isSurelyGood(const RigCheck& check);
 
-/// Listens to a vio as it runs.
+/// Observes a running vio.
 class RigWatch {
  public:
-  /// What comes later than `seconds` after the first odometry is not looked at.
+  /// Ignores data later than `seconds` after the first odometry.
   RigWatch(const CameraCalibration& camera, double seconds);
   void onOdometry(const Odometry& odometry);
   void onInnovations(const std::vector<vio::Innovation>& innovations);
-  /// After an image: a filter that resets forgets, and the last belief before counts.
+  /// Stores the estimate after an image, because a reset of the filter discards it.
   void remember(const vio::Node& node);
   RigCheck check(const ReasonCounts& of_vio) const;
 
@@ -65,18 +66,19 @@ class RigWatch {
   std::vector<Eigen::Vector3d> gyro_, accel_;
 };
 
-/// Throws StartupError where the recording or the rig cannot be read, or has no images or samples.
+/// Throws StartupError if the recording or the rig cannot be read, or has no images or samples.
 RigCheck checkRig(const RigCheckOptions& options);
 
-/// Median of the normalised innovations squared over what it is to be (1 where all is as believed).
+/// Median of the normalised innovations squared, divided by its expected value (1 for a consistent
+/// filter).
 double innovationRatio(const std::vector<vio::Innovation>& innovations);
-/// How vio fared, then judgeBelief where it fared well enough.
+/// Judges the run of vio, and calls judgeBelief if the run was good enough.
 Judgements judgeRig(const RigCheck& check);
-/// What it came to believe of lens, place and IMU; that there is too little to tell by, too.
+/// Judges the estimates of lens, pose and IMU, or reports that the data are too few.
 Judgements judgeBelief(const RigCheck& check);
 
-/// Whether so much contradicts with two cameras that it is worth to look with the first one alone,
-/// and what that says: nothing where it contradicts as well.
+/// Whether the two cameras contradict each other so much that a run with the first camera alone is
+/// useful. judgeSecond judges that run; it returns nothing if that run contradicts as well.
 bool isSecondSuspect(const RigCheck& check);
 Judgements judgeSecond(const RigCheck& both, const RigCheck& alone);
 

@@ -12,11 +12,11 @@
 namespace perdure::calibrate {
 namespace {
 
-constexpr double kInterval = 0.04;  ///< of the motion's controls, seconds
+constexpr double kInterval = 0.04;  ///< s, interval of the motion's control points
 
 Eigen::Vector3d normal3(sim::Dice& dice) { return {dice.normal(), dice.normal(), dice.normal()}; }
 
-/// What makes a lens and its place differ from the data sheet.
+/// Makes a lens and its pose differ from the data sheet.
 void perturb(CameraCalibration& camera, sim::Dice& dice) {
   const double focal = 1.0 + 0.03 * dice.normal();
   camera.fx *= focal;
@@ -48,7 +48,7 @@ sim::Rig makeRig(const SimulatedOptions& options, sim::Dice& dice) {
   return rig;
 }
 
-/// A sum of a few waves of amplitude 1 altogether.
+/// A sum of a few waves with a total amplitude of 1.
 struct Wander {
   struct Wave {
     double amplitude, rate, phase;
@@ -75,8 +75,8 @@ struct Wander3 {
   Eigen::Vector3d at(double t) const { return {x.at(t), y.at(t), z.at(t)}; }
 };
 
-/// The hand: goes about in front of the board, looks past its middle, and after a third of the time
-/// shakes and turns about all axes.
+/// Motion of the hand: moves in front of the board and looks past its middle. After a third of the
+/// time, it also shakes and rotates about all axes.
 sim::Trajectory handMotion(const SimulatedCalibration& simulated, sim::Dice& dice) {
   const SimulatedOptions& options = simulated.options;
   const CameraCalibration& camera = simulated.truth();
@@ -96,7 +96,8 @@ sim::Trajectory handMotion(const SimulatedCalibration& simulated, sim::Dice& dic
     const Eigen::Vector3d p_TC(middle.x() + 1.0 * distance * p.x(),
                                middle.y() + 0.8 * distance * p.y(),
                                -distance * (1.05 + 0.35 * p.z()));
-    // Looking at the middle of the board, then past it: x right, y down, z forward.
+    // The camera first looks at the middle of the board; the rotations are added below. x right, y
+    // down, z forward.
     const Eigen::Vector3d z = (Eigen::Vector3d(middle.x(), middle.y(), 0.0) - p_TC).normalized();
     Eigen::Matrix3d R_TC;
     R_TC.col(0) = Eigen::Vector3d::UnitY().cross(z).normalized();
@@ -114,7 +115,7 @@ sim::Trajectory handMotion(const SimulatedCalibration& simulated, sim::Dice& dic
 }  // namespace
 
 std::vector<TimePoint> SimulatedCalibration::stamps() const {
-  // The body moves from 0 on; an image at its stamp plus offset is within the motion.
+  // The motion starts at time 0, so that each stamp plus the time offset is within the motion.
   std::vector<TimePoint> all;
   const auto count = static_cast<int>(options.seconds * options.rate_hz);
   for (int i = 1; i + 1 < count; ++i) {
@@ -156,7 +157,7 @@ std::vector<View> simulateViews(const SimulatedCalibration& simulated, double si
     View view{frame++, stamp, {}};
     for (std::size_t id = 0; id < board.cornerCount(); ++id) {
       auto pixel = camera.project(simulated.T_CT(middle) * board.corner(id));
-      // A row of a rolling shutter is exposed at its own time.
+      // Each row of a rolling shutter is exposed at its own time.
       for (int i = 0; i < 4 && pixel && simulated.truth().readout_s > 0.0; ++i) {
         const double row = pixel->y() / (camera.height() - 1) - 0.5;
         const double t = middle + simulated.truth().readout_s * row;

@@ -1,5 +1,5 @@
-// A calibration with exact truth: a board on a wall, and a hand that moves a camera and an IMU in
-// front of it. Corners with noise for fast tests, or drawn images.
+// A calibration with exact ground truth: a board on a wall, and a hand that moves a camera and an
+// IMU in front of it. It gives corners with noise for fast tests, or rendered images.
 #pragma once
 
 #include <cstdint>
@@ -18,18 +18,18 @@ struct SimulatedOptions {
   Board board;
   std::uint64_t seed = 1;
   double seconds = 40.0;
-  DistortionModel lens = DistortionModel::kRadialTangential;  ///< equidistant: a fisheye
+  DistortionModel lens = DistortionModel::kRadialTangential;  ///< equidistant: a fisheye lens
   std::uint32_t width = 640, height = 480;
   double rate_hz = 20.0, readout_s = 0.0, exposure_s = 0.003;
-  bool shake = true;  ///< false: slow motion only, as for intrinsics alone
+  bool shake = true;  ///< false: slow motion only, for intrinsics alone
 };
 
-/// The scene's rig holds the truth and, as `calibration`, what a data sheet would say: a few per
-/// cent, degrees and centimetres off, no time offset.
+/// The scene's rig holds the ground truth and, as `calibration`, the values of a data sheet. These
+/// are off by a few per cent, degrees and centimetres, and have no time offset.
 struct SimulatedCalibration {
   SimulatedOptions options;
   sim::Scene scene;
-  RigidTransform T_WT;  ///< the board
+  RigidTransform T_WT;  ///< pose of the board
 
   const CameraCalibration& truth() const { return scene.rig.true_calibration.cameras[0]; }
   /// Stamps of the images; an image shows the body at its stamp plus the time offset.
@@ -40,19 +40,19 @@ struct SimulatedCalibration {
 
 SimulatedCalibration simulateCalibration(const SimulatedOptions& options);
 
-/// What a detector finds that is exact to `sigma_px`; a chessboard only as a whole.
+/// Views of a detector with noise of `sigma_px`; a chessboard is found only as a whole.
 std::vector<View> simulateViews(const SimulatedCalibration& simulated, double sigma_px);
 std::vector<ImuSample> simulateSamples(const SimulatedCalibration& simulated);
 
-/// Linear light of one image.
+/// Renders one image in linear light.
 void drawBoard(const SimulatedCalibration& simulated, const tools::Lens& lens, double t_s,
                tools::Workers& workers, tools::Picture& picture);
 
-/// What the detectors find in the drawn images, with the sensor's noise in them.
+/// Views of the detectors in the rendered images, which have the sensor's noise.
 std::vector<View> drawnViews(const SimulatedCalibration& simulated,
                              const std::function<void(std::size_t, std::size_t)>& progress = {});
 
-/// EuRoC's layout, with rig_truth.yaml and board.txt beside it. Throws StartupError.
+/// Writes the layout of EuRoC, with rig_truth.yaml and board.txt beside it. Throws StartupError.
 void writeSimulated(const SimulatedCalibration& simulated, const std::filesystem::path& folder,
                     const std::function<void(std::size_t, std::size_t)>& progress);
 

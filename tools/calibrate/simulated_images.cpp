@@ -1,4 +1,4 @@
-// The drawn part of simulated.h.
+// Rendering part of simulated.h.
 #include <array>
 #include <cmath>
 #include <opencv2/core/mat.hpp>
@@ -16,9 +16,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr float kBlack = 0.03F, kWhite = 0.6F, kWall = 0.22F;
-constexpr std::size_t kSamples = 16;  ///< of a pixel: 4×4 places, each at a time of its own
+constexpr std::size_t kSamples = 16;  ///< samples of a pixel: 4×4 positions, each at its own time
 
-/// The camera on the board's plane at one time.
+/// Pose of the camera relative to the board at one time.
 struct Eye {
   Eigen::Matrix3f R_TC;
   Eigen::Vector3f p_TC;
@@ -29,7 +29,7 @@ class Painter {
   explicit Painter(const Board& board)
       : board_(board), from_(board.printFrom()), to_(board.printTo()) {}
 
-  /// What a ray meets: 0 black, 1 white, 2 the wall.
+  /// Surface that a ray hits: 0 black, 1 white, 2 the wall.
   int ink(const Eye& eye, const Eigen::Vector3f& ray, Eigen::Vector2d& at) const {
     const Eigen::Vector3f d = eye.R_TC * ray;
     if (d.z() < 1e-3F) return 2;
@@ -40,7 +40,7 @@ class Painter {
   }
   float light(int ink, const Eigen::Vector2d& at) const {
     if (ink < 2) return ink == 0 ? kBlack : kWhite;
-    // A wall with faint, large stains.
+    // The wall has faint, large stains.
     const double stain = std::sin(9.1 * at.x() + 3.0 * std::sin(4.3 * at.y())) *
                          std::sin(7.7 * at.y() + 2.0 * std::sin(5.9 * at.x()));
     return kWall * static_cast<float>(1.0 + 0.12 * stain);
@@ -51,7 +51,7 @@ class Painter {
   Eigen::Vector2d from_, to_;
 };
 
-/// Places within a pixel, in an order in which the times of the exposure are spread over it.
+/// Sample positions within a pixel, ordered so that the exposure times are spread over it.
 constexpr std::array<std::size_t, kSamples> kOrder = {0, 10, 5, 15, 2, 8, 7, 13,
                                                       1, 11, 4, 14, 3, 9, 6, 12};
 
@@ -106,7 +106,7 @@ void drawBoard(const SimulatedCalibration& simulated, const tools::Lens& lens, d
 
 namespace {
 
-/// Calls `take` with each image, developed.
+/// Calls `take` with each developed image.
 template <class Take>
 void drawAll(const SimulatedCalibration& simulated, Take&& take) {
   tools::Workers workers(2);

@@ -19,7 +19,7 @@ Grade gradeOf(double value, double good, double bad) {
   return value <= good ? Grade::kGood : value <= bad ? Grade::kDoubtful : Grade::kBad;
 }
 
-/// `mend` only where it is not good.
+/// Appends `mend` to the text unless the grade is good.
 Judgement judged(Grade grade, std::string text, const std::string& mend) {
   if (grade != Grade::kGood) text += "; " + mend;
   return {grade, std::move(text)};
@@ -52,7 +52,7 @@ Judgement coverageOf(const std::vector<Cell>& cells) {
                             fmt::join(missing, ", ")));
 }
 
-/// Views in which the board leans by so much about an axis of the image.
+/// Judges how many views lean the board by at least 15° about each axis of the image.
 Judgement judgeTilt(const std::vector<RigidTransform>& poses) {
   constexpr double kLean = 15.0 / kDegrees;
   std::array<std::size_t, 2> leaning{};
@@ -104,7 +104,7 @@ Judgement judgeOutliers(std::size_t outliers, std::size_t corners) {
                 "they lie far off: is something in front of the board, or does it shine?");
 }
 
-const std::array kAxes = {"x", "y", "z"};  // of the body, which is the IMU
+const std::array kAxes = {"x", "y", "z"};  // axes of the body, which is the IMU
 
 void judgeMotion(const CameraImu& place, Judgements& all) {
   for (int i = 0; i < 3; ++i) {
@@ -131,7 +131,7 @@ void judgeMotion(const CameraImu& place, Judgements& all) {
                              place.accel_rms_B[0], place.accel_rms_B[1], place.accel_rms_B[2])});
 }
 
-/// The stated deviations against what a rig is to be known to: 0.1°, 3 mm, 0.3 ms.
+/// Judges the estimated standard deviations against the required accuracy: 0.1°, 3 mm, 0.3 ms.
 void judgeCertainty(const CameraImu& place, Judgements& all) {
   const auto worst = [&](int at) {
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(

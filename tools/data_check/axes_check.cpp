@@ -12,7 +12,7 @@
 namespace perdure::tools {
 namespace {
 
-/// Row i of the gyroscope as it should be is `sign[i]` times row `from[i]` of what it says.
+/// Row i of the correct gyroscope rates is `sign[i]` times row `from[i]` of the recorded ones.
 struct SignedAxes {
   std::array<Eigen::Index, 3> from{0, 1, 2};
   std::array<int, 3> sign{1, 1, 1};
@@ -29,7 +29,7 @@ struct SignedAxes {
   }
 };
 
-/// The 24 mirror images.
+/// The 24 signed axis permutations with determinant -1.
 std::vector<SignedAxes> mirroredAxes() {
   std::vector<SignedAxes> all;
   SignedAxes axes;
@@ -42,7 +42,7 @@ std::vector<SignedAxes> mirroredAxes() {
   return all;
 }
 
-/// Share of the images' turning about axis i that `axes` leave unexplained.
+/// Share of the image rotation about axis i that `axes` do not explain.
 double leftAbout(const TurnPairs& pairs, const SignedAxes& axes, Eigen::Index i) {
   const auto at = static_cast<std::size_t>(i);
   return (pairs.reference.row(i) - axes.sign[at] * pairs.given.row(axes.from[at])).squaredNorm() /
@@ -58,13 +58,13 @@ std::string textOf(const SignedAxes& axes) {
   return text;
 }
 
-/// What a change of axes leaves unexplained of the images' turning.
+/// Image rotation that a change of axes does not explain.
 struct Left {
-  double of_changed;  ///< share, on average about the axes that change
-  double of_all;      ///< share of all turning
+  double of_changed;  ///< mean share over the axes that change
+  double of_all;      ///< share of the whole rotation
 };
 
-/// Nothing where an axis that changes does not gain.
+/// Returns nothing if an axis that changes is not explained better than before.
 std::optional<Left> leftBy(const TurnPairs& pairs, const SignedAxes& axes, double least_rad) {
   constexpr double kWrong = 0.4, kRight = 0.3, kClearly = 3.0;
   const double count = std::max<double>(1.0, static_cast<double>(pairs.count()));
@@ -106,7 +106,8 @@ replay::DataFindings judgeAxes(const std::vector<Turn>& turns,
     if (left && (!least || left->of_all < least->of_all)) least = left, best = axes;
   }
   if (!least) return {};
-  // Nothing else looks like an exchange; one sign may be that of a way round a thing close by.
+  // An exchange of axes is unambiguous. A single changed sign may come from a trajectory around a
+  // near object.
   const bool sure = best.exchanges() && leftBy(pairs, best, kMuch_px / camera.fx);
   return {{sure ? replay::DataFinding::Grade::kFatal : replay::DataFinding::Grade::kWarning,
            "gyro_axes",

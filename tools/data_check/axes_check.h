@@ -1,5 +1,5 @@
-// Whether an axis of the gyroscope is exchanged or of the other sign: a mirror image, which no T_BS
-// explains.
+// Checks whether axes of the gyroscope are exchanged or have the wrong sign as a mirror image,
+// which no T_BS can represent.
 #pragma once
 
 #include <vector>
@@ -9,8 +9,8 @@
 
 namespace perdure::tools {
 
-/// Code: gyro_axes. Each of the body's axes is judged for itself, so that one that turns little
-/// counts; nothing where it turns too little to tell.
+/// Code: gyro_axes. Each axis of the body is judged separately, so that an axis with little
+/// rotation counts too. Returns nothing if the rotation is too small.
 replay::DataFindings judgeAxes(const std::vector<Turn>& turns,
                                const std::vector<ImuSample>& samples,
                                const CameraCalibration& camera);

@@ -17,7 +17,7 @@ using Eigen::Vector3d;
 
 constexpr std::size_t kFewestChanges = 60;
 
-/// Changes of the turning from one pair of images to the next, of both sides, in B.
+/// Changes of rotation rate from one image pair to the next, by images and by gyroscope, in B.
 struct AxisChanges {
   std::vector<Vector3d> images, gyro;
 };
@@ -43,7 +43,7 @@ AxisChanges axisChangesOf(const std::vector<Turn>& turns, const std::vector<ImuS
   return changes;
 }
 
-/// Of each axis of the images (row) with each of the gyroscope (column).
+/// Correlation of each axis of the images (row) with each axis of the gyroscope (column).
 Matrix3d correlationOf(const AxisChanges& changes) {
   Matrix3d both = Matrix3d::Zero();
   Vector3d images = Vector3d::Constant(1e-18), gyro = images;
@@ -55,13 +55,13 @@ Matrix3d correlationOf(const AxisChanges& changes) {
          gyro.cwiseSqrt().cwiseInverse().asDiagonal();
 }
 
-/// Which axis of the gyroscope, with which sign, is each axis of B.
+/// The axis of the gyroscope, with its sign, for each axis of B.
 struct Axes {
   std::array<int, 3> axis{0, 1, 2};
   Vector3d sign = Vector3d::Ones();
 };
 
-/// The axes with which the correlations are largest.
+/// The axes with the largest sum of absolute correlations.
 Axes bestAxes(const Matrix3d& correlation) {
   Axes best, tried;
   double most = -1e9;
@@ -117,7 +117,7 @@ bool axesSurelyAgree(const std::vector<Turn>& turns, const std::vector<ImuSample
 replay::DataFindings judgeAxisChanges(const std::vector<Turn>& turns,
                                       const std::vector<ImuSample>& samples,
                                       const CameraCalibration& camera) {
-  constexpr double kSurely = 4.0;  // deviations of a correlation by chance
+  constexpr double kSurely = 4.0;  // limit, in standard deviations of a chance correlation
   constexpr double kSeen = 0.4, kUnseen = 0.2;
   const AxisChanges changes = axisChangesOf(turns, samples, camera);
   if (changes.images.size() < kFewestChanges) return {};
@@ -130,7 +130,7 @@ replay::DataFindings judgeAxisChanges(const std::vector<Turn>& turns,
     const double found = std::abs(correlation(i, axis));
     if (axis == i && axes.sign[i] > 0.0) continue;
     const bool sure = found > std::max(kSeen, kSurely * chance);
-    if (axis == i && !sure) {  // about which it does not turn
+    if (axis == i && !sure) {  // axis without rotation
       axes.sign[i] = 1.0;
       continue;
     }

@@ -1,22 +1,22 @@
-// Whether the gyroscope's axes are those of T_BS: each axis of its own, so that an axis about which
-// a car hardly turns is heard beside the one about which it does.
+// Checks whether the axes of the gyroscope match those of T_BS. Each axis is judged separately,
+// because a car hardly rotates about two of them.
 #pragma once
 
 #include "tools/data_check/motion_check.h"
 
 namespace perdure::tools {
 
-/// The turning that is left of each axis without its mean over half a second, in deviations: where
-/// this is lively, each axis can be told from the others.
+/// Rotation rate of each axis without its mean over half a second, in standard deviations. Where it
+/// is large, each axis can be distinguished from the others.
 std::vector<ImuSample> livelinessOfAxes(const std::vector<ImuSample>& samples);
 
-/// Whether each axis of the gyroscope plainly turns as the images do about it; then there is
-/// nothing that judgeAxisChanges could find.
+/// Whether each axis of the gyroscope clearly correlates with the same axis of the images. Then
+/// judgeAxisChanges cannot find a fault.
 bool axesSurelyAgree(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,
                      const CameraCalibration& camera);
 
-/// Compares how turning changes from image to image, which what a camera's own way adds hardly
-/// does. Code: gyro_axes. Nothing where fewer than 60 changes, or unclear ones, are seen.
+/// Compares changes of the rotation rate between images; the camera's translation hardly affects
+/// them. Code: gyro_axes. Returns nothing for fewer than 60 changes or unclear correlations.
 replay::DataFindings judgeAxisChanges(const std::vector<Turn>& turns,
                                       const std::vector<ImuSample>& samples,
                                       const CameraCalibration& camera);

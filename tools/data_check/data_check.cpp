@@ -19,7 +19,7 @@ using Grade = replay::DataFinding::Grade;
 
 namespace {
 
-/// A check that fails is no reason to stop: what it would say is said of it.
+/// Runs a check; if OpenCV throws, a warning replaces its findings.
 template <class Check>
 void add(const char* of, replay::DataFindings& findings, Check&& check) {
   replay::DataFindings more;
@@ -32,7 +32,7 @@ void add(const char* of, replay::DataFindings& findings, Check&& check) {
   findings.insert(findings.end(), more.begin(), more.end());
 }
 
-/// Whether the stamps may be why another order or sign of axes fits, as where a camera swings.
+/// Whether wrong stamps explain the changed axes as well, for example with a swinging camera.
 bool offsetExplainsAxes(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,
                         CameraCalibration camera) {
   const auto later = offsetOfTurns(turns, samples, camera);
@@ -48,7 +48,7 @@ replay::DataFindings checkTurns(const replay::Recording& recording) {
   const bool unit = !findings.empty() && (findings.front().code.starts_with("gyro_") ||
                                           findings.front().code == "images_still");
   if (unit && findings.front().code != "gyro_factor") return findings;
-  // A mirror image looks like a T_BS that is turned or inverted, and is none.
+  // Checked first, because mirrored axes also look like a rotated or inverted T_BS.
   auto axes = judgeAxes(turns, recording.imu, camera);
   if (!axes.empty()) {
     const bool offset = !findings.empty() && findings.front().code == "time_offset";
@@ -59,7 +59,7 @@ replay::DataFindings checkTurns(const replay::Recording& recording) {
     return axes;
   }
   if (!findings.empty() || axesSurelyAgree(turns, recording.imu, camera)) return findings;
-  constexpr std::size_t kTurns = 120;  // an axis with little turning needs more
+  constexpr std::size_t kTurns = 120;  // an axis with little rotation needs more pairs
   return judgeAxisChanges(turnsOfImages(recording, livelinessOfAxes(recording.imu), kTurns),
                           recording.imu, camera);
 }
@@ -72,7 +72,7 @@ replay::DataFindings checkDrive(const replay::Recording& recording, const replay
   add("the rig", findings, [&] { return checkRigNumbers(recording.calibration); });
   if (!use.images || recording.calibration.cameras.empty()) return findings;
   for (const auto& finding : findings) {
-    if (finding.grade == Grade::kFatal) return findings;  // what is said of turns would follow
+    if (finding.grade == Grade::kFatal) return findings;  // rotations would fail as well
   }
   add("what belongs together", findings, [&] { return checkPairs(recording); });
   add("the two cameras", findings, [&] { return checkStereo(recording); });
@@ -87,7 +87,7 @@ replay::DataFindings checkPoses(const replay::Recording& recording, const replay
   if (!findings.empty()) return findings;
   const auto poses = timedPoses(file, recording);
   findings = judgePoseJumps(poses);
-  if (!findings.empty()) return findings;  // all else would follow
+  if (!findings.empty()) return findings;  // all other checks would fail too
   findings = judgePosesByGyro(poses, recording);
   if (findings.empty() && (use.images || recording.imu.empty())) {
     const CameraCalibration& camera = recording.calibration.cameras.front();
@@ -96,7 +96,7 @@ replay::DataFindings checkPoses(const replay::Recording& recording, const replay
     findings = judgePosesByImages(poses, turns, recording);
     if (findings.empty()) findings = judgePoseTurns(turns, samples, camera);
   }
-  if (!findings.empty()) return findings;  // accelerations would follow
+  if (!findings.empty()) return findings;  // accelerations would fail too
   findings = judgePoseMoving(poses, recording);
   if (findings.empty()) findings = judgePoseAxes(poses, recording);
   if (findings.empty()) findings = judgePoseUnit(poses, recording);

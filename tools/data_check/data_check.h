@@ -1,4 +1,4 @@
-// The checks of a recording that pipeline, demo and doctor make before anything runs.
+// Checks of a recording that pipeline, demo and doctor run first.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -8,19 +8,19 @@
 
 namespace perdure::tools {
 
-/// Those of common/replay, and where images and samples are used whether they turn alike. Images
-/// are only looked at where `use.images`; takes some tenths of a second.
+/// Runs the checks of common/replay, and compares the rotation of images and IMU if both are used.
+/// Images are only read if `use.images` is set; this takes some tenths of a second.
 replay::DataFindings checkDrive(const replay::Recording& recording, const replay::DataUse& use);
 
-/// Whether poses that are given turn and accelerate as the IMU says; and whether the images turn
-/// with them, where `use.images` or where there is no IMU.
+/// Checks whether given poses rotate and accelerate as the IMU measured. Compares them with the
+/// image rotation too if `use.images` is set or if there is no IMU.
 replay::DataFindings checkPoses(const replay::Recording& recording, const replay::PoseFile& file,
                                 const replay::DataUse& use);
 
 /// A list of {grade, code, text}.
 nlohmann::ordered_json toJson(const replay::DataFindings& findings);
 
-/// The recording's notes and what is doubtful, a line each, on standard error.
+/// Prints the recording's notes and the doubtful findings on standard error, one line each.
 void printDoubts(const replay::Recording& recording, const replay::DataFindings& findings);
 
 }  // namespace perdure::tools

@@ -26,16 +26,16 @@ double middleOf(std::vector<double> values) {
 
 constexpr double kLeastScale = 1e-5;
 
-/// A rotation, the direction of the way, and how well both explain the flow.
+/// A rotation, the direction of translation, and the median error of the flow that they predict.
 struct Motion {
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero(), way = Eigen::Vector3d::UnitX();
   double error = 0.0;  ///< median, rad
 };
 
-/// step = ray × rotation, for all points.
+/// Solves step = ray × rotation for all points.
 Motion withoutWay(const std::vector<Flow>& flow) {
   Motion motion;
-  double scale = 1.0;  // the first round is plain least squares
+  double scale = 1.0;  // the first round is ordinary least squares
   for (int round = 0; round < 8; ++round) {
     Eigen::Matrix3d A = 1e-12 * Eigen::Matrix3d::Identity();
     Eigen::Vector3d b = Eigen::Vector3d::Zero();
@@ -57,14 +57,14 @@ Motion withoutWay(const std::vector<Flow>& flow) {
   return motion;
 }
 
-/// How far the flow of one point lies off its epipolar line, and what changes that.
+/// Distance of a point's flow from its epipolar line, and its derivatives.
 struct Off {
   double value;
   Eigen::Vector3d by_rotation, by_way;
 };
 
 Off offOf(const Flow& one, const Motion& motion) {
-  // A point near the focus of expansion has no line; its weight falls to nothing there.
+  // A point near the focus of expansion has no epipolar line; its weight tends to zero.
   constexpr double kNear = 0.05;
   const Eigen::Vector3d left = one.step - one.ray.cross(motion.rotation);
   const Eigen::Vector3d normal = motion.way.cross(one.ray);
@@ -116,7 +116,7 @@ std::vector<Flow> flowBetween(const CameraModel& camera, const FollowedImage& fi
   std::vector<uchar> found;
   std::vector<float> error;
   cv::calcOpticalFlowPyrLK(first.pyramid, second.pyramid, from, to, found, error, kWindow, kLevels);
-  // Who does not come back to where it began was lost on the way.
+  // Rejects points that backward tracking does not return to their origin.
   std::vector<cv::Point2f> back;
   std::vector<uchar> found_back;
   cv::calcOpticalFlowPyrLK(second.pyramid, first.pyramid, to, back, found_back, error, kWindow,
@@ -138,7 +138,7 @@ std::vector<Flow> flowBetween(const CameraModel& camera, const FollowedImage& fi
 Eigen::Vector3d rotationOf(const std::vector<Flow>& flow) {
   const Motion plain = withoutWay(flow);
   Motion best = plain;
-  constexpr double kApart = 2.0;  // a way explains that much better, or there is none to see
+  constexpr double kApart = 2.0;  // least ratio of errors at which the translation is significant
   best.error = plain.error / kApart;
   constexpr std::array<std::array<double, 3>, 7> kWays{
       {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 1}, {-1, 1, 1}, {1, -1, 1}, {1, 1, -1}}};

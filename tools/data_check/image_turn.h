@@ -1,5 +1,6 @@
-// How a camera turned between two images, its own way apart: what a way adds to the flow of a point
-// lies along the point's epipolar line, so that only the flow across it tells of the turn.
+// Estimates the rotation of a camera between two images independent of its translation. Translation
+// moves a point along its epipolar line, so that only the flow across the line depends on the
+// rotation.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,10 +12,10 @@
 namespace perdure::tools {
 
 struct Flow {
-  Eigen::Vector3d ray, step;  ///< unit, in C; and by how much it moved
+  Eigen::Vector3d ray, step;  ///< unit ray in C, and its change
 };
 
-/// An image with what is needed to follow its corners; empty without one.
+/// An image with the pyramid for tracking; empty without an image.
 struct FollowedImage {
   cv::Mat image;
   std::vector<cv::Mat> pyramid;
@@ -24,12 +25,12 @@ struct FollowedImage {
   bool empty() const { return image.empty(); }
 };
 
-/// Of corners that can be followed; empty where there are too few.
+/// Flow of the corners that can be tracked; empty if they are too few.
 std::vector<Flow> flowBetween(const CameraModel& camera, const FollowedImage& first,
                               const FollowedImage& second);
 
-/// The small rotation of the camera, rad in C. The way is left out only where the flow shows one:
-/// where all is far, the flow along the lines tells of the turn, too.
+/// The small rotation of the camera, rad in C. Translation is only estimated if the flow shows one.
+/// If all points are far, the flow along the lines also depends on the rotation.
 Eigen::Vector3d rotationOf(const std::vector<Flow>& flow);
 
 }  // namespace perdure::tools

@@ -75,7 +75,7 @@ void copyWhole(const fs::path& from, const fs::path& to) {
   if (error) throwUnwritten(to, error.message());
 }
 
-/// Writes an image of a recording; false where it has none that can be read.
+/// Writes an image stored in the recording file; returns false if it cannot be read.
 bool writeLoaded(const Recording::FrameFile& file, const fs::path& stem, std::string& extension) {
   const auto frame = file.load();
   if (!frame) return false;
@@ -95,7 +95,7 @@ bool writeLoaded(const Recording::FrameFile& file, const fs::path& stem, std::st
   return true;
 }
 
-/// Writes the image under its stamp; nothing where it cannot be read.
+/// Writes the image under its stamp; returns nothing if it cannot be read.
 std::optional<std::string> writeImage(const Recording::FrameFile& file, const fs::path& folder) {
   const std::string stem = std::to_string(toNanoseconds(file.time));
   std::string extension;
@@ -152,7 +152,7 @@ void writeSamples(const Recording& recording, const fs::path& mav0) {
   if (!recording.speed.empty()) write(mav0 / "speed0" / "data.csv", speed);
 }
 
-/// The images may lie behind links of a mended drive.
+/// Refuses a target inside the source. Resolves links, because a fixed drive links its images.
 void refuseSource(const Recording& recording, const fs::path& copy) {
   std::set<fs::path> folders;
   for (const auto& frame : recording.frames) {

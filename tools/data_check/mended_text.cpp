@@ -60,8 +60,8 @@ Table tableOf(const fs::path& file) {
   return table;
 }
 
-/// `text`, with or without an exponent, times 10^places as whole nanoseconds; nothing where it is
-/// no decimal number, or too large.
+/// `text`, with or without an exponent, times 10^places as an integer number of nanoseconds. Empty
+/// if it is not a decimal number, or too large.
 std::optional<std::string> shifted(std::string_view text, std::size_t places) {
   text = replay::trim(text);
   std::int64_t exponent = 0;
@@ -80,14 +80,14 @@ std::optional<std::string> shifted(std::string_view text, std::size_t places) {
   if (digits.empty() || !number) return std::nullopt;
   const auto whole =
       static_cast<std::int64_t>(point) + exponent + static_cast<std::int64_t>(places);
-  // Beyond a nanosecond nothing is known.
+  // Digits below a nanosecond are dropped.
   digits.resize(static_cast<std::size_t>(std::max<std::int64_t>(whole, 0)), '0');
   digits.erase(0, digits.find_first_not_of('0'));
   if (digits.empty()) digits = "0";
   return replay::parseNanoseconds(digits) ? std::optional(digits) : std::nullopt;
 }
 
-/// How many digits the stamps are short of nanoseconds; 0 where they are nanoseconds.
+/// Number of decimal places from the unit of the stamps to nanoseconds; 0 if they are nanoseconds.
 std::size_t placesShort(const Table& table) {
   std::size_t others = 0;
   std::vector<double> values;
@@ -104,11 +104,11 @@ std::size_t placesShort(const Table& table) {
   return middle >= 1e14 ? 3 : middle >= 1e11 ? 6 : 9;
 }
 
-/// Where they are whole numbers: by how many digits those of IMU and camera are short, seen in
+/// For integer stamps: decimal places from the unit of IMU and camera to nanoseconds, detected from
 /// their rates.
 struct WholeUnit {
   std::size_t places = 0;
-  double least = 0.0, most = 0.0;  ///< stamps of that unit, some beyond those of the two
+  double least = 0.0, most = 0.0;  ///< range of stamps in that unit, with a margin
 };
 
 std::vector<TimePoint> wholeStampsOf(const Table& table) {
@@ -132,7 +132,7 @@ WholeUnit wholeUnitOf(const fs::path& mav0) {
           static_cast<double>(toNanoseconds(*most) + length)};
 }
 
-/// Truth and speed may be on the same clock in nanoseconds already.
+/// Tested for each table, because ground truth and speed may already be in nanoseconds.
 bool isOf(const WholeUnit& unit, const Table& table) {
   if (unit.places == 0 || table.rows.empty()) return false;
   const auto stamp = replay::parseNumber(table.rows[table.rows.size() / 2][0]);
@@ -172,7 +172,7 @@ Column columnNamed(const std::string& name) {
   return force ? Column::kForce : Column::kOther;
 }
 
-/// The axis that a name has as a word of its own, or as its last letter before a unit; else 0.
+/// The axis letter that is a separate word of the name, or its last letter before a unit; else 0.
 char axisOf(const std::string& name) {
   const std::string bare = name.substr(0, name.find_first_of("[("));
   const auto letter = [&](std::size_t i) {
@@ -210,7 +210,7 @@ std::optional<Six> byHead(const Table& table, std::size_t columns) {
   return turns;
 }
 
-/// The median of the length of `count` columns from `first` on, and how far it departs from it.
+/// The median length of `count` columns from `first` on, and the deviation from it.
 struct Length {
   double median = 0, spread = 0;
 };
@@ -231,8 +231,8 @@ Length lengthOf(const Table& table, std::size_t first, std::size_t count) {
   return {median, std::max(median - lengths.front(), lengths.back() - median)};
 }
 
-/// Without a head: four columns of length 1 in every row are a quaternion, and of the other two
-/// threes exactly one measures gravity.
+/// For a table without a header. Four columns of length 1 in every row are a quaternion, and
+/// exactly one of the two other triples measures gravity.
 std::optional<Six> byQuaternion(const Table& table, std::size_t columns) {
   if (columns != 11) return std::nullopt;
   std::optional<std::size_t> at;
@@ -273,7 +273,7 @@ bool mendColumns(Table& table, std::vector<std::string>& mends) {
                     table.file.string(), columns, kSeven));
   }
   for (auto& row : table.rows) {
-    if (row.size() != columns) continue;  // the reader counts it
+    if (row.size() != columns) continue;  // the reader reports this row
     std::vector<std::string> kept = {row[0]};
     for (const std::size_t i : *six) kept.push_back(row[i]);
     row = std::move(kept);
@@ -294,7 +294,7 @@ void writeTable(const Table& table, const fs::path& to) {
   writeChecked(to, text);
 }
 
-/// Links to all that lies in `from`, but for the names in `without`.
+/// Links everything in `from` except the names in `without`.
 void linkAll(const fs::path& from, const fs::path& to, const std::string& without) {
   fs::create_directories(to);
   for (const auto& entry : fs::directory_iterator(from)) {

@@ -1,6 +1,6 @@
-// What `perdure doctor --fix` mends before a drive can be read at all: the tables of a folder in
-// EuRoC's layout whose stamps are not nanoseconds, or whose samples have an orientation beside
-// them.
+// Fixes of `perdure doctor --fix` that are needed before a drive can be read. They concern tables
+// in the layout of EuRoC with stamps that are not nanoseconds, or with an orientation beside the
+// samples.
 #pragma once
 
 #include <filesystem>
@@ -9,19 +9,19 @@
 
 namespace perdure::tools {
 
-/// A folder of links to a drive, with its mended tables; gone with this object.
+/// A folder of links to a drive, with its fixed tables. The destructor removes it.
 class MendedText {
  public:
-  /// Nothing is written where nothing of this kind is to be mended. Throws StartupError(kData)
-  /// where a mend is needed and not sure, kUnavailable where the folder cannot be made.
+  /// Writes nothing if no such fix is needed. Throws StartupError: kData if a fix is needed but
+  /// uncertain, kUnavailable if the folder cannot be created.
   explicit MendedText(const std::filesystem::path& drive);
   ~MendedText();
   MendedText(const MendedText&) = delete;
   MendedText& operator=(const MendedText&) = delete;
 
-  /// What is to be read: `drive` itself where nothing was mended.
+  /// The folder to read: `drive` itself if nothing was fixed.
   const std::filesystem::path& drive() const { return drive_; }
-  const std::vector<std::string>& mends() const { return mends_; }  ///< a sentence each
+  const std::vector<std::string>& mends() const { return mends_; }  ///< one sentence for each fix
 
  private:
   std::filesystem::path drive_, temporary_;

@@ -31,8 +31,8 @@ Frames firstCamera(const Recording& recording) {
   return frames;
 }
 
-/// By how much each pair's turn differs from the one before; 0 where there are no samples. A turn
-/// that lasts tells nothing of the time.
+/// Difference of each pair's rotation from the previous one; 0 without samples. A constant rotation
+/// contains no information about the time offset.
 std::vector<double> liveliness(const Frames& frames, const std::vector<ImuSample>& samples) {
   const TurnIntegral gyro(samples);
   std::vector<double> values(frames.empty() ? 0 : frames.size() - 1, 0.0);
@@ -44,7 +44,8 @@ std::vector<double> liveliness(const Frames& frames, const std::vector<ImuSample
   return values;
 }
 
-/// Runs of pairs that follow each other, so that each image is decoded once: the liveliest ones.
+/// Runs of consecutive pairs with the largest changes. Consecutive pairs need each image decoded
+/// only once.
 using Run = std::pair<std::size_t, std::size_t>;
 std::vector<Run> liveliestRuns(const std::vector<double>& values, std::size_t most) {
   constexpr std::size_t kRuns = 3;
@@ -84,7 +85,7 @@ std::vector<Turn> turnsOfRun(const Frames& frames, const CameraCalibration& cali
   return turns;
 }
 
-/// Of the images (reference) and of the gyroscope so much later.
+/// Rotations of the images (reference) and of the gyroscope, shifted by `later`.
 TurnPairs pairsOf(const std::vector<Turn>& turns, const TurnIntegral& gyro, double later_s) {
   const Duration later = durationFromSeconds(later_s);
   std::vector<Eigen::Vector3d> images, said;
@@ -96,15 +97,15 @@ TurnPairs pairsOf(const std::vector<Turn>& turns, const TurnIntegral& gyro, doub
   return {images, said};
 }
 
-constexpr double kEnough_px = 2.0;    ///< of turning between two images, to tell
-constexpr double kExplained = 0.3;    ///< of the turning is unexplained at most where all is well
-constexpr double kUnexplained = 0.7;  ///< and at least where it is not
+constexpr double kEnough_px = 2.0;    ///< least rotation between two images for a judgement
+constexpr double kExplained = 0.3;    ///< largest unexplained share of good data
+constexpr double kUnexplained = 0.7;  ///< least unexplained share of faulty data
 
-/// Whether rates are what the images show in degrees: more than anything carried turns by, or of
-/// one course with the images and 57 times as large, or, where T_BS may be wrong, too, so large
-/// while the images clearly turn.
+/// Whether rates are the image rotation in degrees. Either they are faster than any carried sensor,
+/// or they are proportional to the image rotation and about 57 times as large. Because T_BS may be
+/// wrong too, the ratio alone suffices if the images clearly rotate.
 bool isInDegrees(const TurnPairs& pairs, double pair_s, const CameraCalibration& camera) {
-  constexpr double kClearly_px = 1.0, kCommon = 0.5, kFastest = 4.0;  // rad/s, in the mean
+  constexpr double kClearly_px = 1.0, kCommon = 0.5, kFastest = 4.0;  // px; share; rad/s, mean
   if (pairs.turningOfGiven() > kFastest * pair_s) return true;
   const double ratio = pairs.turningOfGiven() / std::max(1e-9, pairs.turning());
   const Eigen::Matrix3Xd said = camera.T_BC.R().transpose() * pairs.given;
@@ -117,7 +118,7 @@ bool isInDegrees(const TurnPairs& pairs, double pair_s, const CameraCalibration&
          ratio < 2.0 * kDegrees;
 }
 
-/// Of a unit: rates that are far larger or smaller than what the images show.
+/// Judges the unit: rates that are far larger or smaller than the image rotation.
 replay::DataFindings judgeScale(const TurnPairs& pairs, double pair_s,
                                 const CameraCalibration& camera) {
   const double gyro = pairs.turningOfGiven(), images = pairs.turning(), focal = camera.fx;
@@ -152,7 +153,7 @@ replay::DataFindings judgeScale(const TurnPairs& pairs, double pair_s,
   return {};
 }
 
-/// The time that must be added to the images' stamps, where it explains the turning, and `clearly`
+/// The time to add to the images' stamps. Returned only if it explains the rotation, and `clearly`
 /// times as well as `camera.time_offset_s` does.
 std::optional<double> betterOffset(const std::vector<Turn>& turns, const TurnIntegral& gyro,
                                    const CameraCalibration& camera, double most_s, double clearly) {
@@ -163,7 +164,7 @@ std::optional<double> betterOffset(const std::vector<Turn>& turns, const TurnInt
   };
   double best = std::min(kExplained, leftAt(camera.time_offset_s) / clearly);
   std::optional<double> offset;
-  bool inside = false;  // at the edge of the search the best may lie beyond
+  bool inside = false;  // the optimum may be outside the search range
   const int steps = static_cast<int>(std::lround(100.0 * most_s));
   for (int step = -steps; step <= steps; ++step) {
     const double later = camera.time_offset_s + 0.01 * step;
@@ -176,7 +177,7 @@ std::optional<double> betterOffset(const std::vector<Turn>& turns, const TurnInt
   return inside ? offset : std::nullopt;
 }
 
-/// Of rates that are some tenths too large or small, where both sides agree on all else.
+/// Judges rates that are too large or too small by some tenths, if both sides agree otherwise.
 replay::DataFindings judgeFactor(const TurnPairs& pairs, const CameraCalibration& camera) {
   constexpr double kLeast = 0.1, kSurely = 3.0, kAgreed = 0.05;
   const Eigen::Matrix3Xd said = camera.T_BC.R().transpose() * pairs.given;
@@ -192,7 +193,7 @@ replay::DataFindings judgeFactor(const TurnPairs& pairs, const CameraCalibration
                        1.0 / shown, camera.name, pairs.count())}};
 }
 
-/// Of the images' stamps, s.
+/// Judges the images' stamps, in s.
 constexpr double kLongestOffset_s = 1.0, kOffsetClearly = 3.0;
 
 replay::DataFindings judgePlace(const std::vector<Turn>& turns, const TurnIntegral& gyro,
@@ -200,7 +201,7 @@ replay::DataFindings judgePlace(const std::vector<Turn>& turns, const TurnIntegr
   const Eigen::Matrix3d R_BC = camera.T_BC.R(), R_CB = R_BC.transpose();
   const double given = pairs.unexplained(R_CB);
   const double inverse = pairs.unexplained(R_BC);
-  // Where another rotation explains clearly more, as columns in another order do, it is no inverse.
+  // If another rotation, such as a column permutation, explains clearly more, T_BS is not inverted.
   const double least = pairs.unexplained(pairs.bestRotation());
   constexpr double kNoise = 0.05;
   if (given > kUnexplained && inverse < std::min(kExplained, 2.0 * least + kNoise)) {
@@ -211,7 +212,7 @@ replay::DataFindings judgePlace(const std::vector<Turn>& turns, const TurnIntegr
                  "inverse of Kalibr's T_cam_imu)",
                  camera.name, 100.0 * (1.0 - inverse), 100.0 * std::max(0.0, 1.0 - given))}};
   }
-  // What leaves less unexplained is short, and vio estimates it.
+  // A smaller unexplained share means a short offset, which vio estimates.
   constexpr double kShown = 0.02;
   if (given < kShown) return {};
   if (const auto later = betterOffset(turns, gyro, camera, kLongestOffset_s, kOffsetClearly)) {
@@ -240,7 +241,7 @@ std::vector<Turn> turnsOfImages(const Recording& recording, const std::vector<Im
   const Frames frames = firstCamera(recording);
   if (frames.size() < 2 || samples.size() < 2) return {};
   const CameraCalibration& calibration = recording.calibration.cameras.front();
-  // Files are read in parallel; what a recording loads comes from one place in it.
+  // Files are read in parallel; frames inside a recording file are read one after another.
   const bool files = !frames.front()->load;
   std::vector<std::future<std::vector<Turn>>> runs;
   for (const auto& run : liveliestRuns(liveliness(frames, samples), most)) {
@@ -293,7 +294,7 @@ replay::DataFindings judgePoseTurns(const std::vector<Turn>& turns,
                                     const std::vector<ImuSample>& samples,
                                     const CameraCalibration& camera) {
   constexpr double kLongest_s = 2.0, kLeast_s = 0.1, kClearly = 3.0;
-  CameraCalibration at_images = camera;  // poses are of the images' times
+  CameraCalibration at_images = camera;  // poses have the times of the images
   at_images.time_offset_s = 0.0;
   const TurnIntegral poses(samples);
   const TurnPairs pairs = pairsOf(turns, poses, 0.0);

@@ -1,8 +1,7 @@
-// Whether images turn as the gyroscope says: its unit, the camera's rotation on the IMU (T_BS given
-// the wrong way round) and the time between the two. Rotations between images are those that
-// explain the flow of their corners best (robust least squares; what the camera's own way adds is
-// an outlier or the same in all pairs); both sides are compared without their means, so that a bias
-// is none.
+// Checks whether images rotate as the gyroscope measures: its unit, the camera's rotation on the
+// IMU (inverted T_BS) and the time offset. Image rotations are robust least-squares fits to the
+// flow of corners; the effect of translation is an outlier, or the same in all pairs. Both sides
+// are compared without their means, so that a bias has no effect.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,33 +13,33 @@
 
 namespace perdure::tools {
 
-/// Between two images.
+/// Rotation between two images.
 struct Turn {
   TimePoint from, to;
   Eigen::Vector3d of_images = Eigen::Vector3d::Zero();  ///< rad, in C
 };
 
-/// Of up to `most` pairs of images of cam0 that follow each other, where the rate of turn that
-/// `samples` say changes most. Pairs with fewer than 15 corners that can be followed are left out.
+/// Rotations of up to `most` consecutive image pairs of cam0, chosen where the rates of `samples`
+/// change most. Pairs with fewer than 15 tracked corners are omitted.
 std::vector<Turn> turnsOfImages(const replay::Recording& recording,
                                 const std::vector<ImuSample>& samples, std::size_t most = 60);
 
 /// Codes: gyro_in_degrees, images_still, gyro_too_small, gyro_constant, gyro_factor, T_BS_inverted,
-/// T_BS_turned, time_offset. Nothing where images or gyroscope turn too little to tell.
+/// T_BS_turned, time_offset. Returns nothing if images or gyroscope rotate too little.
 replay::DataFindings judgeTurns(const std::vector<Turn>& turns,
                                 const std::vector<ImuSample>& samples,
                                 const CameraCalibration& camera);
 
-/// The camera's time offset, s, with which the gyroscope explains the images' turning, and three
-/// times as well as with the one given; nothing where none does.
+/// The camera's time offset in s with which the gyroscope explains the image rotation at least
+/// three times as well as with the given one. Returns nothing if there is no such offset.
 std::optional<double> offsetOfTurns(const std::vector<Turn>& turns,
                                     const std::vector<ImuSample>& samples,
                                     const CameraCalibration& camera);
 
-/// The rates of turn between poses that follow each other, as a gyroscope on B would say them.
+/// Rotation rates between consecutive poses, as a gyroscope on B would measure them.
 std::vector<ImuSample> turnsOfPoses(const std::vector<replay::StampedPose>& poses);
 
-/// Code: poses_time_offset. `samples`: turnsOfPoses.
+/// Code: poses_time_offset. `samples`: the result of turnsOfPoses.
 replay::DataFindings judgePoseTurns(const std::vector<Turn>& turns,
                                     const std::vector<ImuSample>& samples,
                                     const CameraCalibration& camera);

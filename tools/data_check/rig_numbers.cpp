@@ -22,15 +22,15 @@ std::string intrinsicsText(const CameraCalibration& camera) {
       camera.name, camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height);
 }
 
-/// Whether a principal point is near the middle, in shares of the image.
+/// Whether a principal point is near the centre; x and y as shares of the image.
 bool isCentral(double x, double y) {
   constexpr double kFar = 0.35;
   return std::abs(x - 0.5) < kFar && std::abs(y - 0.5) < kFar;
 }
 
 void checkIntrinsics(const CameraCalibration& camera, DataFindings& findings) {
-  constexpr double kLeastFocal = 0.1;  // of the width: a fisheye over 180 degrees has 0.3
-  constexpr double kApart = 1.5;       // of fx and fy
+  constexpr double kLeastFocal = 0.1;  // share of the width; a fisheye over 180 degrees has 0.3
+  constexpr double kApart = 1.5;       // ratio of fx and fy
   if (camera.width == 0 || camera.height == 0) return;
   const double width = camera.width, height = camera.height;
   if (std::min(camera.fx, camera.fy) < kLeastFocal * width) {
@@ -60,8 +60,8 @@ void checkIntrinsics(const CameraCalibration& camera, DataFindings& findings) {
                       : "whether they are of images of another size, or of images that were cut")});
 }
 
-/// Pixels, of a grid, that no direction in front of the camera is seen in: there the distorted
-/// radius shrinks again.
+/// Share of the pixels that no direction in front of the camera reaches, because the distorted
+/// radius decreases again. The pixels are on a grid.
 double shareOfFolds(const CameraCalibration& calibration) {
   constexpr int kGrid = 24;
   const CameraModel camera(calibration);
@@ -76,7 +76,7 @@ double shareOfFolds(const CameraCalibration& calibration) {
 }
 
 void checkLens(const CameraCalibration& camera, DataFindings& findings) {
-  // A fit often folds beyond the corners, where no corner of its board was.
+  // A fit often folds outside the area that the corners of its board covered.
   constexpr double kFew = 0.05, kMost = 0.5;
   if (camera.width == 0 || camera.height == 0) return;
   const double folds = shareOfFolds(camera);
@@ -110,7 +110,7 @@ void checkOffset(const CameraCalibration& camera, DataFindings& findings) {
 }
 
 void checkNoise(const ImuCalibration& imu, DataFindings& findings) {
-  constexpr double kGyro = 5e-3, kAccel = 0.3;  // the cheapest units have a fifth
+  constexpr double kGyro = 5e-3, kAccel = 0.3;  // the cheapest units have a fifth of these
   constexpr double kRadians = M_PI / 180.0;
   for (const auto& [value, name] :
        {std::pair(imu.gyro_noise, "gyroscope"), std::pair(imu.accel_noise, "accelerometer")}) {

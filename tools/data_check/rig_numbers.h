@@ -1,13 +1,14 @@
-// Numbers of a rig that cannot be what they stand for, without a look at the recording.
+// Checks the numbers of a rig for values that are impossible for any recording.
 #pragma once
 
 #include "common/replay/data_check.h"
 
 namespace perdure::tools {
 
-/// Codes: intrinsics_unit (fatal: focal lengths that are no pixels of this image), intrinsics_order
-/// (a principal point near the border, or focal lengths far apart), lens_folds (fatal where most of
-/// the image does), time_offset_large, readout_large, imu_noise_large, imu_noise_zero. Only what does not need the recording.
+/// Codes: intrinsics_unit (fatal: focal lengths that are not pixels of this image),
+/// intrinsics_order (a principal point near the border, or very different focal lengths),
+/// lens_folds (fatal if most of the image folds), time_offset_large, readout_large,
+/// imu_noise_large, imu_noise_zero.
 replay::DataFindings checkRigNumbers(const Calibration& calibration);
 
 }  // namespace perdure::tools

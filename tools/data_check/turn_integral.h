@@ -1,4 +1,4 @@
-// The rotation that a gyroscope's rates add up to, and how well two lists of turns agree.
+// Integrates the rates of a gyroscope, and compares two lists of rotations.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,13 +11,13 @@ namespace perdure::tools {
 
 class TurnIntegral {
  public:
-  /// `samples` by time; must outlive this.
+  /// `samples`: sorted by time; must outlive this object.
   explicit TurnIntegral(const std::vector<ImuSample>& samples);
-  /// Samples reach from one to the other without a hole.
+  /// Whether samples cover the interval without a gap.
   bool covers(TimePoint from, TimePoint to) const;
-  /// Orientation of B at a time that is covered, in B at the first sample.
+  /// Orientation of B at a covered time, relative to B at the first sample.
   Eigen::Quaterniond at(TimePoint time) const;
-  /// Rotation vector from one time to the other, both covered.
+  /// Rotation vector between two covered times.
   Eigen::Vector3d between(TimePoint from, TimePoint to) const;
 
  private:
@@ -25,27 +25,27 @@ class TurnIntegral {
 
   const std::vector<ImuSample>& samples_;
   std::vector<Eigen::Quaterniond> turned_;
-  std::vector<int> holes_;  ///< before each sample
+  std::vector<int> holes_;  ///< number of gaps before each sample
 };
 
-/// Two measurements of the same turns, without their means, in columns.
+/// Two measurements of the same rotations, without their means, in columns.
 struct TurnPairs {
   Eigen::Matrix3Xd reference, given;
 
   TurnPairs(const std::vector<Eigen::Vector3d>& reference,
             const std::vector<Eigen::Vector3d>& given);
   std::size_t count() const { return static_cast<std::size_t>(reference.cols()); }
-  /// Root of the mean square, rad: of the reference, and of those given.
+  /// RMS in rad: of the reference, and of the given rotations.
   double turning() const;
   double turningOfGiven() const;
-  /// Share of the reference that those given, turned by R, leave unexplained: 0 where all is
+  /// Share of the reference that the given rotations, rotated by R, do not explain; 0: all is
   /// explained.
   double unexplained(const Eigen::Matrix3d& R) const;
-  /// 0: they are the same; 1: one has nothing to do with the other; 2: they are opposite.
+  /// 0: equal; 1: uncorrelated; 2: opposite.
   double disagreement() const { return disagreementBy(Eigen::Matrix3d::Identity()); }
-  /// Of those given, turned by R.
+  /// Disagreement of the given rotations after rotation by R.
   double disagreementBy(const Eigen::Matrix3d& R) const;
-  /// The R that leaves least (Kabsch).
+  /// The R with the smallest unexplained share (Kabsch).
   Eigen::Matrix3d bestRotation() const;
 };
 

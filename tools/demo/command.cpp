@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A line that rewrites itself on a terminal; elsewhere one each tenth of the way.
+/// Shows the rendering progress: one updated line on a terminal, otherwise one line for each tenth.
 void showRendering(const SimulateProgress& progress) {
   const bool terminal = isatty(STDERR_FILENO) == 1;
   const std::size_t tenth = std::max<std::size_t>(1, progress.frames / 10);
@@ -36,7 +36,7 @@ void showRendering(const SimulateProgress& progress) {
 
 fs::path folderOfPrograms() { return fs::read_symlink("/proc/self/exe").parent_path(); }
 
-/// Where rendered drives of an installation are kept.
+/// Folder for the rendered drives of an installed Perdure.
 fs::path userCache() {
   const char* cache = std::getenv("XDG_CACHE_HOME");
   const char* home = std::getenv("HOME");
@@ -44,7 +44,7 @@ fs::path userCache() {
   return (home != nullptr ? fs::path(home) / ".cache" : fs::temp_directory_path()) / "perdure";
 }
 
-/// Fills in what was not given: folders, drive and network of the demo's own.
+/// Sets the missing options: folders, the demo's own drive and its network.
 void complete(DemoOptions& options, const std::atomic<bool>& interrupted) {
   if (options.programs.empty()) options.programs = folderOfPrograms().string();
   const fs::path installed = folderOfPrograms().parent_path() / "share" / "perdure";

@@ -1,5 +1,5 @@
-// `perdure demo`: the five services under supervision over a drive, and a report of what came out.
-// deploy/demo installs and builds, then calls it.
+// `perdure demo`: runs the five services under supervision over a drive and reports the results.
+// deploy/demo installs, builds and then calls it.
 #pragma once
 
 namespace CLI {

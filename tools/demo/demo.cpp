@@ -38,7 +38,7 @@ std::string contentsOf(const fs::path& file) {
   return text.str();
 }
 
-/// A domain that no other demo of this machine uses; the lock lasts as long as this process.
+/// Locks a DDS domain that no other demo of this host uses, until this process ends.
 void leaseDomain() {
   if (std::getenv("PERDURE_DOMAIN") != nullptr) return;
   constexpr int kFirst = 60, kLast = 99;
@@ -56,17 +56,17 @@ void leaseDomain() {
                      "PERDURE_DOMAIN to a free one");
 }
 
-/// As the services have it from the file beside their own.
+/// The bus options of the services, from bus.yaml beside their configuration.
 bus::Options busOptions(const fs::path& root) {
   std::vector<config::Problem> problems;
   bus::Options options = bus::commonOptions(root / "config", problems);
   config::refuse(problems);
-  options.shared_memory_mb = 0;  // it reads no images
+  options.shared_memory_mb = 0;  // the demo reads no images
   options.identity.clear();
   return options;
 }
 
-/// What a service said last, without the log's own lines.
+/// The last line of a service's log that is not an info line.
 std::string lastWords(const std::string& log_file) {
   std::istringstream lines(contentsOf(log_file));
   std::string last, line;
@@ -76,7 +76,7 @@ std::string lastWords(const std::string& log_file) {
   return last;
 }
 
-/// A short path: a unix socket's has at most 107 bytes.
+/// A short path, because the path of a Unix socket has at most 107 bytes.
 std::string socketFolder() {
   std::string name = (fs::temp_directory_path() / "perdure-demo-XXXXXX").string();
   if (mkdtemp(name.data()) == nullptr) {
@@ -219,7 +219,7 @@ bool Demo::over() {
   if (options_.seconds > 0 && reporter_->secondsOfDrive() >= options_.seconds) return true;
   const Health* capture = reporter_->healthOf("capture");
   if (capture == nullptr || capture->message != "end of drive") return false;
-  // Late detections may still come; what never comes is not waited for longer than the second.
+  // Detections may still arrive. The demo waits 1 s if all frames have objects, otherwise 5 s.
   const std::int64_t quiet = monotonicNs() - reporter_->lastMessageNs();
   return quiet > (reporter_->drained() ? kSecond : 5 * kSecond);
 }
@@ -227,7 +227,7 @@ bool Demo::over() {
 void Demo::checkServices() {
   const auto states = supervisor_->states();
   if (!states) {
-    if (supervisor_->alive()) return;  // busy; asked again soon
+    if (supervisor_->alive()) return;  // busy; retried at the next check
     throw StartupError(ExitCode::kFailure,
                        "supervisord has ended; see " + (folders_.run / "supervisord.log").string());
   }
@@ -269,7 +269,7 @@ void Demo::endOne(const std::string& service) {
   }
 }
 
-/// Truth that cannot be read is told where it is scored.
+/// Sets the ground truth for the pictures. An unreadable one is reported by the scoring.
 void Demo::setTruthOfPictures() {
   const auto data = dataOptions();
   auto truth = truth_ ? pictureTruthOfLabels(truth_->labels, truth_->calibration, outputs_->poses())

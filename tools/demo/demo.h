@@ -16,15 +16,16 @@ namespace perdure::tools {
 
 class Demo {
  public:
-  /// Checks data, model and configuration, starts everything. Throws StartupError with the mend.
+  /// Checks data, model and configuration, then starts everything. Throws StartupError with the
+  /// fix.
   Demo(const DemoOptions& options, const std::atomic<bool>& interrupted);
   ~Demo();
 
-  /// Until the drive ends and everything is drained, --seconds are over, or interrupted; then ends
-  /// the services in order (but with --keep) and writes the outputs. Throws StartupError where a
-  /// service cannot run.
+  /// Runs until the drive has ended and all data are processed, --seconds are over, or the demo is
+  /// interrupted. Then it ends the services in order (unless --keep is given) and writes the
+  /// outputs. Throws StartupError if a service cannot run.
   void run();
-  /// After the end of a drive with --keep: all goes on until it is interrupted, and is then ended.
+  /// Keeps everything running after the drive if --keep is given, until interrupted; then ends it.
   void keep();
 
  private:

@@ -1,4 +1,5 @@
-// How old a frame is when its objects arrive, and how much of that is not the network's own time.
+// Measures the age of a frame when its objects arrive, and the part of it that is not inference
+// time.
 #pragma once
 
 #include <cstdint>
@@ -10,25 +11,25 @@
 
 namespace perdure::tools {
 
-/// Of one host: ages are by CLOCK_MONOTONIC of capture. A frame counts once.
+/// Works on one host only, because ages use the CLOCK_MONOTONIC of capture. Counts each frame once.
 class LatencyMeter {
  public:
-  /// `now_ns` is when it arrived here.
+  /// `now_ns`: time of arrival at this process.
   void onObjects(const Objects& objects, std::int64_t now_ns);
   void onDetections(const Detections& detections);
 
   double last_ms() const { return last_ms_; }
-  /// {"latency_ms": {"median", "p99"}, "latency_beyond_network_ms": {…}}, from capture's handing
-  /// the frame out to the objects' arrival; beyond the network's is without Detections::forward_s,
-  /// over the frames whose detections say it.
+  /// {"latency_ms": {"median", "p99"}, "latency_beyond_network_ms": {…}}. The latency lasts from
+  /// the publication of the frame by capture to the arrival of its objects. The second one excludes
+  /// Detections::forward_s, over the frames whose detections contain it.
   nlohmann::ordered_json report() const;
 
  private:
   struct Frame {
     double age_ms = -1.0;      ///< below 0: no objects yet
-    double forward_ms = -1.0;  ///< below 0: not known
+    double forward_ms = -1.0;  ///< below 0: unknown
   };
-  std::map<std::uint64_t, Frame> frames_;  ///< by sequence number
+  std::map<std::uint64_t, Frame> frames_;  ///< key: sequence number
   double last_ms_ = 0.0;
 };
 

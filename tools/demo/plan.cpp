@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Where a folder of ours may be emptied: it holds this file.
+// File that marks a run folder of the demo, which may be emptied.
 constexpr char kMark[] = "supervisord.conf";
 
 [[noreturn]] void cannotUse(const fs::path& folder, const std::string& why) {
@@ -27,7 +27,7 @@ constexpr char kMark[] = "supervisord.conf";
       fmt::format("{} cannot be used: {}; give --out another folder", folder.string(), why));
 }
 
-/// "--set" arguments that make capture's pace of --rate.
+/// "--set" arguments that give capture the pace of --rate.
 std::vector<std::string> paceOf(const std::string& rate) {
   if (rate == "max") return {"pace.mode=follow"};
   double value = 0.0;
@@ -53,7 +53,7 @@ std::vector<std::string> settingsOf(const std::string& service, const DemoOption
   if (service == "map_store") return {"store.path=" + (folders.state / "map.sqlite").string()};
   if (service == "vio") {
     std::vector<std::string> settings = {"state.directory=" + folders.state.string()};
-    // A simulated folder with wheels is a car's, which slides neither sideways nor up.
+    // A simulated drive with wheel speed is from a car, which does not slip sideways or jump.
     const bool car = isSimulated(options.data) &&
                      fs::exists(fs::path(options.data) / "mav0" / "speed0" / "data.csv");
     if (car) settings.push_back("speed.planar=true");
@@ -91,7 +91,7 @@ ServicePlan planOf(const std::string& name, const DemoOptions& options, const De
   return plan;
 }
 
-/// As supervisord reads a command: in double quotes, with % doubled.
+/// Quotes a word for a command of supervisord: double quotes, and doubled % signs.
 std::string quoted(const std::string& word) {
   std::string text = "\"";
   for (const char c : word) {
@@ -192,9 +192,9 @@ std::string supervisorConfig(const std::vector<ServicePlan>& services, const Dem
   for (const ServicePlan& service : services) {
     std::string command;
     for (const std::string& word : service.command) command += quoted(word) + " ";
-    // supervisord expands stdout_logfile twice, all else once.
-    // Ended by a fault after its first second, a program is started again without delay, however
-    // often. One that cannot start is tried five times, 1, 2, 3, 4 seconds apart.
+    // supervisord expands stdout_logfile twice and everything else once. A program that fails after
+    // its first second is restarted immediately, without a limit. One that fails to start is tried
+    // five times, with pauses of 1, 2, 3 and 4 seconds.
     text += fmt::format(
         "\n[program:{}]\ncommand={}\ndirectory={}\npriority={}\nautorestart=unexpected\n"
         "exitcodes=0\nstartsecs=1\nstartretries=4\nstopsignal=TERM\nstopwaitsecs=5\n"

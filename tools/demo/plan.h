@@ -1,4 +1,4 @@
-// What the demo is asked for, and how the services are to be started for it.
+// Options of the demo, and the commands that start its services.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,56 +12,57 @@
 namespace perdure::tools {
 
 struct DemoOptions {
-  std::string data;   ///< empty: the drive that the demo renders for itself
-  std::string model;  ///< empty: the one in ROOT/models, for that drive only
+  std::string data;   ///< empty: the demo renders its own drive
+  std::string model;  ///< empty: the network in ROOT/models, only for that drive
   std::string sequence, out, rate = "1";
   std::string rig;                  ///< empty: the drive's own calibration
-  std::vector<std::string> topics;  ///< of a recording of ROS: "cam0=/left/image_raw"
-  std::string cache;       ///< where rendered drives are kept; empty: ROOT/out, or the user's cache
-  std::string root = ".";  ///< where config/ and models/ are
+  std::vector<std::string> topics;  ///< topics of a ROS recording: "cam0=/left/image_raw"
+  std::string cache;       ///< folder of rendered drives; empty: ROOT/out, or the user's cache
+  std::string root = ".";  ///< contains config/ and models/
   std::string programs;    ///< folder of the services; empty: that of this program
-  std::string truth;       ///< root of KITTI tracking; empty: looked for beside the data
+  std::string truth;       ///< root of KITTI tracking; empty: searched beside the data
   std::string truth_sequence;
-  double seconds = 0.0;      ///< of the drive; 0: all of it
-  int shared_memory_mb = 0;  ///< of images; 0: none
+  double seconds = 0.0;      ///< part of the drive; 0: all of it
+  int shared_memory_mb = 0;  ///< shared memory for images; 0: none
   bool headless = false;
-  bool keep = false;  ///< all goes on after the end of the drive, until it is interrupted
+  bool keep = false;  ///< keeps everything running after the drive, until interrupted
 };
 
-/// The services in the order in which they are ended: from the source to the store.
+/// The services in the order of their shutdown, from the source to the store.
 inline constexpr const char* kServices[] = {"capture", "inference", "vio", "semantic_filter",
                                             "map_store"};
-/// What only shows them; left out where its program is not installed.
+/// A service that only displays results; omitted if its program is not installed.
 inline constexpr const char kGateway[] = "gateway";
 
 struct ServicePlan {
-  std::string name;                  ///< "semantic_filter"
+  std::string name;                  ///< service name, such as "semantic_filter"
   std::vector<std::string> command;  ///< program and arguments
-  std::string log;                   ///< file
+  std::string log;                   ///< path of the log file
 };
 
-/// Folders of a demo's run, all absolute.
+/// Folders of a demo run, all absolute.
 struct DemoFolders {
   std::filesystem::path out, run, state;
 };
 
-/// Makes OUT and empties OUT/run, which is this command's own. Throws StartupError.
+/// Creates OUT and empties OUT/run, which belongs to this command. Throws StartupError.
 DemoFolders prepareFolders(const DemoOptions& options);
 
-/// What things of each class fill of their cuboids, by the filter's configuration in ROOT. Throws
-/// StartupError where that, or the class priors that it names, cannot be used.
+/// Shape points for each class within its cuboid, from the filter's configuration in ROOT. Throws
+/// StartupError if that configuration or its class priors cannot be used.
 std::map<std::string, std::vector<Eigen::Vector3d>> shapesFor(const DemoOptions& options);
 
-/// In the order of kServices. Throws StartupError where a program is missing or --rate is wrong.
+/// Plans the services in the order of kServices. Throws StartupError if a program is missing or
+/// --rate is invalid.
 std::vector<ServicePlan> planServices(const DemoOptions& options, const DemoFolders& folders);
 
-/// perdure-gateway on this port of loopback; nothing where it is not there.
+/// perdure-gateway on this port of the loopback interface; empty if it is not installed.
 std::optional<ServicePlan> planGateway(const DemoOptions& options, const DemoFolders& folders,
                                        std::uint16_t port);
-/// 8765 where nobody listens there, else any free one.
+/// Returns port 8765 if it is free, otherwise any free port.
 std::uint16_t freePort();
 
-/// The configuration of supervisord: a service that ends by a fault is started again at once.
+/// The configuration of supervisord, which immediately restarts a service that fails.
 std::string supervisorConfig(const std::vector<ServicePlan>& services, const DemoFolders& folders,
                              const std::string& socket, const std::filesystem::path& root);
 

@@ -1,4 +1,4 @@
-// Listens to a running system and writes down what came out: the files of `perdure pipeline`.
+// Subscribes to a running system and writes the files of `perdure pipeline`.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@
 
 namespace perdure::tools {
 
-/// Figures of one service over all of its processes: each start counts from 0.
+/// Sums the counts of one service over all of its processes, because each process counts from 0.
 class ServiceCounts {
  public:
   void add(const Health& health) { by_instance_[health.instance] = health; }
@@ -32,28 +32,28 @@ class ServiceCounts {
 
 class Reporter {
  public:
-  /// Subscribes. `loop` must outlive it and be run by the caller.
-  /// `shapes` are of the filter's class priors, for a network whose boxes enclose outlines.
+  /// Subscribes to the topics. `loop` must outlive the reporter, and the caller runs it. `shapes`
+  /// come from the filter's class priors, for a network whose boxes enclose outlines.
   Reporter(const bus::Participant& participant, bus::WaitLoop& loop, OutputWriter& outputs,
            std::map<std::string, ShapePoints> shapes);
 
-  /// Of what came so far.
+  /// Numbers of frames received so far.
   std::size_t odometryFrames() const { return odometry_.size(); }
   std::size_t objectFrames() const { return objects_.size(); }
   /// Index and sensor time of the newest frame with odometry.
   std::uint64_t newestFrame() const { return newest_frame_; }
   double secondsOfDrive() const { return toSeconds(newest_time_ - first_time_); }
-  /// The drive was given out to its end, and every frame that has odometry has objects.
+  /// Whether the drive has ended and every frame with odometry has objects.
   bool drained() const;
-  /// When the last message about a frame came, CLOCK_MONOTONIC.
+  /// Arrival of the last message about a frame, by CLOCK_MONOTONIC.
   std::int64_t lastMessageNs() const { return last_message_ns_; }
   const Health* healthOf(const std::string& process) const;
 
-  /// "frame 57/154  10.0 Hz  objects 9  latency 83 ms".
+  /// Progress text such as "frame 57/154  10.0 Hz  objects 9  latency 83 ms".
   std::string progressLine(std::size_t frames_in_all) const;
-  /// services, latency, counts of messages; restarts are the caller's.
+  /// Services, latency and message counts; the caller adds the restarts.
   nlohmann::ordered_json report() const;
-  /// Processor time a frame by service, as means over each second.
+  /// Processor time for each frame by service, averaged over each second.
   nlohmann::ordered_json timing() const;
 
  private:
@@ -86,7 +86,7 @@ class Reporter {
   std::map<std::string, std::vector<Span>> spans_;
 };
 
-/// CLOCK_MONOTONIC, as in FrameStamp::captured_ns.
+/// CLOCK_MONOTONIC in ns, as in FrameStamp::captured_ns.
 std::int64_t monotonicNs();
 
 }  // namespace perdure::tools

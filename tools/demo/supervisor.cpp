@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::chrono::seconds kPatienceAtEnd{15};
 
-/// The text of <value><TYPE>…</TYPE></value> that follows <name>`name`</name>.
+/// The text of <value><TYPE>…</TYPE></value> after <name>`name`</name>.
 std::string member(const std::string& xml, const std::string& name) {
   const auto at = xml.find("<name>" + name + "</name>");
   if (at == std::string::npos) return {};
@@ -125,7 +125,7 @@ Supervisor::Supervisor(const std::string& config_file, const std::string& socket
   if (!findProgram("supervisord")) {
     throwUnusable("supervisord is missing; install it with deploy/install --runtime");
   }
-  // In a session of its own: Ctrl-C is this program's business.
+  // Runs in its own session, so that only this program receives Ctrl-C.
   process_.emplace(ProgramOptions{.command = {"supervisord", "-n", "-c", config_file},
                                   .log = log,
                                   .own_session = true,

@@ -1,4 +1,5 @@
-// supervisord as a child: started, asked and told over its unix socket (XML-RPC), ended.
+// Runs supervisord as a child process: starts it, controls it by XML-RPC over its Unix socket, and
+// ends it.
 #pragma once
 
 #include <map>
@@ -17,30 +18,30 @@ struct ServiceState {
   bool ended() const { return state == "STOPPED" || state == "EXITED" || state == "FATAL"; }
 };
 
-/// The processes of an answer to supervisor.getAllProcessInfo. Empty where it is malformed.
+/// The processes in a response of supervisor.getAllProcessInfo. Empty if the response is malformed.
 std::map<std::string, ServiceState> readProcessInfo(const std::string& xml);
 
-/// How often supervisord's log says that each program was started.
+/// Counts the starts of each program in the log of supervisord.
 std::map<std::string, int> countSpawns(const std::string& log);
 
-/// The last exit status of each program that exited, by supervisord's log (its answers do not tell
-/// that of a program that ended too quickly).
+/// The last exit status of each program, from the log of supervisord. Its responses lack the status
+/// of a program that ended too quickly.
 std::map<std::string, int> lastExits(const std::string& log);
 
-/// Why supervisord ended at once, in its own words as its output has them; empty where it has none.
+/// The error in the output of supervisord if it ended at once; empty if there is none.
 std::string complaintIn(const std::string& output);
 
 class Supervisor {
  public:
-  /// Throws StartupError where supervisord is not installed, ends at once or does not answer.
+  /// Throws StartupError if supervisord is not installed, ends at once or does not respond.
   Supervisor(const std::string& config_file, const std::string& socket, const std::string& log);
-  /// Ends supervisord, and with it what still runs.
+  /// Ends supervisord and the programs that still run.
   ~Supervisor();
   Supervisor(const Supervisor&) = delete;
   Supervisor& operator=(const Supervisor&) = delete;
 
   Result<std::map<std::string, ServiceState>> states() const;
-  /// SIGTERM; returns at once.
+  /// Requests the end with SIGTERM and returns at once.
   void stop(const std::string& service) const;
   bool alive();
 

@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-/// Tracking sequences whose frames are those of a raw drive, one by one.
+/// The tracking sequence with the same frames as a raw drive; empty if there is none.
 std::string trackingSequenceOf(const fs::path& drive) {
   return drive.filename() == "2011_09_26_drive_0005_sync" ? "0000" : "";
 }
@@ -32,7 +32,7 @@ bool complete(const TruthFiles& files) {
   return !files.sequence.empty() && fs::exists(files.labels) && fs::exists(files.calibration);
 }
 
-/// A position in W for each label of a static car, the middle one by each axis.
+/// Median position in W over all labels of a static car, separately for each axis.
 Eigen::Vector3d middleOf(const std::vector<replay::KittiLabel>& labels, std::int64_t track,
                          const PosesByFrame& poses, const RigidTransform& T_RI) {
   std::array<std::vector<double>, 3> values;
@@ -52,7 +52,8 @@ Eigen::Vector3d middleOf(const std::vector<replay::KittiLabel>& labels, std::int
   return middle;
 }
 
-/// Each counted track, and the nearest car of the rows: FINAL has one place for each object.
+/// Lists each counted track with the nearest car of the rows. FINAL has one position for each
+/// object.
 Json parkedCars(const std::vector<replay::KittiLabel>& labels, const std::set<std::int64_t>& tracks,
                 const PosesByFrame& poses, const RigidTransform& T_RI,
                 const std::vector<EstimateRow>& rows) {

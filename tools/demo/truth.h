@@ -1,4 +1,4 @@
-// What is known of the drive's parked cars: compared with the map, where labels are at hand.
+// Compares the map with the parked cars of the drive, if labels exist.
 #pragma once
 
 #include <filesystem>
@@ -15,13 +15,13 @@ struct TruthFiles {
   std::string sequence;
 };
 
-/// --truth and --truth-sequence, or, for a KITTI drive that is a tracking sequence, a folder
-/// kitti_tracking near the data. Nothing where there are no labels. Throws StartupError where
-/// --truth was given and lacks them.
+/// Takes --truth and --truth-sequence. For a KITTI drive that is also a tracking sequence, it
+/// otherwise searches a folder kitti_tracking near the data. Empty if there are no labels. Throws
+/// StartupError if --truth was given and has none.
 std::optional<TruthFiles> findTruth(const DemoOptions& options);
 
-/// Copies labels and calibration to OUT/truth and compares OUT's tables with them: recall,
-/// precision, duplicates, position error (FINAL, 1 m), and the parked cars one by one.
+/// Copies labels and calibration to OUT/truth and compares the tables of OUT with them: recall,
+/// precision, duplicates, position error (FINAL, 1 m), and each parked car.
 nlohmann::ordered_json scoreAgainst(const TruthFiles& truth, const std::filesystem::path& out);
 
 }  // namespace perdure::tools

@@ -1,4 +1,5 @@
-// `perdure detect`: a network's detections of a dataset as a CSV that `--detections FILE` reads.
+// `perdure detect`: writes the detections of a network on a dataset as a CSV for `--detections
+// FILE`.
 #pragma once
 
 namespace CLI {

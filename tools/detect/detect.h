@@ -1,4 +1,5 @@
-// The inference service's own node over all frames of a dataset, its answers as a CSV.
+// Runs the node of the inference service over all frames of a dataset and writes its detections as
+// CSV.
 #pragma once
 
 #include <cstdint>
@@ -14,22 +15,23 @@ namespace perdure::tools {
 
 struct DetectOptions {
   std::filesystem::path data, out;
-  std::string sequence;  ///< of KITTI tracking, and of a 7-Scenes folder with several
+  std::string sequence;  ///< sequence of KITTI tracking, or of a 7-Scenes folder
   inference::Config inference;
 };
 
 struct DetectSummary {
   std::uint64_t frames = 0, failed = 0, boxes = 0;
-  double cpu_ms_median = 0.0;  ///< of a frame, all threads: picture to detections
+  double cpu_ms_median = 0.0;  ///< time for each frame, all threads: image to detections
 };
 
-/// frame,class,x1,y1,x2,y2,score,azimuth,sigma_azimuth,logit:<class>…; score and class are the
-/// largest of the soft-max of the K+1 activations that is no clutter.
+/// Columns: frame,class,x1,y1,x2,y2,score,azimuth,sigma_azimuth,logit:<class>…. The class is the
+/// one with the largest soft-max value of the K+1 activations, without clutter. The score is that
+/// value.
 void writeDetectionHeader(std::ostream& out, const ModelInfo& model);
 void writeDetection(std::ostream& out, const ModelInfo& model, std::uint64_t frame,
                     const Detection& detection);
 
-/// Throws StartupError where the data, the network or `out` cannot be used. `report` may be empty.
+/// Throws StartupError if the data, the network or `out` cannot be used. `report` may be empty.
 DetectSummary detect(const DetectOptions& options,
                      const std::function<void(std::uint64_t done, std::uint64_t all)>& report);
 

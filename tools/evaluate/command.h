@@ -1,5 +1,5 @@
-// `perdure evaluate {objects,trajectory,consistency,memory}`: objects and trajectory against the
-// truth, whether their covariances are as large as their errors, and whether ids last.
+// `perdure evaluate {objects,trajectory,consistency,memory}`: compares objects and trajectory with
+// ground truth. Also judges whether covariances match the errors, and whether ids persist.
 #pragma once
 
 namespace CLI {

@@ -1,4 +1,4 @@
-// `perdure evaluate consistency`: ANEES of the map's objects and of odometry against truth.
+// `perdure evaluate consistency`: ANEES of the map's objects and of odometry against ground truth.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -28,7 +28,8 @@ struct Consistency {
   std::optional<OdometryScore> odometry;
 };
 
-/// The truth's world in the run's, by yaw and position at the first pose that both know.
+/// Transform from the ground truth's world to the run's, by yaw and position at their first common
+/// pose.
 RigidTransform alignedAtTheStart(const SimulatedTruth& truth,
                                  const std::vector<replay::StampedPose>& trajectory) {
   for (const auto& pose : trajectory) {
@@ -91,7 +92,7 @@ void print(const Consistency& consistency) {
   }
 }
 
-/// Without a sequence: the folder's own true trajectory, or that of a TUM file.
+/// Without a sequence: the true trajectory of a dataset folder, or of a TUM file.
 replay::PoseFile truePoses(const std::string& truth) {
   if (!fs::is_directory(truth))
     return replay::PoseFile::read(truth, "--truth takes a file of poses or a dataset folder");

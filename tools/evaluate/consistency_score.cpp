@@ -40,7 +40,7 @@ MapBelief beliefOf(const nlohmann::json& json) {
   return belief;
 }
 
-/// The nearest true object of the class that stands and is there when it was last seen.
+/// The nearest static true object of the same class that is present when the belief was last seen.
 std::optional<std::size_t> partnerOf(const MapBelief& belief, const sim::Truth& truth,
                                      const RigidTransform& T_WT, double within) {
   std::optional<std::size_t> best;
@@ -211,7 +211,7 @@ std::pair<double, double> RunAnees::band() const {
 
 ConsistencyScore scoreConsistency(const std::vector<MapBelief>& beliefs, const sim::Truth& truth,
                                   const RigidTransform& T_WT, double within) {
-  std::map<std::size_t, std::pair<double, const MapBelief*>> nearest;  // by true object
+  std::map<std::size_t, std::pair<double, const MapBelief*>> nearest;  // key: true object
   ConsistencyScore score;
   std::uint64_t asked = 0;
   for (const auto& belief : beliefs) {

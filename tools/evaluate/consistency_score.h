@@ -1,6 +1,6 @@
-// Whether the map's covariances are honest: normalised squared errors of its objects against exact
-// truth, and their means (ANEES) with the χ² band (Bar-Shalom et al., "Estimation with
-// Applications to Tracking and Navigation", 5.4).
+// Checks whether covariances are consistent, by normalised estimation errors squared of the map's
+// objects against exact ground truth. Their mean (ANEES) is compared with its χ² band (Bar-Shalom
+// et al., "Estimation with Applications to Tracking and Navigation", 5.4).
 #pragma once
 
 #include <Eigen/Core>
@@ -18,7 +18,7 @@
 
 namespace perdure::tools {
 
-/// An object of objects.json, by the Gaussian of its most probable class.
+/// An object of objects.json, with the Gaussian of its most probable class.
 struct MapBelief {
   std::uint64_t id = 0;
   std::string class_name;
@@ -27,67 +27,68 @@ struct MapBelief {
   Matrix7d covariance = Matrix7d::Identity();
   TimePoint last_seen;
 };
-/// Throws StartupError(kUnavailable) where the file is missing or is none.
+/// Throws StartupError(kUnavailable) if the file is missing or invalid.
 std::vector<MapBelief> readBeliefs(const std::filesystem::path& file);
 
-/// Squared errors over their covariance: of dof degrees each, chi-square where it is honest.
+/// Normalised squared errors with `dof` degrees of freedom each; chi-square for a consistent
+/// estimate.
 struct Anees {
   std::string what;
   int dof = 1;
   std::vector<double> nees;
 
-  double mean() const;          ///< per degree of freedom: 1 where it is honest; 0 of none
-  double median() const;        ///< of nees, not per degree
-  double within3Sigma() const;  ///< share
-  std::pair<double, double> band() const;  ///< of mean() at 95 %, independent objects
+  double mean() const;                     ///< per degree of freedom: 1 if consistent; 0 if empty
+  double median() const;                   ///< median of nees, not per degree of freedom
+  double within3Sigma() const;             ///< share within 3 standard deviations
+  std::pair<double, double> band() const;  ///< 95 % band of mean(), independent objects
 };
 
-/// The same over seeded runs. What one run has in common, its poses' errors, makes its objects err
-/// alike: a run counts as one.
+/// ANEES over several runs with different seeds. A run counts as one sample, because its pose
+/// errors affect all of its objects alike.
 struct RunAnees {
   std::string what;
   int dof = 1;
-  std::vector<double> means;  ///< of each run, per degree of freedom
+  std::vector<double> means;  ///< mean of each run, per degree of freedom
 
-  void add(const Anees& run);  ///< nothing of a run without objects
+  void add(const Anees& run);  ///< ignores a run without objects
   double mean() const;
-  double standardError() const;            ///< of mean(), by the spread of the runs
-  std::pair<double, double> band() const;  ///< of mean() at 95 %, one object a run
+  double standardError() const;            ///< standard error of the mean, from the runs
+  std::pair<double, double> band() const;  ///< 95 % band of mean(), one object in each run
 };
 
-/// A line of odometry.csv.
+/// A row of odometry.csv.
 struct OdometryRow {
   TimePoint time;
   std::uint64_t epoch = 0;
   RigidTransform T_WB;
   Eigen::Vector3d v_WB = Eigen::Vector3d::Zero();
-  Matrix9d covariance = Matrix9d::Zero();  ///< of [θ, p, v]: θ on the right, p and v in W
+  Matrix9d covariance = Matrix9d::Zero();  ///< order [θ, p, v]: θ on the right, p and v in W
 };
-/// Throws StartupError: kUnavailable where the file is missing, kData where a line is none.
+/// Throws StartupError: kUnavailable if the file is missing, kData if a row is invalid.
 std::vector<OdometryRow> readOdometry(const std::filesystem::path& file);
 
-/// Takes the truth's world into the run's, by position and by the turn about z that brings the two
-/// attitudes nearest to each other: of use for a body whose x axis points up, too.
+/// Transform from the ground truth's world to the run's, by position and by the rotation about z
+/// that best aligns the two attitudes. It also works for a body whose x axis points up.
 RigidTransform placedOn(const RigidTransform& T_WB, const RigidTransform& true_T_WB);
 
-/// Over the rows of a run. Those of one run are correlated: no band holds for their mean.
+/// Scores over the rows of a run. The rows are correlated, so that no band applies to their mean.
 struct OdometryScore {
   Anees orientation{"orientation of the body", 3, {}}, position{"position of the body", 3, {}},
       velocity{"velocity of the body", 3, {}};
 };
-/// The truth's W is placed on the run's at the first row of each epoch that
-/// both know, and never again. Rows without a true pose 10 ms to both sides are left out.
+/// The ground truth's W is aligned with the run's once, at the first common row of each epoch. Rows
+/// without a true pose within ±10 ms are omitted.
 OdometryScore scoreOdometry(const std::vector<OdometryRow>& rows, const replay::PoseFile& truth);
 
 struct ConsistencyScore {
   Anees position{"position", 3, {}}, yaw{"yaw", 1, {}},
       half_yaw{"yaw but for its half turns", 1, {}}, size{"size", 3, {}};
-  std::uint64_t objects = 0, left_out = 0;  ///< compared; of no true object or moving
+  std::uint64_t objects = 0, left_out = 0;  ///< left_out: without a partner, or moving
 };
 
-/// Each believed, standing object (existence over one half, named) with the true one of its class
-/// that is nearest, nearer than `within` metres and not nearer to another belief. T_WT takes the
-/// truth's world into the map's.
+/// Compares each static object with existence above one half and a class name. Its partner is the
+/// nearest true object of that class within `within` metres that is not nearer to another belief.
+/// T_WT transforms the ground truth's world to the map's.
 ConsistencyScore scoreConsistency(const std::vector<MapBelief>& beliefs, const sim::Truth& truth,
                                   const RigidTransform& T_WT, double within);
 

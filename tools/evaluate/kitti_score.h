@@ -1,4 +1,5 @@
-// Objects against KITTI tracking's labels: estimates are taken into rectified camera 0.
+// Scores objects against the labels of KITTI tracking; estimates are transformed to rectified
+// camera 0.
 #pragma once
 
 #include <filesystem>
@@ -9,7 +10,8 @@
 
 namespace perdure::tools {
 
-/// Maps a row from W into the camera; nothing where the centre is behind or outside the image.
+/// Transforms a row from W to the camera. Empty if the centre is behind the camera or outside the
+/// image.
 std::optional<Estimate> toCamera(const EstimateRow& row, const RigidTransform& T_RW,
                                  const replay::KittiCalibration& calibration);
 

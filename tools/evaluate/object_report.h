@@ -1,4 +1,4 @@
-// What report.json says of objects: FINAL under 1 m, any orientation, and the truth beside it.
+// Object scores for report.json: FINAL within 1 m, any orientation, and the copied ground truth.
 #pragma once
 
 #include <filesystem>
@@ -10,14 +10,13 @@
 
 namespace perdure::tools {
 
-/// recall, precision, duplicates (objects of the map for each true one that was found: 1 is
-/// perfect), position_error_m.
+/// recall, precision, duplicates (map objects for each true object found: 1 is perfect),
+/// position_error_m.
 nlohmann::ordered_json toReport(const ObjectScore& score);
 
-/// Copies all of the simulated folder but its images to OUT/truth, which is then a simulated folder
-/// for `perdure evaluate`, and scores OUT/objects_final.csv, all classes together, over the
-/// frames that were `used` (nothing: all). Throws StartupError where the folder or OUT lacks a
-/// part.
+/// Copies a simulated folder without its images to OUT/truth, which is then valid input for
+/// `perdure evaluate`. Scores OUT/objects_final.csv, all classes together, over the frames in
+/// `used` (empty: all). Throws StartupError if a part of the folder or of OUT is missing.
 nlohmann::ordered_json reportSimulated(const std::filesystem::path& folder,
                                        const std::filesystem::path& out,
                                        const std::optional<std::set<std::uint64_t>>& used = {});

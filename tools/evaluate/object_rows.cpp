@@ -31,7 +31,7 @@ std::optional<EstimateRow> readRow(const std::string& text) {
   return row;
 }
 
-using Ties = std::vector<std::pair<std::size_t, std::uint64_t>>;  // line of the trajectory, frame
+using Ties = std::vector<std::pair<std::size_t, std::uint64_t>>;  // trajectory row and frame
 
 Ties tieLines(const std::vector<replay::StampedPose>& poses, const std::vector<EstimateRow>& rows) {
   std::map<TimePoint, std::uint64_t> frame_at;
@@ -50,7 +50,8 @@ std::optional<std::uint64_t> multipleOfTenth(TimePoint time) {
   return static_cast<std::uint64_t>(ns / tenth);
 }
 
-/// The frame of line i by the ties around it, by time where its neighbours are not consecutive.
+/// The frame of row i by the ties around it, or by time if the rows between them are not
+/// consecutive frames.
 std::optional<std::uint64_t> frameOf(std::size_t i, const std::vector<replay::StampedPose>& poses,
                                      const Ties& ties) {
   if (ties.empty()) return multipleOfTenth(poses[i].time).value_or(i);

@@ -1,4 +1,4 @@
-// objects_inst.csv and objects_final.csv read back, and which frame each pose belongs to.
+// Reads objects_inst.csv and objects_final.csv, and finds the frame of each pose.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,13 +24,13 @@ struct EstimateRow {
   double length = 0, width = 0, height = 0, yaw = 0;
 };
 
-/// Throws StartupError(kData) that names each wrong line.
+/// Throws StartupError(kData) that names each invalid line.
 std::vector<EstimateRow> readObjectRows(const std::filesystem::path& file);
 
-/// The body's pose by frame index. A trajectory has times only; the rows of the CSV tie times to
-/// frames, stamps that are multiples of 0.1 s from 0 (KITTI tracking) tie themselves, and lines
-/// between tied ones are consecutive frames, or where they cannot be, placed by time. `used`: the
-/// frames of the run, where it was not over all: consecutive are then those of them.
+/// The body's pose by frame index. A trajectory contains times only. The CSV rows tie times to
+/// frames; without rows, stamps that are multiples of 0.1 s from 0 (KITTI tracking) give the frame.
+/// Rows between two ties are consecutive frames, or are assigned by time if that is impossible.
+/// `used`: the frames of the run if it skipped some; rows are then consecutive in these.
 std::map<std::uint64_t, RigidTransform> posesByFrame(
     const std::vector<replay::StampedPose>& poses, const std::vector<EstimateRow>& rows,
     const std::optional<std::set<std::uint64_t>>& used = {});

@@ -22,7 +22,7 @@ bool mayBe(const Estimate& estimate, const TruthLabel& label) {
   return label.class_name.empty() || label.class_name == estimate.class_name;
 }
 
-/// Pairs closer than d and a, greedily by increasing distance, one to one.
+/// Pairs within distance d and angle a, matched one-to-one, greedily by increasing distance.
 std::vector<Match> matchGreedily(const std::vector<TruthLabel>& truth,
                                  const std::vector<Estimate>& estimates, double d, double angle) {
   std::vector<Match> pairs;
@@ -59,7 +59,7 @@ double bestOverlap(const Box& box, const std::vector<TruthLabel>& labels) {
   return best;
 }
 
-/// What is remembered of one true object from frame to frame.
+/// State of one true object across frames.
 struct Track {
   std::uint64_t counted = 0, matched = 0, unmatched_since = 0;
   std::uint64_t last_id = 0;
@@ -104,7 +104,7 @@ void summarise(const std::map<std::int64_t, Track>& tracks, const ScoreOptions& 
   if (matched > 0) score.position_error_m /= matched;
 }
 
-/// Counts one frame under one pair of thresholds; `kinds` says which estimates are neutral.
+/// Counts one frame for one pair of thresholds; `neutral` marks the neutral estimates.
 void countCell(const std::vector<Match>& matches, std::size_t truths,
                const std::vector<bool>& neutral, bool strict, Cell& cell) {
   std::vector<bool> used(neutral.size());
@@ -119,7 +119,7 @@ void countCell(const std::vector<Match>& matches, std::size_t truths,
   }
 }
 
-/// The counted truth nearest to the estimate, where it is near.
+/// The counted true object nearest to the estimate, within kNear_m; otherwise null.
 const TruthLabel* nearestCounted(const Estimate& estimate, const TruthFrame& truth) {
   const TruthLabel* nearest = nullptr;
   double best = kNear_m;

@@ -28,9 +28,9 @@ struct ObjectsOptions {
 struct Evaluated {
   ObjectScore score;
   std::uint64_t estimates = 0, poses = 0;
-  std::string of;            ///< for people: which truth, which class
-  std::size_t left_out = 0;  ///< frames with truth that the run was not over
-  /// Frames between poses that have none, where nobody tells whether the run was over them.
+  std::string of;            ///< description of ground truth and class, for people
+  std::size_t left_out = 0;  ///< frames with ground truth that the run skipped
+  /// Frames without a pose between frames with one, if the run does not state which frames it used.
   std::size_t untold = 0;
 };
 

@@ -1,5 +1,5 @@
-// Whether probabilities are true: of all that was believed with .8, eight in ten should be so
-// (DeGroot and Fienberg, "The Comparison and Evaluation of Forecasters", 1983).
+// Checks whether probabilities are calibrated: of all claims with probability 0.8, eight in ten
+// should be true (DeGroot and Fienberg, "The Comparison and Evaluation of Forecasters", 1983).
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 
 namespace perdure::tools {
 
-/// What was believed with a probability in [0, 1], and whether it was so.
+/// A claim with its estimated probability in [0, 1], and whether it was true.
 struct Claim {
   double believed = 0.0;
   bool so = false;
@@ -17,23 +17,25 @@ struct Claim {
 
 struct ReliabilityBin {
   std::size_t count = 0;
-  double believed = 0.0, observed = 0.0;  ///< means; 0 of none
+  double believed = 0.0, observed = 0.0;  ///< means; 0 if empty
 };
 
 struct Reliability {
   std::string what;
   std::vector<Claim> claims;
 
-  /// Of equal width over [0, 1].
+  /// Bins of equal width over [0, 1].
   std::vector<ReliabilityBin> bins(std::size_t count = 10) const;
-  /// Expected calibration error: Σ |believed − observed| of the bins by their share of the claims.
+  /// Expected calibration error: Σ |believed − observed| of the bins, weighted by their share of
+  /// the claims.
   double calibrationError(std::size_t bins = 10) const;
   double brier() const;  ///< mean of (believed − so)²
-  /// 1 − brier over that of one who always says the share that is so; 0 where all is so, or none.
+  /// 1 − brier() divided by the score of a constant forecast of the observed share; 0 if all claims
+  /// are true or all are false.
   double skill() const;
 };
 
-/// A probability for each class that was thought of, and the one that it was.
+/// Estimated class probabilities of an object, and its true class.
 struct ClassClaim {
   std::map<std::string, double> believed;
   std::string is;
@@ -43,10 +45,10 @@ struct ClassReliability {
   std::string what;
   std::vector<ClassClaim> claims;
 
-  /// The most probable class of each, and whether it was that.
+  /// The most probable class of each claim, and whether it was correct.
   Reliability best() const;
   double brier() const;  ///< mean of Σ_k (believed_k − is_k)², in [0, 2]
-  /// 1 − brier over that of one who always says how frequent the classes are.
+  /// 1 − brier() divided by the score of a constant forecast of the class frequencies.
   double skill() const;
 };
 

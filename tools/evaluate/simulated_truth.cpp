@@ -15,7 +15,7 @@ namespace {
 constexpr double kWhollySeen = 0.9;
 constexpr char kToy[] = "toy";
 
-/// Takes points and yaws of one W into the camera and against the body's heading.
+/// Transforms points of W to the camera, and yaws relative to the body's heading.
 struct Eye {
   RigidTransform T_CW;
   double heading = 0.0;
@@ -34,7 +34,8 @@ bool insideImage(const Box& box, const CameraModel& camera) {
   return box.x1 >= 0 && box.y1 >= 0 && box.x2 <= camera.width() && box.y2 <= camera.height();
 }
 
-/// Of the corners that the camera's model can see, cut at the image; around the centre without any.
+/// Box of the corners that the camera can project, clipped to the image. Without any, a box around
+/// the centre.
 Box boxOf(const EstimateRow& row, const Eye& eye, const CameraModel& camera) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   Box box{kInfinity, kInfinity, -kInfinity, -kInfinity};

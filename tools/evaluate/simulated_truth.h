@@ -1,5 +1,5 @@
-// A simulated folder as truth for objects: the exact states of body and objects, and how much of
-// each is seen in each frame (the folder's files in place of labels).
+// A simulated folder as ground truth for objects: the exact states of body and objects, and the
+// visible share of each object in each frame.
 #pragma once
 
 #include <filesystem>
@@ -17,28 +17,29 @@ namespace perdure::tools {
 
 struct SimulatedTruth {
   sim::Truth truth;
-  replay::PoseFile body{replay::PoseFormat::kTum, {}};  ///< T_WB by time, W of the truth
+  replay::PoseFile body{replay::PoseFormat::kTum, {}};  ///< T_WB by time, W of the ground truth
   CameraModel camera;
-  std::vector<TimePoint> frames;  ///< of cam0, by index
+  std::vector<TimePoint> frames;  ///< times of cam0, by index
 
-  double frameInterval() const;  ///< seconds, the mean; 0.1 where there are fewer than two frames
+  double frameInterval() const;  ///< mean in seconds; 0.1 if there are fewer than two frames
 };
 
 bool isSimulated(const std::filesystem::path& folder);
-/// Throws StartupError(kUnavailable) with what is missing and the mend.
+/// Throws StartupError(kUnavailable) with the missing file and the fix.
 SimulatedTruth readSimulatedTruth(const std::filesystem::path& folder);
 
-/// Frames up to the trajectory's last, each in the camera: the truth through the exact state, the
-/// rows through the trajectory, headings about the vertical against the body's.
+/// Frames up to the last one of the trajectory, in the camera frame. Ground truth is transformed by
+/// the exact state, rows by the trajectory, and headings are about the vertical relative to the
+/// body.
 ///
-/// Counted: an object of any class but `toy` (of `class_name`, where given) that never moves, at
-/// least nine tenths of it in sight, its whole outline inside the image, at least 25 px tall. The
-/// others are ignored, but for toys: whatever is claimed where a toy is, is a false alarm. Rows of
-/// class `other` claim no class and are left out; so are rows of other classes than `class_name`.
+/// Counted objects have any class except `toy` (or `class_name`, if given) and never move. They are
+/// at least nine tenths visible, completely in the image, and at least 25 px tall. Other objects
+/// are ignored, except toys: an estimate at a toy is a false alarm. Rows of class `other` state no
+/// class and are omitted, as are rows of classes other than `class_name`.
 struct SimulatedRun {
   std::map<std::uint64_t, ScoredFrame> frames;
-  std::uint64_t estimates = 0;  ///< rows that were looked at
-  std::uint64_t outside = 0;    ///< of these, centre not in the image or frame without a pose
+  std::uint64_t estimates = 0;  ///< number of examined rows
+  std::uint64_t outside = 0;    ///< part of these: centre outside the image, or no pose
   std::uint64_t poses = 0;      ///< frames with a pose
 };
 SimulatedRun pairWithTruth(const SimulatedTruth& truth, const std::vector<EstimateRow>& rows,

@@ -1,4 +1,5 @@
-// `perdure evaluate trajectory`: a TUM file against a pose file or a dataset folder's own truth.
+// `perdure evaluate trajectory`: compares a TUM file with a pose file or the ground truth of a
+// dataset folder.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
@@ -27,11 +28,11 @@ struct TrajectoryOptions {
   bool json = false;
 };
 
-/// Truth by time, and the times at which a pose was to be expected (empty where nobody knows).
+/// True poses by time, and the times at which a pose is expected (empty if unknown).
 struct Truth {
   PoseFile poses{PoseFormat::kTum, {}};
   std::vector<TimePoint> frames;
-  std::vector<std::uint64_t> numbers;  ///< of the frames
+  std::vector<std::uint64_t> numbers;  ///< numbers of the frames
 };
 
 void readFrames(const std::string& folder, const std::string& sequence,
@@ -52,7 +53,7 @@ void readFrames(const std::string& folder, const std::string& sequence,
   }
 }
 
-/// KITTI's lines have no times: those of the frames, or 10 Hz from 0.
+/// Adds times to KITTI's lines: those of the frames, or 10 Hz from 0.
 PoseFile withTimes(const PoseFile& file, const std::vector<TimePoint>& frames) {
   if (file.format() == PoseFormat::kTum) return file;
   std::vector<replay::StampedPose> poses = file.poses();
@@ -83,12 +84,12 @@ struct Compared {
   TrajectoryScore score;
   double coverage = 0.0;
   std::size_t expected = 0;
-  std::size_t left_out = 0;  ///< frames that the run was not over
-  std::size_t untold = 0;    ///< between poses and without one; nobody tells why
+  std::size_t left_out = 0;  ///< frames that the run skipped
+  std::size_t untold = 0;    ///< frames between poses that lack one, for unknown reasons
 };
 
-/// Takes the times of frames out that the run was not over; their number. Its report may count the
-/// frames of other data than these: poses at times that would go say so.
+/// Removes the times of frames that the run skipped, and returns their number. Removes nothing if a
+/// pose has such a time, because the report then belongs to other data.
 std::size_t leaveOutUnused(const fs::path& run, const PoseFile& poses, Truth& truth) {
   const auto used = usedFramesOf(run);
   if (!used) return 0;
@@ -111,7 +112,7 @@ Alignment alignmentOf(const std::string& name) {
   return name == "yaw" ? Alignment::kYaw : Alignment::kRigid;
 }
 
-/// For people.
+/// Text for the alignment in the output.
 const char* nameOf(Alignment alignment) {
   switch (alignment) {
     case Alignment::kYaw:
@@ -152,7 +153,7 @@ Compared compare(const TrajectoryOptions& options) {
   result.left_out = left_out;
   if (!usedFramesOf(run)) result.untold = withoutPose(frames, file.poses());
   result.score = scoreTrajectory(pairs, alignmentOf(options.align));
-  // Frames that ought to have a pose: those of the dataset that the truth spans.
+  // Frames that should have a pose: those of the dataset within the time span of the ground truth.
   const auto expected = [&](TimePoint t) {
     return t >= begin && t >= poses.front().time && t <= poses.back().time;
   };

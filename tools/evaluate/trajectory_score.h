@@ -1,5 +1,5 @@
-// How far a trajectory is from truth: ATE after alignment, RPE, and KITTI's segment errors.
-// Source: Zhang and Scaramuzza, "A Tutorial on Quantitative Trajectory Evaluation" (IROS 2018);
+// Error of a trajectory against ground truth: ATE after alignment, RPE, and KITTI's segment errors.
+// Sources: Zhang and Scaramuzza, "A Tutorial on Quantitative Trajectory Evaluation" (IROS 2018);
 // Geiger et al., "Are we ready for autonomous driving?" (CVPR 2012) for t_err and r_err.
 #pragma once
 
@@ -19,30 +19,30 @@ struct PosePair {
 enum class Alignment {
   kYaw,    ///< position and yaw
   kRigid,  ///< position and rotation
-  kStart,  ///< position and yaw, of the first pose alone
+  kStart,  ///< position and yaw of the first pose only
 };
 
-/// T_GE with T_GE · estimate ≈ truth in the least-squares sense of positions, or of the first pair
-/// alone. At least one pair.
+/// T_GE with T_GE · estimate ≈ truth, by least squares of positions, or from the first pair only.
+/// Needs at least one pair.
 RigidTransform align(const std::vector<PosePair>& pairs, Alignment alignment);
 
 struct SegmentError {
-  std::vector<double> lengths_m;  ///< that were tried: 100–800 m, shorter where the drive is
+  std::vector<double> lengths_m;  ///< segment lengths: 100–800 m, or less for a short drive
   std::size_t segments = 0;
   double t_err_percent = 0.0, r_err_deg_per_m = 0.0;
 };
 
 struct TrajectoryScore {
   std::size_t poses = 0;
-  double length_m = 0.0;                     ///< of the truth
-  double ate_rmse_m = 0.0, ate_max_m = 0.0;  ///< after alignment
+  double length_m = 0.0;                     ///< length of the ground truth
+  double ate_rmse_m = 0.0, ate_max_m = 0.0;  ///< ATE after alignment
   double ate_rotation_deg = 0.0;             ///< RMSE after alignment
   double rpe_m = 0.0, rpe_deg = 0.0;         ///< RMSE over one second
-  double end_drift_m = 0.0;  ///< of the last pose, when the first ones are laid on each other
+  double end_drift_m = 0.0;  ///< error of the last pose, after alignment of the first ones
   SegmentError segments;
 };
 
-/// At least two pairs, by time.
+/// Needs at least two pairs, sorted by time.
 TrajectoryScore scoreTrajectory(const std::vector<PosePair>& pairs, Alignment alignment);
 
 }  // namespace perdure::tools

@@ -1,5 +1,5 @@
-// Which frames of the data a run was over: those that --every, --from and --seconds leave out are
-// no misses. The pipeline keeps it in report.json.
+// The frames of the data that a run used. Frames that --every, --from and --seconds skip are not
+// misses. The pipeline stores the list in report.json.
 #pragma once
 
 #include <cstdint>
@@ -17,23 +17,23 @@ namespace perdure::tools {
 
 using UsedFrames = std::set<std::uint64_t>;
 
-/// `frames` of report.json: their number, and [first, last, step] of each run of them.
+/// `frames` of report.json: their number, and [first, last, step] of each run of frames.
 nlohmann::ordered_json framesToJson(const UsedFrames& frames);
-/// Of RUN/report.json; nothing where it is not there or does not tell. Throws StartupError where it
-/// tells what cannot be.
+/// Reads RUN/report.json; empty if it is missing or has no frames. Throws StartupError if the
+/// frames are invalid.
 std::optional<UsedFrames> usedFramesOf(const std::filesystem::path& run);
-/// Frames of the data from one used one to the next; 1 where there are fewer than two.
+/// Number of frames of the data from one used frame to the next; 1 if there are fewer than two.
 double strideOf(const UsedFrames& frames);
 
-/// Frames between the first pose and the last one at whose times there is none. Where nobody tells
-/// which frames the run was over, they are misses, or --every has left them out.
+/// Number of frames without a pose between the first pose and the last one. If the used frames are
+/// unknown, these are either misses or frames that --every skipped.
 std::size_t withoutPose(const std::vector<TimePoint>& frames,
                         const std::vector<replay::StampedPose>& poses);
 
-/// The line that says so.
+/// Note for people about such frames.
 std::string noteOfUntold(std::size_t frames);
 
-/// Takes those out that were not used; their number.
+/// Removes the frames that were not used and returns their number.
 template <class Value>
 std::size_t leaveOut(std::map<std::uint64_t, Value>& frames,
                      const std::optional<UsedFrames>& used) {

@@ -1,8 +1,9 @@
-// Carries topics to and from DDS implementations without XCDR2 (Fast DDS before 3, RTI Connext
-// before 6): `objects` and `events` go out as perdure/ego/final/…, `model` and `detections` come in
-// from there. Their types are those of idl/ with every struct final, in the module perdure::fin.
-// Run it so:
-//   eval "$(perdure env)" && final_gateway [strength]    (30: heard in place of perdure-inference)
+// Copies topics to and from DDS implementations without XCDR2 (Fast DDS before 3, RTI Connext
+// before 6). It publishes `objects` and `events` as perdure/ego/final/…, and reads `model` and
+// `detections` from there. Their types are those of idl/ with every struct final, in the module
+// perdure::fin.
+// Usage (strength 30 overrides perdure-inference):
+//   eval "$(perdure env)" && final_gateway [strength]
 #include <dds/dds.h>
 
 #include <cstdlib>
@@ -16,7 +17,7 @@
 
 namespace {
 
-// The same members in the same order: a sample of one type is one of the other.
+// Both types have the same members in the same order, so that a sample fits both.
 static_assert(sizeof(perdure_msg_Objects) == sizeof(perdure_fin_Objects));
 static_assert(sizeof(perdure_msg_ObjectBelief) == sizeof(perdure_fin_ObjectBelief));
 static_assert(sizeof(perdure_msg_Event) == sizeof(perdure_fin_Event));
@@ -33,7 +34,7 @@ struct Link {
   dds_entity_t reader, writer;
 };
 
-/// As the topics of Perdure are: reliable; `latched` for who comes late.
+/// QoS of Perdure's topics: reliable; `latched` stores the last sample for late joiners.
 dds_qos_t* reliable(int depth, bool latched) {
   dds_qos_t* qos = dds_create_qos();
   dds_qset_reliability(qos, DDS_RELIABILITY_RELIABLE, DDS_SECS(1));
@@ -50,7 +51,7 @@ Link link(dds_entity_t participant, const End& from, const End& to, int depth, b
     return dds_create_topic(participant, end.type, end.topic.c_str(), nullptr, nullptr);
   };
   const dds_entity_t reader = dds_create_reader(participant, topic(from), qos, nullptr);
-  if (strength > 0) {  // detections: the strongest that lives is heard
+  if (strength > 0) {  // detections: the strongest live writer owns the topic
     dds_qset_ownership(qos, DDS_OWNERSHIP_EXCLUSIVE);
     dds_qset_ownership_strength(qos, strength);
     dds_qset_liveliness(qos, DDS_LIVELINESS_MANUAL_BY_TOPIC, DDS_MSECS(300));
@@ -91,6 +92,6 @@ int main(int argc, char** argv) {
     dds_waitset_attach(waitset, dds_create_readcondition(l.reader, DDS_ANY_STATE), 0);
   }
   while (dds_waitset_wait(waitset, nullptr, 0, DDS_INFINITY) >= 0) {
-    for (const Link& l : links) carry(l);  // a write says that the writer lives
+    for (const Link& l : links) carry(l);  // a write asserts the liveliness of the writer
   }
 }

@@ -1,4 +1,4 @@
-// A stranger's inference service, heard in place of perdure-inference: what is bright is a lamp.
+// Example of another inference service that replaces perdure-inference: bright pixels are a lamp.
 // Needs Cyclone DDS and idl/{sensors,detections}.idl. eval "$(perdure env)" && inference_stub
 #include <dds/dds.h>
 
@@ -7,7 +7,7 @@
 #include "idl/detections.h"
 #include "idl/sensors.h"
 
-constexpr uint64_t kHash = 0x1a3b, kInstance = 0x57ab;  // of the model; of this process
+constexpr uint64_t kHash = 0x1a3b, kInstance = 0x57ab;  // digests of the model and of this process
 
 void look(const perdure_msg_Frame& frame, dds_entity_t writer) {
   const uint32_t pixels = frame.width * frame.height, bytes = frame.pixels._length;
@@ -18,13 +18,13 @@ void look(const perdure_msg_Frame& frame, dds_entity_t writer) {
     const double x = i % frame.width, y = i / frame.width;
     x1 = std::min(x1, x), y1 = std::min(y1, y), x2 = std::max(x2, x + 1), y2 = std::max(y2, y + 1);
   }
-  float activations[] = {0.0F, 3.0F};  // log-likelihoods: [0] clutter, [1] a lamp
+  float activations[] = {0.0F, 3.0F};  // log-likelihoods: [0] clutter, [1] lamp
   perdure_msg_Detection lamp{.corners = {x1, y1, x2, y2}, .activations = {2, 2, activations}};
-  perdure_msg_Detections answer{.stamp = frame.stamp,  // which frame it is about
+  perdure_msg_Detections answer{.stamp = frame.stamp,  // stamp of the frame
                                 .camera = frame.camera,
                                 .source = kInstance,
                                 .model_hash = kHash,
-                                .items = {1, x2 > x1 ? 1U : 0U, &lamp}};  // none: nothing is there
+                                .items = {1, x2 > x1 ? 1U : 0U, &lamp}};  // no items: nothing found
   dds_write(writer, &answer);
 }
 
@@ -37,13 +37,13 @@ int main() {
   dds_qset_reliability(qos, DDS_RELIABILITY_RELIABLE, DDS_SECS(1));
   const auto frames =
       dds_create_reader(bus, topic(perdure_msg_Frame_desc, "perdure/ego/frame/cam0"), qos, nullptr);
-  // Ownership: the strongest that lives is heard. Liveliness: the lease says when it does not.
+  // Ownership: the strongest live writer counts. Liveliness: its lease ends if the writer stops.
   dds_qset_ownership(qos, DDS_OWNERSHIP_EXCLUSIVE);
   dds_qset_ownership_strength(qos, 30);
   dds_qset_liveliness(qos, DDS_LIVELINESS_MANUAL_BY_TOPIC, DDS_MSECS(300));
   const auto detections = dds_create_writer(
       bus, topic(perdure_msg_Detections_desc, "perdure/ego/detections"), qos, nullptr);
-  // The model says what activations[1], [2], … mean; it waits for whoever comes later.
+  // The model names the classes of activations[1], [2], …; it is latched for late joiners.
   dds_qset_durability(qos = dds_create_qos(), DDS_DURABILITY_TRANSIENT_LOCAL);
   char name[] = "stub", lamp[] = "lamp", *classes[] = {lamp};
   perdure_msg_ModelInfo model{
@@ -51,7 +51,7 @@ int main() {
   const auto models = topic(perdure_msg_ModelInfo_desc, "perdure/ego/model");
   dds_write(dds_create_writer(bus, models, qos, nullptr), &model);
   for (dds_sample_info_t info;; dds_sleepfor(DDS_MSECS(5))) {
-    dds_assert_liveliness(detections);  // also where no frame comes
+    dds_assert_liveliness(detections);  // needed if no frame arrives
     for (void* sample = nullptr; dds_take(frames, &sample, &info, 1, 1) > 0; sample = nullptr) {
       if (info.valid_data) look(*static_cast<const perdure_msg_Frame*>(sample), detections);
       dds_return_loan(frames, &sample, 1);

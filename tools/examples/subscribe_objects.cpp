@@ -1,5 +1,5 @@
-// Prints the objects that Perdure believes in, frame by frame. Needs Cyclone DDS and
-// idl/objects.idl. Run it so:  eval "$(perdure env)" && subscribe_objects
+// Prints the objects that Perdure estimates, frame by frame. Needs Cyclone DDS and idl/objects.idl.
+// Usage: eval "$(perdure env)" && subscribe_objects
 #include <dds/dds.h>
 
 #include <cstdio>

@@ -59,7 +59,7 @@ std::vector<std::string> commandOf(const SwapRequest& request) {
   return command;
 }
 
-/// Follows a swap by what the processes say, and tells people.
+/// Follows a swap by the messages of the processes and prints its progress.
 class Report {
  public:
   enum class End { kNone, kServes, kRolledBack };
@@ -130,7 +130,7 @@ class Report {
   End end_ = End::kNone;
 };
 
-/// Runs the loop until the swap has ended one way or the other; what went wrong, or nothing.
+/// Runs the loop until the swap has succeeded or failed. Returns the error, or an empty text.
 std::string follow(bus::WaitLoop& loop, const SwapRequest& request, Newcomer& newcomer,
                    const Report& report) {
   using Clock = std::chrono::steady_clock;

@@ -1,4 +1,4 @@
-// `perdure inference swap`: another network takes over while frames go on.
+// `perdure inference swap`: replaces the network without interrupting the frames.
 #pragma once
 
 namespace CLI {

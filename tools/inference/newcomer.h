@@ -1,5 +1,5 @@
-// The inference process that `perdure inference swap` starts. It is not tied to the command: it
-// lives on, in a session of its own, whatever becomes of who started it.
+// The inference process that `perdure inference swap` starts. It runs in its own session, so that
+// it continues after the command has ended.
 #pragma once
 
 #include <optional>
@@ -12,15 +12,16 @@ namespace perdure::tools {
 
 class Newcomer {
  public:
-  /// Standard output and error go to the file `log`. Throws StartupError where it cannot be run.
+  /// Redirects standard output and standard error to the file `log`. Throws StartupError if the
+  /// program cannot be run.
   Newcomer(const std::vector<std::string>& command, const std::string& log);
 
   pid_t pid() const { return process_.pid(); }
-  /// Its exit status, or 128 + the signal that ended it; nothing while it runs.
+  /// Its exit status, or 128 + the signal that ended it; empty while it runs.
   std::optional<int> ended() { return process_.ended(); }
-  /// SIGTERM; after some seconds SIGKILL. Returns when it is gone.
+  /// Sends SIGTERM, and SIGKILL after 5 s. Returns after the process has ended.
   void stop() { process_.stop(std::chrono::seconds(5)); }
-  /// The last line that it logged, which says why it ended.
+  /// The last line of its log, which explains why it ended.
   std::string lastLine() const;
   const std::string& log() const { return log_; }
 

@@ -82,7 +82,7 @@ void list(const Request& request) {
   std::cout << (request.json ? jsonOf(reply.objects).dump(1) + "\n" : toTable(reply.objects));
 }
 
-/// Asks for one object by its id. Throws StartupError where there is none.
+/// Requests one object by its id. Throws StartupError if it does not exist.
 MapReply askForOne(const Request& request) {
   MapReply reply = ask(request);
   if (reply.objects.empty()) {
@@ -106,7 +106,7 @@ void why(const Request& request) {
                        "version, or read its file with --db");
   }
   const ObjectBelief& belief = reply.beliefs.front();
-  std::optional<Standing> standing;  // a running map_store does not tell it
+  std::optional<Standing> standing;  // not available from a running map_store
   if (!request.db.empty()) standing = askStanding(request.db, belief.id);
   if (request.json) {
     auto json = toJson(belief.why);
@@ -137,7 +137,7 @@ void chooseKind(Request& request) {
   }
 }
 
-/// As given; else as the map's file has it.
+/// The given anchor, or else the one of the map's file.
 std::optional<GeoAnchor> anchorOf(const Request& request) {
   if (request.anchor.empty()) {
     const bool known = !request.db.empty() && request.frame == "M";

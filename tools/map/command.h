@@ -1,4 +1,4 @@
-// `perdure map`: what the map store holds, asked over DDS or read from its file.
+// `perdure map`: queries the map store over DDS, or reads its file.
 #pragma once
 
 namespace CLI {

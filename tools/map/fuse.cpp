@@ -114,7 +114,8 @@ FusedFile bring(WholeMap& fused, const GivenMap& given, const mapping::Parameter
   return file;
 }
 
-/// Objects that have no place in the graph belong to no part.
+/// Counts sessions and objects for each part; objects without a position in the graph belong to no
+/// part.
 void countParts(const mapping::MapContents& map, FuseOutcome& outcome) {
   outcome.parts = mapping::partsOf(map);
   outcome.objects_of_part.assign(outcome.parts.size(), 0);
@@ -211,7 +212,7 @@ Json toJson(const mapping::Change& change) {
           {"by", toJson(std::vector{change.by}).front()}};
 }
 
-/// What was written is whole; the status says that not all was taken.
+/// Reports omitted maps by a failure status; the written file itself is complete.
 void complainOfLeftOut(const FuseOutcome& outcome) {
   if (outcome.left_out.empty()) return;
   std::string names;

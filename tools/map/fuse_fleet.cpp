@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Gone with all in it when this is.
+/// A folder that its destructor removes with its content.
 class TemporaryFolder {
  public:
   TemporaryFolder() {

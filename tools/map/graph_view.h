@@ -1,5 +1,5 @@
-// The graph of a map for people and programs: how long the way is, how well it is known, and on
-// what its loops rest.
+// The graph of a map for people and programs: length and uncertainty of the trajectory, and the
+// evidence for its loops.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -9,8 +9,8 @@
 
 namespace perdure::tools {
 
-/// Of an answer of kind graph. Figures of what it tells alone: where it is truncated the text says
-/// so.
+/// Text for a reply of kind graph. The figures cover only the data in the reply; the text states if
+/// these are truncated.
 std::string toGraphText(const MapReply& graph);
 nlohmann::ordered_json toGraphJson(const MapReply& graph);
 

@@ -23,7 +23,8 @@ using namespace std::chrono_literals;
                          "; map_store sets a damaged file aside at its next start");
 }
 
-/// What it reads belongs together, though a service goes on writing: objects and graph.
+/// Opens the file in one transaction, so that objects and graph are consistent even if a service
+/// writes to it.
 map_store::Connection openAtOneState(const std::string& path) {
   auto connection = map_store::openStoreForReading(path);
   if (const auto begun = connection.execute("BEGIN"); !begun) cannotRead(path, begun.error());
@@ -35,7 +36,7 @@ Result<map_store::Found> findInM(const map_store::MapReader& reader, const MapQu
   const auto graph = reader.graph();
   if (!graph) return tl::unexpected<Reason>(graph.error());
   const auto& records = graph->map.records;
-  constexpr double kTile_m = 32.0;  // no tiles are taken
+  constexpr double kTile_m = 32.0;  // any value, because no tiles are requested
   map_store::MapInM map(reader, kTile_m, [&records](ObjectId id) {
     const auto at = records.find(id);
     return at == records.end() ? nullptr : &at->second;

@@ -1,4 +1,4 @@
-// Where questions about the map go: to the running map_store over DDS, or to its file.
+// Sends map queries to the running map_store over DDS, or to its file.
 #pragma once
 
 #include <optional>
@@ -14,28 +14,27 @@
 
 namespace perdure::tools {
 
-/// Asks map_store on the bus: waits until both directions are matched, then sends the same request
-/// until it is answered (a question sent before that is lost silently). After `patience_s` the
-/// reason is "no_map_store" or "no_answer".
+/// Queries map_store over the bus. Waits until reader and writer are matched, because DDS drops
+/// earlier requests silently. Then repeats the same request until a reply arrives. After
+/// `patience_s`, fails with "no_map_store" or "no_answer".
 Result<MapReply> askMapStore(const bus::Participant& participant, MapQuery query,
                              double patience_s);
 
-/// How what a map's file holds is laid: in M, in which it is one, or in the W in which it is
-/// stored.
+/// Frame of the objects from a map's file: the consistent frame M, or the stored frame W.
 enum class MapFrameChoice { kM, kW };
 
-/// Reads a map's file, also beside the running service. Places are looked for in query.world, or
-/// where it names none in the newest session's M, or its W.
+/// Reads a map's file, which a service may use at the same time. Searches positions in query.world;
+/// without one, in the M or W of the newest session.
 MapReply askMapFile(const std::string& path, const MapQuery& query,
                     MapFrameChoice frame = MapFrameChoice::kM);
-/// The graph of a map's file, as a running map_store would tell it. Throws StartupError.
+/// The graph of a map's file, in the form of a running map_store. Throws StartupError.
 MapReply askGraphOfFile(const std::string& path, const MapQuery& query);
-/// Where on Earth the origin of the newest session's M lies, and its yaw; nothing where the file
-/// does not know it. Throws StartupError.
+/// Geographic position of the origin of the newest session's M, and its yaw; empty if the file has
+/// none. Throws StartupError.
 std::optional<GeoAnchor> earthAnchorOfMapFile(const std::string& path);
-/// Of an object that the file has. Throws StartupError.
+/// The standing of an object in the file. Throws StartupError.
 Standing askStanding(const std::string& path, ObjectId id);
-/// All objects of a map's file in full. Throws StartupError.
+/// All complete objects of a map's file. Throws StartupError.
 std::vector<map_store::PlacedBelief> beliefsOfMapFile(const std::string& path);
 
 }  // namespace perdure::tools

@@ -11,13 +11,13 @@
 
 namespace perdure::tools {
 
-/// One line an object, with a heading.
+/// One line for each object, with a header.
 std::string toTable(const std::vector<MapObject>& objects);
-/// Everything about one object, with standard deviations.
+/// All data of one object, with standard deviations.
 std::string toText(const MapObject& object);
 nlohmann::ordered_json toJson(const MapObject& object);
-/// RFC 7946. `anchor`: where on Earth the origin of their frame lies, yaw of its x axis from east;
-/// without one a declared default of 0°, 0° and "georeferenced": false.
+/// RFC 7946. `anchor`: geographic position of the frame's origin, and yaw of its x axis from east.
+/// Without an anchor, the output uses 0°, 0° and "georeferenced": false.
 nlohmann::ordered_json toGeoJson(const std::vector<MapObject>& objects,
                                  const std::optional<GeoAnchor>& anchor);
 

@@ -1,5 +1,5 @@
-// What a map's file knows of an object beside its belief: the anchors that it belongs to, what was
-// joined with it, and the loops that hold the map together there.
+// Data of a map's file about an object beside its belief: its anchors, the objects merged into it,
+// and the loops that connect the map there.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -13,32 +13,32 @@
 
 namespace perdure::tools {
 
-/// An anchor that an object was seen from.
+/// An anchor from which an object was seen.
 struct Station {
   mapping::AnchorId anchor = 0;
   WorldId session;
-  TimePoint time;      ///< when the body was there
-  double way_m = 0.0;  ///< of the session, until there
+  TimePoint time;      ///< time of the body at the anchor
+  double way_m = 0.0;  ///< distance travelled in the session up to the anchor
 };
 
 struct Standing {
   mapping::FrameInMap frame;
-  double moved_m = 0.0;                    ///< by the graph, from where it is stored in W
+  double moved_m = 0.0;                    ///< displacement by the graph from the position in W
   std::optional<Station> newest, earlier;  ///< earlier: on the visit before the newest one
   std::uint32_t recalls = 0, restarts = 0;
   std::vector<ObjectId> absorbed;  ///< ids that were merged into it
-  /// That end where it was seen from, the newest first.
+  /// Loops with an end near its anchors, the newest first.
   struct Loop {
     mapping::EdgeId id = 0;
     mapping::AnchorId a = 0, b = 0;
-    bool by_tracking = false;  ///< by objects seen again under their ids; else by a constellation
-    double weight = 0.0;       ///< [0, 1]
+    bool by_tracking = false;  ///< source: re-identified objects; false: a constellation
+    double weight = 0.0;       ///< range [0, 1]
   };
   std::vector<Loop> loops;
 };
 
-/// `belief` as stored, in its W. Loops are those with an end within 60 m in M of where it was seen
-/// from.
+/// `belief`: as stored, in its W. Includes the loops with an end within 60 m in M of the object's
+/// anchors.
 Standing standingOf(const ObjectBelief& belief, const WorldId& world, const mapping::SavedMap& map,
                     std::vector<ObjectId> absorbed);
 

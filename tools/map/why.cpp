@@ -7,8 +7,8 @@
 namespace perdure::tools {
 namespace {
 
-constexpr double kNothing = 0.005;   // nats, shown as 0.00
-constexpr double kTolerance = 1e-6;  // of a sum
+constexpr double kNothing = 0.005;   // nats, displayed as 0.00
+constexpr double kTolerance = 1e-6;  // relative error of a sum
 
 std::string aThing(const std::string& class_name) {
   if (class_name == kOtherClass) return "something of no known class";
@@ -19,7 +19,7 @@ std::string aThing(const std::string& class_name) {
 std::string looks(std::uint32_t n) { return n == 1 ? "1 look" : fmt::format("{} looks", n); }
 std::string times(std::uint32_t n) { return n == 1 ? "once" : fmt::format("{} times", n); }
 
-/// What came back with its reasons needs no others.
+/// Text for an object that came back; a note if it has evidence from before this ledger.
 std::string backFrom(const char* where, const LedgerEntry& entry) {
   return fmt::format("back from {} {}{}", where, times(entry.count),
                      std::abs(entry.log_odds) < kNothing ? "" : ": believed before this ledger");
@@ -88,7 +88,7 @@ std::string line(double nats, const std::string& what) {
   return fmt::format("  {:>+8.2f}  {}\n", std::abs(nats) < kNothing ? 0.0 : nats, what);
 }
 
-/// When it was looked at so; other evidence needs no times.
+/// Time span of observations; other evidence has no times.
 std::string span(ExistenceEvidence kind, const LedgerEntry& entry) {
   switch (kind) {
     case ExistenceEvidence::kHit:

@@ -1,4 +1,4 @@
-// Why the map believes in an object, told as a person would.
+// Explains in plain text why the map contains an object.
 #pragma once
 
 #include <string>
@@ -7,8 +7,8 @@
 
 namespace perdure::tools {
 
-/// What existence and class are made of, entry by entry, with their sums. Says so where there is no
-/// ledger, and where one does not add up to what is believed.
+/// Lists the entries of existence and class with their sums. Reports a missing ledger, and a sum
+/// that differs from the current estimate.
 std::string toWhy(const ObjectBelief& object);
 
 }  // namespace perdure::tools

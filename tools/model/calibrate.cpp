@@ -18,27 +18,28 @@ namespace {
 using inference::Calibration;
 using inference::Candidate;
 
-constexpr double kSame = 0.5;       // IoU of a box with what it is taken for
-constexpr double kOnIgnored = 0.7;  // share of a box in an ignored one
-constexpr double kApart = 0.3;      // IoU under which a place is not that of a true box
-constexpr double kClear = 0.8;      // probability of a box whose sides are measured
-constexpr double kLarge_px = 40.0, kFull_px = 12.0;  // of the input
+constexpr double kSame = 0.5;       // least IoU of a box and the object that it matches
+constexpr double kOnIgnored = 0.7;  // share of a box inside an ignored one
+constexpr double kApart = 0.3;      // IoU below which a place contains no true box
+constexpr double kClear = 0.8;      // least probability of a box whose sides are measured
+constexpr double kLarge_px = 40.0, kFull_px = 12.0;  // pixels of the input
 constexpr std::size_t kLeastInsets = 20, kLeastSides = 40;
 constexpr int kRounds = 3;
-constexpr double kLeastTarget_px = 10.0;  // of the input
+constexpr double kLeastTarget_px = 10.0;  // pixels of the input
 
 struct Target {
   Box box;            ///< pixels of the input
-  std::size_t k = 0;  ///< class of the network + 1; 0: none of its classes
+  std::size_t k = 0;  ///< class index of the network + 1; 0: no class of the network
   bool ignored = false;
   std::optional<Box> hull;
 };
 
-/// A frame as the network saw it: candidates with the network's own log-odds in place of evidence.
+/// The network's output for a frame: candidates whose activations are its own log-odds instead of
+/// evidence.
 struct Seen {
   std::vector<Candidate> candidates;
   std::vector<Target> targets;
-  double width = 0.0, height = 0.0;  ///< of the image in the input
+  double width = 0.0, height = 0.0;  ///< size of the image within the input
   bool sides_known = true;
 };
 
@@ -64,7 +65,8 @@ double covered(const Box& box, const Box& by) {
 
 constexpr int kClutter = -1, kNeutral = -2;
 
-/// Of each box, in the order of falling evidence, the target that it takes, or one of the above.
+/// For each box, in order of decreasing evidence: the index of its target, or one of the values
+/// above.
 std::vector<int> match(const std::vector<Candidate>& boxes, const std::vector<Target>& targets) {
   std::vector<int> result;
   std::vector<bool> taken(targets.size(), false);
@@ -116,7 +118,7 @@ class Study {
   const CalibrateOptions& options_;
   inference::Node node_;
   replay::ClassAliases aliases_;
-  std::vector<std::string> names_;  ///< canonical, of the reported classes
+  std::vector<std::string> names_;  ///< canonical names of the reported classes
   std::set<std::string> judged_;
   std::vector<Seen> frames_;
   CalibrationResult& result_;
@@ -204,7 +206,7 @@ std::vector<BoxOutcome> Study::outcomes(const Calibration& calibration) const {
       if (taken[i] >= 0) {
         outcome.label = frames_[f].targets[static_cast<std::size_t>(taken[i])].k;
       } else if (!judged(static_cast<std::size_t>(best))) {
-        continue;  // it may well be one: nobody labelled them
+        continue;  // may be correct, as the class has no labels
       }
       result.push_back(std::move(outcome));
     }
@@ -223,7 +225,7 @@ void Study::countTargets(const Calibration& calibration) {
   }
 }
 
-/// What is on a map was seen by the network before it came there.
+/// Throws if most objects of a map are not detected, because the map's run detected all of them.
 void Study::requireTheSameFrames() const {
   const bool by_map = std::any_of(frames_.begin(), frames_.end(),
                                   [](const Seen& frame) { return !frame.sides_known; });
@@ -274,7 +276,7 @@ void Study::measureSides(const Calibration& calibration) {
   }
 }
 
-/// The filter's predictions err by some of a side and a pixel; so do these.
+/// Adds random errors of a fraction of a side and a pixel, as in the predictions of the filter.
 inference::Expectation expectationAt(const Target& target, std::mt19937& random) {
   std::normal_distribution<double> normal;
   const Box& b = target.box;
@@ -285,8 +287,8 @@ inference::Expectation expectationAt(const Target& target, std::mt19937& random)
   return {moved, target.k, {x, y, x, y}};
 }
 
-/// Asks for what is there, and for the things of two other frames where nothing is: ghosts are
-/// where things are in other pictures, and as large.
+/// Evaluates predictions at true objects, and at empty places. The empty places are the positions
+/// and sizes of objects in two other frames.
 std::vector<PrimedOutcome> Study::askAround(const Calibration& calibration) const {
   std::mt19937 random(1);
   std::vector<PrimedOutcome> places;
@@ -334,8 +336,8 @@ void Study::fitPrimedAnswers(Calibration& calibration) {
   result_.primed_nats_elsewhere = elsewhere / static_cast<double>(result_.asked_elsewhere);
 }
 
-/// What overlaps loses nats (suppress.h), so that the boxes depend a little on the calibration: a
-/// few rounds settle it.
+/// Fits the calibration in a few rounds. Overlapping boxes lose nats (suppress.h), so that the
+/// boxes depend slightly on the calibration.
 void Study::fit() {
   Calibration calibration = options_.primed_only ? result_.before : plain();
   calibration.primed = {};

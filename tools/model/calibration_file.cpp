@@ -1,4 +1,4 @@
-// model.json with new values, and the reliability diagram.
+// Writes the fitted values to model.json, and draws the reliability diagram.
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -15,7 +15,7 @@ using Json = nlohmann::ordered_json;
 double rounded(double value) { return std::round(value * 1000.0) / 1000.0; }
 
 std::vector<cv::Point2d> curveOf(const Reliability& reliability) {
-  constexpr std::size_t kFew = 10;  // boxes, of which a share means little
+  constexpr std::size_t kFew = 10;  // boxes; a share of fewer is not significant
   std::vector<cv::Point2d> points;
   for (const auto& bin : reliability.bins) {
     if (bin.count >= kFew) points.emplace_back(bin.confidence, bin.right);

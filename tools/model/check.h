@@ -1,7 +1,7 @@
-// Whether OpenCV computes what an imported network's file says: its answers to a picture of noise
-// beside those that numpy computed. Where it does not have the operators, the same of ONNX Runtime,
-// beside what it says itself of the file as it was before the import. OpenCV 4.6 gets some
-// operators wrong without a word.
+// Checks that OpenCV computes an imported network correctly, because OpenCV 4.6 computes some
+// operators wrongly without an error. Compares its outputs for a noise picture with those of numpy.
+// If OpenCV lacks operators, it compares ONNX Runtime on the imported file with ONNX Runtime on the
+// original file.
 #pragma once
 
 #include <filesystem>
@@ -9,17 +9,17 @@
 
 namespace perdure::tools {
 
-/// Of the largest value of a tensor, or of 1: rounding of float32 stays far below.
+/// Relative to the largest value of a tensor, or to 1; rounding of float32 is far below it.
 inline constexpr double kMostDifference = 1e-3;
 
 struct Answers {
-  double difference = 0.0;  ///< the largest, in shares of the tensor's largest value or of 1
-  std::string tensor;       ///< where it is
-  std::string by;           ///< what computes them: OpenCV or ONNX Runtime
+  double difference = 0.0;  ///< the largest, relative to the tensor's largest value or to 1
+  std::string tensor;       ///< tensor with this difference
+  std::string by;           ///< the computing library: OpenCV or ONNX Runtime
 };
 
-/// `reference`: the folder that the import wrote. Throws StartupError (78) where the network
-/// cannot be loaded or run, 69 where a file is missing.
+/// `reference`: the folder that the import wrote. Throws StartupError (78) if the network cannot be
+/// loaded or run, or (69) if a file is missing.
 Answers checkAnswers(const std::filesystem::path& network, const std::filesystem::path& reference);
 
 }  // namespace perdure::tools

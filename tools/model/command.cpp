@@ -53,7 +53,7 @@ void showSights(const fs::path& network, const fs::path& image, double threshold
 }
 
 void compare(const fs::path& network, const fs::path& reference) {
-  if (!fs::exists(reference / "input.f32")) return;  // the import has said why
+  if (!fs::exists(reference / "input.f32")) return;  // the import has reported the reason
   const Answers answers = checkAnswers(network, reference);
   if (answers.difference > kMostDifference) {
     throw StartupError(
@@ -67,14 +67,14 @@ void compare(const fs::path& network, const fs::path& reference) {
               answers.difference);
 }
 
-/// The Python part, and what OpenCV makes of its network.
+/// Runs the Python part and checks its network in OpenCV.
 void importTo(const fs::path& out, const Staging& staging, const ImportOptions& request) {
   const TemporaryFolder reference(fs::temp_directory_path(), "perdure-model-",
                                   "set TMPDIR to a folder that you may write");
   const fs::path made = staging.path() / out.filename();
   ImportRequest wanted{request.network, made, out,
                        request.unchecked ? fs::path() : reference.path(), request.arguments};
-  if (!request.image.empty()) {  // what "--input camera" goes by
+  if (!request.image.empty()) {  // needed for "--input camera"
     const Frame picture = readPicture(request.image);
     wanted.arguments.push_back(fmt::format("--camera={}x{}", picture.width, picture.height));
   }
@@ -113,7 +113,7 @@ void importAndLook(const ImportOptions& request) {
 
 namespace {
 
-/// An option that the Python part takes as it is.
+/// Adds an option that is passed unchanged to the Python part.
 void passOn(CLI::App& command, ImportOptions& request, const std::string& name,
             const std::string& help, const std::string& type) {
   command

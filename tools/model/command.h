@@ -1,4 +1,4 @@
-// `perdure model`: bring a network of one's own, and see what it sees.
+// `perdure model`: imports a user's network and shows its detections.
 #pragma once
 
 namespace CLI {
@@ -8,9 +8,9 @@ class App;
 namespace perdure::tools {
 
 void addModelCommand(CLI::App& app);
-/// Its parts `list` and `fetch`.
+/// Adds the subcommands `list` and `fetch`.
 void addFetch(CLI::App& model);
-/// Its part `calibrate`.
+/// Adds the subcommand `calibrate`.
 void addCalibrate(CLI::App& model);
 
 }  // namespace perdure::tools

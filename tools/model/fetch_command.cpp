@@ -61,7 +61,7 @@ const KnownUse& useNamed(const KnownNetwork& network, const std::string& name) {
                                                    network.name, fmt::join(names, ", ")));
 }
 
-/// Why a file is not the one that is known; nothing where it is.
+/// The difference between a file and the known one; empty if they are equal.
 std::optional<std::string> difference(const fs::path& path, const KnownFile& file) {
   const auto bytes = fs::file_size(path);
   if (bytes != file.bytes) {
@@ -123,7 +123,7 @@ void take(const KnownFile& file, const fs::path& path) {
               static_cast<unsigned long long>(file.bytes));
 }
 
-/// The file of class names beside the other descriptions.
+/// The file of class names in the folder of the descriptions.
 fs::path classesOf(const KnownNetwork& network) {
   std::error_code error;
   for (const std::string& folder : inference::standardModelFolders()) {
@@ -134,7 +134,7 @@ fs::path classesOf(const KnownNetwork& network) {
                      network.classes_file + " is missing beside the descriptions of networks");
 }
 
-/// A Darknet network has no graph to import: its description is copied beside it.
+/// Copies the description of a Darknet network, which has no graph to import, beside the network.
 fs::path describeDarknet(const fs::path& path) {
   const fs::path from =
       inference::findDescription(path.string(), inference::standardModelFolders());
@@ -151,7 +151,7 @@ fs::path describeDarknet(const fs::path& path) {
   return to;
 }
 
-/// Why the calibration is left out; "" where it holds.
+/// The reason why the calibration cannot be used; empty if it can.
 std::string whyUncalibrated(const nlohmann::ordered_json& description, const KnownNetwork& network,
                             const KnownUse& use, bool resized) {
   if (use.calibration.is_null()) return "no calibration was measured for " + use.name;
@@ -163,7 +163,7 @@ std::string whyUncalibrated(const nlohmann::ordered_json& description, const Kno
   return fmt::format("the calibration was measured at {}, not at this size", network.input);
 }
 
-/// `resized`: --input was given.
+/// Adds the known keys and the calibration to the description. `resized`: --input was given.
 void calibrated(const fs::path& description, const KnownNetwork& network, const KnownUse& use,
                 bool resized) {
   std::ifstream in(description);
@@ -180,7 +180,7 @@ void calibrated(const fs::path& description, const KnownNetwork& network, const 
   std::printf("calibrated  %s (%s)\n", use.calibration.dump().c_str(), use.measured.c_str());
 }
 
-/// Of the import: what is known of the network, and what the user asks for.
+/// Arguments of the import: known properties of the network, and the user's options.
 std::vector<std::string> importArguments(const KnownNetwork& network, const std::string& input) {
   std::vector<std::string> arguments = {"--classes=" + classesOf(network).string(),
                                         "--family=" + network.family};

@@ -1,4 +1,4 @@
-// `perdure model import` as a whole: imported, compared, looked at, written.
+// The complete `perdure model import`: import, comparison, test picture, output files.
 #pragma once
 
 #include <filesystem>
@@ -11,11 +11,11 @@ struct ImportOptions {
   std::filesystem::path network, out, image;  ///< out: a folder; empty: the network's
   double threshold = 0.25;
   bool unchecked = false;
-  std::vector<std::string> arguments{};  ///< of the Python part
+  std::vector<std::string> arguments{};  ///< options of the Python part
 };
 
-/// Prints what it finds. Throws StartupError, or CLI::RuntimeError with the status of the Python
-/// part, which has said why; then nothing is written.
+/// Prints the results. Throws StartupError, or CLI::RuntimeError with the status of the Python
+/// part, which has reported the error. Then no file is written.
 void importAndLook(const ImportOptions& options);
 
 }  // namespace perdure::tools

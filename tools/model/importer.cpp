@@ -12,10 +12,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Debian's, which Debian's python3-onnx belongs to; another one in the PATH does not have it.
+// Debian's interpreter, because only it has Debian's python3-onnx.
 constexpr const char* kPython = "/usr/bin/python3";
 
-/// The folder of perdure_model: in the source tree or an installation, seen from the program.
+/// The folder of perdure_model in the source tree or in an installation, relative to the program.
 std::optional<fs::path> pythonFolder() {
   std::error_code error;
   fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path();

@@ -56,7 +56,7 @@ KnownNetwork networkOf(const Json& json) {
                        json.at("input"),
                        json.at("classes_file"),
                        json.value("accuracy", ""),
-                       {},  // files and uses follow
+                       {},  // files and uses are set below
                        {},
                        json.value("keys", Json::object())};
   for (const Json& file : json.at("files")) network.files.push_back(fileOf(file));

@@ -1,4 +1,4 @@
-// Networks that are known to work: where their files are, and what is known of each.
+// Networks that are known to work, with their download addresses and properties.
 #pragma once
 
 #include <cstdint>
@@ -14,29 +14,29 @@ struct KnownFile {
   std::uint64_t bytes = 0;
 };
 
-/// What is reported of a place of a kind, and the calibration that was measured there.
+/// The reported classes for a kind of scene, and the calibration that was measured in it.
 struct KnownUse {
-  std::string name;  ///< street, room
+  std::string name;  ///< kind of scene: street, room
   std::vector<std::string> classes;
-  nlohmann::json calibration;  ///< of model.json; null where none was measured
-  std::string measured;        ///< on what
+  nlohmann::json calibration;  ///< content for model.json; null if none was measured
+  std::string measured;        ///< data used for the measurement
 };
 
 struct KnownNetwork {
   std::string name, maker, licence, family, source, input, classes_file, accuracy;
-  std::vector<KnownFile> files;  ///< the first is the network
+  std::vector<KnownFile> files;  ///< the first one is the network
   std::vector<KnownUse> uses;
-  nlohmann::json keys;  ///< further ones of model.json
+  nlohmann::json keys;  ///< additional keys of model.json
 };
 
-/// Those of `list`; of the program's own where it is empty. Throws StartupError where it is missing
-/// (69) or at odds with itself (78).
+/// The networks of `list`, or of the program's own list if that is empty. Throws StartupError if
+/// the list is missing (69) or inconsistent (78).
 std::vector<KnownNetwork> knownNetworks(const std::filesystem::path& list);
 
-/// Lower-case hexadecimal. Throws StartupError(kUnavailable) where it cannot be read.
+/// Lower-case hexadecimal. Throws StartupError(kUnavailable) if the file cannot be read.
 std::string sha256Of(const std::filesystem::path& file);
 
-/// A few lines for people.
+/// A description of a few lines.
 std::string describe(const KnownNetwork& network);
 
 }  // namespace perdure::tools

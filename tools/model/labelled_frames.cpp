@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 constexpr double kNothingSeen = 0.05, kEnoughSeen = 0.25, kWhollySeen = 0.95;
 
-/// Of a cuboid whose corners are all in the image.
+/// Box of a cuboid whose corners are all in the image.
 std::optional<Box> hullOf(const sim::TruthObject& object, const sim::TruthKey& key,
                           const RigidTransform& T_CW, const CameraModel& camera) {
   const auto box = boxAround(key.centre_W, key.yaw, object.size, T_CW, camera);
@@ -26,7 +26,7 @@ std::optional<Box> hullOf(const sim::TruthObject& object, const sim::TruthKey& k
   return inside ? box : std::nullopt;
 }
 
-/// A view of a simulated object as a label; nothing where too little of it is seen.
+/// Converts a view of a simulated object to a label; empty if its visible part is too small.
 std::optional<TrueBox> labelOf(const sim::TruthView& view, const CameraModel& camera,
                                double least_px) {
   const Box box = view.boxInside(camera.width(), camera.height());
@@ -100,7 +100,8 @@ TrueBox labelOf(const replay::KittiLabel& label, const replay::ClassAliases& ali
 LabelledData readKitti(const LabelRequest& request, std::unique_ptr<replay::Dataset> dataset,
                        const replay::ClassAliases& aliases, double least_px) {
   LabelledData data;
-  // A cyclist is a person and a bicycle to most networks: of these KITTI labels only some.
+  // Excludes cyclists, because most networks report a person and a bicycle, of which KITTI labels
+  // only some.
   data.judged = {"car", "truck", "van"};
   const auto labels = replay::readKittiLabels(labelFile(request, dataset->kind()));
   for (std::uint64_t i = 0; i < dataset->frameCount(); i += request.every) {

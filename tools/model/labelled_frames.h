@@ -1,4 +1,4 @@
-// Frames with true boxes, for calibration: simulated folders, KITTI with its labels, and any frames
+// Frames with true boxes for calibration: simulated folders, KITTI with its labels, and any frames
 // with the objects of a run over them (map_labels.h).
 #pragma once
 
@@ -18,10 +18,10 @@
 namespace perdure::tools {
 
 struct TrueBox {
-  Box box;                  ///< whole outline, pixels of the image, cut at its border
-  std::string class_name;   ///< canonical; empty: of no class, a region where nobody labelled
-  bool ignored = false;     ///< neither to be found nor wrong to be found
-  std::optional<Box> hull;  ///< of its cuboid's image, where it is wholly seen and known
+  Box box;                  ///< complete outline in pixels, clipped to the image
+  std::string class_name;   ///< canonical; empty: an unlabelled region
+  bool ignored = false;     ///< neither a miss nor a false alarm
+  std::optional<Box> hull;  ///< box of the cuboid's image, if fully visible and known
 };
 
 struct LabelledFrame {
@@ -31,30 +31,29 @@ struct LabelledFrame {
 
 struct LabelRequest {
   std::filesystem::path data;
-  std::string sequence;  ///< of KITTI tracking
-  /// label_02/SEQUENCE.txt, which is found by itself in KITTI tracking; or OUT of a run.
+  std::string sequence;  ///< sequence of KITTI tracking
+  /// label_02/SEQUENCE.txt (found automatically in KITTI tracking), or OUT of a run.
   std::filesystem::path labels;
-  std::uint64_t every = 1;  ///< each so many frames
+  std::uint64_t every = 1;  ///< uses each N-th frame
 };
 
 struct LabelledData {
   std::unique_ptr<replay::Dataset> dataset;
-  std::vector<LabelledFrame> frames;  ///< in order
-  /// Classes whose every instance is labelled; empty: of all things.
+  std::vector<LabelledFrame> frames;  ///< sorted by index
+  /// Classes with complete labels; empty: all classes.
   std::set<std::string> judged;
-  bool sides_known = true;  ///< the sides of a box are those of the image, not a prediction
+  bool sides_known = true;  ///< false: the sides of a box are predictions, not measured
 };
 
-/// Box around the images of a cuboid's corners, not cut at the border; nothing where a corner has
-/// no image.
+/// Box around the images of a cuboid's corners, not clipped; empty if a corner has no image.
 std::optional<Box> boxAround(const Eigen::Vector3d& centre_W, double yaw,
                              const Eigen::Vector3d& size, const RigidTransform& T_CW,
                              const CameraModel& camera);
 
-/// What shows under a quarter of itself, or is under `least_px` on its longer side (pixels of the
-/// image), is ignored; what shows under a twentieth is not there. Of KITTI: what is largely
-/// occluded (2, 3) or truncated is ignored, and so are DontCare regions.
-/// Throws StartupError (69) with what is missing and the mend.
+/// Ignores objects whose visible share is below a quarter, or whose longer side is below `least_px`
+/// (pixels of the image); omits those below a twentieth. For KITTI, ignores objects that are
+/// largely occluded (2, 3) or truncated, and DontCare regions. Throws StartupError (69) with the
+/// missing file and the fix.
 LabelledData readLabelled(const LabelRequest& request, const replay::ClassAliases& aliases,
                           double least_px);
 

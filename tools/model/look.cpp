@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The network's score back from the evidence: what calibration did is undone.
+/// Converts the evidence back to the network's own score, without the calibration.
 Sight sightOf(const Detection& detection, const ModelInfo& model,
               const inference::Calibration& calibration) {
   const auto& a = detection.activations;
@@ -30,7 +30,7 @@ Sight sightOf(const Detection& detection, const ModelInfo& model,
 }
 
 cv::Mat pixelsOf(const Frame& frame) {
-  auto* data = const_cast<std::uint8_t*>(frame.data->data());  // only copied from
+  auto* data = const_cast<std::uint8_t*>(frame.data->data());  // the pixels are only read
   return cv::Mat(static_cast<int>(frame.height), static_cast<int>(frame.width), CV_8UC3, data)
       .clone();
 }
@@ -84,7 +84,7 @@ Look lookAt(const fs::path& network, const Frame* frame, double threshold) {
   for (const Detection& detection : answer->detections) {
     look.sights.push_back(sightOf(detection, node.model(), description.calibration));
   }
-  // Second answers to one object have lost evidence since they were emitted.
+  // Duplicate detections of one object lose evidence after the threshold.
   std::erase_if(look.sights, [&](const Sight& s) { return s.score < threshold; });
   std::stable_sort(look.sights.begin(), look.sights.end(),
                    [](const Sight& a, const Sight& b) { return a.score > b.score; });

@@ -1,4 +1,4 @@
-// One picture through the inference service's own node, and what it saw drawn into it.
+// Runs the node of the inference service on one picture and draws its detections.
 #pragma once
 
 #include <filesystem>
@@ -13,29 +13,28 @@ namespace perdure::tools {
 struct Sight {
   Box box;  ///< pixels of the picture
   std::string name;
-  double score = 0.0;  ///< the network's own, before calibration
+  double score = 0.0;  ///< the network's own score, before calibration
 };
 
-/// A picture of any format that OpenCV reads. Throws StartupError (69).
+/// Reads a picture of any format that OpenCV supports. Throws StartupError (69).
 Frame readPicture(const std::filesystem::path& file);
 
-/// A grey ramp of the size: nothing is in it.
+/// A grey ramp of the given size, without objects.
 Frame greyRamp(int width, int height);
 
 struct Look {
-  std::vector<Sight> sights;  ///< by falling score, one a box: its best class
+  std::vector<Sight> sights;  ///< sorted by decreasing score; one for each box, its best class
   int input_width = 0, input_height = 0;
 };
 
-/// Throws StartupError where the network or its model.json cannot be used.
-/// `frame` may be null: the grey ramp of the input's size is then looked at.
+/// Throws StartupError if the network or its model.json cannot be used. If `frame` is null, a grey
+/// ramp of the input's size is used.
 Look lookAt(const std::filesystem::path& network, const Frame* frame, double threshold);
 
-/// Throws StartupError (64) where the name is not that of a PNG or JPEG.
+/// Throws StartupError (64) unless the name is that of a PNG or JPEG.
 void checkDrawing(const std::filesystem::path& file);
 
-/// Writes the picture with boxes, names and scores. Throws StartupError (64, 69, 74) where it
-/// cannot.
+/// Writes the picture with boxes, names and scores. Throws StartupError (64, 69, 74) on failure.
 void drawSights(const Frame& frame, const std::vector<Sight>& sights,
                 const std::filesystem::path& file);
 

@@ -11,16 +11,16 @@
 namespace perdure::tools {
 namespace {
 
-constexpr double kSure = 0.9;     // score of an object that is taken for true
-constexpr double kInImage = 0.9;  // share of a box within the image that is no cut
-constexpr double kHidden = 0.25;  // share of a box behind nearer ones
-constexpr double kBeside = 0.25;  // of a box, on each side: what the map errs by
+constexpr double kSure = 0.9;     // least score of an object that counts as true
+constexpr double kInImage = 0.9;  // least share of a box within the image if it is not truncated
+constexpr double kHidden = 0.25;  // largest occluded share of a box
+constexpr double kBeside = 0.25;  // margin for errors of the map, as a share of a box
 constexpr double kSameTime_s = 1e-3;
 constexpr std::size_t kLeastViews = 20;
 
 struct View {
   const EstimateRow* row = nullptr;
-  Box whole, inside;  ///< not cut, and cut at the border
+  Box whole, inside;  ///< the complete box, and its part in the image
   double depth = 0.0;
 };
 
@@ -33,7 +33,7 @@ Box grown(const Box& box, double share) {
   return {box.x1 - x, box.y1 - y, box.x2 + x, box.y2 + y};
 }
 
-/// The objects that are in the image at all.
+/// The objects that are at least partly in the image.
 std::vector<View> viewsOf(const std::vector<const EstimateRow*>& rows, const RigidTransform& T_WB,
                           const CameraModel& camera) {
   const RigidTransform T_CW = (T_WB * camera.T_BC()).inverse();

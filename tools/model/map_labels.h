@@ -1,4 +1,4 @@
-// The objects of a run in place of labels: calibration where nobody labelled anything.
+// Uses the objects of a run as labels, for calibration without manual labels.
 #pragma once
 
 #include <memory>
@@ -7,12 +7,15 @@
 
 namespace perdure::tools {
 
-/// `request.labels` is OUT of `perdure pipeline` over the same frames. What it found to be there at
-/// the end (objects_final.csv) is expected in each frame in which it was not hidden. Of an object
-/// that is doubtful, cut by the border, largely behind another or small, boxes are ignored; so are
-/// boxes beside an object, as the map errs by some of its size. Judged are the classes that
-/// were seen in twenty views. Boxes of things that move, and of what the map did not hold, count as
-/// clutter. Throws StartupError (69) where there is too little, with the mend.
+/// `request.labels` is OUT of `perdure pipeline` over the same frames. Objects of its final map
+/// (objects_final.csv) are expected in each frame in which they are not occluded.
+///
+/// Boxes of objects that are uncertain, truncated, largely occluded or small are ignored. Boxes
+/// beside an object are ignored too, because sizes of the map have errors. Only classes with at
+/// least twenty views are judged. Boxes of moving objects, and of objects missing from the map,
+/// count as clutter.
+///
+/// Throws StartupError (69) with the fix if there are too few data.
 LabelledData readMapLabels(const LabelRequest& request, std::unique_ptr<replay::Dataset> dataset,
                            const replay::ClassAliases& aliases, double least_px);
 

@@ -1,4 +1,4 @@
-// Results that belong together: written beside their folder's files, and all there or none.
+// Writes related results as one unit: beside the files of their folder, then moves all or none.
 #pragma once
 
 #include <filesystem>
@@ -7,10 +7,11 @@
 
 namespace perdure::tools {
 
-/// A folder that is gone with its owner.
+/// A folder that its destructor removes.
 class TemporaryFolder {
  public:
-  /// In `parent`. Throws StartupError(kInputOutput) where the disk is full, else kUnavailable.
+  /// Creates it in `parent`. Throws StartupError: kInputOutput if the disk is full, otherwise
+  /// kUnavailable.
   TemporaryFolder(const std::filesystem::path& parent, const std::string& prefix,
                   const std::string& mend);
   ~TemporaryFolder();
@@ -22,21 +23,20 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-/// Where files wait for their place in a folder, on the same disk. The folder need not exist.
+/// Holds files on the same disk until they are moved to a folder, which need not exist yet.
 class Staging {
  public:
   explicit Staging(std::filesystem::path folder);
 
   const std::filesystem::path& path() const { return waiting_.path(); }
-  /// The message as it is for those who know of the folder alone.
+  /// The message with paths of the final folder.
   std::string said(std::string message) const;
-  /// Gives all files their place. Throws StartupError where that fails: then the folder has what
-  /// it had.
+  /// Moves all files to the folder. Throws StartupError on failure, and then restores the folder.
   void publish();
 
  private:
   struct Move {
-    std::filesystem::path from, to, former;  ///< former: where what was at `to` waits; "": nothing
+    std::filesystem::path from, to, former;  ///< former: backup of an existing file at `to`, or ""
   };
   std::vector<Move> moves() const;
   static void carryOut(const Move& move);

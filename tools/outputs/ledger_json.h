@@ -1,5 +1,5 @@
-// Why an object is believed, as JSON by the names of the kinds of evidence; and as numbers that
-// read the same on every machine.
+// The ledger of an object as JSON, with the names of the kinds of evidence; and numbers that are
+// equal on every machine.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -8,12 +8,11 @@
 
 namespace perdure::tools {
 
-/// Ten significant digits read back to better than a micrometre over a town, and hide the last bits
-/// in which two compilers may differ.
+/// Rounds to ten significant digits. This is better than a micrometre over a town, and hides the
+/// last bits, in which compilers may differ.
 double rounded(double value);
 
-/// Only kinds that were met; null for an empty ledger. Kinds that this program does not know are
-/// "kind_N".
+/// Contains only the observed kinds; null for an empty ledger. Unknown kinds are named "kind_N".
 nlohmann::ordered_json toJson(const Ledger& ledger);
 
 }  // namespace perdure::tools

@@ -10,8 +10,8 @@ namespace perdure::tools {
 namespace {
 
 constexpr double kMovingAbove = 0.5;
-constexpr double kMostlySeen = 0.6;    // FINAL: with less of it in sight an object counts as hidden
-constexpr double kBelievedFrom = 0.1;  // FINAL: fainter guesses are not a first detection
+constexpr double kMostlySeen = 0.6;    // FINAL: visible share below which an object is occluded
+constexpr double kBelievedFrom = 0.1;  // FINAL: existence from which a track counts as detected
 
 bool isHidden(Visibility v) { return v == Visibility::kOccluded; }
 
@@ -45,8 +45,8 @@ const ShapePoints& cuboidPoints() {
   return corners;
 }
 
-/// What a row looks like from a pose: its shape's hull, or the box about its cuboid's image where
-/// no shape is known. Nothing where its centre is outside the image.
+/// Outline of a row from a pose: the hull of its shape, or the box around its cuboid's image if the
+/// shape is unknown. Empty if its centre is outside the image.
 std::optional<Outline> outlineOf(const ObjectRow& row, const ShapePoints* shape,
                                  const RigidTransform& T_CW, const CameraModel& camera) {
   const Eigen::Vector3d centre = T_CW * row.p_W;
@@ -184,9 +184,10 @@ std::map<ObjectId, ObjectHistory::Look> ObjectHistory::looksOfSurvivors(
   return looks;
 }
 
-/// Of what was surely elsewhere when it was claimed to be moving: the last frame in which it was.
+/// For objects that were certainly elsewhere while they were estimated to be moving: the last such
+/// frame.
 std::map<ObjectId, std::uint64_t> ObjectHistory::lastFramesElsewhere() const {
-  constexpr double kSurely = 21.1;  // χ² of three degrees of freedom, .9999
+  constexpr double kSurely = 21.1;  // χ² of three degrees of freedom, 0.9999
   std::map<ObjectId, std::uint64_t> result;
   for (const auto& [frame, record] : frames_) {
     for (const auto& [id, look] : record.looks) {

@@ -1,5 +1,5 @@
-// What the filter said of each object in each frame, and the two tables made of it: INST (the
-// causal estimate at the frame) and FINAL (the object's last estimate, mapped back; paper, line
+// Estimates of each object in each frame, and the two tables made from them. INST contains the
+// causal estimate at the frame; FINAL contains the object's last estimate, mapped back (paper, line
 // 337).
 #pragma once
 
@@ -16,10 +16,10 @@
 
 namespace perdure::tools {
 
-/// Corners of a convex solid, in halves of length, width and height from the middle.
+/// Corners of a convex solid, in half lengths, widths and heights from the centre.
 using ShapePoints = std::vector<Eigen::Vector3d>;
 
-/// A line of objects_inst.csv or objects_final.csv: centre in W, metres, radians.
+/// A row of objects_inst.csv or objects_final.csv: centre in W, metres, radians.
 struct ObjectRow {
   std::uint64_t frame = 0;
   TimePoint time;
@@ -35,26 +35,29 @@ struct ObjectRow {
 /// Collects by frame; a later message about the same frame replaces the earlier one.
 class ObjectHistory {
  public:
-  /// Needed for FINAL: which frames the last estimate projects into.
+  /// Needed for FINAL, to project the last estimate into the frames.
   void setCamera(const CameraCalibration& calibration) { camera_.emplace(calibration); }
-  /// By class: what its things fill of their cuboids, for FINAL too. Of the rest no more is known
-  /// than the box about the cuboid's image, as before this is told.
+  /// Shapes of the classes within their cuboids, also for FINAL. Classes without a shape, and all
+  /// classes before this call, use the box around the cuboid's image.
   void setShapes(std::map<std::string, ShapePoints> shapes) { shapes_ = std::move(shapes); }
   void add(const Objects& objects);
   void add(const Event& event);
 
-  /// Confirmed, static objects that are claimed to be there and not hidden, by frame and id.
+  /// Confirmed, static, present objects that are not occluded, by frame and id.
   std::vector<ObjectRow> inst() const;
-  /// The surviving id after merges, the last estimate, from the first detection on that made it
-  /// more than a faint guess (r of .1), in the frames in which it projects into the image and is
-  /// not hidden: neither known to be so at the time, nor with under .6 of it in sight beside the
-  /// last estimates of nearer ones. Objects that were judged moving or gone at last give none; what
-  /// drove before it came to rest where it is gives none until then.
+  /// Rows with the surviving id after merges and the last estimate. They start at the first
+  /// detection with existence r of at least 0.1. A frame has a row if the object projects into the
+  /// image and is not occluded. Occluded means: estimated so at the time, or less than 0.6 visible
+  /// beside the last estimates of nearer objects.
+  ///
+  /// Objects that ended as moving or deleted have no rows. An object that moved before it stopped
+  /// at its last position has no rows until then.
   std::vector<ObjectRow> finalRows() const;
-  /// The last belief of each confirmed object that is not gone and was not merged away, by id.
+  /// The last belief of each confirmed object that was neither deleted nor merged into another, by
+  /// id.
   std::vector<ObjectBelief> lastBeliefs() const;
   ObjectId survivorOf(ObjectId id) const;
-  /// Confirmed objects in the newest message.
+  /// Number of confirmed objects in the newest message.
   std::size_t confirmedNow() const;
 
  private:
@@ -63,9 +66,9 @@ class ObjectHistory {
     Eigen::Matrix3d covariance;
   };
   struct Look {
-    bool hidden = false;           ///< known to be occluded
-    bool believed = false;         ///< more than a faint guess
-    std::optional<Place> driving;  ///< where, of what was claimed to be moving
+    bool hidden = false;           ///< estimated to be occluded
+    bool believed = false;         ///< existence is at least 0.1
+    std::optional<Place> driving;  ///< position while estimated to be moving
   };
   struct FrameRecord {
     TimePoint time;

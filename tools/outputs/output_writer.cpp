@@ -20,7 +20,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Declared, not measured: where no GNSS is at hand the map still opens in any viewer, at 0°, 0°.
+// Declared default, not measured: without GNSS, the map opens in any viewer at 0°, 0°.
 constexpr GeoAnchor kDefaultAnchor{};
 
 template <class Derived>
@@ -266,8 +266,8 @@ void OutputWriter::writeObjects() const {
   writeJson("objects.json", {{"objects", objects}});
 }
 
-/// T_MB, in M as the map is: it meets the Earth at the pose nearest to the anchor's time; further
-/// away it would be a guess.
+/// T_MB at the pose nearest to the anchor's time, in the frame of the map. Empty if no pose is
+/// within a second, because the position would be uncertain.
 std::optional<RigidTransform> OutputWriter::poseAtAnchor() const {
   if (!anchor_) return std::nullopt;
   constexpr Duration kNear = std::chrono::seconds(1);

@@ -1,5 +1,5 @@
-// The files that `perdure pipeline` and the demo leave behind, from the streams
-// odometry, objects and events. Two runs over the same messages give the same bytes.
+// Writes the output files of `perdure pipeline` and the demo from the streams odometry, objects and
+// events. The same messages give the same bytes.
 #pragma once
 
 #include <filesystem>
@@ -25,8 +25,8 @@ namespace perdure::tools {
 
 class OutputWriter {
  public:
-  /// Makes the folder where it is missing. Throws StartupError (kUnavailable) where it cannot.
-  /// `sequence` fills the column of that name.
+  /// Creates a missing folder. Throws StartupError (kUnavailable) if that fails. `sequence` is the
+  /// value of the column with this name.
   OutputWriter(std::filesystem::path folder, std::string sequence);
 
   void setShapes(std::map<std::string, ShapePoints> shapes) {
@@ -37,23 +37,23 @@ class OutputWriter {
   void onObjects(const Objects& objects);
   void onEvent(const Event& event);
   void onDetections(const Detections& detections) { log_.add(detections); }
-  /// Points whose standard deviation is above a metre are not drawn.
+  /// Draws only points with a standard deviation of at most a metre.
   void onLandmarks(const Landmarks& landmarks);
-  /// For the pictures, in W; before finish().
+  /// Ground truth for the pictures, in W; to be called before finish().
   void setTruth(PictureTruth truth) { truth_ = std::move(truth); }
-  /// With it map.png and map.geojson are in M, and there is a trajectory_map.tum: the way as the
-  /// map's graph has it in the end. Before finish().
+  /// Writes map.png and map.geojson in M, and trajectory_map.tum with the trajectory of the map's
+  /// final graph. To be called before finish().
   void setInMap(DriveInMap in_map) { in_map_ = std::move(in_map); }
 
-  /// Writes everything but events.jsonl and odometry.csv, which are written as their messages come.
-  /// Throws StartupError(kInputOutput) with the file that could not be written whole.
+  /// Writes all files except events.jsonl and odometry.csv, which are written as messages arrive.
+  /// Throws StartupError(kInputOutput) with the file that is incomplete.
   void finish();
-  /// Any further file: timing.json, report.json.
+  /// Writes an additional file: timing.json, report.json.
   void writeJson(const std::string& name, const nlohmann::ordered_json& json) const;
 
   const ObjectHistory& history() const { return history_; }
   const DriveLog& log() const { return log_; }
-  /// By frame, those of usable odometry.
+  /// Poses of usable odometry, by frame.
   const std::map<std::uint64_t, replay::StampedPose>& poses() const { return poses_; }
   std::size_t odometryFrames() const { return poses_.size(); }
   const std::filesystem::path& folder() const { return folder_; }
@@ -67,7 +67,7 @@ class OutputWriter {
   void writeGeoJson() const;
   void writePictures() const;
   MapContent mapContent() const;
-  /// In M where the run has one, else as they are, in W.
+  /// The beliefs in M if the run has a map frame, otherwise unchanged in W.
   std::vector<ObjectBelief> beliefsInMap() const;
   std::optional<RigidTransform> poseAtAnchor() const;
 

@@ -48,7 +48,7 @@ void ResultsFolder::keep() {
   for (const auto& entry : fs::directory_iterator(written_, error)) {
     names.push_back(entry.path().filename());
   }
-  // Its journal is of the earlier map.
+  // Removes the journal, because it belongs to the earlier map.
   for (const char* part : {"map.sqlite-wal", "map.sqlite-shm"}) removeAll(out_ / part);
   for (const fs::path& name : names) {
     if (fs::is_directory(out_ / name, error)) removeAll(out_ / name);

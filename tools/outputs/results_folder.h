@@ -1,23 +1,25 @@
-// Where a run writes its results: an earlier run's in the same folder stay until they are whole.
+// The folder of a run's results; results of an earlier run stay until the new ones are complete.
 #pragma once
 
 #include <filesystem>
 
 namespace perdure::tools {
 
-/// A folder that holds no run is written directly. One that does gets a folder `unfinished`, whose
-/// files take the earlier ones' places when the run has ended; without that it is removed.
+/// A folder without a run is written directly. Otherwise files are written to a subfolder
+/// `unfinished`, and replace the earlier ones when the run has ended. If the run fails, the
+/// subfolder is removed.
 class ResultsFolder {
  public:
-  /// Throws StartupError(kUnavailable) where what a killed run left cannot be removed.
+  /// Throws StartupError(kUnavailable) if the remains of a killed run cannot be removed.
   explicit ResultsFolder(std::filesystem::path out);
   ResultsFolder(const ResultsFolder&) = delete;
   ResultsFolder& operator=(const ResultsFolder&) = delete;
   ~ResultsFolder();
 
-  /// Where to write.
+  /// The folder to write to.
   const std::filesystem::path& folder() const { return written_; }
-  /// Once nobody has a file in it open. Throws StartupError(kInputOutput) where it cannot.
+  /// Replaces the earlier results; no file in the folder may be open. Throws
+  /// StartupError(kInputOutput) on failure.
   void keep();
 
  private:

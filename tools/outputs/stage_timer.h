@@ -8,10 +8,10 @@
 
 namespace perdure::tools {
 
-/// Middle and upper quantile of a sample by linear interpolation; q in [0, 1]; 0 when empty.
+/// Quantile of a sample by linear interpolation; q in [0, 1]; 0 for an empty sample.
 double quantile(std::vector<double> values, double q);
 
-/// A stage that is timed within another is none of the outer one's time.
+/// Measures stages; the time of a nested stage does not count for the outer one.
 class StageTimer {
  public:
   /// Runs `work` and adds its CPU time (of all threads of the process) and wall time to `stage` as
@@ -21,7 +21,7 @@ class StageTimer {
     const Span span(*this, stage);
     return work();
   }
-  /// Runs `work`, whose times are part of the stage's next call: inertial samples between frames.
+  /// Runs `work` and adds its times to the next call of the stage: inertial samples between frames.
   template <class Work>
   auto timeTowardsNext(const std::string& stage, Work&& work) {
     const Span span(*this, stage, false);
@@ -43,7 +43,7 @@ class StageTimer {
     bool whole_;
     Span* outer_;
     double cpu_start_ms_, wall_start_ms_;
-    double cpu_within_ms_ = 0.0, wall_within_ms_ = 0.0;  ///< of stages inside this one
+    double cpu_within_ms_ = 0.0, wall_within_ms_ = 0.0;  ///< times of stages in this one
   };
   struct Samples {
     std::vector<double> cpu_ms, wall_ms;

@@ -1,4 +1,4 @@
-// The `perdure` command: each subcommand is one line here and lives in its own folder of tools/.
+// The `perdure` command. Each subcommand is one line here; its code is in its own folder of tools/.
 #include <CLI/CLI.hpp>
 #include <cerrno>
 #include <cstdio>
@@ -23,7 +23,7 @@
 
 namespace {
 
-/// What was printed has arrived: a full disk or a file that is closed is no success.
+/// Checks that all output was written. A full disk or a closed file is an error.
 int checkedOutput(int status) {
   errno = 0;
   std::cout.flush();

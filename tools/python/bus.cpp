@@ -26,7 +26,7 @@ bus::Options applied(const BusSettings& settings, bus::Options options) {
   return bus::withEnvironment(options);
 }
 
-/// Throws StartupError where a domain that is open is not what is asked for.
+/// Throws StartupError if the open domain has other options than the requested one.
 void requireSame(const bus::Options& open, const bus::Options& wanted) {
   if (wanted.interface != open.interface || wanted.peers != open.peers) {
     throw StartupError(ExitCode::kUsage,
@@ -60,7 +60,7 @@ bus::Options serviceOptionsOf(const BusSettings& settings, const std::string& pr
 
 bus::Domain openDomain(const bus::Options& options) {
   static std::mutex mutex;
-  static auto& open = *new std::map<std::int64_t, bus::Domain*>;  // as long as the process
+  static auto& open = *new std::map<std::int64_t, bus::Domain*>;  // the map is never deleted
   const std::lock_guard lock(mutex);
   const auto at = open.find(options.domain);
   if (at == open.end()) {

@@ -1,4 +1,4 @@
-// A process of Python's on the bus: one domain a process, participants as many as it asks for.
+// A Python process on the bus: one domain for each process, any number of participants.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -12,21 +12,21 @@
 
 namespace perdure::python {
 
-/// What a caller says; the rest is said by bus.yaml and the environment, as for the commands.
+/// Settings of the caller; the others come from bus.yaml and the environment, as for the commands.
 struct BusSettings {
   std::optional<std::string> interface = {}, vehicle = {}, security = {}, identity = {};
   std::optional<std::int64_t> domain = {};
   std::optional<std::vector<std::string>> peers = {};
 };
-/// As the commands listen, without shared memory, under the identity "subscriber" where none is
-/// named. Throws StartupError.
+/// Options of a subscriber, as for the commands: without shared memory, and with the default
+/// identity "subscriber". Throws StartupError.
 bus::Options optionsOf(const BusSettings& settings);
-/// The same for a service: with shared memory, under the identity of its name.
+/// The same for a service: with shared memory, and with the identity of its name.
 bus::Options serviceOptionsOf(const BusSettings& settings, const std::string& process);
 
-/// The domain of these options. DDS opens one once a process, and holds all its participants to
-/// what the first one's identity may do: a second call gets the same. Throws StartupError where it
-/// is open in another way.
+/// The domain of these options. DDS opens a domain once in each process and restricts all
+/// participants to the permissions of the first identity. A second call therefore returns the same
+/// domain. Throws StartupError if the open domain has other options.
 bus::Domain openDomain(const bus::Options& options);
 
 class Bus {
@@ -35,9 +35,9 @@ class Bus {
 
   const bus::Participant& participant() const { return participant_; }
   const bus::Options& options() const { return domain_.options(); }
-  /// "domain 0, interface lo, vehicle ego"
+  /// For example "domain 0, interface lo, vehicle ego".
   std::string place() const;
-  /// Why nothing has come on a topic, and the mend.
+  /// Explains why no message arrived on a topic, with the fix.
   std::string whySilent(const std::string& topic, std::size_t matched) const;
 
  private:
@@ -45,7 +45,7 @@ class Bus {
   bus::Participant participant_;
 };
 
-/// Any topic's writer, by its name.
+/// A writer of any topic, selected by name.
 class Publisher {
  public:
   /// Raises UnknownTopic.
@@ -53,7 +53,7 @@ class Publisher {
             double lease_s);
   /// Raises Refused with the field and the reason.
   void write(pybind11::handle message);
-  /// The key's instance is gone, for late joiners too.
+  /// Disposes of the instance with the message's key, for late joiners too.
   void dispose(pybind11::handle message);
   std::size_t matched() const { return writer_->matched(); }
   bool waitForAcknowledgement(double seconds);
@@ -64,7 +64,7 @@ class Publisher {
   std::function<void(pybind11::handle)> write_, dispose_;
 };
 
-/// Raises UnknownTopic with the names that there are.
+/// Raises UnknownTopic with the existing names.
 [[noreturn]] void refuseTopic(const std::string& topic);
 
 void bindBus(pybind11::module_& module);

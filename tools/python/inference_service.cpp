@@ -20,7 +20,7 @@ namespace {
 namespace py = pybind11;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::seconds kHangs{10};  // no network takes so long for a frame
+constexpr std::chrono::seconds kHangs{10};  // longer than any network needs for a frame
 
 std::shared_ptr<spdlog::logger> makeLog(const std::string& process) {
   auto log =
@@ -34,11 +34,11 @@ struct ServiceOptions {
   std::string process, camera;
   std::int32_t strength = 1;
   double lease_s = 0.0;
-  bool expects = false;  ///< it answers the filter's predictions
+  bool expects = false;  ///< evaluates the filter's predictions
 };
 
-/// The service's loop has a thread of its own, so that Health and liveliness go on while Python
-/// works on a frame; it hands over the newest frame and drops those before it.
+/// Runs the loop of the service in its own thread, so that Health and liveliness continue while
+/// Python processes a frame. It hands over the newest frame and drops older ones.
 class InferenceService {
  public:
   InferenceService(const BusSettings& settings, const ServiceOptions& options,
@@ -64,7 +64,7 @@ class InferenceService {
     if (thread_.joinable()) thread_.join();
   }
 
-  /// The newest frame; nothing after the time. Throws what ended the loop.
+  /// Returns the newest frame, or nothing after the time. Throws the error that ended the loop.
   std::optional<Frame> next(std::chrono::nanoseconds longest) {
     std::unique_lock lock(mutex_);
     came_.wait_for(lock, longest, [this] { return newest_ || ended_; });
@@ -79,7 +79,7 @@ class InferenceService {
     detections.model_hash = model_.hash;
     const std::lock_guard lock(mutex_);
     busy_since_.reset();
-    if (detections_.livelinessLost() > lost_) {  // it was taken for dead: not the owner any more
+    if (detections_.livelinessLost() > lost_) {  // the lease expired: not the owner any more
       lost_ = detections_.livelinessLost();
       if (detections_.strength() == options_.strength) {
         detections_.setStrength(options_.strength - 1);
@@ -99,7 +99,7 @@ class InferenceService {
     say(HealthState::kDegraded, why);
   }
 
-  /// The filter's newest, once each.
+  /// The newest predictions of the filter, each only once.
   std::optional<Predictions> predictions() {
     const std::lock_guard lock(mutex_);
     return std::exchange(expected_, std::nullopt);

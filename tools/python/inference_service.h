@@ -1,5 +1,5 @@
-// An inference service whose network is Python's: what services/inference does around the network,
-// with the same Health, liveliness and refusals.
+// An inference service with a network in Python. It does the work of services/inference around the
+// network, with the same Health, liveliness and errors.
 #pragma once
 
 #include <pybind11/pybind11.h>

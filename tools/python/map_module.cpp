@@ -1,4 +1,4 @@
-// perdure._map: questions to a map's file, answered as `perdure map --db` answers them.
+// perdure._map: queries to a map's file, with the results of `perdure map --db`.
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 

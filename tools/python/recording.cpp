@@ -14,10 +14,10 @@ namespace {
 
 namespace py = pybind11;
 
-/// A recording, one pass.
+/// A recording that is read once.
 class Recording {
  public:
-  /// `topics`: none means all. Raises UnknownTopic. Throws StartupError.
+  /// `topics`: empty means all. Raises UnknownTopic. Throws StartupError.
   Recording(const std::string& path, const std::vector<std::string>& topics)
       : messages_(path), wanted_(topics.begin(), topics.end()) {
     for (const std::string& topic : topics) {
@@ -32,7 +32,7 @@ class Recording {
     });
   }
 
-  /// (topic, ns of the recorder's clock, message); None at the end. What cannot be read is counted.
+  /// (topic, ns of the recorder's clock, message); None at the end. Counts unreadable messages.
   py::object next() {
     for (;;) {
       py::object read = py::none();
@@ -67,7 +67,7 @@ class Recording {
     for (const auto& [reason, n] : messages_.reasons().all()) all[reason] += n;
     return all;
   }
-  /// Empty where nothing was left out.
+  /// Empty if no message was omitted.
   std::string problem() const { return problem_.empty() ? messages_.lastProblem() : problem_; }
   bool otherVersion() const { return other_version_; }
 

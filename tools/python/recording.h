@@ -1,4 +1,4 @@
-// Recordings (MCAP) as Python reads them.
+// Reads recordings (MCAP) for Python.
 #pragma once
 
 #include <pybind11/pybind11.h>

@@ -2,7 +2,7 @@
 """Writes the type hints that follow from the topics: perdure/*.pyi.
 
 usage: PYTHONPATH=build/release/python tools/python/stubs.py [--check]
---check writes nothing, and ends with 1 where they are not up to date.
+--check writes nothing, and exits with status 1 if they are out of date.
 """
 import inspect
 import pathlib
@@ -16,7 +16,7 @@ HEAD = "# Made by tools/python/stubs.py of the topics' description; do not edit.
 
 
 def member(name, value):
-    """A property or method of a class's own, with its docstring."""
+    """A property or method of a class, with its docstring."""
     if isinstance(value, property):
         doc = (value.fget.__doc__ or "").strip().split("\n")[0]
         hint = value.fget.__annotations__["return"]
@@ -116,7 +116,7 @@ def bus_text():
     lines = [HEAD + BUS]
     for topic, name in bus.topics().items():
         if topic.endswith("/"):
-            continue  # a name that is not known: the overload of str
+            continue  # an unknown name, covered by the overload for str
         lines.append(
             f'@overload\ndef subscribe(topic: Literal["{topic}"], {OPTIONS}) -> '
             f"Subscription[messages.{name}]: ...\n"
@@ -134,7 +134,7 @@ def messages_text():
 
 
 def package_text():
-    """What perdure/__init__.py makes at run time, in words."""
+    """Type hints for the names that perdure/__init__.py creates at run time."""
     source = (FOLDER / "__init__.py").read_text(encoding="utf-8")
     imports = source[source.index("from .bus") : source.index("globals()")]
     kept = [i for i in imports.split("from ")[1:] if "_CLASSES" not in i]

@@ -13,7 +13,7 @@ using Clock = std::chrono::steady_clock;
 
 std::optional<Clock::time_point> endAfter(std::optional<double> seconds) {
   if (!seconds) return std::nullopt;
-  constexpr double kLongest = 1e8;  // three years: the clock has room for it
+  constexpr double kLongest = 1e8;  // three years, which the clock can represent
   const std::chrono::duration<double> length(std::clamp(*seconds, 0.0, kLongest));
   return Clock::now() + std::chrono::duration_cast<Clock::duration>(length);
 }

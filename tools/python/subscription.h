@@ -1,5 +1,5 @@
-// Messages of topics as they come, for one Python thread at a time. It waits without the GIL and
-// hears Ctrl-C within 50 ms.
+// Messages of topics in the order of arrival, for one Python thread at a time. It waits without the
+// GIL and checks for Ctrl-C every 50 ms.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -17,21 +17,21 @@ namespace perdure::python {
 
 class Subscription {
  public:
-  /// `gone`: also what is disposed of. Raises UnknownTopic.
+  /// `gone`: also returns disposed instances. Raises UnknownTopic.
   Subscription(std::shared_ptr<Bus> bus, std::vector<std::string> topics, bool gone);
   ~Subscription();
 
-  /// (topic, message, whether it is gone), in the order of arrival; None after the time (nothing:
-  /// never), or once it is closed.
+  /// (topic, message, whether it was disposed), in the order of arrival; None after the time
+  /// (without a value: no limit) or after close().
   pybind11::object next(std::optional<double> seconds);
-  /// From any thread; who waits goes on.
+  /// Ends a wait; may be called from any thread.
   void close();
   bool closed() const { return loop_.stopped(); }
-  /// Writers that are matched now, of all its topics.
+  /// Number of matched writers of all its topics.
   std::size_t matched() const;
-  /// What DDS and the checks have counted: <topic>_malformed_<reason>, _sample_lost, …
+  /// Counts of DDS and of the checks: <topic>_malformed_<reason>, _sample_lost, …
   ReasonCounts counts() const;
-  /// The first thing that was malformed: the field and the reason; empty where there was none.
+  /// The first malformed message: the field and the reason; empty if there was none.
   std::string firstProblem() const;
   std::string whySilent() const;
 
@@ -39,7 +39,7 @@ class Subscription {
   void add(const std::string& topic, bool gone);
   template <class T>
   void keep(const std::string& topic, const T& message, bool gone);
-  /// False once the time is over.
+  /// Returns false when the time is over.
   bool wait(std::optional<std::chrono::steady_clock::time_point> end);
 
   const std::shared_ptr<Bus> bus_;

@@ -1,4 +1,4 @@
-// The last seconds, packed, in memory: written down when something went wrong.
+// Keeps the last seconds as packed chunks in memory, to be written after a fault.
 #pragma once
 
 #include <deque>
@@ -9,16 +9,16 @@ namespace perdure::tools {
 
 class BlackBox {
  public:
-  /// At least `seconds`, as far as `most_bytes` suffice.
+  /// Keeps at least `seconds`, limited by `most_bytes`.
   BlackBox(double seconds, std::uint64_t most_bytes);
 
   void add(PackedChunk chunk);
-  /// Hands over all that is held, the oldest first.
+  /// Returns all chunks, the oldest first, and empties the box.
   std::deque<PackedChunk> take();
 
   double seconds() const;
   std::uint64_t bytes() const { return bytes_; }
-  /// Chunks that had to go before their time, because memory was short.
+  /// Number of chunks that were dropped early because memory was insufficient.
   std::uint64_t cutShort() const { return cut_short_; }
 
  private:

@@ -17,7 +17,7 @@ std::optional<std::string> FaultWatch::onSilent(std::size_t silent, Time now) {
   const bool more = silent > silent_;
   silent_ = silent;
   if (!more) return std::nullopt;
-  constexpr std::chrono::milliseconds kLease(900);  // of health; one message comes each second
+  constexpr std::chrono::milliseconds kLease(900);  // lease of health; its period is a second
   std::string name = "a process";
   Time oldest = now - kLease;
   for (const auto& [process, seen] : processes_) {

@@ -1,4 +1,4 @@
-// What counts as a fault: a process that says so, or one that says nothing any more.
+// Detects faults: a process that reports one, or a process that became silent.
 #pragma once
 
 #include <chrono>
@@ -17,10 +17,10 @@ class FaultWatch {
   /// `from`: the first state that is a fault; kFailed, or kDegraded.
   explicit FaultWatch(HealthState from = HealthState::kFailed) : from_(from) {}
 
-  /// What happened, where a process goes over to a fault with this message.
+  /// A description, if this message is a process's transition to a fault.
   std::optional<std::string> onHealth(const Health& health, Time now);
-  /// The same by how many writers of `health` are there, but missed their lease. An ordered end is
-  /// no fault: its writer is gone then.
+  /// A description, if the number of `health` writers that missed their lease has grown. An orderly
+  /// shutdown is no fault, because it removes the writer.
   std::optional<std::string> onSilent(std::size_t silent, Time now);
 
  private:

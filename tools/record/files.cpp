@@ -28,7 +28,7 @@ std::string dateOf(std::uint64_t ns) {
                      ns / 1'000'000 % 1000);
 }
 
-/// Of a recording of Perdure or of ROS.
+/// Describes a recording of Perdure or ROS.
 template <class Messages>
 void printHead(const std::string& path, const Messages& recording, const char* what = "") {
   if (recording.endNs() < recording.startNs()) {
@@ -68,7 +68,7 @@ const dds_topic_descriptor_t* typeNamed(const std::string& name) {
   return nullptr;
 }
 
-/// The message as XCDR1, with the IDL that says so.
+/// Adds the message as XCDR1, with the IDL of that encoding.
 Result<void> addPlain(replay::RecordingWriter& file, const replay::RecordedMessage& message) {
   const dds_topic_descriptor_t* type = typeNamed(message.type);
   if (type == nullptr) return fail("unknown_type", message.type);

@@ -1,4 +1,4 @@
-// What can be done with recordings that lie there: `perdure record info`, `repair`, `export`.
+// Operations on recorded files: `perdure record info`, `repair`, `export`.
 #pragma once
 
 #include <filesystem>
@@ -14,18 +14,17 @@ namespace perdure::tools {
 
 void addFileCommands(CLI::App& record);
 
-/// A copy of one recording or a folder of them in which every message is plain XCDR1 (its types
-/// final), for readers without delimited XCDR2. What cannot be read is counted. Throws
-/// StartupError.
+/// Copies a recording, or a folder of recordings, with every message as plain XCDR1 (final types),
+/// for readers without delimited XCDR2. Counts messages that cannot be read. Throws StartupError.
 ReasonCounts exportPlain(const std::filesystem::path& from, const std::filesystem::path& to);
 
-/// Of a recording that gave no message: throws StartupError(kData) with the reason that it has.
+/// Throws StartupError(kData) for a recording without messages, with the reason.
 [[noreturn]] void refuseNothing(const replay::RecordedMessages& recording,
                                 const std::filesystem::path& path);
-/// Of one whose messages are none that can be exported: the same; `reasons` say why.
+/// Throws the same for a recording whose messages cannot be exported; `reasons` explain why.
 [[noreturn]] void refuseForeign(const std::filesystem::path& path, const ReasonCounts& reasons);
 
-/// A file that was begun: removed again, unless it is kept.
+/// A new file, which the destructor removes unless it is kept.
 class NewFile {
  public:
   explicit NewFile(std::filesystem::path file) : file_(std::move(file)) {}

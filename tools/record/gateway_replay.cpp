@@ -12,7 +12,7 @@ namespace perdure::tools {
 namespace {
 
 using namespace std::chrono_literals;
-constexpr double kBack = 3.0;  // s of the recording that are read before a place that is sought
+constexpr double kBack = 3.0;  // s of the recording that a seek reads before its target
 
 bool isShown(const std::string& topic) {
   return topic == "calibration" || topic == "odometry" || topic == "landmarks" ||
@@ -36,7 +36,7 @@ bool looksAtGraph(const gateway::Channels& wanted) {
   return wanted.contains(gateway::kMapGraph) || wanted.contains(gateway::kMapGraphScene);
 }
 
-/// The channel that shows each message of such a topic, as it comes; else none.
+/// The channel that shows each message of a topic as it arrives; empty for other topics.
 std::optional<std::uint32_t> channelOf(const std::string& topic,
                                        const std::vector<std::string>& cameras) {
   if (topic == "landmarks") return gateway::kLandmarks;
@@ -85,8 +85,8 @@ GatewayReplay::GatewayReplay(replay::RecordedMessages& recording, const gateway:
 
 GatewayReplay::~GatewayReplay() = default;
 
-/// Times of the sensors and of the recorder run alike between the first message with both and the
-/// last one.
+/// Measures the relation of sensor time and recorder time; it is linear from the first to the last
+/// message with both.
 void GatewayReplay::measure() {
   begin_ns_ = recording_.startNs();
   end_ns_ = recording_.endNs();
@@ -143,7 +143,7 @@ std::unique_ptr<gateway::Node> GatewayReplay::freshNode() {
     reply.request = query.request;
     reply.ok = false;
     reply.error = "a recording has no map store; perdure map --db FILE asks a map";
-    refusals_.push_back(reply);  // the node is in the middle of asking
+    refusals_.push_back(reply);  // queues the reply, because the node is making the request
   };
   return std::make_unique<gateway::Node>(
       config_, "recording", 1,
@@ -153,7 +153,7 @@ std::unique_ptr<gateway::Node> GatewayReplay::freshNode() {
                        .query = no_store});
 }
 
-/// What was known before that place is known again: the last seconds are gone through.
+/// Restores the state at that time by reading the seconds before it.
 void GatewayReplay::seek(std::uint64_t log_ns) {
   node_ = freshNode();
   newest_.clear();
@@ -171,8 +171,7 @@ void GatewayReplay::seek(std::uint64_t log_ns) {
   if (!playing_) showFrame();
 }
 
-/// Camera and network, as they were told last before a place; before they were told at all: as they
-/// are known.
+/// Restores the last calibration and model before a time; if there are none, uses the known ones.
 void GatewayReplay::recallRig(std::uint64_t log_ns) {
   if (calibration_) node_->onCalibration(*calibration_);
   if (model_) node_->onModel(*model_);
@@ -183,7 +182,7 @@ void GatewayReplay::recallRig(std::uint64_t log_ns) {
   }
 }
 
-/// To who begins to look: what he would have seen.
+/// Repeats the newest messages for a client that opens a channel.
 void GatewayReplay::repeatFrames(const gateway::Channels& before) {
   for (const auto& [topic, message] : newest_) {
     const auto channel = channelOf(topic, config_.cameras);
@@ -191,7 +190,7 @@ void GatewayReplay::repeatFrames(const gateway::Channels& before) {
   }
 }
 
-/// The newest graph of the map that was told before a place: what is read grows until there is one.
+/// Finds the newest graph of the map before a time; extends the search until one is found.
 void GatewayReplay::recallGraph(std::uint64_t log_ns) {
   graph_.reset();
   if (!recording_.topics().contains("map/reply")) return;
@@ -209,7 +208,7 @@ void GatewayReplay::recallGraph(std::uint64_t log_ns) {
   }
 }
 
-/// On to the next objects, so that what is paused is seen.
+/// Advances to the next objects, so that a paused replay shows them.
 void GatewayReplay::showFrame() {
   fed_objects_ = false;
   while (next_ && !fed_objects_) (void)pull();
@@ -238,7 +237,7 @@ void GatewayReplay::seekToNextEvent(const gateway::Call& call) {
   tellState(true, "");
 }
 
-/// Hands over one message; false at the end.
+/// Feeds one message; returns false at the end.
 bool GatewayReplay::pull() {
   if (!next_) return false;
   at_ns_ = std::max(at_ns_, next_->log_ns);

@@ -1,5 +1,5 @@
-// A recording to look at without a bus: the gateway's page and Foxglove with play, pause, seek,
-// speed and the next event, all from the client.
+// Replays a recording without a bus in the gateway's page and Foxglove. Clients control play,
+// pause, seek, speed and the next event.
 #pragma once
 
 #include <condition_variable>
@@ -20,27 +20,28 @@ namespace perdure::tools {
 
 class GatewayReplay {
  public:
-  /// Finds out what the recording covers, and begins `start_s` after its first frame. Throws
-  /// StartupError: it holds nothing to be shown, ends before, or the port cannot be had.
+  /// Determines the time range of the recording, and starts `start_s` after its first frame. Throws
+  /// StartupError if the recording has nothing to show, if it ends earlier, or if the port is not
+  /// available.
   GatewayReplay(replay::RecordedMessages& recording, const gateway::Config& config,
                 const gateway::PlaybackRequest& start, double start_s = 0.0);
   ~GatewayReplay();
 
   std::uint16_t port() const { return server_->port(); }
   gateway::TimeRange range() const { return {sensorTime(first_.log_ns), sensorTime(last_.log_ns)}; }
-  /// Until stop().
+  /// Runs until stop().
   void run();
-  void stop();  ///< from any thread
+  void stop();  ///< may be called from any thread
 
  private:
   using Clock = std::chrono::steady_clock;
-  /// A message that has both times: the recorder's, and the sensors'.
+  /// A message with both times: of the recorder and of the sensors.
   struct Instant {
     std::uint64_t log_ns = 0;
     TimePoint time;
   };
   struct Mail {
-    std::vector<gateway::Channels> wanted;  ///< each: who leaves and comes again is told anew
+    std::vector<gateway::Channels> wanted;  ///< every change, so that returning clients are updated
     std::deque<gateway::Call> calls;
     std::deque<gateway::PlaybackRequest> requests;
     bool stop = false;
@@ -77,11 +78,11 @@ class GatewayReplay {
   gateway::Channels wanted_;
   std::optional<Calibration> calibration_;
   std::optional<ModelInfo> model_;
-  std::optional<MapReply> graph_;  ///< of the map, as it was told last
+  std::optional<MapReply> graph_;  ///< newest graph of the map
   std::optional<replay::RecordedMessage> next_;
-  /// Of topics that are only shown as they come, for who begins to look.
+  /// Newest messages of topics without history, for clients that open a channel.
   std::map<std::string, replay::RecordedMessage> newest_;
-  std::uint64_t at_ns_ = 0;  ///< log time that is shown
+  std::uint64_t at_ns_ = 0;  ///< log time of the display
   bool playing_ = true, stopped_ = false, ended_ = false;
   double speed_ = 1.0;
   std::uint64_t clock_log_ns_ = 0;
@@ -92,7 +93,7 @@ class GatewayReplay {
   std::mutex mutex_;
   std::condition_variable something_;
   Mail mail_;
-  std::unique_ptr<gateway::web::Server> server_;  // its thread uses what is above
+  std::unique_ptr<gateway::web::Server> server_;  // its thread uses the members above
 };
 
 }  // namespace perdure::tools

@@ -22,7 +22,7 @@ struct Options {
   std::int64_t port = 8765;
 };
 
-/// Nothing goes onto the bus: whoever looks has the controls.
+/// Uses no bus; the clients control the replay.
 void runGateway(const Options& options) {
   const service::BlockedSignals blocked;
   replay::RecordedMessages recording(options.path);

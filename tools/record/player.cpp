@@ -12,7 +12,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// What is said by one process to another one that is not there any more, and who was how.
+/// Conversations between processes, and the state of processes that do not run any more.
 const std::set<std::string> kNotByItself{"health", "map/query", "map/near", "map/reply"};
 
 const std::map<std::string, std::set<std::string>> kInputs{
@@ -32,7 +32,7 @@ bool isHeardBy(const std::string& service, const std::string& topic) {
   return inputs->second.contains(topic.starts_with("frame/") ? "frame/" : topic);
 }
 
-/// The service that tells of such a thing.
+/// The service that publishes events of this kind.
 const char* writerOf(EventKind kind) {
   const bool of_the_map = kind == EventKind::kLoopClosed || kind == EventKind::kLoopWithdrawn ||
                           kind == EventKind::kRelocalised;
@@ -91,7 +91,7 @@ Player::Writers Player::otherWriters() {
   return others;
 }
 
-/// Events have two services that write them: those of the other one are played.
+/// Plays only the events of the absent service, because two services publish events.
 void Player::settleEvents(Writers& others) {
   const auto events = others.find("events");
   if (events == others.end()) return;
@@ -103,7 +103,7 @@ void Player::settleEvents(Writers& others) {
   if (events->second.empty()) others.erase(events);
 }
 
-/// What a service writes that hears this recording: it writes it anew.
+/// Omits the outputs of a service that reads this recording, because it publishes them again.
 void Player::leaveToListeners(Writers& others) {
   const auto hears = [&](const std::string& process) {
     return kInputs.contains(process) &&
@@ -130,7 +130,7 @@ void Player::refuse(const Writers& others) {
                          "; stop them, choose by --topics or --for, or play over them by --force");
 }
 
-/// Two writers of one topic make nonsense of both.
+/// Refuses topics that another process writes, because two writers would mix their data.
 void Player::refuseContested() {
   Writers others = otherWriters();
   if (options_.force) return;
@@ -170,7 +170,7 @@ void Player::waitForReaders() {
   }
 }
 
-/// False where the loop was stopped meanwhile.
+/// Returns false if the loop was stopped meanwhile.
 bool Player::waitUntil(std::uint64_t log_ns) {
   const double later = static_cast<double>(log_ns - first_ns_) / options_.rate;
   const auto due = began_ + std::chrono::nanoseconds(static_cast<std::int64_t>(later));
@@ -182,7 +182,7 @@ bool Player::waitUntil(std::uint64_t log_ns) {
   return false;
 }
 
-/// Between two runs in one folder, or by a time that is none, nobody wants to wait.
+/// Skips the pause between two runs in one folder, or at an invalid time.
 void Player::leaveOutGap(std::uint64_t log_ns) {
   constexpr std::uint64_t kLongest = 10'000'000'000;
   const std::uint64_t gap = log_ns - last_ns_;

@@ -1,4 +1,4 @@
-// A recording back onto the bus: the same messages, at the same distances in time.
+// Publishes a recording on the bus: the same messages, with the same time intervals.
 #pragma once
 
 #include <functional>
@@ -14,29 +14,29 @@
 namespace perdure::tools {
 
 struct PlayOptions {
-  std::vector<std::string> topics;  ///< empty: all that is recorded but health and conversations
-  std::string for_service;          ///< instead of topics: what that service listens to
+  std::vector<std::string> topics;  ///< empty: all recorded topics except health and conversations
+  std::string for_service;          ///< service whose inputs replace `topics`
   double rate = 1.0;                ///< seconds of the recording in one second
-  double start_s = 0.0, seconds = 0.0;  ///< from where, and how much of it; 0: to its end
-  double wait_s = 2.0;                  ///< at most, for a reader of each topic
+  double start_s = 0.0, seconds = 0.0;  ///< start and duration; 0: to the end
+  double wait_s = 2.0;                  ///< longest wait for a reader of each topic
   bool loop = false, force = false;
 };
 
 class Player {
  public:
-  /// Takes about a second to see who is on the bus. What the services that listen to this write
-  /// themselves is left out where topics were not named. Throws StartupError: a topic that there is
-  /// not, or that is not in the recording, or that another process writes (unless `force`).
+  /// Takes about a second to discover the bus. If no topics are named, omits the outputs of
+  /// services that read this recording. Throws StartupError for an unknown topic, a topic that is
+  /// not in the recording, or a topic that another process writes (unless `force`).
   Player(const bus::Participant& participant, bus::WaitLoop& loop,
          replay::RecordedMessages& recording, const PlayOptions& options);
 
-  /// Once to the end, or until the loop is stopped.
+  /// Plays once to the end, or until the loop is stopped.
   void play();
   std::uint64_t played() const { return played_; }
-  /// What could not be played, by topic and reason.
+  /// Messages that could not be played, by topic and reason.
   const ReasonCounts& reasons() const { return reasons_; }
   const std::set<std::string>& topics() const { return topics_; }
-  /// "map/frame (map_store)": what is not played, and who writes it.
+  /// Omitted topics with their writer, for example "map/frame (map_store)".
   const std::set<std::string>& leftOut() const { return left_out_; }
 
  private:
@@ -63,9 +63,9 @@ class Player {
   replay::RecordedMessages& recording_;
   const PlayOptions options_;
   std::set<std::string> topics_, left_out_;
-  std::set<std::string> event_writers_;  ///< services whose events are left to them
+  std::set<std::string> event_writers_;  ///< services that publish their own events
   std::map<std::string, Voice> voices_;
-  std::uint64_t first_ns_ = 0;  ///< log time that was due when playing began, gaps left out
+  std::uint64_t first_ns_ = 0;  ///< log time that was due at the start of playing, without gaps
   std::uint64_t last_ns_ = 0, played_ = 0;
   std::chrono::steady_clock::time_point began_;
   ReasonCounts reasons_;

@@ -33,7 +33,7 @@ std::shared_ptr<spdlog::logger> makeLog(const std::string& process) {
   return log;
 }
 
-/// SIGUSR1 as a question: asked for in ticks, in no other thread.
+/// Receives SIGUSR1 by a flag that a timer polls, without an extra thread.
 class DumpSignal {
  public:
   DumpSignal() {
@@ -76,7 +76,7 @@ void runRecord(RecordOptions& options) {
   if (options.out.empty()) {
     throw StartupError(ExitCode::kUsage, "perdure record needs --out DIR, the recordings' folder");
   }
-  const DumpSignal dump;  // before there is another thread
+  const DumpSignal dump;  // must exist before other threads
   const service::BlockedSignals blocked;
   options.recorder.fault =
       options.fault == "failed" ? HealthState::kFailed : HealthState::kDegraded;

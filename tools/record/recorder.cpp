@@ -11,7 +11,7 @@ namespace {
 
 namespace mcap = replay::mcap;
 
-constexpr std::int64_t kLongestChunk = 500'000'000;  // ns: a killed recorder loses no more
+constexpr std::int64_t kLongestChunk = 500'000'000;  // ns: most that a killed recorder loses
 constexpr std::size_t kLargestChunk = 4u << 20;      // bytes
 constexpr char kFramePrefix[] = "frame/";
 
@@ -21,7 +21,7 @@ std::int64_t nowOf() {
       .count();
 }
 
-/// What says what the other messages mean, and comes once: calibration, model.
+/// Whether a topic describes other messages and is published once: calibration, model.
 bool isLatchedAlone(const bus::TopicInfo& info) {
   return info.qos.latched && info.qos.depth == 1 && info.rate_hz == 0;
 }
@@ -49,7 +49,7 @@ Recorder::Recorder(service::Context& context, const RecorderOptions& options, St
       catalogue_(std::make_shared<mcap::Catalogue>()),
       latched_(std::make_shared<std::vector<Latched>>()),
       watch_(options.fault) {
-  // In the table's order: of what comes at once causes are read before their effects.
+  // In the order of the table, so that simultaneous causes are read before their effects.
   std::vector<std::string> topics = options.topics;
   for (const bus::TopicInfo& info : bus::topicTable()) {
     const bool wanted = options.topics.empty() && info.recorded && !info.name.ends_with('/');
@@ -58,7 +58,7 @@ Recorder::Recorder(service::Context& context, const RecorderOptions& options, St
   if (options.images && options.topics.empty()) lookForCameras();
   for (const std::string& topic : topics) listen(topic);
   health_ = &context.on(bus::topics::kHealth, [this](const Health& health) {
-    if (health.instance == context_.instance()) return;  // a full disk is no reason to write
+    if (health.instance == context_.instance()) return;  // own faults trigger no dump
     onFault(watch_.onHealth(health, FaultWatch::Time::clock::now()));
   });
   context.countReasons([this](ReasonCounts& counts) { report(counts); });
@@ -120,7 +120,7 @@ void Recorder::onMessage(Source& source, const bus::CdrMessage& message) {
   if (draft_.bytes() >= kLargestChunk) cut();
 }
 
-/// The newest of each content: what comes again goes behind the others.
+/// Stores the newest message of each content; a repeated one moves to the end.
 void Recorder::keepLatched(const Source& source, std::span<const std::uint8_t> bytes) {
   constexpr std::size_t kMost = 16;
   auto latched = std::make_shared<std::vector<Latched>>(*latched_);
@@ -152,7 +152,7 @@ void Recorder::updateHealth() {
   if (stored.disk_full) {
     problem += "; recording goes on as soon as there is room: free some, or lower --quota";
   }
-  constexpr std::int64_t kTold = 10'000'000'000;  // ns: how long that is said
+  constexpr std::int64_t kTold = 10'000'000'000;  // ns: duration of the report
   const std::int64_t now = LogClock::steadyNs();
   if (stored.overrun > overrun_) slow_until_ns_ = now + kTold;
   overrun_ = stored.overrun;

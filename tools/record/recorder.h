@@ -1,4 +1,4 @@
-// Topics as they pass by, into chunks: what `perdure record` does on the bus.
+// Records topics as chunks; the part of `perdure record` on the bus.
 #pragma once
 
 #include <map>
@@ -15,19 +15,19 @@
 namespace perdure::tools {
 
 struct RecorderOptions {
-  std::vector<std::string> topics;  ///< empty: those that the table records
-  bool images = false;              ///< without `topics`: those of every camera that appears too
-  HealthState fault = HealthState::kFailed;  ///< the first state that is one
+  std::vector<std::string> topics;           ///< empty: the topics that the table records
+  bool images = false;                       ///< topics of all cameras too, unless `topics` is set
+  HealthState fault = HealthState::kFailed;  ///< the first state that is a fault
 };
 
-/// Log times: the system's clock at the start, and from then on the steady one, which no
-/// correction turns back.
+/// Log times: the system clock at the start, continued by the steady clock, so that clock
+/// corrections have no effect.
 class LogClock {
  public:
   LogClock();
   std::uint64_t nowNs() const;
   static std::int64_t steadyNs();
-  /// How far the system's clock was set since the start, in nanoseconds; small ones are slewing.
+  /// Change of the system clock since the start, in nanoseconds; small values are slewing.
   std::int64_t setByNs() const;
 
  private:
@@ -36,10 +36,10 @@ class LogClock {
 
 class Recorder {
  public:
-  /// Throws StartupError: a topic that there is not.
+  /// Throws StartupError if a topic does not exist.
   Recorder(service::Context& context, const RecorderOptions& options, Store& store);
 
-  /// Hands over what has come, and where `fault` says so asks for what is held to be written.
+  /// Hands over the collected messages; `fault` also requests that the stored chunks be written.
   void cut(bool fault = false);
   std::uint64_t messages() const { return messages_; }
 

@@ -24,7 +24,7 @@ bool isFull(const std::error_code& error) {
   return error == std::errc::no_space_on_device || error.value() == EDQUOT;
 }
 
-/// On the disk when this returns; nothing is left of one that could not be made.
+/// A copy that is on the disk when this returns. A failed copy is removed.
 fs::path copyOf(const fs::path& file) {
   fs::path copy = file;
   copy += ".before-repair";

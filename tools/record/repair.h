@@ -1,4 +1,4 @@
-// `perdure record repair`: recordings that were not finished are made whole, and no byte is lost.
+// `perdure record repair`: completes unfinished recordings without losing a byte.
 #pragma once
 
 #include <filesystem>
@@ -6,8 +6,8 @@
 
 namespace perdure::tools {
 
-/// Files, or folders of them. Where bytes are cut off, the file as it was stays beside it as
-/// FILE.before-repair. All are tried before what was refused is thrown as a StartupError.
+/// Repairs files, or folders of files. If bytes are cut off, the original stays beside it as
+/// FILE.before-repair. All files are processed before the failures are thrown as a StartupError.
 void repairAll(const std::vector<std::filesystem::path>& paths);
 
 }  // namespace perdure::tools

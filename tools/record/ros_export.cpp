@@ -14,7 +14,8 @@ namespace {
 
 namespace mcap = replay::mcap;
 
-/// What ROS 2's recorder notes of a topic's writer, in the numbers that all its releases read.
+/// QoS of a topic's writer in the format of ROS 2's recorder, with the numbers that all releases
+/// read.
 std::string qosOf(const ros::Outlet& outlet) {
   const std::string forever = "\n    sec: 9223372036\n    nsec: 854775807\n";
   return std::string("- history: 1\n  depth: ") + (outlet.latched ? "1" : "10") +
@@ -86,7 +87,7 @@ class Export {
           file.add(outlet, cdr, now_ns_);
         }) {}
 
-  /// Those that say what others mean come first, whenever they were recorded.
+  /// Writes messages that describe others first, independent of their time.
   ReasonCounts run() {
     recording_.rewind([](const std::string& topic) { return topic == "model"; });
     while (const auto message = recording_.next()) take(*message);

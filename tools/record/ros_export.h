@@ -1,4 +1,5 @@
-// `perdure record export --ros2`: a recording as one of ROS 2, for viewers and for `ros2 bag play`.
+// `perdure record export --ros2`: converts a recording to ROS 2, for viewers and for `ros2 bag
+// play`.
 #pragma once
 
 #include <filesystem>
@@ -7,8 +8,8 @@
 
 namespace perdure::tools {
 
-/// MCAP, profile ros2; topics are those of common/ros/mirror.h. What cannot be read is counted.
-/// Throws StartupError.
+/// Writes MCAP with profile ros2; the topics are those of common/ros/mirror.h. Counts messages that
+/// cannot be read. Throws StartupError.
 ReasonCounts exportRos2(const std::filesystem::path& from, const std::filesystem::path& to);
 
 }  // namespace perdure::tools

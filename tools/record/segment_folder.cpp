@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 constexpr std::string_view kPrefix = "perdure-";
 constexpr char kExtension[] = ".mcap";
 
-/// The number in a name of ours; 0: it is not one.
+/// The number in the name of a segment; 0 for other files.
 std::uint64_t numberOf(const fs::path& file) {
   const std::string name = file.filename().string();
   if (!name.starts_with(kPrefix) || file.extension() != kExtension) return 0;
@@ -103,7 +103,7 @@ void SegmentFolder::keepQuota() {
 bool SegmentFolder::hasRoomFor(std::uint64_t bytes) const {
   struct statvfs disk {};
   if (keep_free_ == 0 || statvfs(folder_.c_str(), &disk) != 0) {
-    return true;  // the write will tell
+    return true;  // the write will report the error
   }
   return std::uint64_t{disk.f_bavail} * disk.f_frsize >= bytes + keep_free_;
 }

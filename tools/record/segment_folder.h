@@ -11,23 +11,23 @@ namespace perdure::tools {
 
 class SegmentFolder {
  public:
-  /// Makes the folder, locks it, and finishes what a killed recorder left. `quota` and `keep_free`
-  /// are bytes; quota 0: none. Throws StartupError: it cannot be written, or another recorder has
-  /// it.
+  /// Creates and locks the folder, and completes files of a killed recorder. `quota` and
+  /// `keep_free` are in bytes; quota 0: none. Throws StartupError if the folder cannot be written,
+  /// or if another recorder uses it.
   SegmentFolder(const std::filesystem::path& folder, std::uint64_t quota, std::uint64_t keep_free);
   ~SegmentFolder();
   SegmentFolder(const SegmentFolder&) = delete;
   SegmentFolder& operator=(const SegmentFolder&) = delete;
 
-  /// "FOLDER/perdure-000124-20261122T091658Z.mcap": the number goes up whatever the clock does.
-  /// `word` is put behind the time: "-fault".
+  /// "FOLDER/perdure-000124-20261122T091658Z.mcap". The number increases independent of the clock.
+  /// `word` is appended after the time: "-fault".
   std::filesystem::path nextFile(std::int64_t wall_ns, const std::string& word);
-  /// The newest size of one of its files.
+  /// Sets the current size of one of its files.
   void sizeIs(const std::filesystem::path& file, std::uint64_t bytes) { sizes_[file] = bytes; }
   void remove(const std::filesystem::path& file);
-  /// Removes the oldest files until the quota is kept, but never the newest.
+  /// Removes the oldest files until the quota is met, but never the newest.
   void keepQuota();
-  /// Whether `bytes` more leave the disk what it should have.
+  /// Whether enough free space remains after `bytes` more.
   bool hasRoomFor(std::uint64_t bytes) const;
 
   std::uint64_t bytes() const;
@@ -42,7 +42,7 @@ class SegmentFolder {
   std::filesystem::path folder_;
   std::uint64_t quota_, keep_free_, removed_ = 0, next_number_ = 1;
   int lock_ = -1;
-  std::map<std::filesystem::path, std::uint64_t> sizes_;  // by name: by time
+  std::map<std::filesystem::path, std::uint64_t> sizes_;  // order by name is order by time
   std::vector<std::string> repaired_;
 };
 

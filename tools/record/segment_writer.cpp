@@ -19,7 +19,7 @@ bool SegmentWriter::note(const Result<void>& written) {
   return written.has_value();
 }
 
-/// A file is over by its time, or where a quota would hold too few of its size.
+/// A file ends after its time, or earlier if the quota would hold too few files of its size.
 bool SegmentWriter::isOver(const PackedChunk& packed) const {
   constexpr std::uint64_t kFilesOfQuota = 8;
   const bool large = folder_.quota() > 0 && file_->size() > folder_.quota() / kFilesOfQuota;

@@ -1,5 +1,5 @@
-// Chunks into files of a bounded length, each of which can be read alone. A full disk is waited
-// out.
+// Writes chunks to files of limited length, each of which can be read alone. After a full disk, it
+// continues when there is space.
 #pragma once
 
 #include <memory>
@@ -14,7 +14,7 @@ namespace perdure::tools {
 
 using CatalogueNow = std::shared_ptr<const replay::mcap::Catalogue>;
 
-/// A message that each file begins with, so that it says what the others mean.
+/// A message at the start of each file, needed to interpret the others.
 struct Latched {
   std::uint16_t channel = 0;
   std::uint32_t sequence = 0;
@@ -22,26 +22,26 @@ struct Latched {
 };
 using LatchedNow = std::shared_ptr<const std::vector<Latched>>;
 
-/// A packed chunk, and what one has to know to write it into any file.
+/// A packed chunk with the data needed to write it to any file.
 struct PackedChunk {
   replay::mcap::Chunk chunk;
   CatalogueNow catalogue;
   LatchedNow latched;
-  std::int64_t steady_ns = 0;  ///< of its first message, by the steady clock
+  std::int64_t steady_ns = 0;  ///< steady time of its first message
 };
 
 class SegmentWriter {
  public:
-  /// `segment_s` seconds to a file; `word` as SegmentFolder has it.
+  /// `segment_s`: seconds in each file; `word`: as in SegmentFolder.
   SegmentWriter(SegmentFolder& folder, double segment_s, std::string word);
   ~SegmentWriter();
 
-  /// False where it could not be written: it is lost, and problem() says why.
+  /// Returns false if the chunk could not be written and is lost; problem() has the reason.
   bool add(const PackedChunk& packed);
-  /// Ends the file that is being written.
+  /// Finishes the current file.
   void finish();
 
-  /// Empty where all is well.
+  /// Empty if there is no problem.
   const std::string& problem() const { return problem_; }
   bool diskFull() const { return disk_full_; }
   std::uint64_t bytes() const { return bytes_; }
@@ -61,7 +61,7 @@ class SegmentWriter {
   const std::string word_;
   std::optional<replay::mcap::Writer> file_;
   std::int64_t began_ns_ = 0;
-  std::vector<std::filesystem::path> left_over_;  // unfinished, because the disk was full
+  std::vector<std::filesystem::path> left_over_;  // files that a full disk left unfinished
   std::string problem_;
   bool disk_full_ = false;
   std::uint64_t bytes_ = 0, files_ = 0;

@@ -1,4 +1,4 @@
-// The recorder's thread: packs chunks and writes them, or keeps them for a fault. The bus never
+// Thread of the recorder that packs and writes chunks, or keeps them for a fault. The bus never
 // waits for the disk.
 #pragma once
 
@@ -16,22 +16,22 @@ namespace perdure::tools {
 
 struct StoreOptions {
   double segment_s = 60.0;
-  double last_s = 0.0;    ///< > 0: a black box of so many seconds, written at faults alone
-  double after_s = 10.0;  ///< seconds that follow the fault in its file
-  std::uint64_t memory = 512u << 20;  ///< most of the black box, bytes
+  double last_s = 0.0;                ///< length of the black box for faults; 0: no black box
+  double after_s = 10.0;              ///< seconds after the fault in its file
+  std::uint64_t memory = 512u << 20;  ///< size limit of the black box, bytes
 };
 
-/// What became of the messages, since the start.
+/// Counts of the messages since the start.
 struct StoreReport {
-  std::uint64_t chunks = 0;    ///< that came
-  std::uint64_t messages = 0;  ///< in files, or held for a fault
-  std::uint64_t lost = 0;      ///< while the disk was full or failed
+  std::uint64_t chunks = 0;    ///< number of received chunks
+  std::uint64_t messages = 0;  ///< number in files, or stored for a fault
+  std::uint64_t lost = 0;      ///< number lost while the disk was full or failed
   std::uint64_t bytes = 0, files = 0, removed = 0, folder_bytes = 0, dumps = 0;
-  std::uint64_t overrun = 0;    ///< chunks that the disk was too slow for
-  std::uint64_t cut_short = 0;  ///< chunks that the black box had no memory for
-  std::string problem;          ///< empty where all is well
-  bool disk_full = false;       ///< that is the problem
-  std::string lost_to;          ///< the problem for which messages were lost last
+  std::uint64_t overrun = 0;    ///< chunks lost to a slow disk
+  std::uint64_t cut_short = 0;  ///< chunks dropped because the black box was full
+  std::string problem;          ///< empty if there is none
+  bool disk_full = false;       ///< the problem is a full disk
+  std::string lost_to;          ///< the problem that last caused lost messages
 };
 
 class Store {
@@ -46,11 +46,11 @@ class Store {
     CatalogueNow catalogue;
     LatchedNow latched;
     std::int64_t steady_ns = 0;
-    bool fault = false;  ///< writes down what is held, up to and with this one
+    bool fault = false;  ///< writes the stored chunks up to this one
   };
-  /// Returns at once; what the disk is too slow for is lost, the oldest first, and counted.
+  /// Returns at once. If the disk is too slow, drops the oldest chunks and counts them.
   void give(Job job);
-  /// All that was given is written and the last file ended when this returns.
+  /// Returns when all chunks are written and the last file is finished.
   void finish();
   StoreReport report() const;
 
@@ -67,7 +67,7 @@ class Store {
   std::optional<BlackBox> black_box_;
   std::optional<std::int64_t> dump_until_ns_;
   std::atomic<bool> fault_ = false;
-  StoreReport now_;  // of the thread
+  StoreReport now_;  // only for the recorder's thread
   mutable std::mutex mutex_;
   StoreReport report_;
   BoundedQueue<Job> queue_;

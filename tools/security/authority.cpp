@@ -40,8 +40,8 @@ void requireName(const std::string& name) {
                          "most 48, and not \"authority\"");
 }
 
-/// To the topics that were named: what a driver of ROS stands for is what it writes; of others it
-/// is what they read.
+/// Restricts the permissions to `topics`: those that a ros2_driver writes, or that another role
+/// reads.
 void narrow(Permissions& permissions, bus::Role role, const std::vector<std::string>& topics) {
   if (topics.empty()) return;
   if (role != bus::Role::kRos2Driver) {
@@ -73,7 +73,7 @@ std::string contentsOf(const fs::path& file) {
   return text.str();
 }
 
-/// Of what is there already.
+/// The owner of an existing file or folder.
 std::optional<Owner> ownerOf(const fs::path& path) {
   struct stat status {};
   if (stat(path.c_str(), &status) != 0) return std::nullopt;
@@ -104,7 +104,7 @@ Authority Authority::create(const fs::path& folder, const std::string& vehicle, 
   writePrivate(own / kRevoked, toPem(made.revoked_.get()), kForOwner);
   writePrivate(own / kGovernance, signedDocument(made.signer(), governanceXml()), kForOwner);
   made.save();
-  writePrivate(own / kKey, toPem(made.key_.get()), kForOwner);  // last: it says that all is there
+  writePrivate(own / kKey, toPem(made.key_.get()), kForOwner);  // last, because it marks completion
   return made;
 }
 
@@ -175,7 +175,7 @@ void Authority::write(const std::string& name, const Known& known, const Validit
   const auto put = [&](const char* file, const std::string& text) {
     writePrivate(folder / file, text, kForOwner, owner);
   };
-  // On record first: what was given out can be revoked.
+  // Recorded first, so that every issued certificate can be revoked.
   const fs::path record = own / kIssued / (name + ".pem");
   writePrivate(record, contentsOf(record) + pem, kForOwner);
   put(kCa, toPem(certificate_.get()));

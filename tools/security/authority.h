@@ -1,4 +1,4 @@
-// The folder of bus.security with its authority: makes, renews and revokes identities.
+// The folder of bus.security with its authority: creates, renews and revokes identities.
 #pragma once
 
 #include <filesystem>
@@ -11,28 +11,31 @@
 
 namespace perdure::tools {
 
-/// FOLDER/authority: the authority's key, which no vehicle needs, and what it has issued.
-/// FOLDER/NAME: an identity, all that its host needs (common/bus/security/identity.h).
+/// FOLDER/authority contains the authority's key, which no vehicle needs, and the issued
+/// certificates. FOLDER/NAME is an identity with all files that its host needs
+/// (common/bus/security/identity.h).
 class Authority {
  public:
-  /// A new one. Throws StartupError where the folder has one, or cannot be written.
+  /// Creates an authority. Throws StartupError if the folder has one, or cannot be written.
   static Authority create(const std::filesystem::path& folder, const std::string& vehicle,
                           double days);
-  /// Throws StartupError where there is none, or its key cannot be read.
+  /// Opens an authority. Throws StartupError if there is none, or its key cannot be read.
   explicit Authority(const std::filesystem::path& folder);
 
   struct Wanted {
     std::string name, role;
-    /// Read instead of the role's, "frame/*" among them; of a ros2_driver what it writes.
+    /// Topics to read instead of the role's default, including "frame/*"; for a ros2_driver, topics
+    /// to write.
     std::vector<std::string> topics = {};
-    std::string owner = {};  ///< user of the files; empty: as they are, or ours
+    std::string owner = {};  ///< user of the files; empty: unchanged, or the current user
   };
-  /// Throws StartupError: a name that is taken or is none, an unknown role, topic or user.
+  /// Throws StartupError for a used or invalid name, or an unknown role, topic or user.
   void add(const Wanted& wanted, const Validity& validity);
-  /// New key, certificate and permissions; the old ones go on until their end, or are revoked.
+  /// Issues a new key, certificate and permissions. The old ones stay valid until they expire or
+  /// are revoked.
   void renew(const std::string& name, const Validity& validity);
-  /// Every certificate that this name was ever given. The list goes into each folder here; other
-  /// hosts need it too, and who runs takes it at its next start.
+  /// Revokes all certificates of this name. Updates the list in each folder here; other hosts need
+  /// the new list too. Running processes read it at their next start.
   void revoke(const std::string& name);
   std::vector<std::string> names() const;
   const std::string& vehicle() const { return vehicle_; }

@@ -1,4 +1,5 @@
-// X.509 and S/MIME by OpenSSL: keys on P-256, signatures ECDSA with SHA-256, as DDS-Security asks.
+// X.509 and S/MIME with OpenSSL. Keys are on P-256 and signatures are ECDSA with SHA-256, as
+// DDS-Security requires.
 #pragma once
 
 #include <chrono>
@@ -14,10 +15,10 @@ using TimePoint = std::chrono::system_clock::time_point;
 struct Validity {
   TimePoint from, until;
 };
-/// From an hour ago, for hosts whose clock is behind.
+/// Starts an hour ago, for hosts whose clock is slow.
 Validity validFor(double days);
 
-/// The subject of a certificate, as DDS's permissions write it too (RFC 2253).
+/// The subject of a certificate, in the form that the permissions of DDS use (RFC 2253).
 struct Subject {
   std::string name;  ///< CN
   std::string role;  ///< OU
@@ -25,20 +26,20 @@ struct Subject {
 };
 
 bus::Key makeKey();
-/// Signed by itself.
+/// A self-signed certificate.
 bus::Certificate makeAuthority(EVP_PKEY* key, const Validity& validity);
 
-/// Who signs. Both live as long as it does.
+/// The signing authority. Its certificate and key must outlive it.
 struct Signer {
   X509* certificate;
   EVP_PKEY* key;
 };
 bus::Certificate issue(const Signer& authority, EVP_PKEY* key, const Subject& subject,
                        const Validity& validity);
-/// Certificates of `revoked` are refused, besides those of `before` (may be nullptr).
+/// A list that revokes `revoked` in addition to those of `before` (may be nullptr).
 bus::RevokedList makeRevokedList(const Signer& authority, const X509_CRL* before,
                                  const std::vector<const X509*>& revoked);
-/// A document as S/MIME with its signature.
+/// A document with its signature, as S/MIME.
 std::string signedDocument(const Signer& authority, const std::string& xml);
 
 std::string toPem(X509* certificate);

@@ -23,7 +23,7 @@ struct Request {
   std::vector<std::string> names;
 };
 
-/// The user of the units, where root makes the services' identities on a host that has it.
+/// The user of the systemd units, if root creates identities on a host that has this user.
 std::string serviceUser() {
   constexpr char kUser[] = "perdure";
   return geteuid() == 0 && getpwnam(kUser) != nullptr ? kUser : "";

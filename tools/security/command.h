@@ -1,4 +1,4 @@
-// `perdure security`: identities for a bus that is closed to strangers.
+// `perdure security`: identities for a bus with access control.
 #pragma once
 
 namespace CLI {

@@ -1,5 +1,5 @@
-// The two documents of DDS-Security (OMG DDS Security 1.1, 9.4): what is protected on the bus, and
-// what each identity may do, made from the topic table.
+// The two documents of DDS-Security (OMG DDS Security 1.1, 9.4). They state the protection of the
+// bus and the rights of each identity, generated from the topic table.
 #pragma once
 
 #include <string>
@@ -10,17 +10,17 @@
 
 namespace perdure::tools {
 
-/// For every domain and every vehicle: nobody joins without a certificate, everything is encrypted,
-/// every read and write is a matter of permissions.
+/// For every domain and every vehicle: joining requires a certificate, all data are encrypted, and
+/// every read and write requires a permission.
 std::string governanceXml();
 
-/// What a role writes and reads, as names of topics; "frame/*" stands for every camera.
+/// Topics that a role writes and reads; "frame/*" stands for all cameras.
 struct Permissions {
   std::vector<std::string> writes, reads;
 };
 Permissions permissionsOf(bus::Role role);
 
-/// All else is denied.
+/// All other topics are denied.
 std::string permissionsXml(const Subject& subject, const std::string& vehicle,
                            const Permissions& permissions, const Validity& validity);
 

@@ -1,4 +1,4 @@
-// Files whose mode is right from their first byte.
+// Writes files with the correct mode from their first byte.
 #pragma once
 
 #include <sys/types.h>
@@ -13,13 +13,13 @@ struct Owner {
   uid_t user;
   gid_t group;
 };
-/// Throws StartupError where there is no such user.
+/// Throws StartupError if the user does not exist.
 Owner ownerNamed(const std::string& user);
 
-/// Replaces the file at once, or throws StartupError.
+/// Replaces the file atomically, or throws StartupError.
 void writePrivate(const std::filesystem::path& file, const std::string& text, mode_t mode,
                   const std::optional<Owner>& owner = {});
-/// For its owner alone.
+/// Creates a folder that only its owner can access.
 void makePrivateFolder(const std::filesystem::path& folder, const std::optional<Owner>& owner = {});
 
 }  // namespace perdure::tools

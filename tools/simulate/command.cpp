@@ -24,7 +24,7 @@ struct CommandLine {
   bool list = false, quiet = false, no_noise = false, no_images = false;
 };
 
-/// "640x480" into numbers. Throws StartupError(kUsage).
+/// Parses "640x480". Throws StartupError(kUsage).
 void readSize(const std::string& text, sim::SceneOptions& world) {
   const char* end = text.data() + text.size();
   const auto width = std::from_chars(text.data(), end, world.width);
@@ -45,7 +45,7 @@ void listScenes() {
   }
 }
 
-/// A bar that rewrites itself on a terminal; elsewhere a line each tenth of the way.
+/// Shows progress: one updated line on a terminal, otherwise a line for each tenth.
 class ProgressBar {
  public:
   void show(const SimulateProgress& progress) {

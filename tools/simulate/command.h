@@ -1,4 +1,4 @@
-// `perdure simulate`: a rendered camera and IMU sequence with exact truth.
+// `perdure simulate`: renders a camera and IMU sequence with exact ground truth.
 #pragma once
 
 namespace CLI {

@@ -29,7 +29,7 @@ std::string lineOf(const JournalEntry& entry) {
   return line + " .";
 }
 
-/// Streams do not read hexadecimal numbers.
+/// Reads a hexadecimal number, which streams do not support.
 bool take(std::istringstream& line, double& value) {
   std::string word;
   if (!(line >> word)) return false;

@@ -1,5 +1,6 @@
-// What a run of the simulator has done so far, so that the next one carries on where it was cut and
-// ends with the same bytes. One line a frame, numbers in hexadecimal, exact to the last bit.
+// Journal of the frames that a run has rendered. The next run continues after an interruption and
+// produces the same bytes. It has one line for each frame, with hexadecimal numbers, exact to the
+// last bit.
 #pragma once
 
 #include <cstdint>
@@ -14,14 +15,14 @@
 namespace perdure::tools {
 
 struct JournalEntry {
-  std::vector<SensorState> sensors;  ///< after the frame, one of each camera
+  std::vector<SensorState> sensors;  ///< states after the frame, one for each camera
   std::vector<sim::TruthView> views;
 };
 
 class Journal {
  public:
-  /// Reads the entries of `file` up to the first that is cut or for whose frame `is_whole` says
-  /// false, forgets what follows, and appends from there.
+  /// Reads the entries of `file` up to the first one that is truncated or whose frame is incomplete
+  /// according to `is_whole`. Discards the rest, and appends there.
   Journal(const std::filesystem::path& file, std::size_t cameras,
           const std::function<bool(std::size_t)>& is_whole);
   const std::vector<JournalEntry>& entries() const { return entries_; }

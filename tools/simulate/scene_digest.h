@@ -1,4 +1,5 @@
-// A number that differs where two scenes do: what a folder was made from, beyond its scene's name.
+// A digest that differs between different scenes; it identifies the content of a folder beyond the
+// scene's name.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +8,7 @@
 
 namespace perdure::tools {
 
-/// Over objects, scenery, light, sensors, and the motions at each second.
+/// Covers objects, scenery, light, sensors, and the motions at each second.
 std::uint64_t digestOf(const sim::Scene& scene);
 
 }  // namespace perdure::tools

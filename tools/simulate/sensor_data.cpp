@@ -1,4 +1,4 @@
-// The part of the folder that is not drawn: writeSensors of writer.h.
+// Sensor data of the folder, without images: writeSensors of writer.h.
 #include <fmt/format.h>
 
 #include <iterator>
@@ -34,7 +34,7 @@ std::string speedCsv(const std::vector<SpeedSample>& samples) {
   return text;
 }
 
-/// The states at the inertial samples' times.
+/// The states at the times of the inertial samples.
 std::string statesCsv(const sim::Scene& scene, const std::vector<sim::ImuRecord>& records) {
   std::string text =
       "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],"

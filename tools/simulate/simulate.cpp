@@ -24,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr char kSceneFile[] = "scene.json", kJournalFile[] = "unfinished.journal";
-constexpr int kTruthStep = 2;  ///< pixels between the rays of visibility where nothing is drawn
+constexpr int kTruthStep = 2;  ///< pixels between visibility rays if no images are rendered
 
 nlohmann::json descriptionOf(const SimulateOptions& options, const sim::Scene& scene) {
   const sim::SceneOptions& w = options.world;
@@ -56,7 +56,7 @@ std::string textOf(const fs::path& file) {
   return text.str();
 }
 
-/// Refuses a folder that holds anything but this very run.
+/// Refuses a folder with other content than this run.
 void claim(const fs::path& out, const std::string& description) {
   std::error_code error;
   fs::create_directories(out, error);
@@ -79,7 +79,7 @@ void claim(const fs::path& out, const std::string& description) {
   if (!fs::exists(file)) writeWhole(file, description);
 }
 
-/// The cameras of a run, what they draw into, and how far they are.
+/// The cameras of a run, their pictures, and their progress.
 class Run {
  public:
   Run(const SimulateOptions& options, const sim::Scene& scene)
@@ -151,7 +151,7 @@ class Run {
     sensor.errors = scene_.rig.cameras.at(camera);
     sensor.encoding = options_.world.mono8 ? ImageEncoding::kMono8 : ImageEncoding::kBgr8;
     sensor.noise = options_.world.noise;
-    sensor.adapt = scene_.name != "random";  // views that have nothing to do with each other
+    sensor.adapt = scene_.name != "random";  // views of random are independent
     sensor.interval_s = static_cast<double>(options_.every) /
                         scene_.rig.true_calibration.cameras.at(camera).rate_hz;
     sensor.seed = mixBits(scene_.seed, 0xca3 + camera);

@@ -1,5 +1,5 @@
-// One run of the simulator: a scene by name, drawn frame by frame into a folder that the rest of
-// Perdure reads as a dataset. Resumable; the same options give the same bytes.
+// One run of the simulator: renders a scene by name, frame by frame, to a dataset folder. A run can
+// be resumed; the same options give the same bytes.
 #pragma once
 
 #include <cstdint>
@@ -18,22 +18,22 @@ struct SimulateOptions {
   std::filesystem::path out;
   sim::SceneOptions world;
   ImageFormat format = ImageFormat::kPng;
-  bool images = true;       ///< false: truth, IMU and speed only; visibility at half the resolution
-  std::uint64_t every = 1;  ///< draw each so-many-th frame only
+  bool images = true;       ///< false: ground truth, IMU, speed only; visibility at half resolution
+  std::uint64_t every = 1;  ///< renders only each N-th frame
   int threads = 2;
 };
 
 struct SimulateProgress {
-  std::size_t frame = 0, frames = 0;  ///< done, to do
-  std::size_t resumed = 0;            ///< of those done, by an earlier run
+  std::size_t frame = 0, frames = 0;  ///< completed frames and their total
+  std::size_t resumed = 0;            ///< frames from an earlier run
 };
 
-/// False where the folder was complete already. Throws StartupError for options that make no sense,
-/// an unknown scene, and a folder that holds something else. `report` may be empty.
+/// Returns false if the folder was already complete. Throws StartupError for invalid options, an
+/// unknown scene, or a folder with other content. `report` may be empty.
 bool simulate(const SimulateOptions& options,
               const std::function<void(const SimulateProgress&)>& report);
-/// The same of a scene that the caller made; options.scene and options.seed do not count, and
-/// options.world must be those with which it was made.
+/// The same for a given scene. Ignores options.scene and options.seed; options.world must be that
+/// of the scene.
 bool simulate(const sim::Scene& scene, const SimulateOptions& options,
               const std::function<void(const SimulateProgress&)>& report);
 

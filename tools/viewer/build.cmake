@@ -1,5 +1,5 @@
-# Builds the page: three.js by the lockfile, the shapes, the modules. Where npm gets nothing there is
-# no page, and the next build tries again.
+# Builds the page: three.js by the lockfile, the shapes, the modules. If npm cannot download
+# three.js, there is no page, and the next build tries again.
 set(fetched ${WORK}/node_modules/.perdure-lock)
 execute_process(COMMAND ${CMAKE_COMMAND} -E compare_files ${SOURCE}/package-lock.json ${fetched}
   RESULT_VARIABLE changed OUTPUT_QUIET ERROR_QUIET)
@@ -15,7 +15,7 @@ if(changed)
   file(COPY_FILE ${SOURCE}/package-lock.json ${fetched})
 endif()
 file(REMOVE_RECURSE ${PAGE})
-if(MESHES)  # not where it is for another architecture: the page then shows boxes
+if(MESHES)  # unset for another architecture; the page then shows boxes
   execute_process(COMMAND ${MESHES} ${PAGE}/meshes COMMAND_ERROR_IS_FATAL ANY)
 endif()
 execute_process(COMMAND ${NODE} ${SOURCE}/build.mjs ${PAGE} ${WORK}/node_modules

@@ -1,5 +1,5 @@
-// Copies the page into a folder: the modules of src as they are, and three.js of node_modules beside
-// them, each with a FILE.gz for browsers that take it.
+// Copies the page to a folder: the modules of src unchanged, and three.js of node_modules beside
+// them, each also as FILE.gz for browsers that accept it.
 // usage: node build.mjs OUT NODE_MODULES
 import { cpSync, mkdirSync, readdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
 import { dirname, extname, join } from 'node:path';

@@ -1,4 +1,4 @@
-// The checks of `perdure doctor`: each is a line with its verdict and, where it fails, the mend.
+// The checks of `perdure doctor`. Each finding is one line with a verdict and, on failure, the fix.
 #pragma once
 
 #include <optional>
@@ -13,60 +13,62 @@ enum class Verdict { kOk, kWarn, kFail };
 
 struct Finding {
   Verdict verdict = Verdict::kOk;
-  std::string text;  ///< what was found; the mend where it is not well
+  std::string text;  ///< result of the check; with the fix if the verdict is not OK
 };
 using Findings = std::vector<Finding>;
 
-/// "OK   vio is on the bus", a line each.
+/// One line for each finding, for example "OK   vio is on the bus".
 std::string toText(const Findings& findings);
 
-/// Of the host: receive buffers, the interface, large datagrams over loopback, the clock.
+/// Checks the host: receive buffers, the interface, large datagrams over loopback, the clock.
 Findings checkHost(const bus::Options& options);
-/// Of RouDi, where images are to go through shared memory: it answers, and its largest chunk
-/// (`roudi_toml`, where it can be read) holds an image of bus.shared_memory_mb. Else nothing.
+/// Checks RouDi if images are sent through shared memory: RouDi responds, and its largest chunk
+/// holds an image of bus.shared_memory_mb. The chunk size is read from `roudi_toml` if the file is
+/// readable. Returns nothing without shared memory.
 Findings checkSharedMemory(const bus::Options& options, const std::string& roudi_toml);
-/// Of the identities in bus.security that this user can read, and of an authority beside them.
+/// Checks the identities in bus.security that this user can read, and whether an authority is
+/// stored beside them.
 Findings checkSecurity(const bus::Options& options);
-/// Of a folder that a service must write to.
+/// Checks that a service can write to the folder and that it has free space.
 Finding checkWritable(const std::string& folder);
-/// Of the bus: who is there, what each says of itself, what does not fit together.
+/// Checks the bus: the participants, the state that each reports, and incompatible types.
 Findings checkBus(const bus::Options& options, double seconds);
 
 struct Drive {
   std::string data;
-  std::string rig = {};       ///< a file in place of the recording's own calibration
-  std::string sequence = {};  ///< of KITTI tracking, and of a 7-Scenes folder with several
-  std::string poses = {};     ///< a file of another program's poses, looked at as well
+  std::string rig = {};       ///< calibration file that replaces the recording's own
+  std::string sequence = {};  ///< sequence of KITTI tracking, or of a 7-Scenes folder with several
+  std::string poses = {};     ///< file with poses of another program, to be checked too
 };
 
-/// A camera that hangs upside down is no fault where vio, which feels gravity, agrees.
+/// Accepts a camera that hangs upside down if vio, which measures gravity, agrees.
 void settleUpsideDown(bool vio_agrees, Findings& findings);
-/// Of a recording: stamps, units, images, axes; and where these can be used at all, of its rig by
-/// the innovations of vio over it, for so many seconds, or until the rig is surely good.
+/// Checks the time stamps, units, images and axes of a recording. If these are usable, checks the
+/// rig by the innovations of vio over `seconds`, or until the rig is certainly good.
 Findings checkRigBy(const Drive& drive, std::optional<double> seconds = {});
 
-/// model.path of inference.yaml in the folder; empty where none is set.
+/// model.path of inference.yaml in the folder; empty if it is not set.
 std::string configuredNetwork(const std::string& folder);
-/// Warns where a letterboxed network shows a third of its input no image of the recording's cam0.
+/// Warns if more than a third of a letterboxed network's input is padding for images of cam0.
 /// Throws StartupError as the service does.
 Findings checkNetworkShape(const Drive& drive, const std::string& network);
 
-/// Writes a copy of a recording to `folder` with what is sure mended, and looks at it again. The
-/// progress goes to standard error. Throws StartupError as writeDrive does.
+/// Writes a copy of a recording to `folder` with every certain fault fixed, and checks the copy.
+/// Reports progress on standard error. Throws StartupError as writeDrive does.
 Findings fixRecording(const Drive& given, const std::string& folder);
 
-/// The largest bus.shared_memory_mb in the folder's files; 0 where none is set.
+/// The largest bus.shared_memory_mb in the folder's files; 0 if none is set.
 std::int64_t configuredSharedMemory(const std::string& folder);
 
 struct ReportOptions {
   bus::Options bus;
-  double seconds = 5.0;  ///< how long Health is written down
+  double seconds = 5.0;  ///< duration of the Health record
   std::string file;      ///< NAME.tar.gz
   std::string configuration;
-  bool images = false;  ///< one of each camera
+  bool images = false;  ///< include one image of each camera
 };
-/// Packs what a maintainer asks for: versions, host, configuration, status, Health, journal.
-/// Throws StartupError where the file cannot be written.
+/// Packs the data for a maintainer: versions, host, configuration, status, Health, journal. Throws
+/// StartupError if the file cannot be written.
 void writeReport(const ReportOptions& options, const Findings& findings);
 
 }  // namespace perdure::tools

@@ -33,13 +33,14 @@ Findings checkUsualServices(const std::vector<std::string>& participants,
 }
 
 Finding checkCount(std::size_t participants) {
-  constexpr std::size_t kMany = 50;  // of 61 that have an index without multicast
+  constexpr std::size_t kMany = 50;  // DDS has 61 participant indices without multicast
   const std::string text = std::to_string(participants) + " participants on the bus";
   if (participants < kMany) return {Verdict::kOk, text};
   return {Verdict::kWarn, text + "; near the limit of 61: another bus.domain parts them"};
 }
 
-/// Types of another name on our topics: their samples arrive nowhere, and silently.
+/// Finds endpoints that use one of our topics with another type name. DDS drops their samples
+/// silently.
 Findings checkTypes(const std::vector<bus::RemoteEndpoint>& endpoints, const std::string& prefix) {
   Findings findings;
   for (const bus::RemoteEndpoint& endpoint : endpoints) {
@@ -70,7 +71,7 @@ Finding findingOf(const Health& health) {
   return {Verdict::kFail, state + "says nothing"};
 }
 
-/// Counts that mean a misfit or a loss, not the ordinary life of a filter.
+/// Reports counts that indicate a misconfiguration or lost data; normal filter events are ignored.
 Findings checkCounts(const Health& health) {
   Findings findings;
   for (const auto& [reason, n] : health.reasons) {

@@ -72,7 +72,7 @@ void runDoctor(const DoctorOptions& given) {
     const auto network = named ? given.network : configuredNetwork(given.configuration);
     std::error_code error;
     if (named || std::filesystem::is_regular_file(network, error)) {
-      // A recording that needs a mend may not open: then its copy does.
+      // A damaged recording may not open; in that case the fixed copy is used.
       const Drive drive = given.copy.empty() || !std::filesystem::is_directory(given.copy, error)
                               ? given.drive
                               : Drive{.data = given.copy, .rig = given.drive.rig};
@@ -80,7 +80,7 @@ void runDoctor(const DoctorOptions& given) {
         const Findings shape = checkNetworkShape(drive, network);
         findings.insert(findings.end(), shape.begin(), shape.end());
       } catch (const StartupError& e) {
-        // What was found of the recording is told all the same.
+        // The findings about the recording are reported in spite of this error.
         findings.push_back({named ? Verdict::kFail : Verdict::kWarn,
                             fmt::format("the network's shape was not looked at: {}", e.what())});
       }
@@ -95,7 +95,7 @@ void runDoctor(const DoctorOptions& given) {
   const std::string roudi = options.configuration + "/roudi.toml";
   const Findings shared = checkSharedMemory(options.bus, roudi);
   findings.insert(findings.end(), shared.begin(), shared.end());
-  options.bus.shared_memory_mb = 0;  // what listens here needs none
+  options.bus.shared_memory_mb = 0;  // readers do not need shared memory
   const Findings security = checkSecurity(options.bus);
   findings.insert(findings.end(), security.begin(), security.end());
   for (const std::string& folder : options.folders) findings.push_back(checkWritable(folder));
@@ -127,7 +127,7 @@ void addDoctorCommand(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "doctor", "check host, bus and services: a line each with OK, WARN or FAIL and the mend");
   auto options = std::make_shared<DoctorOptions>();
-  // An unset variable of a script must not check something else.
+  // An unset shell variable must not select the default check.
   const CLI::Validator not_empty(
       [](const std::string& text) { return std::string(text.empty() ? "is empty" : ""); }, "");
   command->add_option("--seconds", options->seconds, "how long to listen to the bus")

@@ -15,7 +15,7 @@
 namespace perdure::tools {
 namespace {
 
-/// A socket that closes with its owner.
+/// Closes the socket in its destructor.
 class Socket {
  public:
   Socket() : fd_(socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {}
@@ -31,7 +31,7 @@ class Socket {
 };
 
 Finding checkReceiveBuffer() {
-  constexpr long kEnough = 4 << 20;  // three colour images of the drive
+  constexpr long kEnough = 4 << 20;  // size of three colour images
   std::ifstream file("/proc/sys/net/core/rmem_max");
   long bytes = 0;
   if (!(file >> bytes)) return {Verdict::kWarn, "net.core.rmem_max cannot be read"};

@@ -21,7 +21,7 @@ std::string configuredNetwork(const std::string& folder) {
     const YAML::Node path = yaml["model"] ? yaml["model"]["path"] : YAML::Node();
     return path && path.IsScalar() ? path.Scalar() : "";
   } catch (const YAML::Exception&) {
-    return {};  // there is none, or the service says what is wrong with it
+    return {};  // the file is missing, or the service reports its fault
   }
 }
 

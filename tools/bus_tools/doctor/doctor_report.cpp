@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder that goes away with its owner.
+/// Temporary folder; its destructor removes it.
 class Workshop {
  public:
   Workshop() {
@@ -43,8 +43,8 @@ class Workshop {
   fs::path path_;
 };
 
-/// What the commands say, each under its own heading; those that are not here say so themselves.
-/// Some are lines of a shell, with its patterns and pipes.
+/// Appends the output of each command under its own heading; a missing command leaves its error
+/// message. Some commands are shell lines with patterns and pipes.
 void writeAnswers(const fs::path& file, std::initializer_list<const char*> commands) {
   for (const char* command : commands) {
     std::ofstream(file, std::ios::app) << "\n$ " << command << '\n'
@@ -67,7 +67,7 @@ void writeHost(const fs::path& folder) {
                 "journalctl --no-pager -o short-precise -n 5000 -u 'perdure-*' -u iox-roudi"});
 }
 
-/// Settings only: the keys of bus.security may be in the same folder.
+/// Copies only settings, because the folder may also contain the keys of bus.security.
 void copyConfiguration(const std::string& from, const fs::path& to) {
   std::error_code ignored;
   if (from.empty()) return;
@@ -83,7 +83,7 @@ void copyConfiguration(const std::string& from, const fs::path& to) {
 
 const char* const kPnmKind[] = {"P5", "P6"};
 
-/// Grey as PGM, colour as PPM.
+/// Writes grey images as PGM and colour images as PPM.
 void writePnm(const Frame& frame, const fs::path& file) {
   const bool grey = frame.encoding == ImageEncoding::kMono8;
   std::ofstream out(file, std::ios::binary);
@@ -94,7 +94,7 @@ void writePnm(const Frame& frame, const fs::path& file) {
   out << pixels;
 }
 
-/// One image of each camera that the calibration names, within two seconds.
+/// Writes one image of each calibrated camera, as far as they arrive within two seconds.
 void writeImages(const bus::Options& options, const StatusSeen& seen, const fs::path& folder) {
   if (!seen.calibration) return;
   for (const CameraCalibration& camera : seen.calibration->cameras) {
@@ -114,7 +114,7 @@ void writeImages(const bus::Options& options, const StatusSeen& seen, const fs::
   }
 }
 
-/// Health as it comes, a line each, and the status at the end.
+/// Writes each Health message on one line as it arrives, and finally the status.
 StatusSeen writeBus(const ReportOptions& options, const fs::path& folder) {
   std::ofstream health(folder / "health.jsonl");
   StatusWatch watch(options.bus);

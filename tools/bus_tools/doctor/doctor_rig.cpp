@@ -12,7 +12,7 @@
 namespace perdure::tools {
 namespace {
 
-/// Whether vio can run over it at all.
+/// Returns whether vio can run on the recording.
 bool addFindings(const replay::DataFindings& of_data, Findings& findings) {
   bool usable = true;
   for (const auto& finding : of_data) {
@@ -32,12 +32,12 @@ void checkPosesOf(const Drive& drive, const replay::Recording& recording, Findin
   }
 }
 
-/// Whether the rig can be judged over it.
+/// Returns whether the rig can be judged by the recording.
 bool checkRecording(const Drive& drive, Findings& findings) {
   const auto dataset =
       replay::Dataset::open({.path = drive.data, .sequence = drive.sequence, .rig = drive.rig});
   const replay::Recording& recording = dataset->recording();
-  // Those of 7-Scenes tell what its layout leaves open; nothing is wrong with the data.
+  // The notes of 7-Scenes state what its layout leaves open; they are not faults of the data.
   const bool scenes = recording.kind == replay::DatasetKind::kSevenScenes;
   const bool of_layout = scenes || recording.kind == replay::DatasetKind::kKittiTracking;
   for (const auto& note : recording.notes) {

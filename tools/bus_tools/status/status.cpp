@@ -11,11 +11,11 @@
 namespace perdure::tools {
 namespace {
 
-constexpr double kSilentHealth = 1.5;           // s; it comes each second
-constexpr double kJustStarted = 5.0;            // s; a restart is worth knowing, though it is over
-constexpr double kSlow = 0.8;                   // of the expected rate; below it is degraded
+constexpr double kSilentHealth = 1.5;           // s; Health is published each second
+constexpr double kJustStarted = 5.0;            // s; a recent restart is reported
+constexpr double kSlow = 0.8;                   // share of the expected rate; less is degraded
 constexpr double kLate = 200.0;                 // ms from capture
-constexpr char kEndOfDrive[] = "end of drive";  // capture's Health
+constexpr char kEndOfDrive[] = "end of drive";  // message in the Health of capture
 
 Level levelOf(HealthState state) {
   switch (state) {
@@ -39,7 +39,7 @@ void addSentence(std::string& text, const std::string& sentence) {
   if (!sentence.empty()) text += (text.empty() ? "" : "; ") + sentence;
 }
 
-/// "48 s", "12 min", "5 h", "3 d".
+/// Formats a time span: "48 s", "12 min", "5 h", "3 d".
 std::string spanText(double seconds) {
   constexpr double kMinute = 60.0, kHour = 3600.0, kDay = 86400.0;
   if (seconds < 2 * kMinute) return fmt::format("{:.0f} s", seconds);
@@ -48,7 +48,7 @@ std::string spanText(double seconds) {
   return fmt::format("{:.0f} d", seconds / kDay);
 }
 
-/// What the source does: nothing is expected of the topics before it starts and after it has ended.
+/// State of the data source. Topics are expected only between its start and its end.
 struct Source {
   bool gives = false;
   std::string why_not;
@@ -69,7 +69,7 @@ Source sourceOf(const StatusSeen& seen) {
   return {true, {}};
 }
 
-/// Nothing more comes to it, and nothing else is wrong with it.
+/// Whether the service's only fault is that the recording has ended.
 bool endedWith(const Source& source, const Health& health) {
   return source.ended && health.state == HealthState::kDegraded &&
          health.reasons.contains(service::kInputSilent);
@@ -124,7 +124,8 @@ StatusNode judgeService(const std::string& name, const ServiceSeen* seen, const 
   return node;
 }
 
-/// The process that writes what `service` would, where that is not heard; empty where none does.
+/// The process that writes the topics of `service` while `service` is silent; empty if there is
+/// none.
 std::string standInFor(const StatusSeen& seen, const std::string& service) {
   if (isHeard(seen, service)) return {};
   for (const auto& [name, topic] : seen.topics) {
@@ -135,7 +136,7 @@ std::string standInFor(const StatusSeen& seen, const std::string& service) {
   return {};
 }
 
-/// Whether its data come is judged where sensors and topics are.
+/// Node of a service that another process replaces. Its data are judged under sensors and topics.
 StatusNode standingIn(const StatusSeen& seen, const std::string& service,
                       const std::string& process) {
   std::string topics;
@@ -225,7 +226,7 @@ double imuRate(const StatusSeen& seen) {
 
 double expectedOf(const StatusSeen& seen, const std::string& name) {
   const bus::TopicInfo* info = bus::findTopic(name);
-  if (info == nullptr || name == "speed") return 0.0;  // its rate is its own
+  if (info == nullptr || name == "speed") return 0.0;  // speed has no fixed rate
   const std::string camera = name.starts_with("frame/") ? name.substr(6) : "";
   return bus::expectedRate(*info, cameraRate(seen, camera), imuRate(seen));
 }
@@ -234,8 +235,8 @@ StatusNode judgeTopics(const StatusSeen& seen, const Source& source) {
   StatusNode node{"topics"};
   const std::string foreign_odometry = standInFor(seen, "vio");
   for (const auto& [name, topic] : seen.topics) {
-    if (name.starts_with("frame/") || name == "imu" || name == "speed") continue;  // sensors
-    if (name == "health") continue;                                                // services
+    if (name.starts_with("frame/") || name == "imu" || name == "speed") continue;  // a sensor
+    if (name == "health") continue;                                                // a service
     const bool none = name == "landmarks" && topic.writers == 0 && !foreign_odometry.empty();
     node.add(judgeTopic(name, topic, none ? 0.0 : expectedOf(seen, name), source));
     if (none)
@@ -244,7 +245,7 @@ StatusNode judgeTopics(const StatusSeen& seen, const Source& source) {
   return node;
 }
 
-/// By what their source says of its frames: they are not read here, for their size.
+/// Takes the frame rate from the Health of the source, because images are too large to read here.
 TopicSeen framesOf(const StatusSeen& seen, const std::string& source, TopicSeen topic) {
   if (!isHeard(seen, source)) return topic;
   const auto capture = seen.services.find(source);
@@ -276,7 +277,7 @@ StatusNode judgeSensors(const StatusSeen& seen, const Source& source) {
     if (name.starts_with("frame/")) {
       const bool somebody_has_it = expectedOf(seen, name) > 0 || topic.writers > 0;
       if (!somebody_has_it) continue;
-      // A stand-in without Health does not tell how many there are.
+      // Without Health of the stand-in, the frame rate is unknown.
       const bool told = stand_in.empty() || isHeard(seen, stand_in);
       node.add(judgeTopic(name, framesOf(seen, source_of_frames, topic),
                           told ? expectedOf(seen, name) : 0.0, source));
@@ -349,7 +350,7 @@ std::uint64_t refusals(const StatusSeen& seen) {
   return n;
 }
 
-/// Of the identities on this host: the worst, or the one that ends first.
+/// Judges the identities on this host by the worst one, or by the one that expires first.
 StatusNode judgeSecurity(const StatusSeen& seen) {
   StatusNode node{"security"};
   const IdentitySeen* first = nullptr;

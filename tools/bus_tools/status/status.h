@@ -1,5 +1,5 @@
-// `perdure status`: what was seen of services, topics and the host, judged as one tree in which the
-// worst state dominates.
+// `perdure status`: judges the observed services, topics and host as one tree. The worst level of a
+// subtree becomes the level of its root.
 #pragma once
 
 #include <chrono>
@@ -18,38 +18,38 @@
 
 namespace perdure::tools {
 
-/// In order of gravity; as exit status 0, 1, 2.
+/// In order of severity; the values are the exit status.
 enum class Level { kOk = 0, kDegraded = 1, kFailed = 2 };
 
 struct StatusNode {
   std::string name;
   Level level = Level::kOk;
-  std::string text = {};  ///< for people: figures; what is wrong and the mend
+  std::string text = {};  ///< for people: figures; the fault and its fix
   nlohmann::ordered_json data =
-      nullptr;  ///< the same figures for programs; null where there are none
+      nullptr;  ///< the same figures, for programs; null if there are none
   std::vector<StatusNode> children = {};
 
-  /// Takes it in; its level counts here too.
+  /// Appends a child and raises the level of this node to the child's level if that is worse.
   void add(StatusNode child);
 };
 
-/// What was heard of one process. Ages are since the last message arrived.
+/// Observations of one process. Ages count from the arrival of the last message.
 struct ServiceSeen {
   Health health;
   double age_s = 0.0;
-  double frames_hz = 0.0;      ///< of frames_out, between its last two messages
-  double cpu = 0.0;            ///< of one core, likewise; below 0 where it is not known
-  std::optional<double> up_s;  ///< since its start, where that is known
-  int restarts = 0;            ///< that were seen since this listens
+  double frames_hz = 0.0;      ///< rate of frames_out, from the last two messages
+  double cpu = 0.0;            ///< share of one core, likewise; below 0 if unknown
+  std::optional<double> up_s;  ///< time since the start of the process, if known
+  int restarts = 0;            ///< restarts seen since this watch started
 };
 
 struct TopicSeen {
   std::size_t writers = 0, readers = 0;
-  std::size_t messages = 0;  ///< in the window of the rate
+  std::size_t messages = 0;  ///< messages in the window of the rate
   double rate_hz = 0.0;
-  std::optional<double> age_s;            ///< nothing where no message came
-  std::optional<double> latency_ms;       ///< median, from capture to here; of one host
-  std::set<std::string> written_by = {};  ///< names of processes, where they have one
+  std::optional<double> age_s;            ///< empty if no message arrived
+  std::optional<double> latency_ms;       ///< median from capture to arrival, on one host only
+  std::set<std::string> written_by = {};  ///< processes with a known name
 };
 
 struct DiskSeen {
@@ -65,9 +65,9 @@ struct TemperatureSeen {
 struct IdentitySeen {
   std::string name;
   std::optional<std::chrono::system_clock::time_point> until;
-  std::string problem;  ///< with the mend, where it is not fit
+  std::string problem;  ///< the fault and its fix; empty if the identity is valid
 };
-/// Of bus.security, as far as this user can read it; sorted by name.
+/// Reads the identities of bus.security that this user can read; sorted by name.
 std::vector<IdentitySeen> lookAtIdentities(const std::string& folder);
 bool endsSoon(const IdentitySeen& seen);
 
@@ -75,34 +75,34 @@ struct HostSeen {
   std::vector<DiskSeen> disks;
   std::vector<TemperatureSeen> temperatures;
   bool clock_synchronised = false;
-  bool several_hosts = false;  ///< the topics are on a network
+  bool several_hosts = false;  ///< the topics use a network
   bool closed = false;         ///< bus.security is on
   std::vector<IdentitySeen> identities;
 };
 
 struct StatusSeen {
   std::string vehicle;
-  std::map<std::string, ServiceSeen> services;  ///< by process
-  std::map<std::string, TopicSeen> topics;      ///< by name, "frame/cam0" among them
+  std::map<std::string, ServiceSeen> services;  ///< key: process name
+  std::map<std::string, TopicSeen> topics;      ///< key: topic name, including "frame/cam0"
   std::optional<Calibration> calibration;
   std::optional<MapHeader> map_header;
-  std::optional<MapFrame> map_frame;  ///< with the map's graph
+  std::optional<MapFrame> map_frame;  ///< includes the state of the map's graph
   HostSeen host;
 };
 
 StatusNode judge(const StatusSeen& seen);
-/// A part of it.
+/// The part of the tree about the map.
 StatusNode judgeMap(const StatusSeen& seen);
 
 const char* levelWord(Level level);
-/// Lines with branches; `colour` for a terminal.
+/// The tree as text lines with branches; `colour` adds terminal colours.
 std::string toText(const StatusNode& node, bool colour);
 nlohmann::ordered_json toJson(const StatusNode& node);
-/// On one line, or indented. What processes say of themselves may be any bytes: what is no UTF-8 is
-/// replaced.
+/// JSON on one line, or indented. Bytes that are not UTF-8 are replaced, because the messages of
+/// processes may contain any bytes.
 std::string dumped(const nlohmann::ordered_json& json, int indent = -1);
 
-/// Of the folders that exist.
+/// Reads the state of the host; folders that do not exist are ignored.
 HostSeen lookAtHost(const std::vector<std::string>& folders, const bus::Options& options);
 
 }  // namespace perdure::tools

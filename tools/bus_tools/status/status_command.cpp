@@ -48,7 +48,7 @@ void runStatus(StatusOptions options) {
   if (options.watch) {
     const auto start = std::chrono::steady_clock::now();
     watch.loop().every(std::chrono::milliseconds(500), [&] {
-      constexpr std::chrono::seconds kFirst{2};  // until all that lives was heard
+      constexpr std::chrono::seconds kFirst{2};  // time to observe all services
       if (std::chrono::steady_clock::now() - start < kFirst) return;
       print(look(watch, options), options);
       if (!std::cout) watch.loop().stop();

@@ -18,7 +18,7 @@ std::optional<std::string> lineOf(const fs::path& file) {
   return line;
 }
 
-/// Thousandths of a degree, as sysfs has them.
+/// Reads a temperature; sysfs gives it in thousandths of a degree.
 std::optional<double> celsiusOf(const fs::path& file) {
   const auto line = lineOf(file);
   if (!line) return std::nullopt;

@@ -1,4 +1,4 @@
-// The map and its graph, by what map_store has latched.
+// Judges the map and its graph by the latched topics of map_store.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -29,7 +29,7 @@ std::string placeText(const MapFrame& frame) {
                      kDegree * sigma[3]);
 }
 
-/// A graph that is not there is no fault: it can be turned off.
+/// A missing graph is no fault, because the graph can be disabled.
 StatusNode judgeGraph(const std::optional<MapFrame>& frame) {
   StatusNode node{"graph"};
   if (!frame) {

@@ -11,9 +11,10 @@
 namespace perdure::tools {
 namespace {
 
-constexpr double kSettle = 0.5;  // s, in which latched history comes
+constexpr double kSettle = 0.5;  // s; time in which latched samples arrive
 
-/// From capture to now; below 0 where the message does not tell, or tells of another host's clock.
+/// Time from capture to now, in ms. Below 0 if the message has no stamp or a stamp of another
+/// host's clock.
 template <class T>
 double latencyOf(const T& message) {
   constexpr double kLongest = 1e4;  // ms
@@ -24,7 +25,7 @@ double latencyOf(const T& message) {
   return -1.0;
 }
 
-/// Since the start of one of our programs on this host, by /proc.
+/// Time since the start of one of our processes on this host, from /proc.
 std::optional<double> upSeconds(std::uint32_t pid) {
   std::ifstream stat("/proc/" + std::to_string(pid) + "/stat"), uptime("/proc/uptime");
   std::string line;
@@ -57,7 +58,7 @@ StatusWatch::StatusWatch(const bus::Options& options)
       start_s_(steadySeconds()) {
   for (const bus::TopicInfo& info : bus::topicTable()) {
     const std::string name(info.name);
-    // Maps are large, and what they hold is not asked for here.
+    // Maps and images are large, and their content is not needed here.
     if (name.ends_with('/') || name == "map" || name == "object_state") continue;
     bus::withTopic(name, [&](const auto& topic) { listen(topic); });
   }

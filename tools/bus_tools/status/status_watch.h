@@ -1,4 +1,5 @@
-// Listens to a running system for `perdure status`: Health, discovery, and all topics but images.
+// Reads the topics of a running system for `perdure status`: Health, discovery, and all topics
+// except images, the map and object states.
 #pragma once
 
 #include <deque>
@@ -20,9 +21,9 @@ class StatusWatch {
   explicit StatusWatch(const bus::Options& options);
 
   bus::WaitLoop& loop() { return loop_; }
-  /// Told of each Health besides.
+  /// Sets a handler that is also called for each Health message.
   void onHealth(std::function<void(const Health&)> handler) { on_health_ = std::move(handler); }
-  /// As it is now; all but the host.
+  /// The current observations, without the host.
   StatusSeen seen();
 
  private:
@@ -34,11 +35,12 @@ class StatusWatch {
   struct Process {
     Health before, last;
     double before_s = -1.0, last_s = -1.0;
-    double began_s = -1.0;  ///< where its start was seen
+    double began_s = -1.0;  ///< -1 if its start was not observed
     int restarts = 0;
   };
 
-  /// What comes at first may be latched: older than its arrival.
+  /// Whether the first phase is over, in which latched samples arrive that are older than their
+  /// arrival.
   bool settled(double now) const;
   template <class T>
   void listen(const bus::Topic<T>& topic);

@@ -11,9 +11,9 @@
 namespace perdure::calibrate {
 namespace {
 
-constexpr double kLongestPair = 0.25;  ///< s between two views whose rotation is compared
-constexpr double kTimeStep = 0.0025;   ///< s, of the search for the time offset
-constexpr double kLeastSpread = 0.02;  ///< rad/s: less rotation about a second axis is none
+constexpr double kLongestPair = 0.25;  ///< s, longest time between two compared views
+constexpr double kTimeStep = 0.0025;   ///< s, step of the search for the time offset
+constexpr double kLeastSpread = 0.02;  ///< rad/s, least rotation about a second axis
 
 struct Turn {
   double from_s, to_s;
@@ -31,7 +31,7 @@ std::vector<Turn> turnsOf(const std::vector<CameraPose>& poses) {
   return turns;
 }
 
-/// The mean of the gyroscope over any time, by its integral.
+/// Mean of the gyroscope over any time interval, computed by integration.
 class GyroMean {
  public:
   explicit GyroMean(const std::vector<ImuReading>& readings) : readings_(readings) {
@@ -60,11 +60,11 @@ class GyroMean {
   std::vector<Eigen::Vector3d> sums_;
 };
 
-/// Rates of the body and of the camera.
+/// Pairs of angular rates: of the body and of the camera.
 using Pairs = std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>;
 
-/// Without the tenth whose speeds of turning differ most: whatever the rotation between body and
-/// camera, these are alike.
+/// Removes the tenth of the pairs with the most different magnitudes. The magnitudes do not depend
+/// on the rotation between body and camera.
 void dropUnlike(Pairs& pairs) {
   const auto unlike = [](const auto& pair) {
     return std::abs(pair.first.norm() - pair.second.norm());
@@ -74,8 +74,8 @@ void dropUnlike(Pairs& pairs) {
   pairs.resize(pairs.size() - pairs.size() / 10);
 }
 
-/// The rotation that takes the camera's rates into the body's, less a constant bias (Kabsch;
-/// Wahba's problem).
+/// The rotation from the camera's rates to the body's, and a constant bias (Kabsch; Wahba's
+/// problem).
 std::optional<Alignment> alignAt(const std::vector<Turn>& turns, const GyroMean& gyro,
                                  double offset) {
   Pairs pairs;
@@ -148,8 +148,8 @@ Result<Alignment> alignRates(const std::vector<CameraPose>& poses,
 
 std::vector<bool> agreeing(const std::vector<CameraPose>& poses,
                            const std::vector<ImuReading>& readings, const Alignment& alignment) {
-  constexpr std::ptrdiff_t kNeighbours = 4;  // to each side
-  constexpr double kMost = 0.3;              // rad
+  constexpr std::ptrdiff_t kNeighbours = 4;  // neighbours on each side
+  constexpr double kMost = 0.3;              // rad, largest difference of rotation
   const GyroMean gyro(readings);
   std::vector<bool> good;
   const auto count = static_cast<std::ptrdiff_t>(poses.size());

@@ -1,5 +1,5 @@
-// First guesses of what ties a camera to an IMU, in closed form: rotation and time offset from the
-// rates at which both turn, gravity from the mean of the turned forces.
+// Initial estimates in closed form of a camera's extrinsics on an IMU: rotation and time offset
+// from the angular rates of both, gravity from the mean of the rotated specific forces.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,7 +13,7 @@
 
 namespace perdure::calibrate {
 
-/// The camera at one time of its own clock.
+/// Pose of the camera at a time of its own clock.
 struct CameraPose {
   double time_s = 0.0;
   RigidTransform T_TC;
@@ -27,18 +27,18 @@ struct Alignment {
   Eigen::Quaterniond q_BC = Eigen::Quaterniond::Identity();
   double time_offset_s = 0.0;  ///< t_imu = t_image + time_offset_s
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
-  double rms = 0.0;                                      ///< rad/s, of what is left
-  Eigen::Vector3d rate_rms_B = Eigen::Vector3d::Zero();  ///< how much the body turned, rad/s
+  double rms = 0.0;                                      ///< rad/s, RMS of the residuals
+  Eigen::Vector3d rate_rms_B = Eigen::Vector3d::Zero();  ///< rad/s, RMS rotation about each axis
   Eigen::Vector3d spread = Eigen::Vector3d::Zero();      ///< singular values, largest first
 };
 
-/// Poses and readings by time. Fails with calibrate_no_rotation (the mend: how to turn) or
-/// calibrate_time_offset (no offset within ±`widest_s` fits).
+/// Aligns poses and readings, both sorted by time. Fails with calibrate_no_rotation (the detail
+/// states which motion is needed) or calibrate_time_offset (no offset within ±`widest_s` fits).
 Result<Alignment> alignRates(const std::vector<CameraPose>& poses,
                              const std::vector<ImuReading>& readings, double widest_s);
 
-/// Whether each pose turned against most of its neighbours in time as the gyroscope did: a board
-/// that was found upside down, or a view that has two explanations, did not.
+/// Whether each pose rotated as the gyroscope did, compared with most of its neighbours in time. A
+/// board detected upside down, or a view with an ambiguous pose, did not.
 std::vector<bool> agreeing(const std::vector<CameraPose>& poses,
                            const std::vector<ImuReading>& readings, const Alignment& alignment);
 

@@ -14,8 +14,8 @@
 namespace perdure::calibrate {
 namespace {
 
-constexpr int kTagModules = 8;  ///< of 36h11: six of data and the black border
-constexpr int kMostTags = 587;  ///< of the family
+constexpr int kTagModules = 8;  ///< modules of 36h11: six of data and the black border
+constexpr int kMostTags = 587;  ///< size of the family
 constexpr char kMend[] =
     "give chessboard:COLUMNSxROWS:SQUARE (inner corners, metres) such as chessboard:9x6:0.03, or "
     "aprilgrid:COLUMNSxROWS:TAG[:GAP] such as aprilgrid:6x6:0.088:0.3";
@@ -24,7 +24,7 @@ constexpr char kMend[] =
   throw StartupError(ExitCode::kUsage, "--board `" + text + "` " + what + "; " + kMend);
 }
 
-/// The black modules of each tag of the family, row by row.
+/// Black modules of each tag of the family, row by row.
 const std::vector<std::uint64_t>& tagPictures() {
   static const std::vector<std::uint64_t> pictures = [] {
     const std::unique_ptr<apriltag_family_t, decltype(&tag36h11_destroy)> family(tag36h11_create(),
@@ -122,8 +122,8 @@ bool Board::black(const Eigen::Vector2d& point) const {
   const double x = point.x() / size_m, y = point.y() / size_m, step = 1.0 + gap;
   if (!within(x, -gap, columns * step) || !within(y, -gap, rows * step)) return false;
   const double column = std::floor((x + gap) / step), row = std::floor((y + gap) / step);
-  const double u = x - column * step, v = y - row * step;  // from -gap to 1
-  if (u < 0 && v < 0) return true;                         // the square between four tags
+  const double u = x - column * step, v = y - row * step;  // range -gap … 1
+  if (u < 0 && v < 0) return true;                         // square between four tags
   if (u < 0 || v < 0 || column >= columns || row >= rows) return false;
   const auto tag = static_cast<std::size_t>(row * columns + column);
   const auto at = static_cast<std::uint64_t>(v * kTagModules) * kTagModules +
@@ -136,7 +136,7 @@ std::string boardSvg(const Board& board) {
   const double width = 1e3 * (to.x() - from.x()), height = 1e3 * (to.y() - from.y());
   const double cell =
       board.kind == BoardKind::kChessboard ? board.size_m : board.size_m / kTagModules;
-  const double line = 12.0;  // mm below the board, for the scale and the text
+  const double line = 12.0;  // mm below the board, for scale and text
   std::string text = fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}mm\" height=\"{1}mm\" "
       "viewBox=\"0 0 {0} {1}\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"

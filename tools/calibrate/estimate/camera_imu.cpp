@@ -12,10 +12,10 @@ namespace perdure::calibrate {
 namespace {
 
 constexpr std::size_t kLeastSightings = 60;
-constexpr int kRounds = 4;  ///< of solving, weighing and leaving out
+constexpr int kRounds = 4;  ///< rounds of solving, weighting and outlier removal
 constexpr double kGateSigma = 5.0;
 constexpr double kLeastPx = 0.02;
-constexpr double kSettled = 1e-5;  ///< s: the time offset stays in its segments
+constexpr double kSettled = 1e-5;  ///< s, change of the time offset below which the rounds end
 
 Eigen::Vector3d rmsOf(const std::vector<ImuResidual>& all, Eigen::Vector3d ImuResidual::*which) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -23,7 +23,7 @@ Eigen::Vector3d rmsOf(const std::vector<ImuResidual>& all, Eigen::Vector3d ImuRe
   return (sum / static_cast<double>(all.size())).cwiseSqrt();
 }
 
-/// Of each value with the next one.
+/// Correlation of each value with the next one.
 double correlationOf(const std::vector<ImuResidual>& all, Eigen::Vector3d ImuResidual::*which) {
   double product = 0.0, square = 0.0;
   for (std::size_t i = 1; i < all.size(); ++i) {
@@ -33,7 +33,8 @@ double correlationOf(const std::vector<ImuResidual>& all, Eigen::Vector3d ImuRes
   return square > 0.0 ? product / square : 0.0;
 }
 
-/// The largest value of an axis, several times in a row: the sensor's range has ended.
+/// Whether a reading is clipped: the largest value of an axis repeats at least three times in a
+/// row.
 bool isSaturated(const std::vector<ImuReading>& readings, Eigen::Vector3d ImuReading::*which,
                  double least) {
   for (int axis = 0; axis < 3; ++axis) {
@@ -49,7 +50,7 @@ bool isSaturated(const std::vector<ImuReading>& readings, Eigen::Vector3d ImuRea
   return false;
 }
 
-/// The longest run of views without a gap.
+/// The longest sequence of views without a gap.
 std::vector<Sighting> longestStretch(const std::vector<Sighting>& all, double gap_s) {
   std::size_t best_from = 0, best_to = 0, from = 0;
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -78,7 +79,7 @@ class CameraImuRun {
   }
 
  private:
-  /// Poses of the camera, the stretch, and the readings beside it.
+  /// Computes the camera poses, the stretch, and the readings of its time.
   Result<void> prepare() {
     if (input_.views.empty()) {
       return fail("calibrate_few_views", "no image shows the board; see --board");
@@ -140,7 +141,7 @@ class CameraImuRun {
     return {};
   }
 
-  /// First guesses, in closed form.
+  /// Computes the initial estimates in closed form.
   Result<void> start() {
     const auto aligned = alignRates(poses_, near_, options_.widest_offset_s);
     if (!aligned) return tl::unexpected(aligned.error());
@@ -167,7 +168,8 @@ class CameraImuRun {
     return {};
   }
 
-  /// Views whose pose is not where the gyroscope turned it: all of their corners would be wrong.
+  /// Removes views whose rotation contradicts the gyroscope, because all of their corners would be
+  /// wrong.
   void dropDisagreeing(const Alignment& alignment) {
     const auto good = agreeing(poses_, near_, alignment);
     std::vector<CameraPose> poses;
@@ -180,11 +182,11 @@ class CameraImuRun {
     poses_ = std::move(poses), problem_.sightings = std::move(sightings);
   }
 
-  /// A spline over the views whose controls are the camera's poses.
+  /// Initialises a spline over the views from the camera poses.
   void placeSpline() {
     auto& x = problem_.x;
     x.spline.interval_s = chooseKnotInterval(near_);
-    // One frame's time beyond the views, so that the time offset can move.
+    // Time in s that the spline extends beyond the views, so that the time offset can change.
     constexpr double kPad = 0.05;
     const double from =
         std::max(near_.front().time_s, problem_.sightings.front().time_s + x.time_offset_s - kPad);
@@ -230,7 +232,8 @@ class CameraImuRun {
     return {};
   }
 
-  /// Deviations by what is left: corners by themselves, the IMU no better than declared.
+  /// Sets the standard deviations from the residuals. Those of the IMU are at least the declared
+  /// ones.
   void weigh() {
     std::vector<double> sizes;
     for (const auto& r : problem_.cornerResiduals()) sizes.push_back(r.residual.norm());
@@ -248,7 +251,8 @@ class CameraImuRun {
         std::max(declared_.accel, rmsOf(left, &ImuResidual::accel).norm() / std::sqrt(3.0) * freed);
   }
 
-  /// Residuals are smaller than the noise by what the spline takes up.
+  /// Factor from the residuals to the noise: the degrees of freedom of the spline reduce the
+  /// residuals.
   double freedomOf(std::size_t samples) const {
     const auto n = static_cast<double>(samples);
     const auto controls = static_cast<double>(problem_.x.spline.controls.size());

@@ -1,7 +1,8 @@
-// The place of a camera on an IMU, their time offset, the lens, the IMU's biases and gravity, from
-// one recording of a board: one least-squares problem over a continuous-time trajectory (Furgale,
-// Rehder, Siegwart, "Unified Temporal and Spatial Calibration for Multi-Sensor Systems", IROS
-// 2013). Unlike there the lens is estimated along, and biases are piecewise linear walks.
+// Estimates a camera's pose on an IMU, their time offset, the lens, the biases of the IMU, and
+// gravity from one recording of a board. It is one least-squares problem over a continuous-time
+// trajectory (Furgale, Rehder, Siegwart, "Unified Temporal and Spatial Calibration for Multi-Sensor
+// Systems", IROS 2013). In contrast to the paper, the lens is estimated too, and biases are
+// piecewise linear random walks.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,29 +17,29 @@
 namespace perdure::calibrate {
 
 struct CameraImuOptions {
-  double gravity = 9.81;         ///< m/s², at the place of use
-  double widest_offset_s = 0.3;  ///< of the search for a time offset
-  double longest_gap_s = 1.0;    ///< without the board in view; a longer one ends the stretch
-  bool hold_lens = false;        ///< the lens stays as it is given
+  double gravity = 9.81;         ///< m/s², at the place of the recording
+  double widest_offset_s = 0.3;  ///< largest time offset of the search
+  double longest_gap_s = 1.0;    ///< longest time without the board; a longer one ends the stretch
+  bool hold_lens = false;        ///< keeps the given lens constant
 };
 
 struct CameraImuInput {
   Board board;
-  std::vector<View> views;         ///< by time
-  std::vector<ImuSample> samples;  ///< by time
-  CameraCalibration camera;        ///< lens; T_BC's position is the first guess
+  std::vector<View> views;         ///< sorted by time
+  std::vector<ImuSample> samples;  ///< sorted by time
+  CameraCalibration camera;        ///< lens; T_BC's position is the initial estimate
   ImuCalibration imu;              ///< noise densities
-  double sigma_px = 0.1;           ///< first guess of a corner's deviation
+  double sigma_px = 0.1;           ///< initial standard deviation of a corner
 };
 
 /// Order of the covariance: θ (right of R_BC), p_BC, time offset, lens.
 inline constexpr int kRotationAt = 0, kPositionAt = 3, kOffsetAt = 6, kLensAt = 7;
 using Matrix15d = Eigen::Matrix<double, 15, 15>;
 
-/// What is left of a sensor's samples, as a multiple of the declared white noise.
+/// Residuals of a sensor's samples, as a multiple of the declared white noise.
 struct NoiseCheck {
   double ratio = 0.0;
-  double correlation = 0.0;  ///< of neighbouring residuals, -1 … 1; white noise has none
+  double correlation = 0.0;  ///< correlation of neighbours, -1 … 1; 0 for white noise
 };
 
 struct ImuResidual {
@@ -47,18 +48,18 @@ struct ImuResidual {
 };
 
 struct CameraImu {
-  CameraCalibration camera;  ///< with T_BC and time offset
+  CameraCalibration camera;  ///< includes T_BC and the time offset
   Matrix15d covariance = Matrix15d::Zero();
-  /// Residuals that are near in time go together (a corner errs with its neighbours): by so much
-  /// the covariance is wider than that of independent ones.
+  /// Factor by which the covariance is larger than with independent residuals. Residuals that are
+  /// close in time are correlated, because a corner errs together with its neighbours.
   double widened = 1.0;
-  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = gyro_bias;  ///< means
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = gyro_bias;  ///< mean biases
   Eigen::Vector3d gyro_bias_sigma = gyro_bias, accel_bias_sigma = gyro_bias;
   Eigen::Vector3d gravity_T = gyro_bias;  ///< m/s², in the board's frame
-  double from_s = 0.0, to_s = 0.0;        ///< the stretch, since the first view
+  double from_s = 0.0, to_s = 0.0;        ///< limits of the stretch, since the first view
   double knot_interval_s = 0.0;
-  Eigen::Vector3d rate_rms_B = gyro_bias, accel_rms_B = gyro_bias;  ///< how much it was moved
-  double sigma_px = 0.0;                                            ///< from the residuals
+  Eigen::Vector3d rate_rms_B = gyro_bias, accel_rms_B = gyro_bias;  ///< RMS motion along each axis
+  double sigma_px = 0.0;                                            ///< estimated from residuals
   std::size_t views = 0, corners = 0, outliers = 0, samples = 0;
   NoiseCheck gyro, accel;
   std::vector<CornerResidual> residuals;
@@ -70,8 +71,8 @@ struct CameraImu {
 /// calibrate_imu_saturated, calibrate_no_convergence or calibrate_not_observable.
 Result<CameraImu> estimateCameraImu(const CameraImuInput& input, const CameraImuOptions& options);
 
-/// The widest spacing of knots with which a spline follows the samples as well as it does with the
-/// narrowest one; seconds.
+/// The largest knot spacing, in s, with which a spline fits the samples as well as with the
+/// smallest one.
 double chooseKnotInterval(const std::vector<ImuReading>& readings);
 
 }  // namespace perdure::calibrate

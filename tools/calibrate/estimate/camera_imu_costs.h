@@ -60,7 +60,7 @@ using Rotations = std::array<Eigen::Map<const Eigen::Quaternion<T>>, kOrder>;
 template <class T>
 using Positions = std::array<Eigen::Map<const Vector3<T>>, kOrder>;
 
-/// A value of a bias between its two neighbouring values in time.
+/// A bias at a time between two of its nodes, by linear interpolation.
 template <class T>
 Vector3<T> biasAt(const T* before, const T* after, double share) {
   const Eigen::Map<const Vector3<T>> a(before), b(after);
@@ -104,15 +104,15 @@ struct AccelCost {
   }
 };
 
-/// All corners of one image. Two rows each.
+/// All corners of one image, with two residuals each.
 struct FrameCost {
   struct Sight {
     Eigen::Vector3d point_T;
     Eigen::Vector2d pixel;
-    double row_delay_s;  ///< when its row was exposed, after the stamp
+    double row_delay_s;  ///< exposure time of its row, after the stamp
   };
   DistortionModel model;
-  double u, interval_s, weight;  ///< u at a time offset of 0, of the chosen segment
+  double u, interval_s, weight;  ///< u at time offset 0, within the chosen segment
   bool rolling;
   std::vector<Sight> sights;
 
@@ -147,7 +147,7 @@ struct FrameCost {
   }
 };
 
-/// Neighbouring values of a bias differ as a random walk does.
+/// Random walk: the difference of neighbouring bias values.
 struct WalkCost {
   double weight;
   template <class T>
@@ -157,7 +157,7 @@ struct WalkCost {
   }
 };
 
-/// The first value of a bias is not beyond what sensors have.
+/// Prior that limits the first bias value to the range of real sensors.
 struct BiasPrior {
   double weight;
   template <class T>

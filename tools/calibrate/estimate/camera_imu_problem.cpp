@@ -11,14 +11,14 @@
 namespace perdure::calibrate {
 namespace {
 
-constexpr double kCluster = 0.25;      // s in which residuals may go together
+constexpr double kCluster = 0.25;      // s; residuals within this time may be correlated
 constexpr double kBiasInterval = 0.5;  // s
 constexpr double kGyroBiasPrior = 0.5, kAccelBiasPrior = 2.0;  // rad/s, m/s²
 
 double* turnOf(Spline& spline, std::size_t i) { return spline.controls[i].q.coeffs().data(); }
 double* placeOf(Spline& spline, std::size_t i) { return spline.controls[i].p.data(); }
 
-/// The controls of segment k: five turns, then five places.
+/// The control points of segment k: five rotations, then five positions.
 std::vector<double*> controlsOf(Spline& spline, std::size_t k, bool with_places) {
   std::vector<double*> blocks;
   for (std::size_t i = 0; i < kOrder; ++i) blocks.push_back(turnOf(spline, k + i));
@@ -26,9 +26,9 @@ std::vector<double*> controlsOf(Spline& spline, std::size_t k, bool with_places)
   return blocks;
 }
 
-/// How much wider an estimate's covariance is for residuals that go together within a cluster:
-/// the sandwich of the clusters' influences over that of single rows (Liang and Zeger, 1986).
-/// `influence`: of each row's unit residual on the estimate.
+/// Factor by which the covariance grows because residuals are correlated within a cluster. It is
+/// the ratio of the sandwich estimate with clusters to the one with single rows (Liang and Zeger,
+/// 1986). `influence`: effect of each row's unit residual on the estimate.
 double wideningOf(const Eigen::MatrixXd& influence, const std::vector<double>& residuals,
                   const std::vector<int>& clusters, const Eigen::MatrixXd& covariance) {
   const int last = *std::max_element(clusters.begin(), clusters.end());
@@ -43,14 +43,14 @@ double wideningOf(const Eigen::MatrixXd& influence, const std::vector<double>& r
   return solver.solve(sums.transpose() * sums).trace() / solver.solve(single).trace();
 }
 
-/// Row-major Jacobian of Ceres as Eigen's.
+/// Converts a row-major Jacobian of Ceres to Eigen.
 Eigen::SparseMatrix<double> toEigen(const ceres::CRSMatrix& m) {
   using Rows = Eigen::SparseMatrix<double, Eigen::RowMajor>;
   return Eigen::Map<const Rows>(m.num_rows, m.num_cols, static_cast<Eigen::Index>(m.values.size()),
                                 m.rows.data(), m.cols.data(), m.values.data());
 }
 
-/// The Jacobian by all unknowns, `last` at its end, and the residuals.
+/// The Jacobian of all free parameters, with those of `last` at the end, and the residuals.
 Eigen::SparseMatrix<double> jacobianWithLast(ceres::Problem& problem,
                                              const std::vector<double*>& last,
                                              std::vector<double>& residuals) {
@@ -212,7 +212,7 @@ void CameraImuProblem::gateCorners(double limit_px) {
 
 std::vector<ImuResidual> CameraImuProblem::imuResiduals() const {
   std::vector<ImuResidual> all;
-  Spline spline = x.spline;  // Ceres' way with pointers is not const
+  Spline spline = x.spline;  // Ceres needs pointers that are not const
   for (const ImuReading& reading : readings) {
     const std::size_t k = x.spline.segmentAt(reading.time_s);
     const double u = x.spline.withinOf(k, reading.time_s), dt = x.spline.interval_s;
@@ -236,7 +236,7 @@ Eigen::Vector3d CameraImuProblem::biasMean(const std::vector<Eigen::Vector3d>& b
   return sum / static_cast<double>(bias.size());
 }
 
-/// The stretch of kCluster to which each row of the Jacobian belongs, in the order of build().
+/// The cluster (a time of kCluster) of each row of the Jacobian, in the order of build().
 std::vector<int> CameraImuProblem::clusterOfRows() const {
   std::vector<int> clusters;
   const auto add = [&](double t, std::size_t rows) {
@@ -258,8 +258,8 @@ std::vector<double*> CameraImuProblem::calibrationBlocks() {
   return blocks;
 }
 
-// One sparse factorisation of the normal equations, of whose inverse only the wanted columns are
-// made.
+// Factorises the sparse normal equations once and computes only the required columns of their
+// inverse.
 Result<CameraImuProblem::Certainty> CameraImuProblem::certainty() {
   const auto blind =
       fail("calibrate_not_observable",
@@ -268,7 +268,7 @@ Result<CameraImuProblem::Certainty> CameraImuProblem::certainty() {
   ceres::Problem problem;
   build(problem);
   std::vector<double*> wanted = calibrationBlocks();
-  constexpr Eigen::Index kSizes[] = {3, 6, 7, 11, 15};  // of the first so many blocks
+  constexpr Eigen::Index kSizes[] = {3, 6, 7, 11, 15};  // sizes of the first 1, 2, … blocks
   const Eigen::Index calibrated = kSizes[wanted.size() - 1], size = calibrated + 6;
   const std::size_t middle = x.gyro_bias.size() / 2;
   wanted.insert(wanted.end(), {x.gyro_bias[middle].data(), x.accel_bias[middle].data()});

@@ -22,9 +22,10 @@ double brightness(const cv::Mat& grey, const cv::Point2f& at) {
   return cv::mean(patch)[0];
 }
 
-/// OpenCV may begin at either end of the board: the square after the first corner is black.
+/// Whether the corners start at the wrong end of the board: OpenCV may start at either end, but the
+/// square after the first corner must be black.
 bool isUpsideDown(const Board& board, const cv::Mat& grey, const std::vector<cv::Point2f>& found) {
-  double difference = 0.0;  // of squares that are to be black and to be white
+  double difference = 0.0;  // expected black minus expected white squares
   for (int row = 0; row + 1 < board.rows; ++row) {
     for (int column = 0; column + 1 < board.columns; ++column) {
       const auto at = static_cast<std::size_t>(row * board.columns + column);
@@ -38,8 +39,8 @@ bool isUpsideDown(const Board& board, const cv::Mat& grey, const std::vector<cv:
   return difference > 0.0;
 }
 
-/// How black and white lie around a corner, alike across and unlike beside: 1 where the steps' own
-/// quarter and the one across are black, -1 where they are white, 0 where it is no crossing.
+/// Pattern of black and white around a corner. Returns 1 if the quadrants a + b and -a - b are
+/// black, -1 if they are white, and 0 if opposite quadrants do not match.
 int crossingAt(const cv::Mat& grey, const cv::Point2f& corner, const cv::Point2f& a,
                const cv::Point2f& b) {
   const double one = brightness(grey, corner + a + b), across = brightness(grey, corner - a - b);
@@ -52,10 +53,10 @@ int crossingAt(const cv::Mat& grey, const cv::Point2f& corner, const cv::Point2f
   return darker > lighter ? 1 : -1;
 }
 
-/// Whether every corner is a crossing of squares: a board that is found a square beside its place
-/// has a row of corners that are none.
+/// Whether every corner is a crossing of squares. A board that is detected one square beside its
+/// true place has a row of corners that are not.
 bool areCrossings(const Board& board, const cv::Mat& grey, const std::vector<cv::Point2f>& found) {
-  constexpr float kStep = 0.3F;  // of a square
+  constexpr float kStep = 0.3F;  // share of a square
   const auto at = [&](int column, int row) {
     return found[static_cast<std::size_t>(row * board.columns + column)];
   };
@@ -76,7 +77,8 @@ std::vector<Corner> findChessboard(const Board& board, const cv::Mat& grey) {
   if (!cv::findChessboardCornersSB(grey, size, found, cv::CALIB_CB_NORMALIZE_IMAGE)) {
     return {};
   }
-  // Refined by the edges beside each corner: what the detector gives is biased by some hundredths.
+  // Refines the corners by the adjacent edges, because the detector is biased by some hundredths of
+  // a pixel.
   double side = 1e9;
   for (std::size_t i = 1; i < found.size(); ++i) {
     side = std::min(side, cv::norm(found[i] - found[i - 1]));
@@ -92,12 +94,12 @@ std::vector<Corner> findChessboard(const Board& board, const cv::Mat& grey) {
   return corners;
 }
 
-/// Refines the corners of a tag, clockwise, each as the crossing of edges that it is. What moves
-/// far, lies at the image's border or is no crossing is left out.
+/// Refines the corners of a tag, in clockwise order, as crossings of edges. The result is false for
+/// corners that move too far, lie at the image border or are not crossings.
 std::vector<bool> refineCrossings(const cv::Mat& grey, double side_px,
                                   std::vector<cv::Point2f>& pixels) {
   constexpr double kFarthest = 2.0;
-  constexpr float kStep = 0.09F;  // of the tag's side, within its border
+  constexpr float kStep = 0.09F;  // share of the tag's side, within its border
   const int half = std::clamp(static_cast<int>(0.12 * side_px), 2, 6);
   const std::vector<cv::Point2f> before = pixels;
   cv::cornerSubPix(grey, pixels, {half, half}, {-1, -1}, kRefinement);
@@ -129,8 +131,8 @@ std::vector<Corner> findAprilGrid(const Board& board, const cv::Mat& grey) {
     apriltag_detection_t* tag = nullptr;
     zarray_get(found.get(), i, static_cast<void*>(&tag));
     if (tag->hamming > 0 || tag->id >= board.columns * board.rows) continue;
-    // The library gives lower left, lower right, upper right, upper left, with pixels' corners at
-    // whole numbers.
+    // The order of the library is lower left, lower right, upper right, upper left. Its integer
+    // coordinates are at the corners of pixels.
     std::vector<cv::Point2f> pixels;
     double side = 1e9;
     for (const int which : {3, 2, 1, 0}) {

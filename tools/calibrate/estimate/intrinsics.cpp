@@ -15,7 +15,7 @@ namespace perdure::calibrate {
 namespace {
 
 constexpr std::size_t kLeastCorners = 8, kLeastViews = 5;
-constexpr double kOutlierSigma = 5.0, kLeastOutlier = 0.5;  // px
+constexpr double kOutlierSigma = 5.0, kLeastOutlier = 0.5;  // limits; the second in px
 
 struct CornerCost {
   DistortionModel model;
@@ -36,8 +36,8 @@ struct CornerCost {
   }
 };
 
-/// Where the ends of the board would be in the image, as shares of its width: what makes one view
-/// differ from another.
+/// Positions of the board's four outer corners in the image, as shares of the image width. They
+/// measure how much views differ.
 std::optional<Vector8d> outlineOf(const Board& board, const View& view, double width) {
   std::vector<cv::Point2d> plane, image;
   for (const Corner& corner : view.corners) {
@@ -59,7 +59,7 @@ std::optional<Vector8d> outlineOf(const Board& board, const View& view, double w
   return outline.allFinite() ? std::optional(outline) : std::nullopt;
 }
 
-/// The views that differ most: each next one is the farthest from those taken.
+/// The views that differ most, by farthest-point selection.
 std::vector<const View*> mostDifferent(const Board& board, const std::vector<View>& views,
                                        double width, std::size_t most) {
   std::vector<std::pair<const View*, Vector8d>> all;
@@ -82,7 +82,7 @@ std::vector<const View*> mostDifferent(const Board& board, const std::vector<Vie
   return taken;
 }
 
-/// Reprojection error of a view in a pose, squared pixels a corner.
+/// Squared reprojection error of a view for a pose, in px² for each corner.
 double errorOf(const CameraModel& camera, const Board& board, const View& view,
                const RigidTransform& T_CT) {
   double sum = 0.0;
@@ -94,7 +94,7 @@ double errorOf(const CameraModel& camera, const Board& board, const View& view,
   return sum / static_cast<double>(view.corners.size());
 }
 
-/// The undistorted lens of some focal length that fits the views best.
+/// The lens without distortion and with the focal length that fits the views best.
 CameraCalibration firstGuess(const Board& board, const std::vector<const View*>& views,
                              CameraCalibration camera) {
   constexpr int kSteps = 24;
@@ -111,7 +111,7 @@ CameraCalibration firstGuess(const Board& board, const std::vector<const View*>&
     double sum = 0.0;
     for (std::size_t k = 0; k < used; ++k) {
       const auto T_CT = boardPose(model, board, *views[k]);
-      // Views that this lens cannot explain count, but do not decide alone.
+      // Bounds the error, so that views that do not fit this lens do not dominate the sum.
       const double error = T_CT ? std::sqrt(errorOf(model, board, *views[k], *T_CT)) : 1e9;
       sum += std::min(error, 50.0);
     }
@@ -126,7 +126,7 @@ struct ViewState {
   std::vector<bool> good;
 };
 
-/// The least-squares problem over a lens and the poses of some views.
+/// The least-squares problem over a lens and the poses of the views.
 class Bundle {
  public:
   Bundle(const Board& board, const CameraCalibration& camera, const IntrinsicsOptions& options)
@@ -157,14 +157,15 @@ class Bundle {
     return summary.IsSolutionUsable() && summary.termination_type != ceres::NO_CONVERGENCE;
   }
 
-  /// Corners far from where they should be by the residuals' own spread (by their median).
+  /// Removes corners with large residuals, relative to the spread of all residuals (from their
+  /// median).
   void dropOutliers() {
     std::vector<double> sizes;
     for (const auto& r : residuals()) sizes.push_back(r.residual.norm());
     if (sizes.empty()) return;
     const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
     std::nth_element(sizes.begin(), middle, sizes.end());
-    constexpr double kRayleighMedian = 1.1774;  // of a length with deviation 1 in each coordinate
+    constexpr double kRayleighMedian = 1.1774;  // median length of a 2-D vector with unit variances
     const double limit = std::max(kLeastOutlier, kOutlierSigma * *middle / kRayleighMedian);
     for (ViewState& state : states_) {
       for (std::size_t i = 0; i < state.good.size(); ++i) {
@@ -299,7 +300,7 @@ std::optional<RigidTransform> boardPose(const CameraModel& camera, const Board& 
     }
     cv::solvePnPRefineLM(points, rays, K, {}, rotation, position);
   } catch (const cv::Exception&) {
-    return std::nullopt;  // corners on a line
+    return std::nullopt;  // the corners are collinear
   }
   cv::Mat R;
   cv::Rodrigues(rotation, R);
@@ -324,7 +325,7 @@ Result<Intrinsics> estimateIntrinsics(const Board& board, const std::vector<View
   CameraCalibration guess = camera;
   guess.distortion = options.model;
   guess = firstGuess(board, chosen, guess);
-  // First the views that fit an undistorted lens well enough to have a pose at all.
+  // First solves with the views whose pose an undistorted lens explains.
   Bundle rough(board, guess, options);
   rough.take(
       {chosen.begin(),

@@ -1,6 +1,6 @@
-// Focal lengths, principal point and distortion from views of a board: least squares over the
-// views' poses and the lens (Zhang, "A Flexible New Technique for Camera Calibration", PAMI 2000),
-// with any of the lenses of common/camera.
+// Estimates focal lengths, principal point and distortion from views of a board. The least-squares
+// problem covers the poses of the views and the lens (Zhang, "A Flexible New Technique for Camera
+// Calibration", PAMI 2000). It supports each lens model of common/camera.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,37 +16,37 @@ namespace perdure::calibrate {
 using Vector8d = Eigen::Matrix<double, 8, 1>;
 using Matrix8d = Eigen::Matrix<double, 8, 8>;
 
-/// A corner against where the estimate puts it.
+/// Residual of a detected corner against its predicted position.
 struct CornerResidual {
   std::uint64_t frame = 0;
-  double time_s = 0.0;  ///< since the first view
+  double time_s = 0.0;  ///< time since the first view
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero(), residual = Eigen::Vector2d::Zero();  ///< px
 };
 
 struct IntrinsicsOptions {
   DistortionModel model = DistortionModel::kRadialTangential;
-  std::size_t most_views = 60;  ///< the most different ones are taken
+  std::size_t most_views = 60;  ///< the most different views are used
 };
 
 struct Intrinsics {
   CameraCalibration camera;                ///< name, size and lens only
-  Matrix8d covariance = Matrix8d::Zero();  ///< of fx fy cx cy and the coefficients
-  double sigma_px = 0.0;                   ///< of a corner's coordinate, from the residuals
+  Matrix8d covariance = Matrix8d::Zero();  ///< order: fx, fy, cx, cy, coefficients
+  double sigma_px = 0.0;                   ///< standard deviation of a coordinate
   std::size_t views = 0, corners = 0, outliers = 0;
-  std::vector<RigidTransform> T_CT;  ///< board in camera, of each view that was used
+  std::vector<RigidTransform> T_CT;  ///< board in camera, for each used view
   std::vector<CornerResidual> residuals;
 };
 
-/// fx fy cx cy, and the coefficients (0 where the lens has none).
+/// fx, fy, cx, cy and the coefficients (0 for those that the lens lacks).
 Vector8d lensOf(const CameraCalibration& camera);
 void setLens(const Vector8d& lens, CameraCalibration& camera);
 
-/// The board in the camera, z > 0. Nothing where the corners do not tell.
+/// Pose of the board in the camera frame, z > 0. Empty if the corners do not determine it.
 std::optional<RigidTransform> boardPose(const CameraModel& camera, const Board& board,
                                         const View& view);
 
-/// `camera` gives name and size of the images. Fails with calibrate_few_views or
-/// calibrate_no_convergence; the detail says the mend.
+/// `camera` provides the name and the image size. Fails with calibrate_few_views or
+/// calibrate_no_convergence; the detail states the fix.
 Result<Intrinsics> estimateIntrinsics(const Board& board, const std::vector<View>& views,
                                       const CameraCalibration& camera,
                                       const IntrinsicsOptions& options);

@@ -1,4 +1,4 @@
-// A camera's projection as a template, so that Ceres' dual numbers go through it. The same model as
+// Projection of a camera as a template for the dual numbers of Ceres. It is the same model as in
 // common/camera.
 #pragma once
 
@@ -10,7 +10,7 @@
 
 namespace perdure::calibrate {
 
-/// focal: fx fy cx cy, in pixels; distortion: four coefficients (none: not read).
+/// focal: fx, fy, cx, cy in pixels; distortion: four coefficients (not read if the model has none).
 template <class T>
 Eigen::Matrix<T, 2, 1> projectPoint(DistortionModel model, const T* focal, const T* distortion,
                                     const Eigen::Matrix<T, 3, 1>& point_C) {

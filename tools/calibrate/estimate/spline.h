@@ -1,6 +1,6 @@
-// The motion of the body as one smooth curve: a uniform cumulative B-spline of order 5 for the
-// rotation and one for the position (Furgale et al., ICRA 2012; Sommer et al., CVPR 2020), as a
-// template through which Ceres' dual numbers go.
+// Motion of the body as a smooth curve: a uniform cumulative B-spline of order 5 for the rotation,
+// and one for the position (Furgale et al., ICRA 2012; Sommer et al., CVPR 2020). The code is a
+// template for the dual numbers of Ceres.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,7 +21,7 @@ inline constexpr auto kCumulativeWeights = cumulativeMatrix<kOrder>();
 template <class T>
 using Vector3 = Eigen::Matrix<T, 3, 1>;
 
-/// Rotation vector to unit quaternion, smooth at zero.
+/// Unit quaternion of a rotation vector, smooth at zero.
 template <class T>
 Eigen::Quaternion<T> expQuaternionOf(const Vector3<T>& theta) {
   using std::cos;
@@ -36,7 +36,7 @@ Eigen::Quaternion<T> expQuaternionOf(const Vector3<T>& theta) {
   return {cos(T(0.5) * n), s * theta.x(), s * theta.y(), s * theta.z()};
 }
 
-/// The rotation vector of a quaternion, smooth at zero; turns of less than half a circle.
+/// Rotation vector of a quaternion, smooth at zero, for rotations below 180°.
 template <class T>
 Vector3<T> logOf(const Eigen::Quaternion<T>& q) {
   using std::atan2;
@@ -59,7 +59,8 @@ struct Turning {
   Vector3<T> rate;         ///< w_TB_B, rad/s
 };
 
-/// Five controls, u in [0, 1) of the interval (a little beyond is exact enough to differentiate).
+/// Rotation and angular rate from five control points; u in [0, 1) of the interval. Values slightly
+/// outside are accurate enough for differentiation.
 template <class T>
 Turning<T> rotationAt(const std::array<Eigen::Map<const Eigen::Quaternion<T>>, kOrder>& controls,
                       const T& u, double interval_s) {
@@ -86,7 +87,7 @@ Vector3<T> positionAt(const std::array<Eigen::Map<const Vector3<T>>, kOrder>& co
   return sum;
 }
 
-/// The controls and where they lie in time.
+/// Control points and their times.
 struct Spline {
   double start_s = 0.0, interval_s = 0.05;
   std::vector<RigidTransform> controls;  ///< T_TB
@@ -98,11 +99,11 @@ struct Spline {
     const double at = std::floor((t - start_s) / interval_s);
     return std::min(segments() - 1, static_cast<std::size_t>(std::max(0.0, at)));
   }
-  /// Of segment `k` at time t.
+  /// Position of time t within segment `k`, in [0, 1).
   double withinOf(std::size_t k, double t) const {
     return (t - start_s) / interval_s - static_cast<double>(k);
   }
-  /// The time at which control i weighs most.
+  /// The time at which control point i has its largest weight.
   double timeOf(std::size_t i) const {
     return start_s + interval_s * (static_cast<double>(i) - 0.5 * (kOrder - 2));
   }

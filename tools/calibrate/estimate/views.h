@@ -1,4 +1,4 @@
-// What a camera saw of the board: corners with their numbers, frame by frame.
+// Views of a board by a camera: corners with their numbers, frame by frame.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,18 +15,18 @@
 namespace perdure::calibrate {
 
 struct Corner {
-  std::size_t id = 0;  ///< of Board::corner
+  std::size_t id = 0;  ///< index of Board::corner
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
 };
 
 struct View {
   std::uint64_t frame = 0;
-  TimePoint time;  ///< stamp of the image, its own clock
+  TimePoint time;  ///< stamp of the image, by the camera's clock
   std::vector<Corner> corners;
 };
 
-/// The corners of the board in a grey image; empty where there is none. Places to a few hundredths
-/// of a pixel.
+/// The corners of the board in a grey image; empty if there is no board. Accurate to a few
+/// hundredths of a pixel.
 std::vector<Corner> findCorners(const Board& board, const cv::Mat& grey);
 
 }  // namespace perdure::calibrate

@@ -23,7 +23,7 @@ using Quaternion = Eigen::Quaterniond;
 
 constexpr double kInDegrees = 180.0 / M_PI;
 
-/// A way in which poses may have been written.
+/// A convention in which poses may have been written.
 struct Reading {
   const char *code, *what, *mend;
   bool w_first, inverted, of_camera;
@@ -56,7 +56,7 @@ constexpr std::array kReadings{
     Reading{"poses_w_first", "inverted, of the camera, and with the quaternion's w first", kBoth,
             true, true, true}};
 
-/// A turn between two poses, and what another sensor says of it, in B.
+/// Two poses, and the rotation between them as another sensor measured it, in B.
 struct Step {
   Quaternion from, to;
   Eigen::Vector3d reference;
@@ -72,7 +72,7 @@ TurnPairs pairsOf(const std::vector<Step>& steps, const Reading& reading, const 
   return {reference, given};
 }
 
-/// Pairs of poses so far apart, and `later` on the clock of the gyroscope.
+/// Pairs of poses `seconds` apart, shifted by `later_s` to the clock of the gyroscope.
 std::vector<Step> stepsOf(const std::vector<StampedPose>& poses, const TurnIntegral& gyro,
                           double seconds, double later_s) {
   const Duration length = durationFromSeconds(seconds), later = durationFromSeconds(later_s);
@@ -92,11 +92,11 @@ std::vector<Step> stepsOf(const std::vector<StampedPose>& poses, const TurnInteg
 }
 
 struct Limits {
-  std::size_t fewest;   ///< pairs
-  double least_rad;     ///< of turning, in a pair
-  double shown;         ///< disagreement from which axes may be others
-  double contradicted;  ///< and from which a reading is wrong
-  double explained;     ///< and up to which another one is right
+  std::size_t fewest;   ///< least number of pairs
+  double least_rad;     ///< least rotation in a pair
+  double shown;         ///< least disagreement at which axes may differ
+  double contradicted;  ///< least disagreement at which a reading is wrong
+  double explained;     ///< largest disagreement of a correct reading
 };
 
 struct Sensor {
@@ -113,11 +113,11 @@ std::string namesOf(const std::vector<const Reading*>& readings) {
 }
 
 struct Wrong {
-  std::vector<const Reading*> likely;  ///< the best first
+  std::vector<const Reading*> likely;  ///< sorted by likelihood
   DataFinding finding;
 };
 
-/// Which readings explain the turns that the poses as they are do not.
+/// The readings that explain the rotations if the poses as written do not.
 std::optional<Wrong> wrongReading(const std::vector<Step>& steps, const Quaternion& q_BC,
                                   const Limits& limits, const Sensor& sensor) {
   if (steps.size() < limits.fewest) return std::nullopt;
@@ -131,7 +131,7 @@ std::optional<Wrong> wrongReading(const std::vector<Step>& steps, const Quaterni
     best = std::min(best, pairsOf(steps, reading, q_BC).disagreement());
   }
   if (best >= limits.explained) return std::nullopt;
-  // Where the body turns about one axis only, other axes may look like an inverse.
+  // If the body rotates about one axis only, different axes may look like an inverse.
   constexpr double kFits = 0.005, kClearly = 3.0;
   if (best > kFits && given.disagreementBy(given.bestRotation()) < best / kClearly) {
     return std::nullopt;
@@ -152,7 +152,8 @@ std::optional<Wrong> wrongReading(const std::vector<Step>& steps, const Quaterni
            100.0 * (1.0 - best))}};
 }
 
-/// With the mend. Turns do not tell an inverse from a quaternion that is conjugated alone.
+/// The finding with its fix. Rotations alone do not distinguish an inverse from a quaternion that
+/// is conjugated.
 DataFinding mended(Wrong wrong, const std::vector<StampedPose>& poses,
                    const replay::Recording& recording) {
   const Reading& reading = *wrong.likely.front();
@@ -171,7 +172,7 @@ DataFinding mended(Wrong wrong, const std::vector<StampedPose>& poses,
   return wrong.finding;
 }
 
-/// "their x is the body's -y, …" where R takes axes to axes; else by how much it turns.
+/// "their x is the body's -y, …" if R maps axes to axes; otherwise its angle.
 std::string axesText(const Eigen::Matrix3d& R) {
   Eigen::Matrix3d axes = Eigen::Matrix3d::Zero();
   std::string text;
@@ -208,7 +209,7 @@ std::optional<DataFinding> otherAxes(const std::vector<Step>& steps, const Quate
           100.0 * (1.0 - left), axesText(R), sensor.else_see)};
 }
 
-/// The time that must be added to the poses', where it explains their turns.
+/// The time to add to that of the poses, if it explains their rotations.
 std::optional<double> betterTime(const std::vector<StampedPose>& poses, const TurnIntegral& gyro,
                                  const CameraCalibration& camera, const Limits& limits) {
   constexpr double kStep_s = 0.3, kMost_s = 2.0, kEach_s = 0.02, kShown = 0.2, kClearly = 3.0;
@@ -230,8 +231,8 @@ std::optional<double> betterTime(const std::vector<StampedPose>& poses, const Tu
   return offset;
 }
 
-/// What must be added to the poses' times in their first and in their last third, where each third
-/// fits at its own and not at the other's: a clock that is too fast or too slow.
+/// Time offsets of the poses in their first and in their last third. Each third fits only at its
+/// own offset if the clock is too fast or too slow.
 struct GrowingOffset {
   double first_s, last_s, per_second;
 };
@@ -272,7 +273,7 @@ std::optional<GrowingOffset> growingOffset(const std::vector<StampedPose>& poses
   return GrowingOffset{offset[0], offset[1], (offset[1] - offset[0]) / apart};
 }
 
-/// Poses of another drive, or turns that nobody can explain.
+/// Reports poses of another drive, or rotations that no reading explains.
 std::optional<DataFinding> nothingInCommon(const std::vector<Step>& steps, const Quaternion& q_BC,
                                            const Limits& limits) {
   constexpr double kMuch_rad = 0.1, kAlien = 0.9, kStillAlien = 0.7, kAlike = 3.0;
@@ -306,7 +307,7 @@ std::vector<StampedPose> timedPoses(const replay::PoseFile& file,
 DataFindings judgePosesByGyro(const std::vector<StampedPose>& poses,
                               const replay::Recording& recording) {
   if (recording.imu.size() < 2 || recording.calibration.cameras.empty()) return {};
-  // Short steps tell where the body shakes, long ones where poses are rough and turning is slow.
+  // Short steps suit a shaking body; long steps suit rough poses and slow rotation.
   constexpr std::array kSteps_s{0.3, 1.0};
   constexpr Limits kLimits{
       .fewest = 8, .least_rad = 0.02, .shown = 0.1, .contradicted = 0.5, .explained = 0.15};
@@ -354,7 +355,7 @@ DataFindings judgePosesByImages(const std::vector<StampedPose>& poses,
                                 const replay::Recording& recording) {
   const CameraCalibration& camera = recording.calibration.cameras.front();
   constexpr double kEnough_px = 2.0;
-  // The camera's own way adds to what is seen of its turning.
+  // The limits are wide, because the camera's translation disturbs its measured rotation.
   const Limits limits{.fewest = 12,
                       .least_rad = kEnough_px / camera.fx,
                       .shown = 0.6,

@@ -1,5 +1,6 @@
-// Whether poses that are given turn and accelerate as the drive's own sensors say: their direction
-// (T_WB or its inverse), their axes, the order of their quaternions, their unit of length.
+// Checks whether given poses rotate and accelerate as the drive's sensors measure. It judges their
+// direction (T_WB or its inverse), their axes, the order of their quaternions, and their unit of
+// length.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,56 +14,55 @@
 
 namespace perdure::tools {
 
-/// Those that the drive's frames or clock know, with times; a KITTI pose has that of its frame.
+/// The poses with their times; a KITTI pose has the time of its frame.
 std::vector<replay::StampedPose> timedPoses(const replay::PoseFile& file,
                                             const replay::Recording& recording);
 
-/// Against the gyroscope. Codes: poses_without_turning, poses_inverted, poses_conjugated,
+/// Compares with the gyroscope. Codes: poses_without_turning, poses_inverted, poses_conjugated,
 /// poses_w_first, poses_of_camera, poses_other_axes, poses_contradict_gyro, poses_time_offset,
-/// poses_clock_rate. Nothing where too little turns to tell.
+/// poses_clock_rate. Returns nothing if the rotation is too small.
 replay::DataFindings judgePosesByGyro(const std::vector<replay::StampedPose>& poses,
                                       const replay::Recording& recording);
 
-/// The same, against the images' turns (turnsOfImages).
+/// Compares with the image rotations of turnsOfImages in the same way.
 replay::DataFindings judgePosesByImages(const std::vector<replay::StampedPose>& poses,
                                         const std::vector<Turn>& turns,
                                         const replay::Recording& recording);
 
-/// Where turns are those of an inverse: whether the whole pose was inverted, or the quaternion
-/// alone was conjugated, by the accelerations and by which positions are smooth.
+/// Decides whether the whole pose was inverted or only the quaternion conjugated, if the rotations
+/// are those of an inverse. The accelerations and the smoothness of positions decide.
 enum class Inversion { kUnsure, kPose, kQuaternion };
 Inversion howInverted(const std::vector<replay::StampedPose>& poses,
                       const replay::Recording& recording, bool of_camera);
 
-/// Orientations that stay while the gyroscope turns so from second to second. Code:
-/// poses_without_turning.
+/// Constant orientations although the gyroscope measures rotation. Code: poses_without_turning.
 replay::DataFindings judgePoseTurning(const std::vector<replay::StampedPose>& poses,
                                       const std::vector<Eigen::Vector3d>& gyro_turns);
 
-/// Positions that stay while the accelerometer says otherwise; for right orientations. Code:
+/// Constant positions although the accelerometer measures motion; needs correct orientations. Code:
 /// poses_without_positions.
 replay::DataFindings judgePoseMoving(const std::vector<replay::StampedPose>& poses,
                                      const replay::Recording& recording);
 
-/// The times of the frames beside those of poses that are none of theirs. Both are not empty.
+/// Text with the times of the frames and those of poses that match no frame. Both must not be
+/// empty.
 std::string timesBeside(const replay::Recording& recording,
                         const std::vector<replay::StampedPose>& poses);
 
-/// Poses with times, all of them before the first frame or after the last one. Code:
-/// poses_elsewhere.
+/// Poses that are all before the first frame or after the last one. Code: poses_elsewhere.
 replay::DataFindings judgePoseTimes(const replay::PoseFile& file,
                                     const replay::Recording& recording);
 
-/// Neighbours so far apart as no motion explains. Code: poses_jump.
+/// Neighbours farther apart than any motion explains. Code: poses_jump.
 replay::DataFindings judgePoseJumps(const std::vector<replay::StampedPose>& poses);
 
-/// Positions in another world than the orientations. Codes: poses_other_position_axes,
+/// Positions in a different world frame than the orientations. Codes: poses_other_position_axes,
 /// poses_in_degrees.
 replay::DataFindings judgePoseAxes(const std::vector<replay::StampedPose>& poses,
                                    const replay::Recording& recording);
 
-/// The unit of length: by accelerometer and gyroscope where there are any, else by a speed that no
-/// vehicle has. Codes: poses_unit, poses_too_fast. Poses whose turning is right.
+/// The unit of length, judged by accelerometer and gyroscope if they exist, otherwise by a speed
+/// that no vehicle reaches. Needs correct rotations. Codes: poses_unit, poses_too_fast.
 replay::DataFindings judgePoseUnit(const std::vector<replay::StampedPose>& poses,
                                    const replay::Recording& recording);
 

@@ -1,4 +1,5 @@
-// Poses that no drive has: which do not turn or move, jump, or move along other axes than they say.
+// Checks for implausible poses: without rotation or translation, with jumps, or with positions
+// along other axes than the orientations.
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
@@ -29,8 +30,7 @@ double angleBetween(const StampedPose& a, const StampedPose& b) {
   return a.T_WB.q.angularDistance(b.T_WB.q);
 }
 
-/// Root of the mean square of the positions' accelerations over steps of a second; less is
-/// smoother. Nothing where there are few.
+/// RMS acceleration of the positions over steps of 1 s; lower is smoother. Empty for few poses.
 std::optional<double> roughness(const Poses& poses) {
   constexpr double kStep_s = 1.0;
   constexpr std::size_t kFewest = 8;
@@ -52,16 +52,16 @@ std::optional<double> roughness(const Poses& poses) {
   return std::sqrt(sum / static_cast<double>(count));
 }
 
-/// The positions jump, or the orientations, between two neighbours.
+/// A jump of the positions or orientations between two neighbours.
 struct Jump {
-  std::size_t before;  ///< index of the pose
+  std::size_t before;  ///< index of the pose before the jump
   double metres, rad;
 };
 
 std::vector<Jump> jumpsOf(const Poses& poses) {
   constexpr std::size_t kNeighbours = 10;
   constexpr double kTimes = 10.0, kLeast_m = 1.0, kLeast_rad = 0.35;
-  constexpr double kMostAccel = 50.0, kMostTurn = 15.0;  // m/s², rad/s: nothing carried has more
+  constexpr double kMostAccel = 50.0, kMostTurn = 15.0;  // m/s², rad/s: limits of carried sensors
   std::vector<Jump> jumps;
   for (std::size_t i = 0; i + 1 < poses.size(); ++i) {
     const double metres = (poses[i + 1].T_WB.p - poses[i].T_WB.p).norm();
@@ -88,7 +88,7 @@ std::vector<Jump> jumpsOf(const Poses& poses) {
   return jumps;
 }
 
-/// Rows: an axis of W each, of which axis of the positions it is, and its sign.
+/// Row i: the axis of the positions that is axis i of W, with its sign.
 using SignedAxes = Eigen::Matrix3d;
 
 std::vector<SignedAxes> allSignedAxes() {
@@ -106,14 +106,14 @@ std::vector<SignedAxes> allSignedAxes() {
   return all;
 }
 
-/// How much the accelerations have in common once the positions are turned so; 0: nothing.
+/// Correlation of the accelerations after the positions are rotated by `axes`; 0: none.
 double commonOf(std::vector<Push> pushes, const SignedAxes& axes) {
   for (Push& push : pushes) push.by_poses = axes * push.by_poses;
   const auto scale = scaleOf(pushes);
   return scale ? scale->common : 0.0;
 }
 
-/// "-x, y, z", with what cannot be told.
+/// Text such as "-x, y, z", including the ambiguous axes.
 std::string orderText(const std::vector<SignedAxes>& likely) {
   const SignedAxes& simplest =
       *std::max_element(likely.begin(), likely.end(),
@@ -133,7 +133,7 @@ std::string orderText(const std::vector<SignedAxes>& likely) {
                         : text + fmt::format(" (of {} the drive shows too little to tell)", unsure);
 }
 
-/// Latitude and longitude in the place of x and y, as metres: x to the east, y to the north.
+/// Converts latitude and longitude in x and y to metres: x to the east, y to the north.
 Poses metresOfDegrees(Poses poses, bool latitude_first) {
   constexpr double kMetres = 111'200.0;
   const Eigen::Index lat = latitude_first ? 0 : 1, lon = 1 - lat;
@@ -226,7 +226,7 @@ DataFindings judgePoseTurning(const Poses& poses, const std::vector<Eigen::Vecto
   for (const StampedPose& pose : poses) {
     if (angleBetween(poses.front(), pose) > kSame_rad) return {};
   }
-  const TurnPairs turns(gyro_turns, gyro_turns);  // without the mean, which a bias may be
+  const TurnPairs turns(gyro_turns, gyro_turns);  // ignores the mean, which may be a bias
   if (turns.turning() < kTurns_rad) return {};
   const double most = turns.reference.colwise().norm().maxCoeff();
   return {{Grade::kFatal, "poses_without_turning",
@@ -237,7 +237,7 @@ DataFindings judgePoseTurning(const Poses& poses, const std::vector<Eigen::Vecto
 }
 
 DataFindings judgePoseMoving(const Poses& poses, const replay::Recording& recording) {
-  // What orientations are off by tilts gravity: 2 degrees about each axis push by 0.4.
+  // An orientation error tilts gravity: 2 degrees about each axis add 0.4 m/s².
   constexpr double kSame_m = 1e-6, kPushes = 0.2, kSurely = 1.0;
   if (poses.empty()) return {};
   for (const StampedPose& pose : poses) {

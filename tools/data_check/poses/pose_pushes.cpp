@@ -11,7 +11,8 @@ using replay::StampedPose;
 
 constexpr std::size_t kFewestPushes = 12;
 
-/// Mean of the specific force around `middle`, in B at that time; weights fall to 0 at both ends.
+/// Weighted mean of the specific force around `middle`, in B at that time. The weights decrease to
+/// 0 at both ends.
 std::optional<Eigen::Vector3d> meanForce(const std::vector<ImuSample>& samples,
                                          const TurnIntegral& gyro, TimePoint from, TimePoint middle,
                                          TimePoint to) {
@@ -35,7 +36,7 @@ std::optional<Eigen::Vector3d> meanForce(const std::vector<ImuSample>& samples,
   return sum / weights;
 }
 
-/// Leaves of accelerations, three rows for each push, what neither gravity nor a bias explains.
+/// Removes from accelerations (three rows for each push) the parts that gravity or a bias explains.
 void takeFree(const std::vector<Push>& pushes, Eigen::MatrixXd& columns) {
   Eigen::MatrixXd free(columns.rows(), 6);
   for (std::size_t i = 0; i < pushes.size(); ++i) {

@@ -1,4 +1,4 @@
-// What poses and accelerometer say of the same accelerations.
+// Compares the accelerations of poses with those of the accelerometer.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,45 +11,44 @@
 
 namespace perdure::tools {
 
-/// About one pose, in W: acceleration by the poses, the mean specific force over the same time,
-/// weighted as a second difference weighs it, and R_WB.
+/// Data around one pose, in W: acceleration by the poses, mean specific force with the weights of a
+/// second difference, and R_WB.
 struct Push {
   Eigen::Vector3d by_poses, by_imu;
   Eigen::Matrix3d R_WB;
 };
 
-/// Whether gravity is what it measures most of the time.
+/// Whether the samples measure gravity most of the time.
 bool measuresGravity(const std::vector<ImuSample>& samples);
 
-/// Of poses so far apart; all samples of the recording must be those of `gyro`.
+/// Pushes of poses `seconds` apart; `gyro` must contain all samples of the recording.
 std::vector<Push> pushesOf(const std::vector<replay::StampedPose>& poses,
                            const replay::Recording& recording, const TurnIntegral& gyro,
                            double seconds);
 
-/// What one metre of the poses is by the accelerometer, at least and at most: noise of the poses
-/// lessens the one, noise of the accelerometer raises the other, and both have twice the deviation
-/// of a ratio of so many steps.
+/// Length in m of one unit of the poses, by the accelerometer, with its lower and upper bound.
+/// Noise of the poses lowers one bound, noise of the accelerometer raises the other. Both include
+/// two standard deviations of the ratio for the number of steps.
 struct Scale {
   double least, metres, most;
-  double common;  ///< share of the accelerations that both have
+  double common;  ///< shared fraction of the accelerations
   std::size_t steps;
 
   bool fits(double unit) const {
-    constexpr double kSystematic = 1.05;  // scale of the accelerometer, clocks, smoothed poses
+    constexpr double kSystematic = 1.05;  // errors of scale, clocks and smoothing
     return least < kSystematic * unit && most > unit / kSystematic;
   }
 };
 
-/// Gravity and the bias are free. Nothing where there are few or they have nothing in common.
+/// Estimates gravity and the bias too. Returns nothing if pushes are few or uncorrelated.
 std::optional<Scale> scaleOf(const std::vector<Push>& pushes);
 
-/// The scale over those steps (of 0.3 to 2 s) that have most in common; nothing where gravity is
-/// not what the accelerometer measures most of the time.
+/// The scale for the step length (0.3 to 2 s) with the highest correlation. Empty unless the
+/// accelerometer measures gravity most of the time.
 std::optional<Scale> bestScale(const std::vector<replay::StampedPose>& poses,
                                const replay::Recording& recording);
 
-/// Root of the mean square of what the accelerometer says beside gravity and bias, m/s², over
-/// steps of a second; 0 where there are few.
+/// RMS of the specific force without gravity and bias, m/s², over steps of 1 s; 0 for few poses.
 double pushingOfImu(const std::vector<replay::StampedPose>& poses,
                     const replay::Recording& recording);
 

@@ -1,4 +1,4 @@
-// The unit of length of given poses.
+// Unit of length of given poses.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@ using Grade = DataFinding::Grade;
 struct LengthUnit {
   double metres;
   const char* name;
-  double widest;  ///< most/least up to which it is named: a scale of no unit may be near it
+  double widest;  ///< largest most/least for a match: a scale of no unit may be near it
 };
 constexpr double kAny = 1e9;
 constexpr std::array kLengthUnits{

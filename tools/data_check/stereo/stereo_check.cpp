@@ -23,8 +23,8 @@ using replay::DataFindings;
 using replay::Recording;
 
 constexpr std::size_t kFewestMatches = 60;
-constexpr double kMostMatch = 0.5;  // share of the corners of cam0 that a rig that fits finds
-constexpr double kFewMatch = 0.25;  // and that two images of other things have at most
+constexpr double kMostMatch = 0.5;  // least share of cam0's corners that a correct rig matches
+constexpr double kFewMatch = 0.25;  // largest share that two unrelated images match
 constexpr double kDegreesOfTurn = 180.0 / M_PI;
 
 double medianOf(std::vector<double> values) {
@@ -34,7 +34,7 @@ double medianOf(std::vector<double> values) {
   return *middle;
 }
 
-/// Unit normal of the epipolar plane of a ray of C0, in C1; nothing near the baseline.
+/// Unit normal of the epipolar plane of a ray of C0, in C1; empty near the baseline.
 std::optional<Vector3d> planeOf(const StereoMatch& match, const RigidTransform& T_C1C0) {
   constexpr double kAlongBaseline = 0.1;
   const Vector3d normal = T_C1C0.p.normalized().cross(T_C1C0.q * match.first);
@@ -42,11 +42,11 @@ std::optional<Vector3d> planeOf(const StereoMatch& match, const RigidTransform& 
   return normal.normalized();
 }
 
-/// How matches meet a geometry.
+/// Statistics of matches against a geometry.
 struct Fit {
-  std::size_t count = 0;               ///< of matches that can tell
-  double off_px = 0.0;                 ///< from the epipolar line, median
-  std::size_t before = 0, behind = 0;  ///< the cameras, of those with parallax
+  std::size_t count = 0;               ///< number of matches away from the baseline
+  double off_px = 0.0;                 ///< median distance from the epipolar line
+  std::size_t before = 0, behind = 0;  ///< numbers of matches with parallax
   bool isBehind() const { return behind > kFewestMatches && behind > 2 * before; }
   bool isBefore() const { return before > 2 * behind; }
 };
@@ -58,7 +58,7 @@ Fit fitOf(const std::vector<StereoMatch>& matches, const RigidTransform& T_C1C0,
     const auto normal = planeOf(match, T_C1C0);
     if (!normal) continue;
     off_px.push_back(fx * std::asin(std::min(1.0, std::abs(normal->dot(match.second)))));
-    // Of what is before the cameras: towards t, as ray + t / depth has it.
+    // A point in front of the cameras shifts towards t, according to ray + t / depth.
     const double parallax = -normal->dot((T_C1C0.q * match.first).cross(match.second));
     if (std::abs(parallax) * fx < 2.0) continue;
     ++(parallax > 0.0 ? fit.before : fit.behind);
@@ -73,10 +73,10 @@ struct Turned {
   Vector3d sigma = Vector3d::Zero();
 };
 
-/// The small turn of cam1 with which matches lie on their epipolar lines best (Gauss-Newton with
-/// Cauchy's weights; the baseline is believed).
+/// The small rotation of cam1 that minimises the distances from the epipolar lines. Gauss-Newton
+/// with Cauchy weights; the baseline stays constant.
 Turned turnOf(const std::vector<StereoMatch>& matches, const RigidTransform& T_C1C0) {
-  constexpr double kFinest = 2e-4;  // rad; corners are found no better
+  constexpr double kFinest = 2e-4;  // rad; accuracy of corners
   Turned turned;
   for (int round = 0; round < 20; ++round) {
     RigidTransform T = T_C1C0;
@@ -87,7 +87,7 @@ Turned turnOf(const std::vector<StereoMatch>& matches, const RigidTransform& T_C
     for (const StereoMatch& match : matches) {
       const auto normal = planeOf(match, T);
       if (!normal) continue;
-      // T turned by a small d has n + d × n: its dot with b changes by d · (n × b).
+      // A rotation of T by a small d changes n to n + d × n, and its product with b by d · (n × b).
       rows.emplace_back(normal->dot(match.second), normal->cross(match.second));
       sizes.push_back(std::abs(rows.back().first));
     }
@@ -132,7 +132,7 @@ class StereoJudge {
     const auto &name0 = first_.calibration().name, &name1 = second_.calibration().name;
     const StereoMatches by_rig = matchesOf(pairs_, first_, second_, T_C1C0_.R());
     StereoMatches best = by_rig;
-    if (by_rig.share() < kMostMatch) {  // as if both looked the same way
+    if (by_rig.share() < kMostMatch) {  // assumes equal viewing directions
       const auto alike = matchesOf(pairs_, first_, second_, Matrix3d::Identity());
       if (alike.matches.size() > 1.5 * static_cast<double>(best.matches.size())) best = alike;
     }
@@ -149,7 +149,7 @@ class StereoJudge {
   }
 
  private:
-  /// Where the pictures do not look alike.
+  /// Judges pairs whose pictures do not match.
   DataFindings judgeUnlike(const StereoMatches& by_rig, const StereoMatches& best) const {
     if (by_rig.tried < kFewestMatches) return {};
     if (auto late = judgeStamps(); !late.empty()) return late;
@@ -198,7 +198,7 @@ class StereoJudge {
     const RigidTransform turn(expQuaternion(turned.by), Vector3d::Zero());
     const Fit mended = fitOf(matches, turn * T_C1C0_, fx);
     const bool wrong = given.off_px > kFarOff_px || given.isBehind();
-    // A turn about the vertical axis from one image to the next looks like parallax of both signs.
+    // Rotation about the vertical axis between the images looks like parallax of both signs.
     const bool mixed = given.behind > kFewestMatches && 3 * given.behind > given.before;
     if (!wrong && !mixed && !isTurned(turned, given, mended)) return {};
     if (auto late = judgeStamps(); !late.empty()) return late;
@@ -219,7 +219,8 @@ class StereoJudge {
                                of, name0));
   }
 
-  /// Whether a turn of cam1 explains surely what does not fit, and all is before the cameras then.
+  /// Whether a rotation of cam1 explains the misfit with certainty and places the points in front
+  /// of the cameras.
   static bool isTurned(const Turned& turned, const Fit& given, const Fit& mended) {
     constexpr double kLeast_rad = 1.0 / kDegreesOfTurn, kSurely = 6.0, kFits_px = 2.0;
     const double angle = turned.by.norm();
@@ -252,7 +253,7 @@ class StereoJudge {
 DataFindings checkStereo(const Recording& recording) {
   const auto& cameras = recording.calibration.cameras;
   if (cameras.size() < 2) return {};
-  if (hasPlaceInMm(cameras[0]) || hasPlaceInMm(cameras[1])) return {};  // is told by itself
+  if (hasPlaceInMm(cameras[0]) || hasPlaceInMm(cameras[1])) return {};  // has its own finding
   const auto pairs = someStereoImages(recording);
   if (pairs.empty()) return {};
   if (areSameImages(pairs)) {

@@ -12,7 +12,7 @@ namespace {
 
 using replay::Recording;
 
-constexpr double kWidth_px = 640.0;  // larger images are looked at in this size
+constexpr double kWidth_px = 640.0;  // larger images are scaled down to this width
 
 CameraModel scaled(const CameraModel& camera, double scale) {
   CameraCalibration c = camera.calibration();
@@ -34,7 +34,8 @@ cv::Mat resized(const cv::Mat& image, const CameraModel& to) {
   return small;
 }
 
-/// Where each pixel of the first camera is in the second image, were all far; −1e4 where nowhere.
+/// Pixel in the second image for each pixel of the first, for points at infinity; −1e4 if
+/// invisible.
 cv::Mat whereFar(const CameraModel& first, const CameraModel& second, const Eigen::Matrix3d& R) {
   const cv::Size size = sizeOf(first);
   cv::Mat where(size, CV_32FC2, cv::Scalar(-1e4, -1e4));
@@ -51,7 +52,7 @@ cv::Mat whereFar(const CameraModel& first, const CameraModel& second, const Eige
   return where;
 }
 
-/// Where corners may be looked for: not at the border of what both see.
+/// Mask for corner detection: the area that both cameras see, without its border.
 cv::Mat seenByBoth(const cv::Mat& where) {
   constexpr int kBorder_px = 12;
   cv::Mat across, seen, inner;
@@ -63,7 +64,7 @@ cv::Mat seenByBoth(const cv::Mat& where) {
   return inner;
 }
 
-/// By the grey values about each pixel: exposure and gamma are no matter.
+/// Normalises by the local mean and contrast, so that exposure and gamma have no effect.
 cv::Mat evened(const cv::Mat& image) {
   constexpr double kNoise = 2.0, kContrast = 40.0;
   const cv::Size about(31, 31);
@@ -84,7 +85,7 @@ void flipImage(cv::Mat& image, Flip flip) {
   image = flipped;
 }
 
-/// Corners of the first image that are found in the second one, and from there where they were.
+/// Adds the corners of the first image that are tracked to the second and back to their origin.
 void addMatches(const CameraModel& camera, const Eigen::Matrix3d& R, const cv::Mat& first,
                 const cv::Mat& second, const cv::Mat& seen, StereoMatches& all) {
   std::vector<cv::Point2f> from, to, back;
@@ -131,7 +132,7 @@ std::vector<StereoImages> someStereoImages(const Recording& recording, std::size
 }
 
 bool areSameImages(const std::vector<StereoImages>& pairs) {
-  constexpr double kLeastContrast = 5.0, kNoise = 0.5;  // grey values; a copy may be a JPEG again
+  constexpr double kLeastContrast = 5.0, kNoise = 0.5;  // grey values; allows for a JPEG copy
   std::size_t same = 0;
   for (const auto& [first, second] : pairs) {
     if (first.size() != second.size()) return false;

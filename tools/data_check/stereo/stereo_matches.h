@@ -1,6 +1,6 @@
-// What two cameras see of the same points. The second image is looked at as the first camera would
-// see it from there, turned by what the calibration says: so cameras of any size, lens and
-// direction can be compared, and what remains is parallax.
+// Matches points between two cameras. The second image is warped to the view of the first camera by
+// the calibrated rotation. Cameras of any size, lens and direction can be compared so, and only
+// parallax remains.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,12 +16,12 @@ struct StereoImages {
   cv::Mat first, second;
 };
 
-/// Up to `most` pairs of cam0 and cam1, over the drive, of those whose images have the
-/// calibration's size.
+/// Up to `most` pairs of cam0 and cam1, spread over the drive, whose images have the calibrated
+/// size.
 std::vector<StereoImages> someStereoImages(const replay::Recording& recording,
                                            std::size_t most = 8);
 
-/// Whether nearly all pairs show the same picture twice.
+/// Whether nearly all pairs contain the same picture twice.
 bool areSameImages(const std::vector<StereoImages>& pairs);
 
 struct StereoMatch {
@@ -30,16 +30,16 @@ struct StereoMatch {
 
 struct StereoMatches {
   std::vector<StereoMatch> matches;
-  std::size_t tried = 0;  ///< corners of cam0 that cam1 would see, were they far
+  std::size_t tried = 0;  ///< corners of cam0 that are visible in cam1 if they are far
   double share() const {
     return tried == 0 ? 0.0 : static_cast<double>(matches.size()) / static_cast<double>(tried);
   }
 };
 
-/// How the second image is mirrored before it is looked at.
+/// Mirroring of the second image before the comparison.
 enum class Flip { kNone, kSideways, kUpright, kBoth };
 
-/// R: the direction of C0's rays in C1.
+/// R rotates a ray of C0 into C1.
 StereoMatches matchesOf(const std::vector<StereoImages>& pairs, const CameraModel& first,
                         const CameraModel& second, const Eigen::Matrix3d& R_C1C0,
                         Flip flip = Flip::kNone);

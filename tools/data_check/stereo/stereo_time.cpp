@@ -13,11 +13,11 @@ using Eigen::Vector3d;
 using replay::Recording;
 
 constexpr double kLooked_s = 4.0, kLongest_s = 2.5;
-constexpr double kTurning_px = 2.0;  // between two images, to tell
-constexpr double kFits = 0.3;        // of the turning is unexplained at most
-constexpr double kClearly = 3.0;     // times as well
+constexpr double kTurning_px = 2.0;  // least rotation between two images for a judgement
+constexpr double kFits = 0.3;        // largest unexplained share of the rotation
+constexpr double kClearly = 3.0;     // least factor of improvement
 
-/// A camera's images between two times as a recording of one camera.
+/// The images of one camera between two times, as a recording of one camera.
 Recording partOf(const Recording& recording, std::size_t camera, TimePoint from, TimePoint to) {
   Recording part;
   part.calibration.cameras = {recording.calibration.cameras[camera]};
@@ -29,7 +29,7 @@ Recording partOf(const Recording& recording, std::size_t camera, TimePoint from,
   return part;
 }
 
-/// Of all its images, turned into B.
+/// The rotations of all image pairs, transformed to B.
 std::vector<Turn> turnsIn(const Recording& part) {
   if (part.frames.size() < 2) return {};
   std::vector<ImuSample> span(2);
@@ -40,7 +40,7 @@ std::vector<Turn> turnsIn(const Recording& part) {
   return turns;
 }
 
-/// Turning between two times by turns that follow each other; nothing where they leave a hole.
+/// Rotation between two times from consecutive rotations; empty if they have a gap.
 std::optional<Vector3d> turnedBetween(const std::vector<Turn>& turns, TimePoint from,
                                       TimePoint to) {
   Vector3d sum = Vector3d::Zero();
@@ -55,7 +55,8 @@ std::optional<Vector3d> turnedBetween(const std::vector<Turn>& turns, TimePoint 
   return sum;
 }
 
-/// Share of the second one's turning that the first one's so much later leaves unexplained.
+/// Share of the second camera's rotation that the first one's, shifted by `later`, does not
+/// explain.
 double leftOver(const std::vector<Turn>& first, const std::vector<Turn>& second, double later) {
   std::vector<std::pair<Vector3d, Vector3d>> both;
   Vector3d mean = Vector3d::Zero(), mean_of_first = Vector3d::Zero();
@@ -84,7 +85,8 @@ double changeOf(const std::vector<Turn>& turns) {
   return std::sqrt(sum / std::max<double>(1.0, static_cast<double>(turns.size())));
 }
 
-/// Begin of the seconds in which the IMU's turning changes most; of the middle without samples.
+/// Start of the seconds with the largest change of the IMU's rotation, or of the middle without
+/// samples.
 TimePoint liveliest(const Recording& recording, TimePoint first, TimePoint last) {
   const Duration length = durationFromSeconds(kLooked_s);
   TimePoint best = first + std::max(Duration(0), (last - first - length) / 2);

@@ -1,5 +1,5 @@
-// Whether the stamps of two cameras are of one clock: both turn at the same time, and what their
-// own way adds to the turning of their images is nearly the same in both.
+// Checks whether the stamps of two cameras have the same clock. Both rotate at the same time, and
+// translation affects both image rotations nearly equally.
 #pragma once
 
 #include <optional>
@@ -8,9 +8,8 @@
 
 namespace perdure::tools {
 
-/// How much later than its stamp says cam1 saw what cam0 saw, s (negative: sooner), where its
-/// images turn as those of cam0 at that time and clearly not at their own. Looks 2.5 s to both
-/// sides.
+/// Delay in s of cam1's exposure after its stamp, by the clock of cam0 (negative: earlier).
+/// Returned only if the rotations agree at that delay and clearly not at 0. Searches ±2.5 s.
 std::optional<double> lateStampsOfSecond(const replay::Recording& recording);
 
 }  // namespace perdure::tools

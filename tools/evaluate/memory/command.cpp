@@ -1,5 +1,5 @@
-// `perdure evaluate memory`: whether objects that are seen again keep their ids, in a run that
-// drifts, and in a run that begins with the map of another one.
+// `perdure evaluate memory`: checks whether objects that are seen again keep their ids. It judges a
+// run with drift, and a run that starts with the map of another one.
 #include "tools/evaluate/command.h"
 
 #include <CLI/CLI.hpp>
@@ -35,7 +35,7 @@ struct MemoryResult {
   TrajectoryErrors trajectory;
   std::optional<TrajectoryErrors> map_trajectory;
   std::optional<ReturnScore> returned;
-  std::optional<LoopScore> loops;  ///< where the run kept a graph
+  std::optional<LoopScore> loops;  ///< set if the run stored a graph
 };
 
 std::vector<MemoryFrame> framesOf(const fs::path& run, const SimulatedTruth& truth,
@@ -70,7 +70,7 @@ TrajectoryErrors trajectoryErrors(const fs::path& file, const SimulatedTruth& tr
   return {scoreTrajectory(pairs, Alignment::kStart), scoreTrajectory(pairs, Alignment::kYaw)};
 }
 
-/// The map's graph; nothing where the run kept none.
+/// The map's graph; empty if the run stored none.
 std::optional<mapping::SavedMap> graphOf(const fs::path& run) {
   const fs::path file = run / "map.sqlite";
   if (!fs::exists(file)) return std::nullopt;

@@ -44,7 +44,7 @@ std::optional<JudgedLoop> judge(const mapping::SavedEdge& saved, const SavedMap&
   return loop;
 }
 
-/// Each anchor's part, by one of its anchors.
+/// Connected parts of the graph, each represented by one of its anchors (union-find).
 class Parts {
  public:
   void join(AnchorId a, AnchorId b) { parent_[of(b)] = of(a); }
@@ -57,7 +57,7 @@ class Parts {
   std::map<AnchorId, AnchorId> parent_;
 };
 
-/// RMSE over all parts, each aligned by itself.
+/// RMSE over all parts, each aligned separately.
 double alignedError(const std::map<AnchorId, std::vector<PosePair>>& parts) {
   double squares = 0.0;
   std::size_t count = 0;
@@ -71,7 +71,7 @@ double alignedError(const std::map<AnchorId, std::vector<PosePair>>& parts) {
   return count == 0 ? 0.0 : std::sqrt(squares / static_cast<double>(count));
 }
 
-/// The object of each frame that an earlier visit saw.
+/// For each frame, the visible objects that an earlier visit saw.
 std::map<std::size_t, std::set<std::uint64_t>> seenAgain(const std::vector<MemoryFrame>& frames,
                                                          const MemoryOptions& options) {
   std::map<std::size_t, std::set<std::uint64_t>> again;
@@ -83,7 +83,7 @@ std::map<std::size_t, std::set<std::uint64_t>> seenAgain(const std::vector<Memor
   return again;
 }
 
-/// Driven when the body was where an anchor is.
+/// Distance travelled when the body passed an anchor.
 double wayAt(const std::vector<MemoryFrame>& frames, TimePoint time) {
   const auto after =
       std::lower_bound(frames.begin(), frames.end(), time,

@@ -1,5 +1,6 @@
-// Whether the loops of a map are true: each against the exact relation of its two anchors, what
-// they did to the way, and how far the body drove among known objects before one was closed.
+// Checks whether the loops of a map are correct. Measures the error of each loop against the exact
+// relation of its anchors, and the effect of the loops on the trajectory. Also measures the
+// distance travelled among known objects before the first loop closed.
 #pragma once
 
 #include <cstdint>
@@ -14,14 +15,15 @@
 namespace perdure::tools {
 
 struct LoopOptions {
-  /// A loop is wrong where it is off by more than the larger of these in the plane, or in yaw.
+  /// A loop is wrong if its error in the plane exceeds both wrong_m and wrong_sigmas · σ, or if its
+  /// yaw error exceeds wrong_rad.
   double wrong_m = 2.0, wrong_sigmas = 4.0;
   double wrong_rad = 0.17453;
-  /// Of a return: ways without an object of an earlier visit that are shorter do not end it, and at
-  /// least so many objects of earlier visits are seen.
+  /// Limits of a return visit: the least gap without objects of an earlier visit that ends it, and
+  /// the least number of such objects.
   double gap_m = 30.0;
   std::uint64_t objects = 4;
-  /// An anchor lies up to this far behind the body that closes the loop.
+  /// Largest distance of an anchor behind the body that closes the loop.
   double anchor_m = 14.0;
 };
 
@@ -30,42 +32,42 @@ struct JudgedLoop {
   mapping::EdgeId id = 0;
   mapping::EdgeKind kind = mapping::EdgeKind::kLoop;
   TimePoint from, to;    ///< stamps of its anchors, the earlier one first
-  double off_m = 0.0;    ///< in the plane
-  double off_rad = 0.0;  ///< in yaw, ≥ 0
-  double sigma_m = 0.0;  ///< that the edge states, along its error
-  double weight = 1.0;   ///< by which it counts in the graph
+  double off_m = 0.0;    ///< error in the plane
+  double off_rad = 0.0;  ///< error in yaw, ≥ 0
+  double sigma_m = 0.0;  ///< standard deviation that the edge states, along its error
+  double weight = 1.0;   ///< weight in the graph
   bool believed = false, wrong = false;
 };
 
 struct LoopJudgement {
-  std::vector<JudgedLoop> loops;  ///< by id
+  std::vector<JudgedLoop> loops;  ///< sorted by id
   std::uint64_t unjudged = 0;     ///< edges of these kinds whose anchors have no true pose or are
                                   ///< not in the map
 
   std::uint64_t believed() const, wrong() const, wrongBelieved() const;
 };
-/// `truth`: T_WB by time, z up. Anchors are the body's level frames.
+/// `truth`: T_WB by time, z up. Anchors are the body's gravity-levelled frames.
 LoopJudgement judgeLoops(const mapping::SavedMap& map, const replay::PoseFile& truth,
                          const LoopOptions& options);
 
-/// ATE of the anchors' places, RMSE, m: each part that hangs together is aligned with the truth by
-/// position and yaw. Parts with one anchor are left out.
+/// ATE of the anchor positions, RMSE in m. Each connected part is aligned with ground truth by
+/// position and yaw. Parts with one anchor are omitted.
 struct AnchorErrors {
-  std::uint64_t anchors = 0;  ///< that have a true pose
-  double odometry_m = 0.0;    ///< by chained increments of the odometry, a part for each session
-  double map_m = 0.0;         ///< by T_MA, a part for all that believed edges join
+  std::uint64_t anchors = 0;  ///< anchors with a true pose
+  double odometry_m = 0.0;    ///< ATE of chained odometry increments, a part for each session
+  double map_m = 0.0;         ///< ATE of T_MA, a part for all anchors that accepted edges connect
 };
 AnchorErrors scoreAnchors(const mapping::SavedMap& map, const replay::PoseFile& truth);
 
-/// A stretch of way among objects that an earlier visit saw.
+/// A section of the trajectory among objects that an earlier visit saw.
 struct ReturnVisit {
-  std::size_t first = 0, last = 0;  ///< frames
-  std::uint64_t objects = 0;        ///< of earlier visits that are seen
-  /// Driven in it up to the anchor of its first loop that is kept, believed and not wrong.
+  std::size_t first = 0, last = 0;  ///< frame indices
+  std::uint64_t objects = 0;        ///< visible objects of earlier visits
+  /// Distance travelled in the visit to the anchor of its first accepted correct loop in the map.
   std::optional<double> closed_after_m;
 };
-/// `frames` as besideTheBody gives them. Where a later loop took a loop's place, it counts from the
-/// later one: the map holds no other.
+/// `frames`: the result of besideTheBody. If a later loop replaced another, the distance counts to
+/// the later one, because the map does not store the other.
 std::vector<ReturnVisit> returnVisits(const std::vector<MemoryFrame>& frames,
                                       const std::vector<JudgedLoop>& loops,
                                       const MemoryOptions& memory, const LoopOptions& options);
@@ -75,8 +77,8 @@ struct LoopScore {
   AnchorErrors anchors;
   std::vector<ReturnVisit> returns;
 
-  std::uint64_t missed() const;  ///< returns without a loop
-  /// Median of those that have one.
+  std::uint64_t missed() const;  ///< return visits without a loop
+  /// Median distance of the return visits with a loop.
   std::optional<double> wayToClose() const;
 };
 LoopScore scoreLoops(const mapping::SavedMap& map, const replay::PoseFile& truth,

@@ -86,7 +86,7 @@ std::vector<Sighting> matched(const std::vector<SeenObject>& visible,
   return sightings;
 }
 
-/// Where a point of the truth's W is in the run's, by the pose of a frame.
+/// Converts a point from the ground truth's W to the run's W by the poses of a frame.
 Eigen::Vector3d inFrameOf(const MemoryFrame& frame, const Eigen::Vector3d& point_W) {
   return frame.T_WB * (frame.true_T_WB.inverse() * point_W);
 }
@@ -113,7 +113,7 @@ void scoreSightings(const std::vector<MemoryFrame>& frames, MemoryScore& score) 
 
 void scoreIds(const std::vector<Visit>& visits, MemoryScore& score) {
   std::set<std::uint64_t> ids;
-  std::vector<std::uint64_t> reported;  // on each visit
+  std::vector<std::uint64_t> reported;  // main id of each visit
   for (const auto& visit : visits) {
     for (const auto& [id, times] : visit.ids) ids.insert(id);
     if (const auto id = visit.id()) reported.push_back(*id);
@@ -126,7 +126,7 @@ void scoreIds(const std::vector<Visit>& visits, MemoryScore& score) {
   score.kept += reported.front() == reported.back() ? 1 : 0;
 }
 
-/// The id of each object on the last visit on which it was reported.
+/// The id of each object on the last visit with a report.
 std::map<std::uint64_t, std::uint64_t> lastIds(
     const std::map<std::uint64_t, std::vector<Visit>>& visits) {
   std::map<std::uint64_t, std::uint64_t> ids;
@@ -138,7 +138,7 @@ std::map<std::uint64_t, std::uint64_t> lastIds(
   return ids;
 }
 
-/// The object to which an id was matched in most frames.
+/// The object that matched each id in most frames.
 std::map<std::uint64_t, std::uint64_t> ownersOf(const std::vector<MemoryFrame>& frames) {
   std::map<std::uint64_t, Counts> times;
   for (const auto& frame : frames) {
@@ -266,7 +266,7 @@ ReturnScore scoreReturn(const std::vector<MemoryFrame>& before, const std::vecto
     score.first = {toSeconds(now[first].time - now.front().time), now[first].way_m,
                    objectsIn(now, first + 1).size()};
   }
-  std::map<std::uint64_t, Counts> ids;  // by object, once the first known one is there
+  std::map<std::uint64_t, Counts> ids;  // key: object; counts after the first known id
   for (std::size_t i = first; i < now.size(); ++i) {
     for (const auto& sighting : now[i].sightings) {
       auto& counts = ids[sighting.object];

@@ -1,6 +1,6 @@
-// Whether an object that is seen again after a while still has its id: a run's reports matched to
-// the truth beside the body, so that what the frame has drifted does not count, and the visits to
-// each true object.
+// Checks whether an object that is seen again keeps its id. The reports of a run are matched to
+// ground truth relative to the body, so that drift has no effect. The visits to each true object
+// are then compared.
 #pragma once
 
 #include <cstdint>
@@ -15,28 +15,28 @@
 namespace perdure::tools {
 
 struct MemoryOptions {
-  double reach_m = 25.0;    ///< how far from the body an object may be
-  double near_m = 1.5;      ///< of a report from the object that it matches
-  double least_seen = 0.5;  ///< share of an object that is in sight where it is visible
-  double apart_s = 60.0;    ///< between two visits
+  double reach_m = 25.0;    ///< largest distance of an object from the body
+  double near_m = 1.5;      ///< largest distance of a report from its object
+  double least_seen = 0.5;  ///< least visible share of a visible object
+  double apart_s = 60.0;    ///< least time between two visits
 };
 
-/// A true object that is visible, and the id of the report that matches it.
+/// A visible true object, and the id of the report that matches it.
 struct Sighting {
   std::uint64_t object = 0;
   std::optional<std::uint64_t> id;
 };
 struct MemoryFrame {
   TimePoint time;
-  double way_m = 0.0;  ///< true, since the run's first frame
+  double way_m = 0.0;  ///< true distance travelled since the first frame
   RigidTransform T_WB, true_T_WB;
   std::vector<Sighting> sightings;
   std::set<std::uint64_t> reported;  ///< ids, matched or not
 };
 
-/// Frames of the run that have a pose, in order. Objects that never move, but for toys, within
-/// reach, visible enough. A report matches an object of its class; pairs greedily by distance in
-/// the body's frame, one to one.
+/// Frames of the run with a pose, in order. Objects count if they never move, are not toys, are
+/// within reach and sufficiently visible. A report matches an object of its class; pairs are
+/// matched one-to-one, greedily by distance in the body frame.
 std::vector<MemoryFrame> besideTheBody(const SimulatedTruth& truth,
                                        const std::vector<EstimateRow>& rows,
                                        const std::vector<replay::StampedPose>& trajectory,
@@ -44,51 +44,52 @@ std::vector<MemoryFrame> besideTheBody(const SimulatedTruth& truth,
 
 /// Frames in which an object is visible, with gaps shorter than `apart_s`.
 struct Visit {
-  std::vector<std::size_t> frames;           ///< indices into the run's
-  std::map<std::uint64_t, std::size_t> ids;  ///< in how many of them each was matched to it
+  std::vector<std::size_t> frames;           ///< indices of frames of the run
+  std::map<std::uint64_t, std::size_t> ids;  ///< number of frames in which each id matched
 
-  /// In most frames; of equal ones the least. Nothing where no report matched.
+  /// The id of most frames; the smallest one on a tie. Empty if no report matched.
   std::optional<std::uint64_t> id() const;
 };
-/// By true object.
+/// Visits by true object.
 std::map<std::uint64_t, std::vector<Visit>> visitsOf(const std::vector<MemoryFrame>& frames,
                                                      const MemoryOptions& options);
 
 struct MemoryScore {
   std::uint64_t frames = 0, sightings = 0, matched = 0;
-  std::uint64_t late_sightings = 0, late_matched = 0;  ///< in the second half of the frames
+  std::uint64_t late_sightings = 0, late_matched = 0;  ///< counts in the second half of frames
   std::uint64_t objects = 0, seen_twice = 0;
-  /// Reported on two visits, the first and the last ones are taken; of these with the same id.
+  /// Objects reported on at least two visits; of these, those with the same id on the first and the
+  /// last visit.
   std::uint64_t reported_twice = 0, kept = 0;
   std::uint64_t objects_matched = 0, ids = 0, with_more_ids = 0;  ///< ids: summed over objects
-  /// By how much the true place of what is seen twice moved in W from its first visit to its last:
-  /// the median.
+  /// Median displacement in W of the true positions of objects seen twice, from the first visit to
+  /// the last.
   double drift_m = 0.0;
 
-  double keptShare() const;  ///< 1 where nothing was reported twice
-  double recall() const;     ///< 1 where nothing was visible
+  double keptShare() const;  ///< 1 if nothing was reported twice
+  double recall() const;     ///< 1 if nothing was visible
   double lateRecall() const;
   double idsPerObject() const;  ///< 1 is perfect
 };
 MemoryScore scoreMemory(const SimulatedTruth& truth, const std::vector<MemoryFrame>& frames,
                         const MemoryOptions& options);
 
-/// A run that began with the map of another one.
+/// Score of a run that started with the map of another run.
 struct ReturnScore {
-  std::uint64_t ids = 0;    ///< that the run before had reported
-  std::uint64_t known = 0;  ///< objects it had reported, and that this run sees
-  /// Of these: seen, and reported, once the first known id was there.
+  std::uint64_t ids = 0;    ///< ids that the earlier run reported
+  std::uint64_t known = 0;  ///< objects that the earlier run reported and this run sees
+  /// Counts of these objects, visible and reported, after the first report of a known id.
   std::uint64_t seen = 0, reported = 0;
-  std::uint64_t kept = 0;   ///< with the id that they had on the last visit before
-  std::uint64_t wrong = 0;  ///< with an id that was another object's
-  /// When the first known id was there.
+  std::uint64_t kept = 0;   ///< objects with the id of the last earlier visit
+  std::uint64_t wrong = 0;  ///< objects with an id of another object
+  /// Time and place of the first report of a known id.
   struct First {
     double seconds = 0.0, way_m = 0.0;
-    std::uint64_t objects = 0;  ///< that had been in view, that frame included
+    std::uint64_t objects = 0;  ///< objects visible up to that frame, inclusive
   };
   std::optional<First> first;
 
-  double keptShare() const;  ///< of the known ones; 1 where there are none
+  double keptShare() const;  ///< share of the known objects; 1 if there are none
 };
 ReturnScore scoreReturn(const std::vector<MemoryFrame>& before, const std::vector<MemoryFrame>& now,
                         const MemoryOptions& options);

@@ -1,5 +1,6 @@
-"""python3 -m perdure_model: the part of `perdure model import` that looks at graphs. Writes the
-network, its model.json and what to compare OpenCV's answers with; tells its findings."""
+"""python3 -m perdure_model: the part of `perdure model import` that processes graphs. Writes the
+network, its model.json and reference outputs for the comparison with OpenCV; prints its findings.
+"""
 
 import json
 import os
@@ -24,7 +25,7 @@ from .graph import Graph
 from .opencv import Repair
 from .options import Request, parsed
 
-USUAL_CLUTTER_RATE = 0.79  # of the networks measured in services/inference/README.md
+USUAL_CLUTTER_RATE = 0.79  # measured for the networks in services/inference/README.md
 
 
 def recognise(path, graph, size, request):
@@ -72,10 +73,10 @@ def check_names(path, found, request, graph):
 
 
 def cut(path, graph, found, request):
-    """Returns the operators that are left and that OpenCV does not have."""
+    """Cuts the graph at the heads. Returns the remaining operators that OpenCV lacks."""
     was = {n.kind for n in graph.nodes}
     graph.keep(found.cuts)
-    for old, new in found.cuts.items():  # the names may be taken: all others make way first
+    for old, new in found.cuts.items():  # renames others first, because the names may be used
         graph.rename(old, f"perdure_cut_{new}")
     for new in found.cuts.values():
         graph.rename(new, f"perdure_was_{new}")
@@ -92,7 +93,7 @@ def cut(path, graph, found, request):
 
 
 def other_size(args, graph, found, size, request):
-    """The input's size by --input; of the camera's shape with as many pixels."""
+    """The input size by --input; for a camera, its aspect ratio with about as many pixels."""
     if not request.new_size:
         return size
     steps = [level["stride"] for level in found.keys.get("levels", [])] or [32]
@@ -119,7 +120,8 @@ def description(args, found, names, size, request):
 
 
 def write_reference(args, graph, size, given, found, inside):
-    """What the network answers to pixels of noise: the service must say the same."""
+    """Writes the network's outputs for a noise image, with which the service's outputs are
+    compared."""
     folder, outputs = args.reference, list(found.cuts.values())
     pixels = np.random.default_rng(11).uniform(0, 255, (1, 3, size[1], size[0]))
     mean, scale = (np.broadcast_to(given[k], 3).reshape(3, 1, 1) for k in ("mean", "scale"))
@@ -149,7 +151,7 @@ def write(args, graph, described, priors):
 
 
 def imported(args, request, graph):
-    """Writes; returns what was found, the input's size, and what was repaired."""
+    """Imports and writes; returns the finding, the input size, and the repairs."""
     eight_bits = quantised.to_float(graph)
     size = graph.fix_input(args.network, request.size)
     graph.fold()
@@ -161,10 +163,10 @@ def imported(args, request, graph):
     size = other_size(args, graph, found, size, request)
     outputs = list(found.cuts.values())
     given = input_of(found, request)
-    if args.reference:  # of the graph as it was, so that a wrong repair shows too
+    if args.reference:  # uses the original graph, to detect wrong repairs too
         why = write_reference(args, graph, size, given, found, inside)
         found.notes += [why] if why else []
-    repaired = {} if inside else Repair(graph).run()  # what OpenCV wants is not what the standard says
+    repaired = {} if inside else Repair(graph).run()  # repairs for OpenCV deviate from the standard
     if inside:
         found.keys["backend"] = "onnxruntime"
         found.notes.append(f"it computes with {', '.join(inside)}, which OpenCV does not have: for ONNX Runtime alone")
@@ -196,13 +198,13 @@ def run(args):
         done = imported(args, request, graph)
     except Fault:
         raise
-    except Exception as e:  # a graph at odds with itself can go wrong anywhere
+    except Exception as e:  # an inconsistent graph can fail anywhere
         raise Fault(f"{args.network} is not a graph that makes sense here ({type(e).__name__}: {e}); export it again, "
                     "with opset 12")
     try:
         tell(graph, request, *done)
     except OSError as e:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is left unwritten fails no more at the end
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # avoids a second error at the end
         raise Fault(f"standard output cannot be written whole ({e.strerror}); free space, or send it elsewhere",
                     INPUT_OUTPUT)
 

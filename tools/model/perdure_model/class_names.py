@@ -1,4 +1,4 @@
-"""The names of classes: of a user's file or list, or of the network's own metadata."""
+"""Class names from a user's file or list, or from the network's metadata."""
 
 import ast
 import os
@@ -8,13 +8,13 @@ from pathlib import Path
 
 from .faults import DATA, UNAVAILABLE, USAGE, Fault
 
-UNUSED = ("n/a", "???")  # lists of COCO's 91 have them for numbers that no class has
+UNUSED = ("n/a", "???")  # COCO's list of 91 uses them for unused numbers
 SAVE = "save the file as UTF-8"
 
 
 def names_of(text):
-    """A file with a name a line, or a list with commas."""
-    if os.path.isfile(text):  # also of a list that is longer than any path: it is none
+    """Names from a file with one name a line, or from a list with commas."""
+    if os.path.isfile(text):  # False for lists longer than any path
         return distinct(names_of_lines(text, decoded(text)))
     if not ("," in text or not ("/" in text or text.endswith((".txt", ".names")))):
         raise Fault(f"the file of class names {text} is missing; give a file with a name a line, or names with commas "
@@ -34,7 +34,7 @@ def decoded(path):
     if content.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in content:
         raise Fault(f"{path} is not UTF-8 but UTF-16, or no text; {SAVE}", DATA)
     try:
-        return content.decode("utf-8-sig")  # passes a byte-order mark over
+        return content.decode("utf-8-sig")  # skips a byte-order mark
     except UnicodeDecodeError as e:
         line = e.object.count(b"\n", 0, e.start) + 1
         raise Fault(f"{path}:{line} is not UTF-8 (byte 0x{e.object[e.start]:02x}); {SAVE}", DATA)
@@ -70,13 +70,13 @@ def refuse_repeated(where, what, named, status):
 
 
 def distinct(names):
-    """What repeats gets its number: n/a-12 and so on."""
+    """Appends a number to repeated names: n/a-12 and so on."""
     lower = [name.lower() for name in names]
     return [n if lower.count(n) == 1 else f"{n}-{i}" for i, n in enumerate(lower)]
 
 
 def names_in(graph):
-    """Ultralytics writes the class names into the file."""
+    """Class names that Ultralytics stores in the file."""
     try:
         names = ast.literal_eval(graph.metadata["names"])
         return distinct([str(names[i]) for i in sorted(names)] if isinstance(names, dict) else [str(n) for n in names])

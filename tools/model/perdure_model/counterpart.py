@@ -1,4 +1,4 @@
-"""What a network answers to an image, by something else than what the service computes with."""
+"""Computes the reference outputs of a network for an image, without the library of the service."""
 
 import os
 import sys
@@ -9,8 +9,8 @@ from onnx import TensorProto, helper
 
 
 def answers(path, graph, image, found, outputs, inside):
-    """({tensor: values}, why there are none): by numpy, or where operators are `inside` that it does
-    not have by ONNX Runtime from the whole file."""
+    """({tensor: values}, the reason if there are none). Uses numpy, or ONNX Runtime on the original
+    file if numpy lacks operators (`inside`)."""
     if inside:
         return by_onnx_runtime(path, graph, image, found)
     values, stuck = graph.evaluate({graph.image: image}, outputs)
@@ -20,20 +20,21 @@ def answers(path, graph, image, found, outputs, inside):
 
 
 def sources_of(graph, found):
-    """{tensor of the description: its name in the file}; where an activation was taken out, what it read."""
+    """{tensor of the description: its name in the file}; the input of an activation that was
+    removed."""
     producers = graph.producers()
     return {new: producers[new].inputs[0] if producers[new].kind == "Identity" else old
             for old, new in found.cuts.items()}
 
 
 def zeros_for(given, types):
-    """Of the inputs beside the image, which the tensors do not depend on."""
+    """Zeros for an input other than the image, which does not affect the tensors."""
     return np.zeros([d if isinstance(d, int) else 1 for d in given.shape], types[given.type])
 
 
 def quietly_imported():
-    """onnxruntime; None where it is not installed. Debian's shares a library with onnx, whose
-    operators it registers again, with a line of complaint for each of them."""
+    """onnxruntime, or None if it is not installed. Suppresses its messages: Debian's package shares
+    a library with onnx and registers its operators a second time."""
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     sys.stderr.flush()
     os.dup2(nowhere, 2)

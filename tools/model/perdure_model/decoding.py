@@ -1,4 +1,5 @@
-"""The decode rules of services/inference in numpy, to be held against a file's own decoding."""
+"""The decoding rules of services/inference in numpy, for the comparison with a file's own
+decoding."""
 
 import numpy as np
 
@@ -69,7 +70,8 @@ def fastestdet(heads):
 
 
 def yolo_fastestv2(heads):
-    """What its files decode themselves: sigmoids of the boxes and objectness, the soft-max, a row for each cell."""
+    """The decoding inside its files: sigmoids of boxes and objectness, the soft-max, a row for each
+    cell."""
     box, objectness, classes = (planes(h) for h in heads[0])
     return np.concatenate([sigmoid(box), sigmoid(objectness), softmax(classes, 1)], 1)
 
@@ -80,7 +82,8 @@ def nanodet(heads, classes):
 
 
 def as_rows(value, columns):
-    """A tensor that may be (1,N,C), (1,C,N), (1,C,H,W) or (1,A,H,W,C) as (N, C); None where it is not."""
+    """A tensor of shape (1,N,C), (1,C,N), (1,C,H,W) or (1,A,H,W,C) as (N, C); None for other
+    shapes."""
     value = np.asarray(value)
     if value.dtype.kind != "f" or value.ndim < 2 or value.shape[0] != 1:
         return None
@@ -95,8 +98,8 @@ def corners(rows):
 
 
 def disagreement(mine, values, more=0):
-    """The least largest difference to a tensor of the same size, in shares of 1 + its value; None
-    where there is none of that size. Boxes may be by their corners there, and `more` columns follow."""
+    """The smallest maximum difference to a tensor of the same size, relative to 1 + its value. None
+    if no tensor has that size. Boxes may be given by corners there, and `more` columns follow."""
     best = None
     for value in values:
         rows = as_rows(value, mine.shape[1] + more)

@@ -1,5 +1,5 @@
-"""What ends an import: a sentence with the mend, and the exit status (64 usage, 65 data that cannot be used
-as they are, 69 missing, 74 not written, 78 wrong)."""
+"""Error that ends an import: a sentence with the fix, and the exit status (64 usage, 65 unusable
+data, 69 missing, 74 not written, 78 wrong)."""
 
 import errno
 
@@ -13,7 +13,7 @@ class Fault(Exception):
 
 
 def unwritten(name, error):
-    """Of an OSError; one without a number is numpy's: not all was written."""
+    """Fault for an OSError; one without a number comes from numpy after an incomplete write."""
     why = error.strerror or "not all of it could be written"
     if error.errno in (None, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
         return Fault(f"{name} cannot be written whole ({why}); free space, or give a folder on another disk",

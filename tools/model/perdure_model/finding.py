@@ -1,8 +1,8 @@
-"""What was found out about a network: its family, what to cut it at, and what model.json will say."""
+"""Finding about a network: its family, the tensors to cut at, and the content of model.json."""
 
 from dataclasses import dataclass, field
 
-# As the authors' own code feeds their networks.
+# As in the authors' own code.
 INPUTS = {
     "yolov5": {"fit": "letterbox_centre", "pad": 114, "colour": "rgb", "scale": 1 / 255, "mean": [0, 0, 0]},
     "yolox": {"fit": "letterbox_top_left", "pad": 114, "colour": "bgr", "scale": 1.0, "mean": [0, 0, 0]},
@@ -26,8 +26,8 @@ class Finding:
     family: str
     classes: int
     cuts: dict = field(default_factory=dict)     # tensor of the graph: its name in model.json
-    keys: dict = field(default_factory=dict)     # of model.json: activation, levels, outputs …
+    keys: dict = field(default_factory=dict)     # content of model.json: activation, levels …
     notes: list = field(default_factory=list)    # sentences for people
-    compared: str = ""                           # how its decoding was held against the file's own
+    compared: str = ""                           # result of the comparison with its own decoding
     disagreement: float = None
-    input: dict = field(default_factory=dict)    # where it is another than the family's usual one
+    input: dict = field(default_factory=dict)    # differences from the family's usual input

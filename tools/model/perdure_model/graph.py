@@ -1,4 +1,4 @@
-"""A network's graph: loaded, its input fixed, constants folded, cut, and written again."""
+"""A network's graph: loads it, fixes its input, folds constants, cuts it and writes it."""
 
 import warnings
 
@@ -9,12 +9,13 @@ from onnx import TensorProto, helper, numpy_helper, shape_inference
 from .faults import DATA, UNAVAILABLE, Fault
 from .numpy_ops import OPS
 
-LARGEST_CONSTANT = 1 << 22  # values
+LARGEST_CONSTANT = 1 << 22  # number of values
 KEEPS_SHAPE = ("HardSwish", "Mish")
 
 
 class Node:
-    """Inputs and outputs are names; "" where an input is left out. Attributes are plain values."""
+    """A node. Inputs and outputs are names ("" for an omitted input); attributes are plain
+    values."""
 
     def __init__(self, kind, inputs, outputs, attributes=None, domain="", name=""):
         self.kind, self.inputs, self.outputs = kind, list(inputs), list(outputs)
@@ -37,7 +38,7 @@ class Node:
 class Graph:
     def __init__(self, nodes, constants, inputs, outputs, opset, metadata):
         self.nodes, self.constants, self.outputs = nodes, constants, outputs
-        self.inputs = inputs  # name: (element type, dimensions with None where they are open)
+        self.inputs = inputs  # name: (element type, dimensions; None if unknown)
         self.opset, self.metadata = opset, metadata
         self.shapes, self.types = {}, {}
         self.image = ""
@@ -47,13 +48,13 @@ class Graph:
     @classmethod
     def load(cls, path):
         try:
-            with warnings.catch_warnings():  # protobuf warns where it could not read all
+            with warnings.catch_warnings():  # protobuf warns about incomplete reads
                 warnings.simplefilter("error", RuntimeWarning)
                 model = onnx.load(str(path))
         except FileNotFoundError as e:
             raise Fault(f"{e.filename or path} is missing; give an .onnx file (weights kept in a second file must lie "
                         "beside it)", UNAVAILABLE)
-        except Exception as e:  # protobuf's own, and what a truncated file makes it throw
+        except Exception as e:  # protobuf's own errors, and others for a truncated file
             raise Fault(f"{path} is not a whole ONNX file ({str(e).splitlines()[0] if str(e) else type(e).__name__}); "
                         "export or copy it again", DATA)
         graph = model.graph
@@ -66,13 +67,13 @@ class Graph:
                 tensor = i.type.tensor_type
                 inputs[i.name] = (tensor.elem_type, [d.dim_value or None for d in tensor.shape.dim])
         read = {i for n in graph.node for i in n.input}
-        # Tools that simplify leave the inputs of what they folded away: whatever nothing reads is no input.
+        # Some simplifiers leave unused inputs behind; an input without a reader is removed.
         inputs = {name: what for name, what in inputs.items() if name in read} or inputs
         opset = max([o.version for o in model.opset_import if o.domain in ("", "ai.onnx")] or [1])
         metadata = {p.key: p.value for p in model.metadata_props}
         nodes = [Node.of(n) for n in graph.node]
         loaded = cls(nodes, constants, inputs, [o.name for o in graph.output], opset, metadata)
-        for info in [*graph.value_info, *graph.output]:  # of operators that nobody can infer through
+        for info in [*graph.value_info, *graph.output]:  # needed by operators without inference
             tensor = info.type.tensor_type
             loaded.types[info.name] = tensor.elem_type
             if tensor.HasField("shape") and all(d.dim_value for d in tensor.shape.dim):
@@ -80,7 +81,7 @@ class Graph:
         return loaded
 
     def fix_input(self, path, size):
-        """Chooses the image among the inputs and gives it one size; `size`: (width, height)."""
+        """Selects the image among the inputs and sets its size; `size`: (width, height)."""
         images = [n for n, (_, d) in self.inputs.items() if len(d) == 4]
         if len(images) != 1:
             raise Fault(f"{path} has {len(images)} inputs that could be an image ({', '.join(self.inputs) or 'none'}); "
@@ -108,7 +109,7 @@ class Graph:
         return width, height
 
     def to_float32(self):
-        """Networks of half or double precision, or with parts of it, are computed in float32."""
+        """Converts networks, or parts of them, from half or double precision to float32."""
         other, kinds = (np.float16, np.float64), (TensorProto.FLOAT16, TensorProto.DOUBLE)
         self.types = {k: TensorProto.FLOAT if t in kinds else t for k, t in self.types.items()}
         self.constants = {k: v.astype(np.float32) if v.dtype in other else v for k, v in self.constants.items()}
@@ -135,7 +136,7 @@ class Graph:
         return self.constants.get(name)
 
     def origin(self, name):
-        """The names that an exporter gave to a convolution: of its answer and of its weights."""
+        """The exporter's names of a convolution: of its output and of its weights."""
         node = next((n for n in self.nodes if name in n.outputs), None)
         return " ".join([name, *(node.inputs[1:] if node else [])])
 
@@ -154,12 +155,12 @@ class Graph:
     def infer_shapes(self):
         try:
             model = self.to_model()
-            for node in model.graph.node:  # of a newer opset than the file says, which stops the inference
+            for node in model.graph.node:  # operators of an undeclared opset stop the inference
                 if node.op_type in KEEPS_SHAPE:
                     node.op_type = "Relu"
                     del node.attribute[:]
             model = shape_inference.infer_shapes(model, data_prop=True)
-        except Exception:  # an operator that this onnx does not know, or a graph at odds with itself
+        except Exception:  # unknown operators, or an inconsistent graph
             return
         for info in [*model.graph.value_info, *model.graph.output]:
             tensor = info.type.tensor_type
@@ -172,7 +173,7 @@ class Graph:
             self.shapes[name], self.types[name] = dims, kind
 
     def shape(self, name):
-        """None where it, or a side of it, is not known."""
+        """The shape; None if it, or one of its dimensions, is unknown."""
         if name in self.constants:
             return list(self.constants[name].shape)
         shape = self.shapes.get(name)
@@ -205,7 +206,7 @@ class Graph:
         return len(kept) < before
 
     def value_of(self, node):
-        """The outputs of a node that depends on nothing but constants and known shapes."""
+        """The outputs of a node that depends only on constants and known shapes."""
         if node.domain or any(o in self.outputs for o in node.outputs):
             return None
         if node.kind == "Shape" and self.shape(node.inputs[0]) is not None:
@@ -221,13 +222,13 @@ class Graph:
 
     def fold(self):
         self.infer_shapes()
-        for _ in range(8):  # each round may make shapes known that were not
+        for _ in range(8):  # each round may determine more shapes
             if not self.fold_once():
                 break
             self.infer_shapes()
 
     def keep(self, outputs):
-        """Cuts everything off that these tensors do not need."""
+        """Removes all nodes that these tensors do not need."""
         self.outputs = list(outputs)
         self.nodes = self.ancestors(outputs)
         used = {i for n in self.nodes for i in n.inputs} | set(outputs)
@@ -235,7 +236,7 @@ class Graph:
         self.inputs = {k: v for k, v in self.inputs.items() if k in used or k == self.image}
 
     def rename(self, old, new):
-        """A tensor, wherever it comes from; nothing where there is none of the name."""
+        """Renames a tensor of any origin; does nothing if the name does not exist."""
         for node in self.nodes:
             node.inputs = [new if i == old else i for i in node.inputs]
             node.outputs = [new if o == old else o for o in node.outputs]
@@ -249,9 +250,9 @@ class Graph:
 
     def evaluate(self, known, until=None):
         """Values of all tensors that follow from `known` and the constants: (values, the operators
-        that could not be computed). Stops once all of `until` are there."""
+        without an implementation). Stops when all of `until` are computed."""
         values, stuck = dict(known), []
-        left = {}  # how many nodes still need a tensor, so that memory is given back
+        left = {}  # number of nodes that still need a tensor, to free memory early
         if until is not None:
             for node in self.nodes:
                 for name in node.inputs:

@@ -1,11 +1,12 @@
-"""Where a graph's heads are: the convolutions behind its outputs, with only the decoding between."""
+"""Finds the heads of a graph: the convolutions before its outputs, with only decoding operators
+between."""
 
 from dataclasses import dataclass
 
 import numpy as np
 import onnx
 
-# What exporters write behind the heads: shapes, activations, arithmetic, choosing.
+# Operators of the decoding behind the heads: shapes, activations, arithmetic, selection.
 DECODING = {
     "Reshape", "Transpose", "Concat", "Slice", "Split", "Squeeze", "Unsqueeze", "Flatten", "Identity", "Cast", "Expand",
     "Tile", "Gather", "GatherElements", "GatherND", "ScatterND", "Shape", "Range", "ConstantOfShape", "Sigmoid",
@@ -14,7 +15,7 @@ DECODING = {
     "ReduceMax", "ReduceSum", "ReduceMin", "ArgMax", "TopK", "NonMaxSuppression", "NonZero", "Constant", "Abs", "Round",
     "Ceil", "CumSum"}
 
-# Chooses boxes inside the network: the answer has no fixed meaning for each row.
+# Operators that select boxes inside the network, so that a row of the output has no fixed meaning.
 CHOOSING = ("NonMaxSuppression", "TopK", "NonZero", "BatchedNMS_TRT", "BatchedNMSDynamic_TRT", "EfficientNMS_TRT",
             "MultiClassNMS", "If", "Loop", "Scan", "RoiAlign")
 
@@ -28,7 +29,7 @@ class Head:
 
 
 def is_mean_of_bins(graph, node):
-    """YOLOv8's last convolution: one output, its weights 0, 1, 2 …"""
+    """YOLOv8's last convolution: one output, with the weights 0, 1, 2 …"""
     weight = graph.constant(node.inputs[1]) if node.kind == "Conv" and len(node.inputs) > 1 else None
     return weight is not None and weight.shape[0] == 1 and weight.size > 1 and \
         np.array_equal(weight.ravel(), np.arange(weight.size))
@@ -39,7 +40,8 @@ def is_decoding(graph, node):
 
 
 def advanced(graph, name, consumers):
-    """A convolution's output, past a factor or summand for each channel (YOLOv7's implicit knowledge)."""
+    """A convolution's output after factors or summands for each channel (YOLOv7's implicit
+    knowledge)."""
     channels = graph.shape(name)
     while channels and name not in graph.outputs and len(consumers.get(name, [])) == 1:
         node = consumers[name][0]
@@ -54,8 +56,8 @@ def advanced(graph, name, consumers):
 
 
 def find_heads(graph):
-    """([Head] in the order in which the outputs put them together, the names of other tensors where
-    the decoding begins)."""
+    """([Head] in the order of concatenation in the outputs, the names of other tensors at which
+    decoding starts)."""
     producers, consumers = graph.producers(), graph.consumers()
     heads, others, seen = [], [], set()
     todo = list(reversed(graph.outputs))
@@ -83,8 +85,8 @@ def is_unknown(node):
 
 
 def hides_heads(graph, others):
-    """The first operator that keeps heads from being found: behind it shapes are not known, or nobody knows what it
-    does. None where `others` (of find_heads) are no heads."""
+    """The first operator that prevents the detection of heads, because its output shape or its
+    function is unknown. None if `others` (of find_heads) are not heads."""
     producers = graph.producers()
     behind = [producers[name] for name in others if name in producers]
     for node in graph.ancestors([n.outputs[0] for n in behind if n.kind == "Conv" and graph.shape(n.outputs[0]) is None]):
@@ -95,7 +97,7 @@ def hides_heads(graph, others):
 
 
 def levels_of(heads):
-    """Heads of one resolution together, in the order of their first ones; finest first where mixed."""
+    """Groups heads by resolution, in the order of the first head of each group."""
     levels = {}
     for head in heads:
         levels.setdefault((head.rows, head.columns), []).append(head)

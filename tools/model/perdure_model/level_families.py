@@ -1,5 +1,5 @@
-"""Families that are known by their heads: YOLOv5, v7, v8 to v12 and 26, YOLOX, RTMDet, NanoDet, PicoDet, FastestDet,
-YOLO-FastestV2."""
+"""Families identified by their heads: YOLOv5, v7, v8 to v12 and 26, YOLOX, RTMDet, NanoDet,
+PicoDet, FastestDet, YOLO-FastestV2."""
 
 import numpy as np
 
@@ -9,11 +9,12 @@ from .finding import Finding
 from .heads import decoding_nodes
 
 AS_THE_FILE = "decodes random heads as the file itself does (within {:.0e})"
-AGREES = 2e-3  # of 1 + the value, in float32 with random heads
+AGREES = 2e-3  # relative to 1 + the value, in float32 with random heads
 
 
 class Levels:
-    """The heads of a graph by levels, and what the file's own decoding makes of random values."""
+    """The heads of a graph by level, and the results of the file's own decoding for random
+    values."""
 
     def __init__(self, graph, levels, size, request):
         self.graph, self.levels, self.size, self.request = graph, levels, size, request
@@ -22,7 +23,7 @@ class Levels:
         self.kinds = {n.kind for n in self.nodes}
 
     def with_values(self, value):
-        """`value(shape)` in each head: (heads by level, all float tensors that follow)."""
+        """Sets `value(shape)` in each head: (heads by level, all float tensors that follow)."""
         heads = [[value((1, h.channels, h.rows, h.columns)).astype(np.float32) for h in level] for level in self.levels]
         known = {h.name: v for level, values in zip(self.levels, heads) for h, v in zip(level, values)}
         found, stuck = self.graph.evaluate(known)
@@ -42,7 +43,8 @@ class Levels:
         return found.pop() if len(found) == 1 else None
 
     def cuts(self, roles):
-        """{tensor: name in model.json} and the levels' keys; `roles` by the order of the heads."""
+        """{tensor: name in model.json} and the keys of the levels; `roles` are in the order of the
+        heads."""
         names, keys = {}, []
         for level, stride in zip(self.levels, self.strides):
             key = {"stride": stride}
@@ -53,14 +55,14 @@ class Levels:
         return names, keys
 
     def finish(self, finding, mine, random):
-        """Holds our decoding against the file's own."""
+        """Compares our decoding with the file's own."""
         _, values, stuck = random
         if not self.nodes:
             finding.compared = "the file has no decoding of its own to compare with"
             return finding
         finding.disagreement = min((e for m in mine for e in [decoding.disagreement(m, values)] if e is not None),
                                    default=None)
-        if finding.disagreement is None:  # boxes without their scores beside them are taken where they agree
+        if finding.disagreement is None:  # boxes without scores count if they agree
             boxes = [e for m in mine if m.shape[1] > 4 for e in [decoding.disagreement(m[:, :4], values)]]
             finding.disagreement = min((e for e in boxes if e is not None and e < AGREES), default=None)
         if finding.disagreement is None:
@@ -74,7 +76,8 @@ class Levels:
 
 
 def yolox(levels):
-    """Boxes, objectness and classes apart, in this order or objectness first (FastestDet)."""
+    """Separate boxes, objectness and classes, in this order or with objectness first
+    (FastestDet)."""
     if not levels.count(3):
         return None
     channels = [h.channels for h in levels.levels[0]]
@@ -94,7 +97,8 @@ def yolox(levels):
 
 
 def box_and_classes(levels):
-    """(the index of the boxes' head, of the classes', channels of both) of levels with two heads; None elsewhere."""
+    """(index of the box head, index of the class head, channels of both) of levels with two heads;
+    otherwise None."""
     first, second = (levels.same_channels(i) for i in (0, 1)) if levels.count(2) else (None, None)
     wanted = len(levels.request.names or [])
     if first is None or second is None:
@@ -106,8 +110,8 @@ def box_and_classes(levels):
 
 
 def two_heads(levels, found, alternatives):
-    """Boxes and classes apart. `alternatives`: {what model.json says of it: our decoding}; the first holds where the
-    file has no decoding of its own."""
+    """Separate boxes and classes. `alternatives`: {keys of model.json: our decoding}. The first one
+    is used if the file has no decoding of its own."""
     box, classes, _, _ = box_and_classes(levels)
     found.cuts, keys = levels.cuts(["box", "classes"] if box == 0 else ["classes", "box"])
     random = levels.random()
@@ -162,7 +166,7 @@ def nanodet(levels):
     bins = levels.request.bins or 8
     if channels is None or channels <= 4 * bins or (wanted and channels != wanted + 4 * bins):
         return None
-    hard = any(n.kind == "HardSwish" for n in levels.graph.nodes)  # NanoDet has leaky ones
+    hard = any(n.kind == "HardSwish" for n in levels.graph.nodes)  # NanoDet uses leaky ReLU
     family = levels.request.family or ("picodet" if hard and len(levels.levels) > 3 else "nanodet")
     names, keys = levels.cuts(["tensor"])
     found = Finding(family, channels - 4 * bins, names,
@@ -202,7 +206,8 @@ def yolo_fastestv2(levels):
 
 
 def anchors_of(levels, count, classes):
-    """From the file's own decoding at raw values of zero, where a box is its anchor; [] elsewhere."""
+    """Anchors from the file's own decoding of zeros, for which each box equals its anchor;
+    otherwise []."""
     _, values, _ = levels.with_values(np.zeros)
     total = count * sum(level[0].rows * level[0].columns for level in levels.levels)
     for value in values:
@@ -219,7 +224,7 @@ def anchors_of(levels, count, classes):
 
 
 def yolov5(levels):
-    """A head of anchors times (box, objectness, classes)."""
+    """A head with (box, objectness, classes) for each anchor."""
     channels = levels.same_channels(0) if levels.count(1) else None
     request = levels.request
     given = request.anchors
@@ -248,7 +253,7 @@ def yolov5(levels):
 
 
 def yolov8_with_more(levels):
-    """Masks or key points beside boxes and classes: those are left out."""
+    """Heads with masks or key points beside boxes and classes; these are omitted."""
     wanted = len(levels.request.names or [])
     picks = [(next((i for i, h in enumerate(level) if h.channels == 64), None),
               next((i for i, h in enumerate(level) if h.channels == wanted), None)) for level in levels.levels]
@@ -271,12 +276,12 @@ def yolov8_with_more(levels):
 
 RULES = {"yolox": yolox, "fastestdet": yolox, "yolov8": yolov8, "yolov5": yolov5, "yolov7": yolov5, "nanodet": nanodet,
          "picodet": nanodet, "rtmdet": rtmdet, "yolo-fastestv2": yolo_fastestv2}
-ONE_TO_ONE = "one2one"  # in the names of a branch that was trained to answer once for each object
+ONE_TO_ONE = "one2one"  # part of the names in a branch trained for one detection of each object
 
 
 def dense(levels):
-    """Levels without their one-to-one branch, where the file has both (YOLOv10, YOLO26): the dense branch is the
-    likelihood."""
+    """Levels without the one-to-one branch if the file has both (YOLOv10, YOLO26), because the
+    dense branch gives the likelihood."""
     kept = [[h for h in level if ONE_TO_ONE not in levels.graph.origin(h.name)] for level in levels.levels]
     if all(len(level) == 2 for level in kept) and levels.count(4):
         return Levels(levels.graph, kept, levels.size, levels.request), "of its two branches the dense one is taken"
@@ -285,7 +290,7 @@ def dense(levels):
 
 
 def candidates(levels, family):
-    """Findings of all rules that fit, those that decode as the file does first."""
+    """Findings of all rules that fit; those that decode like the file come first."""
     if family and family not in RULES:
         return []
     levels, note = dense(levels)

@@ -1,6 +1,6 @@
-"""ONNX operators in numpy: constants are folded with them, a file's own decoding is evaluated, and
-OpenCV's answers are compared with theirs. Each takes the inputs (None where left out), the
-attributes and the opset, and gives a list of outputs."""
+"""ONNX operators in numpy. They fold constants, evaluate a file's own decoding, and provide
+reference outputs for OpenCV. Each takes the inputs (None if omitted), the attributes and the opset,
+and returns a list of outputs."""
 
 import functools
 import math
@@ -55,7 +55,7 @@ for _name, _function in {"Max": np.maximum, "Min": np.minimum}.items():
 
 
 def axes_of(x, a, where=1):
-    """From the attribute, or from an input as in newer opsets."""
+    """Axes from the attribute, or from an input in newer opsets."""
     if len(x) > where and x[where] is not None:
         return tuple(int(i) for i in np.atleast_1d(x[where]))
     return tuple(a["axes"]) if "axes" in a else None
@@ -277,7 +277,7 @@ def spatial_pads(a, sizes, kernel, strides, dilations):
 def windows(x, kernel, strides, dilations, pads, fill, ceil=False):
     """(N, C, rows, columns, kh, kw) views of a padded image."""
     (top, bottom), (left, right) = pads
-    if ceil:  # windows may reach beyond the last pad by less than a stride
+    if ceil:  # windows may extend beyond the last pad by less than a stride
         bottom, right = bottom + strides[0] - 1, right + strides[1] - 1
     x = np.pad(x, ((0, 0), (0, 0), (top, bottom), (left, right)), constant_values=fill)
     reach = [(k - 1) * d + 1 for k, d in zip(kernel, dilations)]
@@ -359,7 +359,7 @@ def depth_to_space(x, a, v):
 
 @op("Resize", "Upsample")
 def resize(x, a, v):
-    """Nearest and linear of the last two axes, in the three usual conventions."""
+    """Nearest and linear resizing of the last two axes, in the three usual conventions."""
     data = x[0]
     scales = x[1] if len(x) == 2 else (x[2] if len(x) > 2 else None)
     sizes = x[3] if len(x) > 3 else None

@@ -1,6 +1,6 @@
-"""What OpenCV 4.6 needs of a graph: operators that it does not load, or computes wrongly without a
-word, in a form that it computes rightly. Every rule here was found by running the one operator
-there and in numpy; tests/tools/model has the cases."""
+"""Repairs a graph for OpenCV 4.6: replaces operators that it cannot load, or computes wrongly
+without an error. Each rule was found by a comparison of single operators with numpy;
+tests/tools/model has the cases."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ DEFAULTS = {"InstanceNormalization": {"epsilon": 1e-5}}
 
 
 class Repair:
-    """Rewrites node by node; `done` counts what was changed, by a word for people."""
+    """Rewrites the graph node by node; `done` counts the changes by a short description."""
 
     def __init__(self, graph):
         self.graph, self.done, self.count = graph, {}, 0
@@ -38,7 +38,8 @@ class Repair:
         return f"repair_{self.count}"
 
     def emit(self, kind, inputs, outputs=None, **attributes):
-        """`inputs`: names, or arrays that become constants. Returns the output's name."""
+        """Adds a node. `inputs`: names, or arrays that become constants. Returns the output's
+        name."""
         names = []
         for value in inputs:
             if not isinstance(value, str):
@@ -70,7 +71,7 @@ class Repair:
         if shape is None:
             return False
         axis = node.attributes.get("axis", -1 if newer else 1) % len(shape)
-        if not newer and axis != len(shape) - 1:  # over all axes from this one on
+        if not newer and axis != len(shape) - 1:  # covers all axes from this one on
             flat = self.emit("Reshape", [node.inputs[0], np.array([int(np.prod(shape[:axis])), -1], np.int64)])
             self.emit("Reshape", [self.emit("Softmax", [flat], axis=1), np.array(shape, np.int64)], node.outputs)
             return self.note("Softmax over several axes")
@@ -134,7 +135,7 @@ class Repair:
         return self.bound(node, "max")
 
     def bound(self, node, key):
-        """Max and Min with one number."""
+        """Max and Min with a scalar."""
         if len(node.inputs) != 2:
             return False
         variable = [i for i in node.inputs if self.constant(i) is None]
@@ -146,7 +147,8 @@ class Repair:
         return self.note(f"{node.kind} with a constant")
 
     def on_matmul(self, node):
-        """OpenCV wants the constant on the right, C·X = (Xᵀ·Cᵀ)ᵀ, and of two dimensions."""
+        """Transforms C·X to (Xᵀ·Cᵀ)ᵀ, because OpenCV needs a two-dimensional constant on the
+        right."""
         left, right = self.constant(node.inputs[0]), self.constant(node.inputs[1])
         variable = self.shape(node.inputs[1] if left is not None else node.inputs[0])
         fixed = right if left is None else left
@@ -165,7 +167,8 @@ class Repair:
         return self.note("MatMul with a constant")
 
     def product(self, name, fixed, outputs=None):
-        """A variable times a constant of two or more dimensions, one of its first ones above 1."""
+        """A variable times a constant of at least two dimensions, with a leading dimension above
+        1."""
         parts = np.ascontiguousarray(fixed.reshape(-1, *fixed.shape[-2:]))
         if len(parts) == 1:
             return self.emit("MatMul", [name, parts[0]], outputs)
@@ -174,7 +177,8 @@ class Repair:
         return self.emit("Concat", products, outputs, axis=axis)
 
     def on_layernormalization(self, node):
-        """Of the last axis. A mean is a product with ones, and of the shape that it is taken from."""
+        """Normalisation over the last axis. A mean is a product with ones, in the shape of its
+        input."""
         shape = self.shape(node.inputs[0])
         if shape is None or len(shape) < 3 or node.attributes.get("axis", -1) not in (-1, len(shape) - 1):
             return False
@@ -205,7 +209,7 @@ class Repair:
         if shape is None or any(value.dtype.kind != "f" for value in fixed):
             return False
         kind = node.kind
-        if kind == "Div":  # a quotient by a factor; the divisor's power is elementwise, and right
+        if kind == "Div":  # a quotient times a factor becomes a product with the power
             divisor = self.constant(b)
             if divisor is not None and divisor.all():
                 b = self.as_constant(1 / divisor)
@@ -213,7 +217,7 @@ class Repair:
                 return False
             else:
                 b = self.power(b)
-                if self.constant(a) is not None:  # one number would be merged with the power, wrongly
+                if self.constant(a) is not None:  # OpenCV merges a scalar with the power wrongly
                     a = self.as_constant(np.broadcast_to(self.constant(a), shape))
             kind = "Mul"
             self.note("Div")
@@ -243,7 +247,7 @@ class Repair:
         return result
 
     def is_fine(self, a, b, shape):
-        """OpenCV gets it right: one number, one number a channel, or equals."""
+        """Whether OpenCV is correct: a scalar, one value for each channel, or equal shapes."""
         value = self.constant(b)
         if value is not None:
             return value.size == 1 or self.is_channels(value.shape, shape)
@@ -267,8 +271,8 @@ class Repair:
             if list(value.shape) != list(shape):
                 self.note("constants that were to be broadcast")
             full = np.broadcast_to(value, shape)
-            # A convolution right before would take the factors for one number a channel; and only
-            # what begins with 1 is taken value by value.
+            # Reshapes, because OpenCV takes factors after a convolution as one value for each
+            # channel. Only tensors with a leading 1 are multiplied elementwise.
             flat = shape if shape[0] == 1 else [1, int(np.prod(shape))]
             a = self.emit("Reshape", [a, np.array(flat, np.int64)])
             if flat != shape:
@@ -280,7 +284,7 @@ class Repair:
         self.emit(kind, [a, b], outputs)
 
     def widen(self, name, given, shape):
-        """A variable to a larger shape: ones times it, along one axis after another."""
+        """Expands a variable to a larger shape by products with ones, one axis at a time."""
         given = [1] * (len(shape) - len(given)) + list(given)
         if given != list(self.shape(name) or given):
             name = self.emit("Reshape", [name, np.array(given, np.int64)])

@@ -15,7 +15,7 @@ LARGEST_SIDE = 8192
 
 
 class Parser(argparse.ArgumentParser):
-    """One that says what is wrong as all others do."""
+    """A parser with the error format of this program."""
 
     def error(self, message):
         raise Fault(f"{message}; perdure model import --help tells the options", USAGE)
@@ -38,7 +38,7 @@ def parsed(arguments):
 
 
 class Request:
-    """The command line, read."""
+    """The parsed command line."""
 
     def __init__(self, args):
         self.family, self.boxes, self.y_first = args.family, args.boxes, args.y_first
@@ -65,7 +65,7 @@ def refuse(option, text, why):
 
 
 def size_of(option, text):
-    """640x480; None where there is no text."""
+    """Parses 640x480; None without a text."""
     if not text:
         return None
     sides = re.fullmatch("([0-9]{1,5})x([0-9]{1,5})", text)
@@ -84,7 +84,7 @@ def count_of(option, text):
 
 
 def numbers_of(option, text, whole=None):
-    """`whole`: what the user wrote, of which `text` is a part."""
+    """`whole`: the user's complete text, of which `text` is a part."""
     values = []
     for part in text.split(","):
         try:
@@ -111,7 +111,7 @@ def anchors_of(text):
 
 
 def input_of(args):
-    """What the user says of the network's input, as in model.json."""
+    """The user's options of the network's input, as in model.json."""
     said = {"colour": args.colour, "fit": args.fit, "pad": number_of("--pad", args.pad)}
     said["scale"] = numbers_of("--scale", args.scale) if args.scale else None
     said["mean"] = numbers_of("--mean", args.mean) if args.mean else None

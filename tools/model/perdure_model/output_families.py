@@ -1,4 +1,4 @@
-"""Families that are known by their outputs: boxes and scores of all levels at once."""
+"""Families identified by their outputs: boxes and scores of all levels together."""
 
 import numpy as np
 
@@ -7,23 +7,23 @@ from .finding import Finding
 from .graph import Node
 from .heads import CHOOSING, decoding_nodes, find_heads
 
-# The scores pass these as they are, so that an activation before them may be left out.
+# Operators that do not change the scores, so that a preceding activation may be removed.
 PASSING = {"Reshape", "Transpose", "Concat", "Slice", "Squeeze", "Unsqueeze", "Flatten", "Identity", "Split", "Cast",
            "Gather"}
-MANY_QUERIES = 1000  # more rows than that come from cells or priors, not from queries
+MANY_QUERIES = 1000  # more rows come from cells or priors, not from queries
 
 
 class Outputs:
     def __init__(self, graph, size, request):
         self.graph, self.size, self.request = graph, size, request
         self.shapes = {o: graph.shape(o) for o in graph.outputs}
-        self.known = None  # (boxes, scores), where they are found behind the outputs
+        self.known = None  # (boxes, scores), if found before the outputs
 
     def of_rank(self, rank):
         return {o: s for o, s in self.shapes.items() if s is not None and len(s) == rank and s[0] == 1}
 
     def pair(self):
-        """(boxes, scores) where one output is (1,N,4) and another (1,N,C)."""
+        """(boxes, scores) if one output is (1,N,4) and another (1,N,C)."""
         if self.known:
             return self.known
         found = self.of_rank(3)
@@ -48,9 +48,9 @@ class Outputs:
         return pairs[0]
 
     def strip(self, name, boxes=0):
-        """Takes the sigmoid or soft-max behind which nothing but shapes follows out of the graph:
-        "sigmoid", "softmax" or "" where there is none. Of columns put together the first `boxes`
-        are no scores."""
+        """Removes the sigmoid or soft-max before `name` if only shape operators follow it. Returns
+        "sigmoid", "softmax" or "" if there is none. Of concatenated columns, the first `boxes` are
+        not scores."""
         producers = self.graph.producers()
         found, todo = [], [name]
         while todo:
@@ -71,7 +71,7 @@ class Outputs:
         if len(kinds) != 1 or boxes:
             return ""
         for node in found:
-            if node.outputs[0] in self.graph.outputs:  # the outputs keep their names
+            if node.outputs[0] in self.graph.outputs:  # keeps the names of the outputs
                 node.kind, node.attributes = "Identity", {}
             else:
                 self.graph.rename_uses(node.outputs[0], node.inputs[0])
@@ -123,8 +123,8 @@ def single(outputs):
 
 
 def box_form(outputs, name, family, found):
-    """boxes of model.json: offsets where priors are given, else what the numbers look like at raw
-    values of zero, where every box is its prior."""
+    """`boxes` of model.json: offsets if priors are given. Otherwise the form follows from the
+    decoding of zeros, for which each box equals its prior."""
     graph, request = outputs.graph, outputs.request
     form = {"y_first": True} if request.y_first else {}
     if request.priors is not None:
@@ -154,7 +154,7 @@ def box_form(outputs, name, family, found):
 
 
 def two(outputs):
-    """Boxes and scores: SSD and DETR."""
+    """Separate boxes and scores: SSD and DETR."""
     names = outputs.pair()
     if names is None:
         return None
@@ -184,7 +184,8 @@ def two(outputs):
 
 
 def chosen(graph, name):
-    """Whether the rows of a tensor were picked out of others, and are no decoder's answers."""
+    """Whether the rows of a tensor were selected from others, and are not direct outputs of a
+    decoder."""
     producers, todo = graph.producers(), [name]
     while todo:
         node = producers.get(todo.pop())
@@ -198,8 +199,8 @@ def chosen(graph, name):
 
 
 def before_choice(outputs):
-    """(boxes, scores) of a decoder behind which its exporter added the choice of the best: the
-    sigmoids that TopK looks at, and the boxes (1,Q,4) of centres that are taken apart for corners."""
+    """(boxes, scores) of a decoder before the selection that its exporter added: the sigmoids that
+    TopK reads, and the boxes (1,Q,4) with centres that are converted to corners."""
     graph = outputs.graph
     producers = graph.producers()
     ends = graph.ancestors([o for o in graph.outputs])
@@ -219,7 +220,8 @@ def before_choice(outputs):
 
 
 def queried(outputs):
-    """RT-DETR, D-FINE and their kin: a decoder answers for queries that were chosen before it."""
+    """RT-DETR, D-FINE and similar: a decoder with outputs for queries that were selected before
+    it."""
     graph, pair = outputs.graph, outputs.pair()
     if pair is None or any(chosen(graph, name) for name in pair):
         pair = before_choice(outputs)

@@ -1,5 +1,6 @@
-"""Networks of eight bits taken apart to float: QuantizeLinear and DequantizeLinear around each operator (QDQ),
-quantisation at run time (DynamicQuantizeLinear with ConvInteger, MatMulInteger), QLinearConv and QLinearMatMul."""
+"""Converts 8-bit networks to float: QuantizeLinear and DequantizeLinear around each operator (QDQ),
+quantisation at run time (DynamicQuantizeLinear with ConvInteger, MatMulInteger), QLinearConv and
+QLinearMatMul."""
 
 import numpy as np
 from onnx import TensorProto
@@ -7,12 +8,12 @@ from onnx import TensorProto
 from .faults import Fault
 from .graph import Node
 
-# Behind these a quantisation that begins at zero stands for the Relu that the quantising tool took out.
+# After these, a quantisation with zero as lower limit replaces a Relu that the quantiser removed.
 LINEAR = ("Conv", "ConvTranspose", "Gemm", "MatMul", "Add", "BatchNormalization")
 
 
 def dequantised(value, scale, zero, axis):
-    """(value - zero)·scale, by channels along `axis` where there are several."""
+    """(value - zero)·scale, by channels along `axis` if there are several."""
     value = np.asarray(value).astype(np.float32)
     scale = np.asarray(scale, np.float32)
     zero = np.zeros_like(scale) if zero is None else np.asarray(zero).astype(np.float32)
@@ -34,7 +35,7 @@ def dequantised(value, scale, zero, axis):
 class Floats:
     def __init__(self, graph):
         self.graph, self.constants = graph, graph.constants
-        self.same = {}   # tensor of integers or behind them: the float tensor that it was made from
+        self.same = {}   # tensor of integers, or derived from them: the original float tensor
         self.nodes, self.kinds, self.sums = [], {}, set()
         self.count = 0
 
@@ -52,7 +53,7 @@ class Floats:
         return name
 
     def fixed(self, node, index):
-        """A constant input; None where it is left out."""
+        """A constant input; None if it is omitted."""
         if len(node.inputs) <= index or node.inputs[index] == "":
             return None
         value = self.constants.get(node.inputs[index])
@@ -68,7 +69,8 @@ class Floats:
             self.same[output] = source
 
     def limited(self, output, source, scale, zero):
-        """What quantisation does beyond rounding: from zero on, it cuts off what is below."""
+        """Effect of a quantisation without rounding: it clips values below zero if its range starts
+        there."""
         zero = np.zeros((), np.uint8) if zero is None else np.asarray(zero)
         begins = zero.size == 1 and int(zero.ravel()[0]) == np.iinfo(zero.dtype).min
         if not begins or self.kinds.get(source) not in LINEAR:
@@ -82,7 +84,7 @@ class Floats:
             self.emit("Clip", [source], output, {"min": 0.0, "max": float(high)})
 
     def weight(self, node, index, zero, axis, scale=None):
-        """A quantised constant of `node` as float; a tensor that is computed stays itself."""
+        """A quantised constant of `node` as float; a computed tensor is unchanged."""
         name = node.inputs[index]
         if name not in self.constants:
             return self.real(name)
@@ -90,7 +92,7 @@ class Floats:
         return self.constant(value, f"{name}_float{self.count}")
 
     def integer(self, node, kind):
-        """ConvInteger and MatMulInteger: their scales are factors behind them."""
+        """ConvInteger and MatMulInteger: their scales are factors after them."""
         zero = self.constants.get(node.inputs[3]) if len(node.inputs) > 3 and node.inputs[3] else None
         weight = self.weight(node, 1, zero, 0 if kind == "Conv" else -1)
         if kind == "Conv" and weight not in self.constants:
@@ -101,7 +103,8 @@ class Floats:
         self.sums.add(node.outputs[0])
 
     def linear(self, node, kind):
-        """QLinearConv and QLinearMatMul: x, its scale and zero, w, its scale and zero, those of the answer, bias."""
+        """QLinearConv and QLinearMatMul. Inputs: x, its scale and zero, w, its scale and zero,
+        scale and zero of the output, bias."""
         x_scale, w_scale, w_zero = self.fixed(node, 1), self.fixed(node, 4), self.fixed(node, 5)
         axis = 0 if kind == "Conv" else -1
         inputs = [self.weight(node, 0, self.fixed(node, 2), 0, x_scale), self.weight(node, 3, w_zero, axis, w_scale)]
@@ -115,7 +118,7 @@ class Floats:
         self.limited(node.outputs[0], out, self.fixed(node, 6), self.fixed(node, 7))
 
     def take(self, node):
-        """True where `node` was of integers and is float now."""
+        """Returns True if `node` used integers and was converted to float."""
         if node.domain:
             return False
         if node.kind == "DequantizeLinear":
@@ -149,7 +152,8 @@ QUANTISED = ("DequantizeLinear", "QuantizeLinear", "DynamicQuantizeLinear", "Con
 
 
 def to_float(graph):
-    """The graph without integers; returns what was taken apart, for people ("" where nothing was)."""
+    """Converts the graph to float. Returns a description of the conversions for people ("" if there
+    were none)."""
     found = sorted({n.kind for n in graph.nodes if n.kind in QUANTISED and not n.domain})
     if not found:
         return ""
@@ -161,7 +165,7 @@ def to_float(graph):
             for output in node.outputs:
                 floats.kinds[output] = node.kind
     graph.nodes = floats.nodes
-    for kept in (graph.types, graph.shapes):  # of tensors that are gone
+    for kept in (graph.types, graph.shapes):  # deletes entries of removed tensors
         for name in floats.same:
             kept.pop(name, None)
     return f"its eight-bit operators ({', '.join(found)}) were taken apart to float: it is as fast as the float network"

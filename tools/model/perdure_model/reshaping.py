@@ -1,4 +1,5 @@
-"""Another input size for a network that is convolutional: sizes that the file has written down are scaled with it."""
+"""Changes the input size of a convolutional network: scales the sizes that are stored in the
+file."""
 
 import math
 
@@ -8,7 +9,7 @@ from .faults import USAGE, Fault
 
 
 def of_camera(size, camera, step):
-    """About as many pixels as `size`, in the shape of the camera's images, in multiples of `step`."""
+    """About as many pixels as `size`, with the camera's aspect ratio, in multiples of `step`."""
     height = math.sqrt(size[0] * size[1] * camera[1] / camera[0])
     return [max(step, round(n / step) * step) for n in (height * camera[0] / camera[1], height)]
 
@@ -18,7 +19,7 @@ class Reshaping:
         self.graph, self.old, self.new = graph, old, new
 
     def pair(self, rows, columns):
-        """A grid of cells of some stride, at the new size; None where it is none."""
+        """A grid of cells of some stride, at the new size; None if it is not such a grid."""
         if rows < 1 or columns < 1 or rows * self.old[0] != columns * self.old[1] or self.old[1] % rows:
             return None
         stride = self.old[1] // rows
@@ -27,7 +28,7 @@ class Reshaping:
         return [self.new[1] // stride, self.new[0] // stride]
 
     def count(self, cells):
-        """The number of cells of some stride, at the new size; None where it is none."""
+        """The number of cells of some stride, at the new size; None if it is not such a number."""
         stride = math.isqrt(self.old[0] * self.old[1] // cells) if cells > 0 else 0
         if stride == 0 or self.old[0] % stride or self.old[1] % stride:
             return None
@@ -35,7 +36,7 @@ class Reshaping:
         return grid[0] * grid[1] if grid and cells * stride * stride == self.old[0] * self.old[1] else None
 
     def target(self, target, given):
-        """The target of a Reshape. `given`: the shape that it takes, at the old size."""
+        """The target of a Reshape. `given`: its input shape at the old size."""
         shape = [given[i] if n == 0 else int(n) for i, n in enumerate(target)]
         if -1 in shape:
             shape[shape.index(-1)] = -int(np.prod(given)) // int(np.prod(shape))
@@ -54,7 +55,7 @@ class Reshaping:
         return len(given) >= 4 and given[-2] * given[-1] == cells or cells in given[1:]
 
     def constant_of(self, node, index, value):
-        """A constant of this node's own: others may share the one that it has."""
+        """Gives the node its own constant, because other nodes may share the old one."""
         name = f"{node.outputs[0]}_input{index}"
         self.graph.constants[name] = value
         node.inputs[index] = name
@@ -74,7 +75,7 @@ class Reshaping:
             self.constant_of(node, 3, np.array([*sizes[:-2], *grid], np.int64))
 
     def pool(self, node):
-        """Over the whole of its tensor: it is of every size then."""
+        """A pool over its whole tensor becomes global, so that it fits every size."""
         given = self.graph.shape(node.inputs[0])
         kernel, strides = node.attributes.get("kernel_shape"), node.attributes.get("strides", [1, 1])
         if given and list(given[2:]) == list(kernel) and not any(node.attributes.get("pads", [0])) and \
@@ -93,7 +94,7 @@ class Reshaping:
 
 
 def first_at_odds(graph, outputs):
-    """What cannot be computed at the new size, by its operator; "" where everything is."""
+    """The first operator that cannot be computed at the new size; "" if all can."""
     _, _, height, width = graph.inputs[graph.image][1]
     image = np.zeros((1, 3, height, width), np.float32)
     values, stuck = graph.evaluate({graph.image: image}, outputs)
@@ -101,7 +102,8 @@ def first_at_odds(graph, outputs):
 
 
 def reshape(path, graph, found, old, new):
-    """`found`: the finding, whose heads have been cut free. Throws where the network is not convolutional."""
+    """`found`: the finding, already cut at its heads. Throws if the network is not
+    convolutional."""
     levels = found.keys.get("levels")
     if found.family == "fastestdet":
         raise Fault(f"{path} is a fastestdet, which says sizes in shares of the input that it was trained with; "

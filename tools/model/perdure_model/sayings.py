@@ -1,4 +1,4 @@
-"""What is said where a network cannot be taken: the operator's name, and the export that works."""
+"""Errors for networks that cannot be imported: they name the operator and an export that works."""
 
 from onnx import GraphProto
 
@@ -34,14 +34,15 @@ def exports(family):
 
 
 def refuse_choosing(path, operators, family):
-    """The answer of a network that suppresses its boxes itself has no evidence for each class."""
+    """Refuses a network with its own suppression, because its output has no evidence for each
+    class."""
     raise Fault(f"{path} chooses its boxes itself (operator {', '.join(operators)}), and behind it no heads of a known "
                 f"family were found; Perdure needs the boxes before that choice, with a score for each class. "
                 f"{exports(family)}")
 
 
 def refuse_hidden(path, node, found, family):
-    """Without the heads behind it the network would be taken for one of fewer levels."""
+    """Refuses a network with an undetected head; it would be imported with fewer levels."""
     what = f"{node.domain}.{node.kind}" if node.domain else node.kind
     where = f"node {node.name}" if node.name else f"the node that gives {node.outputs[0]}"
     levels = f"; only {found} of its levels were found" if found else ""
@@ -50,15 +51,15 @@ def refuse_hidden(path, node, found, family):
 
 
 def refuse_own(path, graph):
-    """The project's own family has calibrated numbers that no graph holds."""
+    """Refuses the project's own family, whose calibration is not in the graph."""
     if {"logits8", "box8"} <= set(graph.outputs):
         raise Fault(f"{path} is of the project's own family perdure: use it as it is, with the model.json that "
                     "tools/train wrote beside it")
 
 
 def inside(path, graph, family, onnx_runtime):
-    """Operators that are left after the cut and that OpenCV 4.6 has not. Refused where there is no
-    ONNX Runtime, which has them unless they are another runtime's own or hold graphs."""
+    """The remaining operators that OpenCV 4.6 lacks. Refuses them without ONNX Runtime, and refuses
+    operators of other runtimes or with subgraphs."""
     found = sorted({n.kind for n in graph.nodes if n.kind in INSIDE or n.domain})
     own = any(n.domain or any(isinstance(a, GraphProto) for a in n.attributes.values()) for n in graph.nodes)
     if not found or (onnx_runtime and not own):

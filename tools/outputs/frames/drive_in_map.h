@@ -1,4 +1,4 @@
-// How a run lies in M, the frame in which its map is one, for the pictures and map.geojson.
+// Poses and edges of a run in M, the frame of its map, for the pictures and map.geojson.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,28 +13,29 @@
 
 namespace perdure::tools {
 
-/// A loop or tracking edge of the map's graph, between two places in M.
+/// A loop or tracking edge of the map's graph, between two positions in M.
 struct LoopLine {
   Eigen::Vector3d a_M = Eigen::Vector3d::Zero(), b_M = Eigen::Vector3d::Zero();
   bool believed = true;
 };
 
 struct DriveInMap {
-  /// T_MW beside each anchor of the session, by time, as the graph has it in the end. Empty: the
-  /// run has no graph, and M is W.
+  /// T_MW at each anchor of the session, by time, from the final graph. Empty: the run has no
+  /// graph, and M is W.
   std::vector<std::pair<TimePoint, RigidTransform>> along;
-  /// T_MW for the last belief of each object; what is missing is laid by `along`.
+  /// T_MW for the last belief of each object; objects without an entry use `along`.
   std::map<ObjectId, RigidTransform> objects;
   std::vector<Eigen::Vector3d> anchors_M;
   std::vector<LoopLine> loops;
-  /// The body by frame where the map had it at that time, in the axes in which the session began.
+  /// Position of the body by frame as the map estimated it at that time, in the axes of the
+  /// session's start.
   std::map<std::uint64_t, Eigen::Vector3d> then;
 
-  /// The body in M; between anchors T_MW is interpolated.
+  /// Pose of the body in M; T_MW is interpolated between anchors.
   RigidTransform T_MB(const replay::StampedPose& pose) const;
-  /// T_MW at the last anchor until a time, or the first one.
+  /// T_MW at the last anchor before a time, or at the first one.
   RigidTransform T_MW(TimePoint time) const;
-  /// T_MW where the session began.
+  /// T_MW at the start of the session.
   RigidTransform T_MW_begin() const;
 };
 

@@ -1,4 +1,4 @@
-// A plain line chart in a part of a picture: axes with ticks and numbers, curves, shaded spans.
+// A line chart in a part of a picture: axes with ticks and numbers, curves, shaded spans.
 #pragma once
 
 #include <opencv2/core/mat.hpp>
@@ -10,9 +10,9 @@ namespace perdure::tools {
 
 /// Round numbers, at most `most` of them, that cover [low, high].
 std::vector<double> ticksOf(double low, double high, int most);
-/// 1, 2 or 5 times a power of ten: the largest that is not above `value` > 0.
+/// 1, 2 or 5 times a power of ten: the largest one up to `value` > 0.
 double roundBelow(double value);
-/// In as few digits as are needed; never "-0".
+/// With as few digits as necessary; never "-0".
 std::string numberText(double value);
 
 class Chart {
@@ -20,12 +20,12 @@ class Chart {
   struct Range {
     double low = 0.0, high = 1.0;
   };
-  /// `area` is that of the curves; numbers stand to the left of it and below it.
+  /// `area` is the area of the curves; numbers are to the left of it and below it.
   Chart(cv::Mat& picture, const cv::Rect& area, const Range& x, const Range& y);
 
   void shade(double from, double to, const Colour& colour, double opacity);
   void drawGrid(bool with_x_numbers);
-  /// Points (x, y); what is above or below the range is drawn at its edge.
+  /// Points (x, y); values outside the range are drawn at its edge.
   void drawCurve(const std::vector<cv::Point2d>& points, Stroke stroke);
   cv::Point2d at(double x, double y) const;
 

@@ -1,4 +1,4 @@
-// What was said at each frame, in short: enough to draw the frame again after the drive.
+// Short records of each frame, sufficient to draw the frame after the drive.
 #pragma once
 
 #include <array>
@@ -32,19 +32,19 @@ ObjectGlance glanceAt(const ObjectBelief& object);
 
 struct DetectionGlance {
   Box box;
-  double probability = 0.0;  ///< of the best class against clutter and the other classes
+  double probability = 0.0;  ///< probability of the best class against clutter and others
 };
 
 struct FrameGlance {
   FrameStamp stamp;
-  bool has_objects = false;  ///< an `objects` message came for it
-  RigidTransform T_WB;       ///< where has_objects
+  bool has_objects = false;  ///< an `objects` message was received for this frame
+  RigidTransform T_WB;       ///< valid if has_objects
   std::vector<ObjectGlance> objects;
   std::vector<DetectionGlance> detections;
 };
 
-/// The corners of an object's box in W: bit 0 of the index is front or rear, bit 1 left or right,
-/// bit 2 top or bottom.
+/// The corners of an object's box in W. Index bit 0: front or rear; bit 1: left or right; bit 2:
+/// top or bottom.
 std::array<Eigen::Vector3d, 8> cornersOf(const ObjectGlance& object);
 
 /// Collects by frame; a later message about the same frame replaces the earlier one.

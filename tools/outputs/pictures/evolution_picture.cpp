@@ -12,7 +12,7 @@
 namespace perdure::tools {
 namespace {
 
-constexpr double kSameThing = 3.0;  // metres between an object and its truth
+constexpr double kSameThing = 3.0;  // largest distance in m of an object from its true one
 constexpr int kWidth = 1500, kRow = 190, kTop = 66, kBottom = 56;
 constexpr int kLeft = 84, kBetween = 90, kRight = 24;
 constexpr int kBodyRow = 300;
@@ -24,7 +24,7 @@ struct Seen {
 };
 struct Candidate {
   Evolution evolution;
-  std::vector<Seen> seen;  ///< while in sight
+  std::vector<Seen> seen;  ///< frames in which it is visible
   bool confirmed = false;
 };
 
@@ -62,7 +62,7 @@ std::vector<const Candidate*> chosen(const std::map<ObjectId, Candidate>& all, s
   return firsts;
 }
 
-/// Nothing where the track was not there in half of the frames in which the object was in sight.
+/// Empty if the track was absent in at least half of the frames in which the object was visible.
 std::optional<double> medianDistance(const Candidate& one, const TruthTrack& track) {
   std::vector<double> distances;
   for (const Seen& seen : one.seen) {
@@ -75,7 +75,7 @@ std::optional<double> medianDistance(const Candidate& one, const TruthTrack& tra
   return *middle;
 }
 
-/// The nearest pairs first, each object and each track in one pair at most.
+/// Pairs with the smallest distance first; each object and each track is in at most one pair.
 std::map<ObjectId, const TruthTrack*> pairs(const std::map<ObjectId, Candidate>& all,
                                             const PictureTruth* truth) {
   struct Pair {
@@ -128,7 +128,7 @@ void shadePhases(Chart& chart, const Evolution& evolution) {
   }
 }
 
-/// Draws f(point) where it has a value; frames without one, and gaps, part the curve.
+/// Draws f(point) if it has a value; frames without a value, and gaps, interrupt the curve.
 template <class Value>
 void drawSeries(Chart& chart, const Evolution& evolution, const Stroke& stroke, Value&& value) {
   constexpr std::uint64_t kGap = 5;
@@ -147,7 +147,8 @@ void drawSeries(Chart& chart, const Evolution& evolution, const Stroke& stroke, 
   end();
 }
 
-/// The upper end of the error's axis: nearly all of the curves, not their wildest start.
+/// Upper end of the error axis: covers nearly all of the curves, without extreme values at their
+/// start.
 double topOf(const Evolution& evolution) {
   std::vector<double> values;
   for (const auto& point : evolution.points) {

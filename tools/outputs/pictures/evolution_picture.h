@@ -1,6 +1,6 @@
-// evolution.png: how sure the system was of a few objects, frame by frame: the error of the
-// position where truth is known, its standard deviation, and the existence. Above them, where the
-// map closed loops, how far off the body was.
+// evolution.png: the uncertainty of selected objects over the frames. It shows the position error
+// if ground truth is known, its standard deviation, and the existence. If the map closed loops, a
+// row above shows the error of the body.
 #pragma once
 
 #include <filesystem>
@@ -16,27 +16,28 @@ enum class Phase { kInSight, kHidden, kOutOfView };
 
 struct EvolutionPoint {
   std::uint64_t frame = 0;
-  double sigma = 0.0;           ///< root of the trace of the position's covariance, m
-  std::optional<double> error;  ///< distance of the centre from truth, m
+  double sigma = 0.0;           ///< root of the trace of the position covariance, m
+  std::optional<double> error;  ///< distance of the centre from ground truth, m
   double existence = 0.0;
   Phase phase = Phase::kInSight;
 };
 
 struct Evolution {
   ObjectId id = 0;
-  std::string class_name;  ///< the last one
+  std::string class_name;  ///< the class at the end
   std::vector<EvolutionPoint> points;
 };
 
-/// Of the objects that were confirmed: the longest seen of each class but *other*, then the longest
-/// seen of the rest, at most `most`. Truth is the track that was nearest to an object by the median
-/// over the frames in which it was in sight: within 3 m, the nearest pairs first, one each.
+/// Selects at most `most` confirmed objects: the one visible longest in each class except *other*,
+/// then the others visible longest. Ground truth is the nearest track by the median over the frames
+/// in which the object was visible, within 3 m. Pairs are one-to-one, with the smallest distances
+/// first.
 std::vector<Evolution> chooseEvolutions(const DriveLog& log, const PictureTruth* truth,
                                         std::size_t most);
 
-/// `body` is a row of its own above the objects, where it has points.
+/// `body` is a separate row above the objects, if it has points.
 cv::Mat drawEvolutions(const std::vector<Evolution>& evolutions, const BodyErrors& body = {});
-/// False: there is nothing to draw, or the file cannot be written.
+/// Returns false if there is nothing to draw, or if the file cannot be written.
 bool writeEvolution(const DriveLog& log, const PictureTruth* truth, const BodyErrors& body,
                     const std::filesystem::path& file);
 

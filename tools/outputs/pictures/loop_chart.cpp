@@ -39,7 +39,7 @@ void drawSeries(Chart& chart, const BodyErrors& errors, const Stroke& stroke, Va
   chart.drawCurve(points, stroke);
 }
 
-/// A pale line over the height, and a tip on the border above.
+/// A pale line over the whole height, and a tip on the border above.
 void drawMark(cv::Mat& picture, const cv::Rect& area, const Chart& chart,
               const BodyErrors::Mark& mark, double top) {
   const cv::Point2d at = chart.at(static_cast<double>(mark.frame), top);
@@ -50,7 +50,7 @@ void drawMark(cv::Mat& picture, const cv::Rect& area, const Chart& chart,
   drawFilled(picture, {at, at + cv::Point2d(-4, -7), at + cv::Point2d(4, -7)}, colour, 1.0);
 }
 
-/// Entries from right to left over the area.
+/// Draws legend entries from right to left over the area.
 class LegendLine {
  public:
   LegendLine(cv::Mat& picture, const cv::Rect& area)

@@ -1,4 +1,4 @@
-// The first row of evolution.png: how far off the body was in W, and on the map before and after
+// The first row of evolution.png: the body's position error in W, and on the map before and after
 // each loop.
 #pragma once
 
@@ -18,26 +18,26 @@ namespace perdure::tools {
 struct BodyErrors {
   struct Point {
     std::uint64_t frame = 0;
-    std::optional<double> in_W;    ///< of the odometry, m
-    std::optional<double> then;    ///< where the map had the body at that time
-    std::optional<double> at_end;  ///< where the map has that place in the end
+    std::optional<double> in_W;    ///< error of the odometry, m
+    std::optional<double> then;    ///< error of the map at that time
+    std::optional<double> at_end;  ///< error of the final map
   };
   struct Mark {
     std::uint64_t frame = 0;
     EventKind kind = EventKind::kLoopClosed;
   };
-  bool against_truth = false;  ///< else `then` is how far the map moved the body out of W
+  bool against_truth = false;  ///< false: `then` is the map's correction of the body in W
   std::vector<Point> points;
   std::vector<Mark> marks;
 };
 
-/// `poses` in W, by frame. Truth is in W, laid where the run begins; so are all of the errors. No
-/// points where there was no loop.
+/// `poses`: in W, by frame. Ground truth and all errors are in W, with ground truth aligned at the
+/// start of the run. Returns no points if there was no loop.
 BodyErrors bodyErrors(const std::map<std::uint64_t, replay::StampedPose>& poses,
                       const DriveInMap& in_map, std::vector<BodyErrors::Mark> marks,
                       const PictureTruth* truth);
 
-/// Into an area of the picture; `frames` is the range of the axis below.
+/// Draws into an area of the picture; `frames` is the range of the axis below.
 void drawBodyErrors(cv::Mat& picture, const cv::Rect& area, const BodyErrors& errors,
                     const Chart::Range& frames);
 

@@ -18,7 +18,7 @@ namespace perdure::tools {
 namespace {
 
 constexpr double kLongSide = 1500.0, kLongestSide = 4000.0;  // pixels
-constexpr double kLeastScale = 4.0, kMostScale = 60.0;       // pixels a metre
+constexpr double kLeastScale = 4.0, kMostScale = 60.0;       // pixels for each metre
 constexpr double kNearTheWay = 60.0;                         // metres
 constexpr double kLeastExtent = 6.0;
 
@@ -30,8 +30,8 @@ double distanceToWay(const std::vector<Eigen::Vector3d>& path, const Eigen::Vect
   return least;
 }
 
-/// Three times the distance within which four fifths of the objects are: one stray estimate does
-/// not make the rest small.
+/// Three times the distance that includes four fifths of the objects, so that a single outlier does
+/// not shrink the map.
 double usualDistance(const MapContent& content) {
   std::vector<double> distances;
   for (const auto& object : content.objects) {
@@ -61,7 +61,8 @@ void drawEllipse(cv::Mat& picture, const MapView& view, const ObjectGlance& obje
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(
       Eigen::Matrix2d(object.p_covariance.topLeftCorner<2, 2>()));
   const Eigen::Vector2d axes = 2.0 * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt();
-  // What drove out of sight may be anywhere by now: a ring around half of the map tells nothing.
+  // Omits ellipses over half of the map: the position of an object that drove out of sight is
+  // unknown.
   if (!axes.allFinite() || axes.maxCoeff() > 0.5 * (view.high - view.low).minCoeff()) return;
   Polyline line;
   constexpr int kSteps = 48;
@@ -81,7 +82,7 @@ void drawObject(cv::Mat& picture, const MapView& view, const ObjectGlance& objec
   drawClosed(picture, outline,
              {colour, thick(view, object.hidden() ? 1 : 2), object.hidden(), 5.0 * view.text,
               4.0 * view.text});
-  const cv::Point2d front = (outline[0] + outline[1]) / 2.0;  // which way it faces
+  const cv::Point2d front = (outline[0] + outline[1]) / 2.0;  // direction that the object faces
   drawLine(picture, {view.at(flat(object.p_W)), front}, {colour, thick(view, 1)});
 }
 
@@ -117,7 +118,7 @@ void drawWay(cv::Mat& picture, const MapView& view, const std::vector<Eigen::Vec
   drawLine(picture, line, stroke);
 }
 
-/// A disc where it begins, an arrow head where it ends.
+/// Draws a disc at the start and an arrow head at the end.
 void drawEnds(cv::Mat& picture, const MapView& view, const std::vector<Eigen::Vector3d>& path) {
   if (path.empty()) return;
   cv::circle(picture, cv::Point(view.at(flat(path.front()))), thick(view, 5), kInk, cv::FILLED,
@@ -144,7 +145,7 @@ void drawAnchors(cv::Mat& picture, const MapView& view, const std::vector<Eigen:
   }
 }
 
-/// What is not believed is drawn over what is, so that it is seen.
+/// Draws rejected loops over accepted ones, so that they are visible.
 void drawLoops(cv::Mat& picture, const MapView& view, const std::vector<LoopLine>& loops) {
   for (const bool believed : {true, false}) {
     for (const LoopLine& loop : loops) {
@@ -241,7 +242,7 @@ MapView viewOf(const MapContent& content) {
 cv::Mat drawMap(const MapContent& content, const MapView& view) {
   cv::Mat picture(pictureSize(content, view), CV_8UC3, kPaper);
   drawGrid(picture, view);
-  cv::Mat map = picture.clone();  // what is drawn beyond the map's border is not taken over
+  cv::Mat map = picture.clone();  // clips drawings to the map's area
   drawLandmarks(map, view, content.landmarks);
   drawWay(map, view, content.path, {kInk, thick(view, 2)});
   drawAnchors(map, view, content.anchors);

@@ -1,5 +1,6 @@
-// map.png: the map from above, as figures 1 and 4 of the paper: the way, the sparse points, the
-// objects with their uncertainty, and, where it is known, the truth in a colour of its own.
+// map.png: the map from above, as in figures 1 and 4 of the paper. It shows the trajectory, the
+// sparse points, the objects with their uncertainty, and, if known, ground truth in a separate
+// colour.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,37 +15,38 @@
 
 namespace perdure::tools {
 
-/// All of it in one frame, M or W.
+/// All content is in one frame, M or W.
 struct MapContent {
-  bool in_M = false;                  ///< else in W
-  std::vector<Eigen::Vector3d> path;  ///< of the body
-  std::vector<ObjectGlance> objects;  ///< as they are at the end
+  bool in_M = false;                  ///< false: the content is in W
+  std::vector<Eigen::Vector3d> path;  ///< trajectory of the body
+  std::vector<ObjectGlance> objects;  ///< estimates at the end
   std::vector<Eigen::Vector3f> landmarks;
   std::vector<Eigen::Vector3d> anchors;
   std::vector<LoopLine> loops;
   std::optional<PictureTruth> truth;
-  TimePoint end;                       ///< for the truth of what is moved or taken away
+  TimePoint end;                       ///< selects ground truth of objects that move or disappear
   std::optional<double> yaw_of_north;  ///< radians from x
 };
 
-/// Metres to the picture's pixels: x to the right, y up, the same scale both ways.
+/// Transforms metres to pixels of the picture: x to the right, y up, equal scales.
 struct MapView {
   Eigen::Vector2d low = Eigen::Vector2d::Zero(), high = Eigen::Vector2d::Ones();  ///< metres
-  double scale = 1.0;  ///< pixels a metre
-  double text = 1.0;   ///< size of letters and lines; larger pictures need larger ones
-  cv::Rect area;       ///< of the map in the picture
+  double scale = 1.0;  ///< pixels for each metre
+  double text = 1.0;   ///< size of letters and lines, in proportion to the picture
+  cv::Rect area;       ///< area of the map in the picture
   double bar_m = 1.0;  ///< length of the scale bar
-  cv::Point bar;       ///< its left end
+  cv::Point bar;       ///< left end of the scale bar
 
   cv::Point2d at(const Eigen::Vector2d& p) const {
     return {area.x + scale * (p.x() - low.x()), area.y + scale * (high.y() - p.y())};
   }
 };
 
-/// A view of the way and of what is near it (60 m, less in rooms; truth: half of that).
+/// A view of the trajectory and its surroundings (60 m, less in rooms; half of that for ground
+/// truth).
 MapView viewOf(const MapContent& content);
 cv::Mat drawMap(const MapContent& content, const MapView& view);
-/// False: there is neither a way nor an object, or the file cannot be written.
+/// Returns false if there is neither a trajectory nor an object, or if the file cannot be written.
 bool writeMap(const MapContent& content, const std::filesystem::path& file);
 
 }  // namespace perdure::tools

@@ -14,9 +14,9 @@ namespace perdure::tools {
 namespace {
 
 constexpr int kHeader = 30;
-constexpr double kDimmed = 0.88;            // the image, so that lines stand out
-constexpr double kLeastProbability = 0.15;  // fainter boxes are not drawn
-constexpr int kSamples = 16;                // of an edge: lenses bend it
+constexpr double kDimmed = 0.88;            // dims the image, so that lines are visible
+constexpr double kLeastProbability = 0.15;  // less probable boxes are not drawn
+constexpr int kSamples = 16;                // samples of an edge, which lenses may bend
 const Colour kWhite(255, 255, 255), kGrey(165, 165, 165), kNight(38, 34, 30);
 
 int even(double value) { return static_cast<int>(value) / 2 * 2; }
@@ -25,7 +25,7 @@ Colour brightColour(const ObjectGlance& object) {
   return mixed(classColour(object.class_name), kWhite, 0.35);
 }
 
-/// Only the ends where the line between them is straight.
+/// Keeps only the end points of a straight line.
 void straighten(Polyline& line) {
   if (line.size() < 3) return;
   const cv::Point2d way = line.back() - line.front();
@@ -36,7 +36,7 @@ void straighten(Polyline& line) {
   if (straight) line = {line.front(), line.back()};
 }
 
-/// The line from a to b (in C) on the image; in pieces where part of it cannot be seen.
+/// The line from a to b (in C) on the image, split into pieces at invisible parts.
 std::vector<Polyline> projected(const CameraModel& camera, const Eigen::Vector3d& a,
                                 const Eigen::Vector3d& b, double scale) {
   std::vector<Polyline> pieces(1);
@@ -52,7 +52,7 @@ std::vector<Polyline> projected(const CameraModel& camera, const Eigen::Vector3d
   return pieces;
 }
 
-/// Draws an object's box; returns what it covers of the image, empty where it is not in it.
+/// Draws an object's box; returns the area that it covers, empty if it is outside the image.
 cv::Rect drawBox(cv::Mat& image, const ObjectGlance& object, const RigidTransform& T_CW,
                  const CameraModel& camera, double scale) {
   const auto corners_W = cornersOf(object);
@@ -74,7 +74,7 @@ cv::Rect drawBox(cv::Mat& image, const ObjectGlance& object, const RigidTransfor
     }
   };
   for (const auto& [a, b] : kEdges) draw(corners[a], corners[b]);
-  // Which way it faces: from the middle of its floor to the middle of the front's lower edge.
+  // Direction of the object: from the centre of its floor to the centre of the front's lower edge.
   draw((corners[0] + corners[3]) / 2.0, (corners[1] + corners[3]) / 2.0);
   return covered.empty() ? cv::Rect() : cv::boundingRect(covered) & all;
 }
@@ -132,12 +132,12 @@ void drawHeader(cv::Mat& header, const FrameGlance& frame, TimePoint start) {
   if (right.x > sizeOf(text, style).width + 30) drawText(header, key, right, kGrey, {0.42});
 }
 
-// Metres ahead and to the left of the body to pixels of the plan.
+// Transforms metres ahead and to the left of the body to pixels of the plan.
 struct PlanView {
   cv::Point2d body;
   double scale;
   RigidTransform T_WB;
-  Eigen::Matrix3d R_HW;  ///< turns W to the body's heading
+  Eigen::Matrix3d R_HW;  ///< rotates W to the body's heading
 
   cv::Point2d operator()(const Eigen::Vector3d& p_W) const {
     const Eigen::Vector3d p = R_HW * (p_W - T_WB.p);
@@ -213,13 +213,13 @@ void OverlayPicture::drawObjects(cv::Mat& image, const FrameGlance& frame) const
   const RigidTransform T_CW = (frame.T_WB * camera_.T_BC()).inverse();
   const auto objects = fartherFirst(frame);
   std::vector<cv::Rect> boxes(objects.size()), taken;
-  for (const bool hidden : {false, true}) {  // over what hides them, or they would not be seen
+  for (const bool hidden : {false, true}) {  // draws occluded objects last
     for (std::size_t i = 0; i < objects.size(); ++i) {
       if (objects[i].hidden() != hidden) continue;
       boxes[i] = drawBox(image, objects[i], T_CW, camera_, scale_);
     }
   }
-  for (std::size_t i = objects.size(); i-- > 0;) {  // the nearest labels choose first
+  for (std::size_t i = objects.size(); i-- > 0;) {  // places labels of near objects first
     if (!boxes[i].empty()) drawLabel(image, objects[i], boxes[i], taken);
   }
 }

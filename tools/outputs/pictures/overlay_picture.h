@@ -1,5 +1,5 @@
-// One frame of overlay.mp4: the image with the objects as boxes in space, solid where they are in
-// sight, dashed where they are known and hidden, and beside it what is around the body from above.
+// One frame of overlay.mp4: the image with the objects as 3D boxes, solid if visible and dashed if
+// occluded. Beside it, a plan shows the surroundings of the body from above.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,20 +12,20 @@
 namespace perdure::tools {
 
 struct OverlaySettings {
-  double reach_m = 30.0;  ///< from the body to the upper edge of the plan
-  int max_width = 1280;   ///< larger images are made smaller, to this
+  double reach_m = 30.0;  ///< distance from the body to the upper edge of the plan
+  int max_width = 1280;   ///< larger images are scaled down to this width
 };
 
 class OverlayPicture {
  public:
   OverlayPicture(const CameraCalibration& camera, const OverlaySettings& settings);
 
-  /// Of every picture: that of the image (after scaling), the plan and the header; even numbers.
+  /// Size of each picture: the scaled image, the plan and the header; even numbers.
   cv::Size size() const;
-  /// Where the image is in the picture.
+  /// Area of the image in the picture.
   cv::Rect imageArea() const;
-  /// `image`: CV_8UC1 or CV_8UC3 in the size of the calibration, distorted as it is. `path`: where
-  /// the body was, up to this frame. `start`: the time that counts as 0.
+  /// `image`: CV_8UC1 or CV_8UC3 in the size of the calibration, not undistorted. `path`: positions
+  /// of the body up to this frame. `start`: the time that is displayed as 0.
   cv::Mat draw(const cv::Mat& image, const FrameGlance& frame,
                const std::vector<Eigen::Vector3d>& path, TimePoint start) const;
 
@@ -37,11 +37,11 @@ class OverlayPicture {
 
   CameraModel camera_;
   OverlaySettings settings_;
-  double scale_;  ///< of the image in the picture
+  double scale_;  ///< scale of the image in the picture
 };
 
-/// Metres from the body within which nine tenths of the confirmed objects in sight were: what a
-/// plan should show. 30 where there were none; at least 4, at most 60.
+/// Range of the plan: the distance in m from the body that includes nine tenths of the visible
+/// confirmed objects. 30 if there were none; at least 4, at most 60.
 double usualReach(const DriveLog& log);
 
 }  // namespace perdure::tools

@@ -1,4 +1,4 @@
-// overlay.mp4: the frames of the first camera with what was known at each of them.
+// overlay.mp4: the frames of the first camera with the estimates at each frame.
 #pragma once
 
 #include <cstddef>
@@ -21,13 +21,14 @@ class OverlayWriter {
   OverlayWriter(std::filesystem::path file, const CameraCalibration& camera, double rate_hz,
                 const OverlaySettings& settings);
 
-  /// Frames by time. Opens the file at the first. Reasons: image_missing, image_malformed (viewOf),
-  /// image_size (not that of the calibration), those of VideoFile (nothing is written then).
+  /// Adds a frame; frames must be sorted by time. Opens the file at the first one. Reasons:
+  /// image_missing, image_malformed (viewOf), image_size (differs from the calibration), and those
+  /// of VideoFile (then nothing is written).
   Result<void> add(const Frame& frame, const FrameGlance& glance);
-  /// Ends the film. Reason video_not_written.
+  /// Finishes the film. Reason video_not_written.
   Result<void> finish() { return video_ ? video_->finish() : Result<void>(); }
   std::size_t frames() const { return video_ ? video_->frames() : 0; }
-  /// "H.264", "MPEG-4"; empty before the first frame.
+  /// "H.264" or "MPEG-4"; empty before the first frame.
   std::string codec() const { return video_ ? video_->codec() : ""; }
 
  private:
@@ -41,9 +42,9 @@ class OverlayWriter {
   TimePoint start_;
 };
 
-/// Draws each frame of the log whose image the folder still has. Returns what was written as a
-/// sentence, or why nothing was: it never throws for want of images or of a codec. `progress` is
-/// called with frames done and frames in all.
+/// Draws each frame of the log whose image is still in the folder. Returns a sentence about the
+/// result or the reason of a failure; missing images or codecs do not throw. Calls `progress` with
+/// the frames completed and the total.
 std::string writeOverlay(const DriveLog& log, const replay::DatasetOptions& data,
                          const std::filesystem::path& file,
                          const std::function<void(std::size_t, std::size_t)>& progress);

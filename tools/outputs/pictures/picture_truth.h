@@ -1,5 +1,4 @@
-// What really stood where, as the pictures draw it: in W, or where it says so in M, in the order of
-// time.
+// Ground truth for the pictures, in W or M, sorted by time.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,23 +23,23 @@ struct TruthTrack {
   std::string class_name;
   Eigen::Vector3d size = Eigen::Vector3d::Ones();  ///< length, width, height
   bool moves = false;
-  std::vector<Key> keys;  ///< at least one, by time
+  std::vector<Key> keys;  ///< never empty; sorted by time
   TimePoint present_from = TimePoint::min(), present_until = TimePoint::max();
 
-  /// Standing: the last key up to then, or the first. Moving: on the straight way between keys,
-  /// nothing outside them. Nothing while it is not present.
+  /// State at a time. Static objects: the last key until then, or the first one. Moving objects:
+  /// linear interpolation between keys, nothing outside. Empty while the object is absent.
   std::optional<Key> at(TimePoint time) const;
 };
 
 struct PictureTruth {
-  std::map<std::uint64_t, Eigen::Vector3d> path;  ///< of the body by frame; may be empty
+  std::map<std::uint64_t, Eigen::Vector3d> path;  ///< trajectory by frame; may be empty
   std::vector<TruthTrack> objects;
 };
 
-/// From frame B to frame A; both are level.
+/// Transforms from frame B to frame A; both are gravity-levelled.
 PictureTruth turned(const RigidTransform& T_AB, PictureTruth truth);
 
-/// The track of `truth` that is nearest to `p_W` at a time, nearer than `within` metres.
+/// The track of `truth` nearest to `p_W` at a time, within `within` metres.
 const TruthTrack* nearestTruth(const PictureTruth& truth, const Eigen::Vector3d& p_W,
                                TimePoint time, double within);
 

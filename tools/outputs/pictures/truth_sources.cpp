@@ -11,7 +11,7 @@
 namespace perdure::tools {
 namespace {
 
-/// Keeps up as up: only yaw and position.
+/// Keeps only yaw and position, so that the vertical is unchanged.
 RigidTransform level(const RigidTransform& T) {
   return RigidTransform(rotationAboutZ(yawOf(T.R())), T.p);
 }
@@ -40,7 +40,7 @@ double middle(std::vector<double> values) {
   return *at;
 }
 
-/// One key in the middle of all, by each axis; yaw by that of the mean direction.
+/// One key at the median of all, separately for each axis; yaw from the mean direction.
 TruthTrack::Key middleOf(const std::vector<TruthTrack::Key>& keys) {
   TruthTrack::Key result = keys.front();
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
@@ -81,7 +81,8 @@ PictureTruth truthOfLabels(const std::vector<replay::KittiLabel>& labels,
     const auto pose = poses.find(label.frame);
     if (label.dontCare() || pose == poses.end()) continue;
     const RigidTransform T_WR = pose->second.T_WB * T_RI.inverse();
-    // KITTI's rotation_y turns the camera's x axis, about its y axis, to where the object faces.
+    // KITTI's rotation_y is the angle about the camera's y axis from its x axis to the object's
+    // front.
     const Eigen::Vector3d ahead_W =
         T_WR.q * Eigen::Vector3d(std::cos(label.rotation_y), 0.0, -std::sin(label.rotation_y));
     TruthTrack& track = tracks[label.track];

@@ -1,4 +1,4 @@
-// The pictures' truth from what a dataset has of it: a simulated folder's own, or KITTI's labels.
+// Loads ground truth for the pictures from a dataset: a simulated folder's own, or KITTI's labels.
 #pragma once
 
 #include <cstdint>
@@ -15,19 +15,18 @@ namespace perdure::tools {
 
 using StampedPoses = std::map<std::uint64_t, replay::StampedPose>;  ///< T_WB, by frame
 
-/// Truth has a world of its own: it is laid into W, by yaw and position, so that the body stands
-/// where it is estimated at the first of `poses` for which its true pose is known. Empty where
-/// there is none.
+/// Aligns the world of ground truth with W by yaw and position, at the first of `poses` with a
+/// known true pose. Empty if there is none.
 PictureTruth truthOfSimulation(const sim::Truth& truth, const replay::PoseFile& body,
                                const StampedPoses& poses);
 
-/// Labels are seen from the body, so that they stand in W by `poses`. T_RI: the body in rectified
-/// camera 0. A track that stands still is one box, at the middle of its positions.
+/// Transforms labels, which are relative to the body, to W by `poses`. T_RI: the body in rectified
+/// camera 0. A static track becomes one box at the median of its positions.
 PictureTruth truthOfLabels(const std::vector<replay::KittiLabel>& labels,
                            const RigidTransform& T_RI, const StampedPoses& poses);
 
-/// Whichever the folder has; nothing where it has neither, or where its truth cannot be read (that
-/// is said where the truth is scored).
+/// Loads what the folder contains; empty if it contains neither, or if its ground truth is invalid
+/// (the scoring reports that).
 std::optional<PictureTruth> pictureTruth(const replay::Dataset& dataset,
                                          const replay::DatasetOptions& data,
                                          const StampedPoses& poses);

@@ -28,7 +28,7 @@ struct Closer {
 template <class T>
 using Held = std::unique_ptr<T, Closer>;
 
-/// A codec that is ready to take frames; null where this machine cannot.
+/// A codec ready to encode; null if this machine does not support it.
 Held<AVCodecContext> openCodec(const AVCodec* codec, const cv::Size& size, double rate_hz,
                                bool wants_header) {
   Held<AVCodecContext> context(codec == nullptr ? nullptr : avcodec_alloc_context3(codec));
@@ -39,9 +39,9 @@ Held<AVCodecContext> openCodec(const AVCodec* codec, const cv::Size& size, doubl
   context->framerate = av_d2q(rate_hz, 60000);
   context->time_base = av_inv_q(context->framerate);
   context->gop_size = 50;
-  context->colorspace = AVCOL_SPC_SMPTE170M;  // what OpenCV's conversion makes
+  context->colorspace = AVCOL_SPC_SMPTE170M;  // same as in OpenCV's conversion
   context->color_range = AVCOL_RANGE_MPEG;
-  context->thread_count = 1;  // the same bytes on every machine
+  context->thread_count = 1;  // gives the same bytes on every machine
   if (codec->id == AV_CODEC_ID_H264) {
     av_opt_set(context->priv_data, "preset", "superfast", 0);
     av_opt_set(context->priv_data, "crf", "24", 0);
@@ -67,7 +67,7 @@ struct VideoFile::Film {
 
   ~Film() { (void)end(); }
 
-  /// Writes what is left, once; false where not all of the file could be written.
+  /// Writes the remaining data once; false if the file is incomplete.
   bool end() {
     if (!std::exchange(begun, false)) return true;
     avcodec_send_frame(codec.get(), nullptr);
@@ -77,7 +77,7 @@ struct VideoFile::Film {
     return drained && ended && file->pb->error >= 0;
   }
 
-  /// Moves what the codec has finished into the file.
+  /// Writes the encoded data of the codec to the file.
   bool drain() {
     while (avcodec_receive_packet(codec.get(), packet.get()) >= 0) {
       packet->duration = 1;
@@ -106,7 +106,7 @@ struct VideoFile::Film {
     return av_frame_get_buffer(frame.get(), 0) >= 0;
   }
 
-  /// Copies the planes of a picture, which OpenCV puts below one another without gaps.
+  /// Copies the planes of a picture, which OpenCV stores in sequence without gaps.
   void fill(const cv::Mat& planes) {
     const std::uint8_t* from = planes.data;
     for (int plane = 0; plane < 3; ++plane) {

@@ -1,6 +1,6 @@
 // An MP4 film of pictures, by FFmpeg's libraries: H.264 (4:2:0, which browsers play), or MPEG-4
-// part 2 where no H.264 encoder is there. OpenCV's VideoWriter would do the same, but takes x264
-// only at its middling preset: five times the processor time.
+// part 2 without an H.264 encoder. OpenCV's VideoWriter supports x264 only at its medium preset,
+// which takes five times the processor time.
 #pragma once
 
 #include <cstddef>
@@ -15,19 +15,21 @@ namespace perdure::tools {
 
 class VideoFile {
  public:
-  /// Even sides, rate > 0. Reasons: video_no_codec, video_not_written (the file cannot be made).
+  /// Needs even sides and rate > 0. Reasons: video_no_codec, video_not_written (the file cannot be
+  /// created).
   static Result<VideoFile> open(const std::filesystem::path& file, const cv::Size& size,
                                 double rate_hz);
   VideoFile(VideoFile&&) noexcept;
   VideoFile& operator=(VideoFile&&) noexcept;
-  ~VideoFile();  ///< ends the film
+  ~VideoFile();  ///< finishes the film
 
-  /// CV_8UC3 (blue, green, red) of the film's size. Reason video_not_written: the disk is full.
+  /// Appends a picture: CV_8UC3 (blue, green, red) of the film's size. Fails with video_not_written
+  /// if the disk is full.
   Result<void> write(const cv::Mat& picture);
-  /// Ends the film; the same reason.
+  /// Finishes the film. Fails with video_not_written if the disk is full.
   Result<void> finish();
   std::size_t frames() const;
-  const std::string& codec() const;  ///< "H.264", "MPEG-4"
+  const std::string& codec() const;  ///< "H.264" or "MPEG-4"
 
  private:
   struct Film;

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""An inference service of one's own: finds orange cones by their colour, and answers where the map
-expects one. own_detector.py [camera]
+"""Example of an inference service: finds orange cones by their colour, and evaluates the filter's
+predictions. own_detector.py [camera]
 
-Any network may stand in `detect`. Its class needs a prior in config/class_priors.yaml.
+`detect` may call any network. Its class needs a prior in config/class_priors.yaml.
 """
 import sys
 
@@ -11,7 +11,7 @@ import perdure
 
 
 def spans(there, gap=3):
-    """First and last place of each run of True, runs nearer than `gap` taken together."""
+    """First and last index of each run of True; runs closer than `gap` are merged."""
     places = np.flatnonzero(there)
     cuts = np.flatnonzero(np.diff(places) > gap)
     return list(zip(places[np.r_[0, cuts + 1]], places[np.r_[cuts, -1]])) if len(places) else []
@@ -28,7 +28,7 @@ class Cones:
 
     def detect(self, image):
         if image.ndim == 2:
-            return []  # grey: no colour to go by
+            return []  # a grey image has no colour information
         orange = self.orange(image)
         found = []
         for x1, x2 in spans(orange.any(0)):
@@ -45,9 +45,9 @@ class Cones:
         return found
 
     def look(self, image, expected):
-        """Top-down: where the map expects a cone that `detect` did not report. A cone fills half
-        of its box with orange; elsewhere one pixel in fifty is orange. So each pixel of a few that
-        are independent says log(p_cone / p_elsewhere). Optional: leave it out, and nothing is said.
+        """Top-down likelihood for predicted cones that `detect` did not report. A cone fills half
+        of its box with orange; elsewhere one pixel in fifty is orange. Each of a few independent
+        pixels therefore contributes log(p_cone / p_elsewhere). This method is optional.
         """
         if image.ndim == 2:
             return np.full(len(expected), np.nan)

@@ -16,7 +16,7 @@ VEHICLES = ("car", "van", "truck", "bus")
 
 
 def distance(place, line):
-    """From a point to a line of several pieces, m."""
+    """Distance from a point to a polyline, m."""
     line = np.asarray(line, float)
     from_, along = line[:-1], np.diff(line, axis=0)
     share = ((place - from_) * along).sum(1) / np.maximum((along**2).sum(1), 1e-12)

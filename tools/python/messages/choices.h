@@ -1,4 +1,4 @@
-// The words that stand for values of enumerations in Python; one without words is an int.
+// Words for values of enumerations in Python; an enumeration without words is an int.
 #pragma once
 
 #include <array>
@@ -39,7 +39,7 @@ template <>
 inline constexpr std::array<std::string_view, 3> kWords<MapLoopState>{"tentative", "confirmed",
                                                                       "withdrawn"};
 
-/// "visible", …; empty where there is no word.
+/// For example "visible"; empty if the value has no word.
 template <class E>
 std::string_view wordOf(E value) {
   const auto place = static_cast<std::size_t>(value);

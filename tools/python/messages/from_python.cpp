@@ -21,7 +21,7 @@ std::string shapeText(const py::array& array) {
   return py::str(array.attr("shape")).cast<std::string>();
 }
 
-/// Keeps an array for readers that may end in any thread.
+/// Keeps an array alive for readers, which may end in any thread.
 std::shared_ptr<const void> keeperOf(py::array array) {
   PyObject* const kept = array.release().ptr();
   return {kept, [](const void* object) {

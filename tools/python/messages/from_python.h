@@ -1,5 +1,5 @@
-// Instances of the Python classes as messages. Kinds and shapes are checked here, bounds by the
-// encoder. Raises perdure.Refused with the path of the field. Needs the GIL.
+// Converts instances of the Python classes to messages. Kinds and shapes are checked here, bounds
+// by the encoder. Raises perdure.Refused with the path of the field. Needs the GIL.
 #pragma once
 
 #include <pybind11/pybind11.h>

@@ -1,5 +1,5 @@
-// The Python classes of messages, as perdure/messages.py has made them from the schema: one for
-// each struct that common/wire describes. All need the GIL.
+// The Python classes of messages, which perdure/messages.py creates from the schema: one for each
+// struct of common/wire. All functions need the GIL.
 #pragma once
 
 #include <cxxabi.h>
@@ -16,16 +16,16 @@
 namespace perdure::python {
 
 struct MessageClass {
-  std::string name;               ///< "ObjectBelief"
-  PyTypeObject* type = nullptr;   ///< kept for ever
+  std::string name;               ///< struct name, such as "ObjectBelief"
+  PyTypeObject* type = nullptr;   ///< never released
   std::vector<PyObject*> fields;  ///< interned, in the order of the description
 
-  /// An instance without values. Raises where the class is not registered.
+  /// An instance without values. Raises if the class is not registered.
   pybind11::object make() const;
   bool isOne(pybind11::handle object) const;
 };
 
-/// Of this module; made when it is asked for first.
+/// The class in this module; created on first use.
 MessageClass& messageClass(const std::string& name);
 void registerClass(const std::string& name, pybind11::type type,
                    const std::vector<std::string>& fields);
@@ -49,7 +49,7 @@ MessageClass& messageClass() {
   return it;
 }
 
-/// Calls visit(Topic<T>) for the type of every topic that there is.
+/// Calls visit(Topic<T>) for the type of every topic.
 template <class Visit>
 void forEachTopic(Visit visit) {
   for (const bus::TopicInfo& info : bus::topicTable()) {

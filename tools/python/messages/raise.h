@@ -1,4 +1,4 @@
-// Python's exceptions of perdure.errors, raised from C++. All need the GIL.
+// Raises Python's exceptions of perdure.errors from C++. All functions need the GIL.
 #pragma once
 
 #include <string>
@@ -7,10 +7,10 @@
 
 namespace perdure::python {
 
-/// Raises perdure.errors.`name` with a sentence that says the mend.
+/// Raises perdure.errors.`name` with a sentence that contains the fix.
 [[noreturn]] void raise(const char* name, const std::string& sentence);
 
-/// Once a module: a StartupError becomes the exception that its exit status stands for.
+/// Converts a StartupError to the exception for its exit status. Call it once in each module.
 void translateStartupErrors();
 
 }  // namespace perdure::python

@@ -11,7 +11,7 @@ namespace {
 
 namespace py = pybind11;
 
-/// By the bound's identity: those of equal numbers differ in what they bound.
+/// Compares the address of the limits, because limits with equal numbers may have different units.
 const char* unitOf(const wire::Limits& limits) {
   using namespace wire;
   struct Unit {

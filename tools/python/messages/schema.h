@@ -1,5 +1,5 @@
-// What common/wire describes of each struct, for Python: names, kinds, shapes and units. The
-// classes, their docstrings and their type hints are made of it.
+// Describes each struct of common/wire for Python: names, kinds, shapes and units. The classes,
+// their docstrings and their type hints are generated from it.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -7,9 +7,9 @@
 namespace perdure::python {
 
 /// {"Objects": [(name, kind, shape or None, unit, item or None), …], …}: every struct of every
-/// topic, those first that others hold. Kinds: int, bool, float, str, choice, array, pose, message,
-/// optional_message, optional_float, list, names, counts, bytes, pixels. Item: the struct's name,
-/// or the words of a choice.
+/// topic, after the structs that it contains. Kinds: int, bool, float, str, choice, array, pose,
+/// message, optional_message, optional_float, list, names, counts, bytes, pixels. Item: the
+/// struct's name, or the words of a choice.
 pybind11::dict schema();
 
 /// {"objects": "Objects", "frame/": "Frame", …}

@@ -30,7 +30,7 @@ py::object arrayOf(const std::vector<X>& numbers) {
   return py::array_t<X>(static_cast<py::ssize_t>(numbers.size()), numbers.data());
 }
 
-/// The bytes where they lie, which stay as long as the array does, and may not be written to.
+/// A read-only array over the existing bytes, which live as long as the array.
 py::object pixelsOf(const Frame& frame) {
   if (!frame.data) return py::none();
   const auto bytes = *frame.data;
@@ -174,7 +174,7 @@ class Giver {
   std::size_t next_ = 0;
 };
 
-/// What can be done with each struct that some topic holds.
+/// Conversions of a struct that a topic contains.
 struct Conversion {
   std::string name;
   py::object (*give)(const void* message);
@@ -197,7 +197,7 @@ Conversion conversionOf() {
           }};
 }
 
-/// Goes through descriptions for the structs that they hold.
+/// Searches descriptions for the structs that they contain.
 class Finder {
  public:
   template <class D, class W>

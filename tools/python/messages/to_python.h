@@ -1,5 +1,5 @@
-// Messages as instances of the Python classes, by the description of common/wire: matrices are
-// numpy arrays of their own, pixels stay where they lie. All need the GIL.
+// Converts messages to instances of the Python classes, by the description of common/wire. Matrices
+// become separate numpy arrays; pixels are not copied. All functions need the GIL.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -11,13 +11,13 @@ namespace perdure::python {
 
 pybind11::object toPython(std::type_index type, const void* message);
 
-/// T: the type of a topic, or one that such a type holds.
+/// T: the type of a topic, or a type that a topic's type contains.
 template <class T>
 pybind11::object toPython(const T& message) {
   return toPython(typeid(T), &message);
 }
 
-/// The values of a fresh struct, into an instance of the class that has its name.
+/// Sets the default values of a struct in an instance of the class with its name.
 void setDefaults(const std::string& name, pybind11::handle instance);
 
 }  // namespace perdure::python

@@ -12,9 +12,9 @@
     perdure.read("run.mcap")                             # a recording
     perdure.publish(MyNetwork())                         # an inference service
 
-Topics, quality of service, bounds and security are those of the C++ programs. Lengths are metres,
-angles radians, times nanoseconds of the sensors' clock; W is the odometry's frame of reference, B
-the body, M the map.
+Topics, quality of service, bounds and security are those of the C++ programs. Lengths are in
+metres, angles in radians, times in nanoseconds of the sensor clock. W is the reference frame of
+odometry, B the body, M the map.
 """
 
 from .bus import Gone, Publisher, Subscription, publisher, subscribe, topics

@@ -1,11 +1,11 @@
 """Topics of a running Perdure: ``subscribe`` and ``publisher``.
 
-Settings that every call here takes, all optional: ``interface`` (network interface, "lo"),
-``domain`` (DDS domain), ``vehicle`` ("ego"), ``security`` (folder of identities), ``identity`` (a
-folder in it; "subscriber"), ``peers`` (addresses of other hosts), ``process`` (what this program
-is called in ``perdure topics``). What is not given is said by bus.yaml (/etc/perdure, config, or
-the file that PERDURE_BUS names), PERDURE_DOMAIN and CYCLONEDDS_URI, as for ``perdure echo``;
-PERDURE_DOMAIN goes before ``domain``.
+All calls here take these optional settings: ``interface`` (network interface, "lo"), ``domain``
+(DDS domain), ``vehicle`` ("ego"), ``security`` (folder of identities), ``identity`` (a folder in
+it; "subscriber"), ``peers`` (addresses of other hosts), ``process`` (name of this program in
+``perdure topics``). Missing settings come from bus.yaml (/etc/perdure, config, or the file that
+PERDURE_BUS names), PERDURE_DOMAIN and CYCLONEDDS_URI, as for ``perdure echo``. PERDURE_DOMAIN
+overrides ``domain``.
 """
 
 import atexit
@@ -21,7 +21,7 @@ _process = os.getpid()
 
 
 def _bus(process="python", **settings):
-    """The participant of these settings, one a process."""
+    """The participant of these settings, one for each process."""
     if os.getpid() != _process:
         raise Error(
             "this process was forked from one that imported perdure, and DDS does not survive "
@@ -42,14 +42,14 @@ def _leave():
 def topics():
     """Names of all topics and of their types: {"objects": "Objects", "frame/": "Frame", …}.
 
-    "frame/" stands for frame/<camera>, as "frame/cam0".
+    "frame/" stands for frame/<camera>, for example "frame/cam0".
     """
     return dict(TOPIC_TYPES)
 
 
 class Gone:
-    """An instance of a keyed topic that was disposed of; only the key of ``message`` means
-    anything (the id of an ObjectState, the square of a MapTile)."""
+    """A disposed instance of a keyed topic. Only the key of ``message`` is valid (the id of an
+    ObjectState, the square of a MapTile)."""
 
     def __init__(self, message):
         self.message = message
@@ -59,11 +59,11 @@ class Gone:
 
 
 class Subscription:
-    """Messages as they come: iterate, or call ``next``. Made by ``subscribe``.
+    """Messages in the order of arrival: iterate, or call ``next``. Created by ``subscribe``.
 
-    It waits without the GIL, and Ctrl-C ends the wait within 0.2 s. What comes while nobody asks
-    is kept up to the topic's depth, the newest of it (4 frames, 8 objects, 512 inertial samples).
-    One thread may wait at a time; ``close`` may be called from any.
+    It waits without the GIL, and Ctrl-C ends the wait within 0.2 s. Between calls, it stores the
+    newest messages up to the topic's depth (4 frames, 8 objects, 512 inertial samples). One thread
+    may wait at a time; ``close`` may be called from any.
     """
 
     def __init__(self, names, *, timeout=None, count=None, gone=False, **settings):
@@ -73,7 +73,7 @@ class Subscription:
         self._inner = _perdure.Subscription(_bus(**settings), list(names), gone)
 
     def next(self, seconds=None):
-        """The next message, or None after ``seconds`` (None: it waits for ever) or once closed."""
+        """The next message, or None after ``seconds`` (None: no limit) or after ``close``."""
         found = self._inner.next(seconds)
         if found is None:
             return None
@@ -98,7 +98,7 @@ class Subscription:
         return message
 
     def wait_for_writer(self, seconds=None):
-        """True once somebody writes one of the topics; False after ``seconds``."""
+        """True when one of the topics has a writer; False after ``seconds``."""
         end = None if seconds is None else time.monotonic() + seconds
         while not self.matched:
             if self.closed or (end is not None and time.monotonic() >= end):
@@ -108,12 +108,12 @@ class Subscription:
 
     @property
     def matched(self):
-        """How many writers there are now."""
+        """The current number of writers."""
         return self._inner.matched
 
     @property
     def counts(self):
-        """What was lost or could not be read since the start, by reason (as in Health):
+        """Lost or unreadable messages since the start, by reason (as in Health):
         "objects_malformed_bad_covariance", "frame_cam0_sample_lost", …"""
         return self._inner.counts
 
@@ -122,7 +122,7 @@ class Subscription:
         return self._inner.closed
 
     def close(self):
-        """Ends it; who waits for a message gets none."""
+        """Ends the subscription; a waiting ``next`` returns None."""
         self._inner.close()
 
     def __enter__(self):
@@ -139,11 +139,11 @@ def subscribe(*names, timeout=None, count=None, gone=False, **settings):
             for o in frame:
                 print(o.id, o.class_name, o.pmf[0], o.position)
 
-    Of several topics it yields (topic, message).
+    For several topics, it yields (topic, message).
 
-    timeout: seconds without a message after which iterating raises Silence, which says why.
-    count: it ends after so many messages.
-    gone: of keyed topics (object_state, map), also what was disposed of, as Gone.
+    timeout: seconds without a message after which the iteration raises Silence with the reason.
+    count: number of messages after which it ends.
+    gone: for keyed topics (object_state, map), also yields disposed instances as Gone.
     settings: of the bus, see this module.
 
     Raises UnknownTopic, Unavailable.
@@ -154,30 +154,30 @@ def subscribe(*names, timeout=None, count=None, gone=False, **settings):
 
 
 class Publisher:
-    """Writes one topic, with its quality of service and its bounds. Made by ``publisher``."""
+    """Writes one topic, with its quality of service and its bounds. Created by ``publisher``."""
 
     def __init__(self, topic, *, strength=0, lease_s=0.0, **settings):
         self._inner = _perdure.Publisher(_bus(**settings), topic, strength, lease_s)
 
     def write(self, message):
-        """Raises Refused with the field and the reason where it is not what readers take."""
+        """Raises Refused with the field and the reason if readers would reject the message."""
         self._inner.write(message)
 
     def dispose(self, message):
-        """Of a keyed topic: the instance with this message's key is gone."""
+        """Disposes of the instance with this message's key, for keyed topics."""
         self._inner.dispose(message)
 
     def acknowledged(self, seconds):
-        """Waits until every reader has all that was written; False after ``seconds``."""
+        """Waits until every reader has received all messages; False after ``seconds``."""
         return self._inner.acknowledged(seconds)
 
     @property
     def matched(self):
-        """How many readers there are now."""
+        """The current number of readers."""
         return self._inner.matched
 
     def wait_for_reader(self, seconds=None):
-        """True once somebody reads; False after ``seconds``."""
+        """True when the topic has a reader; False after ``seconds``."""
         end = None if seconds is None else time.monotonic() + seconds
         while not self.matched:
             if end is not None and time.monotonic() >= end:
@@ -187,8 +187,8 @@ class Publisher:
 
 
 def publisher(topic, *, strength=0, lease_s=0.0, **settings):
-    """A writer of any topic, for drivers and experiments; of a network's results: ``publish``.
+    """A writer of any topic, for drivers and experiments. For a network's results, use ``publish``.
 
-    strength, lease_s: of ``detections``, which only its strongest living writer is heard on.
+    strength, lease_s: for ``detections``; of its writers, only the strongest live one is read.
     """
     return Publisher(topic, strength=strength, lease_s=lease_s, **settings)

@@ -1,36 +1,36 @@
-"""What goes wrong. Each exception's text is a sentence that says the mend."""
+"""Exceptions. The text of each is a sentence that contains the fix."""
 
 
 class Error(Exception):
-    """Anything that Perdure refuses; the classes below are kinds of it."""
+    """Base class of the errors below."""
 
 
 class UnknownTopic(Error, ValueError):
-    """There is no such topic; the text lists those that there are."""
+    """The topic does not exist; the text lists the existing ones."""
 
 
 class Refused(Error, ValueError):
-    """A value that no message may hold: wrong kind or shape, or out of its bounds.
+    """A value that is invalid in a message: wrong kind or shape, or out of its bounds.
 
-    The text begins with the field, as ``detections[3].activations``.
+    The text begins with the field, for example ``detections[3].activations``.
     """
 
 
 class Missing(Error, FileNotFoundError):
-    """There is no such file."""
+    """The file does not exist."""
 
 
 class Unusable(Error, ValueError):
-    """A file or configuration is there, but is not what it has to be, or is of a newer version."""
+    """A file or configuration exists, but is invalid or of a newer version."""
 
 
 class OtherVersion(Unusable):
-    """Messages of another version of Perdure, which this one cannot read."""
+    """Messages of another version of Perdure, which this version cannot read."""
 
 
 class Unavailable(Error, OSError):
-    """The bus cannot be opened, or something on it or on the disk does not answer."""
+    """The bus cannot be opened, or a process or the disk does not respond."""
 
 
 class Silence(Error, TimeoutError):
-    """Nothing came within the time that was given."""
+    """No message arrived within the given time."""

@@ -12,11 +12,11 @@ from . import messages
 from .bus import Publisher, Subscription
 from .errors import Missing, Unavailable, Unusable
 
-_MOST = 100_000  # objects in a reply
+_MOST = 100_000  # limit of objects in a reply
 
 
 def _files():
-    """The module that reads files, loaded where it is used first: it brings Ceres."""
+    """The module that reads files. It is loaded on first use, because it links Ceres."""
     from . import _map
 
     if not getattr(_map, "registered", False):
@@ -28,13 +28,14 @@ def _files():
 class Map:
     """A map of objects: a file, or that of the running map store.
 
-    ``Map("map.sqlite")`` reads the file that map_store or ``perdure pipeline`` wrote, also while a
-    service writes on; every question reads it anew. ``Map()`` asks the map store on the bus, with
-    the settings of ``perdure.subscribe``. Both answer as ``perdure map`` does.
+    ``Map("map.sqlite")`` reads the file of map_store or ``perdure pipeline``, even while a service
+    writes to it; every call reads it again. ``Map()`` queries the map store on the bus, with the
+    settings of ``perdure.subscribe``. The results equal those of ``perdure map``.
 
-    frame: "M", in which the map is one, without the odometry's drift; or, of a file, "W": as
-    stored, each object in the odometry's frame of its own session. Positions are in metres there.
-    patience_s: how long the map store on the bus may take to answer.
+    frame: "M", the consistent frame of the map, without the odometry's drift. For a file also "W":
+    as stored, each object in the odometry frame of its session. Positions are in metres in this
+    frame.
+    patience_s: longest wait for a reply of the map store on the bus.
     """
 
     def __init__(self, path=None, *, frame="M", patience_s=5.0, **settings) -> None:
@@ -60,26 +61,26 @@ class Map:
         return self._ask(kind="all").objects
 
     def by_class(self, name: str) -> List["messages.MapObject"]:
-        """Those whose most probable class has this name, by id."""
+        """Objects whose most probable class has this name, by id."""
         return self._ask(kind="by_class", class_name=name).objects
 
     def near(self, place, radius: float) -> List["messages.MapObject"]:
-        """Those whose centre is within ``radius`` m of ``place`` (3,), the nearest first."""
+        """Objects whose centre is within ``radius`` m of ``place`` (3,), the nearest first."""
         return self._ask(kind="by_radius", low=place, radius=radius).objects
 
     def in_box(self, low, high) -> List["messages.MapObject"]:
-        """Those whose centre is between two corners (3,), m, by id."""
+        """Objects whose centre is between two corners (3,), m, by id."""
         corners = np.array([low, high], float)
         return self._ask(kind="by_box", low=corners.min(0), high=corners.max(0)).objects
 
     def get(self, object_id: int) -> Optional["messages.MapObject"]:
-        """The object with this id; None where the map has none."""
+        """The object with this id; None if it does not exist."""
         objects = self._ask(kind="by_id", object_id=object_id).objects
         return objects[0] if objects else None
 
     def belief(self, object_id: int) -> Optional["messages.ObjectBelief"]:
-        """All that is believed of it: every class with its Gaussian, as stored in W, and the
-        evidence; None where the map has no such object."""
+        """The complete belief of an object: every class with its Gaussian, as stored in W, and the
+        evidence. None if the object does not exist."""
         beliefs = self._ask(kind="by_id", object_id=object_id).beliefs
         return beliefs[0] if beliefs else None
 
@@ -113,11 +114,11 @@ class Map:
         try:
             return _files().ask(self._path, query, self._as_stored)
         except Unavailable as error:
-            raise Unusable(str(error)) from None  # it is there
+            raise Unusable(str(error)) from None  # the file exists
 
     def _ask_bus(self, query):
-        """The same question again each half second until it is answered: one that was sent before
-        both ends have met is lost."""
+        """Repeats the query each half second until a reply arrives, because a request is lost if
+        sent before reader and writer are matched."""
         if self._line is None:
             self._line = (
                 Publisher("map/query", **self._settings),

@@ -1,12 +1,12 @@
-"""The classes of messages, made of the description that the C++ programs use.
+"""The classes of messages, created from the description that the C++ programs use.
 
-Every topic's type and what it holds is a class here and in ``perdure``: ``Objects``,
-``ObjectBelief``, ``Detections``, … ``help(perdure.Objects)`` shows fields, shapes and units.
-An instance made by hand has the defaults of C++: ``Detection(box=(10, 10, 50, 80))``.
+Every topic's type and the types inside it are classes here and in ``perdure``: ``Objects``,
+``ObjectBelief``, ``Detections``, … ``help(perdure.Objects)`` shows fields, shapes and units. A new
+instance has the defaults of C++: ``Detection(box=(10, 10, 50, 80))``.
 
-Times are nanoseconds of the sensors' clock, lengths metres, angles radians. Arrays are numpy's,
-float64 unless said otherwise; an array is the message's own and may be changed. ``Frame.pixels``
-is the exception: it shows the memory in which the image came, and cannot be written to.
+Times are in nanoseconds of the sensor clock, lengths in metres, angles in radians. Arrays are numpy
+arrays of float64 unless stated otherwise; a message owns its arrays, and they may be changed.
+``Frame.pixels`` is the exception: it is a read-only view of the memory of the received image.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ from ._notes import NOTES
 
 
 class Message:
-    """The base of all: fields by name, ``==``, and a text for people."""
+    """Base class of all messages: fields by name, ``==``, and a text for people."""
 
     __slots__ = ()
     _fields = ()
@@ -58,7 +58,7 @@ class Message:
         return _restored, (type(self).__name__, [getattr(self, f) for f in self._fields])
 
     def to_dict(self):
-        """The fields as a dict, and so on inside; arrays stay arrays."""
+        """The fields as a dict, recursively; arrays stay arrays."""
 
         def plain(value):
             if isinstance(value, Message):
@@ -103,12 +103,12 @@ class _Pose:
         return m
 
     def __matmul__(self, points) -> "Array":
-        """``T_WB @ points``: (3,) or (N, 3) points of B in W, in metres."""
+        """``T_WB @ points`` transforms (3,) or (N, 3) points from B to W, in metres."""
         return np.asarray(points) @ self.rotation.T + self.p
 
 
 class _State:
-    """What mean holds: [x, y, z, yaw, log length, log width, log height]."""
+    """Access to the elements of mean: [x, y, z, yaw, log length, log width, log height]."""
 
     __slots__ = ()
 
@@ -269,7 +269,7 @@ def hint_of(field):
 
 
 def line_of(struct, field):
-    """What a docstring says of a field: shape, unit, and what it is."""
+    """Docstring line of a field: shape, unit and meaning."""
     name, kind, shape, unit, item = field
     said = []
     if shape is not None:
@@ -311,7 +311,7 @@ CLASSES = {name: _make(name, fields) for name, fields in SCHEMA.items()}
 
 
 def register(module):
-    """Tells a module of C++ which classes stand for its structs."""
+    """Registers the Python classes of the structs in a C++ module."""
     for name, made in CLASSES.items():
         module.register_class(name, made, [f[0] for f in SCHEMA[name]])
 

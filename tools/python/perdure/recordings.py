@@ -11,13 +11,13 @@ from .errors import Missing, OtherVersion, Unavailable, Unusable
 class Recorded(NamedTuple):
     """One message of a recording."""
 
-    topic: str  #: "objects", "frame/cam0", …
-    time_ns: int  #: when the recorder got it, ns since 1970; never goes back
+    topic: str  #: topic name, such as "frame/cam0"
+    time_ns: int  #: time of reception by the recorder, ns since 1970; never decreases
     message: Any  #: an instance of the topic's class
 
 
 class Recording:
-    """A recording, from its beginning each time it is iterated. Made by ``read``."""
+    """A recording; each iteration starts at its beginning. Created by ``read``."""
 
     def __init__(self, path, topics: Sequence[str] = ()) -> None:
         self.path = os.fspath(path)
@@ -28,21 +28,21 @@ class Recording:
         try:
             self._inner = _perdure.Recording(self.path, list(topics))
         except Unavailable as error:
-            raise Unusable(str(error)) from None  # it is there
+            raise Unusable(str(error)) from None  # the file exists
 
     @property
     def topics(self) -> Dict[str, int]:
-        """How many messages there are of each topic."""
+        """Number of messages of each topic."""
         return self._inner.topics
 
     @property
     def seconds(self) -> float:
-        """From the first message to the last, s."""
+        """Time from the first message to the last, s."""
         return (self._inner.end_ns - self._inner.start_ns) * 1e-9
 
     @property
     def counts(self) -> Dict[str, int]:
-        """What could not be read so far, by reason."""
+        """Number of unreadable messages so far, by reason."""
         return self._inner.counts
 
     def __iter__(self) -> Iterator[Recorded]:
@@ -76,8 +76,8 @@ def read(path, topics: Sequence[str] = ()) -> Recording:
         for topic, time_ns, message in perdure.read("run.mcap", topics=["objects"]):
             print(message.stamp.time_ns, len(message))
 
-    Messages that cannot be read are left out and counted, and a warning at the end says so.
+    Unreadable messages are omitted and counted, and a warning at the end reports them.
 
-    Raises Missing, Unusable, OtherVersion, UnknownTopic (with the topics that it holds).
+    Raises Missing, Unusable, OtherVersion, UnknownTopic (with the topics of the recording).
     """
     return Recording(path, topics)

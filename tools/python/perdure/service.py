@@ -1,4 +1,4 @@
-"""An inference service around a network of one's own: ``publish``."""
+"""An inference service for a user's network: ``publish``."""
 
 import copy
 import signal
@@ -15,37 +15,37 @@ from .errors import Refused
 
 
 class Detector(Protocol):
-    """What ``publish`` needs of a network. Beside ``classes`` it may have ``name``, ``version``,
-    ``box_sigma`` and ``boxes``, which go into ModelInfo, and the method ``look``::
+    """Interface of a network for ``publish``. Beside ``classes`` it may have ``name``, ``version``,
+    ``box_sigma`` and ``boxes``, which are copied to ModelInfo, and the method ``look``::
 
         def look(self, image, expected):
-            '''The filter's predictions that no box of ``detect`` met, a list of
-            ``perdure.Prediction`` with ``box`` (in this image, its part inside), ``class_name``,
-            ``probability``. Called after ``detect``, where there are any.
+            '''``expected``: the filter's predictions without a box of ``detect``, a list of
+            ``perdure.Prediction`` with ``box`` (in this image, clipped to it), ``class_name``,
+            ``probability``. Called after ``detect`` if there are any.
 
-            Returns an array (N,) of nats: log P(this picture | the object is there, and detect
-            did not report it) / P(this picture | nothing is there); NaN: nothing is said of it.
-            Or two arrays: nats and boxes (N, 4), where the object really is in the image.'''
+            Returns an array (N,) of nats: log P(this picture | the object exists, and detect
+            did not report it) / P(this picture | no object); NaN: no evidence.
+            Or two arrays: nats and boxes (N, 4), the true positions in the image.'''
 
-    Answers are evidence that the object exists, whatever its class, and go out as detections with
-    ``primed`` and ``primed_for``. Those beyond 5 nats are cut."""
+    The nats are evidence for existence, independent of the class. They are published as detections
+    with ``primed`` and ``primed_for``, and limited to ±5 nats."""
 
-    classes: Sequence[str]  #: lower-case names, K of them, as in config/class_priors.yaml
+    classes: Sequence[str]  #: K lower-case names, as in config/class_priors.yaml
 
     def detect(self, image: np.ndarray):
-        """What is in an image, (height, width) or (height, width, 3) uint8 in the order blue,
-        green, red, which must not be written to.
+        """Detects objects in an image, (height, width) or (height, width, 3) uint8 in the order
+        blue, green, red. The image is read-only.
 
-        Returns a list of ``perdure.Detection``, or two arrays: boxes (N, 4), x1 y1 x2 y2 in px,
-        and activations (N, K + 1): log-likelihoods, [:, 0] of clutter, [:, k] of class k; only
-        their differences matter. Of probabilities: ``perdure.activations(p)``.
+        Returns a list of ``perdure.Detection``, or two arrays: boxes (N, 4), x1 y1 x2 y2 in px, and
+        activations (N, K + 1): log-likelihoods, [:, 0] of clutter, [:, k] of class k. Only their
+        differences matter. ``perdure.activations(p)`` computes them from probabilities.
         """
 
 
 def activations(probabilities) -> np.ndarray:
-    """Of (N, K) probabilities of the classes, each on its own (sigmoids): the activations
-    (N, K + 1) float32, log p / (1 - p) against clutter's 0. Of a soft-max over K + 1, clutter
-    first, its logarithm is enough. Better calibrated: ``perdure model calibrate``."""
+    """Converts (N, K) independent class probabilities (sigmoids) to activations (N, K + 1) float32:
+    log p / (1 - p) against 0 for clutter. For a soft-max over K + 1 with clutter first, use its
+    logarithm instead. ``perdure model calibrate`` gives better calibrated values."""
     p = np.clip(np.atleast_2d(np.asarray(probabilities, float)), 1e-6, 1 - 1e-6)
     odds = np.log(p) - np.log1p(-p)
     return np.hstack([np.zeros((len(odds), 1)), odds]).astype(np.float32)
@@ -69,7 +69,7 @@ def _model_of(detector) -> "messages.ModelInfo":
 
 
 def _detections_of(found, k: int) -> List["messages.Detection"]:
-    """What ``detect`` returned, checked."""
+    """Checks and converts the result of ``detect``."""
     if found is None:
         return []
     if isinstance(found, tuple) and len(found) == 2:
@@ -99,9 +99,9 @@ def _detections_of(found, k: int) -> List["messages.Detection"]:
     return found
 
 
-_HORIZON_S = 0.5  # how long after their frame predictions are of use
-_MET = 0.6  # overlap (IoU) from which a reported box meets a prediction
-_MOST_NATS = 5.0  # of one answer
+_HORIZON_S = 0.5  # seconds after their frame in which predictions are valid
+_MET = 0.6  # least overlap (IoU) of a reported box and a prediction
+_MOST_NATS = 5.0  # limit of one top-down likelihood
 
 
 def _overlaps(a, b) -> np.ndarray:
@@ -113,7 +113,7 @@ def _overlaps(a, b) -> np.ndarray:
 
 
 def _expected_in(predictions, frame, classes) -> List["messages.Prediction"]:
-    """The predictions as they are in this frame; none where they are of another one."""
+    """The predictions for this frame; none if they belong to another one."""
     after = 1e-9 * (frame.stamp.time_ns - predictions.stamp.time_ns)
     fits = predictions.stamp.source == frame.stamp.source and 0 <= after <= _HORIZON_S
     if not fits or predictions.camera not in ("", frame.camera):
@@ -132,7 +132,7 @@ def _expected_in(predictions, frame, classes) -> List["messages.Prediction"]:
 
 
 def _unmet(expected, found) -> List["messages.Prediction"]:
-    """Reported boxes meet predictions one to one, those that overlap most first."""
+    """Predictions without a reported box; pairs are one-to-one, by decreasing overlap."""
     if not expected or not found:
         return expected
     overlaps = _overlaps(np.array([p.box for p in expected]), np.array([d.box for d in found]))
@@ -145,7 +145,7 @@ def _unmet(expected, found) -> List["messages.Prediction"]:
 
 
 def _answers_of(said, asked, k: int) -> List["messages.Detection"]:
-    """What ``look`` returned, checked, as detections."""
+    """Checks the result of ``look`` and converts it to detections."""
     nats, boxes = said if isinstance(said, tuple) and len(said) == 2 else (said, None)
     nats = np.asarray(nats, float)
     if nats.shape != (len(asked),):
@@ -173,7 +173,7 @@ def _answers_of(said, asked, k: int) -> List["messages.Detection"]:
 
 
 class _EndBySignal:
-    """SIGTERM ends ``publish`` in order, as Ctrl-C does."""
+    """SIGTERM ends ``publish`` in order, like Ctrl-C."""
 
     def __enter__(self):
         self._before = None
@@ -207,20 +207,20 @@ def publish(
 
         perdure.publish(Lamps())
 
-    Each image of ``camera`` goes to ``detector.detect`` in this thread, the newest first; older
-    ones are dropped and counted. Model, detections, liveliness and Health (under the name
-    ``process``) are those of perdure-inference; they go on while the network computes.
+    This thread calls ``detector.detect`` for images of ``camera``, the newest first; older ones are
+    dropped and counted. Model, detections, liveliness and Health (under the name ``process``) are
+    those of perdure-inference; they continue while the network computes.
 
-    strength: the strongest living writer of ``detections`` is heard; 30 is heard in place of
-        perdure-inference.
-    longest_s: a frame that takes longer loses the topic to another inference process, if one runs.
-    frames: ends after so many frames.
+    strength: only the strongest live writer of ``detections`` is read; 30 overrides
+    perdure-inference.
+    longest_s: after a longer frame, another inference process takes over the topic, if one runs.
+    frames: number of frames after which it ends.
     settings: of the bus, as in ``perdure.subscribe``; the identity is "inference".
 
-    A detector with the method ``look`` answers the filter's predictions too (``Detector``).
+    A detector with the method ``look`` also evaluates the filter's predictions (``Detector``).
 
-    An exception at the first frame ends it. Later ones are printed, counted in Health
-    (``detect_failed``), and say so there until a frame succeeds.
+    An exception at the first frame ends the service. Later ones are printed, counted in Health
+    (``detect_failed``), and reported there until a frame succeeds.
     """
     model = _model_of(detector)
     look = getattr(detector, "look", None)
@@ -267,6 +267,6 @@ def publish(
                     traceback.print_exc(file=sys.stderr)
                     service.failed(f"detect failed: {type(error).__name__}: {error}; see its log")
             if service.ended:
-                service.next(0)  # raises what has ended it, if it was not a signal
+                service.next(0)  # raises the error that ended it, unless it was a signal
     finally:
         service.close()

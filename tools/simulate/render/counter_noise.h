@@ -1,5 +1,5 @@
-// Random numbers that depend on a counter alone: the same for a pixel of a frame whatever was drawn
-// before it and by whichever thread. Mixing by SplitMix64 (Steele, Lea, Flood, OOPSLA 2014).
+// Random numbers that depend only on a counter. A pixel of a frame has the same numbers in any
+// drawing order and thread. Mixing by SplitMix64 (Steele, Lea, Flood, OOPSLA 2014).
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ constexpr std::uint64_t mixBits(std::uint64_t a, std::uint64_t b) {
 constexpr float uniformOf(std::uint64_t bits) {
   return static_cast<float>(bits >> 40) * (1.0F / 16777216.0F);
 }
-/// Mean 0, standard deviation 1, within ±3.5: four uniform numbers summed.
+/// Mean 0, standard deviation 1, within ±3.5: the sum of four uniform numbers.
 constexpr float normalOf(std::uint64_t bits) {
   const auto sum = static_cast<float>((bits & 0xffff) + (bits >> 16 & 0xffff) +
                                       (bits >> 32 & 0xffff) + (bits >> 48));

@@ -1,4 +1,4 @@
-// The ray of each pixel of a distorted camera, and where points beyond its image would be drawn.
+// The ray of each pixel of a distorted camera, and a projection that extends beyond its image.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,18 +15,18 @@ class Lens {
   int width() const { return width_; }
   int height() const { return height_; }
   const CameraModel& model() const { return model_; }
-  /// Whether the distortion can be inverted there.
+  /// Whether the distortion can be inverted at the pixel.
   bool sees(int column, int row) const { return rays_[indexOf(column, row)].z() > 0.0F; }
   /// Unit direction in C through a pixel's centre.
   const Eigen::Vector3f& direction(int column, int row) const {
     return rays_[indexOf(column, row)];
   }
-  /// The same at an offset within the pixel.
+  /// The same, at an offset within the pixel.
   Eigen::Vector3f direction(int column, int row, float dx, float dy) const;
-  /// Angle between neighbouring pixels in the image's centre, radians.
+  /// Angle between neighbouring pixels at the image centre, radians.
   float pixelAngle() const { return pixel_angle_; }
-  /// Pixel of any point with z > 0; beyond the distortion's range, the outermost valid pixel in
-  /// that direction is carried on radially at the focal length.
+  /// Pixel of any point with z > 0. Outside the range of the distortion, the outermost valid pixel
+  /// in that direction is extended radially with the focal length.
   Eigen::Vector2d projectBeyond(const Eigen::Vector3d& point_C) const;
 
  private:
@@ -38,9 +38,9 @@ class Lens {
   CameraModel model_;
   int width_, height_;
   float pixel_angle_;
-  double max_radius_;  ///< of the normalised image, up to which project() answers
+  double max_radius_;  ///< largest radius in the normalised image for project()
   std::vector<Eigen::Vector3f>
-      rays_;  ///< (x, y, 1), or z = 0 where there is none; one more each way
+      rays_;  ///< (x, y, 1), or z = 0 if invalid; has a border of one pixel
 };
 
 }  // namespace perdure::tools

@@ -1,5 +1,5 @@
-// Light on surfaces: sun (with a shadow ray by the caller), the sky's hemisphere, light thrown back
-// by the ground, a dark rim where objects touch what they stand on, gloss and haze. Lambert's law.
+// Light on surfaces: sun (the caller traces the shadow ray), sky hemisphere, light reflected by the
+// ground, contact shadows, gloss and haze. Lambert's law.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,12 +11,12 @@
 
 namespace perdure::tools {
 
-/// What a ray met.
+/// Intersection of a ray.
 struct Hit {
   std::uint32_t instance = kNothing;  ///< kNothing: the sky
   std::uint32_t material = 0;
   float distance = 0.0F;
-  Eigen::Vector3f position, normal;  ///< W, the normal of unit length and towards the eye
+  Eigen::Vector3f position, normal;  ///< W; the normal has unit length and points to the eye
   Eigen::Vector2f uv;
   float repeats_per_metre = 0.0F;
   const Material* surface = nullptr;
@@ -25,12 +25,12 @@ struct Hit {
 class Lighting {
  public:
   explicit Lighting(const sim::Scene& scene);
-  /// Learns where objects stand now.
+  /// Updates the positions of the objects.
   void setTime(const World& world);
 
   const Eigen::Vector3f& sun() const { return sun_W_; }
-  /// Linear RGB radiance towards the eye; `ray` is the unit direction from it, `pixel_angle` the
-  /// angle that a pixel covers.
+  /// Linear RGB radiance towards the eye. `ray` is the unit direction from the eye, `pixel_angle`
+  /// the angle of a pixel.
   Eigen::Vector3f shade(const Eigen::Vector3f& origin, const Eigen::Vector3f& ray, const Hit& hit,
                         bool in_sun, float pixel_angle) const;
   const Sky& sky() const { return sky_; }

@@ -8,14 +8,14 @@
 namespace perdure::tools {
 namespace {
 
-constexpr double kNearPlane = 0.05;  ///< triangles are cut here, metres before the camera
-/// Cells along the longer side of an outline's raster: four a pixel, within these limits.
+constexpr double kNearPlane = 0.05;  ///< clipping plane of triangles, metres before the camera
+/// Cells along the longer side of an outline's raster: four for each pixel, within these limits.
 constexpr double kMinCells = 24.0, kMaxCells = 112.0;
 
 using Polygon = std::vector<Eigen::Vector3d>;
 using Triangle = std::array<const Eigen::Vector2d*, 3>;
 
-/// The part of a triangle beyond the near plane: nothing, three or four corners.
+/// Clips a triangle at the near plane: nothing, three or four corners remain.
 void cutNear(const std::array<Eigen::Vector3d, 3>& triangle, Polygon& out) {
   out.clear();
   for (std::size_t i = 0; i < 3; ++i) {
@@ -27,7 +27,7 @@ void cutNear(const std::array<Eigen::Vector3d, 3>& triangle, Polygon& out) {
   }
 }
 
-/// Cells whose centre lies in one of the triangles drawn so far.
+/// Cells whose centre is in one of the triangles drawn so far.
 class Raster {
  public:
   Raster(const Box& box, double cell)
@@ -38,7 +38,7 @@ class Raster {
         rows_(sizeOf(box.height())),
         cells_(static_cast<std::size_t>(columns_ * rows_)) {}
 
-  /// In units of cells.
+  /// Converts pixels to cells.
   Eigen::Vector2d cellOf(const Eigen::Vector2d& pixel) const {
     return (pixel - Eigen::Vector2d(x_, y_)) / cell_;
   }
@@ -90,10 +90,10 @@ void include(Box& box, const Eigen::Vector2d& pixel) {
   box.y1 = std::min(box.y1, pixel.y()), box.y2 = std::max(box.y2, pixel.y());
 }
 
-/// The projected triangles of a surface, cut at the near plane.
+/// The projected triangles of a surface, clipped at the near plane.
 struct Projected {
   std::vector<Eigen::Vector2d> pixels;
-  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< of pixels
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< indices of pixels
 };
 
 Projected projectSurface(const Surface& surface, const RigidTransform& T_CO, const Lens& lens) {
@@ -127,7 +127,7 @@ Projected projectSurface(const Surface& surface, const RigidTransform& T_CO, con
   return result;
 }
 
-/// Keeps the part of a polygon where sign · (coordinate − border) >= 0.
+/// Keeps the part of a polygon with sign · (coordinate − border) >= 0.
 void cutBorder(std::vector<Eigen::Vector2d>& polygon, int axis, double border, double sign) {
   std::vector<Eigen::Vector2d> kept;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -139,7 +139,7 @@ void cutBorder(std::vector<Eigen::Vector2d>& polygon, int axis, double border, d
   polygon.swap(kept);
 }
 
-/// Box of the triangles' parts within the image; nothing where no part is.
+/// Box around the triangles' parts within the image; empty if there are none.
 std::optional<Box> boxInside(const Projected& projected, const Box& image) {
   Box box{1e9, 1e9, -1e9, -1e9};
   std::vector<Eigen::Vector2d> part;
@@ -166,7 +166,7 @@ double widestAngle(const Lens& lens) {
   return widest + 0.05;
 }
 
-/// Quick and certain: no part of a ball about `centre_C` is in the image.
+/// Fast conservative test: true only if no part of a ball about `centre_C` is in the image.
 bool isOutside(const Eigen::Vector3d& centre_C, double radius, double widest) {
   const double distance = centre_C.norm();
   if (distance <= radius) return false;

@@ -1,5 +1,6 @@
-// What share of an object is seen: its pixels in the drawn image over the pixels of its whole
-// outline, drawn alone on an image plane that is larger than the image by one image on each side.
+// Computes the visible share of an object: its pixels in the rendered image divided by the pixels
+// of its complete outline. The outline is drawn alone on an image plane that extends the image by
+// its own size on each side.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,18 +16,18 @@
 
 namespace perdure::tools {
 
-/// An object alone.
+/// Outline of an object without occluders.
 struct Outline {
   double area = 0.0;  ///< pixels² of the enlarged plane
-  Box box;            ///< of its corners, within the enlarged plane
-  /// Of the part within the image; set where the border cuts it.
+  Box box;            ///< box of its corners, within the enlarged plane
+  /// Box of the part within the image; set if the border truncates the object.
   std::optional<Box> inside;
 };
-/// area 0 where the object is behind the camera or beside the enlarged plane.
+/// The area is 0 if the object is behind the camera or outside the enlarged plane.
 Outline outlineOf(const Surface& surface, const RigidTransform& T_CO, const Lens& lens);
 
-/// One row for each present object whose outline's box touches the image, by id. `seen` is of
-/// render() or identify() of the same shot, `step` that of identify() or 1.
+/// One row for each present object whose outline box touches the image, by id. `seen` is the result
+/// of render() or identify() for the same shot. `step` is that of identify(), or 1.
 std::vector<sim::TruthView> viewsOf(const World& world, const Lens& lens, const Shot& shot,
                                     const Picture& seen, int step, Workers& workers);
 

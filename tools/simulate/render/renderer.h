@@ -1,6 +1,5 @@
-// Draws what one camera sees of a world: rays through each pixel of the distorted image, shaded,
-// with four more rays where neighbours differ, and smeared along the motion during the exposure.
-// The result does not depend on the number of threads.
+// Renders the image of one camera: rays through each pixel of the distorted image, shading, four
+// additional rays at edges, and motion blur. The result does not depend on the number of threads.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,12 +15,13 @@
 
 namespace perdure::tools {
 
-inline constexpr int kTile = 32;  ///< pixels; a task draws a square of this side
+inline constexpr int kTile = 32;  ///< pixels; side of the square that a task draws
 
-/// Where a camera is while it takes one image. Rolling shutter: the middle row is exposed at
-/// `time_s`, the first and last half the readout before and after; objects stand as at `time_s`.
+/// Poses of a camera during one exposure. With a rolling shutter, the middle row is exposed at
+/// `time_s`, and the first and last row half the readout before and after it. Objects have their
+/// poses at `time_s`.
 struct Shot {
-  double time_s = 0.0;  ///< scene time of the exposure's middle
+  double time_s = 0.0;  ///< scene time at the middle of the exposure
   sim::MotionState body;
   RigidTransform T_BC;
   double exposure_s = 0.0, readout_s = 0.0;
@@ -30,8 +30,8 @@ Shot shotAt(const sim::Scene& scene, std::size_t camera, double time_s);
 
 struct Picture {
   int width = 0, height = 0;
-  std::vector<Eigen::Vector4f> radiance;  ///< linear RGB, and nothing: four for speed
-  std::vector<std::uint32_t> instance;    ///< at the pixel's centre; see World::instances, kNothing
+  std::vector<Eigen::Vector4f> radiance;  ///< linear RGB and padding, for vector instructions
+  std::vector<std::uint32_t> instance;    ///< index at the pixel centre; see World::instances
   std::size_t index(int column, int row) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
            static_cast<std::size_t>(column);
@@ -40,18 +40,18 @@ struct Picture {
 
 class Renderer {
  public:
-  /// All are to outlive the renderer.
+  /// Both arguments must outlive the renderer.
   Renderer(World& world, Workers& workers);
 
-  /// Moves the world to the shot's time and draws it.
+  /// Moves the world to the shot's time and renders it.
   void render(const Lens& lens, const Shot& shot, Picture& picture);
-  /// Only what is seen, in each `step`-th pixel of each `step`-th row: picture.instance, with
-  /// picture.width = ceil(lens.width() / step).
+  /// Identifies the visible instances without shading, in each `step`-th pixel of each `step`-th
+  /// row: picture.instance, with picture.width = ceil(lens.width() / step).
   void identify(const Lens& lens, const Shot& shot, int step, Picture& picture);
 
  private:
   struct Eye {
-    Eigen::Matrix3f R;  ///< of C in W
+    Eigen::Matrix3f R;  ///< rotation of C in W
     Eigen::Vector3f p;
   };
   struct Packet {
@@ -63,15 +63,15 @@ class Renderer {
   struct Place {
     int column = 0, row = 0;
   };
-  /// Rays that add to pixels.
+  /// Rays and the pixels that they contribute to.
   struct Samples {
     Packet packet;
     std::array<Place, kPacket> places;
     std::array<float, kPacket> shares{};
   };
-  /// What is known of a pixel beside its radiance.
+  /// Properties of a pixel besides its radiance.
   struct Detail {
-    std::uint32_t key = 0;  ///< instance, material and whether the sun shines
+    std::uint32_t key = 0;  ///< instance, material and whether the sun is visible
     float inverse_distance = 0.0F;
     Eigen::Vector3f normal;
   };
@@ -82,7 +82,7 @@ class Renderer {
   void findSun(Packet& packet) const;
   void drawTile(int left, int top, Picture& picture);
   void drawBlock(Packet& packet, const Place* places, Picture& picture);
-  /// Towards which neighbours a pixel is to be smoothed, as bits.
+  /// Bits of the neighbours across an edge that needs antialiasing.
   unsigned edgesOf(const Picture& picture, int column, int row) const;
   void smoothTile(int left, int top, Picture& picture);
   void addSamples(Samples& samples, Picture& picture) const;
@@ -94,7 +94,7 @@ class Renderer {
   Workers& workers_;
   Lighting lighting_;
   const Lens* lens_ = nullptr;
-  std::vector<Eye> eyes_;  ///< of each row, or one for all
+  std::vector<Eye> eyes_;  ///< one for each row, or one for all
   Eigen::Matrix3f R_CW_;
   Eigen::Vector3f eye_velocity_C_, turn_rate_C_;
   float exposure_s_ = 0.0F;

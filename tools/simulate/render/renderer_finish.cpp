@@ -1,4 +1,4 @@
-// The second half of Renderer: smooth edges and motion blur.
+// Second part of Renderer: antialiasing and motion blur.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -8,24 +8,24 @@
 namespace perdure::tools {
 namespace {
 
-constexpr float kMinSmear = 0.6F;   ///< pixels; less is not to be seen
-constexpr float kLongSmear = 3.0F;  ///< pixels; a tap each pixel need not be between pixels
+constexpr float kMinSmear = 0.6F;   ///< pixels; less is invisible
+constexpr float kLongSmear = 3.0F;  ///< pixels; above it, taps at integer pixels suffice
 constexpr int kMaxTaps = 16;
 constexpr unsigned kLeft = 1, kRight = 2, kAbove = 4, kBelow = 8;
 
 struct Ray {
   float dx, dy, share;
 };
-/// More rays of a pixel, and what is left of the one through its centre.
+/// Additional rays of a pixel, and the weight of the central ray.
 struct Pattern {
   float centre_share;
   unsigned count;
   std::array<Ray, 4> rays;
 };
 
-/// An edge towards one neighbour, or two at a corner, lies in that half of the pixel: two rays
-/// there. Foliage, where three neighbours differ, has no edge to be drawn smoothly: two rays. Thin
-/// things, between two neighbours: four.
+/// Chooses the rays by the neighbours that differ. One neighbour, or two at a corner: two rays in
+/// that half of the pixel. Three neighbours (foliage without clear edges): two rays. Two opposite
+/// neighbours (thin objects): four rays.
 Pattern makePattern(unsigned edges) {
   constexpr float kNear = 0.2F, kFar = 0.22F, kCentre = 1.0F - kNear - kFar;
   const float x = static_cast<float>((edges >> 1 & 1U)) - static_cast<float>(edges & 1U);
@@ -66,7 +66,7 @@ const Eigen::Vector4f& nearest(const Picture& picture, float x, float y) {
   return picture.radiance[picture.index(column, row)];
 }
 
-/// Between pixels; held at the border.
+/// Bilinear interpolation; constant outside the border.
 Eigen::Vector4f between(const Picture& picture, float x, float y) {
   x = std::clamp(x, 0.0F, static_cast<float>(picture.width - 1));
   y = std::clamp(y, 0.0F, static_cast<float>(picture.height - 1));
@@ -137,7 +137,7 @@ void Renderer::addSamples(Samples& samples, Picture& picture) const {
   packet.count = 0;
 }
 
-/// How far what a pixel shows moves in the image during the exposure, in pixels.
+/// Motion of the pixel's content in the image during the exposure, in pixels.
 Eigen::Vector2f Renderer::smear(const Picture& picture, int column, int row) const {
   const Eigen::Vector3f& d = lens_->direction(column, row);
   const std::size_t at = picture.index(column, row);

@@ -8,15 +8,15 @@
 namespace perdure::tools {
 namespace {
 
-constexpr double kMiddleGrey = 0.16;    ///< wanted mean of the linear image, of full scale
+constexpr double kMiddleGrey = 0.16;    ///< desired mean of the image, of full scale
 constexpr double kAdaptation_s = 0.4;   ///< time constant of the exposure
-constexpr double kGainReturn_s = 10.0;  ///< time constant with which the gain comes back
+constexpr double kGainReturn_s = 10.0;  ///< time constant of the gain's return
 constexpr int kGammaSteps = 4096;
 constexpr int kMeterStep = 8;
 const Eigen::Vector3f kLuminance(0.2126F, 0.7152F, 0.0722F);
 
-/// The table is over the square root of the linear value: fine where the curve is steep. Light
-/// above 0.7 is compressed, as cameras do to keep skies from turning flat.
+/// Gamma table over the square root of the linear value, for a high resolution at the steep part of
+/// the curve. Light above 0.7 is compressed, as in cameras, so that skies keep contrast.
 std::vector<std::uint8_t> gammaTable() {
   std::vector<std::uint8_t> table;
   for (int i = 0; i < kGammaSteps; ++i) {
@@ -28,7 +28,7 @@ std::vector<std::uint8_t> gammaTable() {
   return table;
 }
 
-/// Logarithm of the mean luminance, dark and blinding pixels limited.
+/// Logarithm of the mean luminance; dark and bright pixels are limited.
 double metered(const Picture& picture) {
   double sum = 0.0;
   std::size_t count = 0;
@@ -58,7 +58,7 @@ Sensor::Sensor(const SensorOptions& options, const Lens& lens)
 
 void Sensor::expose(const Picture& picture, std::uint64_t index) {
   const double wanted = std::log(kMiddleGrey) - metered(picture);
-  // The image just taken sets the exposure of the next one; the first one is metered beforehand.
+  // Each image sets the exposure of the next one; the first one is metered in advance.
   if (state_.frames == 0 || !options_.adapt) state_.log_exposure = wanted;
   scale_ = static_cast<float>(std::exp(state_.log_exposure + state_.log_gain));
   const double share = 1.0 - std::exp(-options_.interval_s / kAdaptation_s);

@@ -1,5 +1,5 @@
-// A camera's sensor: what becomes of radiance on the way to eight bits. Automatic exposure, fading
-// towards the corners, shot and read noise, a gain that wanders, gamma and quantisation.
+// A camera's sensor, which converts radiance to eight bits: automatic exposure, vignetting, shot
+// and read noise, random-walk gain, gamma and quantisation.
 #pragma once
 
 #include <cstddef>
@@ -13,27 +13,27 @@
 
 namespace perdure::tools {
 
-/// What a sensor carries from one image to the next.
+/// State of a sensor between images.
 struct SensorState {
-  std::uint64_t frames = 0;   ///< taken so far
-  double log_exposure = 0.0;  ///< of what brings the scene to the wanted brightness
-  double log_gain = 0.0;      ///< the wandering error of the gain
+  std::uint64_t frames = 0;   ///< number of images so far
+  double log_exposure = 0.0;  ///< logarithm of the factor to the desired brightness
+  double log_gain = 0.0;      ///< random-walk error of the gain
 };
 
 struct SensorOptions {
   sim::CameraErrors errors;
   ImageEncoding encoding = ImageEncoding::kBgr8;
-  bool noise = true;  ///< shot and read noise and the wandering gain
-  bool adapt = true;  ///< false: each image is exposed for itself, as single views are
+  bool noise = true;  ///< includes shot noise, read noise and random-walk gain
+  bool adapt = true;  ///< false: exposes each image separately, for independent views
   double interval_s = 0.05;
-  std::uint64_t seed = 0;  ///< differs between cameras
+  std::uint64_t seed = 0;  ///< seed, different for each camera
 };
 
 class Sensor {
  public:
   Sensor(const SensorOptions& options, const Lens& lens);
 
-  /// The image as packed rows, `index` being the frame's; noise depends on seed, index and pixel.
+  /// The image as packed rows. `index` is the frame index; noise depends on seed, index and pixel.
   std::vector<std::uint8_t> develop(const Picture& picture, std::uint64_t index, Workers& workers);
   const SensorState& state() const { return state_; }
   void setState(const SensorState& state) { state_ = state; }
@@ -46,7 +46,7 @@ class Sensor {
 
   SensorOptions options_;
   SensorState state_;
-  std::vector<float> fading_;  ///< by pixel
+  std::vector<float> fading_;  ///< factor for each pixel
   std::vector<std::uint8_t> gamma_;
   float scale_ = 1.0F;
 };

@@ -1,4 +1,4 @@
-// What a ray meets that meets nothing: a sky with clouds outdoors, a ceiling with lamps indoors.
+// Background of rays without a hit: a sky with clouds outdoors, a ceiling with lamps indoors.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,7 +15,7 @@ class Sky {
   /// Linear RGB radiance from unit direction `d_W`, seen from `origin_W`.
   Eigen::Vector3f radiance(const Eigen::Vector3f& origin_W, const Eigen::Vector3f& d_W) const;
   bool indoors() const { return indoors_; }
-  /// Of the haze far away.
+  /// Colour of distant haze.
   const Eigen::Vector3f& horizon() const { return horizon_; }
 
  private:

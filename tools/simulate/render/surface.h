@@ -1,4 +1,4 @@
-// What the renderer needs to know of a hit triangle, beside Embree's own copy of its corners.
+// Shading data of a hit triangle, in addition to Embree's copy of its corners.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,11 +11,11 @@
 
 namespace perdure::tools {
 
-/// What shading reads of a triangle, in one piece: rays meet triangles in no order.
+/// Shading data of a triangle, contiguous because rays hit triangles in random order.
 struct Facet {
   std::array<Eigen::Vector3f, 3> normals;
   std::array<Eigen::Vector2f, 3> uvs;
-  float repeats_per_metre = 0.0F;  ///< of the texture
+  float repeats_per_metre = 0.0F;  ///< density of the texture
   std::uint32_t material = 0;
 };
 
@@ -23,16 +23,17 @@ struct Facet {
 struct Surface {
   std::vector<Eigen::Vector3f> positions;
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  std::vector<Facet> facets;  ///< of each triangle
+  std::vector<Facet> facets;  ///< data of each triangle
   std::vector<Material> materials;
 
-  /// Adds `mesh`, placed by T_SM. Throws std::invalid_argument where its lists do not fit together.
+  /// Adds `mesh`, placed by T_SM. Throws std::invalid_argument if its lists have inconsistent
+  /// lengths.
   void add(const Mesh& mesh, const RigidTransform& T_SM = {});
 };
 
-/// The place on a surface that a ray met, interpolated between the triangle's corners.
+/// A hit point on a surface, interpolated between the triangle's corners.
 struct SurfacePoint {
-  Eigen::Vector3f normal;  ///< in the surface's frame, not of unit length
+  Eigen::Vector3f normal;  ///< surface frame; not normalised
   Eigen::Vector2f uv;
   float repeats_per_metre = 0.0F;
   const Material* material = nullptr;

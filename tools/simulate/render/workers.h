@@ -1,5 +1,5 @@
-// A few threads that share the tasks of a frame. What a task computes must not depend on who runs
-// it: then neither does the result on the number of threads.
+// Threads that share the tasks of a frame. The result of a task must not depend on its thread, so
+// that the image does not depend on the number of threads.
 #pragma once
 
 #include <condition_variable>
@@ -15,7 +15,7 @@ namespace perdure::tools {
 
 class Workers {
  public:
-  /// `threads` >= 1, the caller of run() being one of them.
+  /// `threads` >= 1, including the caller of run().
   explicit Workers(int threads);
   ~Workers();
   Workers(const Workers&) = delete;
@@ -23,9 +23,10 @@ class Workers {
 
   /// Calls task(0) … task(count - 1) and returns when all are done. Rethrows the first exception.
   void run(std::size_t count, const std::function<void(std::size_t)>& task);
-  /// Runs `job` beside what follows; waits while two jobs are under way. At once on one thread.
+  /// Runs `job` in parallel to the following code; waits while two jobs are running. With one
+  /// thread, runs it at once.
   void post(std::function<void()> job);
-  /// Waits for the posted jobs and rethrows the first exception of theirs.
+  /// Waits for the posted jobs and rethrows their first exception.
   void drain();
 
  private:

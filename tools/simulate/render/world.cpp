@@ -19,7 +19,7 @@ void* bufferOf(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::
   return buffer;
 }
 
-/// Objects that look the same share one surface.
+/// Objects with the same look share one surface.
 using Look = std::tuple<std::string, std::string, std::uint64_t, std::array<double, 3>>;
 
 Look lookOf(const sim::SceneObject& object) {
@@ -52,8 +52,8 @@ bool staysForGood(const sim::SceneObject& object) {
 
 World::World(const sim::Scene& scene, int threads)
     : scene_(scene), instances_(scene.objects.size() + 1), geometries_(scene.objects.size() + 1) {
-  // One thread: the order of triangles, and with it which of two touching ones a ray meets, must
-  // not depend on how a build was scheduled.
+  // One thread, because scheduling must not affect the order of triangles. This order decides which
+  // of two touching triangles a ray hits.
   device_ = rtcNewDevice("threads=1");
   if (!device_) throw std::runtime_error("Embree cannot start");
   makeSurfaces(threads);
@@ -79,7 +79,7 @@ void World::makeSurfaces(int threads) {
   Workers workers(threads);
   instances_[0].surface = sceneryOf(scene_, workers);
   std::map<Look, std::size_t> known;
-  std::vector<std::size_t> first;  // of each look
+  std::vector<std::size_t> first;  // first object with each look
   for (std::size_t i = 0; i < scene_.objects.size(); ++i) {
     if (known.try_emplace(lookOf(scene_.objects[i]), i).second) first.push_back(i);
   }
@@ -111,7 +111,7 @@ RTCGeometry World::trianglesOf(const Surface& surface, const Instance& place) {
   return geometry;
 }
 
-/// The scenery and all objects that stay, each under its instance's index.
+/// Attaches the scenery and all static objects, each with the index of its instance.
 void World::attachFixed() {
   fixed_ = rtcNewScene(device_);
   for (std::size_t i = 0; i < instances_.size(); ++i) {
@@ -136,7 +136,7 @@ void World::attachMoving(std::size_t index) {
   rtcCommitScene(alone);
   RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_INSTANCE);
   rtcSetGeometryInstancedScene(geometry, alone);
-  rtcReleaseScene(alone);  // the instance holds it
+  rtcReleaseScene(alone);  // the instance holds a reference
   rtcAttachGeometryByID(top_, geometry, static_cast<unsigned>(index));
   geometries_[index] = geometry;
   place(index);

@@ -1,6 +1,6 @@
-// A scene as Embree holds it: all that stays where it is in one tree of triangles, and each object
-// that moves, comes or goes an instance beside it, of which only the transform changes. Embree
-// (Wald et al., SIGGRAPH 2014).
+// A scene in Embree. All static parts are in one tree of triangles. Each object that moves, appears
+// or disappears is an instance, of which only the transform changes. Embree (Wald et al., SIGGRAPH
+// 2014).
 #pragma once
 
 #include <Eigen/Core>
@@ -15,37 +15,37 @@
 
 namespace perdure::tools {
 
-inline constexpr unsigned kPacket = 8;  ///< rays that Embree follows together
+inline constexpr unsigned kPacket = 8;  ///< rays that Embree traces together
 inline constexpr std::uint32_t kNothing = RTC_INVALID_GEOMETRY_ID;
 
-/// An object (or all scenery) where it is now.
+/// An object (or all scenery) in its current pose.
 struct Instance {
   std::shared_ptr<const Surface> surface;
   Eigen::Matrix3f R = Eigen::Matrix3f::Identity();
   Eigen::Vector3f p = Eigen::Vector3f::Zero();
   Eigen::Vector3f velocity = Eigen::Vector3f::Zero();   ///< W, m/s
   Eigen::Vector3f turn_rate = Eigen::Vector3f::Zero();  ///< W, rad/s
-  bool moves = false;                                   ///< just now
+  bool moves = false;                                   ///< moving at the current time
   bool present = true;
 };
 
 class World {
  public:
-  /// Throws std::runtime_error where Embree cannot start.
+  /// Throws std::runtime_error if Embree cannot start.
   explicit World(const sim::Scene& scene, int threads = 2);
   ~World();
   World(const World&) = delete;
   World& operator=(const World&) = delete;
 
-  /// Moves objects to where they are at scene time `t_s`. False where all stay as they were.
+  /// Moves objects to their poses at scene time `t_s`. Returns false if none has moved.
   bool setTime(double t_s);
   const sim::Scene& scene() const { return scene_; }
-  /// [0] is the scenery, [i + 1] scene().objects[i].
+  /// [0] is the scenery, [i + 1] is scene().objects[i].
   const std::vector<Instance>& instances() const { return instances_; }
 
-  /// The nearest hits; see instanceOf.
+  /// Finds the nearest hits; see instanceOf.
   void intersect(const int* valid, RTCRayHit8& rays) const;
-  /// Sets tfar to -infinity where something is between tnear and tfar.
+  /// Sets tfar to -infinity if a surface is between tnear and tfar.
   void occluded(const int* valid, RTCRay8& rays) const;
 
   /// Index of the instance that lane `i` hit, or kNothing.
@@ -53,7 +53,7 @@ class World {
     if (rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) return kNothing;
     return movesAlone(rays, i) ? rays.hit.instID[0][i] : rays.hit.geomID[i];
   }
-  /// Whether the hit's Ng is in the instance's own frame rather than in W.
+  /// Whether the hit's Ng is in the instance's own frame and not in W.
   static bool movesAlone(const RTCRayHit8& rays, unsigned i) {
     return rays.hit.instID[0][i] != RTC_INVALID_GEOMETRY_ID && rays.hit.instID[0][i] != 0;
   }
@@ -68,9 +68,9 @@ class World {
 
   sim::Scene scene_;
   std::vector<Instance> instances_;
-  std::vector<RTCGeometry> geometries_;  ///< of what moves alone, null for the rest
+  std::vector<RTCGeometry> geometries_;  ///< geometry of moving instances; else null
   RTCDevice device_ = nullptr;
-  RTCScene fixed_ = nullptr, top_ = nullptr;  ///< top_: fixed_ and what moves
+  RTCScene fixed_ = nullptr, top_ = nullptr;  ///< top_: fixed_ and the moving instances
   std::optional<double> time_s_;
 };
 

@@ -1,4 +1,4 @@
-// Seeded choices for looks: the same seed gives the same shape on every machine.
+// Seeded random choices for looks: the same seed gives the same shape on every machine.
 #pragma once
 
 #include <array>
@@ -25,14 +25,14 @@ class Dice {
     return static_cast<float>(low + (high - low) * unit);
   }
   bool chance(float probability) { return uniform(0.0F, 1.0F) < probability; }
-  /// 0 … count − 1; count > 0.
+  /// Uniform in 0 … count − 1; count > 0.
   int below(int count) { return static_cast<int>(engine_() % static_cast<std::uint64_t>(count)); }
   template <typename T, std::size_t N>
   const T& pick(const std::array<T, N>& list) {
     return list[static_cast<std::size_t>(below(static_cast<int>(N)))];
   }
   std::uint64_t seed() { return engine_(); }
-  /// For the functions in noise.h.
+  /// Seed for the functions in noise.h.
   std::uint32_t noiseSeed() { return static_cast<std::uint32_t>(seed()); }
 
  private:

@@ -1,4 +1,4 @@
-// Materials that the generators share, with colours drawn from palettes of the real thing.
+// Materials that the generators share, with colours from palettes of real materials.
 #pragma once
 
 #include "tools/simulate/shapes/dice.h"
@@ -6,8 +6,8 @@
 
 namespace perdure::tools::shapes {
 
-/// A texture of one of a few seeds, so that a town of hundreds of things holds tens of pictures.
-/// The top byte of the look's seed (the set of looks) keeps sets apart.
+/// A texture with one of a few seeds, so that hundreds of objects share tens of textures. The top
+/// byte of the look's seed selects the look set, and separates the sets.
 std::shared_ptr<const Texture> sharedTexture(TextureKind kind, std::uint64_t look_seed, Dice& dice,
                                              int size = 256);
 

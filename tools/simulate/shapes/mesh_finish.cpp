@@ -13,7 +13,7 @@ namespace {
 using Vec2 = Eigen::Vector2f;
 using Vec3 = Eigen::Vector3f;
 
-constexpr float kWeldStep = 1e-5F;  // m: corners nearer than this are one
+constexpr float kWeldStep = 1e-5F;  // m; closer corners are merged
 
 Vec3 crossOf(const LooseFace& face) {
   return (face.corners[1] - face.corners[0]).cross(face.corners[2] - face.corners[0]);
@@ -80,7 +80,7 @@ struct VertexHash {
 
 std::uint32_t vertexOf(const Vec3& p, const Vec3& n, const Vec2& uv, Mesh& mesh,
                        std::unordered_map<VertexKey, std::uint32_t, VertexHash>& known) {
-  // Adding zero turns −0 into 0: equal numbers then have equal bytes.
+  // Adding zero changes −0 to 0, so that equal numbers have equal bytes.
   const VertexKey key{{p.x() + 0.0F, p.y() + 0.0F, p.z() + 0.0F, n.x() + 0.0F, n.y() + 0.0F,
                        n.z() + 0.0F, uv.x() + 0.0F, uv.y() + 0.0F}};
   const auto [at, fresh] =

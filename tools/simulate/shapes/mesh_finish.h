@@ -1,4 +1,5 @@
-// From loose faces to a mesh: the size made exact, normals smoothed up to a crease, corners shared.
+// Converts loose faces to a mesh: fits the size exactly, smooths normals up to a crease, and merges
+// corners.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,13 +16,13 @@ struct LooseFace {
   std::array<Eigen::Vector2f, 3> uvs;
   bool has_uvs = false;
   std::uint16_t material = 0;
-  std::uint32_t part = 0;  ///< only faces of one part are smoothed together
+  std::uint32_t part = 0;  ///< faces of different parts are not smoothed together
   float repeat_m = 1.0F, crease_deg = 40.0F;
 };
 
 /// Scales each axis so that the bounding box is exactly `size` (in float), centred.
 void fitTo(const Eigen::Vector3d& size, std::vector<LooseFace>& faces);
-/// Normals weighted by angle; texture coordinates from positions where a face brings none.
+/// Normals are weighted by angle. Faces without texture coordinates take them from positions.
 Mesh joinFaces(const std::vector<LooseFace>& faces, const std::vector<Material>& materials);
 
 }  // namespace perdure::tools::shapes

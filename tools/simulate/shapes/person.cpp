@@ -9,7 +9,7 @@
 namespace perdure::tools::shapes {
 namespace {
 
-constexpr float kStature = 1.75F;  // metres; the proportions below are of a body so tall
+constexpr float kStature = 1.75F;  // metres; body height for the proportions below
 
 struct Clothes {
   int skin, hair, shirt, trousers, shoes;
@@ -18,7 +18,7 @@ struct Clothes {
 
 struct Pose {
   float stride = 0.0F;  ///< angle of the front leg from the vertical
-  float spread = 0.1F;  ///< of the arms, sidewards
+  float spread = 0.1F;  ///< sideways angle of the arms
   float left_first = 1.0F;
 };
 
@@ -115,7 +115,7 @@ Clothes dress(MeshBuilder& b, const Order& order, Dice& dice) {
   return c;
 }
 
-/// The pose that needs least stretching to fill the size.
+/// The pose that needs the least stretching to fill the size.
 Pose poseFor(const Order& order, const std::string& shape, Dice& dice) {
   const auto tall = static_cast<float>(order.size.z());
   const float length = static_cast<float>(order.size.x()) / tall * kStature;

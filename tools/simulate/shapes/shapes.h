@@ -1,4 +1,5 @@
-// The generators, one for each class of object or kind of scenery; `mesh.h` is their public face.
+// The generators, one for each class of object or kind of scenery; `mesh.h` is the public
+// interface.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,8 +11,8 @@
 
 namespace perdure::tools::shapes {
 
-/// What a generator is given: the size to fill exactly, the shape's name (empty: the look decides)
-/// and the seed of the look. Each throws std::invalid_argument for a shape that is not known.
+/// Arguments of a generator: the exact size, the name of the shape (empty: chosen by the look) and
+/// the seed of the look. Each generator throws std::invalid_argument for an unknown shape.
 struct Order {
   Eigen::Vector3d size = Eigen::Vector3d::Ones();
   std::string shape;
@@ -37,7 +38,7 @@ Mesh makeFloor(const Order& order);
 Mesh makeCrate(const Order& order);
 Mesh makeShelf(const Order& order);
 
-/// The order's shape, or one that the look picks where it is empty; must be among `known`.
+/// The shape of the order, or one chosen by the look if it is empty; it must be one of `known`.
 std::string chosenShape(const Order& order, const std::string& class_name,
                         const std::vector<std::string>& known);
 

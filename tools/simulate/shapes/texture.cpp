@@ -16,8 +16,8 @@ namespace {
 
 using Eigen::Vector3f;
 
-constexpr float kWidest = 1e6F;  // texels; wider footprints see the mean all the same
-constexpr float kBlend = 1e-3F;  // nearer to one level than this: the other is not read
+constexpr float kWidest = 1e6F;  // texels; wider footprints also give the mean
+constexpr float kBlend = 1e-3F;  // distance to a level at which only that level is read
 
 const std::array<float, 256>& decoding() {
   static const std::array<float, 256> table = [] {
@@ -31,13 +31,13 @@ const std::array<float, 256>& decoding() {
   return table;
 }
 
-/// Into [0, 1); |x| is below 2³¹ repeats.
+/// Wraps to [0, 1); |x| must be below 2³¹ repeats.
 float wrapped(float x) {
   const float part = x - static_cast<float>(static_cast<int>(x));
   return part < 0.0F ? part + 1.0F : part;
 }
 
-/// Level and share of the next one: log2 of the footprint, straight between the powers of two.
+/// Level and weight of the next one: log2 of the footprint, linear between powers of two.
 std::pair<std::size_t, float> levelOf(float texels, std::size_t last) {
   const auto bits = std::bit_cast<std::uint32_t>(texels);
   const std::size_t level = (bits >> 23U) - 127U;
@@ -87,7 +87,7 @@ Texture::Texture(TextureKind kind, std::uint64_t seed, int size) {
 Vector3f Texture::bilinear(const Level& level, float u, float v) {
   const float scale = static_cast<float>(level.size);
   const float x = u * scale - 0.5F, y = v * scale - 0.5F;
-  // Neither is below −1: truncation after adding one is the floor, and far faster.
+  // Both are at least −1, so that truncation after adding one equals floor, and is much faster.
   const int ix = static_cast<int>(x + 1.0F) - 1, iy = static_cast<int>(y + 1.0F) - 1;
   const float ax = x - static_cast<float>(ix), ay = y - static_cast<float>(iy);
   const int mask = level.size - 1;

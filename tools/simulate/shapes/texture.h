@@ -1,4 +1,4 @@
-// Procedural pictures, made from a seed, with mip maps so that distance does not make them flicker.
+// Procedural textures from a seed, with mip maps against flicker at a distance.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,8 +9,8 @@
 
 namespace perdure::tools {
 
-/// Paving, brick, bark, leaves, wood (boards), timber, books, screens and the grounds bring their
-/// own colours; plaster, fabric, metal, car paint, skin and markings are nearly white, to be tinted
+/// Paving, brick, bark, leaves, wood (boards), timber, books, screens and grounds have their own
+/// colours. Plaster, fabric, metal, car paint, skin and markings are nearly white, and are tinted
 /// by the material.
 enum class TextureKind {
   kAsphalt,
@@ -38,7 +38,7 @@ enum class TextureKind {
 
 class Texture {
  public:
-  /// size × size texels, tileable; size is a power of two from 1 to 4096, else
+  /// size × size texels, tileable; size is a power of two from 1 to 4096, otherwise throws
   /// std::invalid_argument.
   Texture(TextureKind kind, std::uint64_t seed, int size = 256);
   /// Linear RGB, bilinear within and linear between levels; `footprint` is the width of the pixel
@@ -46,7 +46,7 @@ class Texture {
   Eigen::Vector3f sample(const Eigen::Vector2f& uv, float footprint) const;
 
  private:
-  using Texel = std::array<std::uint8_t, 4>;  ///< RGB by square root, so that dark tones keep steps
+  using Texel = std::array<std::uint8_t, 4>;  ///< square root of RGB, for dark tones
   struct Level {
     int size = 0;
     std::vector<Texel> texels;
@@ -55,7 +55,7 @@ class Texture {
   std::vector<Level> levels_;
 };
 
-/// Shared where kind, seed and size are the same.
+/// Returns a shared texture if kind, seed and size are equal.
 std::shared_ptr<const Texture> makeTexture(TextureKind kind, std::uint64_t seed, int size = 256);
 
 }  // namespace perdure::tools

@@ -1,15 +1,15 @@
-"""Changes to a picture that leave its truth known: crops, scale, mirror, light, blur, noise."""
+"""Image augmentation with consistent ground truth: crops, scale, mirroring, light, blur, noise."""
 
 import numpy as np
 from PIL import Image
 
 from .settings import HEIGHT, WIDTH
 
-MIN_SIDE = 10.0  # of the longer side, pixels: what is smaller is neither there nor not there
+MIN_SIDE = 10.0  # longer side in pixels; smaller objects are ignored
 
 
 def crop(image, truth, rng):
-    """A window of the picture brought to full size; beyond its border it is grey."""
+    """Scales a window of the picture to full size; the area outside the picture is grey."""
     zoom = np.exp(rng.uniform(np.log(0.7), np.log(1.6)))
     width, height = WIDTH / zoom, HEIGHT / zoom
     x = rng.uniform(min(0, WIDTH - width), max(0, WIDTH - width))
@@ -30,7 +30,7 @@ def crop(image, truth, rng):
 
 
 def moved(truth, x, y, zoom):
-    """Boxes cut by the new border; those of which little is left become ignored."""
+    """Boxes clipped to the new border; boxes with a small remainder become ignored."""
     boxes = (truth["boxes"] - np.array([x, y, x, y], np.float32)) * zoom
     area = np.prod(boxes[:, 2:] - boxes[:, :2], axis=1)
     boxes = np.clip(boxes, 0, [WIDTH, HEIGHT, WIDTH, HEIGHT]).astype(np.float32)
@@ -48,7 +48,8 @@ def mirrored(image, truth):
 
 
 def coloured(image, rng):
-    """Exposure, contrast, white balance, sometimes no colour at all. `image` is float, 0 to 255."""
+    """Changes exposure, contrast and white balance, and sometimes removes colour. `image`: float, 0
+    to 255."""
     if rng.random() < 0.15:
         image = np.repeat(image.mean(2, keepdims=True), 3, axis=2)
     gain = np.exp(rng.normal(0, 0.2)) * np.exp(rng.normal(0, 0.06, 3))
@@ -63,8 +64,8 @@ def blurred(image, rng):
 
 
 def augmented(image, truth, rng, crops=0.75):
-    """uint8 (240, 320, 3) and its truth, changed at random: a share `crops` of the pictures is cut
-    and scaled. A pure function of `rng`'s state."""
+    """A randomly changed uint8 image (240, 320, 3) and its ground truth. A share `crops` of the
+    pictures is cropped and scaled. The result depends only on the state of `rng`."""
     if rng.random() < crops:
         image, truth = crop(image, truth, rng)
     if rng.random() < 0.5:

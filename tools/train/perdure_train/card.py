@@ -1,4 +1,4 @@
-"""The model card's figures and its table."""
+"""The figures of the model card and its table."""
 
 import math
 

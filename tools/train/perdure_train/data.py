@@ -1,4 +1,4 @@
-"""Pictures with truth in a cache folder, read by memory map, and batches of them."""
+"""Pictures with ground truth in a cache folder, read through memory maps, and their batches."""
 
 import json
 from pathlib import Path
@@ -29,13 +29,14 @@ class Chunk:
 
 
 def chunk_folders(folder):
-    """The finished chunks below `folder`: truth.json is written last."""
+    """The complete chunks below `folder`; truth.json marks them, because it is written last."""
     return sorted(path.parent for path in Path(folder).glob("*/truth.json"))
 
 
 class Pictures(Dataset):
-    """The pictures of all chunks; with `augment`, each look is another one. Those that show the
-    class `favour` (an index) count twice. `crops` is the share that is cut and scaled."""
+    """The pictures of all chunks. With `augment`, each look has a different augmentation. Pictures
+    with the class `favour` (an index) count twice. `crops` is the share that is cropped and scaled.
+    """
 
     def __init__(self, folders, augment, seed=0, favour=None, crops=0.75):
         self.chunks = [Chunk(folder) for folder in folders]
@@ -47,7 +48,7 @@ class Pictures(Dataset):
         return len(self.index)
 
     def __getitem__(self, key):
-        """`key`: (look, picture); the look decides the augmentation."""
+        """`key`: (look, picture); the look number selects the augmentation."""
         look, picture = key
         chunk, i = self.index[picture]
         image, truth = np.array(self.chunks[chunk].images[i]), self.chunks[chunk].truth[i]
@@ -78,7 +79,7 @@ class Looks(torch.utils.data.Sampler):
 
 
 def batch_of(samples):
-    """Images (N, 3, 240, 320) uint8, channels last, and truth padded to the most objects."""
+    """Images (N, 3, 240, 320) uint8, channels last, and ground truth padded to the most objects."""
     images = torch.from_numpy(np.stack([image for image, _ in samples])).permute(0, 3, 1, 2)
     most = max(1, max(len(truth["classes"]) for _, truth in samples))
     padded = {"mask": np.zeros((len(samples), most), bool)}
@@ -92,5 +93,5 @@ def batch_of(samples):
 
 
 def as_input(images):
-    """uint8 to what the network takes; model.json says the same: (pixel - 127.5) / 255."""
+    """Converts uint8 to the network's input, as in model.json: (pixel - 127.5) / 255."""
     return (images.float() - 127.5) / 255.0

@@ -1,4 +1,4 @@
-"""The network as an ONNX file that OpenCV 4.6 loads: batch norm folded, names given."""
+"""Writes the network as an ONNX file for OpenCV 4.6, with folded batch norm and named outputs."""
 
 import copy
 
@@ -13,7 +13,7 @@ from .settings import HEIGHT, WIDTH
 
 
 class _Affine(nn.Module):
-    """A batch norm that cannot go into its convolution, which others share."""
+    """A batch norm that cannot be folded, because several strides share its convolution."""
 
     def __init__(self, norm):
         super().__init__()
@@ -26,7 +26,7 @@ class _Affine(nn.Module):
 
 
 def _fold(module):
-    """Batch norm into the convolution before it, everywhere below `module`."""
+    """Folds batch norms into their preceding convolutions, for all modules below `module`."""
     for name, child in module.named_children():
         if isinstance(child, Trunk):
             child.norms = nn.ModuleList([_Affine(norm) for norm in child.norms])
@@ -53,8 +53,8 @@ class _Flat(nn.Module):
 
 
 def _without_identities(model):
-    """torch 1.13 gives a tensor that is used twice a second name by Identity; OpenCV 4.6 knows no
-    Identity of a constant. The first name does for both."""
+    """Removes Identity nodes of constants, which OpenCV 4.6 does not support. torch 1.13 adds them
+    as second names of tensors that are used twice; the first name replaces them."""
     renamed = {n.output[0]: n.input[0] for n in model.graph.node if n.op_type == "Identity"}
     nodes = [n for n in model.graph.node if n.op_type != "Identity"]
     for node in nodes:
@@ -68,8 +68,8 @@ def _without_identities(model):
 
 
 def write_onnx(network, path, background_shift=0.0, size=(WIDTH, HEIGHT)):
-    """For images of `size`, width first; the weights are the same for all. `background_shift` is
-    added to the background's logit: calibration that needs no key."""
+    """For images of `size`, width first; the weights are independent of it. `background_shift` is
+    added to the background's logit as a calibration without a separate key."""
     network = folded(network)
     with torch.no_grad():
         network.logits.bias[0] += background_shift

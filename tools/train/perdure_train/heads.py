@@ -1,4 +1,4 @@
-"""What the heads' numbers mean: cells, boxes and azimuths, for training and for tests."""
+"""Decodes the outputs of the heads: cells, boxes and azimuths, for training and tests."""
 
 import math
 
@@ -23,7 +23,7 @@ def cells():
 
 
 def flat(outputs):
-    """One (N, A, channels) each of logits, box, azimuth and spread, float32."""
+    """Logits, box, azimuth and spread, each as one float32 (N, A, channels)."""
     parts = []
     for part in range(len(outputs[0])):
         maps = [level[part].float().flatten(2) for level in outputs]
@@ -32,7 +32,8 @@ def flat(outputs):
 
 
 def boxes_of(raw, centres, strides):
-    """Corners (…, A, 4) in pixels of the input; low may pass high by a stride at the most."""
+    """Corners (…, A, 4) in pixels of the input. The lower corner may exceed the upper one by at
+    most a stride."""
     distance = (functional.softplus(raw) - REACH) * strides[:, None]
     return torch.cat((centres - distance[..., :2], centres + distance[..., 2:]), -1)
 
@@ -43,7 +44,7 @@ def spread_of(raw):
 
 
 def azimuth_of(raw):
-    """The angle of the likeliest bin, corrected by its residual."""
+    """The angle of the most probable bin, corrected by its residual."""
     bins, residuals = raw.split(BINS, -1)
     best = bins.argmax(-1, keepdim=True)
     angle = best.float() * 2 * HALF_BIN + residuals.gather(-1, best) * HALF_BIN
@@ -62,5 +63,5 @@ def iou(a, b):
 
 
 def area(boxes):
-    """Of a box whose sides have passed each other: 0."""
+    """Area of boxes; 0 if the sides are in the wrong order."""
     return (boxes[..., 2:] - boxes[..., :2]).clamp_min(0).prod(-1)

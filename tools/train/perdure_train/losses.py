@@ -1,9 +1,9 @@
-"""Which cell is to find which object, and what its errors cost.
+"""Assignment of cells to objects, and the loss functions.
 
-Assignment: Feng et al., "TOOD: Task-aligned One-stage Object Detection" (ICCV 2021): of the cells
-inside an object's box, those whose present class score and box suit it best. Their quality is the
-target of the class's probability, the rest is the background's; soft targets under a plain
-cross-entropy are a proper score, so that probabilities come out nearly calibrated.
+The assignment follows Feng et al., "TOOD: Task-aligned One-stage Object Detection" (ICCV 2021).
+Among the cells inside an object's box, it selects those with the best current class score and box.
+Their quality is the target probability of the class; the background receives the rest. Soft targets
+with a plain cross-entropy are a proper score, so that the probabilities are nearly calibrated.
 """
 
 import torch
@@ -18,7 +18,8 @@ WEIGHTS = {"class": 1.0, "box": 5.0, "side": 1.0, "bin": 1.0, "residual": 1.0, "
 
 
 def inside(centres, boxes, margin):
-    """(N, G, A): whether a cell's centre is in a box that is `margin` (A,) larger on each side."""
+    """(N, G, A): whether a cell's centre is in a box that is enlarged by `margin` (A,) on each
+    side."""
     x, y = centres[:, 0], centres[:, 1]
     b = boxes[..., None]
     return (
@@ -31,14 +32,14 @@ def inside(centres, boxes, margin):
 def assign(probabilities, boxes, centres, strides, truth):
     """Quality (N, A) in [0, 1] and object index (N, A); quality 0 is background."""
     wanted = truth["mask"] & ~truth["ignored"]
-    overlap = iou(truth["boxes"][:, :, None], boxes[:, None])  # N, G, A
+    overlap = iou(truth["boxes"][:, :, None], boxes[:, None])  # shape (N, G, A)
     classes = (truth["classes"] + 1)[:, :, None].expand(-1, -1, boxes.shape[1])
     score = probabilities.transpose(1, 2).gather(1, classes)
     candidate = inside(centres, truth["boxes"], REACH * strides) & wanted[:, :, None]
     fit = (score.sqrt() * overlap.pow(6) + 1e-12) * candidate
     best = fit.topk(TOP, dim=2)
     chosen = torch.zeros_like(fit).scatter_(2, best.indices, 1.0) * (fit > 0)
-    owner = (overlap * chosen).argmax(1)  # a cell chosen twice goes to the box it fits best
+    owner = (overlap * chosen).argmax(1)  # a cell chosen twice belongs to the best box
     fit = fit * chosen
     scale = (overlap * chosen).amax(2, keepdim=True) / fit.amax(2, keepdim=True).clamp_min(1e-12)
     quality = (fit * scale).gather(1, owner[:, None]).squeeze(1)
@@ -66,16 +67,16 @@ def box_loss(boxes, target, strides, weight):
 
 
 def spread_loss(raw, boxes, target, strides, weight):
-    """Negative log-likelihood of the sides' errors under a Laplace distribution. What the boxes are
-    does not depend on it: only how sure the network says it is (the idea of Kendall and Gal, "What
-    uncertainties do we need in Bayesian deep learning", NIPS 2017)."""
+    """Negative log-likelihood of the sides' errors under a Laplace distribution. It trains only the
+    estimated uncertainty and not the boxes (after Kendall and Gal, "What uncertainties do we need
+    in Bayesian deep learning", NIPS 2017)."""
     error = (boxes.detach() - target).abs() / strides[:, None]
     scale = spread_of(raw)
     return ((error / scale + scale.log()).mean(-1) * weight).sum()
 
 
 def azimuth_loss(raw, angle, weight):
-    """Both neighbouring bins share the truth by their nearness; each has its own residual."""
+    """The two neighbouring bins share the target by their distance; each has its own residual."""
     bins, residuals = raw.split(BINS, -1)
     position = torch.remainder(angle / (2 * HALF_BIN), BINS)
     lower = position.floor().long() % BINS

@@ -1,4 +1,4 @@
-"""The deployed service's own answers on simulated folders, beside their truth."""
+"""Detections of the deployed service on simulated folders, beside their ground truth."""
 
 import re
 import shutil
@@ -36,14 +36,15 @@ def _detect(program, data, model, threshold, clutter_rate, work):
 
 
 def _folder_of(program, cache, kind, seed, threads):
-    """The simulated folder itself, kept in the cache: `perdure detect` reads it."""
+    """The simulated folder in the cache, for `perdure detect`."""
     folder = Path(cache) / f"{kind}-folders" / str(seed)
-    prepare.simulate(program, kind, seed, folder, threads)  # returns at once where it is whole
+    prepare.simulate(program, kind, seed, folder, threads)  # returns at once if complete
     return folder
 
 
 def frames_of(program, cache, kind, scenes, model, clutter_rate, threshold=0.05, threads=2):
-    """[(detections, truth)] of all frames of the set's first scenes; median CPU ms a frame.
+    """[(detections, truth)] of all frames in the first scenes of a set, and the median CPU time in
+    ms for each frame.
 
     detections: boxes, odds, azimuths and p, the calibrated probabilities.
     """

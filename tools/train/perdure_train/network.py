@@ -22,7 +22,8 @@ class _ReLU(torch.autograd.Function):
         (y,) = ctx.saved_tensors
         if y.dtype != torch.bfloat16:
             return gradient * y.sign()
-        # The bits of a positive number are a positive integer: 0 or all ones makes a mask.
+        # The bits of a positive number are a positive integer; clamping and negation give a mask of
+        # all ones.
         mask = y.view(torch.int16).clamp_max(1).neg()
         return (mask & gradient.to(y.dtype).view(torch.int16)).view(torch.bfloat16)
 
@@ -54,8 +55,8 @@ class Block(nn.Module):
 
 
 class Trunk(nn.Module):
-    """A convolution that the strides share. Its batch norm they do not: activations differ from
-    stride to stride, and with statistics of all of them together boxes came out a tenth too high."""
+    """A convolution that all strides share, with a separate batch norm for each stride. Activations
+    differ between strides; shared statistics made boxes a tenth too high."""
 
     def __init__(self, width):
         super().__init__()
@@ -68,18 +69,18 @@ class Trunk(nn.Module):
 
 
 def upsampled(small, rows):
-    """Twice as large; without the row too many where the input's height is no multiple."""
+    """Doubles the size, and removes the surplus row if the input's height is not a multiple."""
     large = nn.functional.interpolate(small, scale_factor=2.0, mode="nearest")
     return large if large.shape[2] == rows else large[:, :, :rows]
 
 
 class Network(nn.Module):
-    """Images (N, 3, 240, 320), RGB in [0, 1] less 0.5, to one (logits, box, azimuth, spread) a
-    stride.
+    """Maps images (N, 3, 240, 320), RGB in [0, 1] minus 0.5, to one (logits, box, azimuth, spread)
+    for each stride.
 
     logits: K + 1, background first. box: softplus of the distances to the left, top, right and
-    bottom from the cell's centre, less REACH, in strides. azimuth: BINS logits, then BINS residuals
-    in units of half a bin. spread: softplus of how far each side may be from where it is, in strides.
+    bottom from the cell's centre, minus REACH, in strides. azimuth: BINS logits, then BINS
+    residuals in units of half a bin. spread: softplus of the uncertainty of each side, in strides.
     """
 
     def __init__(self, widths=(16, 32, 64, 80, 64), neck=48):
@@ -108,7 +109,7 @@ class Network(nn.Module):
             nn.init.zeros_(head.bias)
         nn.init.constant_(self.box.bias, 1.0)
         nn.init.constant_(self.spread.bias, -1.0)
-        with torch.no_grad():  # one cell in a hundred holds something
+        with torch.no_grad():  # one cell in a hundred contains an object
             self.logits.bias[0] = math.log(99.0 * len(CLASSES))
 
     def forward(self, images):

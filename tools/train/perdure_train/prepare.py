@@ -1,4 +1,4 @@
-"""Pictures for training and for tests: `perdure simulate` is run, its folders become chunks."""
+"""Pictures for training and tests: runs `perdure simulate` and converts its folders to chunks."""
 
 import json
 import shutil
@@ -10,8 +10,8 @@ import numpy as np
 from .progress import Progress
 from .simulated import read_folder
 
-VIEWS = 40  # of one random scene
-SETS = {  # look set, first seed: nothing is in two of them
+VIEWS = 40  # views of one random scene
+SETS = {  # look set and first seed; the sets are disjoint
     "train": ("train", 1000),
     "calibration": ("train", 500_000),
     "test": ("test", 900_000),
@@ -41,7 +41,7 @@ def simulate(program, kind, seed, folder, threads):
 
 
 def make_chunk(program, kind, seed, folder, threads):
-    """Everything of one scene; truth.json comes last and says that the chunk is whole."""
+    """Creates the chunk of one scene; truth.json is written last to mark it as complete."""
     chunk, work = folder / f"{seed}", folder / f"{seed}.part"
     if (chunk / "truth.json").exists():
         return
@@ -57,7 +57,7 @@ def make_chunk(program, kind, seed, folder, threads):
 
 
 def prepare(program, cache, kind, count, threads=2):
-    """At least `count` pictures of a set; what is there already stays."""
+    """Ensures at least `count` pictures of a set; existing ones stay."""
     folder, first = Path(cache) / kind, SETS[kind][1]
     folder.mkdir(parents=True, exist_ok=True)
     scenes = -(-count // VIEWS)

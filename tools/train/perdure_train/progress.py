@@ -1,4 +1,4 @@
-"""A line that rewrites itself on a terminal; elsewhere a line every half minute."""
+"""Progress output: one updated line on a terminal, otherwise a line every half minute."""
 
 import math
 import sys

@@ -1,4 +1,4 @@
-"""Export and calibration: the ONNX file and the model.json that says what it means."""
+"""Export and calibration: the ONNX file and the model.json that describes it."""
 
 import json
 import math
@@ -14,8 +14,8 @@ from .settings import AZIMUTH_CLASSES, BINS, CLASSES, HEIGHT, REACH, STRIDES, WI
 from .training import settle_statistics
 
 NAME = f"perdure_{WIDTH}x{HEIGHT}"
-DEMO_SIZE = (480, 360)  # the same weights for the demo, whose people are small
-SCENES = 12  # of the calibration set
+DEMO_SIZE = (480, 360)  # same weights; the demo has small people
+SCENES = 12  # scenes of the calibration set
 THRESHOLD = 0.05
 
 
@@ -54,7 +54,8 @@ def write_description(path, **values):
 
 
 def fit_calibration(odds, labels):
-    """Temperature T and shift b of softmax([0, odds / T + b]) that make `labels` likeliest."""
+    """Temperature T and shift b of softmax([0, odds / T + b]) that maximise the likelihood of
+    `labels`."""
     odds = torch.tensor(odds, dtype=torch.float64)
     labels = torch.tensor(labels)
     log_t = torch.zeros(1, dtype=torch.float64, requires_grad=True)
@@ -80,7 +81,7 @@ def robust_sigma(values, floor, ceiling):
 
 
 def azimuth_sigma_of(frames):
-    """What is left where the network is right about front and back."""
+    """Standard deviation of the azimuth; excludes errors of 180°."""
     errors = np.concatenate(
         [scores.azimuth_errors(frames, CLASSES.index(name))[0] for name in AZIMUTH_CLASSES]
     )
@@ -104,7 +105,8 @@ def release(options, program):
                                       clutter_rate, THRESHOLD, options.threads)
         return frames
 
-    # The shift moves the background's logit, and with it what passes the threshold: twice over.
+    # The shift moves the background's logit and so changes which boxes pass the threshold.
+    # Therefore the fit is repeated.
     shift, temperature = 0.0, 1.0
     for _ in range(2):
         temperature, more = fit_calibration(*scores.outcomes(look(0.5)))

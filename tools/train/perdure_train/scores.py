@@ -1,4 +1,5 @@
-"""Detections against truth: AP50, recall, calibration error, azimuth. Only numpy."""
+"""Scores detections against ground truth: AP50, recall, calibration error, azimuth. Needs only
+numpy."""
 
 import csv
 import math
@@ -7,7 +8,7 @@ import numpy as np
 
 from .settings import CLASSES
 
-SIZES = {"small": (10, 24), "medium": (24, 64), "large": (64, 1e9)}  # square root of the area, px
+SIZES = {"small": (10, 24), "medium": (24, 64), "large": (64, 1e9)}  # √area in px
 
 
 def overlaps(a, b):
@@ -20,9 +21,10 @@ def overlaps(a, b):
 
 
 def read_detections(file, clutter_rate):
-    """By frame: boxes, calibrated log-odds (n, K) against the background, azimuth and its sigma.
+    """For each frame: boxes, calibrated log-odds (n, K) against the background, azimuth and its
+    sigma.
 
-    The activations of the file hold logit(c), which is taken out again (the service's README).
+    The activations of the file include logit(c), which is subtracted (see the service's README).
     """
     frames = {}
     prior = math.log(clutter_rate / (1 - clutter_rate))
@@ -48,7 +50,7 @@ EMPTY = {"boxes": np.zeros((0, 4)), "odds": np.zeros((0, len(CLASSES))), "azimut
 
 
 def probabilities(odds, temperature=1.0, shift=0.0):
-    """Soft-max over background (0) and classes: (n, K), without the background's."""
+    """Soft-max over background (0) and classes: (n, K), without the background column."""
     z = np.concatenate([np.zeros((len(odds), 1)), odds / temperature + shift], 1)
     z = np.exp(z - z.max(1, keepdims=True))
     return (z / z.sum(1, keepdims=True))[:, 1:]
@@ -59,8 +61,8 @@ def sizes_of(boxes):
 
 
 def match(boxes, scores, truth, wanted, minimum=0.5):
-    """Greedily by falling score: the index of the truth that each box takes, -1 for a false alarm,
-    -2 where it lies on something that is not counted."""
+    """Matches greedily by decreasing score. Returns the index of the true object for each box. The
+    index is -1 for a false alarm, and -2 if the box covers an object that does not count."""
     result = np.full(len(boxes), -1)
     if len(boxes) == 0 or len(truth) == 0:
         return result
@@ -80,13 +82,13 @@ def match(boxes, scores, truth, wanted, minimum=0.5):
 
 
 def covered(box, others):
-    """The largest share of `box` that lies in one of `others`."""
+    """The largest share of `box` that one of `others` covers."""
     low, high = np.maximum(box[:2], others[:, :2]), np.minimum(box[2:], others[:, 2:])
     return (np.clip(high - low, 0, None).prod(1) / max((box[2:] - box[:2]).prod(), 1e-9)).max()
 
 
 def average_precision(scores, hits, count):
-    """Area under the precision's envelope over recall."""
+    """Area under the precision envelope over recall."""
     if count == 0:
         return math.nan
     order = np.argsort(-scores, kind="stable")
@@ -99,7 +101,7 @@ def average_precision(scores, hits, count):
 
 
 def class_average_precision(frames, k, sizes=(0, 1e9)):
-    """AP50 of class k; truths of another size or class ignored flag are not counted."""
+    """AP50 of class k; true objects of another size, or with the ignored flag, do not count."""
     scores, hits, count = [], [], 0
     for detections, truth in frames:
         chosen = truth["classes"] == k
@@ -119,7 +121,7 @@ def class_average_precision(frames, k, sizes=(0, 1e9)):
 
 
 def recall(frames, k, minimum, largest=1e9):
-    """Found and counted truths of class k with size in the range, by any box of IoU 0.5."""
+    """Found and counted true objects of class k in the size range, by any box with IoU 0.5."""
     found = count = 0
     for detections, truth in frames:
         size = sizes_of(truth["boxes"])
@@ -132,7 +134,7 @@ def recall(frames, k, minimum, largest=1e9):
 
 
 def azimuth_errors(frames, k):
-    """Absolute errors in radians, and errors over their sigmas, of matched detections of class k."""
+    """Absolute errors in radians, and errors divided by sigma, of matched detections of class k."""
     errors, ratios = [], []
     for detections, truth in frames:
         best = detections["p"].argmax(1) == k if len(detections["p"]) else np.zeros(0, bool)
@@ -149,10 +151,10 @@ def azimuth_errors(frames, k):
 
 
 def outcomes(frames):
-    """Of every emitted box: log-odds (n, K) and the true class, 0 clutter, k + 1 class k.
+    """Log-odds (n, K) and true class of each emitted box; 0 is clutter, k + 1 is class k.
 
-    A box is of an object's class where they overlap by half or more and no better-scored box
-    has taken it; what lies on something ignored is left out.
+    A box has an object's class if their IoU is at least 0.5 and no box with a higher score has the
+    object. Boxes on ignored objects are omitted.
     """
     odds, labels = [], []
     for detections, truth in frames:
@@ -181,14 +183,14 @@ def calibration_error(p, labels, bins=15):
     return float(error)
 
 
-CLEAR = 0.8  # probability of the best class; what is half hidden has other errors
-LARGE = 40.0  # pixels of the input; of smaller ones the pixel is the larger error
-FULL = 12.0  # pixels: a median over many does not mind them
+CLEAR = 0.8  # least probability of the best class; half-hidden objects have other errors
+LARGE = 40.0  # pixels of the input; below it, pixel quantisation dominates
+FULL = 12.0  # pixels; the median suppresses their quantisation
 
 
 def matches(frames, at_least=0.0):
-    """(detections, truth, i, j) of each box i that is object j's best answer, of those whose best
-    class has this probability."""
+    """(detections, truth, i, j) for each box i that is the best match of object j and whose best
+    class has at least this probability."""
     for detections, truth in frames:
         if not len(detections["boxes"]) or not len(truth["boxes"]):
             continue
@@ -198,7 +200,7 @@ def matches(frames, at_least=0.0):
 
 
 def side_errors(frames):
-    """Errors of sides relative to the box's size, where that is large, of clear best matches."""
+    """Errors of the sides of clear best matches, relative to the size of large boxes."""
     errors = []
     for detections, truth, i, j in matches(frames, CLEAR):
         box = truth["boxes"][j]
@@ -210,8 +212,8 @@ def side_errors(frames):
 
 
 def side_insets(frames, cls):
-    """How far the sides lie inside the outline, in its widths and heights: medians (x1, y1, x2, y2)
-    over the clear matches of one class that are wholly in sight; zeros where those are few."""
+    """Median insets of the sides within the outline, relative to its width and height: (x1, y1, x2,
+    y2). Uses clear matches of one class that are completely visible; zeros if there are few."""
     insets = []
     for detections, truth, i, j in matches(frames, CLEAR):
         outline = truth["boxes"][j]
@@ -224,8 +226,8 @@ def side_insets(frames, cls):
 
 
 def side_ratios(frames):
-    """Errors of sides over what the network says of them, of all matched boxes; those at the
-    border of the image are left out."""
+    """Errors of the sides divided by their estimated spread, for all matched boxes; sides at the
+    image border are omitted."""
     ratios = []
     for detections, truth, i, j in matches(frames):
         box = truth["boxes"][j]

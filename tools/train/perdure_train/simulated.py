@@ -1,4 +1,4 @@
-"""A folder of `perdure simulate` as pictures with boxes, classes and azimuths."""
+"""Reads a folder of `perdure simulate` as pictures with boxes, classes and azimuths."""
 
 import csv
 import json
@@ -10,13 +10,13 @@ from PIL import Image
 
 from .settings import CLASSES, HEIGHT, WIDTH
 
-MIN_SIDE = 10.0  # of the longer side in pixels of the input; smaller ones are ignored
-HIDDEN = 0.05  # share of the outline within the image in sight below which there is nothing to see
-IGNORED = 0.25  # share below which an object is neither to be found nor wrong to be found
+MIN_SIDE = 10.0  # longer side in pixels of the input; smaller objects are ignored
+HIDDEN = 0.05  # visible share of the outline within the image below which an object is invisible
+IGNORED = 0.25  # visible share below which an object counts neither as a miss nor as a false alarm
 
 
 def table(file):
-    """Rows of numbers of a CSV; its header, and what is no number, are left out."""
+    """Numeric rows of a CSV, without its header and rows that are not numbers."""
     with open(file, newline="") as stream:
         return [row for row in csv.reader(stream) if row and not row[0].startswith("#")]
 
@@ -36,19 +36,19 @@ def listed(text, key):
 
 
 class Lens:
-    """Pinhole with radial and tangential distortion, as EuRoC's sensor.yaml gives it."""
+    """Pinhole camera with radial and tangential distortion, from EuRoC's sensor.yaml."""
 
     def __init__(self, text):
         self.fx, self.fy, self.cx, self.cy = listed(text, "intrinsics:")
         self.k1, self.k2, self.p1, self.p2 = listed(text, "distortion_coefficients:")
 
     def hull(self, points_C):
-        """Box (x1, y1, x2, y2) around the images of points in front of the camera, or nothing."""
+        """Box (x1, y1, x2, y2) around the images of points in front of the camera, or None."""
         if points_C[:, 2].min() < 0.5:
             return None
         x, y = points_C[:, 0] / points_C[:, 2], points_C[:, 1] / points_C[:, 2]
         r = x * x + y * y
-        if r.max() > 2.0:  # beyond what the polynomial describes
+        if r.max() > 2.0:  # outside the valid range of the polynomial
             return None
         radial = 1 + self.k1 * r + self.k2 * r * r
         u = self.fx * (x * radial + 2 * self.p1 * x * y + self.p2 * (r + 2 * x * x)) + self.cx
@@ -64,7 +64,7 @@ def corners(thing, centre, yaw):
 
 
 class Poses:
-    """Of the camera in the world, by time."""
+    """Poses of the camera in the world, by time."""
 
     def __init__(self, mav0):
         rows = np.array(
@@ -77,14 +77,14 @@ class Poses:
         self.lens = Lens(text)
 
     def at(self, time_ns):
-        """R_WC and p_WC at the state nearest to the time."""
+        """R_WC and p_WC of the state nearest to the time."""
         row = self.rows[np.abs(self.times - time_ns).argmin()]
         R_WB = rotation(*row[3:7])
         return R_WB @ self.T_BC[:3, :3], R_WB @ self.T_BC[:3, 3] + row[:3]
 
 
 def azimuth(R_WC, p_WC, centre, yaw):
-    """alpha as KITTI has it, in the gravity-levelled camera: rotation_y less the bearing."""
+    """KITTI's alpha in the gravity-levelled camera: rotation_y minus the bearing."""
     forward = np.array([R_WC[0, 2], R_WC[1, 2]])
     forward /= max(np.linalg.norm(forward), 1e-9)
     right = np.array([forward[1], -forward[0]])
@@ -95,7 +95,7 @@ def azimuth(R_WC, p_WC, centre, yaw):
 
 
 def key_at(thing, time_ns):
-    """Centre and yaw; on a straight way between dense keys where the object moves."""
+    """Centre and yaw; linearly interpolated between dense keys for moving objects."""
     keys = thing["keys"]
     after = next((i for i, key in enumerate(keys) if key["time_ns"] > time_ns), len(keys))
     before = keys[max(after - 1, 0)]
@@ -107,7 +107,7 @@ def key_at(thing, time_ns):
 
 
 def judged(row, scale):
-    """Box in pixels of the input, cut by the image, and whether it is ignored; or nothing."""
+    """Box in pixels of the input, clipped to the image, and whether it is ignored; or None."""
     full = np.array([float(x) for x in row[3:7]]) * scale
     box = np.clip(full, 0, [WIDTH, HEIGHT, WIDTH, HEIGHT])
     sides, whole = box[2:] - box[:2], full[2:] - full[:2]
@@ -121,8 +121,8 @@ def judged(row, scale):
 
 
 def hull_of(thing, seen, R_WC, p_WC, time_ns, lens, scale):
-    """Box of the cuboid's image in pixels of the input, where all of the object is in sight and in
-    the image; else four times NaN."""
+    """Box of the cuboid's image in pixels of the input if the object is completely visible;
+    otherwise four times NaN."""
     hull = lens.hull((corners(thing, *key_at(thing, time_ns)) - p_WC) @ R_WC)
     if hull is None or seen < 0.95:
         return [math.nan] * 4
@@ -132,7 +132,7 @@ def hull_of(thing, seen, R_WC, p_WC, time_ns, lens, scale):
 
 
 def read_folder(folder):
-    """Images (N, 240, 320, 3) and the truth of each frame, ready for data.Chunk."""
+    """Images (N, 240, 320, 3) and the ground truth of each frame, for data.Chunk."""
     mav0 = Path(folder) / "mav0"
     things = {t["id"]: t for t in json.loads((Path(folder) / "objects_truth.json").read_text())["objects"]}
     poses = Poses(mav0)

@@ -1,4 +1,4 @@
-"""The training loop: AdamW with a cosine, an average of the weights, checkpoints."""
+"""The training loop: AdamW with a cosine schedule, averaged weights, checkpoints."""
 
 import copy
 import math
@@ -17,7 +17,7 @@ from .settings import CLASSES
 
 
 def optimiser_of(network, rate, decay):
-    """Weight decay for the convolutions' weights alone."""
+    """Applies weight decay only to the weights of convolutions."""
     weights = [p for p in network.parameters() if p.ndim > 1]
     others = [p for p in network.parameters() if p.ndim <= 1]
     groups = [{"params": weights, "weight_decay": decay}, {"params": others, "weight_decay": 0.0}]
@@ -26,7 +26,7 @@ def optimiser_of(network, rate, decay):
 
 @torch.no_grad()
 def average(slow, fast, step):
-    """Exponential average, quick at first. Buffers (batch norm's statistics) too."""
+    """Exponential average with a faster start. Includes buffers (batch norm's statistics)."""
     keep = min(0.9985, (1 + step) / (20 + step))
     for a, b in zip(slow.state_dict().values(), fast.state_dict().values()):
         if a.dtype.is_floating_point:
@@ -37,14 +37,14 @@ def average(slow, fast, step):
 
 @torch.no_grad()
 def settle_statistics(network, pictures, batches=100, batch=32, seed=1):
-    """The statistics of batch norm anew, in float32, as the mean over plain pictures of all scenes
-    (Wu and Johnson, "Rethinking 'Batch' in BatchNorm", 2021): those that training leaves are of
-    augmented pictures and in bf16."""
+    """Recomputes the batch-norm statistics in float32 as the mean over unchanged pictures of all
+    scenes (Wu and Johnson, "Rethinking 'Batch' in BatchNorm", 2021). The statistics from training
+    come from augmented pictures in bf16."""
     norms = [m for m in network.modules() if isinstance(m, torch.nn.BatchNorm2d)]
     momenta = [m.momentum for m in norms]
     for m in norms:
         m.reset_running_stats()
-        m.momentum = None  # the mean of all
+        m.momentum = None  # means the average of all batches
     network.train()
     rng = np.random.default_rng(seed)
     for _ in range(batches):
@@ -86,10 +86,10 @@ class Trainer:
         self.checkpoint.parent.mkdir(parents=True, exist_ok=True)
         part = self.checkpoint.with_suffix(".part")
         torch.save(state, part)
-        part.replace(self.checkpoint)  # whole or not at all
+        part.replace(self.checkpoint)  # replaces the file atomically
 
     def rate(self):
-        """Of the learning: warm-up, then a cosine over the share of the training that is done."""
+        """Learning rate: warm-up, then a cosine over the completed share of the training."""
         warm = min(1.0, (self.step + 1) / 150)
         return self.options.rate * warm * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * self.share)))
 
@@ -115,7 +115,7 @@ class Trainer:
         return {name: float(value.detach()) for name, value in terms.items()}
 
     def run(self):
-        """To the end of the steps, or of the minutes where those are given."""
+        """Trains to the end of the steps, or for the given minutes."""
         options, smooth = self.options, {}
         progress = Progress("training")
         started, before, saved = time.time(), self.share, time.time()

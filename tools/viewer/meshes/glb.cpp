@@ -22,7 +22,7 @@ float brightness(const Material& material) {
          0.0722F * material.colour.z();
 }
 
-/// Of each material against the one with the largest area.
+/// Shade of each material, relative to the one with the largest area.
 std::vector<float> shades(const Mesh& mesh) {
   std::vector<float> area(mesh.materials.size(), 0.0F);
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
@@ -34,7 +34,7 @@ std::vector<float> shades(const Mesh& mesh) {
   std::vector<float> result;
   for (std::size_t i = 0; i < mesh.materials.size(); ++i) {
     constexpr float kBrightest = 0.75F, kDarkest = 0.12F;
-    // Square root: linear light to what eyes see.
+    // Square root converts linear light to perceived brightness.
     const float shade = std::clamp(std::sqrt(brightness(mesh.materials[i])), kDarkest, kBrightest);
     result.push_back(static_cast<std::ptrdiff_t>(i) == body ? 1.0F : shade);
   }
@@ -54,7 +54,7 @@ Vertices verticesOf(const Mesh& mesh) {
       out.indices.push_back(at->second);
       if (!is_new) continue;
       const Eigen::Vector3f p = (mesh.positions[corner] - middle).cwiseQuotient(size);
-      // Scaled back by the page: a normal scales the other way.
+      // The page scales the mesh back; a normal needs the inverse scale.
       const Eigen::Vector3f n = mesh.normals[corner].cwiseProduct(size).normalized();
       out.positions.insert(out.positions.end(), {p.x(), p.y(), p.z()});
       out.normals.insert(out.normals.end(), {n.x(), n.y(), n.z()});

@@ -1,5 +1,5 @@
-// A mesh as binary glTF 2.0 for the page: one primitive in a box of 1 × 1 × 1 about the origin,
-// with COLOR_0 instead of materials.
+// Converts a mesh to binary glTF 2.0 for the page: one primitive in a box of 1 × 1 × 1 about the
+// origin, with COLOR_0 instead of materials.
 #pragma once
 
 #include <string>
@@ -8,8 +8,8 @@
 
 namespace perdure::tools::viewer {
 
-/// COLOR_0 says how bright each part is against the one with the largest area, which is 1: the page
-/// gives that the colour of its class.
+/// COLOR_0 is the brightness of each part, relative to the one with the largest area, which is 1.
+/// The page multiplies it by the colour of the class.
 std::string glbOf(const Mesh& mesh);
 
 }  // namespace perdure::tools::viewer

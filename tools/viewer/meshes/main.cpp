@@ -9,7 +9,7 @@ namespace {
 
 struct Shape {
   const char *file, *class_name;
-  Eigen::Vector3d size;  ///< m, a usual one: parts keep their proportions
+  Eigen::Vector3d size;  ///< m, a typical size, for the proportions of the parts
   std::uint64_t look;
 };
 

@@ -1,7 +1,7 @@
-// The camera's image with what is drawn over it: both of one frame, by their time.
+// The camera image with annotations of the same frame, matched by their time.
 import { readImage, seconds } from './connection.js';
 
-const KEPT = 12; // images that wait for their annotations
+const KEPT = 12; // limit of images without annotations
 const PATIENCE_MS = 250;
 
 const css = (c) => `rgba(${Math.round(255 * c.r)},${Math.round(255 * c.g)},${Math.round(255 * c.b)},${c.a})`;
@@ -12,7 +12,7 @@ export class CameraView {
     this.pen = canvas.getContext('2d');
     this.images = []; // {time, at, bitmap}
     this.annotations = null;
-    this.likelihood = false; // draws regions as bright as their class is likely, over a darker image
+    this.likelihood = false; // shows the likelihood of a class as brightness
     this.drawn = 0;
     setInterval(() => this.drawLate(), 100);
   }
@@ -32,7 +32,7 @@ export class CameraView {
 
   showLikelihood(on) {
     this.likelihood = on;
-    this.annotations = null; // of the other kind
+    this.annotations = null; // channel of the other kind
   }
 
   drawMatching() {
@@ -42,7 +42,7 @@ export class CameraView {
     this.draw(this.images.shift(), this.annotations.message);
   }
 
-  /** Where no annotations come, the image is shown without. */
+  /** Shows an image without annotations if none arrive. */
   drawLate() {
     const late = this.images.findIndex((i) => performance.now() - i.at > PATIENCE_MS);
     if (late < 0 || (this.annotations && performance.now() - this.annotations.at < 2 * PATIENCE_MS)) return;
@@ -71,7 +71,7 @@ export class CameraView {
 
   drawAnnotations(message) {
     const { pen, canvas } = this;
-    // Lines and letters as large on the screen, however small the image is shown.
+    // Lines and letters keep their size on the screen, independent of the image scale.
     const scale = Math.max(1, (0.85 * canvas.width) / Math.max(1, canvas.clientWidth));
     for (const p of message.points) {
       pen.strokeStyle = css(p.outline_color);

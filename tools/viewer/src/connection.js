@@ -1,5 +1,5 @@
-// The gateway by Foxglove's WebSocket protocol: channels by topic, services by name. Connects again
-// by itself, and says in words why there is nothing.
+// The gateway by Foxglove's WebSocket protocol: channels by topic, services by name. Reconnects
+// automatically and reports why there is no connection.
 
 const PROTOCOLS = ['foxglove.sdk.v1', 'foxglove.websocket.v1'];
 const MESSAGE = 1, TIME = 2, SERVICE_RESPONSE = 3, PLAYBACK = 5, SERVICE_REQUEST = 2, PLAYBACK_CONTROL = 3;
@@ -43,7 +43,8 @@ export class Connection {
     setTimeout(() => this.open(), pause);
   }
 
-  /** A browser hides why a WebSocket was refused; plain HTTP tells whether the gateway is there. */
+  /** Finds out by plain HTTP if the gateway is running, because browsers hide why a WebSocket
+      was refused. */
   async whyLost(event) {
     const host = new URL(this.address).host;
     try {
@@ -58,7 +59,8 @@ export class Connection {
     }
   }
 
-  /** `handler` gets each message of the topic; JSON parsed, anything else as a DataView. */
+  /** `handler` receives each message of the topic: parsed JSON, or a DataView for other
+      encodings. */
   on(topic, handler) {
     this.handlers.set(topic, handler);
     for (const channel of this.channels.values()) if (channel.topic === topic) this.subscribe([channel]);
@@ -86,7 +88,7 @@ export class Connection {
     if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
   }
 
-  /** A service of the gateway; rejects with its sentence. */
+  /** Calls a service of the gateway; rejects with the gateway's error sentence. */
   call(name, request) {
     const service = this.services.get(name);
     if (service === undefined || this.socket.readyState !== WebSocket.OPEN) {
@@ -127,7 +129,7 @@ export class Connection {
     if (view.getUint8(14)) this.onSeek?.();
   }
 
-  /** Of a recording: play or pause, how fast, and where (s) if it is to be somewhere else. */
+  /** Controls a recording: play or pause, speed, and optionally a new position (s). */
   control(play, speed, seek) {
     const id = new TextEncoder().encode(`p${this.nextId++}`), bytes = new Uint8Array(19 + id.length), view = new DataView(bytes.buffer);
     view.setUint8(0, PLAYBACK_CONTROL);

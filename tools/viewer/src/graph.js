@@ -1,10 +1,10 @@
-// The graph of the map in three dimensions, in M: anchors, the way between them, loops.
+// The graph of the map in three dimensions, in M: anchors, trajectory, loops.
 import * as THREE from './vendor/three.module.js';
 import { LOOPS, lookOfLoop } from './words.js';
 
 const ANCHOR = '#8fb8de', UNKNOWN = '#8c8c8c', WAY = '#7094b8', NEAR_PX = 8, STEPS = 8;
 
-/** From a to b, raised between them: both may lie on the way. */
+/** An arch from a to b, because both may be on the trajectory. */
 function arch(a, b) {
   const height = 1 + 0.15 * a.distanceTo(b), points = [];
   for (let i = 0; i <= STEPS; ++i) {
@@ -17,7 +17,7 @@ function arch(a, b) {
 
 const segmentsOf = (points) => points.slice(1).flatMap((p, i) => [points[i], p]);
 
-/** Pixels from a point to a line between two others. */
+/** Distance in pixels from a point to a line between two others. */
 function pixelsFrom(at, a, b) {
   const dx = b.x - a.x, dy = b.y - a.y;
   const t = Math.min(1, Math.max(0, ((at.x - a.x) * dx + (at.y - a.y) * dy) / Math.max(1e-9, dx * dx + dy * dy)));
@@ -25,16 +25,16 @@ function pixelsFrom(at, a, b) {
 }
 
 export class Graph {
-  /** `map`: the group that lies as M does. */
+  /** `map`: the group with the pose of M. */
   constructor(map) {
     this.group = new THREE.Group();
     map.add(this.group);
-    this.anchors = new Map(); // id → anchor, with its place
+    this.anchors = new Map(); // id → anchor, with its position
     this.loops = new Map(); // id → loop, with the points of its line
     this.way = this.line(WAY, 0.7, false);
     this.lines = Object.fromEntries(Object.entries(LOOPS).map(([look, { colour, dashed }]) => [look, this.line(colour, 0.95, dashed)]));
     this.chosenLine = this.line('#ffffff', 1, false);
-    this.chosenLine.renderOrder = 6; // over the line of its loop
+    this.chosenLine.renderOrder = 6; // drawn after the line of its loop
     this.chosenLine.material.depthTest = false;
     this.ball = new THREE.SphereGeometry(0.3, 12, 8);
     this.ballMaterial = new THREE.MeshBasicMaterial({ fog: false });
@@ -59,7 +59,7 @@ export class Graph {
     if (line.material.isLineDashedMaterial) line.computeLineDistances();
   }
 
-  /** A message of /map/graph. */
+  /** Processes a message of /map/graph. */
   set(message) {
     this.anchors = new Map(message.anchors.map((a) => [a.id, { ...a, place: new THREE.Vector3().fromArray(a.at) }]));
     this.loops = new Map();
@@ -98,7 +98,8 @@ export class Graph {
     this.group.add(this.balls);
   }
 
-  /** {kind: "anchor" | "loop", id}, or nothing. Around an anchor its 2σ: the larger of x and y; grey where that is not known. */
+  /** Selects {kind: "anchor" | "loop", id}, or nothing. Draws the 2σ circle of an anchor with
+      the larger of x and y; grey if it is unknown. */
   choose(part) {
     const anchor = part?.kind === 'anchor' ? this.anchors.get(part.id) : undefined;
     const loop = part?.kind === 'loop' ? this.loops.get(part.id) : undefined;
@@ -118,10 +119,8 @@ export class Graph {
     return local && this.group.localToWorld(local.clone());
   }
 
-  /**
-   * What lies within a few pixels of a place on the screen, with its distance from the camera; an
-   * anchor before a loop.
-   */
+  /** The part within a few pixels of a screen position, with its distance from the camera.
+      Anchors have priority over loops. */
   pick(at, camera, width, height) {
     const inverse = new THREE.Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse).multiply(this.group.matrixWorld);
     const shown = (p) => {

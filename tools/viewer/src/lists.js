@@ -1,4 +1,4 @@
-// The list of objects with its search, the log of events, and the state of services.
+// The searchable list of objects, the log of events, and the state of services.
 import { colourOf, escaped, looksLike, percent, visibilityWords, wordsOfTime } from './words.js';
 
 const MOST_ROWS = 400;
@@ -18,7 +18,7 @@ export class ObjectList {
     return at ? Math.hypot(at[0] - b[0], at[1] - b[1]) : Infinity;
   }
 
-  /** Every word has to be in what is said of an object. */
+  /** Whether every word occurs in the description of an object. */
   matches(o, words, onlyMap) {
     if (this.model.answer?.asked === this.search.value.trim()) return this.model.answer.ids.has(o.id);
     const text = `${o.class} ${o.id} ${onlyMap ? 'remembered map' : visibilityWords(o)} ${this.model.isProvisional(o.id) ? 'provisional' : ''} ${o.elsewhere ? 'elsewhere' : ''} ${o.confirmed ? 'confirmed' : 'unconfirmed'} ${(o.moving ?? 0) >= 0.5 ? 'moving' : ''}`.toLowerCase();
@@ -81,7 +81,7 @@ export class ObjectList {
     return row;
   }
 
-  /** The id `step` rows on. */
+  /** The id `step` rows after the selected one. */
   next(step) {
     if (!this.order?.length) return 0;
     const at = this.order.indexOf(this.model.chosen);
@@ -107,7 +107,7 @@ export class EventLog {
 
   clear() {
     this.list.innerHTML = '<li class="empty">No events yet.</li>';
-    this.predicted = new Map(); // object → the line of its newest prediction
+    this.predicted = new Map(); // object → line of its newest prediction
   }
 
   add(event) {
@@ -118,12 +118,12 @@ export class EventLog {
     if (event.at) line.dataset.at = event.at.join();
     let words = escaped(event.words) + (event.detail ? ` <span class="dim">${escaped(event.detail)}</span>` : '');
     for (const id of new Set([event.object_id, event.other_id])) {
-      // Not the digits of a time: 0.1 s.
+      // Skips digits inside a number, such as 0.1 s.
       if (id) words = words.replace(new RegExp(`(?<![\\d.])${id}(?!\\.?\\d)`), `<a data-object="${id}">${id}</a>`);
     }
     line.innerHTML = `<time>${wordsOfTime(time)}</time><span>${words}</span>`;
     if (event.event === 'predicted_return') {
-      // It is told again and again until the object is seen: the newest is enough.
+      // Keeps only the newest prediction, because it is repeated until the object is visible.
       this.predicted.get(event.object_id)?.remove();
       this.predicted.set(event.object_id, line);
     }

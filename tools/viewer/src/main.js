@@ -1,4 +1,4 @@
-// Puts the page together: what comes goes to the model, and from there to map, lists and panels.
+// Assembles the page: messages update the model, which updates map, lists and panels.
 import { CameraView } from './camera.js';
 import { Connection } from './connection.js';
 import { EventLog, ObjectList, renderServices } from './lists.js';
@@ -52,7 +52,7 @@ function choose(id, { reveal = true } = {}) {
   }
 }
 
-/** An anchor or a loop of the map's graph: {kind, id}. */
+/** Selects an anchor or a loop of the map's graph: {kind, id}. */
 function choosePart(part) {
   choose(0);
   world?.choosePart(part);
@@ -70,7 +70,7 @@ function openTab(name) {
   if (name === 'object') panel.ask();
 }
 
-// What comes.
+// Incoming messages.
 let cameraTopic = '';
 function lookThroughCamera() {
   const first = [...connection.channels.values()].find((c) => c.schemaName === 'foxglove::CompressedImage');
@@ -121,10 +121,10 @@ connection.on('/health', (health) => {
   renderServices($('services'), health);
 });
 
-// What is asked.
+// User queries.
 $('search').addEventListener('input', () => list.render());
 $('ask-map').addEventListener('click', askMap);
-/** What is typed as a question: a number, "near 30" (m around the vehicle), "at 12 -40 30", or a class. */
+/** Parses a query: a number, "near 30" (m around the vehicle), "at 12 -40 30", or a class. */
 function questionOf(text) {
   const words = text.toLowerCase().split(/\s+/).filter(Boolean), numbers = words.slice(1).map(Number);
   if (words.length === 0) return {};
@@ -165,7 +165,7 @@ const toggles = {
   g: () => {
     const on = world?.toggle('graph');
     if (on) connection.on('/map/graph', takeGraph);
-    else connection.off('/map/graph'); // nobody looks: nothing is asked
+    else connection.off('/map/graph'); // a hidden view needs no data
     showLegendOfGraph();
     return on;
   },
@@ -174,7 +174,7 @@ const toggles = {
     $('camera').hidden = !showsCamera;
     if (showsCamera) lookThroughCamera();
     else if (cameraTopic) {
-      connection.off(cameraTopic); // nobody looks: nothing is sent
+      connection.off(cameraTopic); // a hidden view needs no data
       connection.off(overlayTopic());
       cameraTopic = '';
     }
@@ -231,11 +231,11 @@ document.addEventListener('keydown', (e) => {
   e.preventDefault();
 });
 
-// What is shown, as often as eyes want it.
+// Updates of the display.
 function figures(now) {
   const frame = model.frame, items = [];
   const stands = connection.range && connection.playback?.status !== 'playing';
-  const since = connection.range?.first ?? model.firstTime; // the bar of a recording says the same
+  const since = connection.range?.first ?? model.firstTime; // start of the recording's bar
   if (frame) items.push(['time', `${Math.max(0, model.time - since).toFixed(1)} s`, ''], ['objects', [...model.objects.values()].filter((o) => o.confirmed).length, '']);
   const map = model.mapFrame;
   if (frame && map) items.push(['sessions', map.sessions, 'minor'], ['loops', map.loops, 'minor'], ['σ in map', wordsOfPlace(map.body_sigma), 'minor']);
@@ -243,7 +243,7 @@ function figures(now) {
   return items.map(([k, v, c]) => `<div class="${c}"><dt>${k}</dt><dd>${v}</dd></div>`).join('');
 }
 
-/** What is under the image, or in its place. */
+/** Caption under the image, or text instead of it. */
 function captionOf(state) {
   if (camera.figure.classList.contains('has-image')) {
     return wordsOfImage(state, model.time - camera.shownTime);
@@ -283,7 +283,7 @@ function refresh() {
   requestAnimationFrame(refresh);
 }
 let last4 = 0;
-/** True so many times a second. */
+/** Returns true `rate` times a second. */
 function now4(rate) {
   const now = performance.now();
   if (now - last4 < 1000 / rate) return false;
@@ -291,6 +291,6 @@ function now4(rate) {
   return true;
 }
 
-// For tests: what is there and what was drawn.
+// State of the page, for tests.
 window.perdure = { model, world, camera, connection, choose, choosePart, opened: performance.now() };
 refresh();

@@ -1,12 +1,12 @@
-// Shapes of the classes, made once from the simulator's (meshes/*.glb): in a box of 1 × 1 × 1 about
-// the origin, x forward, z up; COLOR_0 is how bright a part is against the body.
+// Shapes of the classes, generated from the simulator's meshes (meshes/*.glb): in a box of 1 × 1 ×
+// 1 about the origin, x forward, z up. COLOR_0 is the brightness of a part relative to the body.
 import * as THREE from './vendor/three.module.js';
 
 const NAMES = { car: 'car', van: 'van', truck: 'van', bus: 'van', toy: 'car', person: 'person', bicycle: 'bicycle',
   cyclist: 'bicycle', motorcycle: 'bicycle', chair: 'chair', 'dining table': 'table', monitor: 'monitor', couch: 'couch' };
 const loaded = new Map(); // name → geometry, or a promise of it
 
-/** The one mesh of a binary glTF as our exporter writes it. */
+/** Reads the single mesh of a binary glTF from our exporter. */
 function readGlb(buffer) {
   const view = new DataView(buffer);
   if (view.getUint32(0, true) !== 0x46546c67) throw new Error('this is no binary glTF');
@@ -29,7 +29,7 @@ function readGlb(buffer) {
   return geometry;
 }
 
-/** Calls `ready(geometry)` at once or when it has come; never where there is no shape. */
+/** Calls `ready(geometry)` at once or after loading; never if the class has no shape. */
 export function shapeOf(className, ready) {
   const name = NAMES[className];
   if (!name) return;

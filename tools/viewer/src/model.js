@@ -1,4 +1,4 @@
-// What the page knows: the newest of everything, and how the objects were since it was opened.
+// State of the page: the newest data, and the history of the objects since the page was opened.
 
 const RATE_MS = 5000;
 
@@ -15,7 +15,7 @@ export class Model {
     this.health = null;
     this.heardAt = 0; // performance.now() of the newest objects
     this.firstTime = null;
-    this.arrivals = []; // of objects in the last seconds
+    this.arrivals = []; // arrival times of the last seconds
   }
 
   takeObjects(message, now) {
@@ -23,14 +23,14 @@ export class Model {
     const time = frame.timestamp.sec + 1e-9 * frame.timestamp.nsec;
     const world = `${frame.world}/${frame.epoch}`;
     if (this.world !== undefined && this.world !== world) this.history.clear();
-    const another = this.frame && time < this.time - 2; // a recording begins again
+    const another = this.frame && time < this.time - 2; // whether a recording starts again
     if (another) this.history.clear();
     if (another || this.firstTime === null) this.firstTime = time;
     this.world = world;
     this.time = time;
     this.frame = frame;
     this.objects = new Map(objects.map((o) => [o.id, o]));
-    if (this.heardAt > 0) this.live = true; // the first may be of before
+    if (this.heardAt > 0) this.live = true; // ignores the first one, which may be old
     this.heardAt = now;
     this.arrivals.push(now);
     while (this.arrivals[0] < now - RATE_MS) this.arrivals.shift();
@@ -46,7 +46,7 @@ export class Model {
     if (samples.length > 1500) samples.shift();
   }
 
-  /** To another place of a recording: what was remembered on the way there is of another time. */
+  /** Clears the data of another time after a jump to another position of a recording. */
   jumped() {
     this.history.clear();
     this.events = [];
@@ -63,22 +63,22 @@ export class Model {
     this.elsewhere = message.elsewhere;
   }
 
-  /** Of a question about a place `asked` is what was typed: the list then shows what is there. */
+  /** For a query about a place, `asked` is its text; the list then shows the objects there. */
   takeAnswer(objects, asked) {
     for (const o of objects) this.remembered.set(o.id, o);
     this.answer = asked ? { asked, ids: new Set(objects.map((o) => o.id)) } : null;
   }
 
-  /** T_MW as [x y z qx qy qz qw], where it is of the W that is shown; else W is M. */
+  /** T_MW as [x y z qx qy qz qw] if it belongs to the displayed W; otherwise W is M. */
   T_MW() {
     const f = this.mapFrame;
     return f && this.world === `${f.world}/${f.epoch}` ? f.T_MW : [0, 0, 0, 0, 0, 0, 1];
   }
 
-  /** Where an object's centre is in W: what is on the map only is in M. Null: that is not known. */
+  /** Position of an object's centre in W; objects only on the map are in M. Null: unknown. */
   placeInW(o) {
     if (o.elsewhere) return null;
-    if (o.memory === undefined) return o.c; // of the working set
+    if (o.memory === undefined) return o.c; // an object of the working set
     const [x, y, z, a, b, c, w] = this.T_MW();
     return turned([-a, -b, -c, w], [o.c[0] - x, o.c[1] - y, o.c[2] - z]);
   }
@@ -89,7 +89,8 @@ export class Model {
     return [p[0] + x, p[1] + y, p[2] + z];
   }
 
-  /** Its session is not found on the map of before: it may be an object of that. */
+  /** Whether the session is not localised in the earlier map yet: the object may be one of that
+      map. */
   isProvisional(id) {
     return this.remembered.get(id)?.provisional ?? false;
   }
@@ -98,13 +99,14 @@ export class Model {
     return this.objects.get(id) ?? this.remembered.get(id);
   }
 
-  /** Messages of objects a second. Over seconds: a page that stands still hears several at once. */
+  /** Rate of object messages a second, averaged over seconds, because a busy page receives
+      several at once. */
   rate(now) {
     if (this.arrivals.length < 3 || now - this.heardAt > 2000) return 0;
     return (1000 * (this.arrivals.length - 1)) / Math.max(1, this.arrivals.at(-1) - this.arrivals[0]);
   }
 
-  /** Where the page itself stood still, what waits has not been heard yet. */
+  /** Whether the page itself was busy, so that messages are still waiting. */
   stoodStill(now) {
     if (this.heardAt > 0) this.heardAt = Math.max(this.heardAt, now - 1000);
   }
@@ -114,13 +116,13 @@ export class Model {
   }
 }
 
-/** A vector by a quaternion [x y z w]. */
+/** Rotates a vector by a quaternion [x y z w]. */
 function turned([a, b, c, w], [x, y, z]) {
   const u = 2 * (b * z - c * y), v = 2 * (c * x - a * z), t = 2 * (a * y - b * x);
   return [x + w * u + b * t - c * v, y + w * v + c * u - a * t, z + w * t + a * v - b * u];
 }
 
-/** What is wrong, in a sentence with the mend; "" where all is well. Beside it how bad it is. */
+/** The current fault as a sentence with the fix, and its severity; "" if there is none. */
 export function troubleOf(model, connection, now) {
   if (connection.state === 'lost') return ['lost', connection.sentence];
   if (connection.state !== 'open') return ['connecting', ''];
@@ -133,7 +135,7 @@ export function troubleOf(model, connection, now) {
   if (heard.length === 0 && silent > 2) {
     return ['stale', 'No service is heard: do they run, with the same bus.domain, bus.interface and bus.vehicle as the gateway? (perdure status)'];
   }
-  // Who comes later is told the last objects once.
+  // A new client receives the last objects once.
   const last = silent > 2 || !model.live;
   if (last && capture?.message === 'end of drive') return ['stale', 'The drive has ended: this is the last state.'];
   if (silent > 2) {

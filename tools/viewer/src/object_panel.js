@@ -1,4 +1,4 @@
-// Everything about one object, asked of the gateway twice a second while it is looked at.
+// All data of one object, requested from the gateway twice a second while the panel is open.
 import { classWords, colourOf, escaped, existenceWords, isHidden, isInSight, percent, visibilityWords } from './words.js';
 
 const EVERY_MS = 500;
@@ -24,7 +24,7 @@ export class ObjectPanel {
     this.element.innerHTML = '<p class="empty">Click on an object in the map or in the list.</p>';
   }
 
-  /** A part of the map's graph, in the same place: `words` give HTML, anew at each render. */
+  /** Shows a part of the map's graph in the same place: `words` returns HTML at each render. */
   showPart(words) {
     this.clear();
     this.part = words;
@@ -45,7 +45,7 @@ export class ObjectPanel {
     this.note = '';
     this.shown = performance.now();
     if (id === 0) return this.clear();
-    this.render(); // at once, from what is known
+    this.render(); // shows the known data at once
     this.ask();
   }
 
@@ -74,7 +74,7 @@ export class ObjectPanel {
       this.element.innerHTML = `<p class="empty">${escaped(this.note || 'It is asked for …')}</p>`;
       return;
     }
-    // A text that is being selected stays.
+    // Keeps the content while text is being selected.
     if (String(getSelection()).length > 0 && this.element.contains(getSelection().anchorNode)) return;
     const top = this.element.scrollTop;
     this.element.innerHTML = this.heading(o) + this.whereWords(o) + this.existenceChart(o) + this.classes() + this.ledger() + this.margins() + this.place(o) + this.covariance();
@@ -102,7 +102,8 @@ export class ObjectPanel {
     return b && at ? `${Math.hypot(at[0] - b[0], at[1] - b[1], at[2] - b[2]).toFixed(1)} m` : '–';
   }
 
-  /** In W; null: not known. What the store answered is in M, as what is on the map only. */
+  /** Position in W; null: unknown. Replies of the store, and objects only on the map, are in
+      M. */
   here(o) {
     return this.model.objects.has(o.id) ? o.c : this.model.placeInW({ memory: 'long_term', ...o, elsewhere: this.model.find(o.id)?.elsewhere });
   }
@@ -132,7 +133,7 @@ export class ObjectPanel {
     const t0 = samples[0][0], t1 = samples.at(-1)[0], span = Math.max(0.1, t1 - t0);
     const x = (t) => (100 * (t - t0)) / span, y = (p) => 37 - 34 * p;
     const path = (k) => samples.map((s, i) => `${i ? 'L' : 'M'}${x(s[0]).toFixed(2)} ${y(s[k]).toFixed(2)}`).join('');
-    // Darker where it could not be seen.
+    // Darker while it was not visible.
     const gaps = [];
     for (let i = 1; i < samples.length; ++i) {
       if ((samples[i][3] ?? 1) > 0.05) continue;
@@ -169,7 +170,7 @@ export class ObjectPanel {
       <tr><td></td><td class="n"><b>${signed(sum)}</b></td><td><b>log-odds: ${percent(1 / (1 + Math.exp(-sum)))}</b></td></tr></table>`;
   }
 
-  /** Why the likeliest class is before the next one. */
+  /** Explains why the most probable class leads the next one. */
   margins() {
     const [first, second] = this.full?.classes ?? [];
     const ledger = this.full?.ledger ?? {}, ousted = this.full?.ousted;
@@ -203,7 +204,8 @@ export class ObjectPanel {
     return `<h3>Where it is in ${frame}, and how large</h3><p class="dim">± one standard deviation</p><table>${rows.map(([k, v]) => `<tr><td class="dim">${k}</td><td>${v}</td></tr>`).join('')}</table>`;
   }
 
-  /** Of the likeliest class: correlations as colours, and the covariance of a pair where one points. */
+  /** For the most probable class: correlations as colours, and the covariance of the pair under
+      the pointer. */
   covariance() {
     const P = this.full?.classes?.[0]?.covariance;
     if (!P) return '';

@@ -1,4 +1,4 @@
-// Turning, shifting and zooming the view about a point, z up: mouse, touch and keys.
+// Rotates, moves and zooms the view about a point, z up: mouse, touch and keys.
 import * as THREE from './vendor/three.module.js';
 
 export class Orbit {
@@ -8,8 +8,8 @@ export class Orbit {
     this.onMoved = onMoved;
     this.target = new THREE.Vector3();
     this.distance = 28;
-    this.azimuth = Math.PI; // of the camera about the target
-    this.polar = 1.02; // from straight above
+    this.azimuth = Math.PI; // angle of the camera about the target
+    this.polar = 1.02; // angle from the vertical
     this.pointers = new Map();
     this.travelled = 0;
     element.addEventListener('pointerdown', (e) => this.down(e));
@@ -71,7 +71,7 @@ export class Orbit {
   shift(dx, dy) {
     const scale = (1.2 * this.distance) / this.element.clientHeight;
     const c = Math.cos(this.azimuth), s = Math.sin(this.azimuth);
-    // To the right and away, on the ground.
+    // Moves to the right and forward, on the ground.
     this.target.x += scale * (dx * s - dy * c);
     this.target.y += scale * (-dx * c - dy * s);
     this.onMoved(true);

@@ -8,13 +8,13 @@ BOX.setAttribute('color', new THREE.BufferAttribute(new Float32Array(3 * BOX.att
 const SPHERE = new THREE.SphereGeometry(1, 20, 12);
 const UP = new THREE.Vector3(0, 0, 1), PALE = new THREE.Color('#c4d0dc');
 
-/** Strokes of about 0.3 m, in metres, so that a long edge has more of them than a short one. */
+/** Dashes of about 0.3 m, so that their number is proportional to the length of an edge. */
 function outline(size, dashed) {
   const [l, w, h] = size.map((s) => s / 2);
   const corner = (i) => new THREE.Vector3(i & 1 ? l : -l, i & 2 ? w : -w, i & 4 ? h : -h);
   const edges = [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]]
     .map(([a, b]) => [corner(a), corner(b)]);
-  edges.push([new THREE.Vector3(0, 0, -h), new THREE.Vector3(l, 0, -h)]); // which way it faces
+  edges.push([new THREE.Vector3(0, 0, -h), new THREE.Vector3(l, 0, -h)]); // front of the object
   const points = [];
   for (const [a, b] of edges) {
     const strokes = dashed ? Math.min(30, Math.max(2, Math.round(a.distanceTo(b) / 0.32))) : 1;
@@ -26,7 +26,8 @@ function outline(size, dashed) {
   return new THREE.BufferGeometry().setFromPoints(points);
 }
 
-/** Axes (a rotation) and variances of a symmetric 3 × 3 matrix [xx xy xz yy yz zz], by Jacobi. */
+/** Axes (a rotation) and variances of a symmetric 3 × 3 matrix [xx xy xz yy yz zz], by
+    Jacobi. */
 export function eigenOf([xx, xy, xz, yy, yz, zz]) {
   const a = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], v = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
   for (let sweep = 0; sweep < 12; ++sweep) {
@@ -87,7 +88,7 @@ export class Thing {
     this.material.depthWrite = seen;
     this.material.color.copy(this.colour);
     this.material.emissive.copy(this.chosen ? this.colour : new THREE.Color(0)).multiplyScalar(0.45);
-    // Through walls: a hidden one is drawn over what hides it.
+    // An occluded object is drawn over its occluder.
     this.lineMaterial.depthTest = !hidden;
     this.lines.renderOrder = hidden ? 5 : 1;
     this.lineMaterial.color.copy(hidden ? new THREE.Color('#ffd98a') : this.colour).lerp(new THREE.Color('#ffffff'), this.chosen ? 0.7 : 0.15);
@@ -104,7 +105,7 @@ export class Thing {
     this.ellipsoid.position.fromArray(object.c);
     this.ellipsoid.quaternion.setFromRotationMatrix(axes);
     this.ellipsoid.scale.fromArray(variances.map((x) => Math.min(20, Math.max(0.01, 2 * Math.sqrt(x)))));
-    // One that is larger than its object must not hide what is around it.
+    // An ellipsoid larger than its object must not hide the surroundings.
     const size = Math.max(...object.size) / 2, axis = Math.max(...this.ellipsoid.scale.toArray());
     this.ellipsoid.material.opacity = 0.16 * Math.min(1, Math.max(0.25, size / axis));
   }

@@ -1,4 +1,4 @@
-// What things are called and how they are coloured.
+// Names and colours of the displayed data.
 
 const COLOURS = {
   car: '#388ee0', van: '#14b4b8', truck: '#3c6eb4', bus: '#6e6edc', person: '#f58c32', bicycle: '#50b45a',
@@ -23,7 +23,7 @@ export const percent = (p) => (p > 0.9995 ? '100 %' : p >= 0.0995 ? `${(100 * p)
 const looks = (n) => (n === 1 ? '1 look' : `${n} looks`);
 const times = (n) => (n === 1 ? 'once' : `${n} times`);
 
-/** Each kind of evidence for existence as a sentence. */
+/** A sentence for each kind of evidence for existence. */
 export function existenceWords(kind, n) {
   const words = {
     prior: 'before its first box: few boxes are new things',
@@ -71,7 +71,7 @@ export function visibilityWords(o) {
 /** Events of the whole map, which are marked in it. */
 export const MARKS = { loop_closed: '#c58cff', relocalised: '#9fe5bf', loop_withdrawn: '#ff8f88' };
 
-/** Loops of the map's graph by how they are drawn; the gateway has the same colours. */
+/** Styles of the map's loops; the gateway uses the same colours. */
 export const LOOPS = {
   confirmed: { colour: '#c58cff', dashed: false, words: 'A place was found again, and the map believes it.' },
   tie: { colour: '#40bfad', dashed: false, words: 'The place was tied to the map by objects that still had their ids.' },
@@ -80,17 +80,17 @@ export const LOOPS = {
 };
 export const lookOfLoop = (loop) => (loop.state !== 'confirmed' ? loop.state : loop.kind === 'tie' ? 'tie' : 'confirmed');
 
-/** A text node's worth of HTML. */
+/** Escapes a text for HTML. */
 export const escaped = (text) => String(text).replace(/[&<>"']/g, (c) => `&#${c.codePointAt(0)};`);
 
-/** Under an image that is so many seconds older than the objects. */
+/** Caption of an image that is `older` seconds older than the objects. */
 export function wordsOfImage(state, older) {
   const old = older > 0.5 ? `${older.toFixed(1)} s before the objects that are shown` : '';
   if (state === 'lost' || state === 'stale') return old ? `the last image, ${old}` : 'the last image';
   return old ? `the image is of ${old}` : '';
 }
 
-/** In the place of an image. `recorded`: "" live, "without" images, or "empty" so far. */
+/** Text in place of an image. `recorded`: "" for live, "without" images, or "empty" so far. */
 export function wordsOfNoImage(state, { recorded, openFor, heard }) {
   if (recorded === 'without') return 'the recording has no images: perdure record --images keeps them';
   if (recorded || state === 'lost' || state === 'connecting' || openFor < 3) return 'no image yet';
@@ -99,12 +99,12 @@ export function wordsOfNoImage(state, { recorded, openFor, heard }) {
   return state === 'stale' ? `${none}: the camera has stopped.` : `${none}: is the camera in image.cameras of the gateway?`;
 }
 
-/** Standard deviations [x, y, z, yaw] of the body in the map; empty: not known. */
+/** Standard deviations [x, y, z, yaw] of the body in the map; empty: unknown. */
 export function wordsOfPlace(sigma) {
   return sigma.length > 0 ? `${Math.max(sigma[0], sigma[1]).toFixed(2)} m` : 'not known';
 }
 
-/** Seconds since the page was opened; of long before it may be of another clock. */
+/** Seconds since the page was opened; much earlier times may come from another clock. */
 export function wordsOfTime(seconds) {
   if (seconds >= 0) return `${seconds.toFixed(1)} s`;
   return seconds > -3600 ? `−${(-seconds).toFixed(1)} s` : 'before';

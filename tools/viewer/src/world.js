@@ -1,4 +1,4 @@
-// The map in three dimensions: ground, way, vehicle, points and things, with names over them.
+// The map in three dimensions: ground, trajectory, vehicle, points and objects, with their names.
 import * as THREE from './vendor/three.module.js';
 import { Graph } from './graph.js';
 import { Orbit } from './orbit.js';
@@ -12,7 +12,7 @@ export class World {
   constructor(canvas, labels, onPick, onPart) {
     this.canvas = canvas;
     this.labels = labels;
-    this.toolbar = document.getElementById('tools'); // names stay clear of it
+    this.toolbar = document.getElementById('tools'); // obstacle for the names
     this.onPick = onPick;
     this.onPart = onPart;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: 'low-power' });
@@ -55,7 +55,7 @@ export class World {
   }
 
   addGround() {
-    // In short pieces: a line that passes behind the camera is drawn wrongly by some.
+    // In short pieces, because some browsers draw lines that pass behind the camera incorrectly.
     const half = 150, step = 5, points = [];
     for (let a = -half; a <= half; a += step) {
       for (let b = -half; b < half; b += step) points.push(a, b, 0, a, b + step, 0, b, a, 0, b + step, a, 0);
@@ -150,7 +150,7 @@ export class World {
     this.setMapFrame(model.T_MW());
   }
 
-  /** Lays M under W: the working set stays, and the map moves where a loop is closed. */
+  /** Places M relative to W: the working set stays, and the map moves when a loop is closed. */
   setMapFrame([x, y, z, ...q]) {
     this.map.quaternion.fromArray(q).invert();
     this.map.position.set(-x, -y, -z).applyQuaternion(this.map.quaternion);
@@ -158,10 +158,8 @@ export class World {
     this.dirty = true;
   }
 
-  /**
-   * A pole where a loop was closed or taken back, or the session was found. `world` says in which W
-   * `at` is: events may be heard before the first objects of their W.
-   */
+  /** A pole at a place where a loop was closed or retracted, or the session was localised.
+      `world` is the W of `at`, because events may arrive before the first objects of their W. */
   addMark(at, colour, world) {
     const pole = new THREE.Mesh(new THREE.CylinderGeometry(0.05, 0.05, 3, 8).rotateX(Math.PI / 2), new THREE.MeshBasicMaterial({ color: colour }));
     const ring = new THREE.Mesh(new THREE.TorusGeometry(0.7, 0.06, 6, 32), pole.material);
@@ -223,7 +221,7 @@ export class World {
     const ahead = new THREE.Vector3(1, 0, 0).applyQuaternion(this.vehicle.quaternion);
     const heading = Math.atan2(ahead.y, ahead.x);
     if (this.follow) {
-      // Some way ahead of it, and turned with it.
+      // Places the target ahead of the vehicle and rotates it with the vehicle.
       const turned = this.heading === null || this.heading === undefined ? 0 : Math.atan2(Math.sin(heading - this.heading), Math.cos(heading - this.heading));
       if (this.heading === null || this.heading === undefined) this.orbit.azimuth = heading + Math.PI;
       else this.orbit.azimuth += turned;
@@ -233,7 +231,7 @@ export class World {
     this.sight.position.z = 0;
   }
 
-  /** Where most things stand. */
+  /** Sets the ground to the typical height of the objects. */
   setGround(objects) {
     const feet = [...objects.values()].filter((o) => o.confirmed).map((o) => o.c[2] - o.size[2] / 2).sort((a, b) => a - b);
     const z = feet.length > 0 ? feet[feet.length >> 1] : this.vehicle.position.z - 1.2;
@@ -254,7 +252,7 @@ export class World {
     const positions = new Float32Array(3 * n), colours = new Float32Array(3 * n), colour = new THREE.Color();
     for (let i = 0; i < n; ++i) {
       positions.set(values.subarray(4 * i, 4 * i + 3), 3 * i);
-      // The better it is known, the brighter it is.
+      // Brightness increases with the accuracy of the point.
       const known = 1 / (1 + 2 * values[4 * i + 3]);
       colour.setHSL(0.42, 0.55, 0.18 + 0.5 * known).toArray(colours, 3 * i);
     }
@@ -275,11 +273,11 @@ export class World {
     this.thing(id)?.choose(true);
     this.showBlocker();
     this.dirty = true;
-    // What is said of it goes before the next picture, where that takes long.
+    // If drawing is slow, pending updates are processed before the next picture.
     if (this.took >= SLOW_MS) this.restsUntil = Math.max(this.restsUntil, performance.now() + ANSWERED_MS);
   }
 
-  /** A line from what is chosen to what hides it. */
+  /** A line from the selected object to its occluder. */
   showBlocker() {
     const thing = this.things.get(this.chosen), by = thing && this.things.get(thing.object.blocked_by);
     this.blocker.visible = Boolean(by);
@@ -298,7 +296,7 @@ export class World {
     this.dirty = true;
   }
 
-  /** By the boxes, hidden ones too: a finger is not exact. */
+  /** Selects by boxes, including those of occluded objects, because touch is inexact. */
   pick(e) {
     if (this.orbit.travelled > 6) return;
     const box = this.canvas.getBoundingClientRect();
@@ -323,7 +321,7 @@ export class World {
     else this.onPick(best.id);
   }
 
-  /** Draws where something has changed; to be called each animation frame. */
+  /** Draws if something has changed; to be called for each animation frame. */
   draw() {
     const now = performance.now();
     this.keepPace(now);
@@ -336,10 +334,11 @@ export class World {
     ++this.drawn;
   }
 
-  /** Where drawing takes long, half of the time is left to lists and clicks, and pixels are larger. */
+  /** If drawing is slow, leaves half of the time to lists and clicks, and uses larger
+      pixels. */
   keepPace(now) {
     if (this.drewAt === undefined) return;
-    const took = now - this.drewAt; // until the frame after it
+    const took = now - this.drewAt; // time until the next frame
     this.drewAt = undefined;
     this.took = took;
     if (took < SLOW_MS) {

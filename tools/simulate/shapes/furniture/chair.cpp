@@ -13,7 +13,7 @@ struct ChairMaterials {
   int frame, seat;
 };
 
-/// The person on it looks along +x. Metres, of a chair 0.5 × 0.5 × 0.9.
+/// The front of the chair is +x. Dimensions in metres, for a chair of 0.5 × 0.5 × 0.9.
 void addSeatAndLegs(MeshBuilder& b, const ChairMaterials& m, bool round, Dice& dice) {
   const float splay = dice.uniform(0.0F, 0.04F), thick = dice.uniform(0.015F, 0.024F);
   b.box({-0.21F, -0.22F, 0.43F}, {0.23F, 0.22F, 0.475F}, m.seat);
@@ -39,12 +39,12 @@ void addBack(MeshBuilder& b, const ChairMaterials& m, Dice& dice) {
   const auto at = [&](float y, float z) { return Vec3(-0.2F - lean * (z - 0.45F) / 0.45F, y, z); };
   for (float y : {0.19F, -0.19F}) b.tube(at(y, 0.4F), at(y, 0.9F), 0.019F, 0.016F, 6, m.frame);
   const int style = dice.below(3);
-  if (style == 0) {  // slats across
+  if (style == 0) {  // horizontal slats
     for (float z : {0.6F, 0.72F, 0.84F}) {
       b.box(at(-0.19F, z) - Vec3(0.01F, 0.0F, 0.03F), at(0.19F, z) + Vec3(0.01F, 0.0F, 0.03F),
             m.frame);
     }
-  } else if (style == 1) {  // bars upright
+  } else if (style == 1) {  // vertical bars
     for (float y : {-0.12F, -0.04F, 0.04F, 0.12F})
       b.tube(at(y, 0.47F), at(y, 0.88F), 0.009F, 0.009F, 6, m.frame);
     b.box(at(-0.2F, 0.88F) - Vec3(0.014F, 0.0F, 0.03F), at(0.2F, 0.88F) + Vec3(0.014F, 0.0F, 0.03F),

@@ -1,11 +1,11 @@
-// The stuffed block of which couches and armchairs are made.
+// A cushion, the basic part of couches and armchairs.
 #pragma once
 
 #include "tools/simulate/shapes/mesh_builder.h"
 
 namespace perdure::tools::shapes {
 
-/// A box with its edges rounded by `round` (metres, less than half of each side).
+/// A box with edges rounded by `round` (metres, less than half of each side).
 void addCushion(MeshBuilder& builder, const Vec3& low, const Vec3& high, float round, int material);
 
 }  // namespace perdure::tools::shapes

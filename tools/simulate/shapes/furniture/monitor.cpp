@@ -10,7 +10,7 @@ struct MonitorMaterials {
   int shell, screen, stand;
 };
 
-/// The panel faces +x; `s` is the whole monitor's size.
+/// The panel faces +x; `s` is the size of the whole monitor.
 void addPanel(MeshBuilder& b, const Vec3& s, const MonitorMaterials& m, float low, float bezel) {
   const float y = s.y() / 2.0F, front = 0.1F * s.x();
   b.box({front - 0.02F, -y, low}, {front, y, s.z()}, m.shell);

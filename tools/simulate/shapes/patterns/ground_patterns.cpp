@@ -8,7 +8,7 @@
 namespace perdure::tools::shapes {
 namespace {
 
-/// Thin dark lines along the noise's middle contour, in places only.
+/// Thin dark lines along the median contour of the noise, in some places only.
 float cracks(float u, float v, std::uint32_t seed) {
   const float ridge = std::abs(octaves(u, v, 3, 3, 4, seed) - 0.5F);
   const float where = smoothStep(0.5F, 0.62F, valueNoise(u, v, 4, 4, seed + 71U));

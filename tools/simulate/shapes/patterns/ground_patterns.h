@@ -1,4 +1,4 @@
-// The pictures of what one walks and drives on, and of wood.
+// Textures of grounds, roads, floors and wood.
 #pragma once
 
 #include "tools/simulate/shapes/dice.h"

@@ -1,4 +1,4 @@
-// Noise that tiles: value noise on a lattice that wraps after `frequency` cells, and its octaves.
+// Noise that tiles: value noise on a lattice with period `frequency`, and its octaves.
 #pragma once
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 
 namespace perdure::tools::shapes {
 
-/// [0, 1), fixed for a cell and a seed.
+/// In [0, 1), constant for a cell and a seed.
 inline float cellNoise(int x, int y, std::uint32_t seed) {
   std::uint32_t h = static_cast<std::uint32_t>(x) * 0x8DA6B343U ^
                     static_cast<std::uint32_t>(y) * 0xD8163841U ^ seed * 0xCB1AB31FU;
@@ -22,7 +22,7 @@ inline int wrapCell(int i, int period) {
   return m < 0 ? m + period : m;
 }
 
-/// Smooth in u and v, period 1 in both, [0, 1); fx, fy > 0 cells.
+/// In [0, 1), smooth in u and v, with period 1 in both; fx, fy > 0 cells.
 inline float valueNoise(float u, float v, int fx, int fy, std::uint32_t seed) {
   const float x = u * static_cast<float>(fx), y = v * static_cast<float>(fy);
   const int ix = static_cast<int>(std::floor(x)), iy = static_cast<int>(std::floor(y));
@@ -36,7 +36,7 @@ inline float valueNoise(float u, float v, int fx, int fy, std::uint32_t seed) {
   return low + (c + (d - c) * sx - low) * sy;
 }
 
-/// Octaves of half the amplitude and twice the frequency each; [0, 1), mean one half.
+/// Sum of octaves, each with half the amplitude and twice the frequency; in [0, 1), mean 0.5.
 inline float octaves(float u, float v, int fx, int fy, int count, std::uint32_t seed) {
   float sum = 0.0F, weight = 1.0F, total = 0.0F;
   for (int i = 0; i < count; ++i) {

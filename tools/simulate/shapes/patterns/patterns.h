@@ -1,4 +1,4 @@
-// What a texture of each kind shows, as linear RGB texels that tile.
+// Content of the textures, as linear RGB texels that tile.
 #pragma once
 
 #include <Eigen/Core>

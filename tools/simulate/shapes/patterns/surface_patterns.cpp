@@ -182,7 +182,7 @@ Pattern booksPattern(Dice& dice) {
   return patchwork(grey(0.02F), std::move(patches));
 }
 
-/// Strokes like letters, on a board about ten times as wide as high.
+/// Strokes similar to letters, on a board about ten times as wide as high.
 Pattern signPattern(Dice& dice) {
   std::vector<Patch> patches;
   const bool light = dice.chance(0.5F);

@@ -1,4 +1,4 @@
-// The pictures of walls, plants, cloth, metal and screens.
+// Textures of walls, plants, cloth, metal and screens.
 #pragma once
 
 #include "tools/simulate/shapes/dice.h"

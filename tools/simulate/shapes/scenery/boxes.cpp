@@ -20,7 +20,7 @@ int wallSkin(MeshBuilder& b, const Order& order, Dice& dice) {
                     2.2F);
 }
 
-/// Pictures on a wall's two broad sides, if it is high enough to be a room's.
+/// Adds pictures on both broad sides of a wall, if its height is that of a room.
 void addPictures(MeshBuilder& b, const Order& order, const Vec3& s, float depth, Dice& dice) {
   const bool along_x = s.x() > s.y();
   const float length = along_x ? s.x() : s.y();
@@ -62,7 +62,7 @@ Mesh makeWall(const Order& order) {
   const float in = std::min(0.03F, 0.2F * std::min(s.x(), s.y()));
   b.box({-half.x() + in, -half.y() + in, -half.z()},
         {half.x() - in, half.y() - in, half.z() - 0.02F}, skin);
-  if (s.z() > 2.1F) {  // a room's: skirting and pictures
+  if (s.z() > 2.1F) {  // wall of a room: skirting and pictures
     b.box({-half.x() + 0.5F * in, -half.y() + 0.5F * in, -half.z()},
           {half.x() - 0.5F * in, half.y() - 0.5F * in, -half.z() + 0.1F}, trim);
     addPictures(b, order, s, in, dice);
@@ -143,7 +143,7 @@ Mesh makeShelf(const Order& order) {
   const auto wood = sharedTexture(TextureKind::kTimber, order.look_seed, dice, 256);
   const int boards = b.material(textured(woodColour(dice), wood, 0.1F), 1.1F);
   const int paper = b.material(plain({0.6F, 0.57F, 0.5F}));
-  // Books stand along the longer side and are seen from both.
+  // Books are along the longer side and visible from both sides.
   const bool turned = s.x() > s.y();
   const float length = turned ? s.x() : s.y(), depth = turned ? s.y() : s.x();
   b.placing = Eigen::AngleAxisf(turned ? 1.57079633F : 0.0F, Vec3::UnitZ());

@@ -9,7 +9,7 @@
 namespace perdure::tools::shapes {
 namespace {
 
-constexpr float kOverhang = 0.16F;  // metres from the wall to the cornice's and ledges' front
+constexpr float kOverhang = 0.16F;  // metres from the wall to the front of cornice and ledges
 
 struct Look {
   int wall, base, frame, ledge, door, roof;
@@ -19,8 +19,8 @@ struct Look {
   bool ledges, bars, bands, shutters, shop;
 };
 
-/// One side of the house: u runs to the right along the wall seen from outside, z up, out to the
-/// beholder.
+/// One side of the house. u is to the right along the wall seen from outside, z up, and out is away
+/// from the wall.
 class Side {
  public:
   Side(MeshBuilder& b, const Look& look, const Vec3& origin, const Vec3& right, float width,
@@ -82,7 +82,7 @@ class Side {
 
   bool shop() const { return front_ && l_.shop && w_ > 5.0F; }
 
-  /// The board with the name.
+  /// Adds the sign board.
   void shopFront(float storey) {
     const float z = std::min(2.75F, storey - 0.55F), from = 0.06F * w_, to = 0.94F * w_;
     block(from, to, z, z + 0.5F, 0.0F, 0.08F, l_.frame);
@@ -91,7 +91,7 @@ class Side {
                at(to - 0.1F, z + 0.46F, 0.085F), at(from + 0.1F, z + 0.46F, 0.085F), l_.sign);
   }
 
-  /// A piece of wall with one opening.
+  /// Adds a piece of wall with one opening.
   void cell(float u, float z, float bay, float storey, bool door, bool ground) {
     const bool display = ground && shop() && !door;
     const float half = 0.5F * (door      ? 1.15F

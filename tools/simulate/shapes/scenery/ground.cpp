@@ -10,7 +10,7 @@ namespace {
 
 using namespace shapes;
 
-// Layers lie a few millimetres apart, so that each is hit alone; the road itself is z = 0.
+// Layers are a few millimetres apart, so that a ray hits exactly one; the road is at z = 0.
 constexpr float kGrassZ = -0.01F, kPavementZ = -0.005F, kRoadZ = 0.0F, kPatchZ = 0.002F,
                 kSpotZ = 0.004F, kMarkingZ = 0.006F;
 constexpr float kPavement = 3.4F;  // width beside the road, metres
@@ -44,7 +44,7 @@ void addPlane(MeshBuilder& b, const Eigen::AlignedBox2f& box, float z, int mater
          {box.max().x(), box.max().y(), z}, {box.min().x(), box.max().y(), z}, material);
 }
 
-/// A road's own coordinates: along its way, and to its left.
+/// Coordinates of a road: along it, and to its left.
 struct Lane {
   Vec2 from, along, left;
   float length, half;
@@ -72,8 +72,7 @@ class Street {
     for (const sim::Road& road : scene.roads) {
       if ((road.to - road.from).norm() > 1.0) lanes_.emplace_back(road);
     }
-    // The set of looks is in the top byte of every look; the ground takes that of what stands on
-    // it.
+    // The top byte of every look selects the look set; the ground uses the set of its objects.
     look_ = !scene.objects.empty() ? scene.objects.front().look_seed
             : !scene.props.empty() ? scene.props.front().look_seed
                                    : scene.seed;

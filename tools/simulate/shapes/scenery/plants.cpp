@@ -25,7 +25,7 @@ std::array<int, 2> leafMaterials(MeshBuilder& b, const Order& order, Dice& dice)
   return leaves;
 }
 
-/// A lumpy ball: the dark inside of a cluster, through which one does not see.
+/// An irregular ball: the dark, opaque inside of a cluster.
 void addLump(MeshBuilder& b, const Vec3& centre, const Vec3& radii, int material, Dice& dice) {
   constexpr int kSides = 7;
   std::vector<Ring> rings;
@@ -39,7 +39,7 @@ void addLump(MeshBuilder& b, const Vec3& centre, const Vec3& radii, int material
       rings, [material](std::size_t, std::size_t) { return material; }, material, material, 80.0F);
 }
 
-/// Leaves that stick out of a cluster: small sheets about its surface, turned at random.
+/// Leaves at the surface of a cluster: small sheets with random rotations.
 void addSheets(MeshBuilder& b, const Vec3& centre, const Vec3& radii, int count, float size,
                const std::array<int, 2>& leaves, Dice& dice) {
   for (int i = 0; i < count; ++i) {

@@ -68,7 +68,7 @@ BodyProfile suv() {
   return p;
 }
 
-/// No two of a kind are quite alike: the cabin shifts, the roof and the belt rise or sink.
+/// Varies cars of one kind: shifts the cabin, and raises or lowers the roof and the belt line.
 void vary(BodyProfile& p, Dice& dice) {
   const float bonnet = dice.uniform(-0.03F, 0.03F), belt = dice.uniform(-0.02F, 0.02F);
   for (Vec2& v : p.top) {

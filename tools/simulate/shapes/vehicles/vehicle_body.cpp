@@ -8,8 +8,8 @@ namespace perdure::tools::shapes {
 namespace {
 
 constexpr std::size_t kHalf = 9;               // points from the keel to the roof's middle
-constexpr std::size_t kAll = 2 * (kHalf - 1);  // of a whole ring
-constexpr float kSeam = 0.0022F;               // of the length
+constexpr std::size_t kAll = 2 * (kHalf - 1);  // points of a whole ring
+constexpr float kSeam = 0.0022F;               // share of the length
 
 class Body {
  public:
@@ -48,7 +48,7 @@ class Body {
     }
     std::erase_if(xs, [](float x) { return x < 0.0F || x > 1.0F; });
     std::sort(xs.begin(), xs.end());
-    // Stations nearer than a few millimetres are one; seams are wider.
+    // Merges stations closer than a few millimetres; seams are wider.
     xs.erase(std::unique(xs.begin(), xs.end(), [](float a, float c) { return c - a < 1.2e-3F; }),
              xs.end());
     return xs;
@@ -56,7 +56,7 @@ class Body {
 
   float archRadius() const { return 1.16F * p_.wheel_radius * size_.z(); }
 
-  /// Height of the underside, metres: the sill, or the arch over a wheel.
+  /// Height of the underside in metres: the sill, or the arch over a wheel.
   float undersideAt(float x, bool& in_arch) const {
     const float sill = p_.sill * size_.z(), radius = archRadius();
     in_arch = false;

@@ -1,5 +1,5 @@
 // The lofted body of a road vehicle: cross-sections along its length, with bonnet, windscreen, roof
-// and rear, wheel arches cut out, glass, lights, seams and plates.
+// and rear. Wheel arches are cut out; glass, lights, seams and plates are added.
 #pragma once
 
 #include <string>
@@ -17,16 +17,16 @@ struct Span {
 
 /// x is the share of the length from the front; z is the share of the height.
 struct BodyProfile {
-  std::vector<Vec2> top;   ///< outline seen from the side, x rising, from 0 to 1
+  std::vector<Vec2> top;   ///< outline seen from the side, x increasing, from 0 to 1
   std::vector<Vec2> belt;  ///< lower edge of the windows
   Span windscreen, rear_glass;
   std::vector<Span> side_glass;
-  std::vector<float> seams;  ///< of doors
+  std::vector<float> seams;  ///< seams of doors
   float front_axle = 0.18F, rear_axle = 0.8F;
-  float wheel_radius = 0.22F, sill = 0.15F;  ///< of the height
-  float roof_width = 0.76F;                  ///< of the width
+  float wheel_radius = 0.22F, sill = 0.15F;  ///< shares of the height
+  float roof_width = 0.76F;                  ///< share of the width
   float nose_taper = 0.18F, tail_taper = 0.1F;
-  bool rear_doors_with_glass = false;  ///< the upright end of vans
+  bool rear_doors_with_glass = false;  ///< vans with a vertical rear end
   bool split_grille = true;
 };
 
@@ -34,11 +34,12 @@ struct BodyMaterials {
   int paint, trim, glass, headlight, taillight, plate, dark;
 };
 
-/// From x = +length/2 (front) to −length/2, wheels' ground at z = 0. `size` in metres.
+/// Adds the body from x = +length/2 (front) to −length/2, with the wheels on the ground at z = 0.
+/// `size` in metres.
 void addBody(MeshBuilder& builder, const BodyProfile& profile, const Vec3& size,
              const BodyMaterials& materials);
 
-/// Value at x of the line through the points (held outside).
+/// Interpolated value at x of the line through the points; constant outside.
 float lineAt(const std::vector<Vec2>& points, float x);
 
 }  // namespace perdure::tools::shapes

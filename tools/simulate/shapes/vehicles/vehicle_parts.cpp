@@ -6,7 +6,7 @@
 namespace perdure::tools::shapes {
 namespace {
 
-constexpr float kBodyShare = 0.955F;  // of the width; the mirrors take the rest
+constexpr float kBodyShare = 0.955F;  // share of the width; the mirrors take the rest
 
 void addMirrors(MeshBuilder& b, const BodyProfile& p, const Vec3& size, float full_width,
                 int material) {

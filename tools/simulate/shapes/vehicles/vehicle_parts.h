@@ -1,4 +1,4 @@
-// What every road vehicle has beside its body: wheels, mirrors, handles, and the materials of all.
+// Parts of every road vehicle besides its body: wheels, mirrors, handles, and all materials.
 #pragma once
 
 #include "tools/simulate/shapes/dice.h"
@@ -10,7 +10,7 @@ namespace perdure::tools::shapes {
 
 BodyMaterials vehicleMaterials(MeshBuilder& builder, const Order& order, const Vec3& paint,
                                Dice& dice);
-/// Body, wheels, mirrors, handles, roof rails where wished.
+/// Adds body, wheels, mirrors, handles, and optional roof rails.
 void addVehicle(MeshBuilder& builder, const BodyProfile& profile, const Order& order, Dice& dice,
                 bool roof_rails);
 void addWheels(MeshBuilder& builder, const BodyProfile& profile, const Vec3& size, Dice& dice);
