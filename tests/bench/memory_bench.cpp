@@ -1,7 +1,8 @@
-// usage: memory_bench [SMALL LARGE [FRAMES]]
-// What the filter takes for a frame of a drive with SMALL and with LARGE things on the map (100 and
-// 100,000): the same hundred along the way, all others in other streets. Five runs of each, in
-// turns; processor time of this thread, the map store's beside it, since it is another process.
+// usage: memory_bench [SMALL LARGE [FRAMES]] Measures the filter's cost per frame with SMALL and
+// with LARGE objects on the map (default: 100 and 100,000). The same hundred objects stand along
+// the trajectory; all others stand in other streets. Runs each size five times, alternately. Prints
+// the CPU time of this thread; the map store's is printed apart, because it is another process in
+// operation.
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -27,7 +28,7 @@ double cpuMs() {
   return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
 }
 
-/// Parked cars on both sides of the way, four metres and a half apart on each.
+/// Returns parked cars on both sides of the trajectory, 4.5 m apart.
 State parked(std::size_t i) {
   const double side = i % 2 == 0 ? 4.0 : -4.5;
   return makeState(10.0 + 4.5 * static_cast<double>(i), side, 0.75, 0.02, 4.2, 1.75, 1.5);
@@ -59,7 +60,7 @@ Objects mapOf(std::size_t count) {
   return objects;
 }
 
-/// A map file with so many things, none of them in a working set.
+/// A map file with `count` objects, none of them in a working set.
 class MapFile {
  public:
   explicit MapFile(std::size_t count) {
@@ -96,7 +97,7 @@ Cost drive(const MapFile& file, std::uint64_t frames) {
   map_store::Node store(file.config(), 6,
                         {[](auto&) {}, [](auto&) {}, [](auto&) {}, [](auto&) {},
                          [&](const Recalled& r) { answers.push_back(r); }});
-  store.tick(Duration(0));  // publishes the whole map, once at its start
+  store.tick(Duration(0));  // publishes the whole map once, at its start
   Node filter(
       {}, makePriors(), 10,
       {.objects = [&](const Objects& m) { objects.push_back(m); },
@@ -152,7 +153,7 @@ int main(int argc, char** argv) {
   std::array<std::vector<double>, 2> filter, store;
   for (int run = 0; run < kRuns; ++run) {
     for (std::size_t i = 0; i < 2; ++i) {
-      const MapFile file(sizes[i]);  // each run its own: a drive changes the map
+      const MapFile file(sizes[i]);  // one for each run, because a drive changes the map
       const Cost cost = drive(file, frames);
       std::printf("%8zu things: filter %.3f ms, map store %.3f ms a frame, %zu recalled\n",
                   sizes[i], cost.filter_ms, cost.store_ms, cost.recalled);
