@@ -1,5 +1,5 @@
-// What the map's file holds: beliefs and parts of the graph as blobs, the graph as a whole, the
-// place on Earth as a text.
+// Targets: the content of the map file. Beliefs and parts of the graph are blobs; the whole graph
+// is a set of rows; the place on Earth is a text.
 #include "common/mapping/mapper.h"
 #include "services/map_store/core/belief_codec.h"
 #include "services/map_store/core/earth_anchor.h"
@@ -44,7 +44,7 @@ std::vector<Bytes> headers() {
   return {encodeHeader(objects)};
 }
 
-/// The first byte says whether it is an anchor, an edge, a sighting, a merge or a view.
+/// The first byte selects an anchor, an edge, a sighting, a merge or a view.
 bool takePart(View bytes) {
   if (bytes.empty()) return false;
   const View blob = bytes.subspan(1);
@@ -85,9 +85,9 @@ std::vector<Bytes> parts() {
   return seeds;
 }
 
-// A whole graph: rows of its tables, each a byte that says which table, one for its id, two for the
-// length of what follows: the text or blob, of edges behind the weight, of poses four numbers and
-// whether it is held fast.
+// A whole graph consists of rows of its tables. Each row has one byte for the table, one for its
+// id, and two for the length of the rest. The rest is the text or blob; an edge has its weight
+// before it. The rest of a pose is four numbers and whether it is fixed.
 
 enum class Table : std::uint8_t { kClass, kAnchor, kPose, kEdge, kSighting, kMerge, kView, kCount };
 
@@ -128,7 +128,7 @@ void insertRow(std::vector<Statement>& statements, Table table, std::uint64_t id
   } else {
     row.bind(2, content);
   }
-  (void)row.run();  // what a column may not be is not there
+  (void)row.run();  // the row is missing if a column has an invalid value
 }
 
 void fill(View bytes) {
@@ -147,7 +147,7 @@ void fill(View bytes) {
   }
 }
 
-/// As map_store does with it: a mapper goes on from it, and says it to who asks.
+/// Uses the graph as map_store does: a mapper continues from it, and answers queries about it.
 void tell(const mapping::SavedMap& map) {
   mapping::Mapper mapper({}, map);
   std::set<std::pair<std::uint64_t, std::uint32_t>> sessions;
@@ -165,7 +165,7 @@ void tell(const mapping::SavedMap& map) {
 }
 
 bool takeGraph(View bytes) {
-  const auto begun = Transaction::begin(emptyFile());  // rolled back
+  const auto begun = Transaction::begin(emptyFile());  // rolled back at the end
   fill(bytes);
   const auto graph = readGraph(emptyFile());
   require(graph.has_value(), "a graph is read, whatever rows it has");

@@ -24,7 +24,7 @@ const writer = new McapWriter({
 });
 await writer.start({ profile: "ros2", library: "npm" });
 
-// Definitions come parsed; ROS 2 writes them as text, which a reader may or may not look at.
+// The package has parsed definitions. ROS 2 writes them as text, which readers may use.
 const textOf = (fields) =>
   fields.definitions
     .filter((one) => !one.isConstant)
