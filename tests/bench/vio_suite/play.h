@@ -21,8 +21,8 @@ struct Variant {
 
 struct Outcome {
   Accuracy accuracy;
-  double first_s = 0.0;           ///< from the first frame to the first usable output
-  double ms = 0.0, ms_p99 = 0.0;  ///< CPU time of this thread per frame, without decoding
+  double first_s = 0.0;                   ///< from the first frame to the first usable output
+  double ms = 0.0, ms_p99 = 0.0;          ///< CPU time of this thread per frame, without decoding
   double klt_ms = 0.0, klt_ms_p99 = 0.0;  ///< OpenCV's Lucas-Kanade with 200 points; 0: not
                                           ///< measured
   Innovations innovations;                ///< only if requested
