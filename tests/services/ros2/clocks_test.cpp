@@ -62,7 +62,7 @@ TEST(Ros2Clocks, RefusesStampsOfAnotherEpochAndSaysHowFar) {
   EXPECT_NE(refused.error().detail.find("behind those of cam0"), std::string::npos);
 }
 
-/// The first sample has stamps of another clock, and so has every second input after it.
+/// The first message has a stamp of another clock, and so has every second message after it.
 TEST(Ros2Clocks, OneInputsWrongStampsNeverBecomeTheClock) {
   Clocks clocks = clocksOf(true);
   std::size_t good = 0;

@@ -57,7 +57,7 @@ TEST(Board, TheSvgIsBlackWhereTheBoardIs) {
   EXPECT_EQ(squares, 35u);  // of 10×7
 }
 
-/// Drawn images, developed by the sensor with its noise, looked at by the detectors.
+/// Renders images with the sensor's noise, and detects the corners in them.
 void expectExactCorners(const Board& board, DistortionModel model, double rms_px) {
   SimulatedOptions options;
   options.board = board;
