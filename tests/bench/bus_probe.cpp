@@ -1,6 +1,6 @@
 // Measures the cost of the bus between two processes: age on arrival and CPU time, for inertial
 // samples and VGA images. The file that PERDURE_BUS names holds the settings.
-//   perdure_bus_probe send|receive SECONDS
+// usage: perdure_bus_probe send|receive SECONDS
 #include <fmt/format.h>
 #include <sys/resource.h>
 

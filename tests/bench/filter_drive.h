@@ -49,7 +49,7 @@ class Drive {
   std::mt19937 random_;
   CameraCalibration camera_;
   CameraModel model_;
-  std::size_t objects_ = 0, in_view_ = 0;  ///< of the newest message
+  std::size_t objects_ = 0, in_view_ = 0;  ///< counts of the newest message
   Node node_;
 };
 

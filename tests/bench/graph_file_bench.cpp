@@ -1,7 +1,5 @@
-// usage: graph_file_bench [RECORDS ANCHORS EDGES [outbox]]
-// Measures the cost of the pose graph in the map file (default: 100,000 sightings, 5,000 anchors,
-// 6,000 edges). It times writing the whole graph once and reading it at a start, and four kinds of
-// commits of a drive:
+// Measures the cost of the pose graph in the map file. It times writing the whole graph once and
+// reading it at a start, and four kinds of commits of a drive:
 // - the poses of all anchors after a loop;
 // - the same with all covariances of the odometry;
 // - sixty sightings;
@@ -9,6 +7,8 @@
 // With "outbox", the file's triggers collect the changes for a fleet server, and the server has
 // received all of them before each commit. Prints medians of five runs: wall time (mostly the
 // sync), CPU time, and the size of the write-ahead log.
+// usage: graph_file_bench [RECORDS ANCHORS EDGES [outbox]] (default: 100,000 sightings, 5,000
+// anchors, 6,000 edges)
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>

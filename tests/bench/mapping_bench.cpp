@@ -1,8 +1,8 @@
-// usage: mapping_bench [ANCHORS LOOPS] Measures the cost of the pose graph for a drive through a
-// grid of streets with ANCHORS anchors and LOOPS revisited places (default: 5,000 and 100). It
-// times the full optimisation, a second one from its result, one with one more loop, and the
-// marginal covariances of 40 anchors relative to the last. Prints the CPU time of this thread,
-// medians of five runs.
+// Measures the cost of the pose graph for a drive through a grid of streets with ANCHORS anchors
+// and LOOPS revisited places. It times the full optimisation, a second one from its result, one
+// with one more loop, and the marginal covariances of 40 anchors relative to the last. Prints the
+// CPU time of this thread, medians of five runs.
+// usage: mapping_bench [ANCHORS LOOPS] (default: 5,000 and 100)
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>

@@ -1,8 +1,8 @@
-// usage: memory_bench [SMALL LARGE [FRAMES]] Measures the filter's cost per frame with SMALL and
-// with LARGE objects on the map (default: 100 and 100,000). The same hundred objects stand along
-// the trajectory; all others stand in other streets. Runs each size five times, alternately. Prints
-// the CPU time of this thread; the map store's is printed apart, because it is another process in
-// operation.
+// Measures the filter's cost per frame with SMALL and with LARGE objects on the map. The same
+// hundred objects stand along the trajectory; all others stand in other streets. Runs each size
+// five times, alternately. Prints the CPU time of this thread, and separately that of the map
+// store, which is another process in operation.
+// usage: memory_bench [SMALL LARGE [FRAMES]] (default: 100 and 100,000)
 #include <algorithm>
 #include <array>
 #include <cstdio>

@@ -1,7 +1,7 @@
-// usage: place_bench [OBJECTS [SEEN]] Measures the search for the body on a map of OBJECTS objects
-// in streets (default: 100,000), from SEEN objects of one place (24), without a prior pose. It
-// times the index of the map, the search along streets driven before, and the search elsewhere.
-// Prints the CPU time of this thread, medians of five places.
+// Measures the search for the body on a map of OBJECTS objects in streets, from SEEN objects of one
+// place, without a prior pose. It times the index of the map, the search along streets driven
+// before, and the search elsewhere. Prints the CPU time of this thread, medians of five places.
+// usage: place_bench [OBJECTS [SEEN]] (default: 100,000 and 24)
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

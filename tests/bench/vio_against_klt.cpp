@@ -1,6 +1,7 @@
-// usage: vio_against_klt DATASET Compares vio's time for each frame of a dataset with the time in
-// which OpenCV follows 200 points. Both are CPU times of this thread, without decoding. On a shared
-// machine the ratio is more reliable than the times.
+// Compares vio's time for each frame of a dataset with the time in which OpenCV follows 200 points.
+// Both are CPU times of this thread, without decoding. On a shared machine the ratio is more
+// reliable than the times.
+// usage: vio_against_klt DATASET
 #include <algorithm>
 #include <cstdio>
 #include <opencv2/core/utility.hpp>

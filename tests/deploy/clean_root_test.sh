@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # Runs the steps of a new user in a bare Debian root with its own network: deploy/install, the whole
-# build, and the tests that are not labelled long. usage: clean_root_test.sh RELEASE (bookworm,
-# trixie) Takes an hour on two cores the first time. Root and build stay in build/clean/RELEASE, so
-# that a later run rebuilds only what changed. Needs root, debootstrap and, the first time, Debian's
-# mirror; exits with 77 (skipped) without them.
+# build, and the tests that are not labelled long. Takes an hour on two cores the first time. Root
+# and build stay in build/clean/RELEASE, so that a later run rebuilds only what changed. Needs root,
+# debootstrap and, the first time, Debian's mirror; exits with 77 (skipped) without them.
+# usage: clean_root_test.sh RELEASE (bookworm, trixie)
 set -euo pipefail
 release=$1
 cd "$PERDURE_SOURCE"

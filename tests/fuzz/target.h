@@ -25,7 +25,7 @@ inline void require(bool holds, const std::string& what) {
 
 struct Target {
   std::string name;
-  int runs = 1000;                            ///< of the ordinary test
+  int runs = 1000;                            ///< number of runs in the ordinary test
   std::function<std::vector<Bytes>()> seeds;  ///< `take` accepts each of them
   /// Returns whether the reader accepts the bytes. A regular rejection (StartupError, a reason,
   /// nothing) gives false. Any other exception is a fault.

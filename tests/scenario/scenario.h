@@ -20,9 +20,9 @@ namespace perdure::test {
 
 struct Setting {
   std::string scene;
-  std::uint64_t seed = 1;  ///< of the scene
+  std::uint64_t seed = 1;  ///< seed of the scene
   double seconds = 0.0;    ///< 0: the scene's own length
-  double rate_hz = 10.0;   ///< of the frames
+  double rate_hz = 10.0;   ///< frame rate
   std::int64_t detections_seed = 1;
   bool images = false;                        ///< rendered images with vio instead of true poses
   std::vector<std::string> assignments = {};  ///< service.key=value
@@ -35,7 +35,7 @@ struct MapObject {
   double existence = 0.0, moving = 0.0;
   bool working = true;  ///< in the working set, not in long-term memory
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  ///< of the centre
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  ///< covariance of the centre
 };
 
 /// The outputs of a run and its scores. Places are in the truth's W. With vio, each place is

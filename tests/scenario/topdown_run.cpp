@@ -16,7 +16,7 @@ namespace perdure::test {
 namespace {
 
 constexpr double kKnown_m = 1.5;
-constexpr double kSmall_px = 24.0, kLeast_px = 10.0;  // of the network's input
+constexpr double kSmall_px = 24.0, kLeast_px = 10.0;  // pixels of the network's input
 constexpr double kSame = 0.5;
 
 /// The image of a true object in a frame.

@@ -29,7 +29,7 @@ struct TopDownSetting {
 struct TopDownRun {
   tools::SimulatedTruth truth;
   std::vector<LookedAt> frames;
-  std::vector<std::string> classes;  ///< of the activations
+  std::vector<std::string> classes;  ///< classes of the activations
 };
 TopDownRun driveThrough(const TopDownSetting& setting);
 
@@ -39,9 +39,9 @@ TopDownRun driveThrough(const TopDownSetting& setting);
 /// in the image is visible.
 struct HardRecall {
   std::size_t small = 0, small_found = 0, hidden = 0, hidden_found = 0;
-  std::size_t ordinary_found = 0;  ///< of all objects, by a bottom-up box
+  std::size_t ordinary_found = 0;  ///< all objects with a bottom-up box
   std::size_t false_alarms = 0;    ///< boxes on no object, top-down ones included
-  std::size_t false_primed = 0;    ///< of these, top-down ones
+  std::size_t false_primed = 0;    ///< top-down boxes among them
   std::size_t frames = 0;
   HardRecall& operator+=(const HardRecall& more);
   double recall() const {

@@ -27,7 +27,7 @@ struct Outcome {
                                           ///< measured
   Innovations innovations;                ///< only if requested
   std::size_t frames = 0, resets = 0;
-  double readout_s = 0.0;  ///< of the first camera, vio's final estimate
+  double readout_s = 0.0;  ///< vio's final estimate for the first camera
   std::map<std::string, std::uint64_t> reasons;
 };
 

@@ -40,9 +40,10 @@ Accuracy accuracyOf(const std::vector<Odometry>& odometry, const replay::PoseFil
 /// position and yaw.
 struct StartJudgement {
   double scale = 0.0, way_m = 0.0;
-  double error_m = 0.0, deviations = 0.0;             ///< of the last position
-  NeesAt nees;                                        ///< of the last output
-  double velocity_error = 0.0, velocity_sigma = 0.0;  ///< of the first output, m/s
+  double error_m = 0.0, deviations = 0.0;             ///< error of the last position, in m and in
+                                                      ///< standard deviations
+  NeesAt nees;                                        ///< errors of the last output
+  double velocity_error = 0.0, velocity_sigma = 0.0;  ///< errors of the first output, m/s
 };
 StartJudgement judgeStart(const std::vector<Odometry>& odometry, const replay::PoseFile& truth);
 

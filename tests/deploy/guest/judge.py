@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Judges the files that a guest left in its folder: usage: judge.py RUN --unplugs N --mistakes N
---unplugs-with-vio N --stops N. Prints a line for each claim; exits with 1 if one fails."""
+"""Judges the files that a guest left in its folder. Prints a line for each claim; exits with 1 if
+one fails."""
 import argparse
 import pathlib
 import sys

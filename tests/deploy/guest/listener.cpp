@@ -1,5 +1,6 @@
 // Records the messages of capture and vio, one per line, for the test of live sensors in a guest.
-// usage: guest_listener OUT TOUCHED; each frame updates the time of the file TOUCHED.
+// Each frame updates the time of the file TOUCHED.
+// usage: guest_listener OUT TOUCHED
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/os.h>

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Makes a Debian root of this machine's release for the guest, its kernel, and the modules that
-# Debian's kernel lacks. usage: make_root.sh FOLDER; makes FOLDER/{root.img,vmlinuz,initrd}, unless
-# the inputs are unchanged. Exits with 77 if a requirement is missing.
+# Debian's kernel lacks: FOLDER/{root.img,vmlinuz,initrd}. Does nothing if the inputs are unchanged.
+# Exits with 77 if a requirement is missing.
+# usage: make_root.sh FOLDER
 set -euo pipefail
 here=$(dirname "$(realpath "$0")")
 source=$(realpath "$here/../../..")

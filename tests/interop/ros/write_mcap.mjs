@@ -1,5 +1,5 @@
-// Writes a drive (plan.json and its images) as a ROS 2 recording by npm's libraries:
-// write_mcap.mjs PLAN MCAP
+// Writes a drive (plan.json and its images) as a ROS 2 recording by npm's libraries.
+// usage: write_mcap.mjs PLAN MCAP
 import { open, readFile } from "node:fs/promises";
 import path from "node:path";
 import { McapWriter } from "@mcap/core";

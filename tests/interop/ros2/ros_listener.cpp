@@ -1,5 +1,6 @@
 // Subscribes to the topics of perdure-ros2 as ROS 2 nodes do, and prints each message as a line of
-// JSON. ros_listener DOMAIN [TOPIC…]: only those topics.
+// JSON. With TOPICs, it subscribes only to those.
+// usage: ros_listener DOMAIN [TOPIC…]
 #include <chrono>
 #include <csignal>
 #include <cstdio>

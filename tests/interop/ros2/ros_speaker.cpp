@@ -1,6 +1,7 @@
 // Plays a script as ROS 2 drivers would. A line of JSON is a message, with its `topic`, `type`,
-// `stamp` (ns), `frame`, and `after` (s since the start). ros_speaker DOMAIN SCRIPT [sensor]:
-// images, samples and infos use SensorDataQoS. It begins when every topic has a reader.
+// `stamp` (ns), `frame`, and `after` (s since the start). With `sensor`, images, samples and infos
+// use SensorDataQoS. The script begins when every topic has a reader.
+// usage: ros_speaker DOMAIN SCRIPT [sensor]
 #include <chrono>
 #include <cmath>
 #include <cstdio>

@@ -19,7 +19,7 @@ using namespace semantic_filter;  // NOLINT
 constexpr double kOfExtent = 0.25, kPixels = 3.0;
 // An object loses its match after this number of frames in view without the true object's image.
 constexpr std::uint64_t kForgotten = 5;
-constexpr double kLeastExistence = 0.05;  // of an object that is sampled
+constexpr double kLeastExistence = 0.05;  // lowest existence of a sampled object
 constexpr double kOldestAge = 60.0;       // frames
 constexpr std::uint32_t kLeastVisible = 20;
 constexpr double kOutlier = 25.0;  // squared, normalised

@@ -269,7 +269,7 @@ Box World::withErrors(const Box& box, const std::vector<float>& activations, Err
   for (std::size_t k = 1; k < activations.size(); ++k) odds += std::exp(double(activations[k]));
   noise.clutter_probability = 1.0 / (1.0 + odds);
   const BoxMeasurement z = measure(box, W, H, p, noise);
-  double scale = 1.0;  // of a Gaussian, in a draw of the t distribution
+  double scale = 1.0;  // factor of a Gaussian, in a draw of the t distribution
   if (options_.tail > 0.0) {
     double chi2 = 0.0;
     for (int i = 0; i < static_cast<int>(options_.tail); ++i) chi2 += std::pow(dice_.normal(), 2);
@@ -322,7 +322,7 @@ std::optional<Detection> World::look(std::size_t thing, const State& x, const Wo
   const Box box = *frame.outlines[thing];
   const auto own = std::find(model_.classes.begin(), model_.classes.end(), prior.name);
   auto index = static_cast<std::size_t>(own - model_.classes.begin());
-  if (index == model_.classes.size()) {  // of no known class: similar to clutter, or to one known
+  if (index == model_.classes.size()) {  // an unknown class is similar to clutter, or to one known
                                          // class
     const bool alike =
         normalCdf(errors.looks.values[kAlike]) < told_.config.filter.clutter.other_lookalike;

@@ -1,6 +1,5 @@
 // Random worlds whose statistics equal the filter's model, so that any miscalibration is the
-// filter's
-// own. There are no images: boxes are projections of cuboids plus the declared noise.
+// filter's own. There are no images: boxes are projections of cuboids plus the declared noise.
 //
 // The filter's configuration and class priors give: class frequencies, sizes, motion and speed,
 // survival; detection probability, occluders, correlations of activations and box errors; false
@@ -65,9 +64,9 @@ struct WorldFrame {
   Odometry odometry;
   Detections detections;
   semantic_filter::View true_view;                               ///< with the true pose
-  ScratchVector<semantic_filter::TrackVisibility> visibilities;  ///< of each object
+  ScratchVector<semantic_filter::TrackVisibility> visibilities;  ///< visibility of each object
   std::vector<std::optional<Box>> outlines;  ///< the part within the image, even if occluded
-  std::vector<int> origins;                  ///< of each box: the object, or -1
+  std::vector<int> origins;                  ///< true object of each box, or -1
 };
 
 class World {
@@ -93,7 +92,7 @@ class World {
   struct Errors {
     std::optional<RigidTransform> last_T_WC;
     Drift box, looks;
-    Eigen::Vector4d noise = Eigen::Vector4d::Zero();  ///< of the last box, unit Gaussians
+    Eigen::Vector4d noise = Eigen::Vector4d::Zero();  ///< unit Gaussians of the last box
     double noise_stays = 0.0;                         ///< correlation with the noise of the next
                                                       ///< box
     bool unmapped_occluder = false, hard_to_detect = false, out = false;

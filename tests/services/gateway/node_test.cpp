@@ -246,7 +246,7 @@ TEST_F(GatewayNode, ShowsTheTilesOfTheMapThatTheVehicleIsOn) {
 TEST_F(GatewayNode, WithoutAFrameOfTheMapTilesLieInTheOdometrysOwn) {
   node_.onObjects(frameOf(1, {}), kSecond);
   MapFrame of_before = frameOfMap();
-  of_before.world = {76, 1};  // of an earlier W
+  of_before.world = {76, 1};  // an earlier W
   node_.onMapFrame(of_before);
   node_.setWanted({kMap, kTransforms, kMapToOdom});
   MapTile tile;

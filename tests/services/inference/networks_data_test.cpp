@@ -87,7 +87,7 @@ constexpr double kSeen = -2.0;
 
 struct Expectation {
   const char* file;
-  double recall;  ///< of near cars over the tested frames; a lower bound of the measured value
+  double recall;  ///< lower bound of the measured recall of near cars over the tested frames
 };
 
 class Networks : public ::testing::TestWithParam<Expectation> {

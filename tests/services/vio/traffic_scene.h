@@ -14,7 +14,7 @@ struct TrafficOptions {
   unsigned seed = 1;
   double cover = 0.8;           ///< share of the image, from the bottom
   double begins_s = 5.0;        ///< start of the traffic; before it there is no traffic
-  double speed_px_s = 80.0;     ///< of the traffic
+  double speed_px_s = 80.0;     ///< speed of the traffic
   double engine = 0.0;          ///< vibration at 27 Hz in m/s²; a hundredth of it in rad/s
   double wall_m = 8.0;          ///< distance of the static part, m
   bool far_background = false;  ///< as if at infinity: it does not move with the body

@@ -38,7 +38,7 @@ TEST(DataCheck, ASoundDriveHasNoFinding) {
   still.turning = 0.0;
   EXPECT_THAT(codesOf(findingsOf("still", still)), ElementsAre());
   TurningDrive biased;
-  biased.gyro_bias = {0.1, -0.2, 0.1};  // of a low-cost unit
+  biased.gyro_bias = {0.1, -0.2, 0.1};  // typical of a low-cost unit
   EXPECT_THAT(codesOf(findingsOf("biased", biased)), ElementsAre());
 }
 

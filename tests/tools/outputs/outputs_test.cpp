@@ -6,8 +6,8 @@
 #include <sstream>
 
 #include "common/base/errors.h"
-#include "common/earth/geodesy.h"
 #include "tests/support/camera.h"
+#include "common/earth/geodesy.h"
 #include "tools/outputs/object_history.h"
 #include "tools/outputs/output_writer.h"
 #include "tools/outputs/stage_timer.h"

@@ -1,6 +1,5 @@
 // Optional parts of MCAP files by the specification (mcap.dev/spec). The test writes every
-// combination
-// of the features that vary in the public conformance cases. Each is a complete file.
+// combination of the features that vary in the public conformance cases. Each is a complete file.
 //
 //   ch chunks · mx message indexes · chx chunk indexes · st statistics · rsh, rch schemas and
 //   channels repeated in the summary · ax, mdx indexes of attachments and metadata · sum summary

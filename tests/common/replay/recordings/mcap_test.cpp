@@ -116,7 +116,7 @@ TEST_F(Mcap, EveryFieldOfAMessageComesBack) {
 TEST_F(Mcap, AFileThatIsCutAnywhereYieldsEveryWholeChunk) {
   writeChunks(false);
   const auto whole = contentsOf(file);
-  std::vector<std::uint64_t> ends;  // of chunks
+  std::vector<std::uint64_t> ends;  // ends of the chunks
   {
     const auto reader = Reader::open(file);
     for (const ChunkIndex& chunk : reader->chunks()) ends.push_back(chunk.offset + chunk.length);

@@ -220,7 +220,7 @@ TEST(Likelihood, IsTheBrightnessOfTheRegionWhoseBoxMeetsIt) {
   near.classes[0].mean[3] = 0;
   Detections detections;
   detections.detections = {
-      test::detectionOf({275, 202, 365, 278}, {0.F, 3.F, 1.F}),   // of the near object
+      test::detectionOf({275, 202, 365, 278}, {0.F, 3.F, 1.F}),   // the near object's box
       test::detectionOf({300, 210, 330, 260}, {0.F, -9.F, 9.F}),  // inside, but the overlap is too
                                                                   // small
       test::detectionOf({1, 2, 3, 4}, {0.F, 9.F, 9.F})};

@@ -1,6 +1,6 @@
 // Runs Foxglove's own client against the gateway. It subscribes to every advertised channel,
-// decodes it and compares it with Foxglove's schemas. It calls every service. usage: node
-// foxglove.mjs NODE_MODULES PORT SUBPROTOCOL
+// decodes it and compares it with Foxglove's schemas. It calls every service.
+// usage: node foxglove.mjs NODE_MODULES PORT SUBPROTOCOL
 import { readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { join } from 'node:path';

@@ -1,5 +1,6 @@
 // Tests the page in a real browser: its drawing, the effects of clicks and keys, its layout on a
-// phone. usage: node page.mjs NODE_MODULES PORT OUT [WAIT_S]   — OUT: folder for pictures
+// phone. Writes pictures into the folder OUT.
+// usage: node page.mjs NODE_MODULES PORT OUT [WAIT_S]
 import { createRequire } from 'node:module';
 import { mkdirSync } from 'node:fs';
 import { join } from 'node:path';

@@ -138,7 +138,7 @@ TEST(GyroScale, ComesBackFromASavedStateWhereItIsEstimated) {
 }
 
 struct Found {
-  Vector3d error, sigma;  ///< of the scale, at the end
+  Vector3d error, sigma;  ///< error of the scale at the end
 };
 
 /// Drives through a room for twenty seconds with a gyroscope of scale `scale`.

@@ -140,7 +140,7 @@ TEST(Tracker, DoesNotDriftAlongATrack) {
       ++kept;
     }
   }
-  EXPECT_GT(kept, 40);  // of 150 points, those within two fifths of the image remain
+  EXPECT_GT(kept, 40);  // the points within two fifths of the image remain, out of 150
   EXPECT_LT(std::sqrt(squares / kept), 0.2);
 }
 

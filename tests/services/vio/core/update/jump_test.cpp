@@ -22,7 +22,8 @@ struct AfterJump {
   double before_m = 0.0, after_m = 0.0;  ///< rms error over the seeds, before the jump and at the
                                          ///< end
   double soon_m = 0.0;                   ///< one second after the jump
-  double nees = 0.0;                     ///< of position and rotation at the end, per dimension
+  double nees = 0.0;                     ///< NEES of position and rotation at the end, per
+                                         ///< dimension
   double gated = 0.0;                    ///< gated points of the state from the jump on, per run
   int noticed = 0;                       ///< runs in which the jump was counted
 };
