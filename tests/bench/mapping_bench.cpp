@@ -23,7 +23,7 @@ constexpr int kRuns = 5;
 constexpr std::size_t kAsked = 40;
 constexpr double kStep = 12.0;
 constexpr int kBlock = 10;    ///< steps between crossings
-constexpr int kStreets = 16;  ///< in each direction
+constexpr int kStreets = 16;  ///< number of streets in each direction
 
 double cpuMs() {
   timespec t{};
@@ -37,7 +37,8 @@ Eigen::Matrix4d diagonal(double metres, double yaw) {
 
 struct Drive {
   std::vector<LevelPose> truth;
-  std::vector<std::pair<std::size_t, std::size_t>> places;  ///< passed again
+  std::vector<std::pair<std::size_t, std::size_t>> places;  ///< indices of both passes of each
+                                                            ///< revisited place
 };
 
 Drive makeDrive(std::size_t anchors, std::mt19937& random) {

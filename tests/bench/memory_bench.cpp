@@ -28,7 +28,7 @@ double cpuMs() {
   return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
 }
 
-/// Returns parked cars on both sides of the trajectory, 4.5 m apart.
+/// Returns parked cars alternately on both sides of the trajectory, one every 4.5 m.
 State parked(std::size_t i) {
   const double side = i % 2 == 0 ? 4.0 : -4.5;
   return makeState(10.0 + 4.5 * static_cast<double>(i), side, 0.75, 0.02, 4.2, 1.75, 1.5);

@@ -25,7 +25,7 @@ struct Outcome {
   double ms = 0.0, ms_p99 = 0.0;          ///< CPU time of this thread per frame, without decoding
   double klt_ms = 0.0, klt_ms_p99 = 0.0;  ///< OpenCV's Lucas-Kanade with 200 points; 0: not
                                           ///< measured
-  Innovations innovations;                ///< only if requested
+  Innovations innovations;                ///< filled only on request
   std::size_t frames = 0, resets = 0;
   double readout_s = 0.0;  ///< vio's final estimate for the first camera
   std::map<std::string, std::uint64_t> reasons;

@@ -28,7 +28,7 @@ struct Accuracy {
   double scale = 1.0;  ///< the scale of the estimate that fits the truth best
   /// rms error over each of kDistances, as a share of the distance; empty if the clip is shorter.
   std::array<std::optional<double>, kDistances.size()> relative;
-  std::vector<NeesAt> nees;    ///< every ten seconds
+  std::vector<NeesAt> nees;    ///< one sample every ten seconds
   int in_band = 0, asked = 0;  ///< number of samples, and number in the 95 % band of one sample
 };
 

@@ -44,7 +44,7 @@ void record(Dataset& dataset, RecordingWriter& recording, bool images) {
 }
 
 struct Read {
-  std::vector<std::string> order;  ///< kind, time, index
+  std::vector<std::string> order;  ///< kind, time and index of each message
   std::vector<std::vector<std::uint8_t>> pixels;
 };
 

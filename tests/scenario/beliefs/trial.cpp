@@ -22,7 +22,7 @@ constexpr std::uint64_t kForgotten = 5;
 constexpr double kLeastExistence = 0.05;  // lowest existence of a sampled object
 constexpr double kOldestAge = 60.0;       // frames
 constexpr std::uint32_t kLeastVisible = 20;
-constexpr double kOutlier = 25.0;  // squared, normalised
+constexpr double kOutlier = 25.0;  // limit of the squared normalised error
 
 /// Returns the distance of two boxes; below 1, they may belong to the same true object.
 double apartness(const Box& a, const Box& b) {

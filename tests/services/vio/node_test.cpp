@@ -283,7 +283,7 @@ TEST(VioNode, AnOldStateIsLeftAsideAndTheEpochGoesUp) {
   Node second(config, 6, after.outputs());
   ASSERT_TRUE(second.restoreState(first.saveState()));
   second.onCalibration(calibration());
-  player.play(second, 0.0, 2.0);  // from an earlier time, as in another run
+  player.play(second, 0.0, 2.0);  // an earlier time, as in another run
   EXPECT_EQ(second.reasons().of("state_too_old"), 1u);
   EXPECT_EQ(after.odometry.back().world, (WorldId{77, 3}));
 }

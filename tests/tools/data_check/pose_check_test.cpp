@@ -285,7 +285,7 @@ TEST(PoseCheck, AJumpBetweenNeighboursIsToldOnce) {
 
 TEST(PoseCheck, APauseIsNoJump) {
   Poses poses = eachOf(phone().poses, 10);
-  poses.erase(poses.begin() + 100, poses.begin() + 140);  // 2 s, and 4 m
+  poses.erase(poses.begin() + 100, poses.begin() + 140);  // a gap of 2 s and 4 m
   EXPECT_THAT(codesIn(findingsOf(phone(), poses)), ElementsAre());
 }
 

@@ -123,7 +123,7 @@ double processorSeconds(pid_t pid) {
   std::string text((std::istreambuf_iterator<char>(file)), {});
   std::istringstream fields(text.substr(text.rfind(')') + 2));
   std::string word;
-  for (int i = 3; i < 14; ++i) fields >> word;  // utime and stime are the 14th and the 15th
+  for (int i = 3; i < 14; ++i) fields >> word;  // utime and stime are the 14th and the 15th field
   double user = 0, system = 0;
   fields >> user >> system;
   return (user + system) / static_cast<double>(sysconf(_SC_CLK_TCK));

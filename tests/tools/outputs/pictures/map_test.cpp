@@ -204,7 +204,7 @@ TEST(Drawing, LinesToFarAwayPointsAreDrawnAsFarAsTheImageGoes) {
 TEST(Drawing, DashesRunOnOverTheJointsOfALine) {
   cv::Mat image(20, 400, CV_8UC3, kPaper);
   Polyline line;
-  for (int x = 10; x <= 390; x += 3) line.emplace_back(x, 10);  // shorter than a dash
+  for (int x = 10; x <= 390; x += 3) line.emplace_back(x, 10);  // segments shorter than a dash
   drawLine(image, line, {kInk, 1, true, 8.0, 8.0});
   int changes = 0;
   for (int x = 11; x < 390; ++x) {

@@ -21,7 +21,7 @@ Colour onImage(const std::string& class_name) {
 
 cv::Mat black() { return cv::Mat::zeros(480, 640, CV_8UC3); }
 
-/// Returns the image part of the picture of one frame over black.
+/// Draws one frame over a black image and returns the image part of the picture.
 cv::Mat drawn(const FrameGlance& frame, const CameraCalibration& camera = aheadCamera()) {
   const OverlayPicture picture(camera, {});
   return picture.draw(black(), frame, {}, {})(picture.imageArea()).clone();

@@ -75,7 +75,7 @@ const std::string kAnchored =
     kSigmoid + R"("levels": [{"stride": 16, "tensor": "head", "anchors": [[10, 20], [30, 5]]}])";
 
 TEST(DecodeYolov5, DoublesTheSigmoidsOfItsRawHeads) {
-  const Values rows = randomValues(2 * 2 * 7, 3, 1.0F);  // anchor, cell, value
+  const Values rows = randomValues(2 * 2 * 7, 3, 1.0F);  // dimensions: anchor, cell, value
   const auto out = decoded(parsed("yolov5", kAnchored), {{{1, 2, 1, 2, 7}, rows}});
   ASSERT_EQ(out.size(), 4u);
   for (std::size_t a = 0; a < 2; ++a) {

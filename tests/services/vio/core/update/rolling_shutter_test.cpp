@@ -175,7 +175,7 @@ TEST(RollingState, ComesBackOnlyToTheSameShutter) {
 }
 
 struct RollingRun {
-  double readout_error = 0.0, readout_nees = 0.0;  ///< at the end
+  double readout_error = 0.0, readout_nees = 0.0;  ///< errors at the end
   double pose_nees = 0.0;                          ///< mean over the frames, of [θ, p]
   double position_rms = 0.0;
 };
