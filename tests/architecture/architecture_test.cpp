@@ -117,7 +117,7 @@ TEST(DocumentRules, FindLinksAndPathsThatLeadNowhere) {
                           HasSubstr("no file is ools/a/b.h")));
 }
 
-/// Every header and source file, relative to the project's root.
+/// Returns every header and source file, relative to the project's root.
 std::vector<std::string> filesUnder(const std::filesystem::path& root,
                                     std::initializer_list<const char*> rooms) {
   std::vector<std::string> files;
@@ -163,7 +163,7 @@ TEST_F(TheProject, KeepsItsFoldersSmall) {
   EXPECT_THAT(overfullFolders(filesUnder(root_, {"common", "services", "tools"})), IsEmpty());
 }
 
-/// Files and folders of the sources, relative to the root.
+/// Returns the files and folders of the sources, relative to the root.
 std::set<std::string> pathsUnder(const std::filesystem::path& root) {
   std::set<std::string> paths;
   const auto add = [&](const auto& entry) {

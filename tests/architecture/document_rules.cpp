@@ -7,7 +7,7 @@
 namespace perdure::tests {
 namespace {
 
-/// The first group of every match.
+/// Returns the first capture group of every match.
 std::vector<std::string> found(const std::string& content, const char* pattern) {
   const std::regex expression(pattern);
   std::vector<std::string> all;

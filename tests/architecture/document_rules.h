@@ -1,4 +1,4 @@
-// Documents name files that are there: a file that moves takes its mentions with it.
+// Rule for documents: every file that a document names exists.
 #pragma once
 
 #include <set>
@@ -7,9 +7,10 @@
 
 namespace perdure::tests {
 
-/// A sentence for each relative link of a document that leads to nothing, and for each path of a
-/// source or document in back-quotes (a slash in it, no placeholder) with which no file's path
-/// ends. `document` and `paths`, of files and folders, are relative to the project's root.
+/// Returns one sentence for each mention that does not resolve. A mention is a relative link, or a
+/// path in back-quotes that has a slash and no placeholder. A path resolves if some path of the
+/// project ends with it. `document` and `paths` (files and folders) are relative to the project's
+/// root.
 std::vector<std::string> lostPaths(const std::string& document, const std::string& content,
                                    const std::set<std::string>& paths);
 

@@ -1,4 +1,4 @@
-// How many units a folder may hold, so that its listing can be read at a glance.
+// Rule for the size of folders: a folder holds at most a fixed number of units.
 #pragma once
 
 #include <string>
@@ -6,10 +6,10 @@
 
 namespace perdure::tests {
 
-/// A unit is NAME.h with NAME.cpp, or one of them.
+/// Largest number of units in a folder. A unit is NAME.h, NAME.cpp, or both.
 inline constexpr std::size_t kMostUnits = 15;
 
-/// A sentence about each folder that holds more. `paths` are those of files.
+/// Returns one sentence for each folder that holds more units. `paths` are paths of files.
 std::vector<std::string> overfullFolders(const std::vector<std::string>& paths);
 
 }  // namespace perdure::tests

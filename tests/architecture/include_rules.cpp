@@ -12,7 +12,8 @@ namespace {
 constexpr std::array kCommon{"base",   "math",   "types", "earth", "camera", "mapping", "sim",
                              "config", "vision", "wire",  "ros",   "bus",    "replay",  "service"};
 
-/// Folders with layers of their own: their sub-folders from bottom to top; "" is the folder itself.
+/// Folders with layers of their own. Lists their sub-folders from bottom to top; "" is the folder
+/// itself.
 struct Layers {
   std::string_view folder;
   std::vector<std::string_view> bottom_to_top;
@@ -51,7 +52,7 @@ std::ptrdiff_t heightOf(const std::string& folder) {
   return std::find(kCommon.begin(), kCommon.end(), folder) - kCommon.begin();
 }
 
-/// The height of a file among its folder's layers; above all where its sub-folder is not listed.
+/// Returns the index of a file's layer; an unlisted sub-folder is above all layers.
 std::ptrdiff_t layerOf(const std::string& file, const Layers& layers) {
   const std::string rest = file.substr(layers.folder.size());
   const std::size_t slash = rest.find('/');
@@ -60,7 +61,8 @@ std::ptrdiff_t layerOf(const std::string& file, const Layers& layers) {
   return std::find(order.begin(), order.end(), sub) - order.begin();
 }
 
-/// The plain numbers of a room: they include nothing but each other, and everybody may read them.
+/// True for parameters.h files: plain numbers that every file may include. They include only each
+/// other.
 bool isParameters(const std::string& path) { return path.ends_with("/parameters.h"); }
 
 bool pointsUp(const std::string& path, const std::string& include) {
@@ -76,7 +78,7 @@ bool startsWith(const std::string& text, std::initializer_list<std::string_view>
                      [&](std::string_view prefix) { return text.starts_with(prefix); });
 }
 
-/// core/ and node.{h,cpp}: the pure part of a service.
+/// True for core/ and node.{h,cpp}, the pure part of a service.
 bool isPure(const std::string& path) {
   return part(path, 0) == "services" &&
          (part(path, 2) == "core" || startsWith(part(path, 2), {"node.", "node_"}));
@@ -84,7 +86,7 @@ bool isPure(const std::string& path) {
 
 std::string whyNotIncluded(const std::string& path, const std::string& include) {
   const std::string room = part(path, 0), used = part(include, 0);
-  // How Cyclone encodes a message is a matter of the wire.
+  // Only common/wire uses the functions by which Cyclone encodes messages.
   const bool encodes = path.starts_with("common/wire/") &&
                        startsWith(include, {"dds/ddsi/", "dds/ddsc/dds_opcodes.h"});
   if (include.starts_with("dds/") && !encodes &&
@@ -120,7 +122,7 @@ std::string whyNotIncluded(const std::string& path, const std::string& include) 
   return {};
 }
 
-/// The text between the quotes or angles of an include line, or "".
+/// Returns the text between the quotes or angle brackets of an include line, or "".
 std::string includeOf(const std::string& line) {
   constexpr std::string_view kDirective = "#include ";
   if (!line.starts_with(kDirective) || line.size() < kDirective.size() + 2) return {};

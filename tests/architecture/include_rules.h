@@ -1,4 +1,4 @@
-// The layers of the project as rules on include lines.
+// Rules for the layers of the project, checked on include lines.
 #pragma once
 
 #include <string>
@@ -6,7 +6,8 @@
 
 namespace perdure::tests {
 
-/// Sentences about what a file must not include or use. `path` is relative to the project's root.
+/// Returns one sentence for each forbidden include or use. `path` is relative to the project's
+/// root.
 std::vector<std::string> violations(const std::string& path, const std::string& content);
 
 }  // namespace perdure::tests

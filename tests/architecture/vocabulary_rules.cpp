@@ -8,7 +8,8 @@
 namespace perdure::tests {
 namespace {
 
-/// What stands in tools/docs/glossary.md, but for words that plain sentences need.
+/// Former words of tools/docs/glossary.md and their replacements, without words that plain
+/// sentences need.
 const std::map<std::string, std::string> kFormer{{"footing", "ground contact"},
                                                  {"facing", "heading"},
                                                  {"screened", "unmapped occluder"},
@@ -41,7 +42,8 @@ const std::map<std::string, std::string> kFormer{{"footing", "ground contact"},
 
 bool isLetter(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; }
 
-/// Lower-case words of a line; a name in camelCase or snake_case is one word.
+/// Returns the words of a line with a lower-case first letter. A name in camelCase or snake_case is
+/// one word.
 std::vector<std::string> wordsOf(const std::string& line) {
   std::vector<std::string> words;
   for (auto at = line.begin(); at != line.end();) {

@@ -1,5 +1,4 @@
-// The words of tools/docs/glossary.md as a rule: the filter's core does not go back to its old
-// ones.
+// Rule for the filter's core: it does not use the former words of tools/docs/glossary.md.
 #pragma once
 
 #include <string>
@@ -7,8 +6,8 @@
 
 namespace perdure::tests {
 
-/// A sentence for each word of the glossary's column "formerly" that stands in `content`, code or
-/// comment, as a whole word. `path` is relative to the project's root.
+/// Returns one sentence for each word of the glossary's column "formerly" in `content` (code or
+/// comments). Only whole words count. `path` is relative to the project's root.
 std::vector<std::string> formerWords(const std::string& path, const std::string& content);
 
 }  // namespace perdure::tests

@@ -39,9 +39,9 @@ namespace {
 struct Range {
   std::uintptr_t begin = 0, end = 0;
 };
-std::array<Range, 64> g_opencv_code;  // ends at the first empty one; empty before main
+std::array<Range, 64> g_opencv_code;  // ends at the first empty range; empty before main
 
-/// The executable segments of libopencv_*.so.
+/// Stores the executable segments of libopencv_*.so.
 int noteLibrary(dl_phdr_info* info, std::size_t /*size*/, void* next) {
   auto& at = *static_cast<std::size_t*>(next);
   if (std::strstr(info->dlpi_name, "libopencv") == nullptr) return 0;
@@ -75,8 +75,7 @@ void count(const void* caller) {
 }  // namespace
 }  // namespace perdure::tests
 
-// glibc lets a program define all of these in place of its own, and keeps its own under these
-// names.
+// glibc lets a program replace these functions. Its own versions remain under the names below.
 extern "C" {
 void* __libc_malloc(std::size_t size);
 void* __libc_calloc(std::size_t n, std::size_t size);
@@ -129,8 +128,8 @@ void* orThrow(void* memory) {
 
 }  // namespace
 
-// These, too, so that the caller is who asked and not the standard library. The forms without
-// exceptions call them.
+// Replaces operator new, so that the counted caller is the requester and not the standard library.
+// The nothrow forms call these.
 void* operator new(std::size_t size) {
   perdure::tests::count(__builtin_return_address(0));
   return orThrow(__libc_malloc(size));

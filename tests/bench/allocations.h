@@ -1,24 +1,24 @@
-// Counts heap allocations of the whole process by standing before malloc and operator new. A
-// program gets it by linking perdure_allocations; nothing else of the project does.
+// Counts the heap allocations of the whole process by replacing malloc and operator new. A program
+// enables it by linking perdure_allocations; only benchmarks and tests do.
 #pragma once
 
 #include <cstdint>
 
 namespace perdure::tests {
 
-/// Calls of malloc, calloc, realloc, aligned allocation and operator new; frees are not counted.
+/// Calls of malloc, calloc, realloc, aligned allocation and operator new. Frees are not counted.
 struct Allocations {
-  std::uint64_t own = 0;     ///< asked for outside of OpenCV's libraries
-  std::uint64_t opencv = 0;  ///< asked for by code inside OpenCV's libraries
+  std::uint64_t own = 0;     ///< by code outside OpenCV's libraries
+  std::uint64_t opencv = 0;  ///< by code inside OpenCV's libraries
 };
 
-/// Since the process began, in all threads.
+/// Returns the counts since the start of the process, over all threads.
 Allocations allocations();
 
-/// What was allocated since `before`.
+/// Returns the counts since `before`.
 Allocations allocationsSince(const Allocations& before);
 
-/// False under a sanitizer, which owns malloc: then nothing is counted.
+/// Returns false under a sanitizer, which replaces malloc itself; the counts are then 0.
 bool allocationsAreCounted();
 
 }  // namespace perdure::tests

@@ -1,6 +1,6 @@
-// What the bus costs between two processes: age on arrival and CPU time, of inertial samples and
-// images of VGA's size. Settings are those of the file that PERDURE_BUS names.
-//   perdure_bus_probe send|receive SECONDS
+// Measures the cost of the bus between two processes: age on arrival and CPU time, for inertial
+// samples and VGA images. The file that PERDURE_BUS names holds the settings.
+// usage: perdure_bus_probe send|receive SECONDS
 #include <fmt/format.h>
 #include <sys/resource.h>
 

@@ -1,5 +1,5 @@
-// How exact `perdure calibrate` is: simulated recordings of both boards, several seeds, the errors
-// against the truth beside the deviations that the calibration states itself.
+// Measures the accuracy of `perdure calibrate` on simulated recordings of both boards, with several
+// seeds. Compares the errors with the standard deviations that the calibration states.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -30,7 +30,7 @@ struct Worst {
   std::uint64_t runs = 0;
 };
 
-/// Truth less estimate, in the order of the covariance.
+/// Returns truth minus estimate, in the order of the covariance.
 Eigen::Matrix<double, 15, 1> errorOf(const CameraCalibration& found,
                                      const CameraCalibration& truth) {
   Eigen::Matrix<double, 15, 1> error;

@@ -1,6 +1,7 @@
-// Processor time and heap allocations of the filter for each frame, with so many things in view:
-// a field of chairs, people and cars that a camera drives through, seen by a network that misses
-// one in ten and makes false boxes, poses that drift and say so. One thread.
+// Measures the CPU time and heap allocations of the filter for each frame, at several numbers of
+// objects in view. A camera drives through a field of chairs, people and cars. The network misses
+// one detection in ten and reports false boxes. The poses drift, and their covariances state it.
+// Uses one thread.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -59,7 +60,7 @@ int main(int argc, char** argv) {
            " all numbers in view with 0; keys as in config/semantic_filter.yaml)\n";
     return 64;
   }
-  perdure::keepFreedMemory();  // as perdure-semantic-filter does
+  perdure::keepFreedMemory();  // as in perdure-semantic-filter
   try {
     const Config config = bench::configure({argv + std::min(argc, 3), argv + argc});
     std::cout << " in view  objects    boxes  median ms     p99 ms  allocations\n";

@@ -24,7 +24,7 @@ CameraCalibration makeLookout() {
   CameraCalibration camera = testing::makeCamera();
   camera.height = 720;
   camera.cy = 300.0;
-  // Four metres up and 12° down: little hides behind something else.
+  // 3 m above the body and 12° down, so that objects seldom occlude each other.
   const Eigen::AngleAxisd down(0.21, Eigen::Vector3d::UnitY());
   camera.T_BC = RigidTransform(down.toRotationMatrix() * camera.T_BC.R(), {0.0, 0.0, 3.0});
   return camera;

@@ -1,5 +1,6 @@
-// The drive of filter_bench: a field of chairs, people and cars that a camera drives through, seen
-// by a network that misses one in ten and makes false boxes, poses that drift and say so.
+// The drive of filter_bench. A camera drives through a field of chairs, people and cars. The
+// network misses one detection in ten and reports false boxes. The poses drift, and their
+// covariances state it.
 #pragma once
 
 #include <cstddef>
@@ -13,11 +14,11 @@
 
 namespace perdure::semantic_filter::bench {
 
-/// Things at random on both sides of the way, as many in view at any time as asked.
+/// Random objects on both sides of the trajectory, with a given mean number in view.
 class Field {
  public:
   Field(std::size_t in_view, std::uint32_t seed);
-  /// What stands within visibility of `x`, new things ahead.
+  /// Returns the objects within visibility of `x`; adds new objects ahead.
   const std::deque<testing::TrueObject>& near(double x);
 
  private:
@@ -37,7 +38,7 @@ struct Sample {
 class Drive {
  public:
   Drive(const Config& config, std::size_t in_view, std::uint32_t seed);
-  /// Frame k: frames come in order, from 0.
+  /// Processes frame k. Frames must come in order, from 0.
   Sample frame(std::uint64_t k);
 
  private:
@@ -48,7 +49,7 @@ class Drive {
   std::mt19937 random_;
   CameraCalibration camera_;
   CameraModel model_;
-  std::size_t objects_ = 0, in_view_ = 0;  ///< of the newest message
+  std::size_t objects_ = 0, in_view_ = 0;  ///< counts of the newest message
   Node node_;
 };
 

@@ -1,10 +1,14 @@
-// usage: graph_file_bench [RECORDS ANCHORS EDGES [outbox]]
-// What the pose graph costs in the map's file (100,000 sightings, 5,000 anchors, 6,000 edges):
-// writing all of it once, reading it as at a start, and the commits of a drive: the poses of all
-// anchors after a loop, the same with all covariances of the odometry, sixty sightings, and nothing
-// of the graph, sixty objects. With "outbox" the file's triggers gather what a fleet's server is to
-// get, and the server has all of it before each commit. Medians of five runs: wall time (most of a
-// commit is the sync), processor time, and what went to the write-ahead log.
+// Measures the cost of the pose graph in the map file. It times writing the whole graph once and
+// reading it at a start, and four kinds of commits of a drive:
+// - the poses of all anchors after a loop;
+// - the same with all covariances of the odometry;
+// - sixty sightings;
+// - sixty objects without any change of the graph.
+// With "outbox", the file's triggers collect the changes for a fleet server, and the server has
+// received all of them before each commit. Prints medians of five runs: wall time (mostly the
+// sync), CPU time, and the size of the write-ahead log.
+// usage: graph_file_bench [RECORDS ANCHORS EDGES [outbox]] (default: 100,000 sightings, 5,000
+// anchors, 6,000 edges)
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -23,7 +27,7 @@ using namespace perdure::map_store;
 
 constexpr int kRuns = 5;
 
-/// Milliseconds.
+/// Times in milliseconds.
 struct Times {
   double wall = 0.0, cpu = 0.0;
 };
@@ -51,7 +55,7 @@ class Bench {
   Bench(mapping::SavedMap map, bool outbox)
       : map_(std::move(map)), database_({.path = path(), .outbox = outbox}), outbox_(outbox) {}
 
-  /// Commits, each alone in the log.
+  /// Measures commits; the log holds one commit at a time.
   void commit(const char* what, const mapping::Unsaved* graph, int runs = kRuns, int cars = 0) {
     std::vector<double> logs;
     report(what, runs, [&](std::vector<Times>& times) {
@@ -90,7 +94,7 @@ class Bench {
     for (const Times& each : times) wall.push_back(each.wall), cpu.push_back(each.cpu);
     std::printf("%-26s %9.2f ms, CPU %8.2f ms", what, median(wall), median(cpu));
   }
-  /// All of them have moved since the last frame.
+  /// Returns the cars; all of them have moved since the last frame.
   static std::vector<ObjectBelief> carsAt(std::uint64_t sequence, int cars) {
     std::vector<ObjectBelief> all;
     for (int i = 1; i <= cars; ++i) {
@@ -103,7 +107,7 @@ class Bench {
     return outboxMark(Connection::open(path(), Connection::Mode::kReadOnly).value()).value().last;
   }
   std::string path() const { return folder_.file("map.sqlite"); }
-  /// Everything into the file, so that the next commit is alone in the log.
+  /// Moves the log into the file, so that the log holds only the next commit.
   void checkpoint() const {
     const auto other = Connection::open(path(), Connection::Mode::kReadWriteCreate);
     must(other.has_value() && other->execute("PRAGMA wal_checkpoint(TRUNCATE)").has_value());

@@ -1,6 +1,6 @@
-// What inference costs beside the network's forward pass: decode, suppression, top-down answers and
-// the wire, for raw heads of 416×416 as a busy street gives them (seeded), and the image's way into
-// the network.
+// Measures the cost of inference without the network's forward pass: decoding, suppression,
+// top-down answers, serialisation, and the conversion of the image. The inputs are raw heads of
+// 416×416 networks with the density of a busy street (seeded).
 #include <benchmark/benchmark.h>
 
 #include <random>
@@ -19,7 +19,7 @@ using namespace perdure::inference;
 constexpr int kSide = 416;
 constexpr double kLax = 0.05, kFloor = 0.002;
 
-/// Heads of YOLOX with 80 classes, or of the project's own family with 8.
+/// Heads of YOLOX with 80 classes, or of the project's own family with 8 classes.
 struct Heads {
   ModelDescription model;
   std::vector<std::vector<float>> values;
@@ -38,7 +38,7 @@ struct Heads {
   }
 };
 
-/// 40 things, each of which a patch of cells of one stride answers to.
+/// 40 objects, each of which activates a patch of cells of one stride.
 struct Things {
   std::mt19937 random{11};
   std::normal_distribution<float> normal;
@@ -131,7 +131,8 @@ std::vector<Candidate> passing(const std::vector<Candidate>& candidates) {
   return result;
 }
 
-/// Every third reported box a little aside, and as many where nothing is.
+/// Returns expectations: every third reported box as it is, and the same boxes shifted to empty
+/// places.
 std::vector<Expectation> expectationsFor(const std::vector<Candidate>& reported) {
   std::vector<Expectation> expected;
   for (std::size_t i = 0; i < reported.size(); i += 3) {
@@ -198,7 +199,7 @@ void wireAlone(benchmark::State& state) {
   state.counters["boxes"] = static_cast<double>(reported.size());
 }
 
-/// Everything of a frame but the forward pass and the image: the bar is 2 ms.
+/// All work for a frame except the forward pass and the image. The limit is 2 ms.
 void beyondTheForwardPass(benchmark::State& state) {
   const Heads& heads = headsOf(static_cast<int>(state.range(0)));
   const auto expected = expectationsFor(suppress(passing(candidatesOf(heads, kLax)), 0.5, 100));

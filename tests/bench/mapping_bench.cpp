@@ -1,8 +1,8 @@
-// usage: mapping_bench [ANCHORS LOOPS]
-// What the pose graph takes for a drive through streets in squares, ANCHORS long, with LOOPS places
-// that it came past again (5,000 and 100): all of it at once, once more from there, with one loop
-// more, and how well 40 anchors are known from the last one. Processor time of this thread, medians
-// of five runs.
+// Measures the cost of the pose graph for a drive through a grid of streets with ANCHORS anchors
+// and LOOPS revisited places. It times the full optimisation, a second one from its result, one
+// with one more loop, and the marginal covariances of 40 anchors relative to the last. Prints the
+// CPU time of this thread, medians of five runs.
+// usage: mapping_bench [ANCHORS LOOPS] (default: 5,000 and 100)
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -23,7 +23,7 @@ constexpr int kRuns = 5;
 constexpr std::size_t kAsked = 40;
 constexpr double kStep = 12.0;
 constexpr int kBlock = 10;    ///< steps between crossings
-constexpr int kStreets = 16;  ///< each way
+constexpr int kStreets = 16;  ///< number of streets in each direction
 
 double cpuMs() {
   timespec t{};
@@ -37,7 +37,8 @@ Eigen::Matrix4d diagonal(double metres, double yaw) {
 
 struct Drive {
   std::vector<LevelPose> truth;
-  std::vector<std::pair<std::size_t, std::size_t>> places;  ///< passed again
+  std::vector<std::pair<std::size_t, std::size_t>> places;  ///< indices of both passes of each
+                                                            ///< revisited place
 };
 
 Drive makeDrive(std::size_t anchors, std::mt19937& random) {

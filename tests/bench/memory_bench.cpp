@@ -1,7 +1,8 @@
-// usage: memory_bench [SMALL LARGE [FRAMES]]
-// What the filter takes for a frame of a drive with SMALL and with LARGE things on the map (100 and
-// 100,000): the same hundred along the way, all others in other streets. Five runs of each, in
-// turns; processor time of this thread, the map store's beside it, since it is another process.
+// Measures the filter's cost per frame with SMALL and with LARGE objects on the map. The same
+// hundred objects stand along the trajectory; all others stand in other streets. Runs each size
+// five times, alternately. Prints the CPU time of this thread, and separately that of the map
+// store, which is another process in operation.
+// usage: memory_bench [SMALL LARGE [FRAMES]] (default: 100 and 100,000)
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -27,7 +28,7 @@ double cpuMs() {
   return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
 }
 
-/// Parked cars on both sides of the way, four metres and a half apart on each.
+/// Returns parked cars alternately on both sides of the trajectory, one every 4.5 m.
 State parked(std::size_t i) {
   const double side = i % 2 == 0 ? 4.0 : -4.5;
   return makeState(10.0 + 4.5 * static_cast<double>(i), side, 0.75, 0.02, 4.2, 1.75, 1.5);
@@ -59,7 +60,7 @@ Objects mapOf(std::size_t count) {
   return objects;
 }
 
-/// A map file with so many things, none of them in a working set.
+/// A map file with `count` objects, none of them in a working set.
 class MapFile {
  public:
   explicit MapFile(std::size_t count) {
@@ -150,7 +151,7 @@ int main(int argc, char** argv) {
   std::array<std::vector<double>, 2> filter, store;
   for (int run = 0; run < kRuns; ++run) {
     for (std::size_t i = 0; i < 2; ++i) {
-      const MapFile file(sizes[i]);  // each run its own: a drive changes the map
+      const MapFile file(sizes[i]);  // one for each run, because a drive changes the map
       const Cost cost = drive(file, frames);
       std::printf("%8zu things: filter %.3f ms, map store %.3f ms a frame, %zu recalled\n",
                   sizes[i], cost.filter_ms, cost.store_ms, cost.recalled);

@@ -1,7 +1,7 @@
-// usage: place_bench [OBJECTS [SEEN]]
-// What it takes to find the body on a map of OBJECTS (100,000) in streets, by SEEN (24) objects of
-// one place, where nothing says where it is: the index of the map, the search where it was driven
-// before, and where it was not. Processor time of this thread, medians of five places.
+// Measures the search for the body on a map of OBJECTS objects in streets, from SEEN objects of one
+// place, without a prior pose. It times the index of the map, the search along streets driven
+// before, and the search elsewhere. Prints the CPU time of this thread, medians of five places.
+// usage: place_bench [OBJECTS [SEEN]] (default: 100,000 and 24)
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -19,7 +19,7 @@ using namespace perdure;
 using namespace perdure::mapping;
 
 constexpr int kPlaces = 5;
-constexpr double kStreet_m = 120.0;  ///< from one to the next
+constexpr double kStreet_m = 120.0;  ///< distance between neighbouring streets
 constexpr std::uint32_t kClasses = 5;
 
 double cpuMs() {
@@ -31,7 +31,7 @@ double cpuMs() {
 class Town {
  public:
   explicit Town(std::size_t objects) : random_(7) {
-    // Along a street something stands every 8 m on either side.
+    // An object stands every 8 m on either side of a street.
     const double length_m = 4.0 * static_cast<double>(objects);
     const double side_m = std::sqrt(length_m * kStreet_m / 2.0);
     while (objects_.size() < objects) {
@@ -59,7 +59,7 @@ class Town {
   double any(double least, double most) {
     return std::uniform_real_distribution<double>(least, most)(random_);
   }
-  /// The nearest `count` to a place, as the body there sees them.
+  /// Returns the `count` objects nearest to `body`, in the body's frame.
   std::vector<PlacedObject> seenFrom(const LevelPose& body, std::size_t count) {
     std::vector<PlacedObject> seen = objects_;
     const auto nearer = [&](const PlacedObject& a, const PlacedObject& b) {

@@ -1,6 +1,6 @@
-// What OpenCV alone takes to follow 200 points from frame to frame, with its defaults: windows of
-// 21 pixels, three levels above the image; filled up when fewer than 150 are left. The measure that
-// vio's times are compared with.
+// The reference for vio's times: OpenCV alone follows 200 points from frame to frame with its
+// default settings. The windows have 21 pixels, the pyramid has three levels above the image. New
+// points are added if fewer than 150 are left.
 #pragma once
 
 #include <ctime>
@@ -11,7 +11,7 @@
 
 namespace perdure::bench {
 
-/// Of this thread, milliseconds.
+/// CPU time of this thread, in milliseconds.
 inline double cpuMs() {
   timespec t{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);

@@ -1,7 +1,7 @@
+// Compares vio's time for each frame of a dataset with the time in which OpenCV follows 200 points.
+// Both are CPU times of this thread, without decoding. On a shared machine the ratio is more
+// reliable than the times.
 // usage: vio_against_klt DATASET
-// What vio takes for each frame of a dataset, beside what OpenCV alone takes to follow 200 points
-// from frame to frame of the same: processor time of this thread, decoding left out. The ratio says
-// more than milliseconds where the machine is shared.
 #include <algorithm>
 #include <cstdio>
 #include <opencv2/core/utility.hpp>
@@ -40,7 +40,7 @@ int compare(const char* folder) {
   node.onCalibration(dataset->calibration());
   PlainTracker tracker;
   std::vector<double> vio_ms, klt_ms;
-  double since = 0.0;  // a frame may be worked off when a later sample comes
+  double since = 0.0;  // vio may process a frame at a later sample
   while (const auto message = dataset->next()) {
     const double begin = cpuMs();
     if (const auto* imu = std::get_if<ImuSample>(&*message)) node.onImu(*imu);

@@ -1,5 +1,5 @@
-// Times the stages of vio on simulated input and counts what they allocate on the heap, per
-// iteration: `own` by the project's code and Eigen, `opencv` inside OpenCV. One thread.
+// Times the stages of vio on simulated input and counts their heap allocations per iteration: `own`
+// by the project's code and Eigen, `opencv` inside OpenCV. Uses one thread.
 #include <benchmark/benchmark.h>
 
 #include <opencv2/imgproc.hpp>
@@ -21,7 +21,7 @@ namespace {
 using tests::allocations;
 using tests::allocationsSince;
 
-/// Times `work`; `prepare` goes before each call of it, untimed and uncounted.
+/// Times `work`; calls `prepare` before each call of it, untimed and uncounted.
 template <class Prepare, class Work>
 void measure(benchmark::State& loop, const Prepare& prepare, const Work& work) {
   tests::Allocations sum;
@@ -50,7 +50,7 @@ void measure(benchmark::State& loop, const Work& work) {
       loop, [] {}, work);
 }
 
-/// With one camera, or (argument 1) with two.
+/// With one camera, or with two (argument 1).
 const RunningFilter& filter(const benchmark::State& loop) {
   static const RunningFilter one(false), two(true);
   return loop.range(0) == 0 ? one : two;
@@ -69,8 +69,8 @@ void trackImage(benchmark::State& loop) {
   loop.counters["points"] = static_cast<double>(points);
 }
 
-/// What OpenCV alone takes for 200 points: the pyramid of one image and Lucas-Kanade.
-/// Arguments: side of the window, levels above the image, iterations.
+/// The time of OpenCV alone for 200 points: the pyramid of one image and Lucas-Kanade. Arguments:
+/// side of the window, levels above the image, iterations.
 void opencvKlt(benchmark::State& loop) {
   const cv::Size window(static_cast<int>(loop.range(0)), static_cast<int>(loop.range(0)));
   const int levels = static_cast<int>(loop.range(1));
@@ -139,7 +139,7 @@ void cloneAndForget(benchmark::State& loop) {
       });
 }
 
-/// Second argument: tracks.
+/// The second argument is the number of tracks.
 void msckf(benchmark::State& loop) {
   const RunningFilter& run = filter(loop);
   const std::vector<const Track*> tracks = run.tracks(static_cast<std::size_t>(loop.range(1)));
@@ -238,7 +238,7 @@ void registerStages() {
 }  // namespace perdure::vio::bench
 
 int main(int argc, char** argv) {
-  cv::setNumThreads(1);  // as vio does
+  cv::setNumThreads(1);  // as in vio
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 64;
   perdure::vio::bench::registerStages();

@@ -1,4 +1,4 @@
-// What the benchmarks of vio run on: images and a filter in steady state, both of a seed.
+// Inputs of vio's benchmarks: images and a filter in steady state, both seeded.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,8 @@
 
 namespace perdure::vio::bench {
 
-/// A textured wall that passes by at 3.5 pixels a frame, 752 × 480, there and back for ever.
+/// Images of 752 × 480 of a textured wall that passes at 3.5 pixels per frame. The sequence runs
+/// forwards and backwards without end.
 class PassingImages {
  public:
   PassingImages();
@@ -25,11 +26,11 @@ class PassingImages {
   std::size_t at_ = 0;
 };
 
-/// 150 matches over one frame, a fifth of them wrong; R_now_before is the identity.
+/// Returns 150 matches over one frame, a fifth of them wrong; R_now_before is the identity.
 std::vector<Match> someMatches();
 
-/// A simulated drive at 20 Hz with 150 points in each image, and a filter that has followed it for
-/// 100 frames: the window and the points of the state are full.
+/// A simulated drive at 20 Hz with 150 points in each image, and a filter after its first 100
+/// frames. The window and the points of the state are full.
 class RunningFilter {
  public:
   explicit RunningFilter(bool stereo);
@@ -38,20 +39,20 @@ class RunningFilter {
   const test::SimulatedDrive& drive() const { return drive_; }
   const ImuBuffer& imu() const { return imu_; }
 
-  /// After 100 frames.
+  /// The estimator after 100 frames.
   const Estimator& estimator() const { return warm_; }
-  /// Another one like estimator().
+  /// Returns another estimator in the same condition as estimator().
   Estimator warmed() const;
-  /// The frame that comes next for estimator().
+  /// The next frame for estimator().
   const FrameInput& input() const { return inputs_[kWarm]; }
-  /// All of the drive's frames that come after the first 100.
+  /// All frames of the drive after the first 100.
   std::vector<FrameInput> inputs() const { return {inputs_.begin() + kWarm, inputs_.end()}; }
 
   /// The state of estimator(), propagated to input() and cloned there.
   const State& cloned() const { return cloned_; }
-  /// What the window's frames and input() saw.
+  /// The observations of the window's frames and of input().
   const FeatureDatabase& database() const { return database_; }
-  /// The longest tracks of database() that are not in the state, at most `count`.
+  /// Returns the longest tracks of database() that are not in the state, at most `count`.
   std::vector<const Track*> tracks(std::size_t count) const;
 
  private:

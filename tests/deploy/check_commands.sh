@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The commands of deploy/ say what is wrong with their arguments.
+# Checks that the commands of deploy/ report invalid arguments.
 set -euo pipefail
 cd "$PERDURE_SOURCE"
 expect() { # STATUS WORDS COMMAND …
@@ -19,7 +19,8 @@ expect 0 "--runtime" deploy/install --help
 expect 64 "unknown option '--everything'" deploy/package --everything
 expect 0 "perdure-{services,tools,gateway,ros2,python,models,dev}" deploy/package --help
 for script in deploy/demo deploy/install deploy/package tests/run .ci/run; do bash -n "$script"; done
-# What libcamera loads as it runs is no library that a program depends on: the list has to name it.
+# libcamera loads its sensor modules at run time. They are not in the program's dependencies, so
+# that the list must name them.
 grep -qx libcamera-ipa <<< "$(deploy/install --list --runtime)" || {
   echo "deploy/install --runtime installs libcamera without its modules for sensors, libcamera-ipa"
   exit 1

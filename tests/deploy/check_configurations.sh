@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Every configuration file of a service is accepted by it, and a wrong one is refused with 78.
+# Checks that each service accepts its configuration file, and exits with 78 for an invalid one.
 set -euo pipefail
 cd "$PERDURE_SOURCE"
 for service in capture vio inference semantic-filter map-store gateway ros2; do
@@ -15,8 +15,8 @@ for service in capture vio inference semantic-filter map-store gateway ros2; do
     grep -q -- "$place" <<< "$out" || { echo "perdure-$service does not name $place: $out"; exit 1; }
   done
 done
-# What all processes share is read beside a service's own file, which goes before it; a wrong one is
-# refused by services and commands.
+# bus.yaml holds the settings of all processes. It is read together with a service's own settings,
+# which take precedence. Services and commands reject an invalid bus.yaml.
 folder=$(mktemp -d)
 trap 'rm -r "$folder"' EXIT
 cp config/vio.yaml "$folder"

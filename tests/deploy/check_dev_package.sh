@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# What is installed for programs of other people suffices them: the examples, built outside the tree
-# with find_package(Perdure), hear objects.
+# Checks that the installed development files are complete: the examples, built outside the tree
+# with find_package(Perdure), receive objects.
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -r "$folder"' EXIT

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# What the package perdure-gateway holds suffices it: program, unit, configuration and page, from
-# where they are installed. On a closed bus it reads, and writes nothing but questions and its health.
+# Checks that the package perdure-gateway is complete: program, unit, configuration and page, run
+# from the installed locations. On a closed bus the gateway reads all topics; it writes only queries
+# and its health.
 set -euo pipefail
 folder=$(mktemp -d)
 gateway=
@@ -19,8 +20,8 @@ program=$(sed -n 's|^ExecStart=\(\S*\) .*|\1|p' "$unit")
 grep -q -- '--config /etc/perdure/gateway.yaml' "$unit" || fail "the unit reads another configuration"
 "$root$program" --config "$config" --check-config
 
-# Installed so, it finds its page, and ends when it is told to.
-: > "$folder/log"  # the shell may not have made it yet when it is first read
+# The installed gateway finds its page, and stops on SIGTERM.
+: > "$folder/log"  # creates the file before the loop below reads it
 PERDURE_DOMAIN=57 "$root$program" --config "$config" --port 0 > "$folder/log" 2>&1 &
 gateway=$!
 for ((i = 0; i < 200; ++i)); do

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# What the package perdure-ros2 holds suffices it: program, unit and configuration, from where they
-# are installed. On a closed bus it reads, and writes its health alone.
+# Checks that the package perdure-ros2 is complete: program, unit and configuration, run from the
+# installed locations. On a closed bus the bridge reads topics and writes only its health.
 set -euo pipefail
 folder=$(mktemp -d)
 bridge=
@@ -19,7 +19,7 @@ program=$(sed -n 's|^ExecStart=\(\S*\) .*|\1|p' "$unit")
 grep -q -- '--config /etc/perdure/ros2.yaml' "$unit" || fail "the unit reads another configuration"
 "$root$program" --config "$config" --check-config
 
-# Installed so it runs, `perdure status` knows it, and it ends when it is told to.
+# The installed bridge runs, `perdure status` lists it, and it stops on SIGTERM.
 export PERDURE_DOMAIN=58
 "$root$program" --config "$config" > "$folder/log" 2>&1 &
 bridge=$!

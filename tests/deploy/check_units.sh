@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# The systemd units are sound: systemd-analyze verify, with programs that exist here; and closed:
-# systemd-analyze security, 2.5 at most. What a unit says is not said otherwise by the drop-in for all,
-# which is read after it.
+# Checks the systemd units. They must pass systemd-analyze verify, with programs that exist, and
+# have an exposure of at most 2.5 in systemd-analyze security. A unit must not set a key that the
+# common drop-in sets, because systemd reads the drop-in later.
 set -euo pipefail
 command -v systemd-analyze > /dev/null || { echo "no systemd-analyze here: skipped"; exit 77; }
 folder=$(mktemp -d)
@@ -24,7 +24,7 @@ for unit in "$folder"/*.service; do
   fi
 done
 
-# keys FILE: what it sets, but lists, which grow.
+# keys FILE: lists the keys that FILE sets, except list keys, which accumulate.
 keys() { sed -n 's/^\([A-Z][A-Za-z]*\)=.*/\1/p' "$1" | grep -vE '^(Documentation|After|RestrictAddressFamilies)$' | sort -u; }
 common=$folder/perdure-.service.d/common.conf
 for unit in "$folder"/perdure-*.service; do

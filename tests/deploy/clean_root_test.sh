@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# The sources in a bare Debian root, as for somebody who has just cloned them: deploy/install, the
-# whole build, and the tests that are not long, in a network of their own.
+# Runs the steps of a new user in a bare Debian root with its own network: deploy/install, the whole
+# build, and the tests that are not labelled long. Takes an hour on two cores the first time. Root
+# and build stay in build/clean/RELEASE, so that a later run rebuilds only what changed. Needs root,
+# debootstrap and, the first time, Debian's mirror; exits with 77 (skipped) without them.
 # usage: clean_root_test.sh RELEASE (bookworm, trixie)
-# An hour on two cores the first time. Root and build stay in build/clean/RELEASE, so that it then
-# takes what changed. Needs root, debootstrap and, the first time, Debian's mirror; skips (77) without.
 set -euo pipefail
 release=$1
 cd "$PERDURE_SOURCE"
@@ -13,7 +13,7 @@ skip() { echo "$1: skipped"; exit 77; }
 
 [ "$(id -u)" -eq 0 ] || skip "not root, a root cannot be made"
 command -v debootstrap > /dev/null || skip "debootstrap is not here (deploy/install --package)"
-# A namespace of mounts: none stays where this is killed.
+# A mount namespace, so that no mount remains if this script is killed.
 if [ -z "${PERDURE_CLEAN_NAMESPACE:-}" ]; then
   PERDURE_CLEAN_NAMESPACE=yes exec unshare --mount --propagation private "$0" "$@"
 fi
@@ -32,7 +32,7 @@ TEXT
 fi
 cp /etc/resolv.conf "$root/etc/"
 
-# The sources as they are here, without what git ignores.
+# Copies the sources of this checkout, without the files that git ignores.
 sources=$root/root/perdure
 mkdir -p "$sources"
 find "$sources" -mindepth 1 -maxdepth 1 ! -name build -exec rm -rf {} +
@@ -41,7 +41,7 @@ git ls-files -z --cached --others --exclude-standard | xargs -0 -I {} find {} -m
 
 mount -t proc proc "$root/proc"
 mount --rbind /dev "$root/dev"
-mount -t tmpfs tmpfs "$root/dev/shm" # RouDi's memory is not that of others here
+mount -t tmpfs tmpfs "$root/dev/shm" # separates RouDi's memory from that of the host
 mount --rbind /sys "$root/sys"
 inside() { # [--net] COMMAND …
   local alone=()

@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
-# Faults under systemd, in a booted root with the packages: each is seen in `perdure status` within
-# two seconds, mended or degraded as documented, and no object that was on the map is lost.
+# Injects faults under systemd in a booted root with the packages. `perdure status` must show each
+# fault within two seconds. The services must recover or degrade as documented. No object of the map
+# may be lost.
 . "$(dirname "$0")/vehicle.sh"
 
-# A drive whose camera is gone from 12 to 15 s, and whose IMU from 20 to 23 s.
+# Makes a drive without camera images from 12 to 15 s, and without IMU samples from 20 to 23 s.
 make_gaps() {
   [ -e "$work/gaps/objects_truth.json" ] && return
   rm -rf "$work/gaps.new"
   cp -al "$drive" "$work/gaps.new"
-  cut_out() { # SENSOR FROM UNTIL, seconds of the drive
+  cut_out() { # SENSOR FROM UNTIL, in seconds of the drive
     local file=$work/gaps.new/mav0/$1/data.csv
     awk -F, -v from="$2" -v until="$3" 'NR == 2 {first = $1} NR < 2 || ($1 - first) / 1e9 < from || ($1 - first) / 1e9 > until' \
       "$file" > "$file.cut"
@@ -20,14 +21,16 @@ make_gaps() {
 }
 
 now_ms() { echo $(($(date +%s%N) / 1000000)); }
-# written_down NAME COMMAND: in the container, each line behind the time in ms at which it came.
+# written_down NAME COMMAND: runs the command in the container and logs its output; each line begins
+# with its time of arrival in ms.
 written_down() {
   inside systemd-run --quiet --unit="$1" --property="StandardOutput=file:/var/log/$1" --property=StandardError=null \
     bash -c "$2 | while IFS= read -r line; do echo \"\$((\$(date +%s%N) / 1000000)) \$line\"; done"
 }
 status_log=$root/var/log/status odometry_log=$root/var/log/odometry
 
-# seen_since MS PATTERN: waits up to six seconds for a status line after MS that has it; `took` says when.
+# seen_since MS PATTERN: waits up to six seconds for a matching status line after MS; sets `took` to
+# the delay in ms.
 seen_since() {
   local end=$(($1 + 6000)) at
   while true; do
@@ -57,14 +60,14 @@ remember() { objects > "$work/objects.before"; }
 must_keep() { # FAULT
   objects > "$work/objects.after"
   local ended lost
-  # What was told to be merged or gone since is not lost.
+  # An object that an event reports as merged or gone is not lost.
   ended=$(inside timeout 2 perdure echo events 2> /dev/null | grep -E '"event":"(merged|gone)"' | grep -oE '"object_id":[0-9]+' | grep -oE '[0-9]+' | sort -u || true)
   lost=$(comm -23 "$work/objects.before" "$work/objects.after" | comm -23 - <(echo "$ended" | sort))
   [ -z "$lost" ] && ok "$1: all $(wc -l < "$work/objects.before") objects are there" || fail "$1: lost objects $lost"
 }
-# fresh DRIVE: everything anew, until it is well.
+# fresh DRIVE: restarts all services with an empty map, and waits until they are healthy.
 fresh() {
-  inside systemctl stop perdure.target 'perdure-*.service' # the target alone would not be waited for
+  inside systemctl stop perdure.target 'perdure-*.service' # stopping only the target would not wait for the services
   inside sh -c 'rm -f /var/lib/perdure/*'
   inside sed -i "s|^  path: \S*  *#|  path: $1 #|" /etc/perdure/capture.yaml
   inside systemctl start perdure.target
@@ -83,7 +86,7 @@ install_packages "/packages/perdure-services_*.deb /packages/perdure-tools_*.deb
 boot --bind-ro="$work/gaps:/gaps"
 say "it is booted"
 inside sed -i 's|^  path: ""  *#|  path: /drive #|' /etc/perdure/capture.yaml
-# A disk of its own, which can be filled.
+# A separate file system, which the test can fill.
 inside mount -t tmpfs -o size=1500M,mode=0750 none /var/lib/perdure
 inside chown perdure:perdure /var/lib/perdure
 written_down status "perdure status --watch --json"
@@ -114,7 +117,8 @@ inside rm /var/lib/perdure/ballast /var/lib/perdure/ballast2
 must_be_well "disk full" 10
 must_keep "disk full"
 
-# The wall clock of the services alone, five seconds ahead: the machine's own is not ours to set.
+# Sets only the services' wall clock five seconds ahead; the test must not change the machine's own
+# clock.
 inside mkdir -p /etc/systemd/system/perdure-.service.d
 inside sh -c 'printf "[Service]\nEnvironment=LD_PRELOAD=$(dpkg -L libfaketime | grep -m 1 /libfaketime.so.1) FAKETIME_TIMESTAMP_FILE=/run/faketime FAKETIME_CACHE_DURATION=1 FAKETIME_DONT_FAKE_MONOTONIC=1\n" > /etc/systemd/system/perdure-.service.d/clock.conf'
 inside sh -c 'echo +0 > /run/faketime'
@@ -122,13 +126,14 @@ inside systemctl daemon-reload
 fresh /drive
 at=$(now_ms)
 inside sh -c 'echo +5 > /run/faketime'
-must_be_seen "clock stepped by 5 s" "$((at + 1000))" '"name":"clock","level":"degraded"' # read once a second
+must_be_seen "clock stepped by 5 s" "$((at + 1000))" '"name":"clock","level":"degraded"' # the file is read once a second
 seen_since "$at" '"name":"objects","level":"failed"' && fail "clock stepped: objects stop"
 must_keep "clock stepped"
 inside rm -r /etc/systemd/system/perdure-.service.d
 inside systemctl daemon-reload
 
-# RouDi dies and is started anew: images go over the network interface for who starts now.
+# RouDi is killed and restarted. Services that start in between send images over the network
+# interface.
 for service in capture vio inference semantic_filter map_store; do
   inside sh -c "printf 'bus:\n  shared_memory_mb: 8\n' >> /etc/perdure/$service.yaml"
 done
@@ -147,11 +152,11 @@ for service in capture vio inference semantic_filter map_store; do
 done
 inside systemctl disable --quiet --now iox-roudi
 
-# Sensors that go and come back.
+# Sensors that fail and return.
 fresh /gaps
 written_down odometry "perdure echo odometry"
 sleep 22
-# gap N: when odometry came last before its N-th silence of more than a second.
+# gap N: prints the time of the last odometry before its N-th gap of more than a second.
 gap() { awk -v n="$1" '$1 ~ /^[0-9]+$/ && before && $1 - before > 1000 && ++k == n {print before; exit} {before = $1}' "$odometry_log"; }
 at=$(gap 1)
 if [ -n "$at" ]; then

@@ -1,6 +1,8 @@
 #!/usr/bin/env bash
-# Live sensors on a real kernel: a UVC camera and a BMI160 in an emulated guest, capture and vio by their units.
-# usage: guest_test.sh [--seconds 60] [--unplugs 100] [--mistakes 10] [--unplugs-with-vio 3] [--stops 20] [--seed 1]; figures are written to the README of guest/ by hand.
+# Tests live sensors on a real kernel: a UVC camera and a BMI160 in an emulated guest, with the
+# units of capture and vio. The figures are copied by hand into the README of guest/.
+# usage: guest_test.sh [--seconds 60] [--unplugs 100] [--mistakes 10] [--unplugs-with-vio 3]
+# [--stops 20] [--seed 1]
 set -euo pipefail
 cd "$PERDURE_SOURCE"
 guest=$PERDURE_SOURCE/tests/deploy/guest

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The packages in a bare Debian root: installed, booted, started, killed, purged.
+# Tests the packages in a bare Debian root: installation, boot, start, kill, purge.
 . "$(dirname "$0")/vehicle.sh"
 
 build_packages
@@ -24,7 +24,7 @@ inside perdure pipeline --data /drive --odometry truth --detections simulated --
   --out /tmp/pipeline > "$work/pipeline.log" 2>&1 && inside test -s /tmp/pipeline/objects_final.csv &&
   ok "perdure pipeline finds the installed configuration" || fail "perdure pipeline: $(cat "$work/pipeline.log")"
 
-# Objects within ten seconds of the start.
+# Objects must appear within ten seconds of the start.
 inside systemctl reset-failed
 start=$(($(date +%s%N) / 1000000))
 inside systemctl start perdure.target
@@ -37,7 +37,7 @@ else
   inside journalctl --no-pager -n 60 -u 'perdure-*' || true
 fi
 
-# What the units promise.
+# Checks the settings of the units at run time.
 policy() { inside cat "/proc/$(pid_of "$1")/stat" | awk '{print $41, $40}'; } # policy, priority
 [ "$(policy capture)" = "2 10" ] && [ "$(policy vio)" = "2 5" ] && ok "capture and vio run with real-time priority" ||
   fail "scheduling of capture $(policy capture), of vio $(policy vio)"
@@ -69,12 +69,12 @@ watchdogs=$(inside journalctl --no-pager -u 'perdure-*' | grep -c 'Watchdog time
 inside timeout 20 sh -c 'perdure echo objects | grep -m 1 "\"id\""' > "$work/objects.json" && ok "objects go on" || fail "no objects any more"
 inside perdure status || say "status: $?"
 
-# An upgrade restarts what runs.
+# An upgrade restarts the running services.
 pid=$(pid_of vio)
 inside sh -c 'dpkg -i /packages/perdure-services_*.deb' > "$work/upgrade.log" 2>&1 || { tail "$work/upgrade.log"; fail "dpkg -i"; }
 within 10 active_with_other_pid vio "$pid" && ok "an upgrade restarts vio" || fail "after an upgrade vio is $(show vio ActiveState)"
 
-# Purge ends what runs and leaves data alone.
+# A purge stops the services and keeps the data.
 inside rm -r /etc/systemd/system/perdure-vio.service.d
 inside sh -c 'DEBIAN_FRONTEND=noninteractive apt-get -q -y purge "perdure-*"' > "$work/purge.log" 2>&1 || { tail "$work/purge.log"; fail "purge"; }
 inside systemctl list-units --all 'perdure*' --no-legend | grep . && fail "units are left"

@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
-# Three hosts: capture and vio, inference, filter and map, in network namespaces of their own on one
-# bridge. The simulated drive at its own pace, compared with the same drive on one host: with 5 % of
-# all packets lost, with a link that is cut for 2 s, with a host that is gone for 12 s, and raw
-# images against JPEG, open and closed. Needs root; skips (77) without. PERDURE_OUT keeps what comes out.
+# Runs Perdure on three hosts: capture and vio; inference; filter and map. The hosts are network
+# namespaces on one bridge. The simulated drive runs in real time and is compared with the same
+# drive on one host. The conditions are: 5 % of all packets lost, a link cut for 2 s, a host absent
+# for 12 s, raw images and JPEG, an open and a closed bus. Needs root; exits with 77 (skipped)
+# without. PERDURE_OUT names a folder that keeps the results.
 set -euo pipefail
 cd "$PERDURE_SOURCE"
 
@@ -21,7 +22,7 @@ mkdir -p "$out"
 began=$(date +%s%N)
 say() { printf '%7.1f  %s\n' "$((($(date +%s%N) - began) / 1000000))e-3" "$1"; }
 rm -f "$out/verdicts"
-# judge NAME [WHAT EXPRESSION]…: figures of a run, and what must hold of them.
+# judge NAME [WHAT EXPRESSION]…: prints the figures of a run and checks the expressions on them.
 judge() {
   say "$(python3 - "$out" "$@" << 'PY'
 import json, sys
@@ -61,7 +62,8 @@ drive=${PERDURE_DRIVE:-$PERDURE_SOURCE/build/three_hosts/drive}
 [ -e "$drive/objects_truth.json" ] ||
   "$PERDURE_BIN/perdure" simulate --scene street --seed 1 --seconds 30 --encoding jpeg --quiet --out "$drive"
 
-# hosts FOLDER [SETTING]: programs that are started on their hosts; capture gets the setting too.
+# hosts FOLDER [SETTING]: makes wrappers that start each program on its host; capture also gets the
+# setting.
 hosts() {
   mkdir -p "$1"
   local service host more
@@ -78,7 +80,7 @@ printf 'bus:\n  interface: eth0\n' > "$out/bus.yaml"
 hosts "$out/raw"
 hosts "$out/jpeg" image.compress=jpeg
 
-# drive NAME PROGRAMS [VARIABLE=VALUE …]: the demo on host 3, which listens and compares.
+# drive NAME PROGRAMS [VARIABLE=VALUE …]: runs the demo on host 3, which also listens and compares.
 drive() {
   local before
   before=$(sent h1)
@@ -88,8 +90,9 @@ drive() {
   echo $(($(sent h1) - before)) > "$out/$1.bytes"
 }
 # --- one host, three hosts ---
-# One object more or less is .05 of recall here, and the last digit of a pose decides on it: the
-# recall of a single run says nothing to .02, so that the means of all runs are compared (below).
+# One object changes the recall by .05 here, and rounding errors of a pose can decide about it. The
+# recall of a single run is therefore not accurate to .02; the means of all runs are compared
+# (below).
 for run in one_host one_host_again; do
   on h3 env PERDURE_BUS="$out/one_host.yaml" "$PERDURE_BIN/perdure" demo --data "$drive" \
     --model models/perdure_320x240.onnx --root . --out "$out/$run" > "$out/$run.log" 2>&1
@@ -104,7 +107,7 @@ for kind in raw jpeg; do
   judge "$kind" "${frames[@]}"
 done
 
-# --- closed to strangers, and by unicast alone ---
+# --- closed bus, unicast only ---
 rm -rf "$out/security"
 "$PERDURE_BIN/perdure" security init --dir "$out/security" > /dev/null
 printf 'bus:\n  interface: eth0\n  peers: [10.77.0.1, 10.77.0.2, 10.77.0.3]\n  security: %s\n' \
@@ -112,7 +115,7 @@ printf 'bus:\n  interface: eth0\n  peers: [10.77.0.1, 10.77.0.2, 10.77.0.3]\n  s
 drive closed "$out/jpeg" PERDURE_BUS="$out/closed.yaml"
 judge closed "${frames[@]}"
 
-# --- 5 % of all packets, of each process ---
+# --- 5 % of all packets of each process lost ---
 lossy=$(on h1 env PERDURE_BUS="$out/bus.yaml" "$PERDURE_BIN/perdure" env |
   sed -n "s/^export CYCLONEDDS_URI='\(.*\)'$/\1/p" |
   sed 's|<Internal>|<Internal><Test><XmitLossiness>50</XmitLossiness></Test>|')
@@ -134,8 +137,8 @@ print(("ok: " if three >= one - .02 else "FAILED: ") +
 PY
 )" | tee -a "$out/verdicts"
 
-# --- inference's link is cut, its host is gone ---
-# absent NAME SECONDS: from 8 s after the start on; says when its detections are heard again.
+# --- inference's link is cut, its host is absent ---
+# absent NAME SECONDS: cuts the link 8 s after the start; prints when detections are received again.
 absent() {
   { sleep 8
     ip link set to2 down

@@ -1,5 +1,6 @@
-# For tests that boot Debian with the packages in it: sourced, gives a booted root and ways to ask it.
-# Needs root, systemd-nspawn, debootstrap and, the first time, Debian's mirror; skips (77) without.
+# Sourced by tests that boot Debian with the packages. Makes and boots a root, and gives functions
+# to run commands in it. Needs root, systemd-nspawn, debootstrap and, the first time, Debian's
+# mirror; exits with 77 (skipped) without them.
 set -euo pipefail
 cd "$PERDURE_SOURCE"
 
@@ -21,20 +22,20 @@ for program in systemd-nspawn debootstrap dpkg-buildpackage dh; do
 done
 began=$(($(date +%s%N) / 1000000))
 
-# A namespace of mounts: nspawn's do not stay where this is killed.
+# A mount namespace, so that nspawn's mounts do not remain if this script is killed.
 if [ -z "${PERDURE_VEHICLE_NAMESPACE:-}" ]; then
   export PERDURE_VEHICLE_NAMESPACE=yes
   exec unshare --mount --propagation private "$0" "$@"
 fi
 mkdir -p "$work/archives/partial"
 
-# PERDURE_KEEP_PACKAGES=yes takes those that are there.
+# PERDURE_KEEP_PACKAGES=yes uses existing packages.
 build_packages() {
   [ "${PERDURE_KEEP_PACKAGES:-}" = yes ] && compgen -G "$packages/perdure-services_*.deb" > /dev/null && return
   deploy/package > "$work/package.log" 2>&1 || { tail -n 30 "$work/package.log"; fail "deploy/package"; exit 1; }
 }
 
-# The packages are of this machine's release.
+# The root has this machine's release, like the packages.
 release=$(. /etc/os-release && echo "${VERSION_CODENAME:-bookworm}")
 make_base() {
   [ -e "$work/base/etc/debian_version" ] && return
@@ -51,7 +52,7 @@ make_drive() {
     --out "$drive"
 }
 
-# in_root COMMAND …: without booting, with this machine's network.
+# in_root COMMAND …: runs a command in the root without booting it, with this machine's network.
 in_root() {
   systemd-nspawn --quiet --register=no --keep-unit -D "$root" --bind-ro="$packages:/packages" \
     --bind="$work/archives:/var/cache/apt/archives" --setenv=DEBIAN_FRONTEND=noninteractive "$@"
@@ -79,13 +80,13 @@ boot() {
   skip "systemd does not come up in the container"
 }
 
-# inside COMMAND …: in the booted root.
+# inside COMMAND …: runs a command in the booted root.
 inside() { nsenter -t "$leader" -m -u -i -n -p -- "$@"; }
 unit_of() { echo "perdure-${1//_/-}.service"; }
 pid_of() { inside systemctl show -P MainPID "$(unit_of "$1")"; }
 show() { inside systemctl show -P "$2" "$(unit_of "$1")"; }
 
-# within SECONDS COMMAND …: until it succeeds; says how long it took.
+# within SECONDS COMMAND …: repeats the command until it succeeds; sets `took` to the time in ms.
 within() {
   local end=$(($(date +%s%N) / 1000000 + $1 * 1000)) start
   start=$(($(date +%s%N) / 1000000))

@@ -1,4 +1,4 @@
-// Messages of the bus, recordings of them, and compressed images.
+// Targets: bus messages, recordings of them, and compressed images.
 #include <lz4frame.h>
 #include <zstd.h>
 
@@ -29,10 +29,10 @@ struct WireType {
   Bytes (*example)(unsigned seed);
 };
 
-/// What is taken is sound enough to be sent and shown.
+/// Decodes a message; an accepted one must be valid enough to be sent and shown.
 template <class T>
 bool takeMessage(View bytes) {
-  // Memory of its own, aligned as DDS gives it.
+  // A separate buffer with the alignment that DDS gives.
   const auto keeper = std::make_shared<Bytes>(bytes.begin(), bytes.end());
   const auto value = wire::decodeCdr<T>(*keeper, keeper);
   if (!value) {
@@ -67,7 +67,7 @@ const std::vector<WireType>& allTypes() {
   return types;
 }
 
-/// The first byte says the type.
+/// The first byte selects the type.
 bool takeWire(View bytes) {
   if (bytes.empty()) return false;
   return allTypes()[bytes[0] % allTypes().size()].take(bytes.subspan(1));
@@ -90,7 +90,7 @@ Bytes contentsOf(const fs::path& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-/// Two of each sensor message, odometry and a calibration, in two chunks.
+/// A recording of two of each sensor message, odometry and a calibration, in two chunks.
 Bytes recording(bool finished) {
   const fs::path file = scratch() / "seed.mcap";
   fs::remove(file);
@@ -126,7 +126,8 @@ void putAlone(Bytes& file, std::uint16_t channel, const T& message, std::uint64_
   replay::mcap::putMessage(file, {channel, 1, log_ns, log_ns, data});
 }
 
-/// The same as small writers leave it: each message in the file itself. Without an end it was cut.
+/// A recording without chunks, as small writers store it. Without `ended`, the end records are
+/// missing.
 Bytes withoutChunks(bool ended) {
   Bytes file(replay::mcap::kMagic.begin(), replay::mcap::kMagic.end());
   putChannel<Calibration>(file, 1, "perdure/ego/calibration");
@@ -152,7 +153,7 @@ Bytes withoutChunks(bool ended) {
   return file;
 }
 
-/// The same in one chunk by LZ4, or by zstd that does not tell its size.
+/// The records of withoutChunks() in one chunk, by LZ4, or by zstd without its content size.
 Bytes packedByOthers(const std::string& compression) {
   const Bytes records = withoutChunks(false);
   const View content = View(records).subspan(replay::mcap::kMagic.size());
@@ -181,7 +182,7 @@ Bytes packedByOthers(const std::string& compression) {
   return file;
 }
 
-/// Every chunk and message, and then a finished file of it.
+/// Reads every chunk and message, then finishes the file and opens it again.
 bool readContainer(const fs::path& file) {
   auto reader = replay::mcap::Reader::open(file);
   if (!reader) return false;
@@ -200,7 +201,7 @@ bool readContainer(const fs::path& file) {
 
 bool takeContainer(View bytes) { return readContainer(asFile("run.mcap", bytes)); }
 
-/// As a dataset, and message by message.
+/// Reads the file as a dataset, and message by message.
 bool takeRecording(View bytes) {
   const fs::path file = asFile("drive.mcap", bytes);
   const bool messages = unlessRefused([&] {
@@ -254,7 +255,7 @@ Frame ramp() {
   return frame;
 }
 
-/// A frame of 24 by 16 pixels whose JPEG the bytes are.
+/// A frame of 24 × 16 pixels with the bytes as its JPEG.
 bool takeJpeg(View bytes) {
   Frame frame = ramp();
   frame.encoding = ImageEncoding::kJpegMono8;

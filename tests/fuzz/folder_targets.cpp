@@ -1,5 +1,4 @@
-// Dataset folders: what stands in their files is damaged, and what is missing is removed; images
-// stay as they are.
+// Targets: dataset folders. The text files are damaged or removed; images stay unchanged.
 #include <cmath>
 #include <fstream>
 
@@ -37,7 +36,7 @@ const Names kTrackingFiles{"calib/0000.txt", "calib/0001.txt", "label_02/0001.tx
 const Names kSceneFiles{"sensor.yaml", "frame-000000.pose.txt", "frame-000001.pose.txt"};
 const Names kTruthFiles{sim::kObjectsTruthFile, sim::kVisibilityTruthFile, sim::kInsideTruthFile};
 
-/// In scratch(), each once; what was made for the seeds is where damaged ones go.
+/// Each folder is made once, in scratch(). The damaged files replace those of the seeds.
 const fs::path& eurocFolder() {
   static const fs::path folder = [] {
     scratch();
@@ -58,7 +57,7 @@ const fs::path& trackingFolder() {
   return folder;
 }
 
-/// Images of a lens of their own, for those of 640 × 480 pixels take long.
+/// The images have a small camera of their own, because images of 640 × 480 pixels take long.
 const fs::path& sceneFolder() {
   static const fs::path folder = [] {
     scratch();

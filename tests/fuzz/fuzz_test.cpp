@@ -1,5 +1,5 @@
-// Each target over damaged seeds, the same ones on every machine: it takes or refuses, and does
-// nothing else.
+// Runs each target on damaged seeds, the same ones on every machine. A target must accept or reject
+// them; any other behaviour fails.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -17,7 +17,7 @@ void PrintTo(const Target& target, std::ostream* out) { *out << target.name; }
 
 namespace {
 
-/// What is wrong with how the bytes are handled, or "".
+/// Returns the fault in the handling of the bytes, or "".
 std::string faultOf(const Target& target, const Bytes& bytes, bool* taken = nullptr) {
   try {
     const bool took = target.take(bytes);
@@ -30,7 +30,7 @@ std::string faultOf(const Target& target, const Bytes& bytes, bool* taken = null
   }
 }
 
-/// Beside this program, for a look and for perdure-fuzz.
+/// Saves the bytes beside this program, for inspection and for perdure-fuzz.
 std::string keep(const Target& target, const Bytes& bytes) {
   const auto program = std::filesystem::read_symlink("/proc/self/exe");
   const auto file = program.parent_path() / ("fuzz-" + target.name);

@@ -1,5 +1,5 @@
-// The libFuzzer program. $PERDURE_FUZZ_TARGET names the target; without it, the names are listed.
-// $PERDURE_FUZZ_SEEDS is a folder that gets the target's seeds.
+// The libFuzzer program. $PERDURE_FUZZ_TARGET names the target; without it, the program lists the
+// names. $PERDURE_FUZZ_SEEDS is a folder into which the target's seeds are written.
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>

@@ -1,4 +1,4 @@
-// What clients of the gateway say, and what they ask.
+// Targets: messages and requests of the gateway's clients.
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -43,7 +43,8 @@ class Silent : public web::Viewer {
   bool cut_ = false;
 };
 
-/// Whether it is JSON. What a hub offers is the same to each client, and parsed once.
+/// Returns whether the text is JSON. Caches texts, because the hub offers the same ones to each
+/// client.
 bool isJson(const std::string& text) {
   static std::set<std::string> known;
   if (known.contains(text)) return true;
@@ -52,7 +53,7 @@ bool isJson(const std::string& text) {
   return true;
 }
 
-/// What a client wants of a recording, and the answer to it.
+/// Checks a client's playback request and answers it.
 void obey(web::Hub& hub, const PlaybackRequest& request) {
   require(request.speed >= 0.01 && request.speed <= 100.0, "a speed is bounded");
   require(!request.seek || toNanoseconds(*request.seek) >= 0, "a time to seek is one");
@@ -61,8 +62,8 @@ void obey(web::Hub& hub, const PlaybackRequest& request) {
                     request.speed, request.seek.has_value(), request.id});
 }
 
-/// The first byte says whether it is text: all but 'b' and 'p' do; 'p': to a recording that is
-/// played. What is taken goes through a hub with one client.
+/// The first byte selects the kind: 'b' binary, 'p' binary for a hub with a played recording, any
+/// other byte text. The message goes through a hub with one client.
 bool takeSaid(View bytes) {
   if (bytes.empty()) return false;
   const bool text = bytes[0] != 'b' && bytes[0] != 'p';
@@ -91,7 +92,7 @@ bool takeSaid(View bytes) {
   return message.has_value();
 }
 
-/// A question to the map or about an object: an answer or a query to the store.
+/// A request about the map or an object gives an answer or a query to the store.
 bool takeQuestion(View bytes) {
   if (bytes.empty()) return false;
   int answers = 0, queries = 0;
@@ -125,7 +126,7 @@ std::vector<Bytes> questionSeeds() {
   return seeds;
 }
 
-/// What map_store says of the graph to a gateway at which somebody looks at it.
+/// A reply of map_store about the graph, to a gateway with a client that views the graph.
 bool takeGraphReply(View bytes) {
   const auto keeper = std::make_shared<Bytes>(bytes.begin(), bytes.end());
   auto reply = wire::decodeCdr<MapReply>(*keeper, keeper);
@@ -147,7 +148,7 @@ bool takeGraphReply(View bytes) {
                  }});
   node.setWanted({kMapGraph, kMapGraphScene});
   node.tick(1);
-  for (MapAnchor& anchor : reply->anchors) anchor.map = {};  // that which is looked at
+  for (MapAnchor& anchor : reply->anchors) anchor.map = {};  // the displayed map
   node.onMapReply(*reply);
   require(!reply->ok || told == 2, "who looks is told");
   return reply->ok && !reply->anchors.empty();
@@ -168,7 +169,7 @@ std::vector<Bytes> graphReplySeeds() {
   return seeds;
 }
 
-/// A Host and an Origin, in two lines: what is let in is a name of ours.
+/// A Host and an Origin header, in two lines. Only names of this machine are accepted.
 bool takeHeaders(View bytes) {
   const std::string text = textOf(bytes);
   const std::size_t line = text.find('\n');

@@ -1,5 +1,5 @@
-// What the map's file holds: beliefs and parts of the graph as blobs, the graph as a whole, the
-// place on Earth as a text.
+// Targets: the content of the map file. Beliefs and parts of the graph are blobs; the whole graph
+// is a set of rows; the place on Earth is a text.
 #include "common/mapping/mapper.h"
 #include "services/map_store/core/belief_codec.h"
 #include "services/map_store/core/earth_anchor.h"
@@ -139,7 +139,7 @@ void insertRow(std::vector<Statement>& statements, Table table, std::uint64_t id
   } else if (table != Table::kFact) {
     row.bind(2, content);
   }
-  (void)row.run();  // what a column may not be is not there
+  (void)row.run();  // the row is missing if a column has an invalid value
 }
 
 void fill(View bytes) {
@@ -158,7 +158,7 @@ void fill(View bytes) {
   }
 }
 
-/// As map_store does with it: a mapper goes on from it, and says it to who asks.
+/// Uses the graph as map_store does: a mapper continues from it, and answers queries about it.
 void tell(const mapping::SavedMap& map) {
   mapping::Mapper mapper({}, map);
   std::set<std::pair<std::uint64_t, std::uint32_t>> sessions;
@@ -176,7 +176,7 @@ void tell(const mapping::SavedMap& map) {
 }
 
 bool takeGraph(View bytes) {
-  const auto begun = Transaction::begin(emptyFile());  // rolled back
+  const auto begun = Transaction::begin(emptyFile());  // rolled back at the end
   fill(bytes);
   const auto graph = readGraph(emptyFile());
   require(graph.has_value(), "a graph is read, whatever rows it has");

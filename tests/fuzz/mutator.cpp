@@ -54,7 +54,7 @@ void replace(Bytes& bytes, std::size_t at, std::size_t length, std::string_view 
 
 }  // namespace
 
-/// In place of a number that the text has.
+/// Replaces a number of the text.
 void Mutator::putNumber(Bytes& bytes) {
   const std::size_t from = below(bytes.size());
   const auto begin =
@@ -71,7 +71,7 @@ void Mutator::putWord(Bytes& bytes) {
   replace(bytes, at, over, word);
 }
 
-/// A line, or what is one in bytes, goes elsewhere.
+/// Moves or copies a line, or the bytes up to a newline, to another place.
 void Mutator::moveLine(Bytes& bytes, bool copy) {
   const auto lineAt = [&](std::size_t at) {
     const auto end = std::find(bytes.begin() + static_cast<std::ptrdiff_t>(at), bytes.end(), '\n');

@@ -1,4 +1,4 @@
-// Damage of a seed: the same bytes on every machine.
+// Damages a seed; a given random seed gives the same bytes on every machine.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ class Mutator {
  public:
   explicit Mutator(std::uint64_t seed) : random_(seed) {}
 
-  /// One to four changes of `seed`; parts may come from `other`.
+  /// Applies one to four changes to `seed`; parts may come from `other`.
   Bytes damaged(const Bytes& seed, const Bytes& other);
 
  private:

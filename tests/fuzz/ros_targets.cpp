@@ -1,4 +1,4 @@
-// Bags of ROS 1, SQLite recordings of ROS 2, and the messages of both.
+// Targets: bags of ROS 1, SQLite recordings of ROS 2, and the messages of both.
 #include <bzlib.h>
 #include <sqlite3.h>
 
@@ -59,7 +59,7 @@ Bytes connection() {
   return record;
 }
 
-/// A header of ROS 1, and a grey image of 4 × 2.
+/// A header of ROS 1, and a grey image of 4 × 2 pixels.
 Bytes image(std::uint32_t second) {
   Bytes bytes;
   put32(bytes, second), put32(bytes, second), put32(bytes, 0);
@@ -104,7 +104,7 @@ Bytes bag(bool compressed) {
   return file;
 }
 
-/// Sends SQL to a database.
+/// Runs SQL statements on a database.
 class Db3 {
  public:
   explicit Db3(const std::filesystem::path& file) {
@@ -147,7 +147,8 @@ Bytes infoCdr() {
   return ros::cdrOf(info);
 }
 
-/// Two images and what their camera is; `views`: under names that are none of tables.
+/// A recording of two images and their camera information. `views`: topics and messages are views
+/// instead of tables.
 Bytes db3(bool views) {
   const auto file = scratch() / "seed.db3";
   {
@@ -200,14 +201,14 @@ template <class M>
 bool isMessage(View bytes) {
   const auto cdr = ros::messageOf<M>(bytes, ros::Encoding::kCdr, nullptr);
   if (cdr) {
-    const Bytes written = ros::cdrOf(*cdr);  // in which the images of `again` lie
+    const Bytes written = ros::cdrOf(*cdr);  // holds the image data of `again`
     const auto again = ros::messageOf<M>(written, ros::Encoding::kCdr, nullptr);
     require(again && ros::cdrOf(*again) == written, "what is read is written the same");
   }
   return ros::messageOf<M>(bytes, ros::Encoding::kRos1, nullptr) || cdr;
 }
 
-/// The first byte says which message.
+/// The first byte selects the message type.
 bool takeMessage(View bytes) {
   if (bytes.empty()) return false;
   const View rest = bytes.subspan(1);

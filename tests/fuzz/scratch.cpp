@@ -18,7 +18,7 @@ constexpr std::string_view kMark = "=== ";
 class Folder {
  public:
   Folder() {
-    // In memory where that can be: a disk is slow to write small files again and again.
+    // In memory if possible, because a disk is slow for repeated writes of small files.
     const bool memory = std::getenv("TMPDIR") == nullptr && access("/dev/shm", W_OK) == 0;
     const fs::path base = memory ? "/dev/shm" : fs::temp_directory_path();
     std::string name = (base / "perdure-fuzz-XXXXXX").string();
@@ -41,7 +41,7 @@ void write(const fs::path& file, std::string_view text) {
       .write(text.data(), static_cast<std::streamsize>(text.size()));
 }
 
-/// By path, what stands between the marks; of a path that comes twice the last.
+/// Returns the text between the marks, by path; the last text counts if a path occurs twice.
 std::map<std::string, std::string_view> sections(std::string_view text) {
   std::map<std::string, std::string_view> found;
   while (text.starts_with(kMark)) {

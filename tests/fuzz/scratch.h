@@ -1,4 +1,4 @@
-// Bytes as files, for readers that take a path; several files of a folder as one text.
+// Converts bytes to files, for readers that take a path, and several files of a folder to one text.
 #pragma once
 
 #include <filesystem>
@@ -9,16 +9,17 @@
 
 namespace perdure::fuzz {
 
-/// A folder of this process, made when first asked for and removed at the end; from then on also
-/// that of its temporary files.
+/// Returns a folder of this process, made at the first call and removed at the end. TMPDIR then
+/// names it, too.
 const std::filesystem::path& scratch();
 
-/// The bytes as a file of that name in scratch().
+/// Writes the bytes to a file of that name in scratch() and returns its path.
 std::filesystem::path asFile(const std::string& name, View bytes);
 
-/// The files of a folder as one text, each after a line "=== its path".
+/// Joins the files of a folder into one text, each after a line "=== its path".
 Bytes pack(const std::filesystem::path& folder, const std::vector<std::string>& files);
-/// The reverse. Only those of `files` are written, and those that the text lacks are removed.
+/// Splits such a text into files. Writes only those of `files`, and removes those that the text
+/// lacks.
 void unpack(View bytes, const std::filesystem::path& folder, const std::vector<std::string>& files);
 
 }  // namespace perdure::fuzz

@@ -1,5 +1,5 @@
-// What services read at their start: configuration, priors, a network's description, and the states
-// that they left behind.
+// Targets: the files that services read at their start. They are configuration, priors, a network's
+// description, and saved states.
 #include "common/base/ids.h"
 #include "common/config/fields.h"
 #include "services/capture/core/run_state.h"
@@ -11,7 +11,7 @@
 namespace perdure::fuzz {
 namespace {
 
-/// A field of each kind.
+/// One field of each kind.
 struct Everything {
   double rate = 20.0;
   std::int64_t count = 3;
@@ -37,7 +37,7 @@ constexpr char kSettings[] =
     "rate: 12.5\ntracker:\n  count: 7\n  on: false\nname: \"a name\"\nmode: exact\n"
     "place: [1, 2.5, -3e2]\nbus.hosts: [one, 'two, three']\n";
 
-/// What is printed reads back, whatever was taken before.
+/// Printed settings must read back to the same settings, whatever was accepted before.
 bool takeSettings(View bytes) {
   Everything read, again;
   config::Fields fields = read.fields(), printed = again.fields();

@@ -1,5 +1,5 @@
-// What is fuzzed: everything that reads bytes from files, recordings and the bus. The same targets
-// run under libFuzzer and, for some seconds, as an ordinary test.
+// Interface of the fuzz targets: all readers of files, recordings and bus messages. The same
+// targets run under libFuzzer and, for some seconds, as an ordinary test.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace perdure::fuzz {
 using Bytes = std::vector<std::uint8_t>;
 using View = std::span<const std::uint8_t>;
 
-/// A promise that was not kept: what a reader took is not sound.
+/// Thrown if a reader breaks a guarantee, because the data that it accepted are not valid.
 struct Broken : std::logic_error {
   using std::logic_error::logic_error;
 };
@@ -25,10 +25,10 @@ inline void require(bool holds, const std::string& what) {
 
 struct Target {
   std::string name;
-  int runs = 1000;                            ///< of the ordinary test
-  std::function<std::vector<Bytes>()> seeds;  ///< each is taken
-  /// Whether the bytes are taken. What is refused in the way that the reader says (StartupError, a
-  /// reason, nothing) gives false; all else that is thrown is a fault.
+  int runs = 1000;                            ///< number of runs in the ordinary test
+  std::function<std::vector<Bytes>()> seeds;  ///< `take` accepts each of them
+  /// Returns whether the reader accepts the bytes. A regular rejection (StartupError, a reason,
+  /// nothing) gives false. Any other exception is a fault.
   std::function<bool(View)> take;
 };
 
@@ -45,7 +45,7 @@ std::vector<Target> vehicleTargets();
 inline Bytes bytesOf(std::string_view text) { return {text.begin(), text.end()}; }
 inline std::string textOf(View bytes) { return {bytes.begin(), bytes.end()}; }
 
-/// What `read` does; false where it throws StartupError.
+/// Calls `read`; returns false if it throws StartupError.
 bool unlessRefused(const std::function<void()>& read);
 
 }  // namespace perdure::fuzz

@@ -1,4 +1,5 @@
-// Files of lines and of YAML that tools and datasets bring: poses, detections, labels, rows, rigs.
+// Targets: text and YAML files of tools and datasets. They are poses, detections, labels, rows and
+// rigs.
 #include <cmath>
 
 #include "common/replay/files/class_aliases.h"

@@ -1,5 +1,5 @@
-// What tells a vehicle's speed and place: lines of a DBC file and frames of its bus, lines of UDP,
-// sentences of NMEA, reports of gpsd.
+// Targets: inputs of a vehicle's speed and place. They are lines of a DBC file and CAN frames,
+// lines over UDP, sentences of NMEA, and reports of gpsd.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -26,7 +26,7 @@ void requireSound(const SpeedReading& reading) {
 }
 
 void requireSound(const GnssFix& fix) {
-  constexpr double kHighest_m = 1e5;  // as store.earth_anchor has it
+  constexpr double kHighest_m = 1e5;  // the limit of store.earth_anchor
   require(std::abs(fix.latitude_deg) <= 90.0 && std::abs(fix.longitude_deg) <= 180.0 &&
               std::abs(fix.height_m) <= kHighest_m,
           "a place is on Earth");
@@ -35,7 +35,7 @@ void requireSound(const GnssFix& fix) {
   require(!fix.course || std::abs(*fix.course) <= std::numbers::pi, "a course is a direction");
 }
 
-/// What makes a place of fixes.
+/// Estimates a place from fixes and checks it.
 class Places {
  public:
   void offer(const GnssFix& fix) {
@@ -51,7 +51,7 @@ class Places {
   EarthAnchor anchor_{{5.0, {1.0, 0.2, 1.5}}};
 };
 
-/// Lines of bytes, as pieces of a connection bring them.
+/// Splits the bytes into lines, as a connection delivers them in pieces.
 void forLines(View bytes, const std::function<void(std::string_view, std::int64_t)>& take) {
   constexpr std::size_t kPiece = 37;
   Lines lines;
@@ -63,8 +63,8 @@ void forLines(View bytes, const std::function<void(std::string_view, std::int64_
   lines.end(now_ns, later);
 }
 
-/// The first line is the signal of wheels, the second that of reverse or nothing; what follows are
-/// frames: a byte that says whose id it has, one of their length, and their data.
+/// The first line is the wheel signal, the second the reverse signal or empty. The rest are frames:
+/// one byte selects the id, one gives the length, then the data follow.
 bool takeCan(View bytes) {
   const std::string text = textOf(bytes);
   const std::size_t first = std::min(text.find('\n'), text.size());
@@ -116,7 +116,7 @@ bool takeSpeedLines(View bytes) {
   return all;
 }
 
-/// `$TEXT*SUM`, with the sum that is right.
+/// Returns `$TEXT*SUM` with the correct checksum.
 std::string withSum(std::string_view line) {
   const std::size_t begin = line.starts_with('$') ? 1 : 0;
   const std::size_t end = std::max(begin, std::min(line.rfind('*'), line.size()));
@@ -126,7 +126,8 @@ std::string withSum(std::string_view line) {
   return fmt::format("${}*{:02X}", text, sum);
 }
 
-/// Each line as it is, and with the sum that is right: else hardly one would be read.
+/// Reads each line as it is, and with a correct checksum; otherwise hardly any line would be
+/// accepted.
 bool takeNmea(View bytes) {
   NmeaReader reader;
   Places places;
@@ -145,7 +146,7 @@ bool takeNmea(View bytes) {
   return fix;
 }
 
-/// A straight drive of three seconds, and what else receivers say.
+/// A straight drive of three seconds, and other sentences of receivers.
 std::vector<Bytes> nmeaSeeds() {
   std::string drive, others;
   for (int tenth = 0; tenth < 30; tenth += 5) {

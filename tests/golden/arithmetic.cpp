@@ -17,7 +17,7 @@
 namespace perdure::test {
 namespace {
 
-/// The bits of each number that was taken.
+/// Collects the bytes of all results.
 class Bits {
  public:
   void take(double x) { bytes_.append(reinterpret_cast<const char*>(&x), sizeof(x)); }
@@ -31,7 +31,7 @@ class Bits {
   std::string bytes_;
 };
 
-/// Volatile: else the compiler works the results out, exactly.
+/// The arguments are volatile, because the compiler would otherwise compute exact results.
 void takeFunctions(Bits& bits) {
   for (int i = 1; i <= 200; ++i) {
     const volatile double x = 0.0371 * i, y = 1.0 / (0.3 + i);
@@ -46,7 +46,7 @@ void takeFunctions(Bits& bits) {
   }
 }
 
-/// Symmetric and positive definite; no entry is a round number.
+/// Returns a symmetric positive definite matrix without round numbers.
 Eigen::MatrixXd definite(int size) {
   Eigen::MatrixXd m(size, size);
   for (int i = 0; i < size; ++i) {
@@ -55,7 +55,7 @@ Eigen::MatrixXd definite(int size) {
   return m * m.transpose() + 0.1 * Eigen::MatrixXd::Identity(size, size);
 }
 
-/// Small, and large enough for Eigen's blocked kernels.
+/// Uses small matrices, and one large enough for Eigen's blocked kernels.
 void takeMatrices(Bits& bits) {
   for (const int size : {3, 7, 48}) {
     const Eigen::MatrixXd m = definite(size), inverse = m.llt().solve(definite(size).col(0) * m);

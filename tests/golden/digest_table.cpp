@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::string_view kHeader = "arithmetic,run,file,digest";
 
-/// The line at the front of `text`, which is shortened by it; "(the end)" behind the last one.
+/// Removes and returns the first line of `text`; returns "(the end)" after the last line.
 std::string_view takeLine(std::string_view& text) {
   if (text.empty()) return "(the end)";
   const std::string_view line = text.substr(0, text.find('\n'));
@@ -24,7 +24,7 @@ std::string shortened(std::string_view line) {
   return line.size() <= kMost ? std::string(line) : std::string(line.substr(0, kMost)) + "…";
 }
 
-/// How many leading characters of a line to leave out, so that what differs is shown.
+/// Returns how many leading characters of a line to omit, so that the difference is visible.
 std::size_t sameBefore(std::string_view a, std::string_view b) {
   constexpr std::size_t kShown = 40;
   const auto differs = std::mismatch(a.begin(), a.end(), b.begin(), b.end()).first;

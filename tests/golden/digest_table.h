@@ -1,4 +1,4 @@
-// digests.csv: what the outputs of each run are, on machines of each arithmetic.
+// The table digests.csv: the digests of each run's outputs, for each arithmetic.
 #pragma once
 
 #include <filesystem>
@@ -9,25 +9,25 @@
 
 namespace perdure::test {
 
-/// By file.
+/// Digests by file.
 using Digests = std::map<std::string, std::string>;
 
 class DigestTable {
  public:
-  /// An absent file is an empty table. Throws std::runtime_error that names a line that is wrong.
+  /// An absent file gives an empty table. Throws std::runtime_error that names an invalid line.
   static DigestTable read(const std::filesystem::path& file);
   void write(const std::filesystem::path& file) const;
 
-  /// Empty where there are none.
+  /// Returns an empty map if the run has no digests.
   Digests of(const std::string& arithmetic, const std::string& run) const;
-  /// In place of those that the run had.
+  /// Replaces the digests of the run.
   void put(const std::string& arithmetic, const std::string& run, const Digests& digests);
 
  private:
   std::map<std::pair<std::string, std::string>, Digests> rows_;  // by arithmetic and run
 };
 
-/// Where two texts part: "line 12: `…`, was `…`"; empty where they are the same.
+/// Returns the first difference of two texts, "line 12: `…`, was `…`", or "" if they are equal.
 std::string firstDifference(std::string_view now, std::string_view before);
 
 }  // namespace perdure::test

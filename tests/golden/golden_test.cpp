@@ -1,5 +1,5 @@
-// The outputs of whole runs are, byte for byte, those that were recorded on a machine of the same
-// arithmetic.
+// Checks that the outputs of whole runs equal, byte for byte, those recorded on a machine of the
+// same arithmetic.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -21,7 +21,8 @@ namespace fs = std::filesystem;
 
 fs::path tableFile() { return sources() / "tests/golden/digests.csv"; }
 
-/// Beside this program: what a run gives now, and what it gave when its digests were right.
+/// A folder beside this program with a run's current outputs ("now") and the outputs of the
+/// recorded digests ("kept").
 fs::path folderOf(const GoldenRun& run) {
   return fs::read_symlink("/proc/self/exe").parent_path() / "golden" / "runs" / run.name;
 }
@@ -34,7 +35,7 @@ Digests digestsIn(const fs::path& folder) {
   return digests;
 }
 
-/// Where the output parts from the one that has the recorded digest, if that is kept.
+/// Returns the first difference from the output with the recorded digest, if that output is stored.
 std::string whereItDiffers(const fs::path& folder, const std::string& file,
                            const std::string& recorded) {
   const std::string before = contentsOf(folder / "kept" / file);

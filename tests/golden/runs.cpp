@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 using Words = std::vector<std::string>;
 
-constexpr int kVideoFrames = 300;  ///< 15 s of 20 Hz
+constexpr int kVideoFrames = 300;  ///< 15 s at 20 Hz
 
 void perdure(const Words& arguments, const fs::path& log, int expected = 0) {
   Words command{(programs() / "perdure").string()};
@@ -28,7 +28,7 @@ void perdure(const Words& arguments, const fs::path& log, int expected = 0) {
   throw std::runtime_error(text + "\n" + child.log());
 }
 
-/// The folder's first frames as pictures, and its other files.
+/// Extracts the folder's first frames as images, and copies its other files.
 void unpack(const fs::path& from, const fs::path& to) {
   fs::create_directories(to / "mav0/cam0/data");
   fs::copy(from / "mav0/imu0", to / "mav0/imu0");
@@ -52,7 +52,7 @@ void unpack(const fs::path& from, const fs::path& to) {
   if (frames < kVideoFrames) throw std::runtime_error("the list of frames ends too early");
 }
 
-/// What `perdure pipeline` is told, but for --out.
+/// Returns the arguments of `perdure pipeline`, without --out.
 Words inputOf(const GoldenRun& run, const fs::path& folder) {
   if (run.data.empty()) {
     return {"--data",       cachedScene({.scene = run.name}).string(),

@@ -1,5 +1,5 @@
-// The runs of `perdure pipeline` whose outputs are kept as digests: scenes of the simulator, and
-// recorded drives where their data are beside the sources.
+// The runs of `perdure pipeline` with recorded digests: scenes of the simulator, and recorded
+// drives if their data are beside the sources.
 #pragma once
 
 #include <filesystem>
@@ -11,9 +11,9 @@ namespace perdure::test {
 
 struct GoldenRun {
   std::string name;
-  std::string data = {};  ///< the folder that it needs; "": the simulator's scene of that name
-  bool pictures = false;  ///< its results depend on what OpenCV makes of pictures
-  int status = 0;         ///< of the pipeline: 65 where the map has to stay empty
+  std::string data = {};  ///< the required data folder; "": the simulator's scene of that name
+  bool pictures = false;  ///< the results depend on OpenCV's image processing
+  int status = 0;         ///< exit status of the pipeline: 65 if the map must stay empty
 };
 void PrintTo(const GoldenRun& run, std::ostream* out);
 
@@ -21,8 +21,8 @@ const std::vector<GoldenRun>& goldenRuns();
 /// Files of a run that have a digest.
 const std::vector<std::string>& goldenFiles();
 
-/// Makes the run's input in `folder`, where it needs any, and its outputs in `folder`/now, by the
-/// programs that users have. Throws std::runtime_error with what a program said.
+/// Makes the run's input in `folder`, if it needs any, and its outputs in `folder`/now, with the
+/// installed programs' commands. Throws std::runtime_error with a program's log.
 void produce(const GoldenRun& run, const std::filesystem::path& folder);
 
 }  // namespace perdure::test

@@ -1,7 +1,7 @@
-// A program on eProsima Fast DDS 2.9, its types made by fastddsgen from idl/: reads `odometry`
-// directly and `objects` by the gateway, feeds it `model` and `detections`, one box for each frame.
-// What it reads goes to standard output, a line a message. Used by interop_test:
-// fast_peer DOMAIN X1 Y1 X2 Y2
+// A program on eProsima Fast DDS 2.9 with types that fastddsgen generated from idl/. It reads
+// `odometry` directly and `objects` through the gateway. It writes `model` and `detections` to the
+// gateway, one box for each frame. It prints one line for each message. interop_test uses it.
+// usage: fast_peer DOMAIN X1 Y1 X2 Y2
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 
 #include <chrono>

@@ -1,6 +1,5 @@
-// Another vendor's DDS reads `objects` and feeds `detections`: Fast DDS 2.9 on types that
-// fastddsgen made from the same IDL, by way of the gateway, with the real semantic_filter behind
-// it.
+// Another vendor's DDS reads `objects` and writes `detections` through the gateway, with the real
+// semantic_filter: Fast DDS 2.9 with types that fastddsgen generated from the same IDL.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -23,7 +22,7 @@ Calibration calibration() {
   return c;
 }
 
-/// The bodies of the lines "frame K next N objects M | …" by frame.
+/// Returns the lines "frame K next N objects M | …" by frame.
 std::map<std::uint64_t, std::string> linesOf(const std::string& log) {
   std::map<std::uint64_t, std::string> lines;
   std::istringstream text(log);
@@ -36,7 +35,7 @@ std::map<std::uint64_t, std::string> linesOf(const std::string& log) {
   return lines;
 }
 
-/// What the peer must have printed of the message that we have read ourselves.
+/// Returns the line that the peer must print for a message.
 std::string expected(const Objects& m) {
   std::ostringstream text;
   text << "frame " << m.stamp.sequence << " next " << m.next_id << " objects " << m.objects.size();
@@ -111,7 +110,7 @@ TEST(Interop, FastDdsFeedsDetectionsAndReadsObjects) {
     const auto end = std::chrono::steady_clock::now() + 30ms;
     while (std::chrono::steady_clock::now() < end) loop.runOnce(5ms);
   };
-  // Until the last of the ways is open. Fast DDS sends what is latched within three seconds.
+  // Sends until all connections are open. Fast DDS sends latched samples within three seconds.
   while (next < 400 && (boxes == 0 || model.empty() || linesOf(peer.log()).empty())) send();
   constexpr std::uint64_t kFrames = 60, kUnderWay = 5;
   const std::uint64_t first = next;

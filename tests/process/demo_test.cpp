@@ -1,4 +1,4 @@
-// The demo over the real drive: its outputs, its refusals, its end, and kill -9 of each service.
+// Tests the demo over the real drive: outputs, invalid arguments, end, and kill -9 of each service.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -20,7 +20,7 @@ using namespace std::chrono_literals;
 using ::testing::HasSubstr;
 using Json = nlohmann::json;
 
-/// What the bus says while the demo runs.
+/// Collects the bus messages while the demo runs.
 class Listener {
  public:
   Listener() {
@@ -42,7 +42,7 @@ class Listener {
   }
   const Health& health(const std::string& process) { return health_[process]; }
   const Objects& objects() const { return objects_; }
-  /// The first working set of the filter that runs now.
+  /// Returns the first working set of the current filter process.
   const Objects& firstOfFilter() const { return first_of_filter_; }
   std::uint64_t frame() const { return frame_; }
   std::map<std::string, InstanceId> instances() const {
@@ -149,8 +149,8 @@ TEST_F(Demo, SaysWhatIsMissing) {
   EXPECT_THAT(without.log(), HasSubstr("--model FILE.onnx"));
 }
 
-/// Confirmed objects of `before` that `after` still has, and how far those moved that are said to
-/// stand (the middle one): a cyclist and a van drive ahead.
+/// Counts the confirmed objects of `before`, and those still in `after`; gives the median motion of
+/// those estimated as standing. A cyclist and a van drive ahead.
 struct Kept {
   std::size_t before = 0, after = 0;
   double moved_m = 0.0;

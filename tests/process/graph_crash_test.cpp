@@ -1,5 +1,5 @@
-// The map store and the filter are killed just when the graph has closed a loop: what is on disk
-// is whole, either before or after, and ids go on.
+// Kills the map store and the filter at the moment of a loop closure. The map on disk must be
+// complete, with the state before or after the closure, and ids must continue.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -23,9 +23,9 @@ namespace {
 using namespace std::chrono_literals;
 
 enum class Victim { kStore, kFilter, kBoth };
-using Kills = std::map<std::size_t, Victim>;  ///< by how many loops were closed before
+using Kills = std::map<std::size_t, Victim>;  ///< by the number of loops closed before the kill
 
-/// Two laps of a street as odometry that drifts and a detector tell of them: a recording.
+/// Records two laps of a street, with drifting odometry and simulated detections.
 std::string recordTheStreet(const Folder& folder) {
   const std::string perdure = (programs() / "perdure").string();
   const std::string street = folder.file("street"), run = folder.file("run");
@@ -139,7 +139,7 @@ class Vehicle {
   std::unique_ptr<Child> store_, filter_;
 };
 
-/// Each reference leads somewhere, and the drive is one chain.
+/// Checks that every reference resolves, and that the drive is one chain.
 void expectWhole(const Outcome& outcome) {
   EXPECT_EQ(outcome.integrity, "ok");
   EXPECT_EQ(outcome.map.malformed, 0u);
@@ -171,7 +171,7 @@ void expectWhole(const Outcome& outcome) {
   for (const auto& [id, times] : outcome.born) EXPECT_EQ(times, 1u) << "id " << id;
 }
 
-/// Pairs of objects on the map that stand in one another.
+/// Counts the pairs of objects on the map that overlap.
 std::size_t doubled(const Outcome& outcome) {
   std::vector<const ObjectBelief*> present;
   for (const auto& [id, object] : outcome.map.contents.objects) {
@@ -206,7 +206,7 @@ TEST(GraphCrash, WhoeverIsKilledWhenALoopClosesTheMapIsWholeAndIdsGoOn) {
   };
   std::printf("objects %.0f (%.0f without), doubled %zu (%zu), loops %zu (%zu)\n", present(killed),
               present(calm), doubled(killed), doubled(calm), killed.loops, calm.loops);
-  // What a second of the dead filter did not see is seen on the other lap.
+  // Objects that the filter missed during its restart are seen on the other lap.
   EXPECT_NEAR(present(killed), present(calm), 0.1 * present(calm));
   EXPECT_LE(doubled(killed), doubled(calm) + 1);
 }

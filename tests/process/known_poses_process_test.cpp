@@ -1,5 +1,5 @@
-// perdure-vio as a process where another program gives the poses: landmarks come, odometry does
-// not, and what is missing is said.
+// Tests perdure-vio as a process with poses from another program. It publishes landmarks and no
+// odometry, and reports missing inputs.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -49,7 +49,7 @@ class KnownPosesProcess : public ::testing::Test {
     o.covariance = 1e-6 * Matrix9d::Identity();
     EXPECT_TRUE(odometry_.write(o).has_value());
   }
-  /// What vio's Health says last.
+  /// Returns the latest Health of vio.
   std::optional<Health> health() {
     health_reader_.drain([&](const Health& h) {
       if (h.process == "vio") health_ = h;
@@ -76,7 +76,7 @@ TEST_F(KnownPosesProcess, GivesLandmarksAndSaysWhenPosesStop) {
     landmarks_.drain([&](const Landmarks& m) { points[m.stamp.sequence] = m.landmarks.size(); });
     return points.contains(frame);
   };
-  // What is given before all have found each other is lost.
+  // Messages sent before all readers are matched are lost.
   std::uint64_t first = 0;
   ASSERT_TRUE(eventually(20s, [&] {
     give(first++, true);
@@ -87,7 +87,7 @@ TEST_F(KnownPosesProcess, GivesLandmarksAndSaysWhenPosesStop) {
     give(frame, true);
     ASSERT_TRUE(eventually(10s, [&] { return heard(frame); })) << frame << "\n" << vio_.log();
   }
-  std::size_t most = 0;  // how many there are depends on where the drive has come to
+  std::size_t most = 0;  // the number depends on the position in the drive
   for (const auto& [frame, n] : points) most = std::max(most, n);
   EXPECT_GT(most, 20u);
   EXPECT_TRUE(eventually(5s, [&] { return health() && health()->state == HealthState::kOk; }));

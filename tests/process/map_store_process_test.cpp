@@ -1,4 +1,5 @@
-// perdure-map-store as a process: killed and started again, asked over DDS and by its file.
+// Tests perdure-map-store as a process: killed and restarted, queried over DDS and through its
+// file.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -34,7 +35,7 @@ class MapStoreProcess : public ::testing::Test {
     return child;
   }
 
-  /// Beliefs as they come through the wire: symmetric covariances, PMFs that sum to one.
+  /// Makes beliefs that are valid on the wire: symmetric covariances, PMFs that sum to one.
   static Objects frame(std::uint64_t sequence, ObjectId objects) {
     std::vector<ObjectBelief> cars;
     for (ObjectId id = 1; id <= objects; ++id) {

@@ -1,4 +1,5 @@
-// A closed bus with real processes: the five services with their own identities, and strangers.
+// Tests a closed bus with real processes: the five services with their own identities, and foreign
+// programs.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -26,7 +27,8 @@ using tools::validFor;
 
 constexpr const char* kServices[] = {"capture", "vio", "inference", "semantic_filter", "map_store"};
 
-/// A folder of identities, and a bus.yaml that closes the bus for every child: the one setting.
+/// A folder of identities, and a bus.yaml with bus.security as its only setting, which closes the
+/// bus for all child processes.
 class ClosedBus {
  public:
   ClosedBus() {
@@ -80,7 +82,7 @@ class ClosedBus {
   Authority authority_ = Authority::create(folder_.file("security"), "ego", 3650);
 };
 
-/// The operator, in this process.
+/// The operator's participant, in this process.
 class Watcher {
  public:
   explicit Watcher(const bus::Options& options) : domain_(options) {
@@ -126,7 +128,7 @@ Uses granted() {
       if (info.readers.has(role.role)) uses.insert(name + " reads " + topic);
     }
   }
-  uses.erase("vio reads odometry");  // where another program gives it: KnownPosesProcess
+  uses.erase("vio reads odometry");  // only if another program gives the poses: KnownPosesProcess
   return uses;
 }
 
@@ -175,7 +177,7 @@ TEST(ClosedBus, CarriesTheFiveServicesWhichUseAllThatIsGrantedAndNoMore) {
   }
 }
 
-/// The XML of a program that is not ours, with this identity.
+/// Returns the XML configuration of a foreign program with this identity.
 std::string foreign(const ClosedBus& bus, const std::string& identity) {
   bus::Options options = bus.options();
   options.identity = identity;
@@ -188,7 +190,7 @@ class Strangers : public ::testing::Test {
     EXPECT_TRUE(watcher_.until([&] { return watcher_.health("semantic_filter").pid != 0; }))
         << filter_->log();
   }
-  /// Writes detections at 20 Hz under a configuration of its own.
+  /// Starts a program that writes detections at 20 Hz with its own configuration.
   std::unique_ptr<Child> writer(const std::string& xml) {
     return std::make_unique<Child>(
         std::vector<std::string>{"env", "CYCLONEDDS_URI=" + xml, std::getenv("PERDURE_BUS_PEER"),
@@ -199,7 +201,7 @@ class Strangers : public ::testing::Test {
     return watcher_.until(
         [&] { return watcher_.reason("semantic_filter", "security_refused_" + reason) > 0; });
   }
-  /// Long enough for whoever may be heard to be heard (see the test of the inference below).
+  /// Waits until any accepted writer would have been received (see the inference test below).
   void listen() {
     const auto end = std::chrono::steady_clock::now() + 2s;
     (void)watcher_.until([&] { return std::chrono::steady_clock::now() > end; });
@@ -262,7 +264,8 @@ TEST_F(Strangers, ThatMayOnlyReadDoSoButCannotWriteDetections) {
   expectUnheard();
 }
 
-/// A valid certificate with documents of its own making, so that its own DDS lets it write.
+/// A valid certificate with permissions made by the program itself, so that its own DDS allows it
+/// to write.
 TEST_F(LongStrangers, WhoWriteTheirOwnPermissionsAreRefusedByTheOthers) {
   const bus::Key key = tools::makeKey();
   const bus::Certificate own = tools::makeAuthority(key.get(), validFor(30));

@@ -36,10 +36,10 @@ std::size_t renderLap(const fs::path& folder) {
   std::ifstream list(folder / "mav0/cam0/data.csv");
   std::size_t lines = 0;
   for (std::string line; std::getline(list, line);) ++lines;
-  return lines - 1;  // its head
+  return lines - 1;  // the header line
 }
 
-/// Numbers differ from one telling to the next; ids in hexadecimal, too.
+/// Replaces numbers and hexadecimal ids, which differ between repetitions of a message.
 std::string withoutNumbers(const std::string& text) {
   static const std::regex number("\\b[0-9a-f]{8,}\\b|[0-9]+(\\.[0-9]+)?");
   return std::regex_replace(text, number, "#");

@@ -1,4 +1,4 @@
-// The five services over a lap that is driven again and again, and what they say meanwhile.
+// Runs the five services over a lap that is driven repeatedly, and records their messages.
 #pragma once
 
 #include <array>
@@ -19,13 +19,13 @@
 namespace perdure::test {
 
 struct SoakPoint {
-  double s = 0.0;                           ///< since the first frame was handed out
-  std::map<std::string, double> memory_mb;  ///< resident, by service
-  std::size_t held = 0, confirmed = 0;      ///< things of the working set
-  std::uint64_t on_map = 0;                 ///< as map/header says
+  double s = 0.0;                           ///< since the first frame was published
+  std::map<std::string, double> memory_mb;  ///< resident memory, by service
+  std::size_t held = 0, confirmed = 0;      ///< objects of the working set
+  std::uint64_t on_map = 0;                 ///< from map/header
 };
 
-/// A line of a log that is neither information nor finer; numbers in it are "#".
+/// A line of a log with at least warning level; its numbers are replaced by "#".
 struct Complaint {
   std::string service, text;
   std::size_t count = 0;
@@ -34,39 +34,39 @@ struct Complaint {
 
 class SoakRun {
  public:
-  /// Renders the lap into `folder` where it is not there yet; all else there is made anew.
+  /// Renders the lap into `folder` if it does not exist yet; all other files there are made again.
   explicit SoakRun(std::filesystem::path folder, int shared_memory_mb = 0);
 
-  /// Starts the services, listens for so long from the first frame on, ends them in order. A line
-  /// a minute goes to standard output. False where a service does not start, or ends.
+  /// Starts the services, listens for `seconds` from the first frame on, and stops the services in
+  /// order. Prints one line per minute. Returns false if a service does not start, or exits.
   bool run(double seconds);
 
-  const std::vector<SoakPoint>& points() const { return points_; }  ///< one a second
-  /// Of the frames from the first with objects (vio starts with the first motion) to a second
-  /// before the last: how many there are, and without what.
+  const std::vector<SoakPoint>& points() const { return points_; }  ///< one per second
+  /// Counts of frames, from the first one with objects (vio starts with the first motion) to a
+  /// second before the last one: all frames, and those without an output.
   struct Frames {
     std::uint64_t given = 0, without_odometry = 0, without_detections = 0, without_objects = 0;
   };
   Frames frames() const;
   const std::map<std::string, Health>& health() const { return health_; }
   std::vector<Complaint> complaints() const;
-  /// Ids of the things that were confirmed at any time of the lap that began at `lap` (from 0).
+  /// Returns the ids of all objects that were confirmed at some time of lap `lap` (from 0).
   std::set<ObjectId> confirmedIn(std::size_t lap) const;
   std::size_t laps() const { return confirmed_.size(); }
-  /// Growth of a service's memory between two spans, MB: medians of a minute's points that end at
-  /// each time, s.
+  /// Returns the growth of a service's memory between two times, in MB. Compares the medians over
+  /// the minutes that end at `from_s` and `to_s`.
   double growth_mb(const std::string& service, double from_s, double to_s) const;
-  /// How far the body is from where it was at the same place of the lap before all others that has
-  /// odometry there: metres and degrees about gravity, by lap. The body really is where it was.
+  /// The drift at the start of each lap, relative to the first lap that has odometry there: metres
+  /// and degrees about gravity. The true pose is the same in each lap.
   struct Walk {
     std::size_t lap = 0;
     double m = 0.0, up_m = 0.0, deg = 0.0;
   };
   std::vector<Walk> walk() const;
-  /// The most things that the filter held in any frame up to then.
+  /// Returns the largest number of objects in the filter in any frame up to `until_s`.
   std::size_t mostHeld(double until_s) const;
   nlohmann::ordered_json report() const;
-  /// Memory of each service, and objects, over time.
+  /// Draws the memory of each service, and the number of objects, over time.
   void draw(const std::filesystem::path& file) const;
 
  private:

@@ -1,5 +1,5 @@
-// An hour (or PERDURE_SOAK_SECONDS) of a lap that is driven again and again: memory, lost frames,
-// warnings, ids. What was measured is left in PERDURE_SOAK_OUT.
+// Drives a lap repeatedly for an hour (or PERDURE_SOAK_SECONDS). Checks memory, lost frames,
+// warnings and ids. Writes the measurements to PERDURE_SOAK_OUT.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -41,8 +41,8 @@ TEST(Soak, NothingGrowsOrGetsLostWhileALapIsDrivenAgainAndAgain) {
   EXPECT_GT(frames.given, static_cast<std::uint64_t>(19.0 * secondsAsked()));
   EXPECT_EQ(frames.without_odometry, 0u);
   EXPECT_EQ(frames.without_objects, 0u);
-  // Documented: of frames that come while the network is at work the newest is kept, others are
-  // counted as dropped; what its reader overwrote before that is counted as missed.
+  // Documented behaviour: of the frames that arrive while the network is busy, inference processes
+  // the newest and counts the others as dropped. Frames overwritten in its reader count as missed.
   const Health inference = soak.health().at("inference");
   const auto missed = inference.reasons.find("frames_missed");
   EXPECT_LE(frames.without_detections,
@@ -56,8 +56,8 @@ TEST(Soak, NothingGrowsOrGetsLostWhileALapIsDrivenAgainAndAgain) {
 
   ASSERT_GE(soak.laps(), 4u) << "too short to judge what stays";
   const double end = soak.points().back().s, settled = std::max(180.0, end / 6.0);
-  // A thing costs the filter about half a megabyte: its belief in each frame that waits for late
-  // detections. What was once needed stays with the process.
+  // An object costs the filter about half a megabyte, because each frame that waits for late
+  // detections holds its belief. Freed memory stays with the process.
   constexpr double kLeast_mb = 4.0, kThing_mb = 0.8;
   const double more_things = static_cast<double>(soak.mostHeld(end) - soak.mostHeld(settled));
   for (const char* service : tools::kServices) {

@@ -32,7 +32,7 @@ bool raiseLoopback() {
   return up;
 }
 
-/// The lock lasts as long as this process.
+/// The lock is held until this process ends.
 std::int64_t leaseDomain() {
   constexpr int kFirst = 100, kLast = 220;
   for (int domain = kFirst; domain <= kLast; ++domain) {

@@ -1,4 +1,4 @@
-// For tests of real programs: a network of their own, child processes, a folder that goes away.
+// Support for tests of real programs: a separate network, child processes, a temporary folder.
 #pragma once
 
 #include <chrono>
@@ -12,18 +12,19 @@
 
 namespace perdure::test {
 
-/// Gives this process (and its children) a loopback network of its own, where that is allowed; else
-/// leases a DDS domain that no other test of this machine uses. Once a process; later calls agree.
+/// Gives this process and its children a separate loopback network if that is permitted. Otherwise
+/// it leases a DDS domain that no other test of this machine uses. Later calls return the same
+/// result.
 const bus::Options& ownNetwork();
 
-/// Gives this process (and its children) an empty /tmp and /dev/shm of their own, where that is
-/// allowed: what speaks through files there, as iceoryx does, meets no other test.
+/// Gives this process and its children a separate empty /tmp and /dev/shm if that is permitted.
+/// Programs that communicate through files there, such as iceoryx, then cannot reach other tests.
 bool ownFiles();
 
-/// The folder of the built programs and the root of the sources, as ctest says.
+/// The folder of the built programs and the root of the sources, as ctest sets them.
 std::filesystem::path programs();
 std::filesystem::path sources();
-/// A folder or file below the data that tests may use; empty where it is absent.
+/// Returns a file or folder of the test data; empty if it does not exist.
 std::filesystem::path data(const std::string& name);
 
 class Folder {
@@ -38,15 +39,16 @@ class Folder {
   std::filesystem::path path_;
 };
 
-/// A program that runs beside the test. Killed and waited for at the end of the scope.
+/// A program that runs beside the test. The destructor kills it and waits for its end.
 class Child {
  public:
-  /// Its standard output and error go to the file `log`.
+  /// Writes standard output and error to the file `log`.
   Child(std::vector<std::string> command, std::string log);
 
   pid_t pid() const { return process_.pid(); }
   void signal(int number) const { process_.signal(number); }
-  /// Exit status, or 128 + the signal that ended it; -1 where it still runs after `longest`.
+  /// Returns the exit status, or 128 + the signal that ended the program, or -1 if it still runs
+  /// after `longest`.
   int wait(std::chrono::milliseconds longest);
   std::string log() const;
 
@@ -55,7 +57,7 @@ class Child {
   Subprocess process_;
 };
 
-/// Asks every 20 ms until it is so; false after `longest`.
+/// Calls `so` every 20 ms until it returns true; returns false after `longest`.
 bool eventually(std::chrono::milliseconds longest, const std::function<bool()>& so);
 
 std::string contentsOf(const std::filesystem::path& file);

@@ -10,8 +10,8 @@
 namespace perdure::test {
 namespace {
 
-/// Frames that showed an object (its hits went up) and in which its existence fell by more than
-/// time takes (a share of dt / survival). How far it fell at most.
+/// Counts the frames with a hit of an object in which its existence nevertheless decreased by more
+/// than the effect of time (a share of dt / survival), and the largest decrease.
 struct Falls {
   double count = 0.0, most = 0.0;
 };
@@ -34,7 +34,7 @@ Falls fallsOnHits(const Outcome& run) {
   return falls;
 }
 
-/// Merges by what was published of both just before.
+/// Counts of merges, judged by the beliefs published just before them.
 struct Merges {
   double count = 0.0, again = 0.0, younger = 0.0, lost_hits = 0.0, lost_existence = 0.0;
 };
@@ -62,12 +62,12 @@ Merges mergesOf(const Outcome& run) {
     const Glance* a = before ? before->find(kept) : nullptr;
     const Glance* b = before ? before->find(other) : nullptr;
     if (!now || !a || !b) continue;
-    // What was claimed keeps its id, whatever guesses are older.
+    // A confirmed object keeps its id, even if an unconfirmed one is older.
     const bool kept_was = wasClaimed(kept, before->frame);
     const bool other_was = wasClaimed(other, before->frame);
     if (kept_was == other_was && b->first_seen < a->first_seen) merges.younger += 1.0;
     if (now->hits < a->hits + b->hits) merges.lost_hits += 1.0;
-    // A miss in the same frame may take a little.
+    // A miss in the same frame may reduce the existence a little.
     if (now->existence < std::max(a->existence, b->existence) - 0.05) merges.lost_existence += 1.0;
   }
   return merges;

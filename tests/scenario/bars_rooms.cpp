@@ -1,4 +1,4 @@
-// Occlusion, vanish, room: what is hidden stays, what is taken away goes.
+// Bars of occlusion, vanish and room: hidden objects stay, removed objects are deleted.
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -8,7 +8,7 @@
 namespace perdure::test {
 namespace {
 
-/// The chair behind the monitor.
+/// Returns the chair behind the monitor.
 sim::TruthObject hiddenChair(const Outcome& run) {
   for (const auto& chair : run.standing("chair")) {
     const Eigen::Vector3d& p = chair.keys[0].centre_W;
@@ -17,7 +17,7 @@ sim::TruthObject hiddenChair(const Outcome& run) {
   throw std::runtime_error("the scene has no chair behind the monitor");
 }
 
-/// `occluded` events of the object that name a thing of the class, of all.
+/// Counts the `occluded` events of an object: all, and those whose occluder has the right class.
 struct Named {
   double all = 0.0, right = 0.0;
 };
@@ -51,7 +51,7 @@ Hidden whileHidden(const Outcome& run, std::uint64_t id) {
   return hidden;
 }
 
-/// What became of an object after the time from which it was not where it had been.
+/// Returns the mean time between frames.
 double frameSeconds(const Outcome& run) {
   const auto& frames = run.journal.frames;
   return toSeconds(frames.back().time - frames.front().time) /
@@ -60,10 +60,10 @@ double frameSeconds(const Outcome& run) {
 
 struct Returns {
   double foreseen = 0.0, inside = 0.0;
-  double last_error = 0.0;  ///< frames, of the last prediction before a return, the worst
+  double last_error = 0.0;  ///< frames, largest error of the last predictions before the returns
 };
 
-/// Predictions of its return, against when it was seen again.
+/// Compares the predicted returns of an object with the times at which it was seen again.
 Returns returnsOf(const Outcome& run, std::uint64_t id) {
   struct Said {
     double at_s, expected, earliest, latest;
@@ -84,7 +84,8 @@ Returns returnsOf(const Outcome& run, std::uint64_t id) {
       result.inside += s.earliest <= now && now <= s.latest ? 1.0 : 0.0;
     }
     if (!said.empty()) {
-      constexpr double kRounding = 1e-6;  // of seconds since the clock's start, in frames
+      constexpr double kRounding = 1e-6;  // rounding of the seconds since the clock's start, in
+                                          // frames
       const double error = std::abs(said.back().expected - now) / frameSeconds(run) - kRounding;
       result.last_error = std::max(result.last_error, error);
     }
@@ -94,9 +95,10 @@ Returns returnsOf(const Outcome& run, std::uint64_t id) {
 }
 
 struct Fading {
-  double falls_hidden = 0.0;               ///< frames in which existence fell while it was hidden
-  double to_missing = 1e3, to_gone = 1e3;  ///< frames in sight until the event
-  double said_hidden = 0.0;                ///< events said in a frame in which it was not in sight
+  double falls_hidden = 0.0;               ///< frames in which existence decreased while the object
+                                           ///< was hidden
+  double to_missing = 1e3, to_gone = 1e3;  ///< frames with the object in view until the event
+  double said_hidden = 0.0;                ///< events in frames in which the object was not in view
 };
 
 Fading fadingOf(const Outcome& run, std::uint64_t id, TimePoint since) {
@@ -110,7 +112,8 @@ Fading fadingOf(const Outcome& run, std::uint64_t id, TimePoint since) {
       if (!g->in_sight && g->existence < before) fading.falls_hidden += 1.0;
       before = g->existence;
     }
-    // In the frame in which it goes it is no longer published: it went because it was looked for.
+    // An object is not published in the frame of its deletion. That frame counts as in view,
+    // because only a visible miss deletes an object.
     const bool looked_for = g == nullptr || g->in_sight;
     if (f.time >= since && looked_for) in_sight += 1.0;
     seen_until[f.frame] = in_sight;

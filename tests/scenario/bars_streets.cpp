@@ -1,4 +1,4 @@
-// Row, roll, traffic, street.
+// Bars of row, roll, traffic and street.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,16 +12,16 @@ namespace {
 
 constexpr double kDegree = M_PI / 180.0;
 
-/// Radians that the camera leans to a side.
+/// Returns the roll of the camera in radians.
 double rollOf(const RigidTransform& T_WC) {
   const Eigen::Vector3d right = T_WC.R().col(0), forward = T_WC.R().col(2);
   const Eigen::Vector3d level = forward.cross(Eigen::Vector3d::UnitZ()).normalized();
   return std::acos(std::clamp(std::abs(right.dot(level)), 0.0, 1.0));
 }
 
-/// How much an estimate changed between two frames.
+/// Change of an estimate between two frames.
 struct Change {
-  double yaw = 0.0, size = 0.0;  ///< rad; share
+  double yaw = 0.0, size = 0.0;  ///< rad; relative
 };
 
 Change changeBetween(const Glance& a, const Glance& b) {
@@ -29,8 +29,9 @@ Change changeBetween(const Glance& a, const Glance& b) {
           (b.size.cwiseQuotient(a.size) - Eigen::Vector3d::Ones()).cwiseAbs().maxCoeff()};
 }
 
-/// Of each object that is in sight, confirmed and settled (20 looks) from a level camera until it
-/// leans by `least` or more: the change from the last level frame to the most leaning one.
+/// Returns the changes of estimates during a roll of `least` or more, from the last level frame to
+/// the frame with the largest roll. Counts objects in view that are confirmed, settled (20 hits)
+/// and standing.
 std::vector<Change> changesByRoll(const Outcome& run, double least) {
   std::vector<Change> changes;
   std::map<ObjectId, const Glance*> level;
@@ -61,7 +62,7 @@ double quantile(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1) + 0.5)];
 }
 
-/// Distance from a place to the nearest true thing that stands all the time.
+/// Returns the distance from a place to the nearest true object that always stands there.
 double toNearestStanding(const Outcome& run, const Eigen::Vector3d& place) {
   double nearest = 1e9;
   for (const auto& one : run.truth.truth.objects) {
@@ -80,8 +81,8 @@ double toNearestAtEnd(const Outcome& run, const Eigen::Vector3d& place) {
   return nearest;
 }
 
-/// Of parked things that were claimed in ten frames and lie behind the body by more than what the
-/// working set holds: the share that the long-term memory has.
+/// Returns the share of parked objects in the long-term memory. Counts objects that were reported
+/// in ten frames and are now outside the working set's range.
 double rememberedShare(const Outcome& run) {
   const Eigen::Vector3d here = run.truth.body.poses().back().T_WB.p;
   double left = 0.0, kept = 0.0;
@@ -102,7 +103,7 @@ double rememberedShare(const Outcome& run) {
   return left > 0.0 ? kept / left : 0.0;
 }
 
-/// The car that stands for twenty seconds and then drives off ahead of the body.
+/// Returns the car that stands for twenty seconds and then drives off ahead of the body.
 const sim::TruthObject* whatDrivesOff(const Outcome& run) {
   const TimePoint start = run.truth.frames.front();
   for (const auto& object : run.truth.truth.objects) {
@@ -115,7 +116,7 @@ const sim::TruthObject* whatDrivesOff(const Outcome& run) {
   return nullptr;
 }
 
-/// `moved` events of what is then believed to be where the thing is.
+/// Counts the `moved` events of objects that are then estimated near the true object.
 double movedEvents(const Outcome& run, const sim::TruthObject& object) {
   constexpr double kNear = 2.0;  // metres
   double count = 0.0;
@@ -129,7 +130,7 @@ double movedEvents(const Outcome& run, const sim::TruthObject& object) {
   return count;
 }
 
-/// The share of them that kept their id.
+/// Returns the share of the objects that kept their id.
 double keptIds(const Outcome& run) {
   const auto claimed = idsByHalf(run);
   const auto kept = std::count_if(claimed.begin(), claimed.end(),
@@ -137,10 +138,10 @@ double keptIds(const Outcome& run) {
   return claimed.empty() ? 0.0 : static_cast<double>(kept) / number(claimed.size());
 }
 
-/// Interruptions of the claim of a thing in full sight.
+/// Counts interruptions of the confirmation of fully visible objects.
 double flicker(const Outcome& run) {
   double toggles = 0.0;
-  std::map<ObjectId, bool> lost;  // by what was claimed in sight
+  std::map<ObjectId, bool> lost;  // by id, for objects that were confirmed in view
   for (const JournalFrame& f : run.journal.frames) {
     for (const Glance& g : f.objects) {
       if (g.visibility != Visibility::kVisible) {
@@ -156,7 +157,7 @@ double flicker(const Outcome& run) {
   return toggles;
 }
 
-/// What was claimed at rest and is believed metres from there one frame later.
+/// Counts objects that were confirmed at rest and were estimated metres away one frame later.
 double jumps(const Outcome& run) {
   constexpr double kFar = 3.0;  // metres
   double count = 0.0;

@@ -1,4 +1,4 @@
-// Toy and still: size is known by parallax and a prior, or not at all.
+// Bars of toy and still: size is observable by parallax and a prior, or not at all.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kDecided_s = 4.0;  ///< 40 frames at 10 Hz
 
-/// The first frame in which half of it is seen.
+/// Returns the first frame in which at least half of the object is visible.
 std::uint64_t firstSight(const Outcome& run, const sim::TruthObject& object) {
   for (const auto& [frame, views] : run.truth.truth.views) {
     const sim::TruthView* view = run.viewOf(object, frame);
@@ -20,8 +20,8 @@ std::uint64_t firstSight(const Outcome& run, const sim::TruthObject& object) {
   return 0;
 }
 
-/// Beliefs whose centre lies in the image of a true object: without parallax none can be told by
-/// its place.
+/// Returns the beliefs whose centre projects into the image of a true object. Without parallax,
+/// positions cannot match beliefs with objects.
 std::vector<const Glance*> inImageOf(const Outcome& run, const sim::TruthObject& object,
                                      const JournalFrame& f) {
   std::vector<const Glance*> result;
@@ -46,7 +46,7 @@ double probabilityOfCar(const Outcome& run, const sim::TruthObject& object, cons
   return most;
 }
 
-/// 40 frames after first sight, or at the end.
+/// Returns the probability 40 frames after the object is first visible, or at the end.
 double decidedProbability(const Outcome& run, const sim::TruthObject& object) {
   const TimePoint first = run.truth.frames.at(firstSight(run, object));
   const auto wait = std::chrono::duration_cast<Duration>(std::chrono::duration<double>(kDecided_s));
@@ -62,7 +62,8 @@ double height(const Outcome& run, const sim::TruthObject& object, std::uint64_t 
   return view == nullptr ? 0.0 : view->box.height();
 }
 
-/// Largest distance between two places of the camera, over its distance from the toy at first.
+/// Returns the largest distance between two camera positions, relative to the first distance from
+/// the toy.
 double baseline(const Outcome& run, const sim::TruthObject& toy) {
   std::vector<Eigen::Vector3d> places;
   for (const TimePoint t : run.truth.frames) {
@@ -77,7 +78,7 @@ double baseline(const Outcome& run, const sim::TruthObject& toy) {
   return places.empty() ? 0.0 : most / (toy.keys[0].centre_W - places[0]).norm();
 }
 
-/// Deviations between a truth's distance and what a belief says of its class: along the ray.
+/// Error of the distance along the ray, in standard deviations of the belief for this class.
 struct Along {
   double deviations = 1e9, relative_sigma = 0.0;
 };
@@ -99,7 +100,7 @@ Along alongRay(const Outcome& run, const ObjectBelief& belief, const std::string
   return best;
 }
 
-/// The last belief in the image of an object that is most surely there.
+/// Returns the last belief in the image of an object with the highest existence.
 const ObjectBelief* lastBelief(const Outcome& run, const sim::TruthObject& object) {
   const JournalFrame* f = lastFrame(run);
   if (f == nullptr) return nullptr;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr const char* kHeader = "scene,run,bar,tolerated,why";
 
-/// Fields between commas; one in quotes may hold commas, and quotes twice.
+/// Splits a line at commas; a quoted field may contain commas, and doubled quotes.
 std::vector<std::string> fieldsOf(const std::string& line) {
   std::vector<std::string> fields(1);
   bool quoted = false;
@@ -30,7 +30,7 @@ std::vector<std::string> fieldsOf(const std::string& line) {
   return fields;
 }
 
-/// What is wrong with a row, or "".
+/// Returns the error of a row, or "".
 std::string read(const std::string& line, KnownFailure& row) {
   const auto fields = fieldsOf(line);
   if (fields.size() != 5) return "is not " + std::string(kHeader);

@@ -1,5 +1,6 @@
-// Bars that the filter does not pass yet, of known_failures.csv: how far each may be missed, and
-// why. A value worse than that fails; so does one that passes, until its row is gone.
+// Bars that the filter does not pass yet, from known_failures.csv, with a tolerance and a reason. A
+// value worse than the tolerance fails. A value that passes the bar also fails until its row is
+// removed.
 #pragma once
 
 #include <filesystem>
@@ -13,17 +14,17 @@ struct KnownFailure {
   std::string run;  ///< "seeds" 1 to 3 with true poses, "vio", or "recalled"
   std::string bar;  ///< its name
   double tolerated = 0.0;
-  std::string why;  ///< with the figures when the row was written
+  std::string why;  ///< with the figures of the time of writing
 };
 
-/// Throws std::runtime_error with "file:line: what is wrong": the header, the number of fields, a
-/// number, an empty field, a bar of a run that is named twice.
+/// Throws std::runtime_error with "file:line: cause" for an invalid header, number of fields, or
+/// number, for an empty field, or for a repeated bar of a run.
 std::vector<KnownFailure> readKnownFailures(const std::filesystem::path& file);
 
-/// Those of a run.
+/// Returns the rows of a run.
 std::vector<KnownFailure> knownFailures(const std::vector<KnownFailure>& all,
                                         const std::string& scene, const std::string& run);
-/// Of the sources' table.
+/// Reads the table of the sources.
 std::vector<KnownFailure> knownFailures(const std::string& scene, const std::string& run);
 std::filesystem::path knownFailuresFile();
 

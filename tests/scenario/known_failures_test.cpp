@@ -1,4 +1,4 @@
-// The table of known failures as it is read, and what follows from a row.
+// Tests the reading of the table of known failures, and the effects of a row.
 #include "tests/scenario/known_failures.h"
 
 #include <gmock/gmock.h>

@@ -47,7 +47,7 @@ tools::ObjectScore scoreOf(const Outcome& run, const std::vector<tools::Estimate
                             {.frame_interval_s = run.truth.frameInterval()});
 }
 
-/// What the estimate's W says in the truth's; exact poses change nothing.
+/// Transforms poses from the estimate's W to the truth's; the identity for exact poses.
 void takeToTruth(Outcome& run, const std::vector<replay::StampedPose>& trajectory) {
   if (!run.setting.images) return;
   std::map<TimePoint, RigidTransform> poses;

@@ -21,7 +21,7 @@ std::string textOf(const fs::path& file) {
   return text.str();
 }
 
-/// Of all that a scene depends on.
+/// Digest of everything that determines a scene.
 std::string sourcesDigest() {
   const char* root = std::getenv("PERDURE_SOURCE");
   if (root == nullptr) throw std::runtime_error("PERDURE_SOURCE is not set; use ctest");
@@ -38,7 +38,7 @@ std::string sourcesDigest() {
   return toHex(digest(all));
 }
 
-/// Programs lie one folder below the build folder.
+/// Programs are one folder below the build folder.
 fs::path cacheFolder() {
   const fs::path build = fs::read_symlink("/proc/self/exe").parent_path().parent_path();
   const fs::path all = build / "tests" / "scenes", own = all / sourcesDigest();

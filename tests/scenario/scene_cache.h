@@ -1,4 +1,4 @@
-// Where the simulator's scenes are kept for the tests that run over them: making one costs more
+// Stores the simulator's scenes for the tests that use them, because making a scene takes longer
 // than a run.
 #pragma once
 
@@ -8,7 +8,7 @@
 
 namespace perdure::test {
 
-/// A scene in its own length (`seconds` 0) or another.
+/// A scene of its own length (`seconds` 0) or another.
 struct SceneName {
   std::string scene;
   std::uint64_t seed = 1;
@@ -16,8 +16,8 @@ struct SceneName {
   bool images = false;
 };
 
-/// The scene's folder in the build folder above this program, whether or not it was made already.
-/// Images are JPEG. Scenes of other sources of the simulator than these are removed.
+/// Returns the scene's folder in the build folder above this program, even if it does not exist
+/// yet. Images are JPEG. Scenes from other versions of the simulator's sources are removed.
 /// $PERDURE_SOURCE is the root of the sources.
 std::filesystem::path cachedScene(const SceneName& name);
 

@@ -1,4 +1,5 @@
-// `scenes`: the table of what each scene must show, as measured; and one true object's history.
+// `scenes`: prints the table of each scene's bars with measured values, and the history of one true
+// object.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -13,7 +14,7 @@ namespace {
 
 using namespace perdure;  // NOLINT
 
-/// What was published near a true object, frame by frame.
+/// Prints the published objects near a true object, frame by frame.
 void trace(const test::Outcome& run, std::uint64_t truth_id, double within) {
   for (const auto& object : run.truth.truth.objects) {
     if (object.id != truth_id) continue;
@@ -36,7 +37,7 @@ void trace(const test::Outcome& run, std::uint64_t truth_id, double within) {
   }
 }
 
-/// When an object was first and last published, and where what is said of it changed.
+/// Prints when an object was first and last published, and the changes of its state.
 void tell(const test::Outcome& run, ObjectId id, const Eigen::Vector3d& place) {
   const auto seen = run.journal.of(id);
   const auto line = [&](std::size_t i, const char* what) {
@@ -74,7 +75,7 @@ void tell(const test::Outcome& run, ObjectId id, const Eigen::Vector3d& place) {
   }
 }
 
-/// Of each thing whose id of the first half is not that of the second: what became of both.
+/// Prints the histories of both ids for each true object whose id changed between the halves.
 void changedIds(const test::Outcome& run) {
   for (const auto& [object, first, second] : test::idsByHalf(run)) {
     if (first == second) continue;
@@ -85,8 +86,8 @@ void changedIds(const test::Outcome& run) {
   }
 }
 
-/// Of each thing on the map where nothing stands: what was said of it, and the true thing that was
-/// nearest to it while it was found.
+/// Prints the history of each ghost on the map, and the true objects that were nearest when it was
+/// detected.
 void tellOfGhosts(const test::Outcome& run) {
   for (const auto& ghost : test::ghosts(run)) {
     const auto nearest = test::foundNearest(run, ghost.id);
@@ -101,7 +102,7 @@ void tellOfGhosts(const test::Outcome& run) {
   }
 }
 
-/// What ctest tells the tests.
+/// Sets the environment that ctest gives to the tests.
 void findSources() {
   namespace fs = std::filesystem;
   const fs::path source = fs::current_path();

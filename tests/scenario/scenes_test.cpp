@@ -1,5 +1,5 @@
-// What the filter does in each scene, three seeds of each, against the bars that it is to pass. A
-// table says what is asked, what was measured, and, where a bar is not passed yet, why.
+// Tests the filter in each scene with three seeds against its bars. Prints a table with each bar,
+// the measured value, and the reason for each known failure.
 #include <gtest/gtest.h>
 
 #include "tests/scenario/bars.h"
@@ -22,7 +22,7 @@ TEST(Scene, Roll) { holdScene("roll"); }
 TEST(Scene, Traffic) { holdScene("traffic"); }
 TEST(Scene, Street) { holdScene("street"); }
 
-/// The same street, most of which leaves the working set on each lap.
+/// The same street with a smaller working set, so that most objects leave it on each lap.
 TEST(Scene, StreetRecalled) {
   const Outcome run = runScene(
       {.scene = "street",
@@ -34,7 +34,7 @@ TEST(Scene, StreetRecalled) {
             knownFailures("street", "recalled"));
 }
 
-/// Rendered, with vio and, where the carrier has wheels, their speed; 20 frames a second.
+/// Rendered at 20 frames per second, with vio, and with wheel speeds if the carrier has wheels.
 void holdWithVio(const std::string& scene) {
   const Setting setting{.scene = scene, .rate_hz = 20.0, .images = true};
   holdSeeds(barsOf(scene, {1, 2, 3}, setting), knownFailures(scene, "vio"));

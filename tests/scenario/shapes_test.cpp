@@ -1,5 +1,5 @@
-// Whether the shapes of config/class_priors.yaml are those of the simulator's things: what is in
-// the image of a thing, by the renderer, against the image of its shape, seen upright and leaning.
+// Tests whether the shapes of config/class_priors.yaml fit the simulator's objects. Compares the
+// rendered outline of an object with the image of its shape, for an upright and a rolled camera.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -29,7 +29,7 @@ State stateOf(const sim::TruthObject& object) {
   return x;
 }
 
-/// Of sides, in widths and heights of what is in the image.
+/// Errors of the sides, in widths and heights of the rendered outline.
 struct Misfit {
   double squares = 0.0, sides = 0.0;
 
@@ -46,7 +46,7 @@ struct Misfits {
   Misfit of_shape, of_cuboid;
 };
 
-/// By class, of things that stand and whose whole outline is in the image.
+/// Returns the errors by class, for standing objects whose whole outline is in the image.
 std::map<std::string, Misfits> misfitsIn(const Setting& setting,
                                          const semantic_filter::ClassPriors& priors) {
   const tools::SimulatedTruth truth = tools::readSimulatedTruth(sceneFolder(setting));

@@ -16,10 +16,10 @@ namespace perdure::test {
 namespace {
 
 constexpr double kKnown_m = 1.5;
-constexpr double kSmall_px = 24.0, kLeast_px = 10.0;  // of the network's input
+constexpr double kSmall_px = 24.0, kLeast_px = 10.0;  // pixels of the network's input
 constexpr double kSame = 0.5;
 
-/// What is seen of a true object in a frame.
+/// The image of a true object in a frame.
 struct Target {
   Box box;
   bool ignored = true, small = false, hidden = false;

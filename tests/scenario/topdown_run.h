@@ -1,5 +1,6 @@
-// The project's own network and the filter over a rendered scene with true poses, frame by frame,
-// with predictions handed from one to the other: what the network reports of which true object.
+// Runs the project's own network and the filter over a rendered scene with true poses, frame by
+// frame. Predictions go from the filter to the network. Scores which true objects the network
+// reports.
 #pragma once
 
 #include <filesystem>
@@ -11,7 +12,7 @@
 
 namespace perdure::test {
 
-/// One frame: what was reported, and what was believed before it.
+/// One frame: the detections, and the objects before it.
 struct LookedAt {
   std::uint64_t frame = 0;
   Detections detections;
@@ -28,19 +29,19 @@ struct TopDownSetting {
 struct TopDownRun {
   tools::SimulatedTruth truth;
   std::vector<LookedAt> frames;
-  std::vector<std::string> classes;  ///< of the activations
+  std::vector<std::string> classes;  ///< classes of the activations
 };
 TopDownRun driveThrough(const TopDownSetting& setting);
 
-/// True objects that are hard to see and that the map holds: confirmed, within 1.5 m of the truth,
-/// of its class, in the frame before. Small: under 24 px of the network's input (√ of the box's
-/// area), and 10 px or more on the longer side. Half-hidden: .25 to .7 of what lies in the image
-/// is in visibility.
+/// Recall of true objects that are hard to see and on the map: confirmed, within 1.5 m of the truth
+/// and of its class, in the frame before. Small means under 24 px of the network's input (√ of the
+/// box's area), and 10 px or more on the longer side. Half-hidden means that .25 to .7 of the part
+/// in the image is visible.
 struct HardRecall {
   std::size_t small = 0, small_found = 0, hidden = 0, hidden_found = 0;
-  std::size_t ordinary_found = 0;  ///< of all, by a box that is not primed
-  std::size_t false_alarms = 0;    ///< boxes, primed ones included, on no object
-  std::size_t false_primed = 0;    ///< of these, primed
+  std::size_t ordinary_found = 0;  ///< all objects with a bottom-up box
+  std::size_t false_alarms = 0;    ///< boxes on no object, top-down ones included
+  std::size_t false_primed = 0;    ///< top-down boxes among them
   std::size_t frames = 0;
   HardRecall& operator+=(const HardRecall& more);
   double recall() const {
@@ -50,9 +51,9 @@ struct HardRecall {
     return static_cast<double>(false_alarms) / static_cast<double>(frames);
   }
 };
-/// Found: by a box of IoU ½ with its outline cut at the image, one box for one object. Primed
-/// answers count from `least` nats for the object on. `known` says which objects are on the map,
-/// so that runs can be compared over the same ones.
+/// A true object is found if a box has IoU ½ with its outline clipped to the image; each box counts
+/// for one object. Top-down answers count from `least` nats for the object on. `known` determines
+/// which objects are on the map, so that runs can be compared over the same objects.
 HardRecall hardRecall(const TopDownRun& run, const TopDownRun& known, double input_scale,
                       double least);
 

@@ -1,4 +1,4 @@
-// What top-down scoring finds, and that it keeps no ghost alive.
+// Tests the recall of top-down scoring, and that it does not preserve ghosts.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -22,7 +22,8 @@ TopDownSetting street(std::uint64_t seed) {
   return setting;
 }
 
-/// Adds what two runs of a scene, with and without, found of the objects that the first one knew.
+/// Adds the results of a run with and a run without top-down scoring, over the objects on the first
+/// run's map.
 void compare(TopDownSetting setting, double threshold, double threshold_without, HardRecall& with,
              HardRecall& without) {
   setting.inference.detection.prime = true;
@@ -43,7 +44,7 @@ void print(const char* what, double threshold, const HardRecall& r) {
       r.falseAlarms(), r.false_primed);
 }
 
-/// At thresholds of detectors that decide, and at the lax one; over three streets.
+/// At the thresholds of deciding detectors, and at the lax threshold; over three streets.
 TEST(LongTopDown, FindsMoreOfWhatIsSmallOrHalfHiddenAtTheSameRateOfFalseAlarms) {
   struct Point {
     double threshold, without, gain;
@@ -85,7 +86,7 @@ ObjectBelief ghost(ObjectId id, const std::string& name, const Eigen::Vector3d& 
   return belief;
 }
 
-/// Whether the object is still believed in after the frame.
+/// Returns whether the object exists before the frame, with existence above one half.
 bool believed(const LookedAt& look, ObjectId id) {
   for (const ObjectBelief& belief : look.before.objects) {
     if (belief.id == id) return belief.existence > 0.5;
@@ -93,7 +94,7 @@ bool believed(const LookedAt& look, ObjectId id) {
   return false;
 }
 
-/// Things that are not there, planted on free ground ahead of the camera, where it looks at them.
+/// Plants objects that do not exist on free ground ahead of the camera, in its view.
 TEST(LongTopDown, AGhostThatIsPlantedInTheMapStillDies) {
   constexpr std::uint64_t kAt = 30;
   TopDownSetting setting = street(11);
@@ -113,7 +114,8 @@ TEST(LongTopDown, AGhostThatIsPlantedInTheMapStillDies) {
     setting.inference.detection.prime = prime;
     const TopDownRun run = driveThrough(setting);
     for (const ObjectBelief& planted : setting.planted) {
-      // Of the first lap: what is not yet gone may take a neighbour's box on the second.
+      // On the second lap a remaining ghost may be assigned a neighbour's box, so that only the
+      // first lap is judged.
       std::size_t frames = 0, asked = 0, again = 0;
       bool dead = false;
       for (const LookedAt& look : run.frames) {

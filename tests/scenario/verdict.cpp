@@ -32,7 +32,7 @@ double combined(const Bar& bar, const std::vector<double>& by_seed) {
   return bar.sense == Sense::kAtLeast ? *least : *most;
 }
 
-/// What is wrong, or "".
+/// Returns the complaint about a verdict, or "".
 std::string complaint(const Verdict& v, const KnownFailure* row) {
   const std::string said = fmt::format("{} is {:.3g}", v.bar.what, v.bar.measured);
   if (row == nullptr) {

@@ -1,6 +1,6 @@
-// Bars that a run is held to, what several seeds make of them, and what follows where a bar is
-// known to fail: tolerated as far as known_failures.csv says, and to be taken out of it as soon as
-// it passes.
+// Bars of a run, their values over several seeds, and the handling of known failures. A known
+// failure is tolerated as far as known_failures.csv permits. Its row must be removed as soon as the
+// bar passes.
 #pragma once
 
 #include <string>
@@ -12,7 +12,7 @@
 namespace perdure::test {
 
 enum class Sense { kAtLeast, kAtMost };
-/// Of several seeds: the worst, or (of shares and rates) the mean.
+/// How several seeds are combined: the worst value, or (for shares and rates) the mean.
 enum class Of { kWorst, kMean };
 struct Bar {
   std::string what;
@@ -36,17 +36,17 @@ Bars operator+(Bars bars, const Bars& more);
 
 /// A bar over several seeds.
 struct Verdict {
-  Bar bar;  ///< with what is held against the limit; not a number where a seed's is none
+  Bar bar;  ///< with the combined value; NaN if the value of a seed is NaN
   std::vector<double> by_seed;
   bool meets(double limit) const;
   bool meets() const { return meets(bar.limit); }
 };
-/// The same bars of each seed as one table.
+/// Combines the bars of each seed into one table.
 std::vector<Verdict> judge(const std::vector<Bars>& by_seed);
 
-/// What is not as it should be, one sentence each: a bar that fails and has no row, or is worse
-/// than its row tolerates; one that passes and has a row; a row that no bar is called like; a row
-/// that tolerates nothing, for the bar itself asks no more.
+/// Returns one sentence for each problem: a failing bar without a row, or worse than its row
+/// tolerates; a passing bar with a row; a row without a bar of its name; a row whose tolerance is
+/// no weaker than the bar.
 std::vector<std::string> complaints(const std::vector<Verdict>& verdicts,
                                     const std::vector<KnownFailure>& known);
 

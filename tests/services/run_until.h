@@ -8,8 +8,8 @@
 
 namespace perdure::test {
 
-/// Runs the loop until `done`; false where that takes longer than `limit`, which is generous: it
-/// ends a test that would hang, and asserts nothing about speed.
+/// Runs the loop until `done` returns true; returns false after `limit`. The limit is generous,
+/// because it only ends a test that would hang.
 inline bool runUntil(bus::WaitLoop& loop, const std::function<bool()>& done,
                      std::chrono::seconds limit = std::chrono::seconds(20)) {
   const auto end = std::chrono::steady_clock::now() + limit;

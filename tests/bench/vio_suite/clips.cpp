@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr char kWhole[] = "unpacked";  ///< a file that says so
+constexpr char kWhole[] = "unpacked";  ///< a file that marks a folder as complete
 
 std::vector<std::string> imageNames(const fs::path& list) {
   std::ifstream file(list);
@@ -28,7 +28,7 @@ std::vector<std::string> imageNames(const fs::path& list) {
   return names;
 }
 
-/// Frames of the video into images, as the folder's list names them.
+/// Extracts the frames of the video as images with the names of the folder's list.
 void unpack(const fs::path& from, const fs::path& to, const std::function<void(double)>& progress) {
   fs::create_directories(to);
   constexpr auto kOver = fs::copy_options::recursive | fs::copy_options::overwrite_existing;
@@ -52,7 +52,7 @@ void unpack(const fs::path& from, const fs::path& to, const std::function<void(d
   }
 }
 
-/// Samples along the truth with the errors of EuRoC's unit, at the times of the real ones.
+/// Writes samples simulated along the truth, with the errors of EuRoC's unit.
 void writeFittingImu(const fs::path& folder, unsigned seed) {
   const replay::PoseFile truth = replay::PoseFile::read(folder / "gt_tum.txt");
   const auto& poses = truth.poses();

@@ -1,4 +1,4 @@
-// vio over all clips of the suite, under one or more settings: one table.
+// Runs vio over all clips of the suite, under one or more settings, and prints one table.
 #include <CLI/CLI.hpp>
 #include <atomic>
 #include <cmath>
@@ -40,7 +40,7 @@ void assign(vio::Config& config, const std::string& assignments) {
   }
 }
 
-/// "name:key=value,key=value"; with --set before.
+/// Parses "name:key=value,key=value"; the settings of --set are applied first.
 std::vector<Variant> variantsOf(const CommandLine& line) {
   vio::Config base;
   for (const std::string& s : line.set) assign(base, s);
@@ -62,7 +62,7 @@ bool wanted(const Clip& clip, const CommandLine& line) {
          std::find(line.only.begin(), line.only.end(), clip.name) != line.only.end();
 }
 
-/// Clips are taken by several threads; each says on one line how far it is.
+/// Several threads process the clips; each prints its progress on one line.
 class Suite {
  public:
   Suite(const CommandLine& line, std::vector<Clip> clips)

@@ -19,7 +19,7 @@ double quantile(std::vector<double> values, double q) {
   return values[static_cast<std::size_t>(at)];
 }
 
-/// One vio and what it said.
+/// A vio node and its outputs.
 class Player {
  public:
   Player(const Variant& variant, const Calibration& calibration, bool innovations)
@@ -36,7 +36,7 @@ class Player {
       if (!first_frame_) first_frame_ = frame->stamp.time;
       node_.onFrame(*frame);
     }
-    since_ += cpuMs() - begin;  // a frame may be worked off when a later sample comes
+    since_ += cpuMs() - begin;  // vio may process a frame at a later sample
     if (!frame || frame->camera != camera_) return;
     ms_.push_back(since_);
     since_ = 0.0;

@@ -1,4 +1,4 @@
-// Plays a clip through vio, under several settings at once: each image is decoded once.
+// Plays a clip through vio under several settings at once; each image is decoded once.
 #pragma once
 
 #include <filesystem>
@@ -21,26 +21,29 @@ struct Variant {
 
 struct Outcome {
   Accuracy accuracy;
-  double first_s = 0.0;           ///< from the first frame to the first output that may be used
-  double ms = 0.0, ms_p99 = 0.0;  ///< CPU of this thread for a frame, without decoding
-  double klt_ms = 0.0, klt_ms_p99 = 0.0;  ///< OpenCV's Lucas-Kanade with 200 points; 0: not asked
-  Innovations innovations;                ///< where asked for
+  double first_s = 0.0;                   ///< from the first frame to the first usable output
+  double ms = 0.0, ms_p99 = 0.0;          ///< CPU time of this thread per frame, without decoding
+  double klt_ms = 0.0, klt_ms_p99 = 0.0;  ///< OpenCV's Lucas-Kanade with 200 points; 0: not
+                                          ///< measured
+  Innovations innovations;                ///< filled only on request
   std::size_t frames = 0, resets = 0;
-  double readout_s = 0.0;  ///< of the first camera, as vio has it at the end
+  double readout_s = 0.0;  ///< vio's final estimate for the first camera
   std::map<std::string, std::uint64_t> reasons;
 };
 
 struct PlayOptions {
-  double from_s = 0.0, until_s = 1e9;  ///< of the clip's time
+  double from_s = 0.0, until_s = 1e9;  ///< in the clip's time
   bool klt = true, innovations = false;
-  std::optional<double> readout_s = {};  ///< what vio is told of the cameras, whatever they have
+  std::optional<double> readout_s = {};  ///< overrides the read-out time in the cameras'
+                                         ///< calibration
 };
 
-/// In the order of `variants`. `progress`: the share of the clip that is done.
+/// Returns the outcomes in the order of `variants`. `progress` receives the share of the clip that
+/// is done.
 std::vector<Outcome> play(const std::filesystem::path& folder, const std::vector<Variant>& variants,
                           const PlayOptions& options, const std::function<void(double)>& progress);
 
-/// gt_tum.txt of the folder, or the dataset's own truth.
+/// Reads gt_tum.txt of the folder, or the dataset's own truth.
 replay::PoseFile truthOf(const std::filesystem::path& folder, const replay::Dataset& dataset);
 
 }  // namespace perdure::bench

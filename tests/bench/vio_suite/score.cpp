@@ -60,15 +60,16 @@ std::optional<Vector3d> velocityOf(const replay::PoseFile& truth, TimePoint time
   return Vector3d((after->p - before->p) / toSeconds(2 * kHalf));
 }
 
-/// From the truth's world to the estimate's, which are laid on each other at one time by position
-/// and turn about the vertical. Not by the yaw of either: that is undefined where x points up.
+/// Returns the transform from the truth's world to the estimate's: it aligns position and the
+/// rotation about the vertical at one time. It does not compare yaw angles, because yaw is
+/// undefined if x points up.
 RigidTransform laidOn(const RigidTransform& estimate, const RigidTransform& truth) {
   const Eigen::Matrix3d M = estimate.R() * truth.R().transpose();
   const Eigen::Matrix3d turn = rotationAboutZ(std::atan2(M(1, 0) - M(0, 1), M(0, 0) + M(1, 1)));
   return RigidTransform(turn, Vector3d(estimate.p - turn * truth.p));
 }
 
-/// `T_EG`: from the truth's world to the estimate's.
+/// `T_EG` is the transform from the truth's world to the estimate's.
 NeesAt neesAt(const Odometry& o, const RigidTransform& T_EG, const RigidTransform& T_GB,
               const Vector3d& v_G) {
   const RigidTransform T_WB = T_EG * T_GB;

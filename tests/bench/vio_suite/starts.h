@@ -1,5 +1,4 @@
-// Starts in motion: a clip is cut at random places, and vio begins there with nothing but what
-// comes after.
+// Starts in motion: a clip is cut at random times, and vio starts there without earlier data.
 #pragma once
 
 #include <filesystem>
@@ -14,13 +13,14 @@ namespace perdure::bench {
 struct StartRow {
   std::string clip, variant;
   double cut_s = 0.0;
-  double moving_s = -1.0;  ///< from the cut to the first output; −1: none came in five seconds
-  double scale = 0.0;      ///< of the three seconds that follow
-  double error_m = 0.0;    ///< at the end of these, position
-  NeesAt nees;             ///< of a second after the first output
-  double velocity_error = 0.0, velocity_sigma = 0.0;  ///< at the first output, m/s
+  double moving_s = -1.0;  ///< from the cut to the first output; −1: no output within five seconds
+  double scale = 0.0;      ///< scale over the three seconds after the first output
+  double error_m = 0.0;    ///< position error, three seconds after the first output
+  NeesAt nees;             ///< errors one second after the first output
+  double velocity_error = 0.0, velocity_sigma = 0.0;  ///< errors at the first output, m/s
   bool reset = false;
-  /// Wrong and believed: after three seconds more than three deviations and a tenth of the way off.
+  /// True if the start is wrong but its covariance is small: after three seconds the error exceeds
+  /// three standard deviations and a tenth of the distance travelled.
   bool wrong = false;
 };
 

@@ -15,7 +15,7 @@ class Table {
  public:
   void add(const Clip& clip, const std::string& variant, const Outcome& outcome);
   void add(const std::vector<StartRow>& starts);
-  /// By clip, then means of the halves for each variant.
+  /// Rows by clip, then the means of the halves for each variant.
   void print(std::ostream& out);
   void writeCsv(std::ostream& out);
 

@@ -11,13 +11,15 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// A flight on an ellipse about the origin that begins at rest, looks about, and may be shaken.
+/// A flight on an ellipse about the origin. It begins at rest, the gaze varies, and the body may
+/// shake.
 struct Flight {
   double seconds = 30.0, rest_s = 1.0;
   Vector3d radii{2.2, 1.6, 0.35};
   double height = 1.5;
   double lap_s = 16.0;
-  double gaze = 0.9, gaze_s = 7.0;  ///< of the yaw to each side of the way, rad
+  double gaze = 0.9, gaze_s = 7.0;  ///< amplitude of the yaw relative to the direction of travel,
+                                    ///< rad
   double nod = 0.12, lean = 0.12;   ///< pitch and roll, rad
   double shake_m = 0.0, shake_rad = 0.0;
 };
@@ -55,7 +57,8 @@ sim::Trajectory flown(const Flight& f) {
   return sim::Trajectory(0.0, kStep, std::move(poses));
 }
 
-/// An inertial unit: densities, and deviations of scale, of misalignment and of biases.
+/// Errors of an inertial unit: noise densities, and standard deviations of scale, misalignment and
+/// biases.
 struct Grade {
   ImuCalibration densities{1.7e-4, 2e-5, 2e-3, 3e-3, 200.0};
   double scale = 0.002, misaligned = 0.001, gyro_bias = 0.004, accel_bias = 0.03;
@@ -91,10 +94,10 @@ void withoutSpeed(sim::Scene& scene) {
   scene.rig.calibration.has_speed = scene.rig.true_calibration.has_speed = false;
 }
 
-/// Those of the clips are neighbours; draws are further apart.
+/// The seeds of the clips are consecutive; those of the draws are further apart.
 unsigned seedOf(unsigned clip, unsigned draw) { return clip + 100 * draw; }
 
-/// Everything so many times as large.
+/// Multiplies all dimensions of the scene by `factor`.
 void enlarge(sim::Scene& scene, double factor) {
   for (sim::Prop& prop : scene.props) {
     prop.size *= factor;
@@ -181,7 +184,7 @@ sim::Scene plain(const sim::SceneOptions& options, unsigned draw) {
   Flight f;
   f.lap_s = 12.0;
   sim::Scene scene = inRoom("plain", seedOf(27, draw), options, 1.0, f);
-  // One thing in four stays.
+  // One object in four remains.
   std::size_t kept = 0;
   std::erase_if(scene.objects, [&](const auto&) { return kept++ % 4 != 0; });
   std::erase_if(scene.props, [&](const sim::Prop& prop) {

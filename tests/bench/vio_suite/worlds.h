@@ -1,5 +1,5 @@
-// The simulated clips' scenes: places of the simulator, with motions and sensors of their own.
-// `draw`: the same motion past other looks, with other noise and other sensors' errors.
+// The scenes of the simulated clips: places of the simulator with motions and sensors of their own.
+// `draw` keeps the motion and changes textures, noise and sensor errors.
 #pragma once
 
 #include "common/sim/scene.h"

@@ -91,7 +91,7 @@ TEST(Subprocess, IsKilledWhereItTakesTooLong) {
   const auto silent = runProgram({.command = {"sleep", "100"}}, 50ms);
   EXPECT_TRUE(silent.too_late);
   EXPECT_EQ(silent.status, 128 + SIGKILL);
-  // It has closed its output, and lives on.
+  // The program has closed its output but still runs.
   const auto mute = runProgram({.command = {"sh", "-c", "exec sleep 100 > /dev/null 2>&1"}}, 50ms);
   EXPECT_TRUE(mute.too_late);
 }
@@ -111,7 +111,7 @@ TEST(Subprocess, StopsByAskingAndThenByForce) {
   const std::string deaf_file = testing::TempDir() + "perdure_deaf_" + std::to_string(getpid());
   Subprocess deaf({.command = {"sh", "-c", "trap '' TERM; : > \"$0\"; while :; do sleep 0.1; done",
                                deaf_file}});
-  // Until it has said that it is deaf.
+  // Waits until the program ignores SIGTERM.
   while (!std::filesystem::exists(deaf_file)) std::this_thread::sleep_for(1ms);
   deaf.stop(50ms);
   EXPECT_EQ(deaf.ended(), 128 + SIGKILL);

@@ -98,7 +98,8 @@ TEST(CameraModel, TheRationalModelIsTheQuotientOfItsDefinition) {
 
 TEST(CameraModel, DistortionThatFoldsBackDoesNotProjectFarPointsIntoTheImage) {
   CameraCalibration calibration = calibrationWith(DistortionModel::kRadialTangential);
-  calibration.distortion_coefficients = {-0.3, 0.0, 0.0, 0.0};  // grows up to r = 1.05 only
+  calibration.distortion_coefficients = {-0.3, 0.0, 0.0, 0.0};  // increases monotonically only up
+                                                                // to r = 1.05
   const CameraModel camera(calibration);
   EXPECT_TRUE(camera.project({0.9, 0.0, 1.0}).has_value());
   EXPECT_FALSE(camera.project({1.8, 0.0, 1.0}).has_value());

@@ -14,7 +14,7 @@ namespace {
 
 using Kind = WideLens::Kind;
 
-// The figures are about those of TUM-VI's camera 0 (512 x 512, 195 degrees across).
+// The parameters are close to those of TUM-VI's camera 0 (512 × 512, field of view 195 degrees).
 WideLens lensOf(Kind kind) {
   switch (kind) {
     case Kind::kUnified:
@@ -74,7 +74,7 @@ INSTANTIATE_TEST_SUITE_P(All, WideLenses,
                          ::testing::Values(Kind::kUnified, Kind::kExtendedUnified,
                                            Kind::kDoubleSphere));
 
-// Known points: an xi of zero is a pinhole; so is an alpha of zero.
+// Known points: with an xi or an alpha of zero, the model is a pinhole.
 TEST(WideLens, WithoutASphereItIsAPinhole) {
   const Eigen::Vector3d p(0.4, -0.3, 2.0);
   const Eigen::Vector2d pinhole(100 + 50 * 0.2, 80 - 60 * 0.15);
@@ -82,14 +82,14 @@ TEST(WideLens, WithoutASphereItIsAPinhole) {
     const WideLens lens{kind, 0.0, kind == Kind::kExtendedUnified ? 1.0 : 0.0, 50, 60, 100, 80, {}};
     EXPECT_LT((*project(lens, p) - pinhole).norm(), 1e-12);
   }
-  // Mei's: on the unit sphere the point (.6, 0, .8) with xi 1 is at .6/1.8.
+  // Mei's model: with xi = 1, the point (.6, 0, .8) of the unit sphere projects to .6/1.8.
   const WideLens lens{Kind::kUnified, 1.0, 0.0, 90, 90, 0, 0, {}};
   EXPECT_NEAR(project(lens, {3, 0, 4})->x(), 30, 1e-12);
 }
 
 TEST(WideLens, WhatNoEquidistantLensFollowsIsRefused) {
   WideLens lens = lensOf(Kind::kUnified);
-  lens.distortion = {0, 0, 0.02, 0.02};  // not round about its axis
+  lens.distortion = {0, 0, 0.02, 0.02};  // not symmetric about the axis
   CameraCalibration camera = square();
   const auto fit = fitEquidistant(lens, camera);
   ASSERT_FALSE(fit);

@@ -5,7 +5,7 @@
 namespace perdure {
 namespace {
 
-// From printed tables; the last is known to three decimals.
+// Values from printed tables; the last one is given to three decimals.
 TEST(Chi2, QuantilesAgreeWithPublishedTables) {
   EXPECT_NEAR(chi2Quantile(0.95, 1), 3.841459, 1e-6);
   EXPECT_NEAR(chi2Quantile(0.95, 2), 5.991465, 1e-6);

@@ -1,4 +1,4 @@
-// The decompositions against their definitions, for fixed and dynamic sizes.
+// Tests the decompositions against their definitions, for fixed and dynamic sizes.
 #include "common/math/gaussian.h"
 
 #include <gtest/gtest.h>
@@ -33,7 +33,7 @@ TEST(Gaussian, SolvesAndInvertsSymmetricMatrices) {
 }
 
 TEST(Gaussian, RegressionLeavesNothingInCommon) {
-  // With B = C S⁻¹ the rest, x - B s, has no covariance with s.
+  // With B = C S⁻¹, the residual x - B s has no covariance with s.
   const Eigen::MatrixXd S = covariance(6, 3), C = random(3, 6, 4);
   EXPECT_LT((C - regressOn(S, C) * S).norm(), 1e-9);
 }

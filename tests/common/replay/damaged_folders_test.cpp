@@ -1,4 +1,4 @@
-// Folders in EuRoC's layout whose files or stamps were damaged: each is told its own mend.
+// Folders in EuRoC's layout with damaged files or stamps: each finding names its own fix.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-/// `index` of the line, from 0, and its stamp in ns.
+/// Maps the `index` of a line, from 0, and its stamp in ns to the new stamp.
 using NewStamp = std::function<std::int64_t(std::int64_t index, std::int64_t ns)>;
 
 void changeStamps(const fs::path& file, const NewStamp& to) {
@@ -33,7 +33,7 @@ void changeStamps(const fs::path& file, const NewStamp& to) {
   writeText(file, text + "\n");
 }
 
-/// Images that can be told apart, of the calibration's size, each as `change` leaves its file.
+/// Makes a folder of distinct images of the calibration's size; `change` is applied to each file.
 fs::path damaged(const std::string& name,
                  const std::function<void(std::size_t, const fs::path&)>& change) {
   const auto root = tinyEuroc(name);
@@ -48,7 +48,8 @@ fs::path damaged(const std::string& name,
 DataFindings findingsOf(const fs::path& root) {
   return checkData(Dataset::open({.path = root})->recording(), {});
 }
-/// What is found of this code; "" where nothing is. A fatal one begins with "fatal ".
+/// Returns the text of the finding with this code, or "" if there is none. The text of a fatal
+/// finding begins with "fatal ".
 std::string textOf(const fs::path& root, const std::string& code) {
   for (const auto& finding : findingsOf(root)) {
     if (finding.code == code)
@@ -131,7 +132,7 @@ TEST(DamagedFolder, AnIndexIsNoTime) {
   EXPECT_THAT(textOf(root, "clocks_apart"), IsEmpty());
 }
 
-// They count, too.
+// These stamps are consecutive integers, too.
 TEST(DamagedFolder, SamplesOfAKilohertzInWholeMillisecondsAreNoCount) {
   const auto root = tinyEuroc("stamps_1khz");
   std::string list = "#timestamp [ns],filename\n", samples = "#timestamp [ns],w,w,w,a,a,a\n";

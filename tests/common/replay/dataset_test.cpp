@@ -59,7 +59,7 @@ TEST(ReadAhead, GivesWhatTheDriveHasInItsOrderAndMayEndEarly) {
     EXPECT_FALSE(ahead.next());
   }
   const auto again = Dataset::open({.path = root});
-  ReadAhead unread(*again, 1);  // whose thread waits for room when it ends
+  ReadAhead unread(*again, 1);  // its thread waits for room when it is destroyed
   EXPECT_TRUE(unread.next());
 }
 
@@ -169,7 +169,7 @@ TEST(Dataset, SeekGoesOnWhereAnotherStopped) {
 }
 
 TEST(Dataset, SkipGoesToTheFirstFrameThatIsSoLate) {
-  const auto dataset = Dataset::open({.path = tinyEuroc("skip", true)});  // frames each 50 ms
+  const auto dataset = Dataset::open({.path = tinyEuroc("skip", true)});  // one frame every 50 ms
   EXPECT_EQ(dataset->skip(std::chrono::milliseconds(60)), 2U);
   const auto first = dataset->next();
   ASSERT_TRUE(first);

@@ -27,7 +27,7 @@ TEST(Euroc, CalibrationIsReadFromTheSensorFiles) {
   EXPECT_EQ(camera.distortion, DistortionModel::kRadialTangential);
   EXPECT_EQ(camera.distortion_coefficients.size(), 4U);
   EXPECT_EQ(camera.rate_hz, 20.0);
-  // T_BS is the camera in the body: its z axis looks along the body's x.
+  // T_BS is the camera in the body frame: the camera's z axis points along the body's x axis.
   EXPECT_TRUE((camera.T_BC.q * Eigen::Vector3d::UnitZ()).isApprox(Eigen::Vector3d::UnitX(), 1e-9));
   EXPECT_TRUE(camera.T_BC.p.isApprox(Eigen::Vector3d(0.1, 0.2, 0.3)));
   ASSERT_TRUE(calibration.imu);
@@ -117,7 +117,7 @@ TEST(Euroc, WhoWantsNoPixelsNeedsNoImages) {
 
 TEST(Euroc, ASecondCameraSharesIndexAndTimeWithTheFirst) {
   const auto root = tinyEuroc("stereo", true);
-  // cam1 runs 2 ms late, and its third frame has no partner.
+  // cam1 is 2 ms late, and its third frame has no partner.
   writeText(root / "mav0/cam1/data.csv",
             "1002000000,1000000000.png\n1052000000,1050000000.png\n1075000000,1100000000.png\n");
   const auto dataset = open(root);

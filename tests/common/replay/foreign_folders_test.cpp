@@ -1,4 +1,4 @@
-// Folders in EuRoC's layout as other people's tools leave them.
+// Folders in EuRoC's layout as other tools write them.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -27,7 +27,7 @@ struct Given {
   std::size_t samples = 0, frames = 0;
   bool ordered = true;
 };
-/// All that a folder gives.
+/// Reads the dataset to its end.
 Given givenBy(Dataset& dataset) {
   Given given;
   TimePoint last;
@@ -48,7 +48,7 @@ void expectAll(const fs::path& root, std::size_t frames = 5, std::size_t samples
   EXPECT_TRUE(given.ordered);
 }
 
-/// Lines of a text file, changed one by one; the head stays.
+/// Changes the lines of a text file one by one, except the first.
 void changeLines(const fs::path& file,
                  const std::function<std::string(std::size_t, std::string)>& to) {
   std::istringstream lines(readText(file));
@@ -224,7 +224,7 @@ TEST(ForeignFolder, KalibrsResultsBesideTheFolderAreItsCalibration) {
   EXPECT_NEAR(b.rate_hz, 20.0, 1e-6) << "by its stamps";
   EXPECT_EQ(dataset->calibration().imu->accel_bias_walk, before.imu->accel_bias_walk);
   EXPECT_TRUE(dataset->recording().notes.empty());
-  // A file that is no IMU's, and another chain.
+  // A file without an IMU, and a second camera chain.
   writeText(root / "simulation.yaml", "scene: lap\n");
   writeText(root / "dso/camchain-old.yaml",
             readText(root / "dso/camchain.yaml") + "  line_delay_nanoseconds: 30000\n");

@@ -58,7 +58,7 @@ TEST(KittiCalibration, AMissingOrShortEntryIsNamed) {
               HasSubstr("Tr_imu_to_velo has 11"));
 }
 
-/// What the calibration says when one of its numbers is another.
+/// Returns the error of the calibration after one of its numbers is replaced.
 std::string complaintOf(const std::string& number, const std::string& other) {
   const auto file = tinyKittiTracking("damaged") / "calib/0000.txt";
   std::string text = readText(file);
@@ -106,7 +106,7 @@ TEST(KittiRaw, OxtsComesAsInertialSamplesAndSpeedOfTheBody) {
   EXPECT_EQ(speed[3].time, imu[3].time);
 }
 
-/// The line of a file becomes empty.
+/// Replaces a line of a file by an empty one.
 void emptyLine(const fs::path& file, std::size_t number) {
   std::string text = readText(file);
   std::size_t begin = 0;
@@ -176,7 +176,8 @@ TEST(KittiRaw, OxtsGivesTheTrueWayEastNorthAndUp) {
   const auto& poses = dataset->truth()->poses();
   ASSERT_EQ(poses.size(), 4U);
   EXPECT_TRUE(poses[0].T_WB.p.isZero());
-  // A degree of a great circle of 6378137 m is 111319.5 m; one of longitude is cos 49.01 of it.
+  // One degree of a great circle with radius 6378137 m is 111319.5 m; one degree of longitude is
+  // cos 49.01° of it.
   EXPECT_NEAR(poses[2].T_WB.p.x(), 2e-4 * 111319.5 * std::cos(49.01 * 3.14159265 / 180), 1e-3);
   EXPECT_NEAR(poses[2].T_WB.p.y(), 1e-4 * 111319.5, 1e-3);
   EXPECT_NEAR(poses[2].T_WB.p.z(), 1.0, 1e-9);
@@ -282,7 +283,7 @@ TEST(KittiLabels, WrongLinesAreLocated) {
   EXPECT_EQ(startupCodeOf([&] { readKittiLabels(file); }), ExitCode::kData);
 }
 
-// As many frames as the last label says would be laid out.
+// Frames up to the last label's number would be allocated, so that large numbers must be refused.
 TEST(KittiLabels, AFrameOrACountThatMakesNoSenseIsRefused) {
   const auto file = freshFolder("senseless_labels") / "0000.txt";
   writeText(file,

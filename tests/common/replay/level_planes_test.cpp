@@ -23,13 +23,13 @@ CameraCalibration depthCamera() {
   return camera;
 }
 
-/// n · x = d.
+/// The plane n · x = d.
 struct Plane {
   Eigen::Vector3d n;
   double d;
 };
 
-/// Depth of the nearest plane at each pixel, with the noise of structured light.
+/// Renders the depth of the nearest plane at each pixel, with the noise of structured light.
 cv::Mat depthOf(const std::vector<Plane>& planes, const Eigen::Matrix3d& R,
                 const Eigen::Vector3d& p, std::uint32_t seed) {
   std::mt19937 random(seed);
@@ -51,7 +51,7 @@ cv::Mat depthOf(const std::vector<Plane>& planes, const Eigen::Matrix3d& R,
   return depth;
 }
 
-/// A camera that looks along x of a world with z up, pitched down and rolled.
+/// Rotation of a camera that looks along x in a world with z up, pitched down and rolled.
 Eigen::Matrix3d lookingDown(double pitch_deg, double roll_deg) {
   Eigen::Matrix3d R_BC;
   R_BC << 0, 0, 1, -1, 0, 0, 0, -1, 0;
@@ -68,7 +68,7 @@ double angleDeg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 TEST(LevelPlanes, TheFloorTellsUpThoughTheCameraLooksDownAndIsRolled) {
   for (const double pitch : {10.0, 25.0, 40.0}) {
     for (const double roll : {-15.0, 0.0, 15.0}) {
-      // The poses' frame is any; here it is turned about all axes.
+      // The poses may have any frame; this one is rotated about all axes.
       const Eigen::Matrix3d R_PW =
           Eigen::AngleAxisd(2.0, Eigen::Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
       LevelPlanes planes;

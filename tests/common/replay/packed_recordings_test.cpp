@@ -1,4 +1,4 @@
-// Recordings that somebody has packed by zstd: as whole files, or message by message.
+// Recordings that other programs have compressed by zstd: as whole files, or message by message.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sqlite3.h>
@@ -36,7 +36,7 @@ std::string zstdFrame(const std::string& bytes) {
   return frame;
 }
 
-/// TMPDIR is a folder of its own as long as this lives.
+/// Sets TMPDIR to a folder of its own during the test.
 class PackedRecording : public testing::Test {
  protected:
   PackedRecording() : place_(freshFolder("ros_unpacked")) {
@@ -46,7 +46,7 @@ class PackedRecording : public testing::Test {
   ~PackedRecording() override {
     before_ ? setenv("TMPDIR", before_->c_str(), 1) : unsetenv("TMPDIR");
   }
-  /// In two frames of zstd, as writers in parts do.
+  /// Compresses a file into two zstd frames, like writers that write in parts.
   static fs::path packed(const fs::path& file, const fs::path& folder) {
     const std::string bytes = readText(file);
     const fs::path to = folder / (file.filename().string() + ".zstd");
@@ -54,7 +54,7 @@ class PackedRecording : public testing::Test {
                       zstdFrame(bytes.substr(bytes.size() / 2)));
     return to;
   }
-  /// Folders of what was unpacked.
+  /// Returns the number of folders with unpacked recordings.
   std::ptrdiff_t unpacked() const {
     return std::count_if(fs::directory_iterator(place_), {}, [](const auto& entry) {
       return entry.path().filename().string().starts_with("perdure-unpacked-");
@@ -162,7 +162,7 @@ TEST_F(PackedRecording, OfPerdureIsReadAsItsOwn) {
       << "zstd's own name";
 }
 
-/// With three samples of an inertial sensor.
+/// Makes a recording of Perdure with three samples of an inertial sensor.
 fs::path ownRecording(const std::string& name) {
   const fs::path file = freshFolder(name) / "run.mcap";
   RecordingWriter recording(file);
@@ -199,8 +199,8 @@ TEST_F(PackedRecording, ThatASecondOneFollowsSaysSoAndKeepsBoth) {
   EXPECT_EQ(readText(file), bytes + bytes);
 }
 
-/// As rosbag2 does with `compression_mode: MESSAGE`. `cut`: all frames but the first message's lose
-/// their last byte.
+/// Compresses messages like rosbag2 with `compression_mode: MESSAGE`. `cut`: every compressed
+/// message except the first loses its last byte.
 void packMessages(const fs::path& db3, bool cut = false) {
   sqlite3* database = nullptr;
   ASSERT_EQ(sqlite3_open(db3.c_str(), &database), SQLITE_OK);

@@ -1,4 +1,4 @@
-// The readers on the real datasets, where they are at hand.
+// Tests the readers on the real datasets, if they are present.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -74,8 +74,8 @@ TEST_F(RealData, TheStandingVehicleHas95FramesAndItsWholeImu) {
   EXPECT_TRUE(dataset->reasons().all().empty());
 }
 
-// Floor and table of the red kitchen lie level by this up: over all depth images two peaks of
-// heights, 4 cm wide and 0.71 m apart.
+// With this up vector, floor and table of the red kitchen are level: the heights over all depth
+// images have two peaks, 4 cm wide and 0.71 m apart.
 TEST_F(RealData, TheRedKitchenStandsUpright) {
   const fs::path scene = root() / "scenes7_redkitchen";
   if (!fs::is_directory(scene)) GTEST_SKIP() << scene << " is absent";

@@ -1,4 +1,4 @@
-// Recordings as datasets, and as messages in the order of their coming.
+// Recordings as datasets, and as messages in their order of arrival.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -17,13 +17,14 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-constexpr std::uint64_t kLater = 1'000'000'000'000;  // of log times, against the sensor's
+constexpr std::uint64_t kLater = 1'000'000'000'000;  // offset of the log times from the sensor
+                                                     // times
 
 std::uint64_t logOf(TimePoint time) {
   return kLater + static_cast<std::uint64_t>(toNanoseconds(time));
 }
 
-/// Everything that a dataset gives, as capture would publish it.
+/// Records all messages of a dataset as capture would publish them.
 void record(Dataset& dataset, RecordingWriter& recording, bool images) {
   recording.add("calibration", dataset.calibration(), kLater);
   int n = 0;
@@ -43,7 +44,7 @@ void record(Dataset& dataset, RecordingWriter& recording, bool images) {
 }
 
 struct Read {
-  std::vector<std::string> order;  ///< kind, time, index
+  std::vector<std::string> order;  ///< kind, time and index of each message
   std::vector<std::vector<std::uint8_t>> pixels;
 };
 
@@ -179,7 +180,7 @@ TEST(RecordedMessages, JoinsTheSegmentsOfAFolderAndGivesLatchedOnesOnce) {
       sample.sequence = 4 * static_cast<std::uint64_t>(segment) + i;
       recording.add("imu", sample, at + i);
     }
-    if (segment == 2) recording.cut();  // as a recorder that was killed leaves it
+    if (segment == 2) recording.cut();  // as a killed recorder leaves it
     if (segment < 2) recording.finish();
   }
   RecordedMessages messages(folder);

@@ -1,5 +1,5 @@
-// Recordings of ROS as datasets: what is chosen, what is said where something is missing. By
-// rosbag2's SQLite, which is written here; tests/interop/ros has the files of strangers.
+// Recordings of ROS as datasets: the choice of topics, and the messages about missing parts. The
+// recordings are rosbag2's SQLite, written here. tests/interop/ros tests files of foreign programs.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sqlite3.h>
@@ -56,8 +56,8 @@ TEST_P(Images, OfASqliteRecordingAreThoseOfTheFolder) {
   }
 }
 
-// How many bits are used is what all images say: by the first three alone it would be eight, and
-// the others would be white.
+// The number of used bits is determined from all images. The first three alone would give eight
+// bits, and the others would be white.
 TEST_P(Images, Of16BitsThatBeginInTheDarkAreScaledByTheBrightest) {
   const Twin twin = twinOf("ros_dark", {.images = GetParam(), .dark = 3});
   const auto bright = test::allOf(*Dataset::open({.path = twin.folder})).pixels;
@@ -68,7 +68,7 @@ TEST_P(Images, Of16BitsThatBeginInTheDarkAreScaledByTheBrightest) {
   for (std::size_t i = 3; i < 5; ++i) {
     brightest = std::max<int>(brightest, *std::max_element(bright[i].begin(), bright[i].end()));
   }
-  int shift = 2;  // ten bits at least: one more than the dark has
+  int shift = 2;  // at least ten bits, more than the dark images use
   while (brightest * 16 >= 256 << shift) shift += 2;
   EXPECT_GE(brightest * 16, 256) << "eight bits must not do";
   for (std::size_t i = 0; i < 5; ++i) {
@@ -76,7 +76,7 @@ TEST_P(Images, Of16BitsThatBeginInTheDarkAreScaledByTheBrightest) {
     std::size_t wrong = 0;
     for (std::size_t k = 0; k < bright[i].size(); ++k) {
       const int value = i < 3 ? bright[i][k] / 16 : bright[i][k] * 16;
-      const int off = (pixels[i][k] << shift) - value;  // rounded down, or to the nearest
+      const int off = (pixels[i][k] << shift) - value;  // rounded down, or to nearest
       wrong += std::abs(off) < 1 << shift ? 0 : 1;
     }
     EXPECT_EQ(wrong, 0u) << "image " << i;
@@ -132,7 +132,7 @@ TEST(RosDrive, ATransformThatIsNoneIsNamed) {
                     Not(HasSubstr("has no /tf_static"))));
 }
 
-/// Zeroes pages of the file from its share `begin` to `end`; its head stays.
+/// Overwrites pages of the file with zeros, from share `begin` to share `end`; the head stays.
 void zeroPages(const fs::path& file, double begin, double end) {
   constexpr std::streamoff kPage = 4096;
   std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);
@@ -207,7 +207,7 @@ TEST(RosDrive, AnyBytesAreReadOrRefused) {
   EXPECT_GT(refused, 5);
 }
 
-// SQLite's columns take any type; text sorts behind all numbers, and reads as 0.
+// SQLite's columns accept any type. Text sorts after all numbers, and is read as 0.
 TEST(RosDrive, AMessageWhoseTimeIsNoNumberIsLeftOutAndCounted) {
   const Twin twin = twinOf("ros_text_stamps");
   sqlite3* database = nullptr;

@@ -1,4 +1,4 @@
-// A tiny drive as a folder and as a recording of ROS.
+// A tiny drive as a folder and as a ROS recording.
 #pragma once
 
 #include <filesystem>
@@ -10,7 +10,7 @@
 
 namespace perdure::test {
 
-/// The folder, .db3, and the rig file with the noise of its inertial unit.
+/// The folder, the .db3 file, and the rig file with the noise of its inertial unit.
 struct Twin {
   std::filesystem::path folder, file, rig;
 };

@@ -18,7 +18,7 @@ std::string errorOfScene(const DatasetOptions& options) {
 }
 
 double upOffDeg(const Dataset& dataset) {
-  // The camera of frame 0 is the poses' frame: its up turned into W must be z.
+  // The camera of frame 0 is the poses' frame; its up vector must become z in W.
   const RigidTransform T_WC =
       dataset.truth()->poses().front().T_WB * dataset.calibration().cameras.front().T_BC;
   const Eigen::Vector3d up_W = T_WC.q * tinySevenScenesUp();
@@ -67,7 +67,7 @@ TEST(SevenScenes, GravityOfSensorYamlGoesBeforeThePlanes) {
   EXPECT_EQ(dataset->calibration().cameras.front().fx, 525.0);
   writeText(folder / "sensor.yaml", "up: [0, 0, 0]\n");
   EXPECT_THAT(errorOfScene({.path = folder}), HasSubstr("is no direction"));
-  writeText(folder / "sensor.yaml", "up: [0, -1e200, 0]\n");  // its square is no number
+  writeText(folder / "sensor.yaml", "up: [0, -1e200, 0]\n");  // its square overflows
   EXPECT_NEAR(Dataset::open({.path = folder})->truth()->poses().front().T_WB.q.norm(), 1.0, 1e-9);
   writeText(folder / "sensor.yaml",
             text + "resolution: [640, 480]\nintrinsics: [500, 501, 310, 230]\n");

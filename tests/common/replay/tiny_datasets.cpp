@@ -185,7 +185,8 @@ fs::path tinyKittiTracking(const std::string& name) {
 
 namespace {
 
-/// The first camera of tinySevenScenes in a world whose floor is z = 0, a wall at x = 3.
+/// Pose of the first camera of tinySevenScenes in a world with the floor at z = 0 and a wall at x =
+/// 3.
 Eigen::Matrix3d tinySceneCamera() {
   Eigen::Matrix3d R_BC;
   R_BC << 0, 0, 1, -1, 0, 0, 0, -1, 0;

@@ -26,7 +26,7 @@ ObjectBelief objectOf(ObjectId id, std::vector<std::pair<std::string, double>> c
   return object;
 }
 
-/// W lies turned to the left in M, 100 m to its left.
+/// W is rotated to the left in M, and 100 m to its left.
 const RigidTransform kTurned(Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 2,
                                                                   Eigen::Vector3d::UnitZ())),
                              Eigen::Vector3d(0, 100, 0));

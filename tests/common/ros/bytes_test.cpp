@@ -1,4 +1,4 @@
-// ROS' messages as bytes: known ones, both byte orders, and whatever else comes.
+// Serialised ROS messages: known bytes, both byte orders, and malformed input.
 #include "common/ros/bytes.h"
 
 #include <gmock/gmock.h>
@@ -31,8 +31,8 @@ TEST(Cdr, IsWhatRos2Writes) {
   const std::vector<std::uint8_t> known = bytesOf(
       {0, 1, 0, 0,                                    // XCDR1, little-endian
        7, 0, 0, 0, 9,   0,   0,   0,                  // stamp
-       4, 0, 0, 0, 'm', 'a', 'p', 0,                  // a string has its end
-       6, 0, 0, 0, 'j', 'p', 'e', 'g', '8', 0, 0, 0,  // and what follows begins at its own size
+       4, 0, 0, 0, 'm', 'a', 'p', 0,                  // a string ends with a zero byte
+       6, 0, 0, 0, 'j', 'p', 'e', 'g', '8', 0, 0, 0,  // the next field is aligned to its own size
        3, 0, 0, 0, 1,   2,   3});
   const auto data = std::make_shared<const std::vector<std::uint8_t>>(bytesOf({1, 2, 3}));
   EXPECT_EQ(cdrOf(CompressedImage{{{7, 9}, "map"}, "jpeg8", data}), known);
@@ -40,7 +40,7 @@ TEST(Cdr, IsWhatRos2Writes) {
 
 TEST(Cdr, NumbersOfEightBytesBeginAtEightBehindTheHead) {
   const auto bytes = cdrOf(exampleTransform());
-  // Stamp 8, "map" 8, "odom" 9, filled up to 32.
+  // Stamp 8, "map" 8, "odom" 9, padded to 32.
   ASSERT_EQ(bytes.size(), 4u + 32u + 7u * 8u);
   double y = 0;
   std::memcpy(&y, bytes.data() + 4 + 32 + 8, sizeof y);
@@ -54,7 +54,7 @@ struct Small {
   static void fields(auto& m, auto& a) { a("header", m.header), a("values", m.values); }
 };
 
-/// As a big-endian machine writes it.
+/// The bytes of a big-endian machine.
 TEST(Cdr, EitherByteOrderIsRead) {
   const auto bytes = bytesOf({0, 0, 0, 0, 0, 0, 0, 7, 0, 0, 0,    9,    0, 0, 0, 2, 'm', 0,
                               0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0x3F, 0xF8, 0, 0, 0, 0, 0,   0});

@@ -1,4 +1,4 @@
-// ROS' images as frames: every encoding that is read, by pixels that are known.
+// ROS images as frames: every supported encoding, with known pixels.
 #include "common/ros/images.h"
 
 #include <gmock/gmock.h>
@@ -46,7 +46,7 @@ TEST(RosImages, ColoursBecomeBgr) {
   EXPECT_THAT(pixelsOf(imageOf("bgra8", 1, 1, 4, {1, 2, 3, 9})), ElementsAre(1, 2, 3));
 }
 
-/// A red wall: only the red ones of a pattern's pixels are bright.
+/// A red wall: only the red pixels of a Bayer pattern are bright.
 TEST(RosImages, BayerPatternsKeepTheirColour) {
   const std::pair<const char*, int> kRedAt[] = {
       {"bayer_rggb8", 0}, {"bayer_grbg8", 1}, {"bayer_gbrg8", 2}, {"bayer_bggr8", 3}};

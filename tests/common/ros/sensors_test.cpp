@@ -1,4 +1,4 @@
-// What ROS says of cameras and frames, as Perdure's calibration.
+// Converts camera and frame information of ROS into Perdure's calibration.
 #include "common/ros/sensors.h"
 
 #include <gmock/gmock.h>

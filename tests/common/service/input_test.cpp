@@ -12,7 +12,7 @@ Input::Clock::time_point at(int ms) { return Input::Clock::time_point(millisecon
 TEST(Input, ThatHasNeverComeIsNotSilent) {
   Input input("frames", "mend the camera");
   EXPECT_FALSE(input.silent(at(100'000)));
-  input.heardAt(at(0));  // latched, perhaps: one does not make a stream
+  input.heardAt(at(0));  // perhaps latched: one message is not a stream
   EXPECT_FALSE(input.silent(at(100'000)));
 }
 

@@ -1,5 +1,5 @@
-// A small service for the tests of runService: turns each IMU sample into a speed sample. At
-// certain numbers it hangs, as a handler does or as a worker thread does.
+// A small service for the tests of runService. It turns each IMU sample into a speed sample.
+// Sequence number 1001 makes its handler hang; 1002 marks its worker thread as hung.
 #include <chrono>
 #include <thread>
 

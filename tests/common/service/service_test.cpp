@@ -147,7 +147,7 @@ TEST_F(Service, IsDegradedWhileItsInputIsSilentAndWellWhenItComesBack) {
   EXPECT_EQ(running.waitForEnd(), 0);
 }
 
-/// Where systemd would listen.
+/// The socket on which systemd would listen.
 class NotifySocket {
  public:
   NotifySocket() : path_(testing::TempDir() + "perdure_notify") {
@@ -193,7 +193,7 @@ TEST_F(Service, SaysNothingToAWatchdogThatDoesNotWatch) {
   const NotifySocket systemd;
   Subprocess running(quietProbe());
   EXPECT_EQ(systemd.next(), "READY=1");
-  EXPECT_EQ(systemd.next(std::chrono::milliseconds(1500)), "");  // Health went out meanwhile
+  EXPECT_EQ(systemd.next(std::chrono::milliseconds(1500)), "");  // Health was sent meanwhile
   running.signal(SIGINT);
   EXPECT_EQ(running.waitForEnd(), 0);
 }
@@ -210,7 +210,7 @@ TEST_P(Hangs, AndTheWatchdogIsNotFed) {
   EXPECT_EQ(systemd.next(), "WATCHDOG=1");
   ImuSample sample;
   sample.sequence = GetParam();
-  ASSERT_TRUE(imu.write(sample));  // latched: it arrives, whenever they meet
+  ASSERT_TRUE(imu.write(sample));  // latched, so it arrives as soon as both are matched
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
   while (systemd.next(std::chrono::milliseconds(1500)) == "WATCHDOG=1") {
     ASSERT_LT(std::chrono::steady_clock::now(), end) << "it is still fed";

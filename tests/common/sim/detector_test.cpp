@@ -29,7 +29,7 @@ TruthObject thing(std::uint64_t id, const std::string& class_name, const Eigen::
   return object;
 }
 
-/// The same view of one thing in every frame.
+/// Returns a truth with the same view of one object in every frame.
 Truth sameView(const Box& box, double visible, const std::string& class_name = "car") {
   Truth truth;
   truth.objects = {thing(1, class_name, {10, 2, 0}, 0.7)};
@@ -37,7 +37,8 @@ Truth sameView(const Box& box, double visible, const std::string& class_name = "
   return truth;
 }
 
-/// All errors anew in each frame, and nothing false: what the statistics are simple for.
+/// Returns a model with independent errors in each frame and without false boxes, so that the
+/// statistics are simple.
 DetectorModel independent() {
   DetectorModel model;
   model.persistent_share = 0.0;
@@ -73,7 +74,7 @@ TEST(SimulatedDetector, FindsByTheSizeAndTheShareThatIsSeen) {
   EXPECT_NEAR(shareFound(kLarge, model.half_visible), 0.5 * model.found, 0.012);
   EXPECT_LT(shareFound({100, 100, 105, 105}, 1.0), 0.02);
   EXPECT_EQ(shareFound(kLarge, 0.5 * model.least_visible), 0.0);
-  // Of a thing that the border cuts, what is in the image counts.
+  // If the border cuts an object, only the part in the image counts.
   EXPECT_NEAR(shareFound({-100, 150, 100, 230}, 0.5), model.found, 0.006);
 }
 
@@ -151,7 +152,7 @@ TEST(SimulatedDetector, GivesAsManyFalseAlarmsAsItSays) {
   }
 }
 
-/// Soft-max over the activations with even priors.
+/// Returns the soft-max of the activations with uniform priors.
 std::vector<double> posterior(const Detection& d) {
   std::vector<double> p;
   for (const float a : d.activations) p.push_back(std::exp(static_cast<double>(a)));
@@ -160,10 +161,10 @@ std::vector<double> posterior(const Detection& d) {
   return p;
 }
 
-/// Things of all classes, small and large, hidden and not, each as often as one false alarm.
+/// Uses objects of all classes, each as often as one false alarm.
 TEST(SimulatedDetector, ItsActivationsAreCalibrated) {
   DetectorModel model = independent();
-  model.separation = 2.5;  // so that it errs often
+  model.separation = 2.5;  // so that classification errors are frequent
   model.found = 1.0;
   model.half_size_px = 10.0;
   std::vector<std::pair<std::size_t, Detection>> looks;
@@ -175,13 +176,13 @@ TEST(SimulatedDetector, ItsActivationsAreCalibrated) {
   model.false_per_frame = 1.0;
   model.false_smallest_px = 18.0;
   CameraCalibration tiny = camera();
-  tiny.width = tiny.height = 18;  // false alarms of the same size: of the same quality
+  tiny.width = tiny.height = 18;  // false alarms of the same size have the same quality
   const std::size_t each = looks.size() / model.classes.size();
   for (auto& d : collect(SimulatedDetector(model, Truth{}, tiny), 6000)) {
     if (looks.size() < each * (model.classes.size() + 1)) looks.emplace_back(0, std::move(d));
   }
   ASSERT_EQ(looks.size(), each * (model.classes.size() + 1));
-  // Reliability: of all statements "this is k with probability p", a share p is true.
+  // Reliability: of all statements "class k with probability p", a share p is true.
   std::array<double, 10> said{}, true_of{}, count{};
   for (const auto& [truth, d] : looks) {
     const auto p = posterior(d);
@@ -222,9 +223,10 @@ TEST(SimulatedDetector, AToyIsTakenForACar) {
 
 TEST(SimulatedDetector, AzimuthIsKittisAlphaWithItsDeviationAndFlips) {
   DetectorModel model = independent();
-  // The body looks along +x: the thing is 10 m before and 2 m left of it, turned by 0.7 rad.
+  // The body looks along +x. The object is 10 m ahead and 2 m to the left, rotated by 0.7 rad.
   const SimulatedDetector detector(model, sameView(kLarge, 1.0), camera());
-  // KITTI's rotation_y is 0 for a thing that points to the right and grows clockwise from above.
+  // KITTI's rotation_y is 0 for an object that points to the right. It increases clockwise, seen
+  // from above.
   const double alpha = (-M_PI_2 - 0.7) - std::atan2(-2.0, 10.0);
   double squares = 0, upright = 0, flips = 0;
   const auto found = collect(detector);

@@ -16,13 +16,14 @@ struct Reckoned {
   Eigen::Vector3d p, v;
 };
 
-/// Classical Runge-Kutta over two samples at a time: the middle one is the middle of the step.
+/// Integrates by the classical Runge-Kutta method over two sample intervals; the sample between
+/// them is the midpoint.
 Reckoned integrate(const std::vector<ImuRecord>& imu, Reckoned state) {
   const Eigen::Vector3d gravity(0, 0, -kGravity);
   for (std::size_t i = 0; i + 2 < imu.size(); i += 2) {
     const ImuSample &a = imu[i].sample, &b = imu[i + 1].sample, &c = imu[i + 2].sample;
     const double h = toSeconds(c.time - a.time);
-    // The turn within the step, by Magnus' series to the fourth order.
+    // The rotation within the step: Magnus series up to the fourth order.
     const Eigen::Vector3d mean = (a.gyro + 4.0 * b.gyro + c.gyro) / 6.0;
     const Eigen::Vector3d turn = h * mean + h * h / 12.0 * a.gyro.cross(c.gyro);
     const Eigen::Vector3d half = h / 24.0 * (5.0 * a.gyro + 8.0 * b.gyro - c.gyro);
@@ -80,7 +81,8 @@ TEST(Imu, NoiseHasTheDensitiesOfItsCalibration) {
     gyro_walk += (imu[i].gyro_bias - imu[i - 1].gyro_bias).cwiseAbs2() / (n - 1);
     accel_walk += (imu[i].accel_bias - imu[i - 1].accel_bias).cwiseAbs2() / (n - 1);
   }
-  // A variance of 1e5 samples is known to 0.45 %; 3 % is more than six deviations.
+  // The variance of 1e5 samples has an uncertainty of 0.45 %; 3 % is more than six standard
+  // deviations.
   const auto near = [](const Eigen::Vector3d& variance, double density, double factor) {
     for (Eigen::Index i = 0; i < 3; ++i) {
       EXPECT_NEAR(variance[i] / (density * density * factor), 1.0, 0.03);
@@ -92,7 +94,7 @@ TEST(Imu, NoiseHasTheDensitiesOfItsCalibration) {
   near(accel_walk, kCalibration.accel_bias_walk, 1.0 / rate);
 }
 
-/// Allan's deviation over one second shows the white noise's density whatever the rate is.
+/// The Allan deviation over one second equals the density of the white noise at any rate.
 TEST(Imu, AllanDeviationAtOneSecondIsTheDensityAtAnyRate) {
   for (const double rate : {100.0, 400.0}) {
     ImuCalibration calibration{2e-3, 0.0, 2e-2, 0.0, rate};
@@ -145,7 +147,7 @@ TEST(Speed, IsTheBodysOwnAlongItsAxisWithItsDeviation) {
   double sum = 0.0;
   for (const SpeedSample& sample : samples) {
     const MotionState state = scene.body.at(toSeconds(sample.time - kStart));
-    // A vehicle does not skid: its speed along its axis is its speed.
+    // A vehicle does not skid, so that its velocity is parallel to its axis.
     EXPECT_NEAR(state.velocity_W.norm(), state.velocity_W.dot(state.T_WB.R().col(0)), 0.05);
     const double error = sample.speed - state.velocity_W.dot(state.T_WB.R().col(0));
     sum += error * error / 3001.0;

@@ -1,4 +1,4 @@
-// Each scene shows what its sentence says.
+// Tests that each scene shows what its description states.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,7 +27,7 @@ std::vector<const SceneObject*> ofClass(const Scene& scene, const std::string& n
   return found;
 }
 
-/// Angle between the optical axis and the way to a thing's centre, radians.
+/// Returns the angle between the optical axis and the direction of the object's centre, in radians.
 double offAxis(const Scene& scene, const SceneObject& object, double t) {
   const RigidTransform T_WC = cameraPose(scene, t);
   const Eigen::Vector3d way = (object.motion.poseAt(t).p - T_WC.p).normalized();
@@ -38,7 +38,7 @@ struct Span {
   double width = 0.0, height = 0.0;
 };
 
-/// What its corners span in the image; nothing where not all are in it.
+/// Returns the extent of the object's corners in the image, or nothing if a corner is outside.
 std::optional<Span> spanOf(const Scene& scene, const SceneObject& object, double t) {
   const CameraModel camera(scene.rig.calibration.cameras[0]);
   const RigidTransform T_CO = cameraPose(scene, t).inverse() * object.motion.poseAt(t);
@@ -53,7 +53,7 @@ std::optional<Span> spanOf(const Scene& scene, const SceneObject& object, double
   return Span{high.x() - low.x(), high.y() - low.y()};
 }
 
-/// All but the thing itself, as boxes; one sees under a table.
+/// Returns all other objects as boxes. A table is only its top, because the space below it is open.
 std::vector<Solid> othersThan(const Scene& scene, const SceneObject& object, double t) {
   std::vector<Solid> others;
   for (const Prop& prop : scene.props) {
@@ -74,7 +74,7 @@ bool sees(const std::vector<Solid>& others, const Eigen::Vector3d& eye,
                       [&](const Solid& solid) { return blocks(solid, eye, target); });
 }
 
-/// Share of a grid of points of the thing's box that nothing else's box hides.
+/// Returns the share of a grid of points of the object's box that no other box hides.
 double shareSeen(const Scene& scene, const SceneObject& object, double t) {
   const Eigen::Vector3d eye = cameraPose(scene, t).p;
   const std::vector<Solid> others = othersThan(scene, object, t);
@@ -217,7 +217,7 @@ TEST(Vanish, ChangesWhatIsBehindOnesBackAndLooksAgain) {
       if (!goes && !object.steps) continue;
       const double changes = object.steps ? 12.4 : object.present_until_s;
       for (double t = changes - 1.5; t < changes + 1.5; t += 0.1) {
-        EXPECT_GT(offAxis(scene, object, t), 1.0) << t;  // the image reaches to 0.87
+        EXPECT_GT(offAxis(scene, object, t), 1.0) << t;  // the image extends to 0.87
       }
       for (const double t : {2.0, 5.0, 21.0, 24.0}) EXPECT_LT(offAxis(scene, object, t), 0.65) << t;
       EXPECT_GT(shareSeen(scene, object, 4.0), 0.5);
@@ -285,7 +285,7 @@ TEST(Traffic, HasCarsThatPassCrossDriveOffAndArrive) {
       out += early.velocity_W.norm() < 1e-6 && late.velocity_W.x() > 5.0;
       arrived += early.velocity_W.norm() > 3.0 && late.velocity_W.norm() < 1e-3;
       walkers += object.class_name == "person";
-      // It looks where it goes.
+      // The camera points in the direction of motion.
       if (middle.velocity_W.norm() > 1.0) {
         EXPECT_GT(middle.velocity_W.normalized().dot(middle.T_WB.R().col(0)), 0.99) << object.id;
       }
@@ -313,7 +313,7 @@ TEST(Town, HasFourKilometresAndFiveHundredVehicles) {
   EXPECT_GT(driven, 4000.0);
 }
 
-/// What stands in one block of the scene of blocks, relative to its south-west crossing.
+/// The contents of one block of the scene of blocks, relative to its south-west crossing.
 struct BlockContents {
   std::vector<const SceneObject*> objects;
   std::vector<RigidTransform> places;
@@ -333,7 +333,8 @@ std::map<std::pair<int, int>, BlockContents> contentsOfBlocks(const Scene& scene
   return blocks;
 }
 
-/// How many things of `a` have no like of the same size at the same place in `b`.
+/// Returns how many objects of `a` have no counterpart of equal class and size at the same place in
+/// `b`.
 std::size_t missingIn(const BlockContents& a, const BlockContents& b) {
   std::size_t missing = 0;
   for (std::size_t i = 0; i < a.objects.size(); ++i) {
@@ -353,7 +354,7 @@ TEST(Blocks, AreEqualButForAFewThingsAndInAMinorityForMany) {
     const Scene scene = makeScene("blocks", seed, {});
     const auto blocks = contentsOfBlocks(scene);
     ASSERT_EQ(blocks.size(), 56u);
-    // The design: the block that most others are equal to.
+    // The design: the block that equals most others.
     std::size_t equal = 0, few = 0, many = 0;
     const BlockContents* design = nullptr;
     for (const auto& [at, block] : blocks) {
@@ -381,7 +382,7 @@ TEST(Blocks, AreEqualButForAFewThingsAndInAMinorityForMany) {
 TEST(Blocks, AreLongOutOfSightAndThenSeenAgainFromBothDirections) {
   for (const auto seed : kSeeds) {
     const Scene scene = makeScene("blocks", seed, {});
-    std::vector<RigidTransform> way;  // a second apart
+    std::vector<RigidTransform> way;  // one pose per second
     double driven = 0.0;
     for (double t = 0.0; t < scene.seconds; t += 1.0) {
       way.push_back(scene.body.poseAt(t));
@@ -416,7 +417,7 @@ TEST(Random, ShowsAllClassesAtAllSizesUpright) {
   for (std::uint64_t seed = 0; seed < 24; ++seed) {
     const Scene scene = makeScene("random", seed, options);
     for (double t = 0.0; t < scene.seconds; t += 1.0) {
-      // What is seen is seen in passing, not in the leap to the next view.
+      // Objects are seen in motion, not during the jump to the next view.
       EXPECT_LT(scene.body.at(t).velocity_W.norm(), 7.5);
       for (const SceneObject& object : scene.objects) {
         const auto span = spanOf(scene, object, t);

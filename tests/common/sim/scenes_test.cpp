@@ -31,7 +31,7 @@ std::vector<std::uint64_t> seedsOf(const std::string& name) {
 
 bool onVehicle(const Scene& scene) { return scene.rig.speed.has_value(); }
 
-/// The times at which things are where they are: once where nothing moves.
+/// Returns the times of the checks; one time if nothing moves.
 std::vector<double> timesOf(const Scene& scene) {
   const bool moves = std::any_of(scene.objects.begin(), scene.objects.end(),
                                  [](const SceneObject& o) { return o.moves; });
@@ -43,7 +43,7 @@ std::vector<double> timesOf(const Scene& scene) {
 struct Thing {
   Solid solid;
   std::string name;
-  std::size_t owner;  ///< trunk and crown of a tree are one
+  std::size_t owner;  ///< one owner for the trunk and the crown of a tree
 };
 
 std::vector<Thing> thingsOf(const Scene& scene, double t) {
@@ -92,7 +92,7 @@ TEST_P(EveryScene, HasNothingThatStandsInSomethingElse) {
 TEST_P(EveryScene, LetsItsBodyPass) {
   for (const std::uint64_t seed : seedsOf(GetParam())) {
     const Scene scene = makeScene(GetParam(), seed, {});
-    const bool views = GetParam() == "random";  // it is nowhere between its views
+    const bool views = GetParam() == "random";  // between its views, the body has no valid place
     const double clearance = onVehicle(scene) ? 1.0 : 0.15, step = views ? 1.0 : 0.1;
     std::vector<Thing> things = thingsOf(scene, 0.0);
     const bool moving = timesOf(scene).size() > 1;
@@ -128,7 +128,7 @@ TEST_P(EveryScene, HasEverythingStandOnTheGroundOrOnSomething) {
 }
 
 TEST_P(EveryScene, MovesAsBodiesCan) {
-  if (GetParam() == "random") return;  // single views, with leaps in between
+  if (GetParam() == "random") return;  // single views with jumps in between
   for (const std::uint64_t seed : seedsOf(GetParam())) {
     const Scene scene = makeScene(GetParam(), seed, {});
     for (double t = -1.0; t <= scene.seconds; t += 0.02) {
@@ -137,7 +137,7 @@ TEST_P(EveryScene, MovesAsBodiesCan) {
       ASSERT_LT(state.velocity_W.norm(), 11.0);
       ASSERT_LT(state.angular_velocity_B.norm(), 2.0) << "seed " << seed << ", " << t << " s";
       ASSERT_LT(state.angular_acceleration_B.norm(), 8.0) << "seed " << seed << ", " << t << " s";
-      // Whoever drives begins at rest, so that a filter can find its biases.
+      // Every drive begins at rest, so that a filter can estimate the biases.
       if (t < 0.8) {
         ASSERT_LT(state.velocity_W.norm(), 0.03) << t;
       }
@@ -207,7 +207,8 @@ TEST_P(EveryScene, KeepsToItsOptions) {
     EXPECT_EQ(camera.height, 240u);
     EXPECT_EQ(camera.rate_hz, 10.0);
     EXPECT_GT(camera.readout_s, 0.0);
-    // What is before the body is in the middle of the image, up is up.
+    // A point ahead of the body is in the middle of the image, and up in the world is up in the
+    // image.
     const CameraModel model(camera);
     const auto ahead = model.project(camera.T_BC.inverse() * Eigen::Vector3d(50, 0, 0));
     const auto above = model.project(camera.T_BC.inverse() * Eigen::Vector3d(50, 0, 5));

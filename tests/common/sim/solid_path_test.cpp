@@ -20,10 +20,10 @@ TEST(Solid, MeetsWhatItReachesIntoAndNothingElse) {
   EXPECT_TRUE(meet(box(0, 0, 0), box(4.1, 0, 0), 0.2));
   EXPECT_FALSE(meet(box(0, 0, 0), box(0, 2.1, 0)));
   EXPECT_TRUE(meet(box(0, 0, 0), box(0, 2.1, M_PI_2)));
-  // Corner to corner: only turned axes part them.
+  // Corner to corner: only the rotated axes separate them.
   EXPECT_FALSE(meet(box(0, 0, 0), box(3.2, 2.7, M_PI_4)));
   EXPECT_TRUE(meet(box(0, 0, 0), box(3.0, 2.6, M_PI_4)));
-  // One on the other.
+  // One box on top of the other.
   EXPECT_FALSE(meet(box(0, 0, 0), box(0, 0, 0.3, 1.5), -1e-9));
   EXPECT_TRUE(meet(box(0, 0, 0), box(0, 0, 0.3, 1.4)));
 }
@@ -53,7 +53,7 @@ TEST(GroundPath, HasCurvatureThatItsHeadingAndPositionsShow) {
     most = std::max(most, now.curvature);
   }
   EXPECT_NEAR(most, 1.0 / 6.0, 0.03);
-  // Round and round: the heading goes on, the place comes back.
+  // After one lap, the heading has increased by a full turn and the position is the same.
   const PathPoint first = path.at(13.0), second = path.at(13.0 + path.length());
   EXPECT_LT((first.position - second.position).norm(), 1e-9);
   EXPECT_NEAR(second.heading - first.heading, 2 * M_PI, 1e-9);
@@ -96,7 +96,7 @@ TEST(VehicleMotion, PointsAlongItsWayAndLeansOutwards) {
   const Eigen::Vector3d ahead = turning.T_WB.R().col(0), left = turning.T_WB.R().col(1);
   EXPECT_GT(turning.angular_velocity_B.z(), 0.3);
   EXPECT_GT(turning.velocity_W.normalized().dot(ahead), 0.999);
-  EXPECT_GT(left.z(), 0.005);  // in a left turn the left side rises
+  EXPECT_GT(left.z(), 0.005);  // in a left turn, the left side rises
   EXPECT_NEAR(turning.T_WB.p.z(), suspension.height, 1e-9);
 }
 

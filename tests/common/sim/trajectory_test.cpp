@@ -45,7 +45,8 @@ TEST(Trajectory, IsContinuousUpToTheRateOfItsAccelerations) {
   const Trajectory trajectory(0.0, 0.5, wildControls(2, 12));
   const double h = 1e-7;
   for (int i = -6; i < 30; ++i) {
-    const double knot = 0.25 * i;  // of the position's spline and, half-way, of the rotation's
+    const double knot = 0.25 * i;  // knots of the position's spline and, half-way, of the
+                                   // rotation's
     const MotionState before = trajectory.at(knot - h), after = trajectory.at(knot + h);
     EXPECT_LT((after.velocity_W - before.velocity_W).norm(), 1e-5);
     EXPECT_LT((after.acceleration_W - before.acceleration_W).norm(), 1e-4);

@@ -48,7 +48,7 @@ class TruthFolder : public testing::Test {
     scene.objects = {chair(4, Trajectory(place(2, 0.5)))};
     writeObjectsTruth(folder_, truthOf(scene, kEpoch));
   }
-  /// What reading says; empty where it succeeds.
+  /// Returns the error of reading; empty on success.
   std::string complaint() const {
     try {
       readTruth(folder_);

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::uint32_t kWidth = 96, kHeight = 64;
 
-/// A smooth picture: JPEG is made for those.
+/// A smooth picture, which JPEG compresses well.
 Frame picture(ImageEncoding encoding) {
   const std::uint32_t channels = channelsOf(encoding);
   std::vector<std::uint8_t> pixels;

@@ -1,11 +1,13 @@
-# Sourced by guest_test.sh: what is tried laid on a disk of its own, the camera, the guest.
+# Functions of guest_test.sh that prepare the disk with the tested programs, start the camera, and
+# run the guest.
 
-# stage FOLDER: what the package perdure-services holds, where it lies when it is installed, and the job.
+# stage FOLDER: fills FOLDER with the files of the package perdure-services at their installed
+# paths, and with the guest's job.
 stage() {
   local tree=$1
   rm -rf "$tree"
   DESTDIR=$tree cmake --install "$PERDURE_BUILD" --component services --prefix /usr > /dev/null
-  # Folders outside of the prefix are those that the build was configured with.
+  # Folders outside the prefix are those of the build's configuration.
   local etc
   etc=$(dirname "$(find "$tree" -name capture.yaml)")
   mkdir -p "$tree/etc/perdure" "$tree/guest" "$tree/etc/systemd/system/multi-user.target.wants"
@@ -23,16 +25,16 @@ stage() {
   cp "$guest/inside/guest-test.service" "$tree/etc/systemd/system/"
   ln -s ../guest-test.service "$tree/etc/systemd/system/multi-user.target.wants/"
   mkdir -p "$tree/etc/systemd/system/perdure-capture.service.d"
-  # The emulator stands still for seconds where the machine is busy: the watchdog would take that for capture's.
-  # What is freed is overwritten, so that nobody uses it unnoticed.
+  # The emulator stalls for seconds on a busy machine. The longer watchdog time avoids false alarms.
+  # MALLOC_PERTURB_ overwrites freed memory, which exposes its use.
   printf '[Service]\nWatchdogSec=30\nLimitCORE=infinity\nTimeoutStopFailureMode=abort\nTimeoutAbortSec=60\nEnvironment=MALLOC_PERTURB_=165\n' \
     > "$tree/etc/systemd/system/perdure-capture.service.d/core.conf"
 }
 
-# make_disk TREE IMAGE: of root's, whoever made it.
+# make_disk TREE IMAGE: makes a file system of TREE whose root folder belongs to root.
 make_disk() { rm -f "$2"; mke2fs -q -t ext4 -F -E root_owner=0:0 -d "$1" "$2" 300M; }
 
-# start_camera and run_guest: their output lies in the folder of the run.
+# start_camera and run_guest write their output into the run's folder.
 start_camera() {
   python3 "$guest/camera.py" "$run/camera.socket" "$run/share/command" > "$run/camera.log" 2>&1 &
   camera=$!

@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 """A UVC camera for QEMU's usb-redir. usage: camera.py SOCKET COMMANDS
 
-It looks at a fixed scene. Each frame has its number in it, counted over all times that it is plugged: 32 squares in
-the first rows, the lowest bit first. COMMANDS is a file that others write and it takes away, one command:
+It shows a fixed scene. Each frame contains its number, which continues over all plugs: 32 squares
+in the first rows, lowest bit first. Other programs write one command into the file COMMANDS; the
+camera removes the file:
   unplug SECONDS | truncate FRAMES (sends half of each) | silent SECONDS
-It prints what it does, a line each: `sent N` (the last number before that), `started N`, `set CONTROL VALUE`."""
+It prints one line for each action: `told COMMAND`, `sent N` (the last number so far), `started N`,
+`set CONTROL VALUE`."""
 import os
 import random
 import socket
@@ -19,7 +21,7 @@ SQUARE = 8
 
 
 def scene(width, height):
-    """Grey rectangles, the same in each run: corners that can be followed."""
+    """Grey rectangles, the same in each run: they have corners that vio can track."""
     dice = random.Random(7)
     grey = [[128] * width for _ in range(height)]
     for _ in range(400):
@@ -44,7 +46,7 @@ class Camera(RedirectedDevice):
     interfaces = [(0, 14, 1, 0), (1, 14, 2, 0)]
     bulk_in = (0x81, 1, 512)
     pictures = {size: scene(*size) for size in uvc.SIZES}
-    sent = 0  # the number of the last frame that began; goes on when another one is plugged
+    sent = 0  # the number of the last frame; it continues after a new plug
 
     def __init__(self, connection):
         super().__init__(connection)
@@ -60,7 +62,7 @@ class Camera(RedirectedDevice):
                 uvc.text(value & 255) if value >> 8 == 3 and value & 255 <= len(uvc.TEXTS) else None)
         if kind == 0x80 and request == 0:
             return b'\0\0'
-        if kind == 2 and request == 1:  # the endpoint is cleared: a stream ends, or is about to begin
+        if kind == 2 and request == 1:  # the endpoint is cleared: a stream ends or is about to begin
             self.stop()
         if kind in (0, 1, 2):
             return b''
@@ -98,7 +100,8 @@ class Camera(RedirectedDevice):
         self.streaming, self.pending = False, []
 
     def expose(self):
-        """A frame, where it is time for one. Where the host is still busy with the last one, it has none."""
+        """Makes a frame if one is due; skips it while the host is still busy with the previous
+        one."""
         now = time.monotonic()
         if not self.streaming or now < self.next or now < self.silent_until:
             return
@@ -119,7 +122,8 @@ class Camera(RedirectedDevice):
                         for i, part in enumerate(parts)]
 
     def run(self, commands):
-        """Until it is unplugged, for so many seconds; None where the guest is gone."""
+        """Runs until an unplug command and returns its duration in s, or None if the guest has
+        gone."""
         while self.listen(.004):
             self.expose()
             while self.asked and self.pending:
@@ -142,7 +146,7 @@ def command(path):
         return []
     with open(path, encoding='ascii') as file:
         words = file.read().split()
-    if len(words) == 2:  # else it is still being written
+    if len(words) == 2:  # otherwise the writer has not finished
         os.unlink(path)
         return words
     return []

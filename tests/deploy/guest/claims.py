@@ -1,4 +1,4 @@
-"""What is claimed of a run, and the figures of it. Each function takes a Run and a Report."""
+"""The claims about a run, with their figures. Each function takes a Run and a Report."""
 import re
 import statistics
 
@@ -30,7 +30,7 @@ def controls_are_told(run, report):
 
 
 def images_are_counted(run, report):
-    """Of the first opening: up to the silence in which the camera is opened again."""
+    """Checks the first opening, up to the silence after which capture opens the camera again."""
     frames = [f for f in run.between(run.frames, 'booted', 'all_counted') if f.number <= (run.sent_before('silent') or 0)]
     after = [h for h in run.health_of('capture') if frames and h.heard > frames[-1].heard]
     if not frames or not after:
@@ -61,7 +61,7 @@ def flow_is_well(run, report):
 
 
 def offsets_to(stamps, kernel):
-    """Of each stamp, its difference from the last time in `kernel` that is not after it, once a constant is taken off."""
+    """Returns the difference of each stamp from the last time in `kernel` that is not later."""
     out, at = [], 0
     for stamp in stamps:
         while at + 1 < len(kernel) and kernel[at + 1] <= stamp:
@@ -116,7 +116,8 @@ def capture_lives(run, report, wanted):
 
 
 def images_come_back(run, report):
-    """From when udev has told of the nodes, which is when they may be opened: what was before that is the emulator's."""
+    """Measured from the time at which udev reports the nodes, because they can be opened only
+    then. Earlier delays are those of the emulator."""
     of = spans.comebacks(run)
     if not of:
         return
@@ -134,14 +135,14 @@ def images_come_back(run, report):
 
 
 def mistakes_are_survived(run, report, wanted):
-    """udev says that a camera is gone which is there; that nothing crashed is claimed of the whole run."""
+    """udev reports a present camera as removed. Another claim covers crashes in the whole run."""
     made = [int(m[9:]) for m in run.marks if m.startswith('mistaken_')]
     silent = [m for m in run.marks if m.startswith('no_frames_after_mistake')]
     report.claim(made == [wanted] and not silent, f'{made} of {wanted} times udev was mistaken, and images came back ({silent[:3]})')
 
 
 def stops_are_quick(run, report, wanted):
-    """systemd's own times: from its SIGTERM to the end of the process."""
+    """Uses systemd's own times: from its SIGTERM to the end of the process."""
     stops = [line.split() for line in run.read('stops').splitlines()]
     for kind in sorted({s[0] for s in stops}):
         took = [(int(s[2]) - int(s[1])) / 1e6 for s in stops if s[0] == kind]
@@ -151,7 +152,8 @@ def stops_are_quick(run, report, wanted):
 
 
 def odometry_goes_on(run, report, wanted):
-    """Judged as images are: from when udev has told of the nodes, to odometry that may be used, of an image since the plug."""
+    """Measured like images: from the time at which udev reports the nodes to usable odometry for
+    an image taken after the plug."""
     usable = [o for o in run.odometry if o[2] in (1, 2)]
     plugs = [c for c in spans.comebacks(run) if run.marks.get('vio', 0) <= c.plug < run.marks.get('vio_ends', 0)]
     firsts = [next((o[4] for o in usable if o[1] - run.wall >= c.plug and o[4] < c.until), None) for c in plugs]

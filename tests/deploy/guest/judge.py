@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Judges what a guest left in its folder: usage: judge.py RUN --unplugs N --mistakes N --unplugs-with-vio N --stops N. A line for each claim; 1 where one fails."""
+"""Judges the files that a guest left in its folder. Prints a line for each claim; exits with 1 if
+one fails."""
 import argparse
 import pathlib
 import sys

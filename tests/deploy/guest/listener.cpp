@@ -1,5 +1,6 @@
-// Notes what capture and vio say on the bus, a line each: for the test of live sensors in a guest.
-// usage: guest_listener OUT TOUCHED; the file TOUCHED is touched with each frame.
+// Records the messages of capture and vio, one per line, for the test of live sensors in a guest.
+// Each frame updates the time of the file TOUCHED.
+// usage: guest_listener OUT TOUCHED
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/os.h>
@@ -14,7 +15,7 @@
 namespace perdure {
 namespace {
 
-constexpr std::uint32_t kSquare = 8;  // pixels, of the number in the image
+constexpr std::uint32_t kSquare = 8;  // pixels, side of a bit of the number in the image
 
 std::int64_t read(clockid_t clock) {
   timespec t{};
@@ -22,7 +23,8 @@ std::int64_t read(clockid_t clock) {
   return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
 }
 
-/// How far CLOCK_REALTIME is ahead, read where the least time went by in between.
+/// Returns the lead of CLOCK_REALTIME over CLOCK_MONOTONIC in ns, from the fastest of several
+/// readings.
 std::int64_t wallAhead() {
   std::int64_t ahead = 0, least = std::numeric_limits<std::int64_t>::max();
   for (int i = 0; i < 20; ++i) {
@@ -35,7 +37,7 @@ std::int64_t wallAhead() {
   return ahead;
 }
 
-/// The number that the camera drew: 32 squares in the first rows, the lowest bit first.
+/// Returns the number that the camera drew: 32 squares in the first rows, lowest bit first.
 std::uint32_t numberIn(const Frame& frame) {
   const std::uint32_t channels = channelsOf(frame.encoding);
   const std::size_t row = std::size_t{frame.width} * (kSquare / 2) * channels;

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# A Debian root of this machine's release for the guest, its kernel, and the modules that Debian's kernel leaves out.
-# usage: make_root.sh FOLDER; makes FOLDER/{root.img,vmlinuz,initrd}, unless what they are made of is as it was.
-# 77 where something that it needs is absent.
+# Makes a Debian root of this machine's release for the guest, its kernel, and the modules that
+# Debian's kernel lacks: FOLDER/{root.img,vmlinuz,initrd}. Does nothing if the inputs are unchanged.
+# Exits with 77 if a requirement is missing.
+# usage: make_root.sh FOLDER
 set -euo pipefail
 here=$(dirname "$(realpath "$0")")
 source=$(realpath "$here/../../..")
@@ -24,7 +25,7 @@ made_of=$({ echo "$version ${packages[*]}"; cat "$0" "$here"/kernel/*; } | sha25
 [ -n "$version" ] && [ -d "/usr/src/linux-headers-$version" ] && [ -e "/usr/src/linux-source-$series.tar.xz" ] ||
   skip "the kernel's headers or its source are not here (deploy/install --guest)"
 
-# Sources of IIO's trigger by a timer, from Debian's kernel.
+# Sources of IIO's timer trigger, from Debian's kernel.
 modules=$folder/modules
 rm -rf "$modules"
 mkdir -p "$modules"
@@ -51,7 +52,8 @@ chmod +x "$root/usr/sbin/policy-rc.d"
 inside() { DEBIAN_FRONTEND=noninteractive LC_ALL=C chroot "$root" "$@" >> "$folder/root.log" 2>&1; }
 inside apt-get -q update || skip "apt-get update fails in the root"
 mkdir -p "$root/etc/initramfs-tools/conf.d"
-# The initial RAM disk holds what reaches the root, no more: emulation unpacks it slowly.
+# The initial RAM disk holds only the modules that reach the root, because its unpacking is slow in
+# the emulator.
 echo 'MODULES=list' > "$root/etc/initramfs-tools/conf.d/small"
 printf '%s\n' virtio_pci virtio_blk ext4 crc32c_generic > "$root/etc/initramfs-tools/modules"
 inside apt-get -q -y install --no-install-recommends initramfs-tools &&
@@ -64,7 +66,7 @@ inside depmod "$version"
 cp "$root/boot/vmlinuz-$version" "$folder/vmlinuz"
 cp "$root/boot/initrd.img-$version" "$folder/initrd"
 
-# The first process: it lays what is tried over the root, and goes on as systemd.
+# The first process copies the tested files over the root and then becomes systemd.
 cat > "$root/sbin/guest-init" <<'TEXT'
 #!/bin/sh
 mount -o remount,rw / && mount -o ro /dev/vdb /mnt && cp -a /mnt/. / && umount /mnt && systemd-sysusers

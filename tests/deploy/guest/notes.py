@@ -1,11 +1,11 @@
-"""What a guest left in its folder, read."""
+"""Reads the files that a guest left in its folder."""
 import re
 import statistics
 
 MS = 1_000_000
 SECOND = 1000 * MS
 FOREVER = 1 << 62
-NOT_CAPTURE = ('v4l_id', 'v4l2-ctl', '(udev-worker)')  # who else opens a video node
+NOT_CAPTURE = ('v4l_id', 'v4l2-ctl', '(udev-worker)')  # other programs that open a video node
 
 
 class Frame:
@@ -32,7 +32,8 @@ class Health:
 
 
 class Run:
-    """Times in nanoseconds of the guest's CLOCK_MONOTONIC, but stamps, which are on the wall clock of capture's start."""
+    """Times in nanoseconds of the guest's CLOCK_MONOTONIC. Stamps use the wall clock of
+    capture's start."""
 
     def __init__(self, folder):
         self.folder = folder
@@ -53,7 +54,7 @@ class Run:
                 elif kind == 'clocks':
                     self.clocks.append([int(w) for w in words])
             except ValueError:
-                continue  # the last line, cut off
+                continue  # the last line may be incomplete
         self.marks = {}
         for line in self.read('marks').splitlines():
             name, at = line.split()
@@ -76,8 +77,9 @@ class Run:
                 of_event[found[4]].append(int(found[2]) * SECOND + int(found[3]) * 1000)
 
     def read_udev(self):
-        """When the kernel made or removed a node, and when udev told those who listen for that, as libcamera does: its
-        permissions are set by then. Of what is removed the media device says enough: libcamera listens for that one."""
+        """Reads when the kernel made or removed a node, and when udev reported it to listeners
+        such as libcamera; the permissions are set by then. For removals only the media device
+        counts, because libcamera listens to it."""
         for line in self.read('udev_events').splitlines():
             found = re.match(r'(KERNEL|UDEV) *\[(\d+)\.(\d{6})\] (add|remove) .*\((media|video4linux)\)', line)
             if not found or (found[4] == 'remove' and found[5] != 'media'):
@@ -91,7 +93,8 @@ class Run:
         return path.read_text(errors='replace') if path.exists() else ''
 
     def stamps_of_the_kernel(self):
-        """Of v4l2_dqbuf: `timestamp` in microseconds or nanoseconds, with its unit left open by the kernel."""
+        """Stamps of v4l2_dqbuf. `timestamp` is in microseconds or nanoseconds; the kernel does
+        not state the unit."""
         return [int(t) for t in re.findall(r'v4l2_dqbuf: .*?timestamp = (\d+)', self.read('trace'))]
 
     def between(self, things, start, end, at=lambda t: t.heard):
@@ -101,6 +104,7 @@ class Run:
         return [h for h in self.between(self.health, start, end) if h.process == process]
 
     def sent_before(self, command):
-        """Images that the camera had sent when it was first told so."""
+        """Returns the number of images that the camera had sent at the first command of this
+        kind."""
         found = re.search(rf'^told {command}.*\nsent (\d+)$', self.camera_log, re.M)
         return int(found[1]) if found else None

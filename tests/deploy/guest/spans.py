@@ -1,4 +1,4 @@
-"""How long each step took from a plug to the next image on the bus, and which of them are capture's."""
+"""Measures the steps from a plug to the next image on the bus, and capture's share of them."""
 import statistics
 
 from notes import SECOND
@@ -7,7 +7,7 @@ LIMIT = 3 * SECOND
 
 
 class Comeback:
-    """Of one plug: when each step of it was over; None where the next unplug came before."""
+    """The end of each step after one plug; None if the next unplug came first."""
 
     def __init__(self, run, plug, following):
         def first(times, after):
@@ -16,7 +16,7 @@ class Comeback:
         def all_nodes(times):
             of = [t for t in times if plug <= t < self.until]
             return of[-1] if len(of) == run.nodes else None
-        # The first image after a plug is later than all that udev says of its nodes.
+        # The first image after a plug comes later than all reports of udev about its nodes.
         image = next((f for f in run.frames if plug <= f.stamp - run.wall and f.heard < self.until), None)
         self.made, self.told = all_nodes(run.kernel_added), all_nodes(run.udev_added)
         self.opened = first(run.opened, self.told)
@@ -24,7 +24,8 @@ class Comeback:
         self.taken, self.heard = (image.stamp - run.wall, image.heard) if image else (None, None)
 
     def own(self):
-        """From udev's word to the bus: the time taken, or how long it was in vain; None where there is nothing to judge."""
+        """Returns the time from udev's report to the bus, or the time without success; None if
+        the plug cannot be judged."""
         if self.told is None:
             return None
         if self.heard is not None:
@@ -58,7 +59,7 @@ def row(name, spans):
 
 
 def table(run, of):
-    """Lines: each step with how often it was seen, and seconds: least, middle, 95 of 100, most."""
+    """Returns one line for each step: the count, and least, median, 95 % and largest time in s."""
     lines = [f'{"step":38} {"n":>4} ' + ' '.join(f'{head:>7}' for head in ('least', 'middle', '95 %', 'most'))]
     removed = [t for t in run.kernel_removed if run.marks.get('all_counted', 0) <= t < run.end]
     lines.append(row('unplug → the kernel removes the nodes', [t - max(u for u in run.unplugs if u <= t) for t in removed]))

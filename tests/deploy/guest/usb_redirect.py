@@ -1,4 +1,4 @@
-"""A USB device at the end of a socket, for QEMU's usb-redir (protocol of usbredir, version 0.7)."""
+"""A USB device at the end of a socket, for QEMU's usb-redir (usbredir protocol, version 0.7)."""
 import select
 import struct
 
@@ -8,14 +8,15 @@ SET_ALTERNATE, GET_ALTERNATE, ALTERNATE_STATUS = 9, 10, 11
 CANCEL, CONTROL, BULK = 21, 100, 101
 SUCCESS, CANCELLED, STALL = 0, 1, 4
 HIGH_SPEED = 2
-CAPABILITIES = 1 << 4 | 1 << 5 | 1 << 6  # sizes of packets told, 64 bits of ids, 32 bits of bulk length
+CAPABILITIES = 1 << 4 | 1 << 5 | 1 << 6  # stated packet sizes, 64-bit ids, 32-bit bulk lengths
 CONTROL_HEAD, BULK_HEAD = '<BBBBHHH', '<BBHIHH'
 
 
 class RedirectedDevice:
-    """Speaks for one plugged device. A subclass has `identity` (class, subclass, protocol, vendor,
-    product), `interfaces` [(number, class, subclass, protocol)], `bulk_in` (address, interface, packet), and answers
-    control(request_type, request, value, index, length, data) with bytes, or None to stall."""
+    """The protocol for one plugged device. A subclass has `identity` (class, subclass, protocol,
+    vendor, product), `interfaces` [(number, class, subclass, protocol)] and `bulk_in` (address,
+    interface, packet). It implements control(request_type, request, value, index, length, data),
+    which returns bytes, or None for a stall."""
 
     def __init__(self, connection):
         self.connection = connection
@@ -29,7 +30,8 @@ class RedirectedDevice:
         self.connection.sendall(struct.pack('<IIQ', kind, len(body), number) + body)
 
     def listen(self, longest_s):
-        """Handles what comes within that time; False where the other end is gone."""
+        """Handles the messages of the next `longest_s` seconds; returns False if the peer has
+        closed."""
         if not select.select([self.connection], [], [], longest_s)[0]:
             return True
         more = self.connection.recv(1 << 16)
@@ -39,7 +41,7 @@ class RedirectedDevice:
         return bool(more)
 
     def take(self):
-        form = '<IIQ' if self.greeted else '<III'  # the first message has a short id
+        form = '<IIQ' if self.greeted else '<III'  # the first message has a shorter id
         size = struct.calcsize(form)
         if len(self.received) < size:
             return False
@@ -72,7 +74,8 @@ class RedirectedDevice:
             self.asked.append(number)
 
     def plug(self):
-        """Endpoints are numbered 0 … 15 outwards, 16 … 31 inwards; type 255 is none."""
+        """Reports the endpoints: 0 … 15 are outputs, 16 … 31 inputs; type 255 marks an unused
+        one."""
         address, interface, packet = self.bulk_in
         place = 16 + (address & 15)
         types, at, sizes = bytearray([255] * 32), bytearray(32), [0] * 32

@@ -1,8 +1,9 @@
-"""Descriptors and controls of a USB Video Class 1.0 camera: YUYV over a bulk endpoint, exposure and gain."""
+"""Descriptors and controls of a USB Video Class 1.0 camera: YUYV over a bulk endpoint, exposure
+and gain."""
 import struct
 
 SIZES = [(320, 240), (160, 120)]
-INTERVALS = [333333, 666666, 1000000]  # of 100 ns, the shortest first
+INTERVALS = [333333, 666666, 1000000]  # in units of 100 ns, shortest first
 DEFAULT_INTERVAL = 1000000
 PAYLOAD = 16384
 YUY2 = bytes.fromhex('5955593200001000800000aa00389b71')
@@ -74,7 +75,7 @@ class Control:
 
 
 def controls():
-    """By unit and selector."""
+    """Returns the controls by unit and selector."""
     return {(CAMERA, 2): Control('exposure_mode', 1, 1, 8, 9, 8),
             (CAMERA, 4): Control('exposure_100us', 4, 1, 5000, 1, 156),
             (PROCESSING, 2): Control('brightness', 2, 0, 255, 1, 128),
@@ -82,7 +83,7 @@ def controls():
 
 
 def stream_settings(frame, interval):
-    """What the camera makes of a probe."""
+    """Returns the camera's answer to a probe."""
     frame = frame if 1 <= frame <= len(SIZES) else 1
     width, height = SIZES[frame - 1]
     best = min(INTERVALS, key=lambda have: abs(have - interval)) if interval else DEFAULT_INTERVAL

@@ -61,7 +61,7 @@ ros::Time timeOf(std::int64_t ns) {
   return {static_cast<std::int32_t>(ns / kSecond), static_cast<std::uint32_t>(ns % kSecond)};
 }
 
-/// A database that is written, row by row.
+/// A database that is written row by row.
 class Db3 {
  public:
   Db3(const fs::path& file, bool index) {
@@ -149,7 +149,7 @@ ros::Image imageOf(const Frame& frame, const ros::Header& header) {
   return image;
 }
 
-/// Grey values times 16, and a sixteenth in the dark.
+/// Returns grey values times 16, or divided by 16 for a dark image.
 ros::Image twelveBitsOf(const Frame& frame, const ros::Header& header, bool dark) {
   ros::Image image = imageOf(frame, header);
   auto bytes = std::make_shared<std::vector<std::uint8_t>>();

@@ -1,5 +1,5 @@
-// What `perdure record export --ros2` writes, as npm's @mcap/core and
-// @foxglove/rosmsg2-serialization read it.
+// Checks recordings of `perdure record export --ros2`, as npm's @mcap/core and
+// @foxglove/rosmsg2-serialization read them.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@
 namespace perdure::test {
 namespace {
 
-/// What one run of the services may have said, with numbers that are easy to follow.
+/// Messages of a possible run of the services, with simple numbers.
 struct Said {
   Said() {
     calibration.cameras.resize(1);
@@ -25,7 +25,7 @@ struct Said {
     camera.fx = 20, camera.fy = 21, camera.cx = 2, camera.cy = 1;
     camera.distortion = DistortionModel::kRadialTangential;
     camera.distortion_coefficients = {-0.28, 0.07, 0.001, 0.002};
-    // Looks along the body's x axis, 1.5 m above it.
+    // The camera looks along the body's x axis, 1.5 m above it.
     camera.T_BC = {Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5), {0.2, 0.0, 1.5}};
     calibration.imu = ImuCalibration{0.01, 1e-4, 0.1, 1e-3, 100.0};
     stamp = {7, 3, fromNanoseconds(kSensorNs), 0};
@@ -203,7 +203,7 @@ TEST_F(Ros2Export, FramesAreThoseOfRep105AndRep103) {
   const json& pose = odometry["pose"]["covariance"];
   EXPECT_NEAR(pose[0].get<double>(), 0.1, 1e-12);
   EXPECT_NEAR(pose[3 * 6 + 3].get<double>(), 0.02, 1e-12);  // the body's y axis is W's x axis
-  // Along the body's x axis, which is W's y; a turn does not change that to first order.
+  // Along the body's x axis, which is W's y; a rotation does not change that to first order.
   EXPECT_NEAR(odometry["twist"]["covariance"][0].get<double>(), 2.0, 1e-12);
   EXPECT_NEAR(odometry["twist"]["covariance"][7].get<double>(), 1.0 + 9 * 0.03, 1e-12);
   const json moving = last("/tf")["transforms"];
@@ -215,7 +215,7 @@ TEST_F(Ros2Export, FramesAreThoseOfRep105AndRep103) {
   const json fixed_ones = last("/tf_static")["transforms"];
   for (const json& one : fixed_ones) fixed[one["child_frame_id"]] = one;
   EXPECT_EQ(fixed.at("imu_link")["header"]["frame_id"], "base_link");
-  // The camera looks forwards: its link lies as the body does.
+  // The camera looks forwards, so that its link has the body's orientation.
   EXPECT_NEAR(std::abs(fixed.at("cam0_link")["transform"]["rotation"]["w"].get<double>()), 1, 1e-9);
   EXPECT_EQ(fixed.at("cam0_optical")["header"]["frame_id"], "cam0_link");
   EXPECT_NEAR(fixed.at("cam0_optical")["transform"]["rotation"]["x"].get<double>(), -0.5, 1e-9);
@@ -223,7 +223,7 @@ TEST_F(Ros2Export, FramesAreThoseOfRep105AndRep103) {
 
 TEST_F(Ros2Export, ObjectsAreDetectionsAndMarkers) {
   const json detections = last("/perdure/objects")["detections"];
-  ASSERT_EQ(detections.size(), 2u);  // those that are confirmed
+  ASSERT_EQ(detections.size(), 2u);  // only confirmed objects
   EXPECT_EQ(detections[0]["id"], "12");
   EXPECT_NEAR(detections[0]["bbox"]["size"]["x"].get<double>(), 4.0, 1e-9);
   EXPECT_NEAR(yawOf(detections[0]["bbox"]["center"]["orientation"]), M_PI / 2, 1e-9);
@@ -241,13 +241,13 @@ TEST_F(Ros2Export, ObjectsAreDetectionsAndMarkers) {
   EXPECT_EQ(markers[1]["ns"], "car");
   EXPECT_EQ(markers[2]["points"].size(), 26u);
   EXPECT_EQ(markers[3]["text"], "car 12");
-  EXPECT_GT(markers[4]["points"].size(), 60u);  // dashed
+  EXPECT_GT(markers[4]["points"].size(), 60u);  // a dashed line
   EXPECT_EQ(markers[5]["text"], "car 13 (hidden)");
 }
 
 TEST_F(Ros2Export, WhatTheNetworkSawTheLandmarksAndTheStateOfServices) {
   const json found = last("/perdure/detections")["detections"];
-  ASSERT_EQ(found.size(), 1u);  // an answer to a prediction is none
+  ASSERT_EQ(found.size(), 1u);  // an answer to a prediction is not exported
   EXPECT_EQ(found[0]["bbox"]["center"]["position"]["y"], 40.0);
   EXPECT_EQ(found[0]["bbox"]["size_x"], 20.0);
   EXPECT_EQ(found[0]["results"][0]["hypothesis"]["class_id"], "car");

@@ -1,4 +1,4 @@
-// A drive through a street gives the same map whatever it is recorded in.
+// A drive through a street gives the same map in every recording format.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -22,7 +22,7 @@ void runPerdure(std::vector<std::string> arguments, const fs::path& log) {
   ASSERT_EQ(perdure.wait(120s), 0) << perdure.log();
 }
 
-/// Rows without their first field, which names the drive.
+/// Returns the rows without their first field, which names the drive.
 std::string valuesIn(const fs::path& table) {
   std::istringstream lines(contentsOf(table));
   std::string values;
@@ -31,7 +31,7 @@ std::string valuesIn(const fs::path& table) {
   return values;
 }
 
-/// Numbers may differ by what a calibration loses on its way through quaternions.
+/// Numbers may differ by the rounding of the calibration's conversion to quaternions.
 void expectSameTable(const fs::path& a, const fs::path& b) {
   std::istringstream one(valuesIn(a)), other(valuesIn(b));
   std::string left, right;
@@ -56,7 +56,7 @@ TEST(RosDriveMap, IsTheSameFromAFolderAndFromARecording) {
   runPerdure({"simulate", "--scene", "street", "--seconds", "4", "--rate", "10", "--size",
               "320x240", "--quiet", "--out", folder.string()},
              place / "simulate.log");
-  fs::remove_all(folder / "mav0" / "speed0");  // what ROS has no message for
+  fs::remove_all(folder / "mav0" / "speed0");  // ROS has no message for the vehicle's speed
   const auto rig = writeImuRig(*Dataset::open({.path = folder}), place / "rig.yaml");
   std::vector<fs::path> files{folder, place / "street.bag"};
   if (whyNoRosbag().empty()) {

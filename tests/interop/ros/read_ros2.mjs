@@ -1,5 +1,5 @@
-// Reads a ROS 2 recording by its index and prints one JSON line for each message, and one for the
-// file: its profile, its channels, and where a definition is not that of ROS 2 (Humble).
+// Reads a ROS 2 recording by its index. Prints one JSON line for each message, and one for the
+// file: its profile, its channels, and each definition that differs from ROS 2 Humble.
 import { open } from "node:fs/promises";
 import { McapIndexedReader } from "@mcap/core";
 import { parse } from "@foxglove/rosmsg";
@@ -7,7 +7,7 @@ import { ros2humble } from "@foxglove/rosmsg-msgs-common";
 import { MessageReader } from "@foxglove/rosmsg2-serialization";
 import { decompress } from "fzstd";
 
-// vision_msgs 4 is not among npm's: as its documentation has it.
+// npm's packages lack vision_msgs 4; these definitions follow its documentation.
 const vision = {
   "vision_msgs/Detection2DArray": "std_msgs/Header header, vision_msgs/Detection2D[] detections",
   "vision_msgs/Detection2D":
@@ -23,7 +23,7 @@ const vision = {
     "vision_msgs/ObjectHypothesis hypothesis, geometry_msgs/PoseWithCovariance pose",
   "vision_msgs/ObjectHypothesis": "string class_id, float64 score",
 };
-// The parser has its own words for these two.
+// The parser uses other names for these types.
 const aliases = { "builtin_interfaces/Time": "time", "builtin_interfaces/Duration": "duration", byte: "uint8" };
 const textOf = (definitions) =>
   definitions

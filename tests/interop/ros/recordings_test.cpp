@@ -1,4 +1,4 @@
-// Recordings of ROS that programs of others wrote: rosbag (ROS 1), npm's @mcap/core with
+// ROS recordings of foreign programs: rosbag (ROS 1), npm's @mcap/core with
 // @foxglove/rosmsg2-serialization (ROS 2).
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -8,13 +8,13 @@ namespace {
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 
-constexpr char kPython[] = "/usr/bin/python3";  // whose packages are Debian's
+constexpr char kPython[] = "/usr/bin/python3";  // uses Debian's packages
 
 fs::path scriptOf(const std::string& name) { return sources() / "tests/interop/ros" / name; }
 
 }  // namespace
 
-/// Called by `env`, which is everywhere: where npm is not, it says so and ends.
+/// Starts npm through `env`, which always exists. If npm is missing, `env` reports that and exits.
 Npm::Npm() {
   for (const char* name : {"package.json", "write_mcap.mjs", "read_ros2.mjs"})
     fs::copy_file(scriptOf(name), place_.file(name));

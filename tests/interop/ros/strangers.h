@@ -1,5 +1,4 @@
-// Programs that are not ours, as tests call them: npm's libraries for MCAP and ROS 2, Debian's
-// rosbag.
+// Foreign programs that tests call: npm's libraries for MCAP and ROS 2, Debian's rosbag.
 #pragma once
 
 #include <filesystem>
@@ -10,13 +9,13 @@
 
 namespace perdure::test {
 
-/// The scripts of this folder over npm's libraries, which are installed when it is first asked for.
+/// Runs the scripts of this folder with npm's libraries, which are installed at the first use.
 class Npm {
  public:
   static const Npm& one();
-  /// Why there are none; empty where they are.
+  /// Returns why npm's libraries are missing; empty if they are installed.
   const std::string& whyNot() const { return why_not_; }
-  /// A script and its arguments; what it printed. It must end well.
+  /// Runs a script with its arguments and returns its output. The script must succeed.
   std::string run(std::vector<std::string> command) const;
 
  private:
@@ -25,9 +24,9 @@ class Npm {
   std::string why_not_;
 };
 
-/// Empty where there is one.
+/// Returns why rosbag is missing; empty if it is installed.
 std::string whyNoRosbag();
-/// compression: none, bz2, lz4.
+/// compression: none, bz2 or lz4.
 void writeBag(const std::filesystem::path& plan, const std::filesystem::path& bag,
               const std::string& compression);
 

@@ -1,4 +1,6 @@
-"""Writes a drive (plan.json and its images) as a bag of ROS 1 by rosbag: write_bag.py PLAN BAG [bz2|lz4]"""
+"""Writes a drive (plan.json and its images) as a bag of ROS 1 by rosbag.
+
+usage: write_bag.py PLAN BAG [bz2|lz4]"""
 import json
 import pathlib
 import sys

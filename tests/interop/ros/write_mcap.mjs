@@ -1,5 +1,5 @@
-// Writes a drive (plan.json and its images) as a ROS 2 recording by npm's libraries:
-// write_mcap.mjs PLAN MCAP
+// Writes a drive (plan.json and its images) as a ROS 2 recording by npm's libraries.
+// usage: write_mcap.mjs PLAN MCAP
 import { open, readFile } from "node:fs/promises";
 import path from "node:path";
 import { McapWriter } from "@mcap/core";
@@ -24,7 +24,7 @@ const writer = new McapWriter({
 });
 await writer.start({ profile: "ros2", library: "npm" });
 
-// Definitions come parsed; ROS 2 writes them as text, which a reader may or may not look at.
+// The package has parsed definitions. ROS 2 writes them as text, which readers may use.
 const textOf = (fields) =>
   fields.definitions
     .filter((one) => !one.isConstant)

@@ -61,7 +61,7 @@ std::map<std::string, std::vector<json>> BridgeRig::heard() const {
   std::map<std::string, std::vector<json>> by_topic;
   std::istringstream text(listener_->log());
   for (std::string line; std::getline(text, line);) {
-    const json message = json::parse(line, nullptr, false);  // the last may not be whole yet
+    const json message = json::parse(line, nullptr, false);  // the last line may be incomplete
     if (message.is_object()) by_topic[message["topic"]].push_back(message);
   }
   return by_topic;

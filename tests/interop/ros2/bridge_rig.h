@@ -1,4 +1,4 @@
-// perdure-ros2 between a test, which is on Perdure's bus, and nodes of ROS 2 that Fast DDS plays.
+// Runs perdure-ros2 between a test on Perdure's bus and simulated ROS 2 nodes on Fast DDS.
 #pragma once
 
 #include <memory>
@@ -18,18 +18,19 @@ class BridgeRig {
   BridgeRig();
 
   void startBridge(const Settings& settings);
-  /// A node that subscribes, on the bus's domain unless another is given; all topics if none is.
+  /// Starts a node that subscribes to `topics`, or to all if none is given. Without `domain`, it
+  /// uses the bus's domain.
   void listen(const std::vector<std::string>& topics = {}, const std::string& domain = {});
-  /// A node that says these lines (ros_speaker.cpp).
+  /// Starts a node that publishes these lines (ros_speaker.cpp).
   void speak(const std::vector<nlohmann::json>& lines, bool by_sensor_qos = false,
              const std::string& domain = {});
 
-  /// What the listener heard so far, by topic.
+  /// Returns the messages that the listener has received so far, by topic.
   std::map<std::string, std::vector<nlohmann::json>> heard() const;
   bool said() const;
   std::string log() const;
 
-  /// Counts and the newest sentence of the bridge's Health, by what came so far.
+  /// Counts and the latest message of the bridge's Health, as received so far.
   std::uint64_t count(const std::string& reason) const;
   const std::string& sentence() const { return sentence_; }
 
@@ -49,7 +50,8 @@ class BridgeRig {
   std::vector<std::unique_ptr<Child>> speakers_;
 };
 
-/// A line of a script: "Image" on "/camera/image_raw", stamped, said `after` s.
+/// Returns a line of a script, for example "Image" on "/camera/image_raw" with its stamp, sent
+/// `after` s.
 nlohmann::json lineOf(const std::string& type, const std::string& topic, double after,
                       std::int64_t stamp_ns, nlohmann::json more = nlohmann::json::object());
 

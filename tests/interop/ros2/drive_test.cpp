@@ -1,5 +1,5 @@
-// A drive that nodes of ROS 2 play (camera, IMU, a detector) through the bridge: vio and the filter
-// make a map with objects of it. Fast DDS is ROS here; all others are the real programs.
+// Simulated ROS 2 nodes (camera, IMU, a detector) play a drive through the bridge, and vio and the
+// filter map its objects. Fast DDS stands in for ROS; all other programs are the real ones.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ using namespace std::chrono_literals;
 using nlohmann::json;
 using replay::Dataset;
 
-/// Boxes of what is in sight, by frame, as a detector would find them.
+/// Returns the boxes of visible objects by frame, as a detector would report them.
 std::map<std::uint64_t, json> boxesOf(const fs::path& drive) {
   std::ifstream truth(drive / "objects_truth.json"), seen(drive / "visibility_truth.csv");
   const json objects = json::parse(truth);
@@ -45,8 +45,8 @@ std::map<std::uint64_t, json> boxesOf(const fs::path& drive) {
   return by_frame;
 }
 
-/// Fast DDS sends what is latched some seconds after it was matched; and a while of rest before the
-/// drive, in which its first image and sample come again and again.
+/// Fast DDS sends latched samples some seconds after a match. During a rest before the drive, its
+/// first image and sample are repeated.
 constexpr double kLatched = 4.0, kRest = 1.5;
 
 class Script {
@@ -177,7 +177,7 @@ TEST(Ros2Drive, CameraImuAndDetectorOfRosMakeAMapWithObjects) {
     poses += m.state == OdometryState::kTracking;
     way = std::max(way, m.T_WB.p.norm());
   });
-  // The filter's gate, and vio: they are there before the drive begins.
+  // Waits until the outputs of the filter and of vio are matched, before the drive begins.
   ASSERT_TRUE(runUntil(rig.loop, [&] { return objects.matched() > 0 && odometry.matched() > 0; }));
   rig.speak(script.lines(), true);
   EXPECT_TRUE(runUntil(

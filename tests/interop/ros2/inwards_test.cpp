@@ -1,5 +1,5 @@
-// Drivers of ROS 2 that Fast DDS plays become Perdure's topics; what is wrong with them is counted,
-// with the mend.
+// Messages of simulated ROS 2 drivers on Fast DDS become Perdure's topics. Invalid messages are
+// counted, and Health names the fix.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -70,7 +70,7 @@ const Settings kAll{"in.cam0.image=/camera/image_raw", "in.imu.topic=/imu/data",
                     "in.odometry.topic=/vio/odometry", "in.detections.topic=/detector/boxes",
                     "in.detections.classes=[car, person]"};
 
-/// What came onto Perdure's bus.
+/// Messages received on Perdure's bus.
 struct Bus {
   explicit Bus(BridgeRig& rig)
       : frame(rig.participant, bus::topics::frame("cam0")),
@@ -111,7 +111,7 @@ TEST_P(Ros2Inwards, CameraImuOdometryAndDetectionsBecomePerdures) {
   rig.startBridge(kAll);
   Bus bus(rig);
   std::vector<json> lines{transforms()};
-  // Fast DDS sends what is latched some seconds after it was matched.
+  // Fast DDS sends latched samples some seconds after a match.
   constexpr int kFrames = 200;
   for (int i = 0; i < kFrames; ++i) {
     const double after = 0.05 * i;
@@ -176,7 +176,7 @@ TEST_P(Ros2Inwards, CameraImuOdometryAndDetectionsBecomePerdures) {
 }
 INSTANTIATE_TEST_SUITE_P(ReliableAndBestEffort, Ros2Inwards, ::testing::Bool());
 
-/// A node of the tree that `perdure status --json` prints; null where there is none.
+/// Returns a node of the tree that `perdure status --json` prints, or null if it is missing.
 json nodeOf(const json& tree, const std::string& name) {
   if (tree.value("name", "") == name) return tree;
   for (const json& child : tree.value("children", json::array())) {
@@ -262,11 +262,12 @@ TEST(Ros2InwardsWrong, IsCountedAndSaysTheMend) {
                {{"x", "nan"}, {"y", 1}, {"w", 9}, {"h", 8}, {"scores", {{"car", 0.8}}}},
                {{"x", 30}, {"y", 20}, {"w", 9}, {"h", 8}, {"scores", {{"cow", 0.8}}}},
                {{"x", 30}, {"y", 20}, {"w", 9}, {"h", 8}, {"scores", {{"car", 7}}}}})};
-    // One at a time: a queue that is full drops the oldest, always the same one of a burst.
+    // One message at a time: a full queue drops the oldest message, which would be the same one in
+    // each burst.
     lines.push_back(wrong[static_cast<std::size_t>(i) % wrong.size()]);
   }
   rig.speak(lines);
-  // Of the same name and type, with less in it.
+  // A type with the same name but fewer fields.
   rig.speak(
       {lineOf("ShortImu", "/imu/data", 0.5, kBegin), lineOf("ShortImu", "/imu/data", 1.0, kBegin)});
   const std::vector<std::string> reasons{"cam0_image_encoding",      "cam0_image_malformed",
@@ -328,7 +329,8 @@ TEST(Ros2InwardsClock, ADriverWithAClockOfItsOwnIsPlacedByWhenItSpeaks) {
   Bus bus(rig);
   std::vector<json> lines{transforms()};
   constexpr std::int64_t kItsOwn = 42'000 * kMs;
-  for (int i = 0; i < 400; ++i) {  // 12 s: latched transforms come some seconds after a match
+  for (int i = 0; i < 400; ++i) {  // 12 s, because latched transforms arrive some seconds after a
+                                   // match
     lines.push_back(info(0.03 * i, kBegin + i * 30 * kMs));
     lines.push_back(image(0.03 * i, kBegin + i * 30 * kMs));
     lines.push_back(imu(0.03 * i, kItsOwn + i * 30 * kMs));

@@ -1,4 +1,4 @@
-// Every topic that the bridge writes, as a node of ROS 2 receives it.
+// Checks every topic that the bridge writes, as a ROS 2 node receives it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -34,7 +34,7 @@ ObjectBelief carAt(const Eigen::Vector3d& p) {
   return object;
 }
 
-/// All that Perdure's services would say of one frame.
+/// Publishes all messages that Perdure's services would send for one frame.
 class Vehicle {
  public:
   explicit Vehicle(BridgeRig& rig) : participant_(rig.participant) {
@@ -105,7 +105,7 @@ class Vehicle {
   bus::Writer<Objects> objects_{participant_, bus::topics::kObjects};
 };
 
-/// Says frames until every topic was heard; then the newest message of each.
+/// Publishes frames until every topic has been received; returns the newest message of each.
 std::map<std::string, json> newestOfAll(BridgeRig& rig, Vehicle& vehicle, std::size_t topics) {
   std::map<std::string, json> newest;
   for (int i = 0; i < 400 && newest.size() < topics; ++i) {
@@ -244,7 +244,7 @@ TEST(Ros2Outwards, ReadsImagesOnlyWhileSomebodyOfRosDoes) {
   rig.listen({"/perdure/cam0/image_raw"});
   ASSERT_EQ(newestOfAll(rig, vehicle, 1).size(), 1u) << rig.log();
   EXPECT_EQ(vehicle.readersOfFrames(), 1u);
-  rig.listen({"/perdure/objects"});  // the one before ends
+  rig.listen({"/perdure/objects"});  // the previous listener ends
   EXPECT_TRUE(runUntil(
       rig.loop, [&] { return vehicle.readersOfFrames() == 0; }, 40s))
       << rig.log();

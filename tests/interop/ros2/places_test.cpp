@@ -1,4 +1,5 @@
-// Where ROS may be: a domain of its own beside a closed bus, and what is refused at the start.
+// Tests the domain of ROS: a domain of its own beside a closed bus, and settings that are rejected
+// at the start.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,7 +12,7 @@ namespace {
 using namespace std::chrono_literals;
 using ::testing::HasSubstr;
 
-/// A domain beside the one of the bus, for ROS.
+/// Returns a domain for ROS beside that of the bus.
 std::string besideDomain(const bus::Domain& domain) {
   return std::to_string((bus::withEnvironment(domain.options()).domain + 101) % 230);
 }

@@ -1,5 +1,6 @@
-// Subscribes to what perdure-ros2 writes, as nodes of ROS 2 do, and prints each message as a line
-// of JSON. ros_listener DOMAIN [TOPIC…]: those topics alone.
+// Subscribes to the topics of perdure-ros2 as ROS 2 nodes do, and prints each message as a line of
+// JSON. With TOPICs, it subscribes only to those.
+// usage: ros_listener DOMAIN [TOPIC…]
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -190,7 +191,8 @@ class Listener {
       }
     });
   }
-  /// Until SIGTERM: then it leaves as a node does that is shut down, and is not missed for a lease.
+  /// Runs until SIGTERM. It then leaves the domain like a node that is shut down, so that no lease
+  /// has to expire.
   void run() {
     std::signal(SIGTERM, [](int) { g_ends = 1; });
     while (g_ends == 0) {

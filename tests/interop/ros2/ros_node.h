@@ -1,5 +1,5 @@
-// A node of ROS 2 as rmw_fastrtps would have it: a participant of Fast DDS with its stock
-// transports, names by ROS' rules, qualities of service as rclcpp gives them by default.
+// A ROS 2 node as rmw_fastrtps makes it: a participant of Fast DDS with its default transports,
+// names by ROS' rules, and rclcpp's default qualities of service.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,8 @@ namespace perdure::test {
 
 namespace fast = eprosima::fastdds::dds;
 
-/// As rclcpp's SensorDataQoS, the default of its publishers and subscribers, and tf2's of statics.
+/// rclcpp's SensorDataQoS, its default for publishers and subscribers, and tf2's QoS of static
+/// transforms.
 enum class Quality { kSensor, kDefault, kLatched };
 
 class RosNode {
@@ -32,7 +33,7 @@ class RosNode {
     publisher_ = participant_->create_publisher(fast::PUBLISHER_QOS_DEFAULT);
     subscriber_ = participant_->create_subscriber(fast::SUBSCRIBER_QOS_DEFAULT);
   }
-  /// Takes its leave of those who heard of it.
+  /// Announces its departure to the other participants.
   ~RosNode() {
     if (participant_ == nullptr) return;
     participant_->delete_contained_entities();

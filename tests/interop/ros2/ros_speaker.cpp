@@ -1,6 +1,7 @@
-// Plays a script as drivers of ROS 2 would: a line of JSON is a message, with its `topic`, `type`,
-// `stamp` (ns), `frame`, and `after` (s since the start). ros_speaker DOMAIN SCRIPT [sensor]:
-// images, samples and infos by SensorDataQoS. It begins when every topic has a reader.
+// Plays a script as ROS 2 drivers would. A line of JSON is a message, with its `topic`, `type`,
+// `stamp` (ns), `frame`, and `after` (s since the start). With `sensor`, images, samples and infos
+// use SensorDataQoS. The script begins when every topic has a reader.
+// usage: ros_speaker DOMAIN SCRIPT [sensor]
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -21,7 +22,7 @@ using nlohmann::json;
 namespace sensor = sensor_msgs::msg::dds_;
 namespace vision = vision_msgs::msg::dds_;
 
-/// JSON has no words for numbers that are none.
+/// Reads a number, or a string such as "nan", which JSON cannot represent as a number.
 double numberOf(const json& value) {
   return value.is_string() ? std::strtod(value.get<std::string>().c_str(), nullptr)
                            : value.get<double>();
@@ -103,7 +104,7 @@ void fill(tf2_msgs::msg::dds_::TFMessage_& m, const json& line) {
     m.transforms().push_back(t);
   }
 }
-/// A type of this name with less in it than readers expect.
+/// A message with this type name but fewer fields than readers expect.
 void fill(std_msgs::msg::dds_::Header_& m, const json& line) { setHeader(m, line); }
 
 class Speaker {
@@ -187,7 +188,7 @@ int main(int argc, char** argv) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   std::printf("%s%s\n", speaker.heard() ? "heard" : "not heard:", speaker.waits().c_str());
   std::fflush(stdout);
-  // Fast DDS' readers of what is latched hear of it some time after they are matched.
+  // Fast DDS' readers receive latched samples some time after a match.
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
   const auto start = Clock::now();
   for (const json& line : lines) {

@@ -1,4 +1,5 @@
-// `beliefs`: whether the filter's beliefs are true, over seeded worlds that are as it is told.
+// `beliefs`: checks the calibration of the filter's beliefs over seeded worlds that match its
+// model.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <iostream>

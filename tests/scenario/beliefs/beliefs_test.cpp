@@ -1,4 +1,4 @@
-// The bars of the filter's honesty, over fifty worlds that are as it is told.
+// Bars of the filter's calibration, over fifty worlds that match its model.
 #include <gtest/gtest.h>
 
 #include <cstdlib>

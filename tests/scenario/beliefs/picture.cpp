@@ -13,7 +13,7 @@ namespace {
 
 using tools::Chart;
 
-constexpr std::size_t kFewest = 10;  // in a bin that is drawn
+constexpr std::size_t kFewest = 10;  // smallest number of samples in a drawn bin
 constexpr int kWidth = 400, kHeight = 330, kSide = 280, kBelow = 250;
 const tools::Colour kBars(190, 120, 60);
 
@@ -48,7 +48,8 @@ void drawReliability(cv::Mat& picture, const cv::Rect& area, const tools::Reliab
   chart.drawCurve(curve, {kBars, 2});
 }
 
-/// By the quantile of each: flat where they are honest, a tower at the right where too sure.
+/// Histogram of the quantiles: flat for consistent errors, high at the right for overconfident
+/// ones.
 void drawQuantiles(cv::Mat& picture, const cv::Rect& area, const tools::Anees& anees) {
   title(picture, area, fmt::format("{}: quantiles, mean {:.2f}", anees.what, anees.mean()));
   constexpr int kBins = 20;

@@ -1,4 +1,4 @@
-// What the scores of the filter's beliefs look like, for people.
+// Draws the scores of the filter's beliefs.
 #pragma once
 
 #include <filesystem>
@@ -7,8 +7,9 @@
 
 namespace perdure::test {
 
-/// A PNG: reliability diagrams of existence and of the most probable class, with how many were
-/// asked; and how the normalised squared errors lie beside the χ² distribution of honest ones.
+/// Writes a PNG with reliability diagrams of existence and of the most probable class, with sample
+/// counts. It also shows the normalised squared errors against the χ² distribution of consistent
+/// errors.
 void drawBeliefs(const BeliefScores& scores, const std::filesystem::path& file);
 
 }  // namespace perdure::test

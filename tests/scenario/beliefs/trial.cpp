@@ -14,23 +14,24 @@ namespace {
 
 using namespace semantic_filter;  // NOLINT
 
-// An object's image is a thing's where no side is further off than
+// An object matches a true object if each side of its box differs by less than this share of the
+// extent plus this number of pixels.
 constexpr double kOfExtent = 0.25, kPixels = 3.0;
-// Frames in view without a thing's image, after which an object is no longer that thing.
+// An object loses its match after this number of frames in view without the true object's image.
 constexpr std::uint64_t kForgotten = 5;
-constexpr double kLeastExistence = 0.05;  // of an object that is asked
+constexpr double kLeastExistence = 0.05;  // lowest existence of a sampled object
 constexpr double kOldestAge = 60.0;       // frames
 constexpr std::uint32_t kLeastVisible = 20;
-constexpr double kOutlier = 25.0;  // squared, normalised
+constexpr double kOutlier = 25.0;  // limit of the squared normalised error
 
-/// Below 1: could be boxes of one thing.
+/// Returns the distance of two boxes; below 1, they may belong to the same true object.
 double apartness(const Box& a, const Box& b) {
   const double x = kPixels + kOfExtent * b.width(), y = kPixels + kOfExtent * b.height();
   return std::max({std::abs(a.x1 - b.x1) / x, std::abs(a.x2 - b.x2) / x, std::abs(a.y1 - b.y1) / y,
                    std::abs(a.y2 - b.y2) / y});
 }
 
-/// What is known of an object besides what it believes.
+/// Data about an object besides its belief.
 struct Followed {
   std::optional<std::size_t> thing;
   std::uint64_t frames_without = 0;
@@ -71,7 +72,7 @@ class Trial {
   }
 
  private:
-  /// For `initiation.odds`: boxes of things that no object follows, and those of nothing.
+  /// For `initiation.odds`: counts boxes of true objects without a track, and false boxes.
   void countBoxes(const WorldFrame& frame) {
     std::vector<bool> known(visible_.size(), false);
     for (const auto& o : last_.objects) {
@@ -87,7 +88,7 @@ class Trial {
     }
   }
 
-  /// Which thing an object is: that whose outline its image has most in common with, one to one.
+  /// Matches objects with true objects one to one, by the smallest distance of their boxes.
   void applyCorrection(const WorldFrame& frame) {
     struct Pair {
       double apart;

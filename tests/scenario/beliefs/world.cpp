@@ -17,10 +17,11 @@ namespace {
 
 using namespace semantic_filter;  // NOLINT: most names here are the filter's
 
-// Errors that the looks from one place share, after one for each class.
+// Indices of the errors that observations from one place share; they follow one error per class.
 constexpr Eigen::Index kAlike = 0, kAzimuth = 1, kBlindAzimuth = 2, kMoreErrors = 3;
-constexpr double kNever = 1e9;  // as core/measurement/frame.cpp: a change of view that never counts
-constexpr double kBlindShare = 0.2, kFlipShare = 0.1;  // as core/measurement/azimuth.cpp
+constexpr double kNever = 1e9;  // as in core/measurement/frame.cpp: a change of view that has no
+                                // effect
+constexpr double kBlindShare = 0.2, kFlipShare = 0.1;  // as in core/measurement/azimuth.cpp
 
 double normalCdf(double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); }
 
@@ -41,7 +42,7 @@ ModelInfo modelOf(const sim::DetectorModel& detector, const CameraModel& camera)
   return info;
 }
 
-/// √ of the area of the whole image, pixels.
+/// √ of the area of the whole outline, pixels.
 double sizeOf(const Eigen::Vector4d& sides) {
   return std::sqrt((sides[2] - sides[0]) * (sides[3] - sides[1]));
 }
@@ -107,8 +108,8 @@ void World::place() {
   }
 }
 
-/// Of the class's size; beside the way and clear of what stands, or on a lane if it moves. Nothing
-/// where there is no room.
+/// Draws an object with the size distribution of its class. A standing object is beside the
+/// trajectory without overlap; a moving one is on a lane. Returns nothing if there is no room.
 std::optional<Thing> World::draw(const std::string& class_name, double x_m) {
   const ClassPrior prior = told_.priors.of(class_name);
   Thing thing;
@@ -148,17 +149,18 @@ std::optional<Thing> World::draw(const std::string& class_name, double x_m) {
   return std::nullopt;
 }
 
-/// Along x with slow turns of a few degrees, and a nod.
+/// Returns a pose that moves along x with slow turns of a few degrees, and with pitch.
 RigidTransform World::truePose(double t_s) const {
   const double phase = static_cast<double>(options_.seed % 7);
   const double yaw = 0.06 * std::sin(0.35 * t_s + phase), pitch = 0.01 * std::sin(1.1 * t_s);
-  const double bend = options_.speed * 0.06 / 0.35;  // of the way that this yaw drives
+  const double bend = options_.speed * 0.06 / 0.35;  // amplitude of the lateral motion that this
+                                                     // yaw causes
   const Eigen::Vector3d p(options_.speed * t_s,
                           -bend * (std::cos(0.35 * t_s + phase) - std::cos(phase)), 1.2);
   return RigidTransform(Eigen::Matrix3d(rotationAboutZ(yaw) * expSo3({0.0, pitch, 0.0})), p);
 }
 
-/// The walk that the filter's `pose.walk_*` says, with the covariance that belongs to it.
+/// Returns odometry with the random walk of the filter's `pose.walk_*`, and its covariance.
 Odometry World::odometry(std::uint64_t frame, double t_s) {
   const RigidTransform T_WB = truePose(t_s);
   Odometry o;
@@ -258,7 +260,7 @@ std::vector<float> World::activations(std::size_t class_index, double size_px,
   return values;
 }
 
-/// With the errors that filter and `measure` are told: b, which stays with the view, and noise.
+/// Adds the errors of the filter's model and of `measure`: b, which stays with the view, and noise.
 Box World::withErrors(const Box& box, const std::vector<float>& activations, Errors& errors) {
   const double W = camera_.width(), H = camera_.height();
   const BoxParameters& p = told_.config.filter.box;
@@ -267,7 +269,7 @@ Box World::withErrors(const Box& box, const std::vector<float>& activations, Err
   for (std::size_t k = 1; k < activations.size(); ++k) odds += std::exp(double(activations[k]));
   noise.clutter_probability = 1.0 / (1.0 + odds);
   const BoxMeasurement z = measure(box, W, H, p, noise);
-  double scale = 1.0;  // of a Gaussian, in a draw of the t distribution
+  double scale = 1.0;  // factor of a Gaussian, in a draw of the t distribution
   if (options_.tail > 0.0) {
     double chi2 = 0.0;
     for (int i = 0; i < static_cast<int>(options_.tail); ++i) chi2 += std::pow(dice_.normal(), 2);
@@ -290,7 +292,7 @@ Box World::withErrors(const Box& box, const std::vector<float>& activations, Err
 
 double World::azimuth(const Eigen::VectorXd& shared, double alpha) {
   const double sigma = told_.detector.azimuth_sigma;
-  // Less alike from look to look than what else is shared.
+  // The azimuth errors of different observations are less correlated than the other shared errors.
   const double correlation = std::pow(told_.config.filter.tempering.correlation, 2.0);
   const auto mixed = [&](Eigen::Index i) {
     return std::sqrt(correlation) * shared[i] + std::sqrt(1.0 - correlation) * dice_.normal();
@@ -320,7 +322,8 @@ std::optional<Detection> World::look(std::size_t thing, const State& x, const Wo
   const Box box = *frame.outlines[thing];
   const auto own = std::find(model_.classes.begin(), model_.classes.end(), prior.name);
   auto index = static_cast<std::size_t>(own - model_.classes.begin());
-  if (index == model_.classes.size()) {  // of no known class: like clutter, or like one of them
+  if (index == model_.classes.size()) {  // an unknown class is similar to clutter, or to one known
+                                         // class
     const bool alike =
         normalCdf(errors.looks.values[kAlike]) < told_.config.filter.clutter.other_lookalike;
     if (alike) index = thing % model_.classes.size();
@@ -335,8 +338,8 @@ std::optional<Detection> World::look(std::size_t thing, const State& x, const Wo
   return d;
 }
 
-/// One axis of a false box as logClutter has it: cut at each end with the stated probability; what
-/// is cut once ends anywhere; what is whole has a log-uniform size.
+/// Draws one axis of a false box by the model of logClutter. Each end is censored with the stated
+/// probability. If one end is censored, the other is uniform; otherwise the size is log-uniform.
 std::pair<double, double> World::falseExtent(double extent) {
   const ClutterParameters& clutter = told_.config.filter.clutter;
   const bool cut_low = dice_.chance(clutter.censored_probability);
@@ -355,7 +358,7 @@ std::pair<double, double> World::falseExtent(double extent) {
 
 void World::addClutter(std::vector<std::pair<Detection, int>>& boxes) {
   const double left = std::exp(-told_.config.filter.clutter.per_frame);
-  // Poisson's number, by Knuth's products.
+  // Poisson number by Knuth's method of products.
   for (double product = dice_.unit(); product > left; product *= dice_.unit()) {
     const auto [x1, x2] = falseExtent(camera_.width());
     const auto [y1, y2] = falseExtent(camera_.height());
@@ -390,7 +393,7 @@ WorldFrame World::next() {
   }
   if (options_.clutter) addClutter(boxes);
   std::sort(boxes.begin(), boxes.end(), [](const auto& a, const auto& b) {
-    return a.first.box.x1 < b.first.box.x1;  // the order says nothing of who is who
+    return a.first.box.x1 < b.first.box.x1;  // so that the order does not depend on the origins
   });
   for (auto& [box, origin] : boxes) {
     frame.detections.detections.push_back(std::move(box));

@@ -1,12 +1,12 @@
-// Random worlds whose statistics are those that the filter is told: what it then believes wrongly
-// is its own fault. Without pictures: boxes are cuboids' projections plus the declared noise.
+// Random worlds whose statistics equal the filter's model, so that any miscalibration is the
+// filter's own. There are no images: boxes are projections of cuboids plus the declared noise.
 //
-// Drawn from the filter's own configuration and class priors: how frequent classes are, their
-// sizes, what moves and how fast, how long things stay; how often a thing is found, what hides it,
-// how its looks and its boxes' errors are alike; false boxes; the walk of the poses. From the
-// simulated detector's: the classes and how well their features part. Stated nowhere, hence chosen
-// here: how dense things stand, at which size they come into visibility, and how the camera drives.
-// A box is that of the whole cuboid, whatever hides part of it.
+// The filter's configuration and class priors give: class frequencies, sizes, motion and speed,
+// survival; detection probability, occluders, correlations of activations and box errors; false
+// boxes; the random walk of the poses. The simulated detector gives the classes and the separation
+// of their features. Three properties are chosen here: the density of objects, the image size at
+// which they become visible, and the camera's motion. A box always covers the whole cuboid, even if
+// part of it is occluded.
 #pragma once
 
 #include <optional>
@@ -23,17 +23,17 @@
 
 namespace perdure::test {
 
-/// What is told to the filter, and hence what the world is made from.
+/// The filter's configuration and the detector's model, from which the world is drawn.
 struct Told {
   semantic_filter::Config config;
   semantic_filter::ClassPriors priors;
   sim::DetectorModel detector;
 };
-/// Of the files in config/; `assignments` as of `perdure pipeline --set`. The detector is often
-/// unsure, at any size of a box: else there were little to be right or wrong about.
+/// Reads the files in config/; `assignments` as for `perdure pipeline --set`. The detector is often
+/// uncertain at any box size, because clear activations would hardly test the calibration.
 Told readTold(const std::vector<std::string>& assignments = {});
 
-/// Parts of the world that can be left out, to see what is to blame for what.
+/// Effects that can be switched off, to find the cause of an error.
 struct WorldOptions {
   std::uint64_t seed = 1;
   std::uint64_t frames = 120;
@@ -41,31 +41,32 @@ struct WorldOptions {
   double things_per_m = 0.8;
   bool pose_noise = true, clutter = true, motion = true, screens = true, hiding = true;
   bool azimuths = true;
-  bool lasting_errors = true;  ///< b; without it all noise is new
-  bool shared_looks = true;    ///< of one place look alike
+  bool lasting_errors = true;  ///< b; if false, all noise is independent
+  bool shared_looks = true;    ///< observations from one place have correlated errors
   double tail = 0.0;           ///< degrees of freedom of the boxes' noise; 0: Gaussian
 };
 
 struct Thing {
   std::string class_name;
-  semantic_filter::State x = semantic_filter::State::Zero();  ///< at t = 0; velocity with it
+  semantic_filter::State x = semantic_filter::State::Zero();  ///< at t = 0, with velocity
   double present_until_s = 1e9;
-  /// It comes into visibility (round a corner) once its image is this large; sizes are log-uniform,
-  /// as those of false boxes are: `initiation.odds` is told of boxes of any size.
+  /// The object becomes visible (as from round a corner) when its image has this size. Sizes are
+  /// log-uniform, as those of false boxes are, because `initiation.odds` applies to boxes of any
+  /// size.
   double comes_out_px = 0.0;
   bool moves() const { return x.tail<3>().squaredNorm() > 0.0; }
   semantic_filter::State at(double t_s) const;
 };
 
-/// One frame: what the filter gets, and what is true.
+/// One frame: the inputs of the filter, and the truth.
 struct WorldFrame {
   double t_s = 0.0;
   Odometry odometry;
   Detections detections;
   semantic_filter::View true_view;                               ///< with the true pose
-  ScratchVector<semantic_filter::TrackVisibility> visibilities;  ///< of each thing
-  std::vector<std::optional<Box>> outlines;  ///< the part within the image, whatever hides it
-  std::vector<int> origins;                  ///< of each box: the thing, or -1
+  ScratchVector<semantic_filter::TrackVisibility> visibilities;  ///< visibility of each object
+  std::vector<std::optional<Box>> outlines;  ///< the part within the image, even if occluded
+  std::vector<int> origins;                  ///< true object of each box, or -1
 };
 
 class World {
@@ -75,15 +76,15 @@ class World {
   const ModelInfo& model() const { return model_; }
   const CameraModel& camera() const { return camera_; }
   const std::vector<Thing>& things() const { return things_; }
-  /// There, and not round a corner.
+  /// True if the object exists and has become visible.
   bool present(std::size_t thing, double t_s) const {
     return errors_[thing].out && t_s < things_[thing].present_until_s;
   }
-  /// The frames, from 0, once each.
+  /// Returns the next frame, from frame 0 on.
   WorldFrame next();
 
  private:
-  /// Unit Gaussians that change as the view of a thing does.
+  /// Unit Gaussians that change with the view of an object.
   struct Drift {
     Eigen::VectorXd values;
     void draw(sim::Dice& dice, double keep);
@@ -91,8 +92,9 @@ class World {
   struct Errors {
     std::optional<RigidTransform> last_T_WC;
     Drift box, looks;
-    Eigen::Vector4d noise = Eigen::Vector4d::Zero();  ///< of the last box, unit Gaussians
-    double noise_stays = 0.0;                         ///< correlation of the next one with it
+    Eigen::Vector4d noise = Eigen::Vector4d::Zero();  ///< unit Gaussians of the last box
+    double noise_stays = 0.0;                         ///< correlation with the noise of the next
+                                                      ///< box
     bool unmapped_occluder = false, hard_to_detect = false, out = false;
   };
 
@@ -105,7 +107,8 @@ class World {
   std::optional<Detection> look(std::size_t thing, const semantic_filter::State& x,
                                 const WorldFrame& frame);
   Box withErrors(const Box& box, const std::vector<float>& activations, Errors& errors);
-  /// `class_index` is classes.size() for clutter; `shared` are errors of the thing's looks.
+  /// `class_index` is classes.size() for clutter; `shared` are the shared errors of the object's
+  /// observations.
   std::vector<float> activations(std::size_t class_index, double size_px,
                                  const Eigen::VectorXd& shared);
   std::pair<double, double> falseExtent(double extent);
@@ -114,7 +117,8 @@ class World {
 
   WorldOptions options_;
   Told told_;
-  sim::Dice dice_, elusive_dice_;  ///< its own: what else a seed draws does not depend on it
+  sim::Dice dice_, elusive_dice_;  ///< a separate generator, so that the other draws of a seed do
+                                   ///< not depend on it
   CameraModel camera_;
   ModelInfo model_;
   semantic_filter::Model read_model_;

@@ -1,4 +1,5 @@
-// perdure-capture as a process: a small drive over loopback, restarted, followed, and broken.
+// Tests perdure-capture as a process: a small drive over loopback, restarts, paced by its readers,
+// and damaged.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -18,7 +19,7 @@ using test::Child;
 using test::runUntil;
 using ::testing::HasSubstr;
 
-/// Plays the part of "vio" on the bus.
+/// Acts as "vio" on the bus.
 class CaptureProcess : public ::testing::Test {
  protected:
   CaptureProcess() {
@@ -79,7 +80,7 @@ std::vector<std::uint64_t> upTo(std::uint64_t end) {
 }
 
 TEST_F(CaptureProcess, GivesEveryFrameAndSampleOnceAndExits) {
-  const testing::TinyDrive drive;  // 20 frames, a sample each 10 ms from -20 ms to +1050 ms
+  const testing::TinyDrive drive;  // 20 frames, one sample every 10 ms from -20 ms to +1050 ms
   auto capture = start(drive, {"run.on_end=exit"});
   ASSERT_TRUE(runUntil(loop_, [&] { return ended(); })) << capture->log();
   EXPECT_EQ(capture->wait(5s), 0) << capture->log();
@@ -120,7 +121,7 @@ TEST_F(CaptureProcess, CarriesOnInTheDriveWhenItIsKilledAndStartedAgain) {
   EXPECT_EQ(sequences_.back(), 79u) << "and it ends with the drive's last frame";
   EXPECT_TRUE(std::is_sorted(sequences_.begin(), sequences_.end()));
   const std::uint64_t missed = 80 - sequences_.size();
-  // The frame in hand at the kill may have reached the reader or not.
+  // The frame that was being sent at the kill may or may not have reached the reader.
   EXPECT_NEAR(static_cast<double>(last_health_.reasons["missed_while_away"]),
               static_cast<double>(missed), 1.0)
       << "frames that went by are counted";
@@ -142,7 +143,7 @@ TEST_F(CaptureProcess, FollowsItsReadersAndResumesAtTheFirstFrameWithoutAnAnswer
   answers_ = true;
   testing::TinyDrive drive;
   drive.frames = 200;
-  drive.frame_period_ns = 1'000'000'000;  // by the clock it would take 200 s
+  drive.frame_period_ns = 1'000'000'000;  // in real time it would take 200 s
   auto first = start(drive, {"pace.mode=follow"});
   ASSERT_TRUE(runUntil(loop_, [&] { return sequences_.size() >= 50; })) << first->log();
   answers_ = false;
@@ -157,7 +158,8 @@ TEST_F(CaptureProcess, FollowsItsReadersAndResumesAtTheFirstFrameWithoutAnAnswer
   EXPECT_EQ(second->wait(5s), 0);
   ASSERT_EQ(sources_.size(), 2u);
   std::vector<std::uint64_t> expected = upTo(200);
-  expected.insert(expected.begin() + static_cast<std::ptrdiff_t>(open), open);  // it comes again
+  expected.insert(expected.begin() + static_cast<std::ptrdiff_t>(open), open);  // this frame is
+                                                                                // sent again
   EXPECT_EQ(sequences_.size(), expected.size());
   const auto [got, wanted] =
       std::mismatch(sequences_.begin(), sequences_.end(), expected.begin(), expected.end());

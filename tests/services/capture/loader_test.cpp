@@ -34,7 +34,7 @@ class LoaderTest : public ::testing::Test {
     std::string problem;
     std::size_t compressed = 0;
   };
-  /// Until the end, or until there are `most` frames.
+  /// Loads the drive until its end, or until there are `most` frames.
   Loaded load(const testing::TinyDrive& drive, std::uint64_t first = 0, std::size_t most = 1000) {
     config_.dataset.path = drive.write(folder_);
     Loaded out;
@@ -101,7 +101,8 @@ TEST_F(LoaderTest, GivesAllFramesAndTheSamplesAroundThem) {
 
 TEST_F(LoaderTest, ADriveThatRepeatsGoesOnInTimeAndNumberWithoutASeam) {
   testing::TinyDrive drive;
-  drive.imu_before_ns = 300'000'000;  // of neither these nor those after are any given twice
+  drive.imu_before_ns = 300'000'000;  // samples before the first and after the last frame must not
+                                      // be repeated
   drive.imu_after_ns = 300'000'000;
   config_.run.on_end = "repeat";
   const Loaded out = load(drive, 0, 50);
@@ -122,7 +123,7 @@ TEST_F(LoaderTest, ARepeatedDriveCarriesOnInTheLapWhereItWas) {
   testing::TinyDrive drive;
   drive.imu_after_ns = 300'000'000;
   config_.run.on_end = "repeat";
-  const Loaded out = load(drive, 60, 5);  // the first of the fourth lap
+  const Loaded out = load(drive, 60, 5);  // the first frame of the fourth lap
   ASSERT_EQ(out.frames.size(), 5u);
   EXPECT_EQ(out.frames[0].first, 59u) << "with the samples between it and the next";
   EXPECT_EQ(out.frames_ns[1], drive.start_ns + 60 * drive.frame_period_ns);

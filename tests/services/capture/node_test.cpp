@@ -13,8 +13,8 @@ using ::testing::ElementsAre;
 constexpr std::int64_t kMs = 1'000'000;
 constexpr std::int64_t kOrigin = 5'000 * kMs;  // sensor time of the first frame
 
-/// A drive of frames every 100 ms, each followed by one sample 10 ms later; a node that plays it,
-/// and a clock that stands where the test puts it.
+/// A drive with a frame every 100 ms, each followed by a sample 10 ms later; a node that plays it;
+/// and a clock that the test sets.
 class NodeTest : public ::testing::Test {
  protected:
   NodeTest() {
@@ -38,7 +38,7 @@ class NodeTest : public ::testing::Test {
               captured_ns_.push_back(f.stamp.captured_ns);
             }};
   }
-  /// Ticks at `now` until nothing is due; returns what the node said of the next time.
+  /// Ticks at `now` until nothing is due; returns the node's next waiting time.
   Duration run(Node& node, std::int64_t now) {
     while (true) {
       if (node.wants() && !drive_.empty()) {
@@ -108,7 +108,7 @@ TEST_F(NodeTest, CarriesOnAfterARestartWhereTheClockOfTheRunIs) {
   RunState before;
   before.start_ns = 1000 * kMs;
   before.origin_ns = kOrigin;
-  before.last_ns = kOrigin + 210 * kMs;  // frames 0 to 2 and their samples were given
+  before.last_ns = kOrigin + 210 * kMs;  // frames 0 to 2 and their samples have been sent
   before.next_sequence = 3;
   drive_.erase(drive_.begin(), drive_.begin() + 5);  // the loader seeks to frame 3
   Node node(config_, Duration(100 * kMs), before, outputs());
@@ -125,7 +125,8 @@ TEST_F(NodeTest, AnInstantRestartLosesAndDoublesNothing) {
   run(first, 320 * kMs);
   const auto state = runStateFrom(toText(first.state()));
   ASSERT_TRUE(state);
-  drive_.assign(whole.begin() + 7, whole.end());  // from frame 3's sample on, as a seek to 4 gives
+  drive_.assign(whole.begin() + 7, whole.end());  // from the sample of frame 3 on, as after a seek
+                                                  // to 4
   Node second(config_, Duration(100 * kMs), state, outputs());
   run(second, 320 * kMs);
   run(second, 910 * kMs);
@@ -169,7 +170,7 @@ TEST_F(NodeTest, FollowResumesAtTheFirstFrameThatWasNotCredited) {
   RunState before;
   before.origin_ns = kOrigin;
   before.last_ns = kOrigin + 310 * kMs;
-  before.next_sequence = 3;  // 3 was given, not answered
+  before.next_sequence = 3;  // frame 3 was sent but not answered
   drive_.erase(drive_.begin(), drive_.begin() + 5);
   Node node(config_, Duration(100 * kMs), before, outputs());
   node.expect("odometry");
@@ -185,7 +186,7 @@ TEST_F(NodeTest, AWindowOfTwoLetsTwoFramesBeOnTheWay) {
   node.expect("odometry");
   run(node, 0);
   EXPECT_THAT(frames_, ElementsAre(0, 1));
-  node.onAnswer("odometry", stamp(1));  // also an answer for 0
+  node.onAnswer("odometry", stamp(1));  // answers frame 0 as well
   run(node, 0);
   EXPECT_THAT(frames_, ElementsAre(0, 1, 2, 3));
 }

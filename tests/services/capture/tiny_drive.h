@@ -1,4 +1,4 @@
-// A small EuRoC drive written at run time: numbered frames of 16×12 pixels and samples of an IMU.
+// A small EuRoC drive written at run time: numbered frames of 16×12 pixels and IMU samples.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ struct TinyDrive {
   std::int64_t start_ns = 1'000'000'000'000;
   std::int64_t imu_before_ns = 20'000'000, imu_after_ns = 100'000'000;
   bool stereo = false;
-  int truncated = -1;                                ///< index of a frame whose file is cut off
+  int truncated = -1;                                ///< index of a frame with a truncated file
   int imu_gap_after = -1, imu_gap_ns = 500'000'000;  ///< index of a frame
 
   std::string write(const std::filesystem::path& folder) const {

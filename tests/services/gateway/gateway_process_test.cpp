@@ -1,5 +1,5 @@
-// perdure-gateway as a process: what it serves, whom it refuses, and what hostile clients can do to
-// it and to others.
+// Tests perdure-gateway as a process: its services, its rejections, and the effect of hostile
+// clients on it and on other clients.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -56,7 +56,7 @@ class Gateway : public ::testing::Test {
     ASSERT_TRUE(eventually(20s, [&] { return events_.matched() > 0; })) << child_->log();
   }
 
-  /// A client that is greeted, with the ids of the channels by topic.
+  /// Returns a client after the handshake; stores the channel ids by topic.
   std::unique_ptr<RawClient> greeted() {
     auto client = std::make_unique<RawClient>(port_);
     EXPECT_THAT(client->upgrade(), HasSubstr("101")) << child_->log();
@@ -78,7 +78,7 @@ class Gateway : public ::testing::Test {
       beliefs.push_back(objectAt(id, {5.0 * static_cast<double>(id), 0, 0}));
     ASSERT_TRUE(objects_.write(frameOf(sequence, beliefs)).has_value());
   }
-  /// A count of /metrics; 0 where there is none.
+  /// Returns a count of /metrics; 0 if it is missing.
   double metric(const std::string& name) const {
     const std::string text = get(port_, "/metrics").text;
     const auto at = text.find("\n" + name + " ");
@@ -87,7 +87,7 @@ class Gateway : public ::testing::Test {
   double refused(const std::string& reason) const {
     return metric("perdure_gateway_refused_total{reason=\"" + reason + "\"}");
   }
-  /// It serves others as if nothing had been.
+  /// Checks that the gateway still serves other clients.
   void serves() {
     const auto client = lookingAt("/objects");
     publish(++sequence_);
@@ -213,7 +213,8 @@ TEST_F(Gateway, HasNothingThatIsFrequentSentToItWhileNobodyLooks) {
   EXPECT_TRUE(eventually(10s, [&] { return objects_.matched() + odometry.matched() == 0; }));
 }
 
-/// The drive has ended before anybody looked: objects, body and image are those of its last frame.
+/// The drive has ended before the first client subscribes. Objects, body and image are those of its
+/// last frame.
 TEST_F(Gateway, TellsTheEndOfADriveToWhoComesAfterIt) {
   start();
   bus::Writer<Frame> frames(participant_, bus::topics::frame("cam0"));
@@ -232,7 +233,7 @@ TEST_F(Gateway, TellsTheEndOfADriveToWhoComesAfterIt) {
   EXPECT_THAT(client->readMessage(3), HasSubstr("\xff\xd8\xff"));
 }
 
-/// Nothing else comes by which it would be told that somebody looks.
+/// No other message arrives that could make the gateway notice the new subscriber.
 TEST_F(Gateway, TellsTheLastImageWhereThereAreNoObjects) {
   start();
   bus::Writer<Frame> frames(participant_, bus::topics::frame("cam0"));
@@ -241,7 +242,7 @@ TEST_F(Gateway, TellsTheLastImageWhereThereAreNoObjects) {
   EXPECT_THAT(client->readMessage(1), HasSubstr("\xff\xd8\xff"));
 }
 
-/// As a page that is loaded again does, when nothing new comes.
+/// Like a page that is reloaded while no new messages arrive.
 TEST_F(Gateway, TellsTheLastStateToWhoLeavesAndComesAtOnce) {
   start();
   const auto client = lookingAt("/objects");
@@ -261,7 +262,7 @@ TEST_F(Gateway, LosesNothingOfOneClientThroughAnotherThatDoesNotRead) {
   stopped->readSlowly();
   const auto good = lookingAt("/scene");
   constexpr std::uint64_t kFrames = 150;
-  // Each some 150 kB: more than all buffers between the two.
+  // Each message has about 150 kB, more than all buffers between the two ends.
   for (std::uint64_t i = 1; i <= kFrames; ++i) {
     publish(i, 60);
     ASSERT_THAT(
@@ -277,7 +278,8 @@ TEST_F(Gateway, LosesNothingOfOneClientThroughAnotherThatDoesNotRead) {
 
 TEST_F(Gateway, GoesOnThroughFramesThatLieOrMakeNoSense) {
   start();
-  // The gateway ends these and counts why, though they leave their own side open.
+  // The gateway closes these connections and counts the reasons, although the clients keep their
+  // own side open.
   std::vector<std::unique_ptr<RawClient>> open;
   const auto isCut = [&](const std::function<void(RawClient&)>& say) {
     open.push_back(greeted());

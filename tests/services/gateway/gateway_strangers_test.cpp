@@ -1,4 +1,4 @@
-// Programs of other people against perdure-gateway: Foxglove's client, and a browser with the page.
+// Tests perdure-gateway with foreign programs: Foxglove's client, and a browser with the page.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ using namespace perdure::test;
 using nlohmann::json;
 using ::testing::IsEmpty;
 
-/// A drive of every topic that is shown, at 10 Hz: three cars, of which the vehicle passes one.
+/// A drive at 10 Hz with all displayed topics: three cars, one of which the vehicle passes.
 class Drive {
  public:
   explicit Drive(const bus::Participant& participant)
@@ -92,7 +92,8 @@ class Drive {
     detections.camera = "cam0";
     detections.model_hash = 9;
     detections.detections = {test::detectionOf({100, 100, 200, 200}, {0.F, 2.F}),
-                             test::detectionOf({364, 202, 539, 278}, {0.F, 2.F})};  // the first
+                             test::detectionOf({364, 202, 539, 278}, {0.F, 2.F})};  // box of the
+                                                                                    // first car
     (void)detections_.write(detections);
     Frame frame;
     frame.stamp = objects.stamp;
@@ -105,11 +106,11 @@ class Drive {
     queries_.drain([&](const MapQuery& query) {
       if (query.kind != MapQueryKind::kGraph) return;
       (void)replies_.write(test::graphFor(query, {70, 1}));
-      if (!std::exchange(told_loop_, true)) tellLoop(objects);  // somebody looks
+      if (!std::exchange(told_loop_, true)) tellLoop(objects);  // a client displays the graph
     });
   }
 
-  /// A bicycle 12 m ahead in W, of an earlier session; W lies 100 m to the left in M.
+  /// A bicycle 12 m ahead in W, from an earlier session; W is 100 m to the left in M.
   void tellMap(std::uint64_t i, const Objects& objects) {
     MapFrame frame;
     frame.stamp = objects.stamp;
@@ -118,7 +119,7 @@ class Drive {
     frame.T_MW.p.y() = 100;
     frame.sessions = 2;
     frame.loops = 1;
-    frame.anchors = 3;  // and how well the body's place is known is not
+    frame.anchors = 3;  // the uncertainty of the body's position on the map is unknown
     (void)map_frame_.write(frame);
     MapTile tile;
     tile.revision = i;

@@ -104,12 +104,12 @@ TEST_F(GatewayNode, DrawsTheDetectionsOfTheSameFrame) {
   node_.onDetections(detections);
   node_.onObjects(frameOf(1, {}), kSecond);
   node_.onObjects(frameOf(2, {}), kSecond);
-  node_.tick(kSecond);  // those of the second do not come
+  node_.tick(kSecond);  // the detections of the second frame are missing
   const auto drawn = on(cameraChannel(0, kAnnotations));
   ASSERT_EQ(drawn.size(), 2u);
   EXPECT_EQ(drawn[0]["points"].size(), 1u);
   EXPECT_EQ(drawn[1]["points"].size(), 0u);
-  // They are heard after the objects: each frame is drawn once, with its own.
+  // The detections arrive after the objects: each frame is drawn once, with its own detections.
   detections.stamp = frameOf(3, {}).stamp;
   node_.onObjects(frameOf(3, {}), kSecond);
   EXPECT_EQ(on(cameraChannel(0, kAnnotations)).size(), 2u);
@@ -167,9 +167,9 @@ TEST_F(GatewayNode, PassesTheMapsAnswerToWhoAsked) {
   reply.objects.resize(1);
   reply.objects[0].id = 31;
   node_.onMapReply(reply);
-  node_.onMapReply(reply);  // once
+  node_.onMapReply(reply);  // ignored, because it was answered
   reply.client = 6;
-  node_.onMapReply(reply);  // another's
+  node_.onMapReply(reply);  // the reply to another client
   ASSERT_EQ(answers_.size(), 2u);
   EXPECT_EQ(answers_[0].client, 8u);
   EXPECT_EQ(json::parse(answers_[0].payload)["object"]["id"], 4);
@@ -206,7 +206,7 @@ MapObject onMap(ObjectId id, const WorldId& map, const Eigen::Vector3d& p_M) {
   return object;
 }
 
-/// M began as world 70; W, which is 77, is turned by 90 degrees in it and shifted by 100 m.
+/// M began as world 70. W is world 77; it is rotated by 90 degrees in M and shifted by 100 m.
 MapFrame frameOfMap() {
   MapFrame frame;
   frame.stamp = frameOf(1, {}).stamp;
@@ -246,7 +246,7 @@ TEST_F(GatewayNode, ShowsTheTilesOfTheMapThatTheVehicleIsOn) {
 TEST_F(GatewayNode, WithoutAFrameOfTheMapTilesLieInTheOdometrysOwn) {
   node_.onObjects(frameOf(1, {}), kSecond);
   MapFrame of_before = frameOfMap();
-  of_before.world = {76, 1};  // of a W that is no more
+  of_before.world = {76, 1};  // an earlier W
   node_.onMapFrame(of_before);
   node_.setWanted({kMap, kTransforms, kMapToOdom});
   MapTile tile;
@@ -455,7 +455,7 @@ TEST_F(GatewayNode, TellsWhereAnEventWas) {
   EXPECT_EQ(on(kLog)[0]["message"], "the map took a loop back: loop 4");
 }
 
-/// Nothing is heard while nobody looks but events and what is latched.
+/// Without subscribers, the node receives only events and latched topics.
 TEST_F(GatewayNode, BeginsTheWayAnewAfterAWhileInWhichNobodyLooked) {
   Objects frame = frameOf(1, {objectAt(12, {10, -2, 0})});
   node_.setWanted({kTrajectory});

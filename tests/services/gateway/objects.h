@@ -64,7 +64,7 @@ inline Detection detectionOf(const Box& box, std::vector<float> activations) {
   return detection;
 }
 
-/// Looks along the body's x axis from its origin.
+/// A camera at the body's origin that looks along its x axis.
 inline Calibration forwardCamera() {
   CameraCalibration camera;
   camera.name = "cam0";
@@ -81,7 +81,8 @@ inline Calibration forwardCamera() {
   return calibration;
 }
 
-/// Three anchors 100 m to the left of the way, with a loop of each look between them.
+/// Returns three anchors 100 m to the left of the trajectory, with a loop of each display style
+/// between them.
 inline MapReply graphFor(const MapQuery& query, const WorldId& map) {
   MapReply reply;
   reply.client = query.client;
@@ -92,7 +93,7 @@ inline MapReply graphFor(const MapQuery& query, const WorldId& map) {
     anchor.previous = id - 1;
     anchor.session = anchor.map = map;
     anchor.p = {10.0 * static_cast<double>(id - 1), id == 3 ? 101.0 : 100.0, 0.0};
-    if (id == 2) anchor.sigma << 0.2, 0.1, 0.05, 0.01;  // of the third it is not known
+    if (id == 2) anchor.sigma << 0.2, 0.1, 0.05, 0.01;  // the third anchor has no covariance
     anchor.objects = 2;
     reply.anchors.push_back(anchor);
   }

@@ -56,7 +56,7 @@ std::string RawClient::masked(std::string_view payload, std::uint8_t opcode) {
     frame += static_cast<char>(0x80 | 127);
     for (int shift = 56; shift >= 0; shift -= 8) frame += static_cast<char>((n >> shift) & 0xff);
   }
-  frame.append(4, '\0');  // a mask of zeros is one
+  frame.append(4, '\0');  // a mask of zeros is valid
   return frame.append(payload);
 }
 

@@ -1,5 +1,5 @@
-// A client made of a bare socket, which can do what no library does: half a request, a frame that
-// lies about its length, silence.
+// A client on a bare socket, which can violate the protocol unlike a library: half a request, a
+// frame with a wrong length, silence.
 #pragma once
 
 #include <cstdint>
@@ -17,10 +17,10 @@ class RawClient {
   RawClient& operator=(const RawClient&) = delete;
 
   void send(std::string_view bytes) const;
-  /// A frame as a client has to mask it. `opcode`: 1 text, 2 binary, 8 close, 9 ping.
+  /// Returns a masked client frame. `opcode`: 1 text, 2 binary, 8 close, 9 ping.
   static std::string masked(std::string_view payload, std::uint8_t opcode = 1);
   void sendFrame(std::string_view payload, std::uint8_t opcode = 1) const;
-  /// Up to and with the empty line; empty where the other side closes before, or is silent.
+  /// Reads up to and including the empty line; empty if the peer closes earlier or is silent.
   std::string readHead();
   std::string readBody(std::size_t bytes);
 
@@ -28,18 +28,19 @@ class RawClient {
     std::uint8_t opcode = 0;
     std::string payload;
   };
-  /// The next frame, pings answered; opcode 0xff where the connection has ended or nothing comes.
+  /// Reads the next frame and answers pings; opcode 0xff if the connection has ended or nothing
+  /// arrives.
   FrameRead readFrame();
-  /// Until the other side closes; false where it does not within the patience.
+  /// Waits until the peer closes; returns false if it does not within `seconds`.
   bool closed(int seconds);
-  /// Small buffers, so that what is not read is soon in the other's way.
+  /// Uses small buffers, so that unread data soon block the peer.
   void readSlowly() const;
 
-  /// Upgrades; the answer's head.
+  /// Upgrades the connection; returns the head of the answer.
   std::string upgrade(const std::string& more = "Origin: http://127.0.0.1:1\r\n",
                       const std::string& protocols = "foxglove.websocket.v1",
                       const std::string& host = "127.0.0.1:1", const std::string& target = "/");
-  /// Reads frames until one is a message of the subscription, whose payload it returns.
+  /// Reads frames up to a message of the subscription; returns its payload.
   std::string readMessage(std::uint32_t subscription);
 
  private:
@@ -48,7 +49,7 @@ class RawClient {
   std::string buffer_;
 };
 
-/// {status, head + body} of one request.
+/// Status, head and body of the answer to one request.
 struct HttpAnswer {
   int status = 0;
   std::string text;

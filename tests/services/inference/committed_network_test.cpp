@@ -1,4 +1,4 @@
-// The network in models/: that what is committed is what the service can use.
+// Tests that the service can use the network committed in models/.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Real networks on a real image, where they are at hand.
+// Tests real networks on real images, if they are present.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -65,7 +65,8 @@ Frame frameOf(int index) {
   return frame;
 }
 
-/// The best evidence for any of `names` against clutter where `truth` is; -100: no box is there.
+/// Returns the best evidence against clutter for any of `names` at the box `truth`; -100 if no box
+/// is there.
 double evidenceAt(const Detections& detections, const ModelInfo& model,
                   const std::vector<std::string>& names, const Box& truth) {
   double best = -100;
@@ -80,12 +81,13 @@ double evidenceAt(const Detections& detections, const ModelInfo& model,
   return best;
 }
 
-/// Evidence above it (a score of 0.12 before calibration) counts as seen.
+/// Threshold of the evidence (a score of 0.12 before calibration) above which a car counts as
+/// found.
 constexpr double kSeen = -2.0;
 
 struct Expectation {
   const char* file;
-  double recall;  ///< of near cars over the frames that are tried; a floor under what was measured
+  double recall;  ///< lower bound of the measured recall of near cars over the tested frames
 };
 
 class Networks : public ::testing::TestWithParam<Expectation> {
@@ -170,7 +172,8 @@ INSTANTIATE_TEST_SUITE_P(All, Networks,
                            return name;
                          });
 
-/// The rows of the network's own, activated output, computed by OpenCV without our decoding.
+/// Returns the rows of the network's own activated output, computed by OpenCV without Perdure's
+/// decoding.
 cv::Mat activatedRows(const fs::path& model, const Input& input, const Frame& frame) {
   cv::dnn::Net net = cv::dnn::readNet(model.string());
   net.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);

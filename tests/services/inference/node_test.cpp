@@ -42,7 +42,7 @@ class NodeTest : public ::testing::Test {
     f.data = std::make_shared<const std::vector<std::uint8_t>>(128 * 96, std::uint8_t{9});
     return f;
   }
-  /// The message of the StartupError that making a node gives, and its code.
+  /// Returns the code and the message of the StartupError that the construction of a node throws.
   static std::pair<ExitCode, std::string> error(const Config& c) {
     try {
       Node node(c, 1);

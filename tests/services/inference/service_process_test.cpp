@@ -1,4 +1,4 @@
-// One real inference process: under a time budget, and with more frames than it can look at.
+// Tests one real inference process: under a time budget, and with more frames than it can process.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

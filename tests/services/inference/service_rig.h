@@ -1,4 +1,4 @@
-// One real inference process, frames for it, and what comes back.
+// Runs one real inference process, sends frames to it, and receives its detections.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// A real inference process that looks at images in shared memory.
+// Tests a real inference process that reads images from shared memory.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -40,7 +40,7 @@ TEST(InferenceService, LooksAtImagesInSharedMemoryAndStillHearsItself) {
       rig.until([&] { return rig.health.reasons.contains("frame_cam0_in_shared_memory"); }));
   EXPECT_TRUE(rig.until([&] { return rig.health.reasons["frame_cam0_in_shared_memory"] == 20; }));
   EXPECT_TRUE(rig.until([&] {
-    rig.send(64, 64);  // else Health tells that no frames come
+    rig.send(64, 64);  // otherwise Health reports missing frames
     return rig.health.message == "images go through shared memory";
   }));
   EXPECT_FALSE(rig.health.reasons.contains("detections_incompatible_qos"));

@@ -1,6 +1,5 @@
-// Real processes at 30 Hz: `perdure inference swap`, and what newcomers may do wrong. Swap.* is
-// short and has a generous lease; SwapAtFullRate.* has the lease of 30 Hz and is run as a long
-// test.
+// Tests `perdure inference swap` with real processes at 30 Hz, and errors of newcomers. Swap.* is
+// short and has a long lease. SwapAtFullRate.* has the lease of 30 Hz and runs as a long test.
 #include <gmock/gmock.h>
 
 #include "tests/services/inference/swap_rig.h"
@@ -15,9 +14,9 @@ using testing::swapNetwork;
 using testing::SwapRig;
 
 constexpr double kRate = 30.0;
-constexpr int kSettled = 30;  // frames, until what was sent has come back
+constexpr int kSettled = 30;  // frames, until all answers have arrived
 
-/// A filter and one inference process that is heard.
+/// A filter and one inference process that owns the topic.
 struct Drive {
   SwapRig rig;
   std::unique_ptr<Child> filter, owner;
@@ -32,7 +31,7 @@ struct Drive {
     rig.sendFrames(kSettled);
     owner_id = rig.heard();
   }
-  /// The newcomer of a command: once it is gone nobody else will end it.
+  /// Ends the newcomer that a command started, because no other program ends it after the command.
   void endNewcomers() {
     for (const auto& [instance, h] : rig.healths()) {
       if (h.process == "inference" && static_cast<pid_t>(h.pid) != owner->pid()) {
@@ -45,7 +44,7 @@ struct Drive {
 
 void expectNothingLost(SwapRig& rig, std::uint64_t first, std::uint64_t last) {
   if (rig.unanswered(first, last) > rig.droppedByNetworks()) {
-    rig.sendFrames(2 * static_cast<int>(kRate));  // Health comes once a second
+    rig.sendFrames(2 * static_cast<int>(kRate));  // Health is sent once a second
   }
   EXPECT_LE(rig.unanswered(first, last), rig.droppedByNetworks()) << rig.story(first, last);
   for (std::uint64_t k = first; k < last; ++k) {
@@ -70,7 +69,7 @@ TEST(Swap, OnCommandTakesOverWithoutLosingAFrameAndTheOldOneRetires) {
   EXPECT_TRUE(d.rig.happened("second instead of first"));
 }
 
-/// The probability of each class of an object, by name.
+/// Returns the probability of each class of an object, by name.
 std::map<std::string, double> pmfOf(const ObjectBelief& object) {
   std::map<std::string, double> pmf;
   for (const ClassBelief& c : object.classes) pmf[c.name] = c.probability;
@@ -81,7 +80,7 @@ TEST(Swap, ToANetworkOfOtherClassesObjectsKeepIdsAndClassesByName) {
   Drive d(0.1);
   const auto before = d.rig.objects();
   ASSERT_GE(before.objects.size(), 2U);
-  testing::TinyOnnx other = swapNetwork("other");  // its car is the third class, a lamp is new
+  testing::TinyOnnx other = swapNetwork("other");  // the car is its third class, and a lamp is new
   other.classes_json = R"(["person", "lamp", "car"])";
   other.logits = {0.0F, -2.0F, -1.0F, 5.0F};
   const auto command = d.rig.swap(d.rig.model(other), 1.0, "swap");

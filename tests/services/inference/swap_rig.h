@@ -1,5 +1,6 @@
-// The topics around inference for tests of swaps: frames and odometry go out at a steady pace,
-// detections, objects, events, notices and health come back. Real processes on their own network.
+// The topics around inference for tests of swaps. Sends frames and odometry at a constant rate;
+// receives detections, objects, events, notices and health. Runs real processes on a separate
+// network.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -20,14 +21,16 @@ namespace perdure::inference::testing {
 
 using namespace std::chrono_literals;
 
-/// Two or more boxes that a filter takes for things; `by_light` changes what it says of bright
-/// frames: "" nothing, "nan", "empty", "elsewhere".
+/// A network that reports two or more boxes with a clear class. `by_light` selects its fault on
+/// bright frames: "" none, "nan", "empty", "elsewhere".
 inline TinyOnnx swapNetwork(const std::string& name, const std::string& by_light = "") {
   TinyOnnx net;
   net.name = name;
   net.box = {-1.2F, -1.2F, -1.2F, -1.2F};
   net.logits = {0.0F, 5.0F, -2.0F};
-  if (by_light == "nan") net.logits_by_light = {0.0F, 2e36F, 0.0F};  // ∞ from 170 on
+  if (by_light == "nan")
+    net.logits_by_light = {0.0F, 2e36F, 0.0F};  // ∞ for a brightness of 170 or
+                                                // more
   if (by_light == "empty") net.logits_by_light = {1e4F, 0.0F, 0.0F};
   if (by_light == "elsewhere") net.box_by_light = {-1e4F, -1e4F, 9.0F, 9.0F};
   return net;
@@ -92,7 +95,7 @@ class SwapRig {
   }
   std::string model(const TinyOnnx& net) { return net.write(folder.file("model-" + net.name)); }
 
-  /// One frame with its odometry now, and its period.
+  /// Sends one frame with its odometry and waits for one period.
   void sendFrame() {
     const auto begin = std::chrono::steady_clock::now();
     const auto pixels = std::make_shared<const std::vector<std::uint8_t>>(
@@ -120,7 +123,7 @@ class SwapRig {
   void sendFrames(int n) {
     for (int i = 0; i < n; ++i) sendFrame();
   }
-  /// Sends frames until it is so; false after `seconds` of them.
+  /// Sends frames until `so` returns true; returns false after `seconds` of frames.
   bool sendUntil(double seconds, const std::function<bool()>& so) {
     const int most = static_cast<int>(seconds / toSeconds(period_));
     for (int n = 0; n < most && !so(); ++n) sendFrame();
@@ -140,20 +143,20 @@ class SwapRig {
 
   std::uint64_t next() const { return next_; }
   InstanceId heard() const { return last_heard_; }
-  /// Frames in [first, last) that nobody answered.
+  /// Returns how many frames in [first, last) have no answer.
   int unanswered(std::uint64_t first, std::uint64_t last) const {
     int count = 0;
     for (std::uint64_t i = first; i < last; ++i) count += !by_frame_.contains(i);
     return count;
   }
-  /// Frames that came while a network was still at work on another one: its own rate, no loss of
-  /// the swap. As of a second ago.
+  /// Returns how many frames arrived while a network was busy. They are lost by its own rate, not
+  /// by the swap. The counts are up to a second old.
   int droppedByNetworks() const {
     std::uint64_t dropped = 0;
     for (const auto& [instance, h] : healths_) dropped += h.process == "inference" ? h.dropped : 0;
     return static_cast<int>(dropped);
   }
-  /// The longest that a frame waited for its first answer, in periods.
+  /// Returns the longest time from a frame to its first answer, in periods.
   int longestWait(std::uint64_t first, std::uint64_t last) const {
     std::uint64_t longest = 0;
     for (const auto& [frame, next] : answered_at_) {
@@ -161,7 +164,8 @@ class SwapRig {
     }
     return static_cast<int>(longest);
   }
-  /// Frames that nobody answered and what was said at which frame, for a person who looks for why.
+  /// Describes the unanswered frames and the notices with their frames, for the analysis of a
+  /// failure.
   std::string story(std::uint64_t first, std::uint64_t last) const {
     std::ostringstream text;
     for (const auto& [frame, step] : said_at_) {
@@ -178,7 +182,7 @@ class SwapRig {
     }
     return text.str();
   }
-  /// Messages beyond the first of each frame: readers drop them.
+  /// Returns the number of messages beyond the first of each frame; readers drop them.
   int repeated(std::uint64_t first, std::uint64_t last) const {
     int n = 0;
     for (const auto& [frame, who] : by_frame_) {
@@ -209,7 +213,7 @@ class SwapRig {
     return ids;
   }
   const Objects& objects() const { return last_objects_; }
-  /// What the process of this name said last of itself.
+  /// Returns the latest Health of the process with this name.
   Health healthOf(const std::string& process) const {
     for (const auto& [instance, h] : healths_) {
       if (h.process == process) return h;
@@ -243,11 +247,13 @@ class SwapRig {
   std::uint64_t next_ = 0;
   InstanceId last_heard_ = 0;
   std::map<std::uint64_t, std::vector<InstanceId>> by_frame_;
-  std::map<std::uint64_t, std::uint64_t> answered_at_;  ///< the next frame at that time
+  std::map<std::uint64_t, std::uint64_t> answered_at_;  ///< the next frame at the time of the
+                                                        ///< answer
   std::map<std::uint64_t, int> object_messages_;
   Objects last_objects_;
   std::vector<SwapNotice> said_;
-  std::vector<std::pair<std::uint64_t, std::string>> said_at_;  ///< and before which frame
+  std::vector<std::pair<std::uint64_t, std::string>> said_at_;  ///< with the next frame at that
+                                                                ///< time
   std::vector<Event> happened_;
   std::map<std::string, ModelInfo> known_models_;
   std::map<InstanceId, Health> healths_;

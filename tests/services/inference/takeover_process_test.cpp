@@ -1,4 +1,4 @@
-// Two real inference processes on the bus: the owner is killed, stopped, and told to end.
+// Tests two real inference processes on the bus: the owner is killed, stopped, and terminated.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -20,7 +20,7 @@ using test::runUntil;
 
 constexpr auto kPeriod = 100ms;
 
-/// Sends frames at 10 Hz and writes down what comes back.
+/// Sends frames at 10 Hz and records the detections.
 class Takeover : public ::testing::Test {
  protected:
   Takeover() {
@@ -44,7 +44,7 @@ class Takeover : public ::testing::Test {
       return frames_.matched() == 2 && detections_.matched() == 2 && known_models_.size() == 2;
     });
   }
-  /// One frame now, and its period.
+  /// Sends one frame and waits for one period.
   void sendFrame() {
     static const auto pixels =
         std::make_shared<const std::vector<std::uint8_t>>(64 * 64, std::uint8_t{100});
@@ -63,7 +63,7 @@ class Takeover : public ::testing::Test {
   void sendFrames(int n) {
     for (int i = 0; i < n; ++i) sendFrame();
   }
-  /// Sends frames until detections of `instance` are used, at most `limit`; how many were sent.
+  /// Sends at most `limit` frames until detections of `instance` are used; returns their number.
   int framesUntilHeard(InstanceId instance, int limit) {
     for (int n = 0; n < limit; ++n) {
       if (!used_.empty() && used_.rbegin()->second == instance) return n;
@@ -76,7 +76,7 @@ class Takeover : public ::testing::Test {
     for (std::uint64_t i = first; i < next_; ++i) unused += !used_.contains(i);
     return unused;
   }
-  /// The instance whose detections are used while both live.
+  /// Returns the instance whose detections are used while both processes run.
   InstanceId owner() const { return used_.rbegin()->second; }
 
   test::Folder folder_;

@@ -1,5 +1,5 @@
 // A Darknet network written at run time: a 64×64 input, 2×2 cells, one anchor, two classes. Its
-// output does not depend on the image, so that what must come out is known exactly.
+// output does not depend on the image, so that the expected result is known exactly.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
-// A network of the family perdure written at run time as ONNX: a 64×48 input, one stride of 32
-// (2×2 cells, the lower ones beyond the border), two classes, four bins. What must come out is
-// known exactly: it depends on nothing, or on how bright the image is.
+// An ONNX network of the family perdure, written at run time: a 64×48 input, one stride of 32 (2×2
+// cells, the lower ones cross the border), two classes, four bins. The expected result is known
+// exactly, because it is constant or depends only on the image's brightness.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace perdure::inference::testing {
 
-/// The few pieces of protobuf's wire format that onnx.proto needs here.
+/// The part of protobuf's wire format that onnx.proto needs here.
 class Protobuf {
  public:
   Protobuf& number(int field, std::uint64_t value) {
@@ -40,10 +40,9 @@ struct TinyOnnx {
   std::vector<float> box = {0.5F, 1.0F, -0.5F, 2.0F};        ///< left, top, right, bottom
   std::vector<float> logits = {0.0F, 1.0F, -2.0F};           ///< background, car, person
   std::vector<float> azimuth = {0, 6, 0, 0, 0, 0.5F, 0, 0};  ///< bins, residuals
-  /// Added to each of the outputs for each unit of brightness of the cell's corner; none: 0.
+  /// Added to each output per unit of brightness of the cell's corner pixel; empty: 0.
   std::vector<float> box_by_light, logits_by_light;
-  /// Hands the boxes on through Compress, all of whose conditions hold: OpenCV has no such
-  /// operator.
+  /// Adds an operator that OpenCV does not have: the boxes pass through ReverseSequence unchanged.
   bool for_other_runtimes = false;
   std::string name = "tiny", classes_json = R"(["car", "person"])";
   std::string azimuth_json = R"("azimuth": {"bins": 4, "sigma": 0.2, "classes": ["car"]},)";
@@ -81,7 +80,7 @@ struct TinyOnnx {
     const auto type = Protobuf().number(1, 1).message(2, shape);
     return Protobuf().bytes(1, name).message(2, Protobuf().message(1, type));
   }
-  /// Adds a 1×1 convolution of stride 32: its output is `bias` + `light` · pixel in every cell.
+  /// Adds a 1×1 convolution of stride 32; its output in every cell is `bias` + `light` · pixel.
   static void addHead(Protobuf& graph, const std::string& name, const std::vector<float>& bias,
                       const std::vector<float>& light = {}) {
     const auto n = static_cast<std::uint64_t>(bias.size());
@@ -99,7 +98,7 @@ struct TinyOnnx {
     graph.message(5, tensor(name + ".b", {n}, bias));
     graph.message(12, value(name, {1, n, 2, 2}));
   }
-  /// Adds an operator that changes nothing: it reverses four sequences, each of one.
+  /// Adds an operator without effect: it reverses four sequences of length one.
   static void addReverseSequence(Protobuf& graph, const std::string& from, const std::string& to) {
     Protobuf node, lengths;
     node.bytes(1, from).bytes(1, to + ".lengths").bytes(2, to).bytes(3, "node_" + to);

@@ -69,7 +69,7 @@ TEST(Ros2Boxes, ReadsNamesAndNumbersAndRefusesWhatIsNone) {
   EXPECT_EQ(refused.of("score_malformed"), 1u);
 }
 
-/// What the bridge writes outwards it reads inwards as it was.
+/// Boxes that the bridge writes are read back unchanged.
 TEST(Ros2Boxes, AreThoseOfTheMirror) {
   Detections out;
   out.camera = "cam0";

@@ -23,7 +23,7 @@ Clocks clocksOf(bool imu_shared) {
 
 std::string reasonOf(const Result<TimePoint>& placed) { return placed ? "" : placed.error().code; }
 
-/// Both drivers for a while, so that the common clock is known.
+/// Uses both drivers for a while, so that the common clock becomes known.
 void settle(Clocks& clocks, std::int64_t until) {
   for (std::int64_t t = until - 100 * kMs; t <= until; t += 20 * kMs) {
     (void)clocks.place("cam0", stampOf(kWall + t), t);
@@ -62,7 +62,7 @@ TEST(Ros2Clocks, RefusesStampsOfAnotherEpochAndSaysHowFar) {
   EXPECT_NE(refused.error().detail.find("behind those of cam0"), std::string::npos);
 }
 
-/// The first sample that came was of another clock, and every second one after it.
+/// The first message has a stamp of another clock, and so has every second message after it.
 TEST(Ros2Clocks, OneInputsWrongStampsNeverBecomeTheClock) {
   Clocks clocks = clocksOf(true);
   std::size_t good = 0;
@@ -117,7 +117,8 @@ TEST(Ros2Clocks, RefusesOldStampsButBeginsAnewWithADriverThatDoes) {
   }
 }
 
-/// A clock of its own, messages late by 1 to 20 ms: what is left is the least delay of both.
+/// The driver has its own clock, and messages are late by 1 to 20 ms. The smallest delays of both
+/// inputs remain as error.
 TEST(Ros2Clocks, PlacesAClockOfItsOwnByTheLeastDelays) {
   Clocks clocks = clocksOf(false);
   std::mt19937 dice(5);

@@ -110,11 +110,10 @@ TEST_F(Ros2Node, BothImagesOfAPairAreOneFrameWhicheverComesFirst) {
     EXPECT_EQ(frames_[i].stamp.time, frames_[i + 1].stamp.time);
   }
   for (int i = 0; i < 6; ++i) see(1250 + i * 100, 1);
-  EXPECT_EQ(node_->troubles().counts().of("cam1_unpaired"), 2u)
-      << "four of six may wait";
+  EXPECT_EQ(node_->troubles().counts().of("cam1_unpaired"), 2u) << "four of six may wait";
 }
 
-/// 12 bits in 16: a dark start does not settle it.
+/// Images with 12 of 16 bits: a dark start does not fix the number of bits.
 TEST_F(Ros2Node, BrighterImagesOf16BitsRaiseTheBits) {
   make();
   for (int i = 0; i < 8; ++i) node_->onImage(0, imageAt(i * 100, 250, true), i * 100 * kMilli);

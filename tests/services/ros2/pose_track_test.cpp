@@ -52,7 +52,8 @@ TEST(Ros2PoseTrack, IsTheInverseOfWhatTheMirrorWrites) {
   EXPECT_LT(off.norm(), 1e-9);
 }
 
-/// The pose of a point of a rigid body: its error by the Jacobian, against samples of the child's.
+/// The pose of another point of a rigid body: the covariance by the Jacobian, compared with known
+/// values for a lever of 3 m.
 TEST(Ros2PoseTrack, CarriesTheCovarianceToTheBody) {
   ros::Odometry m = odometryAt(0);
   m.pose.pose.orientation = {0, 0, std::sqrt(0.5), std::sqrt(0.5)};

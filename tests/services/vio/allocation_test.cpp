@@ -1,5 +1,5 @@
-// What a running filter allocates on the heap: nothing to propagate and to clone, and for the
-// updates no more after a minute than after some seconds.
+// Counts the heap allocations of a running filter. Propagation and cloning allocate nothing.
+// Updates allocate no more after a minute than after some seconds.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -69,7 +69,7 @@ struct RunningFilter {
 
   double now() const { return kBegin + kFramePeriod * static_cast<double>(frame); }
 
-  /// What the next frame allocates.
+  /// Processes the next frame and returns its number of allocations.
   std::uint64_t step() {
     ++frame;
     const FrameInput input{frame, drive.time(now()), drive.see(now()), {}, {}};
@@ -147,7 +147,7 @@ TEST_F(EstimatorAllocations, StayBelowTheirBoundAndDoNotGrowWithTime) {
       return static_cast<double>(sum) / static_cast<double>(made.size());
     };
     const std::vector<std::uint64_t> early = next(500), late = next(500);
-    // A track that is used once takes about 15; a frame uses 30 at most.
+    // A track that is used once allocates about 15 times; a frame uses at most 30 tracks.
     EXPECT_LT(*std::max_element(early.begin(), early.end()), 400u);
     EXPECT_LT(*std::max_element(late.begin(), late.end()), 400u);
     EXPECT_LT(mean(late), 1.2 * mean(early));

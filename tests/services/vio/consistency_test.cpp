@@ -1,5 +1,5 @@
-// Whether the filter's covariance is what its errors are: seeded runs of a minute in which
-// everything that the covariance speaks of is drawn from what the filter is told.
+// Tests whether the filter's covariance matches its errors: seeded runs of one minute. All
+// quantities in the covariance are drawn from the distributions that the filter assumes.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -23,8 +23,8 @@ constexpr int kRuns = 30, kFewRuns = 8;
 constexpr std::array<int, 6> kSeconds{10, 20, 30, 40, 50, 60};
 constexpr std::array<const char*, 3> kWhat{"orientation", "position", "velocity"};
 
-/// NEES of orientation, position and velocity at each of kSeconds; of the gyroscope's scale at the
-/// end.
+/// NEES of orientation, position and velocity at each of kSeconds; NEES of the gyroscope's scale at
+/// the end.
 struct Nees {
   std::array<std::array<double, 3>, kSeconds.size()> at{};
   double scale = 0.0;
@@ -41,8 +41,8 @@ class Draws {
   std::normal_distribution<double> normal_;
 };
 
-/// A minute after a start at rest; W is placed on the truth at the first output, by yaw and
-/// position.
+/// Runs one minute after a start at rest. W is aligned with the truth at the first output, by yaw
+/// and position.
 Nees run(unsigned seed, test::DrivePlace place, double gyro_scale) {
   Options options;
   options.calibration.gyro_scale = gyro_scale;
@@ -138,8 +138,8 @@ TEST(Consistency, NineTenthsOfTheMeanErrorsOfAFewRunsLieInTheirBand) {
   expectNineTenthsInTheirBand(test::DrivePlace::kRoom, kFewRuns);
 }
 
-// At constant velocity scale cannot be observed: only what the start from rest told of it is left,
-// and the covariance has to say how that fades.
+// At constant velocity, scale is unobservable. Only the information from the start at rest remains,
+// and the covariance must show its decay.
 TEST(Consistency, AFewRunsHoldAtConstantVelocityWithoutSpeed) {
   expectNineTenthsInTheirBand(test::DrivePlace::kStreet, kFewRuns);
 }
@@ -156,7 +156,7 @@ TEST(LongConsistency, HoldsAtConstantVelocityWithoutSpeed) {
   expectNineTenthsInTheirBand(test::DrivePlace::kStreet, kRuns);
 }
 
-/// A sample of rotors that turn: a sinusoid for each axis, of up to `largest`.
+/// The vibration of rotors: a sinusoid on each axis with amplitude up to `largest`.
 class Rotors {
  public:
   Rotors(unsigned seed, double largest) : largest_(largest) {
@@ -177,8 +177,8 @@ class Rotors {
   Vector3d amplitude_, hertz_, phase_;
 };
 
-// The filter is told that rest is rest to 2 cm/s, which a hovering tremble of it is not: the
-// velocity's NEES may lie below its band, tilt's not.
+// The filter assumes a velocity of rest of 2 cm/s; the vibration of hovering is smaller. The NEES
+// of the velocity may therefore be below its band, that of the tilt may not.
 TEST(Consistency, AStartAtRestWithRotorsRunningIsUsableWithinASecond) {
   double tilt_nees = 0.0, velocity_nees = 0.0, largest_velocity = 0.0;
   for (unsigned seed = 1; seed <= kRuns; ++seed) {
@@ -204,7 +204,7 @@ TEST(Consistency, AStartAtRestWithRotorsRunningIsUsableWithinASecond) {
     Estimator estimator(options, drive.T_BC(), 0.0);
     estimator.start(*start);
     std::optional<FrameEstimate> last;
-    for (std::uint64_t frame = 1; frame <= 9; ++frame) {  // up to the first second
+    for (std::uint64_t frame = 1; frame <= 9; ++frame) {  // up to t = 1 s
       const double t = 0.55 + 0.05 * static_cast<double>(frame);
       FrameInput input{frame, drive.time(t), drive.see(t), {}, {}};
       input.motion_px = 0.0;
@@ -216,7 +216,7 @@ TEST(Consistency, AStartAtRestWithRotorsRunningIsUsableWithinASecond) {
     const Eigen::Matrix3d turn = rotationAboutZ(yawOf(last->nav.q_WB.toRotationMatrix()) -
                                                 yawOf(truth.q_WB.toRotationMatrix()));
     const Eigen::Quaterniond q_WB(turn * truth.q_WB.toRotationMatrix());
-    // Of the three only the two of tilt: yaw is W's own.
+    // Uses only the two tilt components, because yaw is a gauge of W.
     const Vector3d theta = last->nav.q_WB * logSo3(last->nav.q_WB.conjugate() * q_WB);
     const Eigen::Matrix3d R = last->nav.q_WB.toRotationMatrix();
     const Eigen::Matrix3d P = R * last->covariance.topLeftCorner<3, 3>() * R.transpose();

@@ -6,7 +6,7 @@
 
 namespace perdure::vio::test {
 
-/// The drive's points as discs of different greys, as camera `camera` sees them.
+/// Draws the drive's points as discs of different grey values, as seen by camera `camera`.
 Frame drawn(const SimulatedDrive& drive, double t, std::uint64_t sequence, std::size_t camera = 0);
 
 }  // namespace perdure::vio::test

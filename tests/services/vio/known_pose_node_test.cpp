@@ -1,4 +1,4 @@
-// The node where another program gives the poses: its inputs, their faults, what it says.
+// Tests the node with poses from another program: its inputs, their faults, its messages.
 #include "services/vio/known_pose_node.h"
 
 #include <gmock/gmock.h>
@@ -60,7 +60,7 @@ class KnownPoses : public ::testing::Test {
       node_.onOdometry(poseOf(i));
     }
   }
-  /// Median distance of the landmarks of a frame from the nearest point of the drive, over their
+  /// Median distance of a frame's landmarks from the nearest point of the drive, relative to their
   /// distance from the body.
   double errorAt(std::uint64_t frame) const {
     std::vector<double> errors;
@@ -185,7 +185,8 @@ TEST_F(KnownPoses, WhatDoesNotFitIsCounted) {
 
 TEST_F(KnownPoses, AClockThatJumpsBackBeginsAnew) {
   play(0, 20);
-  // The same drive again, by numbers that go on; first the frame comes first, then the pose.
+  // The same drive again, with continued sequence numbers. In the first lap the frame comes first,
+  // in the second the pose.
   for (const std::uint64_t lap : {1, 2}) {
     for (std::uint64_t i = 0; i < 20; ++i) {
       Frame frame = imageOf(i);
@@ -246,7 +247,7 @@ TEST_F(KnownPoses, HealthIsNotOkWhereNothingGoesOut) {
               HasSubstr("no pose"));
 }
 
-/// Of a camera that is turned by so much from where the calibration has it, about axes of the body.
+/// Rotation of a camera relative to its calibration, about the body's axes.
 RigidTransform turned(double x_deg, double y_deg, double z_deg) {
   const Eigen::Vector3d turn(x_deg, y_deg, z_deg);
   return {expQuaternion(turn * (M_PI / 180.0)).toRotationMatrix(), Eigen::Vector3d::Zero()};
@@ -318,7 +319,8 @@ TEST_F(KnownPoses, SaysFromTheStartThatFramesHaveAnotherSize) {
 
 TEST_F(KnownPosesInStereo, TellsWhichFrameStillWaits) {
   EXPECT_FALSE(node_.waitsFor());
-  // The second camera is gone; its images may still come, until some frames say that they do not.
+  // The second camera is unplugged. Its images may still arrive until several frames have come
+  // without them.
   for (std::uint64_t i = 0; i < 10; ++i) {
     node_.onOdometry(poseOf(i));
     node_.onFrame(imageOf(i));
@@ -331,7 +333,7 @@ TEST_F(KnownPosesInStereo, TellsWhichFrameStillWaits) {
   EXPECT_EQ(landmarks_.size(), 10u);
   EXPECT_EQ(node_.health(), HealthState::kDegraded);
   EXPECT_THAT(node_.status(), ::testing::HasSubstr("one camera"));
-  // From now on it is not awaited, until it is back.
+  // From here on the node does not wait for the second camera until its images return.
   play(10, 12);
   EXPECT_EQ(landmarks_.size(), 12u);
   for (std::uint64_t i = 11; i < 14; ++i) {

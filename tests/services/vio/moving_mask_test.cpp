@@ -14,7 +14,7 @@ constexpr WorldId kWorld{7, 2};
 
 TimePoint at(double t) { return fromNanoseconds(1'000'000'000) + durationFromSeconds(t); }
 
-/// A cuboid of 4 × 2 × 1.6 m, its length along x of W.
+/// A cuboid of 4 × 2 × 1.6 m; its length is along x of W.
 ObjectBelief thing(const Vector3d& p_W, const Vector3d& velocity, double moving = 0.9) {
   ObjectBelief o;
   o.id = 1;

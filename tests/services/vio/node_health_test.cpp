@@ -1,4 +1,4 @@
-// What the node says of itself: what it waits for, and what is wrong with its inputs.
+// Tests the node's status: the inputs that it waits for, and the faults of its inputs.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -43,7 +43,7 @@ TEST(VioNodeHealth, ARigWhoseSecondCameraDoesNotComeGoesOnWithOneAndSaysSo) {
     player.play(
         node, 0.0, 4.0,
         [&](ImuSample&, double t) {
-          // A period of the IMU before the next frame: what is still not answered waits for cam1.
+          // One IMU period before the next frame, all unanswered frames wait for cam1.
           if (t > 2.0 && std::abs(std::remainder(t - 0.045, 0.05)) < 1e-6) {
             most_waiting = std::max(most_waiting, handed - r.odometry.size());
           }
@@ -145,7 +145,7 @@ TEST(VioNodeHealth, SaysThatTheAccelerationsAreInAnotherUnit) {
   Node node(Config{}, 5, {});
   node.onCalibration(calibration());
   Player player(3.0, 0.0);
-  std::string status;  // at the first attempt that sees it
+  std::string status;  // at the first attempt that detects it
   player.play(node, 0.0, 3.0, [&](ImuSample& sample, double) {
     sample.accel /= 9.80665;
     if (status.empty() && node.reasons().of("start_force_not_gravity") > 0) status = node.status();

@@ -1,4 +1,4 @@
-// The node with images: starts, faults of its inputs, restarts.
+// Tests the node with images: starts, faults of its inputs, restarts.
 #include "services/vio/node.h"
 
 #include <gmock/gmock.h>
@@ -70,7 +70,7 @@ TEST(VioNode, EveryFrameIsAnsweredOnceAndInOrder) {
   }
 }
 
-/// How far the motion from `from` to `to`, seconds of the drive, is from the truth's, in metres.
+/// Error of the motion between the times `from` and `to` of the drive, in metres.
 double motionError(const Recorder& r, const SimulatedDrive& drive, double from, double to) {
   const auto at = [&](double t) {
     return *std::find_if(r.odometry.begin(), r.odometry.end(), [&](const Odometry& o) {
@@ -259,7 +259,7 @@ TEST(VioNode, ResumesWhereAnotherProcessStopped) {
   EXPECT_EQ(after.odometry.front().world, (WorldId{77, 2}));
   EXPECT_EQ(after.odometry.front().state, OdometryState::kDegraded);
   EXPECT_EQ(after.odometry.front().instance, 6u);
-  // Half a second on inertia alone, in the same W.
+  // Half a second of inertial propagation alone, in the same W.
   const Nav a = player.drive().truth(4.0);
   const double t = toSeconds(after.odometry.front().stamp.time - player.drive().time(0.0));
   EXPECT_NEAR(travelled(before.odometry.back(), after.odometry.front()),
@@ -283,7 +283,7 @@ TEST(VioNode, AnOldStateIsLeftAsideAndTheEpochGoesUp) {
   Node second(config, 6, after.outputs());
   ASSERT_TRUE(second.restoreState(first.saveState()));
   second.onCalibration(calibration());
-  player.play(second, 0.0, 2.0);  // before it: another run
+  player.play(second, 0.0, 2.0);  // an earlier time, as in another run
   EXPECT_EQ(second.reasons().of("state_too_old"), 1u);
   EXPECT_EQ(after.odometry.back().world, (WorldId{77, 3}));
 }

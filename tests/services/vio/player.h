@@ -1,4 +1,4 @@
-// Plays a simulated drive with drawn images to a node, and keeps what it says.
+// Plays a simulated drive with drawn images to a node, and records the outputs.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -37,7 +37,8 @@ inline DriveOptions restThenDrive(double rest_s = 1.0) {
   return options;
 }
 
-/// Plays the drive from `from` to `until`; edit may change or drop (return false) a message.
+/// Plays the drive from `from` to `until`; the callbacks may change a message, or drop it (return
+/// false).
 class Player {
  public:
   explicit Player(double until, double rest_s = 1.0)

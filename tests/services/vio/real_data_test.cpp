@@ -1,4 +1,5 @@
-// The filter on real sensors, where ../shared/data is: skipped with a sentence where it is not.
+// Tests the filter on real sensors if ../shared/data exists; otherwise the tests report that they
+// are skipped.
 #include <gtest/gtest.h>
 
 #include <cstdlib>

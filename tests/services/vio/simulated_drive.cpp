@@ -16,7 +16,7 @@ using Eigen::Vector3d;
 namespace {
 
 constexpr double kStreetLength = 620.0, kStreetSpeed = 8.5;  // m, m/s
-constexpr double kFarthest = 80.0;                           // m: points further away are not seen
+constexpr double kFarthest = 80.0;                           // m: farther points are not visible
 
 }  // namespace
 
@@ -66,7 +66,7 @@ SimulatedDrive::SimulatedDrive(const DriveOptions& options)
   ids_.assign(points_.size(), 0);
 }
 
-/// On walls, floor and ceiling.
+/// Places points on walls, floor and ceiling.
 void SimulatedDrive::buildRoom() {
   std::uniform_real_distribution<double> u(-1.0, 1.0);
   for (int i = 0; i < options_.points; ++i) {
@@ -77,7 +77,7 @@ void SimulatedDrive::buildRoom() {
   }
 }
 
-/// On both sides and on the ground, 1.5 m below the body.
+/// Places points on both sides and on the ground, 1.5 m below the body.
 void SimulatedDrive::buildStreet() {
   std::uniform_real_distribution<double> u(-1.0, 1.0);
   const int count = static_cast<int>(options_.points * kStreetLength / 150.0);
@@ -98,7 +98,7 @@ std::vector<RigidTransform> SimulatedDrive::T_BC() const {
   return result;
 }
 
-// Time along the path: none until rest ends, then rising smoothly (three times differentiable).
+// Time along the path: zero during the rest, then increasing smoothly (three times differentiable).
 double SimulatedDrive::phase(double t) const {
   const double s = t - options_.rest_s;
   if (options_.rest_s <= 0.0) return t;
@@ -191,7 +191,8 @@ std::optional<Eigen::Vector2d> SimulatedDrive::project(std::size_t c, const Vect
   const CameraModel& camera = cameras_[c];
   auto pixel = camera.project((seenFrom(t) * camera.T_BC()).inverse() * p_W);
   if (options_.readout_s == 0.0) return pixel;
-  // The row says when the point is seen, and that says in which row: a hundredth is left each time.
+  // The row and the time of its exposure depend on each other. Each iteration reduces the error to
+  // about a hundredth.
   for (int i = 0; i < 3 && pixel; ++i) {
     const double row = pixel->y() / (camera.height() - 1) - 0.5;
     const RigidTransform T_WB = seenFrom(t + row * options_.readout_s);
@@ -239,7 +240,7 @@ Start startAt(const SimulatedDrive& drive, double t, unsigned seed, double scale
   start.nav = drive.truth(t);
   const double theta = 0.01 * scale, v = 0.05 * scale, bg = 0.005 * scale, ba = 0.05 * scale;
   Vector3d tilt = draw(theta);
-  // Yaw is a gauge: it is known at the start.
+  // Yaw is a gauge, so that the start has no error of yaw.
   tilt = start.nav.q_WB * tilt;
   tilt.z() = 0.0;
   tilt = start.nav.q_WB.conjugate() * tilt;

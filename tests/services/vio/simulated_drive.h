@@ -1,5 +1,5 @@
 // A seeded drive with exact truth for the tests: an analytic trajectory, an IMU with noise and
-// bias, and a cloud of points seen by one or two cameras with pixel noise.
+// bias, and a point cloud in the images of one or two cameras with pixel noise.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,8 +14,8 @@
 
 namespace perdure::vio::test {
 
-/// Where it goes: round a room of 12 × 12 × 6 m, along a street at an even 8.5 m/s, or nowhere: it
-/// turns in the middle of the room.
+/// The trajectory: through a room of 12 × 12 × 6 m, along a street at a constant 8.5 m/s, or a
+/// rotation on the spot in the middle of the room.
 enum class DrivePlace { kRoom, kStreet, kSpot };
 
 struct DriveOptions {
@@ -25,18 +25,19 @@ struct DriveOptions {
   ImuNoise noise;
   double pixel_sigma = 0.4;
   bool stereo = false;
-  double camera_ahead_m = 0.0;  ///< of where testCamera has it
-  bool walking_biases = false;  ///< by the noise's walks; imu() has to go before truth()
+  double camera_ahead_m = 0.0;  ///< relative to testCamera
+  bool walking_biases = false;  ///< random walks by the noise; call imu() before truth()
   double time_offset_s = 0.0;   ///< true t_imu − t_image
   double readout_s = 0.0;       ///< true, of a rolling shutter: first to last row
-  double rest_s = 0.0;          ///< stands still this long at the start
-  int points = 600;             ///< of a street: for each 150 m
+  double rest_s = 0.0;          ///< time at rest at the start
+  int points = 600;             ///< on a street: per 150 m
   int points_per_image = 100;
-  /// The world that the cameras see is moved by so much, from then until then (their clock).
+  /// Motion of the world that the cameras see, during this interval of their clock.
   RigidTransform jump;
   double jump_from_s = 1e9, jump_until_s = 1e9;
   Eigen::Vector3d gyro_bias{0.01, -0.02, 0.015}, accel_bias{0.05, -0.03, 0.02};
-  Eigen::Vector3d gyro_scale = Eigen::Vector3d::Ones();  ///< a reading without bias, of the rate
+  Eigen::Vector3d gyro_scale = Eigen::Vector3d::Ones();  ///< reading without bias, divided by the
+                                                         ///< rate
 };
 
 class SimulatedDrive {
@@ -50,17 +51,17 @@ class SimulatedDrive {
   Eigen::Vector3d forceTruth(double t) const;
 
   TimePoint time(double t) const { return fromNanoseconds(1'000'000'000) + durationFromSeconds(t); }
-  /// All samples in [0, until].
+  /// Returns all samples in [0, until].
   std::vector<ImuReading> imu(double until);
-  /// Where the body is for the images: truth, but for the jump.
+  /// Returns the body's pose that the images show: the truth, apart from the jump.
   RigidTransform seenFrom(double t) const;
-  /// Where camera `c` sees a point at image time `t`, each row at its own time.
+  /// Returns the pixel of a point in camera `c` at image time `t`, with each row at its own time.
   std::optional<Eigen::Vector2d> project(std::size_t c, const Eigen::Vector3d& p_W, double t) const;
-  /// What the cameras see at image time `t` (their clock).
+  /// Returns the tracked points of the cameras at image time `t` (their clock).
   TrackedFrame see(double t);
   Eigen::Vector2d pixelOf(std::size_t point, double t) const;
 
-  /// Their calibration says the true read-out.
+  /// The calibration of the cameras has the true read-out time.
   const std::vector<CameraModel>& cameras() const { return cameras_; }
   std::vector<RigidTransform> T_BC() const;
   const std::vector<Eigen::Vector3d>& points() const { return points_; }
@@ -79,21 +80,21 @@ class SimulatedDrive {
   std::normal_distribution<double> normal_;
   std::vector<CameraModel> cameras_;
   std::vector<Eigen::Vector3d> points_;
-  std::vector<std::uint64_t> ids_;  ///< 0: not tracked at the moment
+  std::vector<std::uint64_t> ids_;  ///< 0: not tracked at present
   std::uint64_t next_id_ = 1;
 };
 
-/// An image of 752 × 480 that has corners everywhere, of a seed.
+/// Returns a seeded image of 752 × 480 with corners everywhere.
 cv::Mat texture(unsigned seed);
 
-/// The image moved by (dx, dy) pixels; its border is reflected.
+/// Returns the image moved by (dx, dy) pixels; its border is reflected.
 cv::Mat shifted(const cv::Mat& image, double dx, double dy);
 
-/// The truth at `t` with errors drawn from the covariance that comes with it; yaw and position are
-/// exact. scale: of all deviations (1: 10 mrad of tilt, 0.05 m/s, 5 mrad/s, 0.05 m/s²).
+/// Returns the truth at `t` with errors drawn from the returned covariance; yaw and position are
+/// exact. `scale` applies to all deviations (1: 10 mrad of tilt, 0.05 m/s, 5 mrad/s, 0.05 m/s²).
 Start startAt(const SimulatedDrive& drive, double t, unsigned seed, double scale);
 
-/// A camera of EuRoC's kind looking along body z; index 1 stands 11 cm beside it.
+/// Returns a camera similar to EuRoC's that looks along body z; index 1 is 11 cm beside index 0.
 CameraCalibration testCamera(int index);
 
 }  // namespace perdure::vio::test

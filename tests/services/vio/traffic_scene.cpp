@@ -63,7 +63,7 @@ Vector3d TrafficScene::noise(double sigma) {
   return {random_.gaussian(sigma), random_.gaussian(sigma), random_.gaussian(sigma)};
 }
 
-/// Columns of `strip` from a place that need not be whole, wrapped round.
+/// Returns columns of `strip` from a fractional position, wrapped around.
 cv::Mat columnsFrom(const cv::Mat& strip, double from) {
   const double room = strip.cols - kWidth - 2;
   const double at = from - room * std::floor(from / room);
@@ -76,7 +76,7 @@ cv::Mat columnsFrom(const cv::Mat& strip, double from) {
 }
 
 Frame TrafficScene::frame(double t) {
-  // The body goes to its left, the picture to the right.
+  // The body moves to its left, the image to the right.
   const double slid = kFocal * motion(t).x() / options_.wall_m;
   cv::Mat image = columnsFrom(background_, 3000.0 - (options_.far_background ? 0.0 : slid));
   if (t >= options_.begins_s && traffic_.rows > 0) {

@@ -1,5 +1,5 @@
-// What a vehicle sees and feels that stands before moving traffic, or slides along a wall: two
-// textures, of which the lower one moves through the picture. Seeded.
+// Images and samples of a vehicle that stands before moving traffic, or slides along a wall. There
+// are two textures; the lower one moves through the image. Seeded.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,13 +12,14 @@ namespace perdure::vio::test {
 
 struct TrafficOptions {
   unsigned seed = 1;
-  double cover = 0.8;           ///< share of the picture, from below
-  double begins_s = 5.0;        ///< when the traffic begins to move; before it there is none
-  double speed_px_s = 80.0;     ///< of the traffic
-  double engine = 0.0;          ///< m/s² of vibration at 27 Hz; a hundredth of it in rad/s
-  double wall_m = 8.0;          ///< how far the standing part is
-  bool far_background = false;  ///< as if it were at infinity: it does not move with the body
-  /// How far the body has slid to its left, m, with velocity and acceleration; empty: it stands.
+  double cover = 0.8;           ///< share of the image, from the bottom
+  double begins_s = 5.0;        ///< start of the traffic; before it there is no traffic
+  double speed_px_s = 80.0;     ///< speed of the traffic
+  double engine = 0.0;          ///< vibration at 27 Hz in m/s²; a hundredth of it in rad/s
+  double wall_m = 8.0;          ///< distance of the static part, m
+  bool far_background = false;  ///< as if at infinity: it does not move with the body
+  /// Distance that the body has slid to its left in m, with velocity and acceleration; empty: it
+  /// stands.
   std::function<Eigen::Vector3d(double)> slide = {};  ///< (p, v, a) at a time
 };
 
@@ -27,7 +28,8 @@ class TrafficScene {
   explicit TrafficScene(const TrafficOptions& options);
 
   static Calibration calibration();
-  /// At `t` seconds from the start; frames each .05 s, samples each .005 s, in rising order.
+  /// Frame and sample at `t` seconds from the start. Use frames every .05 s and samples every .005
+  /// s, in rising order.
   Frame frame(double t);
   ImuSample imu(double t);
   Eigen::Vector3d position(double t) const;

@@ -1,5 +1,5 @@
-// A body that stands in moving traffic stays where it is, and one that moves evenly is not taken
-// for one that stands.
+// A body that stands in moving traffic must stay in place, and a body in uniform motion must not be
+// detected as resting.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -19,7 +19,8 @@ using Eigen::Vector3d;
 struct Drive {
   std::size_t poses = 0;
   std::optional<double> started_s;
-  double farthest_m = 0.0, largest_deviation = 0.0;  ///< error, and its share of its deviation
+  double farthest_m = 0.0, largest_deviation = 0.0;  ///< error, and its ratio to the standard
+                                                     ///< deviation
   double last_error_m = 0.0, last_speed = 0.0;
   std::string status;
 };
@@ -56,7 +57,8 @@ Drive play(const test::TrafficOptions& options, double until) {
   return result;
 }
 
-/// One seed of twelve seconds; more and a minute each, for figures, by PERDURE_TRAFFIC_SEEDS.
+/// One seed of twelve seconds. PERDURE_TRAFFIC_SEEDS sets a larger number, of a minute each, for
+/// measurements.
 unsigned seeds() {
   const char* text = std::getenv("PERDURE_TRAFFIC_SEEDS");
   return text ? static_cast<unsigned>(std::atoi(text)) : 1u;
@@ -75,7 +77,8 @@ TEST_P(StandingInTraffic, StaysWhereItIs) {
     }
     EXPECT_LT(d.farthest_m, 0.05) << "seed " << seed;
     EXPECT_LT(d.largest_deviation, 3.0) << "seed " << seed;
-    // Where too little of a background is left from the start, it may wait, and says so.
+    // If too little background is visible from the start, the node may wait, and its status must
+    // state that.
     const bool may_wait = cover > 0.7 && begins_s < 0.5;
     if (may_wait && d.poses == 0) {
       EXPECT_NE(d.status.find("traffic"), std::string::npos) << d.status;
@@ -96,7 +99,7 @@ TEST(StandingInTrafficWithAnEngine, StaysWhereItIs) {
   EXPECT_LT(d.largest_deviation, 3.0);
 }
 
-/// Stands for `rest` seconds, then gains `speed` within `push` seconds and keeps it.
+/// Stands for `rest` seconds, then accelerates to `speed` within `push` seconds and keeps it.
 std::function<Vector3d(double)> pushed(double rest, double push, double speed) {
   return [=](double t) {
     const double s = t - rest, a = speed / push;
@@ -130,7 +133,8 @@ TEST(EvenDrive, BeginsWithoutARestThatIsNone) {
   EXPECT_NE(d.status.find("IMU"), std::string::npos) << d.status;
 }
 
-/// Drives at 2 m/s, brakes at 3 s and stands from 5 s on, where traffic has been all the while.
+/// Accelerates to 2 m/s until 3 s, brakes, and stands from 5 s on. The traffic is visible from 4 s
+/// on.
 TEST(BrakingIntoTraffic, ComesToRest) {
   const auto slide = [](double t) {
     if (t < 1) return Vector3d(0, 0, 0);
@@ -149,8 +153,8 @@ TEST(BrakingIntoTraffic, ComesToRest) {
       EXPECT_LT(d.last_error_m, 0.1);
       EXPECT_LT(d.largest_deviation, 4.0);
     }
-    // Known failure: it follows the traffic for a moment, .2 to .3 m at 8 to 10 deviations, and
-    // creeps on by up to .05 m/s.
+    // Known failure: the estimate follows the traffic for a moment, by .2 to .3 m at 8 to 10
+    // deviations, and then drifts at up to .05 m/s.
     const Drive most = driveAt(0.8);
     EXPECT_LT(most.last_speed, 0.06);
     EXPECT_LT(most.last_error_m, 0.5);

@@ -76,7 +76,7 @@ TEST(WaitingFrames, FramesOfAnEarlierRunAreGivenUp) {
   EXPECT_TRUE(waiting.front().second);
 }
 
-/// Frames of the first camera until it is sure that there is no second one.
+/// Adds frames of the first camera until the second one counts as missing.
 void goAlone(WaitingFrames& waiting, int frames) {
   for (int i = 0; i < frames; ++i) {
     EXPECT_TRUE(waiting.addFirst(frameAt(50 * i)));

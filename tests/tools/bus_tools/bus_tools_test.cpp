@@ -1,4 +1,4 @@
-// The commands as a user runs them, against topics that this test publishes.
+// Runs the commands like a user, on topics that this test publishes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// What doctor says of a network's input beside a camera's images.
+// Tests doctor's findings about the size of a network's input and of a camera's images.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-/// A description alone: nothing here runs the network.
+/// Writes only a description, because these tests do not run the network.
 fs::path networkOf(const fs::path& folder, int width, int height) {
   std::ofstream(folder / "net.onnx") << "no network";
   std::ofstream(folder / "net.onnx.model.json")
@@ -65,7 +65,7 @@ TEST(DoctorOfRecordings, TakesOneSequenceOfSeveral) {
   const fs::path root = replay::tinyKittiTracking("doctor_tracking");
   EXPECT_THAT(replay::startupErrorOf([&] { checkRigBy({.data = root}, 10.0); }),
               HasSubstr("name one with --sequence (0000, 0001)"));
-  for (const char* sequence : {"0000", "0001"}) {  // with images, and of labels alone
+  for (const char* sequence : {"0000", "0001"}) {  // with images; with labels only
     const Findings found = checkRigBy({.data = root, .sequence = sequence}, 10.0);
     ASSERT_FALSE(found.empty());
     EXPECT_THAT(found.back().text, HasSubstr("as always in KITTI tracking")) << sequence;

@@ -1,4 +1,4 @@
-// From drawn images on the disk to a rig file that the services read.
+// Tests the calibration from image files to a rig file that the services read.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

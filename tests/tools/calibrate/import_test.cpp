@@ -1,5 +1,5 @@
-// Rigs from what others have calibrated: the numbers are those of the native file, to the last
-// digit that matters, and what is not known is told by its name.
+// Tests the import of foreign calibrations. The rigs must equal the native file to the last
+// relevant digit, and unknown keys are reported by name.
 #include "tools/calibrate/import.h"
 
 #include <gmock/gmock.h>
@@ -54,7 +54,7 @@ const std::string kNative =
     "  gyroscope_random_walk: 1.9393e-05\n  accelerometer_noise_density: 2.0e-3\n"
     "  accelerometer_random_walk: 3.0e-3\n";
 
-// The same: T_cam_imu is the inverse of T_BS.
+// The same calibration: T_cam_imu is the inverse of T_BS.
 const std::string kChain =
     "cam0:\n  T_cam_imu:\n  - [0.0, -1.0, 0.0, 0.01]\n  - [0.0, 0.0, -1.0, -0.02]\n"
     "  - [1.0, 0.0, 0.0, -0.07]\n  - [0.0, 0.0, 0.0, 1.0]\n  cam_overlaps: []\n"
@@ -102,7 +102,7 @@ TEST_F(RigImport, KalibrsFilesAreTheNativeRig) {
       importRig({file("camchain-imucam.yaml", kChain), file("imu.yaml", kKalibrImu)});
   EXPECT_TRUE(imported.ignored.empty()) << imported.ignored.front();
   expectSame(imported.rig, native);
-  // And what is written is read as the same.
+  // The written file must read back the same.
   expectSame(replay::readRig(file("rig.yaml", replay::rigText(imported.rig, "imported"))), native);
 }
 
@@ -120,7 +120,7 @@ TEST_F(RigImport, CameraInfoIsTheSameWithAPlace) {
   const auto T_BS = transformOf("0 0 1 .07  -1 0 0 .01  0 -1 0 -.02  0 0 0 1");
   auto imported = importRig({info, imu}, {T_BS});
   EXPECT_TRUE(imported.ignored.empty());
-  imported.rig.cameras[0].time_offset_s = 0.0031;  // camera_info has none
+  imported.rig.cameras[0].time_offset_s = 0.0031;  // camera_info has no offset
   expectSame(imported.rig, replay::readRig(file("native.yaml", kNative)));
   EXPECT_THAT(errorOf({info, imu}, {T_BS, T_BS}), HasSubstr("--T_BS was given 2 times, and 1"));
 }
@@ -131,7 +131,7 @@ TEST_F(RigImport, TwoSensorsOfEuRoCAreSeenFromTheIMU) {
       "gyroscope_noise_density: 1e-4\ngyroscope_random_walk: 1e-5\n"
       "accelerometer_noise_density: 2e-3\naccelerometer_random_walk: 3e-3\n";
   std::string camera = kNative.substr(6, kNative.find("imu0:") - 6), flat;
-  for (std::size_t i = 0; i < camera.size(); ++i) {  // the section, two blanks to the left
+  for (std::size_t i = 0; i < camera.size(); ++i) {  // removes two columns of indentation
     if (camera.compare(i, 2, "  ") == 0 && (i == 0 || camera[i - 1] == '\n'))
       ++i;
     else
@@ -139,7 +139,7 @@ TEST_F(RigImport, TwoSensorsOfEuRoCAreSeenFromTheIMU) {
   }
   const auto imported = importRig({file("cam.yaml", flat), file("imu.yaml", imu)});
   EXPECT_NEAR(imported.rig.cameras[0].T_BC.p.x(), 0.07 - 0.5, 1e-12);
-  // What is said of the camera in the IMU's frame is that already.
+  // A pose given in the IMU's frame is used unchanged.
   const auto given = importRig({file("ros.yaml", kCameraInfo), file("imu.yaml", imu)},
                                {transformOf("1 0 0 .05  0 1 0 0  0 0 1 0  0 0 0 1")});
   EXPECT_NEAR(given.rig.cameras[0].T_BC.p.x(), 0.05, 1e-12);

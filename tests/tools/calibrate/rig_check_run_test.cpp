@@ -1,4 +1,4 @@
-// A rig that is right and rigs that are wrong, over one drawn walk.
+// Checks a correct rig and incorrect rigs on one rendered walk.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -45,7 +45,7 @@ TEST_F(RigCheckRun, ARightRigIsGood) {
   for (const Judgement& j : judgeRig(checkOf(rig_))) EXPECT_EQ(j.grade, Grade::kGood) << j.text;
 }
 
-// One that is off is looked at to the end of the drive.
+// A rig with an error is checked to the end of the drive.
 TEST_F(RigCheckRun, EndsEarlyOnlyWhereAllIsGood) {
   Calibration rig = rig_;
   rig.cameras[0].time_offset_s = 0.012;

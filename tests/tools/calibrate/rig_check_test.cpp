@@ -12,7 +12,7 @@ namespace {
 
 using testing::HasSubstr;
 
-/// What vio says of a rig that is right: innovations by the χ² distribution, no pattern.
+/// vio's results for a correct rig: innovations with a χ² distribution and without a pattern.
 RigCheck goodCheck(double pattern = 0.0) {
   RigCheck check;
   check.camera.width = 640, check.camera.height = 480;
@@ -64,7 +64,7 @@ TEST(RigCheck, ACameraThatMovedIsToldOnlyWhereVioIsSure) {
   EXPECT_EQ(worst(check).grade, Grade::kGood) << worst(check).text;
 }
 
-// Where vio would not tell what is bad, more of the drive has to be looked at.
+// If vio's uncertainty would hide an error, the check must use more of the drive.
 TEST(RigCheck, IsSurelyGoodWhereWhatIsBadWouldBeTold) {
   RigCheck check = goodCheck();
   EXPECT_TRUE(isSurelyGood(check));
@@ -128,7 +128,7 @@ TEST(RigCheck, ABiasThatWandersIsNotGravity) {
 
 TEST(RigCheck, ImagesThatContradictTheImuAreNotTooFew) {
   RigCheck check = goodCheck();
-  check.innovations.resize(100);  // nearly all was refused
+  check.innovations.resize(100);  // nearly all innovations were rejected
   check.contradicted = 200;
   EXPECT_EQ(worst(check).grade, Grade::kBad);
   EXPECT_THAT(worst(check).text, HasSubstr("T_BS"));

@@ -20,7 +20,7 @@ CameraCalibration camera640() {
   return camera;
 }
 
-/// Corners all over the image, or right of `from` only, with noise and a pattern.
+/// Returns corner residuals with noise and a pattern, in the whole image or only right of `from`.
 std::vector<CornerResidual> residualsOf(double from, double pattern) {
   sim::Dice dice(5);
   std::vector<CornerResidual> all;

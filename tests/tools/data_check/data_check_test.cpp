@@ -38,7 +38,7 @@ TEST(DataCheck, ASoundDriveHasNoFinding) {
   still.turning = 0.0;
   EXPECT_THAT(codesOf(findingsOf("still", still)), ElementsAre());
   TurningDrive biased;
-  biased.gyro_bias = {0.1, -0.2, 0.1};  // of a cheap unit
+  biased.gyro_bias = {0.1, -0.2, 0.1};  // typical of a low-cost unit
   EXPECT_THAT(codesOf(findingsOf("biased", biased)), ElementsAre());
 }
 
@@ -81,7 +81,7 @@ TEST(DataCheck, ImagesThatStandStillAreNoMatterOfUnits) {
   auto findings = checkDrive(recording, {});
   ASSERT_THAT(codesOf(findings), ElementsAre("images_still"));
   EXPECT_THAT(findings[0].text, HasSubstr("stand still or come again"));
-  // Unless nothing carried turns so fast.
+  // An exception: a rate of turn that no carried device reaches.
   for (auto& sample : recording.imu) sample.gyro *= 180.0 / M_PI;
   findings = checkDrive(recording, {});
   ASSERT_FALSE(findings.empty());
@@ -130,12 +130,12 @@ TEST(DataCheck, AllSignsOfTheGyroscopeAreNamedTogether) {
   TurningDrive drive;
   drive.change = [](ImuSample& sample) { sample.gyro = -sample.gyro; };
   const auto findings = findingsOf("all_signs", drive);
-  // In this drive, which swings, half a period of offset explains it as well.
+  // In this oscillating drive, an offset of half a period is an equally good explanation.
   ASSERT_THAT(codesOf(findings), ElementsAre("gyro_axes", "time_offset"));
   EXPECT_THAT(findings[0].text, HasSubstr("w_x = -w_x, w_y = -w_y, w_z = -w_z"));
 }
 
-// `doctor --fix` inverts a T_BS that is surely the wrong way round.
+// `doctor --fix` inverts a T_BS only if it is certainly inverted.
 TEST(DataCheck, ColumnsInAnotherOrderAreNoInvertedTransform) {
   TurningDrive drive;
   for (const int by : {1, 2}) {
@@ -199,7 +199,7 @@ TEST(DataCheck, ImagesThatComeLateAreDoubtful) {
   const auto findings = findingsOf("late", drive);
   ASSERT_THAT(codesOf(findings), ElementsAre("time_offset"));
   EXPECT_THAT(findings[0].text, HasSubstr("time_offset_s to -0.25"));
-  drive.images_late = std::chrono::milliseconds(100);  // most of the turning fits even so
+  drive.images_late = std::chrono::milliseconds(100);  // most rotations still fit
   const auto slightly = findingsOf("slightly_late", drive);
   ASSERT_THAT(codesOf(slightly), ElementsAre("time_offset"));
   EXPECT_THAT(slightly[0].text, HasSubstr("time_offset_s to -0.10"));
@@ -224,7 +224,7 @@ TEST(DataCheck, AnOffsetBeyondTheSearchGetsNoNumber) {
     drive.images_late = std::chrono::milliseconds(late_ms);
     const auto root = makeTurningDrive("very_late", drive);
     const auto recording = Dataset::open({.path = root})->recording();
-    // Half a period looks like a flipped axis in this drive, so the axes are not asked.
+    // In this drive, half a period resembles a flipped axis; therefore the axes are not checked.
     return judgeTurns(turnsOfImages(recording, recording.imu), recording.imu,
                       recording.calibration.cameras.front());
   };
@@ -235,7 +235,7 @@ TEST(DataCheck, AnOffsetBeyondTheSearchGetsNoNumber) {
       << "the search ends at 1 s";
 }
 
-/// The drive's true poses, by integration of its rates, with times that are so much too late.
+/// Returns the drive's true poses by integration of its rates; the times are too large by `late`.
 replay::PoseFile posesOf(const replay::Recording& recording, Duration late) {
   std::vector<replay::StampedPose> poses;
   RigidTransform T_WB;
@@ -294,7 +294,7 @@ TEST(DataCheck, UnitsOfTheAccelerometerAreToldByGravity) {
   EXPECT_THAT(codesAt(1.5), ElementsAre("accel_scale"));
 }
 
-// What is left has any size, that of g among them, and no direction.
+// Accelerations without gravity may have any magnitude, also that of g, but no constant direction.
 TEST(DataCheck, GravityThatWasTakenAwayIsNoMatterOfUnits) {
   std::vector<ImuSample> samples(200);
   for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -315,7 +315,7 @@ TEST(DataCheck, ExchangedColumnsAreToldByGravity) {
               HasSubstr("DRIVE: what should be rates of turn"));
 }
 
-/// The IMU's stamps of a drive, changed.
+/// Changes the IMU stamps of a drive and returns the findings.
 replay::DataFindings findingsWithStamps(const std::string& name,
                                         const std::function<std::int64_t(std::int64_t)>& change) {
   const auto root = makeTurningDrive(name);

@@ -5,7 +5,7 @@
 namespace perdure::tools {
 namespace {
 
-/// Points at depths of 1 to 4 m before a camera that turns and moves.
+/// Points at depths of 1 to 4 m before a camera that rotates and moves.
 std::vector<Flow> flowOf(const Eigen::Vector3d& rotation, const Eigen::Vector3d& way) {
   std::vector<Flow> flow;
   for (int i = 0; i < 120; ++i) {

@@ -26,7 +26,7 @@ fs::path newFolder(const std::string& name) {
   return folder;
 }
 
-/// The copy of a drive after its mends, read again.
+/// Writes the fixed copy of a drive and reads it again.
 replay::Recording mended(const std::string& name, const TurningDrive& drive,
                          std::size_t mends = 1) {
   const auto root = makeTurningDrive("to_mend_" + name, drive);
@@ -42,7 +42,7 @@ replay::Recording sound() {
   return Dataset::open({.path = makeTurningDrive("to_mend_sound")})->recording();
 }
 
-/// Largest difference of what the samples of two recordings say.
+/// Returns the largest difference between the samples of two recordings.
 double largestDifference(const replay::Recording& a, const replay::Recording& b) {
   EXPECT_EQ(a.imu.size(), b.imu.size());
   double largest = 0.0;
@@ -90,7 +90,7 @@ TEST(MendedCopy, ColumnsAreExchangedAndTheTransformIsTurnedRound) {
 
 TEST(MendedCopy, WhatIsNotSureIsLeftAndSaid) {
   TurningDrive drive;
-  drive.change = [](ImuSample& s) { s.gyro *= M_PI / 180.0; };  // why, nobody knows
+  drive.change = [](ImuSample& s) { s.gyro *= M_PI / 180.0; };  // for an unknown reason
   const auto root = makeTurningDrive("to_mend_unsure", drive);
   const MendedDrive result = mendDrive(Dataset::open({.path = root})->recording());
   EXPECT_THAT(result.mends, SizeIs(0));

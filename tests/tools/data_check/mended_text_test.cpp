@@ -1,4 +1,5 @@
-// Tables that cannot be read as they are: stamps in seconds, orientations beside the samples.
+// Tests tables that need a fix before they can be read: stamps in seconds, orientations among the
+// columns.
 #include "tools/data_check/mended_text.h"
 
 #include <gmock/gmock.h>
@@ -21,7 +22,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using tests::makeTurningDrive;
 
-/// Each line of numbers changed; a line that is no number, by `head`.
+/// Changes each line of numbers, and replaces all other lines by `head`.
 void rewrite(const fs::path& file, const std::function<std::string(const std::string&)>& change,
              const std::string& head = "#other") {
   std::ifstream in(file);
@@ -86,7 +87,7 @@ TEST(MendedText, StampsInSecondsBecomeNanosecondsExactly) {
     gone = text.drive();
   }
   EXPECT_FALSE(fs::exists(gone));
-  // Of the camera, too, and where the folder is given as mav0/.
+  // Also changes the camera's stamps, and gives the folder as mav0/.
   rewrite(root / "mav0/cam0/data.csv", inSeconds);
   const MendedText both(root / "mav0/");
   EXPECT_EQ(both.mends().size(), 2U);
@@ -126,7 +127,7 @@ TEST(MendedText, AQuaternionAmongTheColumnsIsLeftOut) {
   const MendedText text(root);
   EXPECT_THAT(text.mends(), ElementsAre(HasSubstr("columns 6, 7, 8, 9, 10, 11 are taken")));
   expectSound(text);
-  // Accelerations in g: none of the threes measures gravity.
+  // Accelerations in g: no group of three columns measures gravity in m/s².
   rewrite(root / "mav0/imu0/data.csv", [](const std::string& line) {
     return line.substr(0, line.find(',')) + ",0.6,0,0.8,0,0.1,0.2,0.3,0,0.1,1";
   });

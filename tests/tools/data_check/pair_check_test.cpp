@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 using replay::Dataset;
 using testing::HasSubstr;
 
-/// The finding of that code; its text is empty where there is none.
+/// Returns the text of the finding with this code; empty if there is none.
 std::string textOf(const replay::DataFindings& findings, const std::string& code) {
   for (const auto& finding : findings) {
     if (finding.code == code) return finding.text;
@@ -31,7 +31,7 @@ replay::DataFindings pairsIn(const fs::path& root) {
   return checkPairs(Dataset::open({.path = root})->recording());
 }
 
-/// cam1's list with other stamps, and only each `every`-th of its lines.
+/// Changes the stamps in cam1's list, and keeps only each `every`-th line.
 fs::path withList(const std::string& name, std::int64_t later_ns, int every = 1) {
   const fs::path root = replay::tinyEuroc(name, true);
   const fs::path file = root / "mav0/cam1/data.csv";
@@ -104,7 +104,7 @@ struct Sides {
   std::vector<ImuSample> samples;
 };
 
-/// A car turns about z, and hardly about x and y; its gyroscope is changed.
+/// A car that rotates about z, and hardly about x and y; `change` is applied to its gyroscope.
 Sides turningCar(const Change& change) {
   sim::Dice dice(4);
   Sides sides;

@@ -26,7 +26,7 @@ std::vector<std::string> codesIn(const replay::DataFindings& findings) {
   return codes;
 }
 
-/// 20 s in which the body turns about all axes, or as a vehicle about z alone, and accelerates.
+/// 20 s of rotation about all axes, or about z only like a vehicle, and of acceleration.
 struct Way {
   replay::Recording recording;
   Poses poses;  ///< at 200 Hz
@@ -83,7 +83,7 @@ Poses inverted(const Poses& poses) {
 Poses ofCamera(const Poses& poses) {
   return changed(poses, [](const RigidTransform& T) { return T * tests::trueCameraPlace(); });
 }
-/// As they are read where the file has w first.
+/// The poses as they are read if the file has w first.
 Poses withWFirst(const Poses& poses) {
   return changed(poses, [](const RigidTransform& T) {
     return RigidTransform(Eigen::Quaterniond(T.q.z(), T.q.w(), T.q.x(), T.q.y()), T.p);
@@ -199,7 +199,7 @@ Poses conjugated(const Poses& poses) {
   return changed(poses,
                  [](const RigidTransform& T) { return RigidTransform(T.q.conjugate(), T.p); });
 }
-/// Positions alone.
+/// Changes only the positions.
 Poses moved(const Poses& poses, const std::function<Eigen::Vector3d(const Eigen::Vector3d&)>& to) {
   return changed(poses, [&](const RigidTransform& T) { return RigidTransform(T.q, to(T.p)); });
 }
@@ -285,7 +285,7 @@ TEST(PoseCheck, AJumpBetweenNeighboursIsToldOnce) {
 
 TEST(PoseCheck, APauseIsNoJump) {
   Poses poses = eachOf(phone().poses, 10);
-  poses.erase(poses.begin() + 100, poses.begin() + 140);  // 2 s, and 4 m
+  poses.erase(poses.begin() + 100, poses.begin() + 140);  // a gap of 2 s and 4 m
   EXPECT_THAT(codesIn(findingsOf(phone(), poses)), ElementsAre());
 }
 

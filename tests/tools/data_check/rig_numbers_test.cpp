@@ -11,7 +11,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-/// EuRoC's.
+/// The calibration of EuRoC.
 Calibration soundRig() {
   Calibration rig;
   CameraCalibration camera;

@@ -19,7 +19,7 @@ using testing::HasSubstr;
 
 constexpr double kRadius_m = 3.0;
 
-/// A grey value for a place on a sphere about B.
+/// Grey value of a point on a sphere about B.
 double greyAt(const Vector3d& p) {
   double sum = 0.0, phase = 0.0;
   for (int i = 1; i <= 24; ++i) {
@@ -29,7 +29,7 @@ double greyAt(const Vector3d& p) {
   return 128.0 + 22.0 * sum;
 }
 
-/// What a camera at its place on B sees of the sphere, of a body that is turned.
+/// Renders the sphere for a camera at its pose in B, with the body rotated by `q_WB`.
 Frame seenBy(const CameraCalibration& camera, const Eigen::Quaterniond& q_WB = {1, 0, 0, 0}) {
   const Vector3d p_B = camera.T_BC.p;
   Frame frame;
@@ -50,7 +50,7 @@ Frame seenBy(const CameraCalibration& camera, const Eigen::Quaterniond& q_WB = {
   return frame;
 }
 
-/// The image changed, pixel by pixel: `from` gives the index of what is shown at one.
+/// Rearranges the pixels of an image: `from` maps a pixel's index to the index of its new value.
 Frame rearranged(const Frame& frame, const std::function<std::size_t(std::size_t)>& from) {
   Frame other = frame;
   auto pixels = std::make_shared<std::vector<std::uint8_t>>();
@@ -80,7 +80,7 @@ void addFrame(replay::Recording& recording, std::uint64_t i, std::size_t camera,
   recording.frames.push_back(file);
 }
 
-/// Two pairs; `show` changes what cam1 gives.
+/// Two stereo pairs; `show` changes the images of cam1.
 replay::Recording twoPairs(
     const Calibration& calibration,
     const std::function<Frame(const Frame&)>& show = [](const Frame& seen) { return seen; }) {
@@ -94,7 +94,7 @@ replay::Recording twoPairs(
   return recording;
 }
 
-/// The calibration has the second one's place changed.
+/// Returns the findings after a change of the second camera's pose in the calibration.
 replay::DataFindings findingsWith(const std::function<void(RigidTransform&)>& change) {
   replay::Recording recording = twoPairs(twoCameras());
   change(recording.calibration.cameras[1].T_BC);

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 constexpr int kWidth = 160, kHeight = 120;
 constexpr double kFocal = 110.0;
 
-/// About each axis at its own pace, so that every axis is seen.
+/// Each axis has its own frequency, so that every axis is observable.
 Eigen::Vector3d rateAt(const TurningDrive& drive, double t) {
   return drive.turning *
          Eigen::Vector3d(std::sin(5.1 * t), std::cos(4.3 * t), std::sin(3.2 * t + 1.0));
@@ -27,7 +27,7 @@ Eigen::Vector3d rateAt(const TurningDrive& drive, double t) {
 
 constexpr int kWaves = 24;
 
-/// Of several lengths, in several directions.
+/// Waves of several lengths and directions.
 const std::array<Eigen::Vector3d, kWaves>& waves() {
   static const auto all = [] {
     std::array<Eigen::Vector3d, kWaves> made;
@@ -40,7 +40,7 @@ const std::array<Eigen::Vector3d, kWaves>& waves() {
   return all;
 }
 
-/// A grey value for a direction.
+/// Grey value of a direction.
 double textureAt(const Eigen::Vector3d& ray) {
   double sum = 0.0, phase = 0.0;
   for (const Eigen::Vector3d& wave : waves()) sum += std::sin(wave.dot(ray) + (phase += 1.1));
@@ -59,7 +59,7 @@ cv::Mat rendered(const Eigen::Quaterniond& q_WB) {
   return image;
 }
 
-/// Most drives turn the same way: a view is rendered once.
+/// Most drives have the same rotations, so that each view is rendered once.
 const cv::Mat& imageOf(const Eigen::Quaterniond& q_WB) {
   static std::map<std::array<double, 4>, cv::Mat> known;
   cv::Mat& image = known[{q_WB.w(), q_WB.x(), q_WB.y(), q_WB.z()}];

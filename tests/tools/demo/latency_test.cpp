@@ -23,7 +23,7 @@ TEST(Latency, TakesTheNetworksTimeOutFrameByFrame) {
   LatencyMeter meter;
   meter.onDetections(detectionsOf(1, 0.030));
   meter.onObjects(objectsOf(1, 1'000'000), 36'000'000);  // 35 ms
-  meter.onObjects(objectsOf(2, 2'000'000), 47'000'000);  // 45 ms; its detections arrive after it
+  meter.onObjects(objectsOf(2, 2'000'000), 47'000'000);  // 45 ms; its detections arrive later
   meter.onDetections(detectionsOf(2, 0.038));
   const auto report = meter.report();
   EXPECT_DOUBLE_EQ(report["latency_ms"]["median"], 40.0);
@@ -36,11 +36,12 @@ TEST(Latency, CountsAFrameOnceAndLeavesOutWhatIsNotKnown) {
   LatencyMeter meter;
   meter.onDetections(detectionsOf(1, 0.010));
   meter.onObjects(objectsOf(1, 0), 12'000'000);
-  meter.onObjects(objectsOf(1, 0), 99'000'000);  // a new owner says it again
-  meter.onDetections(detectionsOf(1, 0.001));    // likewise
-  meter.onObjects(objectsOf(2, 0), 20'000'000);  // no detections came
-  meter.onDetections(detectionsOf(3, 0.010));    // no objects came
-  meter.onDetections(detectionsOf(4, 0.0));      // an older inference, which does not say
+  meter.onObjects(objectsOf(1, 0), 99'000'000);  // repeated by a new owner
+  meter.onDetections(detectionsOf(1, 0.001));    // repeated as well
+  meter.onObjects(objectsOf(2, 0), 20'000'000);  // without detections
+  meter.onDetections(detectionsOf(3, 0.010));    // without objects
+  meter.onDetections(detectionsOf(4, 0.0));      // an older inference, which does not state the
+                                                 // time
   meter.onObjects(objectsOf(4, 0), 16'000'000);
   const auto report = meter.report();
   EXPECT_DOUBLE_EQ(report["latency_ms"]["median"], 16.0);

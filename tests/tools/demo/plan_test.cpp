@@ -68,7 +68,7 @@ TEST_F(DemoPlan, ShowsItWhereTheGatewayIsInstalled) {
 TEST_F(DemoPlan, ShapesAreOfThePriorsThatTheFiltersConfigurationNames) {
   fs::create_directories(folder_ / "config");
   std::ofstream(folder_ / "config" / "semantic_filter.yaml") << "class_priors: mine.yaml\n";
-  EXPECT_THROW(shapesFor(options_), StartupError);  // there is none yet
+  EXPECT_THROW(shapesFor(options_), StartupError);  // the file does not exist yet
   std::ofstream(folder_ / "mine.yaml")
       << "fallback: {size: [0.7, 0.6, 0.7], spread: [0.4, 0.4, 0.4], common: 0.5, detection: 0.6}\n"
          "other: {size: [1, 1, 1], spread: [0.4, 0.4, 0.4], common: 0.5, detection: 0.6}\n"

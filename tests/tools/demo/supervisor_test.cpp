@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 
-// As supervisord 4.2.5 answers.
+// The answers of supervisord 4.2.5.
 constexpr char kAnswer[] = R"xml(<?xml version='1.0'?>
 <methodResponse>
 <params>
@@ -108,7 +108,7 @@ TEST(SupervisorAnswers, GiveWhyItEndedAtOnce) {
   EXPECT_EQ(complaintIn(""), "");
 }
 
-/// Real supervisord over shell programs.
+/// Runs the real supervisord with shell programs.
 class Supervision : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -160,7 +160,7 @@ TEST_F(Supervision, StartsAKilledProgramAgainHoweverOften) {
     ASSERT_TRUE(eventually([&] {
       const auto states = supervisor->states();
       std::ifstream(pid_file) >> pid;
-      // The state alone may be the one before the kill was noticed.
+      // The state alone may be older than the kill.
       return states && states->at("worker").state == "RUNNING" && pid > 1 && pid != last &&
              countSpawns(log())["worker"] == round;
     })) << log();

@@ -23,7 +23,7 @@ sim::TruthObject chairAt(std::uint64_t id, double x) {
   return chair;
 }
 
-/// What an estimate of it would be that is right.
+/// Returns a correct estimate of the object.
 MapBelief beliefOf(const sim::TruthObject& object, double sigma) {
   MapBelief belief;
   belief.id = object.id;
@@ -52,14 +52,14 @@ TEST(Consistency, HonestCovariancesHaveAneesOneAndStayInTheBand) {
     EXPECT_LT(anees->mean(), anees->band().second) << anees->what;
     EXPECT_GT(anees->within3Sigma(), 0.98) << anees->what;
   }
-  for (auto& belief : beliefs) belief.covariance *= 0.25;  // twice too sure
+  for (auto& belief : beliefs) belief.covariance *= 0.25;  // half of the true standard deviation
   EXPECT_NEAR(scoreConsistency(beliefs, truth, RigidTransform(), 3.0).position.mean(),
               4.0 * score.position.mean(), 1e-9);
 }
 
 TEST(Consistency, RunsCountAsOneEach) {
   RunAnees runs{"position", 3, {}};
-  runs.add({"position", 3, {1.5, 1.5, 1.5}});  // 0.5 per degree
+  runs.add({"position", 3, {1.5, 1.5, 1.5}});  // 0.5 per degree of freedom
   runs.add({"position", 3, {4.5}});
   runs.add({"position", 3, {}});
   ASSERT_EQ(runs.means.size(), 2U) << "a run without objects says nothing";
@@ -108,7 +108,7 @@ TEST(Consistency, OnlyTheNearestStandingBeliefOfTheClassIsCompared) {
   EXPECT_EQ(score.left_out, 4U);
 }
 
-/// A body that circles with its x axis upwards, where yaw by that axis means nothing.
+/// A body that circles with its x axis upwards, so that its yaw is undefined.
 RigidTransform circling(double t) {
   const Eigen::Matrix3d up = expSo3(Eigen::Vector3d(0, -0.5 * std::numbers::pi, 0));
   return {rotationAboutZ(0.3 * t) * up,
@@ -123,7 +123,8 @@ replay::PoseFile circle() {
   return {replay::PoseFormat::kTum, poses};
 }
 
-/// In a world that is turned and moved, with errors of sigma; none in the first row of an epoch.
+/// Odometry in a rotated and shifted world, with errors of sigma; the first row of an epoch has no
+/// error.
 std::vector<OdometryRow> odometryOf(double sigma, double turn) {
   std::mt19937_64 random(5);
   std::normal_distribution<double> normal;
@@ -153,7 +154,8 @@ TEST(Consistency, HonestOdometryHasAneesOneInEachEpochsWorld) {
   const auto score = scoreOdometry(odometryOf(0.01, 2.0), circle());
   for (const Anees* anees : {&score.orientation, &score.position, &score.velocity}) {
     EXPECT_EQ(anees->nees.size(), 380U) << anees->what;
-    EXPECT_GT(anees->mean(), anees->band().first) << anees->what;  // errors of its own each row
+    EXPECT_GT(anees->mean(), anees->band().first) << anees->what;  // errors are independent for
+                                                                   // each row
     EXPECT_LT(anees->mean(), anees->band().second) << anees->what;
   }
   auto fast = odometryOf(0.01, 2.0);

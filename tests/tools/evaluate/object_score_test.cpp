@@ -7,8 +7,8 @@
 namespace perdure::tools {
 namespace {
 
-/// W is the rectified camera: x right, y down, z forward, so a row's yaw turns about z. Good enough
-/// for what does not look at orientation.
+/// W is the rectified camera: x right, y down, z forward, so that a row's yaw is about z. This
+/// suffices for tests without orientations.
 replay::KittiCalibration camera() {
   replay::KittiCalibration calibration;
   calibration.P2 << 700, 0, 600, 0, 0, 700, 180, 0, 0, 0, 1, 0;
@@ -59,7 +59,7 @@ TEST(ObjectScore, DistanceDecidesTheCell) {
 TEST(ObjectScore, AngleIsModuloAFullTurnAndAnyMeansAny) {
   auto label = labelAt(0, 20);
   for (const double turn : {0.0, 2 * std::numbers::pi - 0.4}) {
-    label.heading = turn;  // the estimate's is 0
+    label.heading = turn;  // the estimate has 0
     const auto s = score({rowAt(0, 20)}, {{.counted = {label}, .ignored = {}, .dont_care = {}}});
     EXPECT_EQ(s.cells[2][0].matched, 1U) << turn;
   }
@@ -71,7 +71,7 @@ TEST(ObjectScore, AngleIsModuloAFullTurnAndAnyMeansAny) {
 }
 
 TEST(ObjectScore, PairsAreTakenByIncreasingDistanceOneToOne) {
-  // Estimate 2 is nearest to truth A; estimate 1 could have A or nothing.
+  // Estimate 2 is nearest to truth A; estimate 1 can match only A.
   const TruthFrame truth{{labelAt(0, 20, 1), labelAt(2.0, 20, 2)}, {}, {}};
   const auto s = score({rowAt(-0.9, 20, 1), rowAt(0.8, 20, 2)}, {truth});
   EXPECT_EQ(s.cells[2][2].matched, 1U);
@@ -108,7 +108,8 @@ TEST(ObjectScore, HalfTheBoxInADontCareRegionIsNeutral) {
 }
 
 TEST(ObjectScore, AnEstimateThatOverlapsACountedTruthMoreIsAFalseAlarm) {
-  // 1.4 m from the ignored label in space, but its box lies on the counted one, 3 m too far.
+  // The estimate is 1.4 m from the ignored label in space. Its box overlaps the counted label,
+  // which is 3 m away.
   const TruthFrame truth{{labelAt(0, 20, 1)}, {labelAt(1.3, 23, 2)}, {}};
   const auto s = score({rowAt(0.2, 22.2)}, {truth});
   EXPECT_EQ(s.cells[2][2].matched, 0U);
@@ -157,8 +158,8 @@ TEST(ObjectScore, RowsOfFramesWithoutAPoseCannotCount) {
 }
 
 TEST(ObjectScore, YawInWBecomesRotationAboutTheCamerasVertical) {
-  // W: x forward, y left, z up. A car that heads along W's x drives along the camera's z, which
-  // KITTI calls rotation_y = -pi/2; one that heads to W's right (yaw -pi/2) has rotation_y 0.
+  // W: x forward, y left, z up. A car that heads along W's x drives along the camera's z, and
+  // KITTI's rotation_y is -pi/2. A car that heads to W's right (yaw -pi/2) has rotation_y 0.
   Eigen::Matrix3d R_RW;
   R_RW << 0, -1, 0, 0, 0, -1, 1, 0, 0;
   const RigidTransform T_RW(R_RW, Eigen::Vector3d::Zero());

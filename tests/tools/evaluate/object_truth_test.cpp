@@ -15,7 +15,7 @@ replay::KittiLabel car(std::uint64_t frame, std::int64_t track, const Eigen::Vec
   return label;
 }
 
-/// The body goes along z by a metre a frame; rectified camera and body are the same.
+/// The body moves along z by one metre per frame; rectified camera and body have the same pose.
 PosesByFrame drive(std::uint64_t frames) {
   PosesByFrame poses;
   for (std::uint64_t i = 0; i < frames; ++i) {
@@ -30,9 +30,10 @@ TEST(ObjectTruth, ATrackIsStaticInTheWorldNotInTheCamera) {
   for (std::uint64_t i = 0; i < 20; ++i) {
     const double z = static_cast<double>(i);
     labels.push_back(car(i, 1, {2, 1, 30 - z}));                       // parked
-    labels.push_back(car(i, 2, {-2, 1, 20}));                          // drives ahead at our speed
-    labels.push_back(car(i, 3, {4, 1, 30 - 0.88 * z}));                // creeps by 2.3 m
-    labels.push_back(car(i, 4, {6, 1, 30 - z + (i == 9 ? 2.5 : 0)}));  // parked, one wild label
+    labels.push_back(car(i, 2, {-2, 1, 20}));                          // drives ahead at the body's
+                                                                       // speed
+    labels.push_back(car(i, 3, {4, 1, 30 - 0.88 * z}));                // moves by 2.3 m
+    labels.push_back(car(i, 4, {6, 1, 30 - z + (i == 9 ? 2.5 : 0)}));  // parked, with one outlier
   }
   EXPECT_EQ(staticTracks(labels, RigidTransform(), drive(20)), (std::set<std::int64_t>{1}));
 }

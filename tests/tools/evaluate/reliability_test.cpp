@@ -9,7 +9,8 @@
 namespace perdure::tools {
 namespace {
 
-/// Believes p where p' is so: p' has the odds of p to the power `temper`.
+/// Claims with stated probability p and true probability p', where the odds of p' are those of p to
+/// the power `temper`.
 Reliability believer(double temper, std::size_t count) {
   sim::Dice dice(3);
   Reliability result{"existence", {}};

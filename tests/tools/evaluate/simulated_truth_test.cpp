@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-/// A body at (100, 50), heading north, that looks at the given objects in its only frame.
+/// A body at (100, 50), heading north, with one frame and without objects.
 SimulatedTruth lookingNorth() {
   const CameraCalibration camera = tests::cameraAhead(640, 480, 500.0, {0.5, 0, 0});
   const RigidTransform T_WB(rotationAboutZ(std::numbers::pi / 2), Eigen::Vector3d(100, 50, 1));
@@ -26,7 +26,8 @@ SimulatedTruth lookingNorth() {
           {fromNanoseconds(0)}};
 }
 
-/// Ten metres ahead and `left` to the left of the body, whole in sight, its box 40 px tall.
+/// Adds an object ten metres ahead and `left` to the left of the body, fully visible, with a box 40
+/// px high.
 void addObject(SimulatedTruth& truth, std::uint64_t id, const std::string& class_name,
                double left = 0.0) {
   sim::TruthObject object;
@@ -40,7 +41,7 @@ void addObject(SimulatedTruth& truth, std::uint64_t id, const std::string& class
   truth.truth.views[0].push_back({id, 1.0, Box{x - 40, 220, x + 40, 260}});
 }
 
-/// A row where an object with `left` would be, by a body that took its start for the origin.
+/// Returns the row of an object with this `left`, in a world that begins at the body.
 EstimateRow rowAt(double left, std::uint64_t id = 1, const std::string& class_name = "car") {
   EstimateRow row;
   row.id = id;
@@ -77,7 +78,7 @@ TEST(SimulatedTruth, OnlyWhatIsWholeTallAndStandsCounts) {
   views[3].box.y1 = 236;  // 24 px
   truth.truth.objects[4].moves = true;
   truth.truth.objects[5].keys.push_back(
-      {fromNanoseconds(1), Eigen::Vector3d(0, 0, 0), 0.0});  // is taken elsewhere later
+      {fromNanoseconds(1), Eigen::Vector3d(0, 0, 0), 0.0});  // moves to another place later
   const auto run = pairWithTruth(truth, {}, {{fromNanoseconds(0), RigidTransform()}}, "");
   ASSERT_EQ(run.frames.at(0).truth.counted.size(), 1U);
   EXPECT_EQ(run.frames.at(0).truth.counted[0].track, 1);

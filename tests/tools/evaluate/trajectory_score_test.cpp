@@ -72,7 +72,7 @@ TEST(TrajectoryScore, OnePercentOfScaleIsOnePercentOfSegmentError) {
   const auto s = scoreTrajectory(pairs, Alignment::kYaw);
   EXPECT_EQ(s.segments.lengths_m.front(), 100.0);
   EXPECT_GT(s.segments.segments, 1000U);
-  // A chord of the loop is shorter than its arc, so the error is below 1 % of the arc.
+  // A chord of the loop is shorter than its arc, so that the error is below 1 % of the arc.
   EXPECT_GT(s.segments.t_err_percent, 0.05);
   EXPECT_LT(s.segments.t_err_percent, 1.0);
   EXPECT_NEAR(s.segments.r_err_deg_per_m, 0.0, 1e-6);
@@ -81,7 +81,7 @@ TEST(TrajectoryScore, OnePercentOfScaleIsOnePercentOfSegmentError) {
 TEST(TrajectoryScore, AYawDriftShowsInTheRotationOfSegments) {
   auto pairs = loop(400);
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const double yaw = 0.001 * static_cast<double>(i);  // per metre, for a frame is a metre
+    const double yaw = 0.001 * static_cast<double>(i);  // per metre, because a frame is one metre
     pairs[i].estimate.q = pairs[i].truth.q * expQuaternion({0, 0, yaw});
   }
   const auto s = scoreTrajectory(pairs, Alignment::kYaw);

@@ -58,7 +58,7 @@ TEST(UsedFrames, WithoutAPoseAreThoseBetweenPoses) {
   EXPECT_THAT(noteOfUntold(2), HasSubstr("2 frames between poses have none"));
 }
 
-/// What `perdure evaluate trajectory` says of poses at the first, third and fifth of five frames.
+/// Runs `perdure evaluate trajectory` on poses at the first, third and fifth of five frames.
 nlohmann::json judged(const fs::path& run, const fs::path& drive) {
   std::string tum;
   for (int i = 0; i < 5; i += 2) {

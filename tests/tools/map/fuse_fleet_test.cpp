@@ -1,4 +1,4 @@
-// `perdure map fuse --url`: the vehicles' maps of a server are brought together there.
+// Tests `perdure map fuse --url`, which fuses the vehicles' maps on a server.
 #include "tools/map/fuse_fleet.h"
 
 #include <gmock/gmock.h>

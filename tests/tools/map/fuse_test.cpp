@@ -1,5 +1,5 @@
-// `perdure map fuse` on files: what it refuses, what it writes, and that the same maps give the
-// same bytes.
+// Tests `perdure map fuse` on files: invalid input, the written file, and equal bytes for equal
+// maps.
 #include "tools/map/fuse.h"
 
 #include <gmock/gmock.h>
@@ -30,7 +30,7 @@ const std::vector<mapping::test::Thing>& things() {
   return all;
 }
 
-/// Drives take longer than fusing them.
+/// Caches the drives, because they take longer than their fusion.
 const mapping::MapContents& drivenOnce(const std::string& name,
                                        const mapping::test::DriveSettings& settings) {
   static std::map<std::string, mapping::MapContents> maps;
@@ -43,7 +43,7 @@ class FuseFiles : public ::testing::Test {
   std::string write(const std::string& name, const mapping::test::DriveSettings& settings) {
     map_store::WholeMap map;
     map.contents = drivenOnce(name, settings);
-    // As a drive leaves it: some are in the working set still.
+    // As after a drive: some objects are still in the working set.
     for (auto& [id, object] : map.contents.objects) {
       object.belief.visibility = id % 3 == 0 ? Visibility::kVisible : Visibility::kOutOfView;
       object.belief.visible_fraction = id % 3 == 0 ? 0.5 : 0.0;
@@ -63,7 +63,7 @@ class FuseFiles : public ::testing::Test {
   TemporaryFolder folder;
 };
 
-/// All beliefs of a file as it stores them, and whether they are history.
+/// Returns all stored beliefs of a file, with their history columns.
 std::vector<std::string> beliefBytes(const std::string& path) {
   const auto connection = map_store::openStoreForReading(path);
   auto rows = connection.prepare(
@@ -181,7 +181,7 @@ TEST_F(FuseFiles, RefuseAMapThatIsDamagedInside) {
   EXPECT_FALSE(fs::exists(out()) || fs::exists(out() + ".part"));
 }
 
-/// Networks may have other names for things. What both call alike aligns the maps.
+/// Networks may use different class names. The classes with common names align the maps.
 TEST_F(FuseFiles, MapsOfOtherClassesAreAlignedByThoseInCommon) {
   map_store::WholeMap map;
   map.contents =
@@ -218,7 +218,7 @@ TEST_F(FuseFiles, AMapWithoutAGraphStaysOutAndIsTold) {
   CLI::App app;
   addFuseCommand(app);
   std::vector<std::string> arguments{"fuse", folder.file("old"), a, "--out", out(), "--force"};
-  std::reverse(arguments.begin(), arguments.end());  // as CLI11 takes them
+  std::reverse(arguments.begin(), arguments.end());  // the order that CLI11 expects
   testing::internal::CaptureStdout();
   try {
     app.parse(arguments);

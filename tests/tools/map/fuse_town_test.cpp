@@ -1,5 +1,5 @@
-// Two vehicles through one simulated town, each with a drift, a frame and detections of its own,
-// fused: one object for each true one.
+// Fuses the maps of two vehicles in one simulated town. Each vehicle has its own drift, frame and
+// detections. The result has one object for each true object.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -55,7 +55,7 @@ fs::path drive(const fs::path& data, const Leg& leg) {
   return options.out;
 }
 
-/// The true object that each id of a run was matched to most often.
+/// Returns the true object with which each id of a run was matched most often.
 std::map<ObjectId, std::uint64_t> trueObjects(const fs::path& run, const SimulatedTruth& truth) {
   const auto frames = besideTheBody(truth, readObjectRows(run / "objects_inst.csv"),
                                     replay::PoseFile::read(run / "trajectory.tum").poses(), {});

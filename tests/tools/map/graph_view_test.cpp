@@ -1,4 +1,4 @@
-// What `perdure map graph` says.
+// Tests the output of `perdure map graph`.
 #include "tools/map/graph_view.h"
 
 #include <gmock/gmock.h>

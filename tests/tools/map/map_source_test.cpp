@@ -1,4 +1,4 @@
-// A map's file read in M and in W, and what it knows of an object beside its belief.
+// Tests the reading of a map file in M and in W, and of the data stored with a belief.
 #include "tools/map/map_source.h"
 
 #include <gmock/gmock.h>
@@ -22,10 +22,10 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::SizeIs;
 
-const WorldId kWorld{77, 1};  // of workingSet
+const WorldId kWorld{77, 1};  // as in workingSet
 constexpr double kShift_m = 8.0;
 
-/// Three anchors, 100 m apart. The graph has moved the third by 8 m and turned it by 90°.
+/// Three anchors, 100 m apart. The graph has moved the third by 8 m and rotated it by 90°.
 class MapSource : public ::testing::Test {
  protected:
   MapSource() {

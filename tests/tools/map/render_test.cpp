@@ -36,7 +36,7 @@ TEST(MapRender, GivesLongitudeFirstAndTurnsByTheAnchorsYaw) {
   EXPECT_EQ(json["type"], "FeatureCollection");
   EXPECT_EQ(json["georeferenced"], true);
   const auto& at = json["features"][0]["geometry"]["coordinates"];
-  // 100 m north: of the meridian's 111.2 km a degree at this latitude.
+  // 100 m north; one degree of the meridian is 111.2 km at this latitude.
   EXPECT_NEAR(at[0].get<double>(), 8.4, 1e-7);
   EXPECT_NEAR(at[1].get<double>() - 49.0, 100.0 / 111'200.0, 2e-6);
   EXPECT_NEAR(at[2].get<double>(), 109.0, 0.01);

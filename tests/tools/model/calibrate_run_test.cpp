@@ -1,5 +1,5 @@
-// `perdure model calibrate` from rendered pictures to a model.json that inference runs with: the
-// committed network, and the same one with its evidence spoiled.
+// Tests `perdure model calibrate` from rendered images to a model.json with which inference runs.
+// It uses the committed network with its own calibration and with a wrong one.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -40,7 +40,7 @@ class CalibrateRun : public testing::Test {
   static nlohmann::json read(const fs::path& file) {
     return nlohmann::json::parse(std::ifstream(file));
   }
-  /// The model.json that a calibration of `model` on the rendered frames writes.
+  /// Calibrates `model` on the rendered frames and returns the new model.json.
   nlohmann::json calibrated(const nlohmann::json& model, const std::string& name) {
     const fs::path description = folder_ / (name + ".json"), out = folder_ / (name + ".new.json");
     std::ofstream(description) << model.dump();
@@ -53,8 +53,8 @@ class CalibrateRun : public testing::Test {
     return read(out);
   }
 
-  /// Mean log-likelihood of a box by the frames' own truth, with this model.json as it is; it is
-  /// left in spoiled.json.
+  /// Returns the mean log-likelihood of a box by the frames' truth, for an unchanged model.json.
+  /// Leaves it in spoiled.json.
   double likelihoodByTruth(const fs::path& frames, const nlohmann::json& model) {
     const fs::path description = folder_ / "spoiled.json";
     std::ofstream(description) << model.dump();
@@ -99,8 +99,8 @@ TEST_F(CalibrateRun, MendsANetworkWhoseEvidenceWasSpoiledAndInferenceTakesTheFil
   EXPECT_NEAR(node.description().calibration.temperature, b["temperature"].get<double>(), 1e-9);
 }
 
-/// A network that is too sure of itself, and frames that nobody labelled: the map of a run stands
-/// in. The truth of the frames judges what comes out.
+/// Calibrates an overconfident network on frames without labels: the map of a run replaces the
+/// labels. The result is scored with the frames' truth.
 TEST_F(CalibrateRun, TheMapOfARunStandsInForLabels) {
   const fs::path street = folder_ / "street", out = folder_ / "out";
   const ProgramAnswer drawn =
@@ -126,7 +126,7 @@ TEST_F(CalibrateRun, TheMapOfARunStandsInForLabels) {
       << "the sides of the map's boxes are no measure of a network's";
 }
 
-/// The run was of frames with the same stamps, and of other things.
+/// The run has frames with the same stamps but with other objects.
 TEST_F(CalibrateRun, LabelsOfOtherFramesAreRefused) {
   const fs::path frames = folder_ / "frames", out = folder_ / "other";
   fs::create_directories(out);

@@ -1,4 +1,4 @@
-// `perdure model calibrate` on a small drawn sequence, through the service's own node.
+// Tests `perdure model calibrate` on a small rendered sequence, through the service's own node.
 #include "tools/model/calibrate.h"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// Activations of a known temperature, and what is fitted to them.
+// Fits a calibration to activations with known temperature.
 #include "tools/model/calibration_fit.h"
 
 #include <gtest/gtest.h>
@@ -9,8 +9,8 @@
 namespace perdure::tools {
 namespace {
 
-/// Boxes of a network that says T times what it should, and lies by b: the labels are drawn from
-/// softmax(0, odds / T + b).
+/// Boxes of a network with log-odds too large by the factor T and shifted by b. The labels are
+/// drawn from softmax(0, odds / T + b).
 std::vector<BoxOutcome> boxesOf(double temperature, double bias, std::size_t count) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal(-0.5, 2.0);
@@ -68,7 +68,8 @@ TEST(CalibrationFit, BoxesOfOneKindChangeNothing) {
   EXPECT_DOUBLE_EQ(clutterRateOf(boxes), 0.01);
 }
 
-/// Scores of places: Gaussian where it is and where nothing is, so that the log ratio is a line.
+/// Scores at expected places, with Gaussian distributions for present and absent objects, so that
+/// the log ratio is linear.
 std::vector<PrimedOutcome> placesOf(std::size_t there, std::size_t elsewhere) {
   std::mt19937 random(3);
   std::normal_distribution<double> normal;
@@ -84,7 +85,7 @@ std::vector<PrimedOutcome> placesOf(std::size_t there, std::size_t elsewhere) {
 }
 
 TEST(CalibrationFit, EvidenceOfPrimedAnswersIsTheirLikelihoodRatioWhateverWasAskedMore) {
-  // log N(s; -3, 1) / N(s; -5, 1) + log .8 / .2 = 2 s + 8 + log 4, and nothing: log .2 / .8.
+  // log N(s; -3, 1) / N(s; -5, 1) + log .8 / .2 = 2 s + 8 + log 4; without a score: log .2 / .8.
   for (const auto& [there, elsewhere] : {std::pair{3000U, 9000U}, {9000U, 3000U}}) {
     const auto fitted = fitPrimed(placesOf(there, elsewhere), 0.002);
     ASSERT_TRUE(fitted);

@@ -1,6 +1,7 @@
-// Each family from the exported file to boxes with evidence: imported, repaired, loaded by OpenCV,
-// or by ONNX Runtime where that alone has the operators, and decoded as the service does, against
-// what the generator computed from the published rules.
+// Tests each family from the exported file to boxes with evidence. The file is imported, repaired,
+// loaded by OpenCV (or by ONNX Runtime if only that has the operators), and decoded as in the
+// service. The results are compared with values that the generator computed from the published
+// rules.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,7 +28,7 @@ constexpr double kThreshold = 0.02;
 struct Expected {
   Box box;
   std::vector<double> log_odds;
-  /// Of the best class: what the threshold looks at where there is no background.
+  /// Log-odds of the best class, to which the threshold applies if there is no background class.
   double best() const { return *std::max_element(log_odds.begin(), log_odds.end()); }
 };
 
@@ -53,7 +54,7 @@ std::vector<std::string> linesOf(const fs::path& file) {
   return lines;
 }
 
-/// All candidates of the picture, before overlaps are merged. Calibration is taken out.
+/// Returns all candidates of the image before overlaps are merged, without calibration.
 std::vector<inference::Candidate> candidatesOf(const fs::path& network, const fs::path& picture) {
   auto file = inference::readModelFile(network.string(), "", {});
   file.description.calibration = {1.0, 0.5};
@@ -117,15 +118,15 @@ TEST_P(Families, AnswerAsTheirPublishedRulesSay) {
   for (const Expected& row : expected) {
     double least = INFINITY;
     for (const auto& candidate : found) least = std::min(least, differenceOf(row, candidate));
-    // Near the threshold a box may be on either side; a soft-max with a background is below it
-    // where its odds against the background alone are above.
+    // Near the threshold a box may be accepted or rejected. With a background class, the soft-max
+    // score is lower than the odds against the background alone suggest.
     if (sigmoid(row.best()) < 3 * kThreshold) continue;
     ++sure;
     EXPECT_LT(least, 2e-3) << "box " << row.box.x1 << " " << row.box.y1 << " " << row.box.x2;
   }
   EXPECT_GT(sure, expected.size() / 10) << "the network says next to nothing";
   EXPECT_LE(found.size(), expected.size());
-  for (const auto& candidate : found) {  // and nothing else is found
+  for (const auto& candidate : found) {  // all other candidates must match as well
     double least = INFINITY;
     for (const Expected& row : expected) least = std::min(least, differenceOf(row, candidate));
     EXPECT_LT(least, 2e-3);

@@ -1,5 +1,5 @@
-// Known networks: the list that is shipped, and what `perdure model fetch` does with a server on
-// loopback: takes, checks, imports, or says what it would do.
+// Tests the list of known networks, and `perdure model fetch` with a server on loopback. The
+// command downloads, checks and imports a file, or describes these steps.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -39,7 +39,7 @@ std::string contentOf(const fs::path& file) {
   return text.str();
 }
 
-/// Serves a folder; its port is the system's choice.
+/// Serves a folder on a port that the system chooses.
 constexpr const char* kServer = R"(
 import http.server, os, sys
 os.chdir(sys.argv[1])
@@ -102,7 +102,8 @@ class Fetch : public ::testing::Test {
                         {"sha256", sum}}};
     std::ofstream(folder_ / "list.json") << json{{"networks", {known_}}};
   }
-  /// Of `perdure model fetch tiny`. The tiny networks have three classes: the list names coco's.
+  /// Runs `perdure model fetch tiny`. The tiny networks have three classes, although the list names
+  /// coco's.
   ProgramAnswer fetched(std::vector<std::string> more = {}) {
     std::vector<std::string> command = {(sourceTree() / "build/release/bin/perdure").string()};
     if (const char* bin = std::getenv("PERDURE_BIN")) command = {std::string(bin) + "/perdure"};
@@ -120,7 +121,7 @@ class Fetch : public ::testing::Test {
 };
 
 TEST_F(Fetch, TakesChecksImportsAndCalibrates) {
-  // Three classes, as the tiny networks have.
+  // Three classes, as in the tiny networks.
   std::ofstream(folder_ / "three.names") << "car\nperson\ndog\n";
   known_["classes_file"] = fs::absolute(folder_ / "three.names").string();
   describeFile(fs::file_size(folder_ / "served/tiny.onnx"), sha256Of(folder_ / "served/tiny.onnx"));
@@ -140,7 +141,8 @@ TEST_F(Fetch, TakesChecksImportsAndCalibrates) {
   const auto same = inference::readModelFile((out() / "tiny.perdure.onnx").string(), "", {});
   EXPECT_DOUBLE_EQ(same.description.calibration.clutter_rate, 0.66);
 
-  // What is there is not taken again: without the server, and for a place of another kind.
+  // Existing files are not downloaded again: this run works without the server, for another kind of
+  // place.
   server_->stop(std::chrono::seconds(5));
   const auto again = fetched({"--for", "room"});
   ASSERT_EQ(again.status, 0) << again.output;
@@ -225,7 +227,7 @@ TEST(KnownNetworks, OfTheListHaveAllThatIsNeeded) {
   }
 }
 
-// The sums in the list are those of files that were tried.
+// The checksums in the list belong to files that were tested.
 TEST(KnownNetworks, AreTheFilesAtHand) {
   const fs::path weights = sourceTree() / "../shared/data/weights";
   if (!fs::exists(weights)) GTEST_SKIP() << "../shared/data is absent: no network to try";

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""The program `perdure model import`: its files, its statuses, and what it leaves behind when it fails."""
+"""Tests the program `perdure model import`: its files, its exit statuses, and the remaining
+files after a failure."""
 
 import os
 import subprocess
@@ -67,7 +68,7 @@ class Command(Importing):
         self.assertIn("perdure model import yolov8n.onnx --image street.jpg", told)
 
     def test_files_take_their_places_together(self):
-        """One that cannot be replaced is mounted there; the network before it is taken back."""
+        """A mount makes one file irreplaceable; the previous network must be restored."""
         path = self.made(tiny.yolox)
         importing = f"{os.environ['PERDURE_BIN']}/perdure model import {path} {NAMES} --out {{disk}}"
         done = self.on_a_small_disk(2000, f"""{importing} --pad 100 >&2 || exit 98
@@ -105,7 +106,7 @@ class Command(Importing):
 
     def test_what_nobody_can_run_leaves_nothing_behind(self):
         path = self.made(tiny.yolox)
-        model = onnx.shape_inference.infer_shapes(onnx.load(str(path)))  # written down: nobody infers them then
+        model = onnx.shape_inference.infer_shapes(onnx.load(str(path)))  # shapes cannot be inferred later
         next(n for n in model.graph.node if n.op_type == "Relu").op_type = "Unheard"
         onnx.save(model, str(path))
         status, told = self.perdure("import", path, NAMES, "--out", self.folder / "out")
@@ -151,7 +152,8 @@ class Command(Importing):
         return sorted((self.folder / "sized").iterdir())
 
     def on_a_small_disk(self, blocks, command):
-        """What is said, and what is there then, of a disk that `command` fills; {disk} is its folder."""
+        """Runs `command` on a small file system that it fills, and returns its output; {disk} is
+        the folder."""
         disk = self.folder / "disk"
         disk.mkdir(exist_ok=True)
         script = f"mount -t tmpfs -o size={blocks}k small {disk} || exit 99\n{command.format(disk=disk)}\n"
@@ -165,7 +167,7 @@ class Command(Importing):
         path = self.made(tiny.yolox)
         importing = f"{os.environ['PERDURE_BIN']}/perdure model import {path} {NAMES} --out {{disk}}"
         parts = [4 * -(-p.stat().st_size // 4096) for p in self.files_of(path)]
-        for left in (8, parts[0], sum(parts[:2])):  # kilobytes: the network ends in them, then the others do
+        for left in (8, parts[0], sum(parts[:2])):  # kB; the network, then another file, is too large
             done = self.on_a_small_disk(2000, f"""{importing} >&2 || exit 98
                 cd {{disk}} && sha256sum * > {self.folder}/sums && cd -
                 dd if=/dev/zero of={{disk}}/ballast bs=4k 2>/dev/null; truncate -s -{left}k {{disk}}/ballast

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""What `perdure model import` says of files that it cannot take, and what it finds in those it can."""
+"""Tests the messages of `perdure model import` for unsupported files, and its results for
+supported ones."""
 
 import io
 import sys
@@ -9,7 +10,7 @@ from contextlib import redirect_stdout
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
-from importing import NAMES, Importing  # first: it says what is missing
+from importing import NAMES, Importing  # first, because it reports missing packages
 import numpy as np
 import onnx
 import tiny_networks as tiny
@@ -24,7 +25,7 @@ from perdure_model.quantised import dequantised, to_float
 
 
 def own_decoding(folder):
-    """Heads like those of YOLOv5, sizes by another rule."""
+    """Writes heads like those of YOLOv5, but with another rule for sizes."""
     def decode(net, raw, stride):
         p = net.node("Sigmoid", [tiny.rows_of_anchors(net, raw, stride)])
         wide = net.node("Mul", [p, np.array([stride] * 2 + [50] * 2 + [1] * (1 + tiny.K), np.float32)])
@@ -99,7 +100,7 @@ class Files(Importing):
 
 class Inputs(Importing):
     def convolution(self, shape=(1, 3, 64, 64), kind=TensorProto.FLOAT, more=None):
-        """`more`: further inputs, each with a convolution of its own."""
+        """Writes a file with one convolution for each input; `more` adds further inputs."""
         inputs = {"images": (kind, list(shape)), **(more or {})}
         weight = np.zeros((8, 3, 8, 8), np.float32)
         nodes = [helper.make_node("Conv", [name, "w"], [f"{name}_out"], strides=[8, 8]) for name in inputs]
@@ -120,7 +121,7 @@ class Inputs(Importing):
                       self.refused(self.made(tiny.yolox), NAMES, "--size=320x320")[0])
 
     def test_a_convolutional_network_takes_another_size(self):
-        """The answers of the same weights at that size: computed with the file at an open size."""
+        """Compares with the same weights at that size, computed from the file with an open size."""
         for make in (tiny.yolox, tiny.yolov8, tiny.nanodet):
             path = self.made(make)
             told, description = self.run_import(path, NAMES, "--input=128x64")
@@ -132,7 +133,7 @@ class Inputs(Importing):
             wide = graph.evaluate({"images": image}, graph.outputs)[0]
             self.run_import(path, NAMES)
             whole = Graph.load(self.folder / "out.onnx")
-            for half in (0, 1):  # these networks look at patches: each half of the picture answers alone
+            for half in (0, 1):  # the networks use separate patches, so that halves are independent
                 part = image[:, :, :, 64 * half:64 * (half + 1)]
                 for name, value in whole.evaluate({"images": part}, whole.outputs)[0].items():
                     if name in graph.outputs and value.shape[3] * 2 == wide[name].shape[3]:
@@ -153,7 +154,7 @@ class Inputs(Importing):
         self.assertIn("gives whole boxes for an input of 64x64", whole)
 
     def test_places_that_were_learned_are_not_moved(self):
-        """A constant for each cell is added: no other size has one."""
+        """Adds a constant for each cell, which exists only for one size."""
         net = tiny.Net(21, **tiny.UNIT)
         outputs = []
         for stride in (8, 16, 32):
@@ -332,7 +333,8 @@ class Families(Importing):
 
 class Operators(Importing):
     def whole(self, more, outputs, constants=None, domains=()):
-        """Boxes and scores by products, so that no heads are found, then `more`."""
+        """Computes boxes and scores by matrix products, so that no heads are found; then adds
+        the nodes `more`."""
         weight = np.random.default_rng(1).normal(size=(7, 64)).astype(np.float32)
         nodes = [helper.make_node("AveragePool", ["images"], ["p"], kernel_shape=[8, 8], strides=[8, 8]),
                  helper.make_node("ReduceMean", ["p"], ["m"], axes=[1], keepdims=0),
@@ -400,7 +402,8 @@ class Operators(Importing):
         self.assertIn("computes with If", self.refused(path, NAMES, "--family=detr", "--onnx-runtime")[0])
 
     def with_another(self, kind, name, make, swap):
-        """The network of `make`, the operator that `swap` finds replaced by one that nobody knows."""
+        """Writes the network of `make`; replaces the operator that `swap` selects by an unknown
+        one."""
         path = self.made(make)
         model = onnx.load(str(path))
         node = swap(model.graph.node)
@@ -410,7 +413,8 @@ class Operators(Importing):
         return path
 
     def test_a_level_that_an_unknown_operator_hides_is_not_left_out(self):
-        """In the features of one of its three levels, and behind the heads of one."""
+        """The unknown operator is in the features of one of three levels, or after the heads of
+        one level."""
         def relu(nodes):
             return [n for n in nodes if n.op_type == "Relu"][1]
 
@@ -452,7 +456,7 @@ class Computing(unittest.TestCase):
         self.assertGreater(before, 1)
 
     def test_what_is_no_constant_is_not_taken_for_one(self):
-        """A bound that is computed, and whole numbers: the repair leaves them as they are."""
+        """The repair must not change a computed bound, or an operator on integers."""
         nodes = [Node("ReduceMax", ["images"], ["top"], {"keepdims": 0}), Node("Clip", ["images", "", "top"], ["c"]),
                  Node("Shape", ["c"], ["s"]), Node("Div", ["s", "two"], ["half"])]
         inputs = {"images": (TensorProto.FLOAT, [1, 3, 8, 8])}

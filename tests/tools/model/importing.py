@@ -1,4 +1,5 @@
-"""What tests of `perdure model import` share: a folder, small networks, the import in this process."""
+"""Support for tests of `perdure model import`: a folder, small networks, and the import in this
+process."""
 
 import io
 import json
@@ -35,7 +36,7 @@ class Importing(unittest.TestCase):
         return self.folder / make.__name__ / "net.onnx"
 
     def graph(self, nodes, outputs, constants=None, inputs=None, opset=12, domains=()):
-        """A file of `nodes`; `outputs`: {name: shape}; `inputs`: {name: (type, shape)}."""
+        """Writes a file with `nodes`; `outputs`: {name: shape}; `inputs`: {name: (type, shape)}."""
         inputs = inputs or {"images": (TensorProto.FLOAT, [1, 3, 64, 64])}
         graph = helper.make_graph(
             nodes, "g", [helper.make_tensor_value_info(n, t, s) for n, (t, s) in inputs.items()],
@@ -49,7 +50,7 @@ class Importing(unittest.TestCase):
         return path
 
     def run_import(self, path, *arguments):
-        """(what was printed, model.json)."""
+        """Returns (printed text, model.json)."""
         out = self.folder / "out.onnx"
         told = io.StringIO()
         with redirect_stdout(told):

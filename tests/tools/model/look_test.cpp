@@ -1,4 +1,4 @@
-// What `perdure model` draws and compares, on a network whose answer is known.
+// Tests the drawings and comparisons of `perdure model` on a network with known answers.
 #include "tools/model/look.h"
 
 #include <gmock/gmock.h>
@@ -50,7 +50,8 @@ TEST(Look, ScoresAreTheNetworksOwnWithoutCalibration) {
   const Look look = lookAt(network, nullptr, 0.05);
   ASSERT_FALSE(look.sights.empty());
   EXPECT_EQ(look.sights[0].name, "car");
-  // The logit against the background is 1; T = 2 and c = 3/4 of its model.json are taken out.
+  // The logit against the background is 1; the calibration of its model.json, T = 2 and c = 3/4, is
+  // removed.
   EXPECT_NEAR(look.sights[0].score, 1 / (1 + std::exp(-1.0)), 1e-4);
   for (const Sight& s : look.sights) EXPECT_GE(s.score, 0.05);
 }

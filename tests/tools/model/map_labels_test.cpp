@@ -1,4 +1,4 @@
-// What a run's map says of the frames it was made of.
+// Tests the labels that a run's map gives to the frames of the run.
 #include "tools/model/map_labels.h"
 
 #include <fmt/format.h>
@@ -24,7 +24,7 @@ struct Thing {
 
 class MapLabels : public ::testing::Test {
  protected:
-  /// A run in which the body stood at the origin and found these.
+  /// Writes a run with the body at the origin and with these objects.
   void runFound(const std::vector<Thing>& things, std::int64_t later_ns = 0) {
     const auto dataset = replay::Dataset::open({.path = data_});
     const CameraModel camera(dataset->calibration().cameras.front());
@@ -82,11 +82,11 @@ TEST_F(MapLabels, ExpectsWhatTheMapHoldsInEachFrame) {
 
 TEST_F(MapLabels, IgnoresWhatIsDoubtfulCutHiddenOrSmall) {
   auto things = kFour;
-  things.push_back({"car", 0.6, 16, 12, 40, 3});      // doubtful
+  things.push_back({"car", 0.6, 16, 12, 40, 3});      // uncertain
   things.push_back({"car", 0.99, 32, 12, 40, 3});     // cut by the border
   things.push_back({"car", 0.99, 6.3, 6, 50, 3});     // behind the first
   things.push_back({"car", 0.99, 16, 20, 400, 1.5});  // small
-  things.push_back({"dog", 0.99, 16, 4, 40, 2.5});    // the only one: not judged in few views
+  things.push_back({"dog", 0.99, 16, 4, 40, 2.5});    // the only one: too few views to be judged
   runFound(things);
   const LabelledData data = read();
   EXPECT_EQ(data.judged, std::set<std::string>{"car"});

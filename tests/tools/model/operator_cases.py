@@ -1,5 +1,5 @@
-"""One operator a file, as exporters write them, repaired for OpenCV 4.6; and what it must give, by
-numpy alone.
+"""Files with one operator each, as exporters write them, repaired for OpenCV 4.6. The expected
+results come from numpy alone.
 
     operator_cases.py FOLDER     writes FOLDER/<name>.onnx, <name>.f32 and input.f32
 """
@@ -18,7 +18,7 @@ RANDOM = np.random.default_rng(0)
 IMAGE = RANDOM.uniform(0, 1, (1, 3, 32, 32)).astype(F)
 WEIGHT = RANDOM.normal(0, 0.2, (8, 3, 4, 4)).astype(F)
 PATCHES = IMAGE.reshape(1, 3, 8, 4, 8, 4).transpose(0, 2, 4, 1, 3, 5).reshape(64, 48)
-FEATURES = (PATCHES @ WEIGHT.reshape(8, 48).T).T.reshape(1, 8, 8, 8)  # what the tensor "f" is
+FEATURES = (PATCHES @ WEIGHT.reshape(8, 48).T).T.reshape(1, 8, 8, 8)  # the value of the tensor "f"
 CASES = {}
 
 
@@ -49,7 +49,7 @@ def elementwise():
             constants = {"k": k, "one": F(1)}
             case(f"{kind}_{shape_name}", [*absolute, node(kind, "p k", "out")], constants, function(positive, k))
             case(f"{kind}_{shape_name}_first", [*absolute, node(kind, "k p", "out")], constants, function(k, positive))
-        # Right behind a convolution OpenCV merges what it can.
+        # OpenCV merges operators that directly follow a convolution.
         k = RANDOM.uniform(1, 3, (1, 1, 8, 8)).astype(F)
         case(f"{kind}_behind_a_convolution", [node(kind, "f k", "out")], {"k": k}, function(FEATURES, k))
         for what, other, make in (("rows", rows, node("GlobalAveragePool", "p", "g")),

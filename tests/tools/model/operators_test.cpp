@@ -1,5 +1,5 @@
-// What OpenCV 4.6 does not load or computes wrongly, operator by operator, after the repair: its
-// answers against numpy's.
+// Tests the repair of operators that OpenCV 4.6 does not load or computes wrongly. Compares its
+// answers with numpy's, operator by operator.
 #include <gtest/gtest.h>
 
 #include <cmath>

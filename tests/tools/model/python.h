@@ -1,4 +1,4 @@
-// The generators of this folder, run by Debian's Python.
+// Runs the generators of this folder with Debian's Python.
 #pragma once
 
 #include <filesystem>
@@ -6,11 +6,11 @@
 
 namespace perdure::tools::testing {
 
-/// Whether Debian's Python has onnx: apt-get install python3-onnx.
+/// Returns whether Debian's Python has onnx: apt-get install python3-onnx.
 bool pythonHasOnnx();
 
-/// Runs `script` of this folder with an empty folder to write into, and returns that folder.
-/// Throws std::runtime_error where it fails.
+/// Runs `script` of this folder with an empty folder as output, and returns that folder. Throws
+/// std::runtime_error if it fails.
 std::filesystem::path generated(const std::string& script);
 
 }  // namespace perdure::tools::testing

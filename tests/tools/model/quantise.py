@@ -1,9 +1,9 @@
 #!/usr/bin/python3
-"""Writes a float network again with weights of eight bits, each channel with a scale of its own:
+"""Converts the weights of a float network to eight bits; each channel has its own scale:
 
     quantise.py FLOAT.onnx OUT.onnx qdq|dynamic|rounded
 
-rounded: in float, with the weights that those bits stand for.
+rounded: a float network with the rounded weights.
 """
 
 import sys

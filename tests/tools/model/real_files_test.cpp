@@ -1,5 +1,5 @@
-// Real networks, where they are at hand: imported, they say what their hand-written descriptions
-// in config/models make of the same files.
+// Tests real networks, if they are present. The imported descriptions must match the hand-written
+// ones in config/models for the same files.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -30,7 +30,7 @@ fs::path data() { return source() / "../shared/data"; }
 
 struct Answer {
   std::vector<Detection> detections;
-  double clutter;  ///< what calibration has added to each activation
+  double clutter;  ///< the offset that calibration adds to each activation
 };
 
 Answer answerOf(const fs::path& network, const fs::path& description, const Frame& frame) {
@@ -51,7 +51,7 @@ fs::path streetPicture() {
   return data() / "kitti_raw/2011_09_26/2011_09_26_drive_0005_sync/image_02/data/0000000000.jpg";
 }
 
-/// Imports a network of ../shared/data, or one that was made of it, and says what it sees.
+/// Imports a network of ../shared/data, or a file derived from one, and returns its detections.
 std::vector<Sight> seenBy(const fs::path& network, const std::vector<std::string>& more = {}) {
   const fs::path folder = fs::temp_directory_path() / ("perdure_seen_" + std::to_string(getpid()));
   const fs::path out = importedPath(network, folder);
@@ -85,7 +85,7 @@ class RealWeights : public ::testing::Test {
   static fs::path weights(const std::string& name) { return data() / "weights" / name; }
 };
 
-// Two files of the same weights, exported at two sizes: each re-shaped is the other.
+// Two files with the same weights, exported at two sizes: each one, reshaped, must equal the other.
 TEST_F(RealWeights, ReshapedToASizeAnswerAsTheFileOfThatSize) {
   const fs::path wide = weights("nanodet-plus-m_768x256.onnx");
   const fs::path small = weights("nanodet-plus-m_640x192.onnx");
@@ -101,7 +101,7 @@ TEST_F(RealWeights, PicoDetSeesTheStreetThoughItsConstantsStandAmongItsInputs) {
              std::abs(s.box.x2 - x2) < 10 && std::abs(s.box.y2 - y2) < 10;
     });
   };
-  // As YOLOX-nano sees them, with another decode rule.
+  // The boxes of YOLOX-nano, which has another decode rule.
   EXPECT_TRUE(has("person", 772, 168, 882, 368));
   EXPECT_TRUE(has("car", 295, 170, 453, 287));
 }
@@ -115,8 +115,8 @@ fs::path quantised(const fs::path& network, const fs::path& folder, const std::s
   return out;
 }
 
-// What rounding the weights to eight bits costs by itself (.03 in a score here) is not the
-// import's.
+// The error of the rounding to eight bits (.03 in a score here) must not count as an error of the
+// import.
 TEST_F(RealWeights, OfEightBitsAnswerAsTheFloatsThatTheBitsStandFor) {
   const fs::path folder = fs::temp_directory_path() / ("perdure_bits_" + std::to_string(getpid()));
   fs::create_directories(folder);

@@ -1,4 +1,4 @@
-"""A network in the making: its ONNX graph, and beside it the values that tensors have for a picture."""
+"""Builds a small network: its ONNX graph, and the values of its tensors for one picture."""
 
 import numpy as np
 import onnx
@@ -19,7 +19,7 @@ def softmax(x, axis=-1):
 
 
 class Net:
-    """A graph in the making, and beside each tensor the value that it has for the picture."""
+    """Builds a graph, and computes the value of each tensor for the picture."""
 
     def __init__(self, seed, mean=(0, 0, 0), scale=(1, 1, 1), rgb=False):
         self.random = np.random.default_rng(seed)
@@ -28,7 +28,7 @@ class Net:
         blob = (pixels - np.array(mean, np.float32)) * np.array(scale, np.float32)
         self.nodes, self.constants, self.values = [], [], {"images": blob.transpose(2, 0, 1)[None]}
         self.input_shape = [1, 3, SIZE, SIZE]
-        self.more_inputs = []  # (name, type, shape), of which the heads know nothing
+        self.more_inputs = []  # (name, type, shape), not used by the heads
         self.opset = 12
 
     def constant(self, value):
@@ -46,7 +46,7 @@ class Net:
         return self.random.normal(0, spread, shape).astype(np.float32)
 
     def level(self, stride):
-        """Features of a resolution: patches of the picture, weighed; their values are known."""
+        """Adds features of one resolution: weighted patches of the picture, with known values."""
         blob = self.values["images"]
         cells = SIZE // stride
         patches = blob.reshape(3, cells, stride, cells, stride).transpose(1, 3, 0, 2, 4).reshape(cells * cells, -1)
@@ -66,7 +66,8 @@ class Net:
         return name
 
     def save(self, folder, outputs, rows, arguments, free_outputs=(), metadata=()):
-        """`outputs`: (tensor, shape). `rows`: x1 y1 x2 y2 and the log-odds of each class."""
+        """Writes the files. `outputs`: (tensor, shape). `rows`: x1 y1 x2 y2 and the log-odds of
+        each class."""
         folder.mkdir(parents=True, exist_ok=True)
         infos = [helper.make_tensor_value_info(n, FLOAT, s) for n, s in outputs]
         infos += [helper.make_tensor_value_info(n, t, None) for n, t in free_outputs]

@@ -1,5 +1,5 @@
-"""Tiny networks of random weights in the shapes that exporters write, each with what it must answer
-to one picture, computed here from the families' published rules and from nothing of Perdure.
+"""Tiny networks of random weights in the forms that exporters write. Each has its expected answer
+to one picture, computed here from the families' published rules and without Perdure's code.
 
     tiny_networks.py FOLDER     writes FOLDER/<name>/net.onnx, picture.ppm, arguments, expected.csv
 """
@@ -35,11 +35,12 @@ ANCHORS = {8: [[4, 6], [7, 5], [11, 9]], 16: [[12, 20], [21, 17], [25, 31]], 32:
 
 
 def anchored(net, decode, implicit=False):
-    """Heads of three levels; `decode(net, raw, stride)` adds the file's own decoding of one."""
+    """Adds heads of three levels; `decode(net, raw, stride)` adds the file's own decoding of one
+    level."""
     rows, outputs = [], []
     for stride, anchors in ANCHORS.items():
         raw = net.head(net.level(stride), 3 * (5 + K))
-        if implicit:  # YOLOv7 multiplies each channel before it decodes
+        if implicit:  # YOLOv7 multiplies each channel before the decoding
             factor = 1 + net.normal(1, 3 * (5 + K), 1, 1, spread=0.2)
             value = net.values[raw] * factor
             raw = net.node("Mul", [raw, factor])
@@ -109,7 +110,7 @@ def yolov7(folder):
 
 
 def yolov5_suppressed(folder):
-    """With the suppression in the graph: what lies before it is taken."""
+    """The graph contains the suppression; the import must use the tensors before it."""
     net = Net(4, **UNIT)
     rows, parts = anchored(net, yolov5_decode)
     whole = net.node("Concat", parts, axis=1)
@@ -159,7 +160,7 @@ def yolov8_decode(net, heads):
 
 
 def yolov8(folder):
-    """The class names are in the file, as Ultralytics writes them."""
+    """The file contains the class names, as Ultralytics writes them."""
     net = Net(5, **UNIT)
     rows, heads = yolov8_heads(net)
     whole, count = yolov8_decode(net, heads)
@@ -168,7 +169,7 @@ def yolov8(folder):
 
 
 def yolov8_masks(folder):
-    """With coefficients of masks behind the classes, and the masks' own output."""
+    """Mask coefficients follow the classes, and the masks have their own output."""
     net = Net(15, **UNIT)
     rows, heads = yolov8_heads(net)
     features = [n.input[0] for n in net.nodes if n.output[0] in [box for box, _, _ in heads]]
@@ -180,7 +181,7 @@ def yolov8_masks(folder):
 
 
 def yolov8_open_size(folder):
-    """Of no fixed size: shapes are computed inside, by Shape, Gather and Concat."""
+    """The size is open: the graph computes shapes by Shape, Gather and Concat."""
     net = Net(6, **UNIT)
     rows, heads = yolov8_heads(net)
     outputs = []
@@ -196,7 +197,8 @@ def yolov8_open_size(folder):
 
 
 def yolov8_whole(folder):
-    """Heads that are no convolutions: boxes as they are given, the last sigmoid taken off."""
+    """The heads are not convolutions: boxes are used as they are, and the last sigmoid is
+    removed."""
     net = Net(7, **UNIT)
     features = net.level(8)
     flat = net.node("Reshape", [features, np.array([1, CHANNELS, -1])])
@@ -309,7 +311,7 @@ def ssd_offsets(folder):
 
 
 def attention(net, queries):
-    """Queries that look at cells: (name, value) of (1, queries, CHANNELS)."""
+    """Adds queries with attention to cells: (name, value) of (1, queries, CHANNELS)."""
     features = net.level(16)
     keys = net.node("Reshape", [features, np.array([1, CHANNELS, -1])])
     value = net.values[features].reshape(CHANNELS, -1)
@@ -322,7 +324,7 @@ def attention(net, queries):
 
 
 def detr_parts(net, queries, columns):
-    """Boxes by a sigmoid, raw scores, and their values."""
+    """Adds boxes after a sigmoid and raw scores; returns their names and values."""
     name, value = attention(net, queries)
     w_box, w_class, b_class = net.normal(CHANNELS, 4, spread=0.5), net.normal(CHANNELS, columns), net.normal(columns)
     boxes = net.node("Sigmoid", [net.node("MatMul", [name, w_box])])
@@ -349,7 +351,7 @@ def detr_sigmoids(folder):
 
 
 def later():
-    """Those of later years are in files of their own, which read this one."""
+    """Later families are in separate files, which import this one."""
     import tiny_networks_later
     import tiny_queries
     return *tiny_networks_later.ALL, *tiny_queries.ALL

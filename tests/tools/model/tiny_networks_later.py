@@ -1,4 +1,4 @@
-"""Tiny networks of later families, and of eight bits: as tiny_networks.py."""
+"""Tiny networks of later families, and of eight bits, like those of tiny_networks.py."""
 
 import numpy as np
 import tiny_networks as tiny
@@ -12,7 +12,8 @@ NORMALISED = dict(mean=(103.53, 116.28, 123.675), scale=(1 / 57.375, 1 / 57.12, 
 
 
 def chosen(net, whole, count, most=20):
-    """As end-to-end exports end: the best cells, their boxes, scores and classes, [1,most,6]."""
+    """Adds the end of end-to-end exports: the best cells with boxes, scores and classes,
+    [1,most,6]."""
     rows = net.node("Transpose", [whole], perm=[0, 2, 1])
     boxes, scores = net.node("Split", [rows], 2, axis=2, split=[4, K])
     best = net.node("ReduceMax", [scores], axes=[2], keepdims=0)
@@ -31,7 +32,7 @@ def chosen(net, whole, count, most=20):
 
 
 def named(net, heads, branch):
-    """The weights of these heads get the names that Ultralytics' files have."""
+    """Gives the weights of these heads the names of Ultralytics' files."""
     for box, classes, stride in heads:
         for role, output in (("cv2", box), ("cv3", classes)):
             node = next(n for n in net.nodes if output in n.output)
@@ -40,7 +41,7 @@ def named(net, heads, branch):
 
 
 def yolov10(folder):
-    """End-to-end: the file has its one-to-one branch alone, and chooses."""
+    """End-to-end: the file has only its one-to-one branch, and selects the best cells."""
     net = Net(30, **UNIT)
     rows, heads = tiny.yolov8_heads(net)
     named(net, heads, "one2one_")
@@ -49,7 +50,7 @@ def yolov10(folder):
 
 
 def yolov10_both(folder):
-    """Both branches are answered; what is awaited is the dense one's."""
+    """The file has the outputs of both branches; the dense branch is expected."""
     net = Net(31, **UNIT)
     rows, heads = tiny.yolov8_heads(net)
     single = []
@@ -63,7 +64,8 @@ def yolov10_both(folder):
 
 
 def distances(seed, offset, exponents, **unit):
-    """(net, rows, [(box, classes, distances, stride)]) of heads that say four distances of each cell."""
+    """Returns (net, rows, [(box, classes, distances, stride)]) of heads with four distances for
+    each cell."""
     net = Net(seed, **unit)
     rows, heads = [], []
     for stride in STRIDES:
@@ -77,7 +79,7 @@ def distances(seed, offset, exponents, **unit):
         rows.append(np.stack(level, -1).reshape(-1, 4 + K))
         heads.append((box, classes, after, stride))
     rows = np.concatenate(rows)
-    good = (rows[:, 2] > rows[:, 0]) & (rows[:, 3] > rows[:, 1])  # a box has two sides
+    good = (rows[:, 2] > rows[:, 0]) & (rows[:, 3] > rows[:, 1])  # a valid box has positive sides
     return net, rows[good], heads
 
 
@@ -90,7 +92,7 @@ def strides():
 
 
 def yolo26(folder):
-    """No bins: the head says the four distances; corners, end-to-end."""
+    """Without bins: the head gives the four distances; corners, end-to-end."""
     net, rows, heads = distances(32, 0.5, False, **UNIT)
     flat = [(net.node("Reshape", [b, np.array([1, 4, -1])]), net.node("Reshape", [c, np.array([1, K, -1])]))
             for b, c, _, _ in heads]
@@ -103,7 +105,7 @@ def yolo26(folder):
 
 
 def rtmdet(folder):
-    """The raw answers: distances of a cell's corner in pixels, level by level."""
+    """The raw outputs: distances from a cell's corner in pixels, level by level."""
     net, rows, heads = distances(33, 0.0, True, **NORMALISED)
     outputs = [(c, [1, K, SIZE // s, SIZE // s]) for _, c, _, s in heads]
     outputs += [(net.node("Mul", [after, np.float32(s)]), [1, 4, SIZE // s, SIZE // s]) for _, _, after, s in heads]
@@ -111,7 +113,7 @@ def rtmdet(folder):
 
 
 def rtmdet_suppressed(folder):
-    """With its suppression: boxes and scores stand apart before it; linear distances."""
+    """With its suppression: boxes and scores are separate before it; linear distances."""
     net, rows, heads = distances(34, 0.0, False, **NORMALISED)
     turned = [[net.node("Reshape", [net.node("Transpose", [t], perm=[0, 2, 3, 1]), np.array([1, -1, n])])
                for t, n in ((b, 4), (c, K))] for b, c, _, _ in heads]
@@ -128,7 +130,7 @@ def rtmdet_suppressed(folder):
 
 def picodet_heads(seed):
     net = Net(seed, mean=(123.675, 116.28, 103.53), scale=(1 / 58.395, 1 / 57.12, 1 / 57.375), rgb=True)
-    net.opset = 11  # which has no HardSwish: files have it all the same
+    net.opset = 11  # this version has no HardSwish, but files use it
     rows, outputs = [], []
     for stride in (8, 16, 32, 64):
         cells, features = SIZE // stride, net.level(stride)
@@ -154,7 +156,7 @@ def picodet(folder):
 
 
 def picodet_leftovers(folder):
-    """Constants among the inputs, with their values and without (folded away by a tool, and left)."""
+    """Constants among the inputs, with and without their values (as left by a folding tool)."""
     import onnx
     net, rows, outputs = picodet_heads(36)
     net.save(folder, outputs, rows, [CLASSES])
@@ -170,7 +172,7 @@ FASTEST_ANCHORS = {16: [[6, 9], [19, 25], [28, 40]], 32: [[33, 29], [45, 60], [5
 
 
 def yolo_fastestv2(folder):
-    """Boxes and objectness of three anchors, one soft-max of classes for all of them."""
+    """Boxes and objectness of three anchors, with one common soft-max of the classes."""
     net = Net(37, scale=(1 / 255,) * 3)
     rows, outputs = [], []
     for stride, anchors in FASTEST_ANCHORS.items():
@@ -195,15 +197,15 @@ def yolo_fastestv2(folder):
 # -- eight bits ---------------------------------------------------------------------------------------
 
 def eight_bits(weight):
-    """(integers, scale of each first channel) so that integers·scale is near the weight."""
+    """Returns (integers, scale of each first channel) with integers·scale close to the weight."""
     scale = np.abs(weight).reshape(len(weight), -1).max(1) / 127
     shape = (-1,) + (1,) * (weight.ndim - 1)
     return np.round(weight / scale.reshape(shape)).astype(np.int8), scale.astype(np.float32)
 
 
 class Quantising(Net):
-    """A Net whose convolutions are written with weights of eight bits. What it must answer is computed
-    with the weights that those bits stand for."""
+    """A Net that writes convolutions with eight-bit weights. Its expected answers are computed
+    with the rounded weights."""
 
     def __init__(self, seed, way, **unit):
         super().__init__(seed, **unit)
@@ -217,12 +219,12 @@ class Quantising(Net):
         return (bits * scale.reshape(-1, 1, 1, 1)).astype(np.float32)
 
     def pair(self, name, scale, zero):
-        """Quantised to unsigned eight bits, and back."""
+        """Adds quantisation to unsigned eight bits and back."""
         bits = super().node("QuantizeLinear", [name, np.float32(scale), np.uint8(zero)])
         return super().node("DequantizeLinear", [bits, np.float32(scale), np.uint8(zero)])
 
     def node(self, kind, inputs, count=1, **attributes):
-        if kind == "Relu" and self.way != "dynamic":  # quantisers take it out: numbers begin at zero
+        if kind == "Relu" and self.way != "dynamic":  # quantisers remove it: unsigned numbers begin at zero
             if self.way == "qlinear":
                 return super().node("DequantizeLinear", [self.bits, np.float32(1), np.uint8(0)])
             return self.pair(inputs[0], 1.0, 0)
@@ -252,7 +254,7 @@ class Quantising(Net):
 
     def head(self, features, channels, spread=0.8):
         name = super().head(features, channels, spread)
-        if self.way == "qlinear":  # its bias is rounded as well
+        if self.way == "qlinear":  # the bias is rounded as well
             given = next(c for c in reversed(self.biases))
             self.values[name] = self.values[name] + (self.rounded[0] - given).reshape(1, -1, 1, 1)
         return name
@@ -262,7 +264,7 @@ class Quantising(Net):
 
 
 class QuantisingLinear(Quantising):
-    """Remembers the biases that heads are made with."""
+    """Stores the biases of the heads."""
 
     def __init__(self, seed, **unit):
         self.biases = []
@@ -278,7 +280,7 @@ class QuantisingLinear(Quantising):
 def in_eight_bits(net, folder):
     net.opset = 13
     rows, heads = tiny.yolov8_heads(net)
-    # All that the dense head decodes is left out: it is the float networks' test.
+    # The decoding of the dense head is omitted, because the float networks test it.
     outputs = [(o, [1, n, SIZE // s, SIZE // s]) for b, c, s in heads for o, n in ((b, 64), (c, K))]
     net.save(folder, outputs, rows, [CLASSES])
 

@@ -1,5 +1,5 @@
-"""Tiny networks whose decoder answers for queries that were chosen inside, as RT-DETR's and D-FINE's
-do: as tiny_networks.py."""
+"""Tiny networks whose decoder selects its queries in the graph, like RT-DETR and D-FINE; see
+tiny_networks.py."""
 
 import numpy as np
 from onnx import TensorProto
@@ -11,13 +11,14 @@ CELLS = SIZE // STRIDE
 
 
 def gathered(net, rows, index, width):
-    """Rows of (1,N,width) by an index (1,M)."""
+    """Selects rows of (1,N,width) by an index (1,M)."""
     wide = net.node("Tile", [net.node("Unsqueeze", [index, np.array([2])]), np.array([1, 1, width])])
     return net.node("GatherElements", [rows, wide], axis=1)
 
 
 def sampled(features, points):
-    """Features (C,H,W) between the cells, at points (x, y) in shares of the sides; nothing beyond the border."""
+    """Interpolates features (C,H,W) at points (x, y) in shares of the sides; zero beyond the
+    border."""
     rows = []
     for x, y in points:
         row = np.zeros(len(features))
@@ -31,8 +32,8 @@ def sampled(features, points):
 
 
 def decoder(seed):
-    """(net, boxes, raw scores, their values): the best cells are the queries; each looks at the
-    others, and at a place of the picture that it names itself."""
+    """Returns (net, boxes, raw scores, their values). The best cells are the queries. Each query
+    attends to the other queries, and to a point of the picture that it computes."""
     net = Net(seed, **UNIT)
     net.opset = 16
     features = net.level(STRIDE)
@@ -72,7 +73,8 @@ def rtdetr(folder):
 
 
 def rtdetr_chosen(folder):
-    """As the authors' exporters end: corners in pixels of the picture, whose size is an input, and the best of them."""
+    """The end of the authors' exporters: corners in pixels of the picture, whose size is an
+    input, and the best of them."""
     net, boxes, scores, b, o = decoder(52)
     net.more_inputs = [("orig_target_sizes", TensorProto.INT64, [1, 2])]
     x, y, w, h = net.node("Split", [boxes, np.array([1, 1, 1, 1])], 4, axis=2)

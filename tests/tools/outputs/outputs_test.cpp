@@ -108,7 +108,7 @@ TEST(ObjectHistory, FinalGivesTheSurvivorsIdOnceForMergedObjects) {
   const auto rows = history.finalRows();
   ASSERT_THAT(rows, SizeIs(2));
   for (const auto& row : rows) EXPECT_EQ(row.object_id, 1u);
-  EXPECT_THAT(history.inst(), SizeIs(3));  // causal: what was said then stays said
+  EXPECT_THAT(history.inst(), SizeIs(3));  // causal: earlier rows remain
   EXPECT_THAT(history.lastBeliefs(), SizeIs(1));
 }
 
@@ -157,7 +157,7 @@ TEST(ObjectHistory, FinalDropsFramesInWhichTheLastEstimateIsOutsideTheImage) {
   ObjectHistory history;
   history.setCamera(tests::cameraAhead(640, 480, 500));
   Objects passed = messageAt(1, {carAt(1, 10)});
-  passed.T_WB.p.x() = 20.0;  // the object now lies behind
+  passed.T_WB.p.x() = 20.0;  // the object is now behind the camera
   history.add(messageAt(0, {carAt(1, 10)}));
   history.add(passed);
   const auto rows = history.finalRows();
@@ -226,7 +226,7 @@ TEST(OutputWriter, TheMapIsGeoreferencedAtThePoseNearestToTheAnchor) {
     OutputWriter writer(folder, "0000");
     if (!in_time) calibration.anchor->time += std::chrono::seconds(5);
     writer.onCalibration(calibration);
-    for (int frame = 0; frame < 3; ++frame) {  // the body stands at x = 4 when the anchor is taken
+    for (int frame = 0; frame < 3; ++frame) {  // the body is at x = 4 at the time of the anchor
       Odometry odometry;
       odometry.state = OdometryState::kTracking;
       odometry.stamp.sequence = static_cast<std::uint64_t>(frame);

@@ -1,4 +1,4 @@
-// What tests ask of pictures: whether a colour is at a place, and along a line.
+// Checks of pictures: whether a place has a colour, and which share of a line has it.
 #pragma once
 
 #include <opencv2/core/mat.hpp>
@@ -13,7 +13,8 @@ inline double apart(const cv::Vec3b& pixel, const Colour& colour) {
   return most;
 }
 
-/// Within `reach` pixels of a place some pixel has the colour, to within `tolerance` a channel.
+/// Returns whether a pixel within `reach` of a place has the colour, to within `tolerance` per
+/// channel.
 inline bool hasColour(const cv::Mat& picture, const cv::Point2d& at, const Colour& colour,
                       int reach = 1, double tolerance = 60.0) {
   for (int y = -reach; y <= reach; ++y) {
@@ -27,7 +28,7 @@ inline bool hasColour(const cv::Mat& picture, const cv::Point2d& at, const Colou
   return false;
 }
 
-/// Share of the points between a and b, ends included, that have the colour.
+/// Returns the share of the points between a and b, ends included, that have the colour.
 inline double coverage(const cv::Mat& picture, const cv::Point2d& a, const cv::Point2d& b,
                        const Colour& colour, double tolerance = 60.0) {
   constexpr int kPoints = 200;

@@ -28,7 +28,7 @@ fs::path folderOf(const char* name) {
   return folder;
 }
 
-/// Of a run that ended.
+/// The results of a finished run.
 fs::path earlierRun(const char* name) {
   const fs::path out = folderOf(name);
   writeTo(out / "report.json", "earlier");

@@ -1,4 +1,4 @@
-// A camera that looks along x from the origin of W, and objects before it.
+// A camera at the origin of W that looks along x, and objects before it.
 #pragma once
 
 #include <cmath>

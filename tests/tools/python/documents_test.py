@@ -1,4 +1,5 @@
-"""What documents promise: the README's blocks and the examples run, also as installed."""
+"""Tests the documented code: the blocks of the README and the examples, also in their installed
+form."""
 
 import json
 import os
@@ -22,7 +23,7 @@ HERE = support.SOURCE / "tools/python"
 
 
 class Player(threading.Thread):
-    """The drive again and again, and grey images with something bright in them."""
+    """Plays the drive repeatedly, and grey images with a bright rectangle."""
 
     def __init__(self):
         super().__init__()
@@ -120,7 +121,7 @@ class Examples(unittest.TestCase):
         boxes = [d.box.tolist() for d in own_detector.Cones().detect(image)]
         self.assertEqual(boxes, [[10, 20, 20, 40], [50, 25, 62, 45]])
         self.assertEqual(own_detector.Cones().detect(image[:, :, 0]), [])
-        # Where cones are expected: half of one is there, and nothing.
+        # Two expected cones: half of one is visible, and none is at the other place.
         expected = [perdure.Prediction(class_name="cone") for _ in range(2)]
         expected[0].box, expected[1].box = (5, 20, 15, 40), (60, 5, 75, 20)
         nats = own_detector.Cones().look(image, expected)

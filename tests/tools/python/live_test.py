@@ -1,5 +1,5 @@
-"""A running bus: values against `perdure echo`, Ctrl-C, the map against `perdure map`, a network of
-Python's before the real semantic filter, a closed bus."""
+"""Tests on a running bus: values against `perdure echo`, Ctrl-C, the map against `perdure map`,
+a network in Python with the real semantic filter, a closed bus."""
 
 import json
 import os
@@ -29,7 +29,7 @@ def tearDownModule():
 
 
 def script(text):
-    """A program of Python's whose output comes at once."""
+    """Starts a Python program with unbuffered output."""
     return (sys.executable, "-u", "-c", text)
 
 
@@ -226,7 +226,8 @@ perdure.publish(Network(), longest_s=2.0, vehicle="driven")
 """
 
 
-# From frame 30 on it finds nothing of its own accord, and says where the filter asks.
+# From frame 30 on, this network reports no boxes by itself, and only answers the filter's
+# predictions.
 LOOKS = FROM_RECORDING.replace(
     "        return recorded",
     """        self.number = int(image[0, 0])
@@ -243,8 +244,8 @@ perdure.publish""",
 
 class Network(unittest.TestCase):
     def frames(self, spoiled):
-        """Sends images whose first pixel is the frame's number; when it is asked for the next one,
-        the odometry of the one before."""
+        """Sends images whose first pixel is the frame's number. Before the next image, it sends
+        the odometry of the previous one."""
         writers = {
             t: perdure.publisher(t, vehicle="driven")
             for t in ("frame/cam0", "odometry", "calibration")
@@ -306,7 +307,7 @@ class Network(unittest.TestCase):
         self.assertTrue(any(h.frames_out > 0 for h in states))
 
     def run_looking(self, nats):
-        """Detections from frame 30 on, and objects by their id in the last frame."""
+        """Returns the detections from frame 30 on, and the objects of the last frame by id."""
         heard = {
             t: perdure.subscribe(t, vehicle="driven", timeout=20)
             for t in ("detections", "objects")
@@ -323,8 +324,8 @@ class Network(unittest.TestCase):
                 found = next(heard["detections"])
                 if found.stamp.sequence >= 30:
                     later.append(found)
-                # The filter's predictions of the frame before are there for the next one. What was
-                # given before filter and network had found each other is lost.
+                # The filter's predictions for the previous frame must arrive before the next one.
+                # Messages sent before filter and network are matched are lost.
                 begins = pose.stamp.sequence < 5
                 while pose.stamp.sequence > 0 and (
                     last is None or last.stamp.sequence < pose.stamp.sequence - 1
@@ -354,7 +355,7 @@ class Network(unittest.TestCase):
             boxes = [d.box for d in recorded[found.stamp.sequence].detections if not d.primed]
             near += any(perdure.service._overlaps(answer.box[None], b[None])[0, 0] > 0.5 for b in boxes)
         self.assertGreater(near, 0.5 * len(answers), "answers are where the objects are")
-        # What is said to be there stays; what is said not to be there goes.
+        # Objects with positive answers remain; objects with negative answers lose existence.
         asked = {d.primed_for for _, d in answers} & {d.primed_for for f in gone[0] for d in f.detections}
         self.assertGreater(len(asked), 2)
         exists = [[run[1][i].existence if i in run[1] else 0.0 for i in asked] for run in (kept, gone)]

@@ -1,4 +1,4 @@
-"""Messages: classes, values both ways against C++, what is refused, recordings."""
+"""Tests messages: classes, values both ways against C++, invalid input, recordings."""
 
 import ast
 import io
@@ -25,7 +25,7 @@ def camera_names():
 
 class EveryTopic(unittest.TestCase):
     def test_values_are_those_of_cpp_both_ways(self):
-        """C++ writes one of each, Python reads them and writes them on, C++ reads them."""
+        """C++ writes one message of each topic, Python reads and rewrites them, C++ reads them."""
         with perdure.subscribe(*camera_names(), timeout=20) as heard:
             with Child(support.PEER, "write", 7) as writer, Child(support.PEER, "read") as reader:
                 self.assertEqual(reader.line(), "ready\n")
@@ -37,7 +37,7 @@ class EveryTopic(unittest.TestCase):
                     self.assertEqual(type(message).__name__, perdure.topics().get(topic, "Frame"))
                     same(self, message, written[topic], topic)
                     self.assertTrue(back[topic].wait_for_reader(20), topic)
-                time.sleep(0.3)  # predictions are best effort: both ends must have met
+                time.sleep(0.3)  # predictions are best effort: both ends must be matched
                 for topic, message in came.items():
                     back[topic].write(message)
                 read = {m["topic"]: m["value"] for m in support.lines_of(reader.end())}
@@ -116,7 +116,7 @@ def text(words):
 
 
 def tiny_mcap(type_name, data):
-    """A file with one message, as small as MCAP may be."""
+    """Returns the smallest MCAP file with one message."""
     file = io.BytesIO()
     file.write(b"\x89MCAP0\r\n" + record(1, text("") + text("test")))
     file.write(record(3, struct.pack("<H", 1) + text(type_name) + text("omgidl") + text("")))

@@ -1,5 +1,5 @@
-// The C++ side of the tests of tools/python: `write` publishes one random message of each topic and
-// prints it; `read` prints what comes of vehicle "back" until it has one of each.
+// The C++ side of the tests of tools/python. `write` publishes and prints one random message of
+// each topic. `read` prints the messages of vehicle "back" until it has received one of each topic.
 #include <functional>
 #include <iostream>
 #include <list>
@@ -27,7 +27,7 @@ void print(const std::string& topic, const nlohmann::ordered_json& value) {
   std::cout << nlohmann::ordered_json{{"topic", topic}, {"value", value}}.dump() << std::endl;
 }
 
-/// 0: each reader has all of it.
+/// Returns 0 if each reader has received all messages.
 int writeAll(const Participant& participant, unsigned seed) {
   std::list<std::shared_ptr<RawWriter>> writers;
   std::list<std::function<void()>> writes;
@@ -45,7 +45,7 @@ int writeAll(const Participant& participant, unsigned seed) {
       print(name, wire::toJson(message));
     });
   });
-  std::this_thread::sleep_for(300ms);  // predictions are best effort: both ends must have met
+  std::this_thread::sleep_for(300ms);  // predictions are best effort: both ends must be matched
   for (const auto& write : writes) write();
   for (const auto& writer : writers) {
     if (!writer->waitForAcknowledgement(5)) return 1;

@@ -1,4 +1,4 @@
-"""What the tests of tools/python share: a network of their own, programs, a recorded drive."""
+"""Support for the tests of tools/python: a separate network, programs, a recorded drive."""
 
 import ctypes
 import fcntl
@@ -27,7 +27,8 @@ _leases = []
 
 
 def own_network():
-    """As isolateNetwork() of tests/common/bus: call it before perdure is imported."""
+    """Python version of isolateNetwork() of tests/common/bus; call it before perdure is
+    imported."""
     os.environ.pop("CYCLONEDDS_URI", None)
     os.environ.pop("PERDURE_BUS", None)
     new_user, new_net = 0x10000000, 0x40000000
@@ -48,7 +49,7 @@ def own_network():
 
 
 def run(*command, **options):
-    """Its output; a failure shows all of it."""
+    """Runs a command and returns its output; raises an error with the whole output on failure."""
     done = subprocess.run(
         [str(c) for c in command], capture_output=True, text=True, timeout=90, **options
     )
@@ -62,7 +63,7 @@ def perdure_tool(*arguments):
 
 
 class Child:
-    """A program beside the test; killed at the end of the scope."""
+    """A program that runs beside the test; killed at the end of the scope."""
 
     def __init__(self, *command, **options):
         options.setdefault("stderr", subprocess.STDOUT)
@@ -82,7 +83,7 @@ class Child:
         return self.process.stdout.readline()
 
     def end(self, seconds=30):
-        """What it had still to say, once it has ended by itself."""
+        """Waits for the program to end by itself; returns its remaining output."""
         output, _ = self.process.communicate(timeout=seconds)
         return output
 
@@ -97,10 +98,10 @@ def eventually(so, seconds=20):
 
 
 class Drive:
-    """Six seconds of the simulated street, and what the pipeline made of them."""
+    """Six seconds of the simulated street, and the pipeline's results."""
 
     def __init__(self):
-        """As ctest has made it (PERDURE_PYTHON_DRIVE), or made here."""
+        """Copies the drive that ctest has made (PERDURE_PYTHON_DRIVE), or makes it."""
         made = os.environ.get("PERDURE_PYTHON_DRIVE")
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="perdure-python-"))
         if made:
@@ -129,7 +130,7 @@ def lines_of(text):
 
 
 def same(test, message, value, path=""):
-    """A message of Python's against what C++ prints of it (common/wire/json.h)."""
+    """Compares a Python message with C++'s printed form of it (common/wire/json.h)."""
     import numpy as np
     import perdure
     from perdure.messages import SCHEMA
@@ -162,7 +163,7 @@ def same(test, message, value, path=""):
 
 main = unittest.main
 
-if __name__ == "__main__":  # for the others: support.py FOLDER
+if __name__ == "__main__":  # for the other tests: support.py FOLDER
     drive = Drive()
     shutil.rmtree(sys.argv[1], ignore_errors=True)
     shutil.copytree(drive.folder / "out", sys.argv[1])

@@ -1,4 +1,4 @@
-// Packed chunks, as the recorder's thread gets them; for tests only.
+// Packed chunks as the recorder's thread receives them, for tests.
 #pragma once
 
 #include <random>
@@ -14,7 +14,8 @@ inline CatalogueNow oneChannel() {
   return catalogue;
 }
 
-/// One message of `bytes` that do not pack, `seconds` after the start; the latched one is its own.
+/// Returns one message of `bytes` incompressible bytes, `seconds` after the start, with one latched
+/// message.
 inline PackedChunk chunkAt(double seconds, std::size_t bytes = 1000) {
   std::mt19937_64 random(static_cast<std::uint64_t>(1000 * seconds));
   std::vector<std::uint8_t> data(bytes);

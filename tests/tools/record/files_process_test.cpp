@@ -1,5 +1,4 @@
-// `perdure record info`, `repair` and `export` as they are run, on files that are damaged, cut or
-// of others.
+// Runs `perdure record info`, `repair` and `export` on damaged, truncated and foreign files.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -36,7 +35,7 @@ TEST(RepairProcess, AFileWithoutAWholeChunkStaysAsItIs) {
   EXPECT_EQ(fs::file_size(file), half);
 }
 
-/// Four chunks of ten samples each; where each of them begins.
+/// Writes four chunks of ten samples each; returns their offsets.
 std::vector<std::uint64_t> recordChunks(const fs::path& file) {
   replay::RecordingWriter recording(file);
   for (std::uint64_t i = 0; i < 40; ++i) {

@@ -1,4 +1,5 @@
-// Ten minutes (PERDURE_RECORD_SECONDS) of everything but images at full rate, then kill -9.
+// Records ten minutes (PERDURE_RECORD_SECONDS) of all topics except images at full rate, then kills
+// the recorder by kill -9.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -39,7 +40,7 @@ class FullRate {
   ~FullRate() { stop(); }
   bool heard() const { return imu_.matched() > 0 && objects_.matched() > 0; }
   std::uint64_t published() const { return published_; }
-  /// The last one, after stop().
+  /// The last refusal; valid after stop().
   const std::string& refusal() const { return refusal_; }
   void stop() {
     loop_.stop();
@@ -47,7 +48,7 @@ class FullRate {
   }
 
  private:
-  /// Numbers that do not pack better than real ones.
+  /// Fills the messages with random numbers, which compress no better than real ones.
   void fill() {
     std::mt19937_64 random(1);
     const auto scatter = [&](auto& matrix) {
@@ -116,13 +117,13 @@ class FullRate {
   std::thread thread_;
 };
 
-/// Processor time of a process so far, in seconds.
+/// Returns a process's CPU time so far, in seconds.
 double processorSeconds(pid_t pid) {
   std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
   std::string text((std::istreambuf_iterator<char>(file)), {});
   std::istringstream fields(text.substr(text.rfind(')') + 2));
   std::string word;
-  for (int i = 3; i < 14; ++i) fields >> word;  // utime and stime are the 14th and the 15th
+  for (int i = 3; i < 14; ++i) fields >> word;  // utime and stime are the 14th and the 15th field
   double user = 0, system = 0;
   fields >> user >> system;
   return (user + system) / static_cast<double>(sysconf(_SC_CLK_TCK));

@@ -1,4 +1,4 @@
-// A recording in front of a client: it has the controls, and sees what was known at each place.
+// Tests a recording with clients that control the playback, and the state shown at each time.
 #include "tools/record/gateway_replay.h"
 
 #include <gmock/gmock.h>
@@ -30,7 +30,7 @@ constexpr std::uint64_t kSecond = 1'000'000'000;
 class Replayed : public ::testing::Test {
  protected:
   Replayed() { record("run.mcap", 5000 * kSecond); }
-  /// Twenty seconds at 10 Hz, recorded at a time of its own; events at 7 and 12 s.
+  /// Twenty seconds at 10 Hz; log times differ from sensor times; events at 7 and 12 s.
   void record(const std::string& name, std::uint64_t begin_ns) {
     replay::RecordingWriter writer(folder_.file(name));
     Calibration calibration = gateway::test::forwardCamera();
@@ -95,7 +95,7 @@ class Replayed : public ::testing::Test {
     thread_.join();
   }
 
-  /// The sequence of the next objects that come.
+  /// Returns the sequence number of the next objects.
   std::uint64_t shown() {
     return json::parse(client_->readMessage(1), nullptr, false).value("sequence", 9999);
   }
@@ -109,7 +109,7 @@ class Replayed : public ::testing::Test {
     std::memcpy(&bytes[7], &seek, 8);
     client_->sendFrame(bytes, 2);
   }
-  /// The next state that is told: {status, time in s of the sensors}.
+  /// Returns the next playback state: {status, time in s of the sensors}.
   std::pair<int, double> state() {
     while (true) {
       const auto frame = client_->readFrame();
@@ -154,11 +154,11 @@ TEST_F(Replayed, PlaysOnFromThereAndSaysWhenItHasEnded) {
   for (int i = 0; i < 5 && now.first != 3; ++i) now = state();
   EXPECT_EQ(now.first, 3);
   EXPECT_NEAR(now.second, 21.9, 0.05);
-  control(true, 100);  // again from the beginning
+  control(true, 100);  // restarts from the beginning
   EXPECT_NEAR(state().second, 2.0, 0.2);
 }
 
-/// Times of what a client is told that begins to look at everything.
+/// The times that a client receives after it subscribes to all topics.
 class LateClient {
  public:
   explicit LateClient(std::uint16_t port) : client_(port) {
@@ -167,7 +167,8 @@ class LateClient {
         {"id":2,"channelId":2},{"id":5,"channelId":5},{"id":8,"channelId":8},
         {"id":100,"channelId":100},{"id":101,"channelId":101},{"id":102,"channelId":102}]})");
   }
-  /// By subscription, until all have come; 0: the time; -1: the playback's.
+  /// Returns the times by subscription, when all have arrived. Key 0 is the time message, key -1
+  /// the playback state.
   std::map<int, double> hear() {
     std::map<int, double> told;
     while (told.size() < 9) {
@@ -200,7 +201,7 @@ TEST_F(Replayed, TellsTheLastStateToWhoComesAfterTheEnd) {
   start(how, "run.mcap", 18.0);
   while (state().first != 3) {
   }
-  client_.reset();  // the second is the first one who looks at images, the third the next one
+  client_.reset();  // in the loop, the first client and then the next one subscribe to images
   for (int i = 0; i < 2; ++i) {
     LateClient late(replay_->port());
     const auto told = late.hear();

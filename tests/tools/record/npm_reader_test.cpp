@@ -1,4 +1,4 @@
-// Recordings before a reader that is not ours: npm's @mcap/core, and its decoders of IDL.
+// Tests recordings with a foreign reader: npm's @mcap/core, and its decoders of IDL.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -57,7 +57,7 @@ struct Read {
 
 class NpmReader : public testing::Test {
  protected:
-  /// Once for all tests; says why there is none.
+  /// Installs npm's packages once for all tests; returns the reason of a failure.
   static std::string installed(const test::Folder& place) {
     const auto here = test::sources() / "tests/tools/record/npm";
     for (const char* name : {"package.json", "read.mjs"}) {

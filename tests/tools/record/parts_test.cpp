@@ -1,4 +1,4 @@
-// The recorder's parts, without a bus.
+// Tests the recorder's parts without a bus.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sched.h>
@@ -31,7 +31,8 @@ std::vector<fs::path> filesIn(const fs::path& folder) {
   return files;
 }
 
-/// Messages in a file, the latched one of its beginning among them; -1: it was not finished.
+/// Returns the number of messages in a file, with the latched one at its beginning; -1 if it is
+/// unfinished.
 int messagesIn(const fs::path& file) {
   const auto reader = replay::mcap::Reader::open(file);
   if (!reader || !reader->finished()) return -1;

@@ -1,4 +1,4 @@
-// `perdure record` and `perdure play` as they are run, against topics that this test publishes.
+// Runs `perdure record` and `perdure play` on topics that this test publishes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -33,7 +33,7 @@ std::vector<fs::path> filesIn(const fs::path& folder) {
   return files;
 }
 
-/// Inertial samples at 200 Hz, odometry at 20 Hz and a calibration, as long as it lives.
+/// Publishes inertial samples at 200 Hz, odometry at 20 Hz and a calibration until its destruction.
 class Vehicle {
  public:
   Vehicle()
@@ -88,7 +88,7 @@ class Vehicle {
   std::thread thread_;
 };
 
-/// Sequence numbers of the inertial samples; they are without a gap, or -1 is among them.
+/// Returns the first and last sequence number of the inertial samples; a gap fails the test.
 std::pair<std::int64_t, std::int64_t> imuSpan(const fs::path& path, std::uint64_t* calibrations) {
   replay::RecordedMessages messages(path);
   std::int64_t first = -1, last = -1;
@@ -124,7 +124,7 @@ TEST(RecordProcess, KilledLosesLessThanASecondAndTheNextOneMakesTheFileWhole) {
   std::uint64_t calibrations = 0;
   const auto [first, last] = imuSpan(out, &calibrations);
   EXPECT_EQ(calibrations, 1u);
-  EXPECT_GT(last, static_cast<std::int64_t>(before) - 200);  // of a second
+  EXPECT_GT(last, static_cast<std::int64_t>(before) - 200);  // at most one second is missing
   EXPECT_GT(last - first, 150);
   test::Child next({perdure(), "record", "--out", out, "--seconds", "0.3"}, place.file("next.log"));
   EXPECT_EQ(next.wait(20s), 0);
@@ -167,7 +167,8 @@ TEST(LongRecordProcess, TheBlackBoxWritesTheTimeBeforeAFaultAndWhatIsLatched) {
   const auto [first, last] = imuSpan(out, &calibrations);
   EXPECT_EQ(calibrations, 1u);
   EXPECT_GT(first,
-            static_cast<std::int64_t>(start));  // it was there before the box reaches back to
+            static_cast<std::int64_t>(start));  // the calibration is older than the ring buffer's
+                                                // span
   EXPECT_GT(last - first, 2 * 150);             // two seconds, at 200 Hz on a busy machine
   recorder.signal(SIGUSR1);
   ASSERT_TRUE(test::eventually(10s, [&] { return finished(2); })) << recorder.log();
@@ -200,7 +201,7 @@ TEST(PlayProcess, RefusesTopicsThatOthersWriteUnlessItIsForced) {
   EXPECT_THAT(forced.log(), HasSubstr("1 messages of 1 topics were played"));
 }
 
-/// What map_store writes itself is left to it; events of the filter are played.
+/// Topics that map_store writes itself are not played; events of the filter are played.
 TEST(PlayProcess, PlaysBesideAMapStoreAndSaysWhatIsLeftOut) {
   const test::Folder place;
   replay::RecordingWriter recording(place.file("run.mcap"));
@@ -260,8 +261,8 @@ TEST(PlayProcess, DoesNotWaitForHoursInWhichNothingWasRecorded) {
   EXPECT_THAT(player.log(), HasSubstr("gaps_left_out: 3"));
 }
 
-/// What vio and inference would say along a street with two cars: odometry, and its detections
-/// half a period later. Frames are .1 s apart for the filter, and .2 s on the wire.
+/// Records the messages of vio and inference for a street with two cars: odometry, and its
+/// detections half a period later. Frames are .1 s apart for the filter, and .2 s in log time.
 void recordStreet(const std::string& file) {
   constexpr std::uint64_t kPeriod = 200'000'000, kFrames = 20;
   const std::vector<scene::TrueObject> cars = {
@@ -289,7 +290,7 @@ void recordStreet(const std::string& file) {
   recording.finish();
 }
 
-/// The pipeline's `objects` of the same recording, in order.
+/// Returns the pipeline's `objects` of the same recording, in order.
 std::vector<Objects> runPipeline(const std::string& recording, const std::string& out) {
   PipelineOptions options;
   options.data = recording;

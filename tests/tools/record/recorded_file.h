@@ -1,4 +1,4 @@
-// What tests of recordings share.
+// Support for tests of recordings.
 #pragma once
 
 #include <filesystem>
@@ -11,7 +11,7 @@ namespace perdure::tools {
 
 inline std::string perdure() { return (test::programs() / "perdure").string(); }
 
-/// What a file has: "finished", or why not.
+/// Returns the state of a file: "finished", "unfinished", or an error code.
 inline std::string stateOf(const std::filesystem::path& file) {
   const auto reader = replay::mcap::Reader::open(file);
   return !reader ? reader.error().code : reader->finished() ? "finished" : "unfinished";

@@ -1,4 +1,4 @@
-// The authority's folder, what it grants, and what is said of an identity that is not fit.
+// Tests the authority's folder, its grants, and the reports about unusable identities.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -107,7 +107,7 @@ TEST_F(Security, RevokesAllThatANameWasGiven) {
   authority_.renew("vio", validFor(30));
   EXPECT_NE(contents("vio/certificate.pem"), first);
   authority_.add({.name = "other", .role = "capture"}, validFor(30));
-  Authority again(dir());  // as the command does
+  Authority again(dir());  // a new instance, as in the command
   again.revoke("vio");
   EXPECT_EQ(codeOf("vio"), "revoked");
   EXPECT_EQ(codeOf("other"), "fit");
@@ -177,7 +177,7 @@ TEST(Permissions, GiveEachTopicOneServiceThatWritesItAndEventsTwo) {
   for (const bus::TopicInfo& info : bus::topicTable()) {
     const auto writers = std::count_if(std::begin(kServices), std::end(kServices),
                                        [&](Role role) { return info.writers.has(role); });
-    // Events come of the filter, and of the map's graph.
+    // The filter and the map's graph write events.
     EXPECT_EQ(writers, info.name == "health" ? 5 : info.name == "events" ? 2 : 1) << info.name;
     EXPECT_TRUE(info.readers.has(Role::kRecord) && info.readers.has(Role::kOperator));
   }

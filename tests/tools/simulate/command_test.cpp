@@ -1,4 +1,4 @@
-// The command line of `perdure simulate`.
+// Tests the command line of `perdure simulate`.
 #include "tools/simulate/command.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,5 @@
-// Whole runs of `perdure simulate`: what they write, twice, resumed, and what they refuse.
+// Tests whole runs of `perdure simulate`: the outputs, equal repeated and resumed runs, and invalid
+// input.
 #include "tools/simulate/simulate.h"
 
 #include <gtest/gtest.h>
@@ -34,7 +35,7 @@ SimulateOptions roomInto(const fs::path& out) {
   return options;
 }
 
-/// Every file's bytes by its path in the folder.
+/// Returns the content of every file by its path in the folder.
 std::map<std::string, std::string> contentsOf(const fs::path& folder) {
   std::map<std::string, std::string> contents;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
@@ -74,7 +75,7 @@ TEST(Simulate, CarriesOnWhereItWasCutAndEndsWithTheSameBytes) {
                         }),
                std::runtime_error);
   EXPECT_FALSE(fs::exists(cut.out / "visibility_truth.csv"));
-  // As if the last image had not reached the disk.
+  // Simulates that the last image was not written to the disk.
   fs::remove(cut.out / "mav0/cam0/data/1000200000000.png");
   std::size_t resumed = 0;
   EXPECT_TRUE(simulate(cut, [&](const SimulateProgress& progress) { resumed = progress.resumed; }));

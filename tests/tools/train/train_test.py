@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The training's own parts: azimuths, augmentation, assignment, losses, scores, export."""
+"""Tests the parts of the training: azimuths, augmentation, assignment, losses, scores, export."""
 
 import json
 import math
@@ -25,7 +25,8 @@ torch.set_num_threads(1)
 
 
 def level_camera(yaw):
-    """R_WC of a camera that looks along (cos yaw, sin yaw, 0) with its x axis to the right."""
+    """Returns R_WC of a camera that looks along (cos yaw, sin yaw, 0) with its x axis to the
+    right."""
     forward = np.array([math.cos(yaw), math.sin(yaw), 0])
     right = np.array([forward[1], -forward[0], 0])
     return np.stack([right, [0, 0, -1], forward], axis=1)
@@ -318,8 +319,8 @@ class Folder(unittest.TestCase):
         self.assertEqual(frames[0]["boxes"], [[50.0, 30.0, 100.0, 80.0]])
         self.assertEqual(frames[0]["classes"], [0])
         self.assertAlmostEqual(frames[0]["azimuths"][0], -math.pi / 2, places=3)
-        # From 1 m up: the front face is 4 m away, 2 m wide, from 0.5 to 1.5 m below; the roof's far
-        # edge is 8 m away and is the highest in the image.
+        # Seen from 1 m up. The front face is 4 m away, 2 m wide, and 0.5 to 1.5 m below the camera.
+        # The roof's far edge is 8 m away and is the highest in the image.
         for found, true in zip(frames[0]["hulls"][0], [135, 126.25, 185, 157.5]):
             self.assertAlmostEqual(found, true, places=2)
 

@@ -104,7 +104,7 @@ TEST(PoseFile, AnglesAreNoQuaternions) {
     EXPECT_THAT(errorOfPoses(text), HasSubstr(":2: the header names angles (roll, pitch, yaw)"));
   }
   EXPECT_EQ(errorOfPoses("# roll and yaw are free\n1 0 0 0 0 0 0 1\n"), "");
-  // As many words as columns are no header where none is a time.
+  // A comment with as many words as columns is not a header if no word is a time.
   EXPECT_EQ(errorOfPoses("# roll pitch yaw were turned to quaternions here\n1 0 0 0 0 0 0 1\n"),
             "");
 }

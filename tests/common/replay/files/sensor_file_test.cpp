@@ -1,4 +1,4 @@
-// Calibrations in other people's keys: Kalibr, ROS.
+// Calibrations with the keys of other tools: Kalibr, ROS.
 #include "common/replay/files/sensor_file.h"
 
 #include <gmock/gmock.h>
@@ -113,7 +113,7 @@ TEST(SensorFileOfOthers, KalibrsChainIsARig) {
   std::vector<std::string> notes;
   const Calibration rig = readRig(file, &notes);
   ASSERT_EQ(rig.cameras.size(), 2U);
-  // cam1 is 0.1 m to the right of cam0, which is the body's -y.
+  // cam1 is 0.1 m to the right of cam0, along the body's -y.
   EXPECT_TRUE(rig.cameras[0].T_BC.p.isApprox(Eigen::Vector3d(0.1, 0.0, 0.05)));
   EXPECT_TRUE(rig.cameras[1].T_BC.p.isApprox(Eigen::Vector3d(0.1, -0.1, 0.05)));
   EXPECT_THAT(notes, ElementsAre(HasSubstr("cam1: the key `colour`")));

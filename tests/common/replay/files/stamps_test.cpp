@@ -55,7 +55,7 @@ TEST(StampOrder, KeepsAllThatIncreases) {
   EXPECT_TRUE(orderOf({}).kept.empty());
 }
 
-// 32 times an interval of 31 years is no number of nanoseconds any more.
+// 32 times an interval of 31 years exceeds the range of 64-bit nanoseconds.
 TEST(StampOrder, HoldsAnyStamps) {
   std::vector<TimePoint> stamps;
   for (const double years : {0.0, 31.7, 63.4, 95.1, 126.8, 79.2}) {
@@ -74,7 +74,7 @@ TEST(StampOrder, HoldsAnyStamps) {
 TEST(StampOrder, LeavesOutTheOneThatIsFarAndNotAllBehindIt) {
   for (const std::int64_t by : {3600ll * 1'000'000'000, -3600ll * 1'000'000'000, 2'000'000'000ll}) {
     for (const std::size_t at : {std::size_t{0}, std::size_t{40}, std::size_t{119}}) {
-      if (by == 2'000'000'000ll && at != 40) continue;  // at an end it may be true
+      if (by == 2'000'000'000ll && at != 40) continue;  // at an end the stamp may be correct
       auto stamps = every(kInterval, 120);
       stamps[at] += Duration(by);
       const auto order = orderOf(stamps);
@@ -103,7 +103,8 @@ TEST(StampOrder, SortsWhatIsNotSortedAtAll) {
 TEST(StampOrder, SortsNeighboursThatChangedPlacesAndARowThatFillsAHole) {
   auto stamps = every(kInterval, 100);
   std::swap(stamps[10], stamps[11]);
-  std::rotate(stamps.begin() + 50, stamps.begin() + 90, stamps.begin() + 91);  // 90 stands at 50
+  std::rotate(stamps.begin() + 50, stamps.begin() + 90, stamps.begin() + 91);  // index 90 moves to
+                                                                               // 50
   const auto order = orderOf(stamps);
   EXPECT_EQ(order.kept.size(), 100U);
   EXPECT_EQ(order.strays, 0U);

@@ -1,5 +1,5 @@
-// A bag's chunks whose times overlap are unpacked together: no more than 1 GiB of them. The bags
-// are written here, by the format's description; each chunk is 60 MiB of zeros, packed.
+// Chunks of a bag with overlapping times are unpacked together, up to 1 GiB. The test writes the
+// bags according to the format's description; each chunk is 60 MiB of compressed zeros.
 #include <bzlib.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -49,7 +49,7 @@ std::string message(std::uint32_t number, std::uint32_t second, const std::strin
                 data);
 }
 
-/// A wanted message, and then one that nobody wants.
+/// One message of a wanted topic, then one of an unwanted topic.
 std::string packedChunk(std::uint32_t second) {
   const std::string bytes = connection(0, "/wanted") + connection(1, "/filler") +
                             message(0, second, "0123") +

@@ -1,9 +1,9 @@
-// What a file may leave out and add by the specification (mcap.dev/spec): every combination of the
-// features in which the public conformance cases vary is written here, and is a whole file.
+// Optional parts of MCAP files by the specification (mcap.dev/spec). The test writes every
+// combination of the features that vary in the public conformance cases. Each is a complete file.
 //
 //   ch chunks · mx message indexes · chx chunk indexes · st statistics · rsh, rch schemas and
-//   channels again in the summary · ax, mdx indexes of attachments and metadata · sum summary
-//   offsets · pad three bytes behind each record's last field
+//   channels repeated in the summary · ax, mdx indexes of attachments and metadata · sum summary
+//   offsets · pad three bytes after each record's last field
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 using Buffer = std::vector<std::uint8_t>;
 
-/// What goes into the file.
+/// The content of a file.
 struct Content {
   const char* name;
   int messages = 0;
@@ -51,7 +51,7 @@ std::string nameOf(unsigned features) {
   return name;
 }
 
-/// Whether each feature has something to be of.
+/// Returns whether the file contains the records that each feature needs.
 bool isMeant(const Content& content, unsigned f) {
   const bool messages = content.messages > 0;
   if ((f & (kMx | kChx)) && !(f & kCh)) return false;
@@ -88,7 +88,8 @@ class FileMaker {
       kMetadataIndex{0x0D};
 
   void record(Buffer& to, Op op, Buffer content) const {
-    // Behind a message's last field are its data; they cannot be told from more bytes.
+    // The data of a message extend to the end of its record, so that padding would become part of
+    // them.
     if ((f_ & kPad) && op != Op::kMessage && op != Op::kFooter) {
       for (const std::uint8_t byte : {0x01, 0xff, 0xff}) content.push_back(byte);
     }
@@ -284,7 +285,7 @@ class McapConformance : public testing::TestWithParam<Content> {
         .write(reinterpret_cast<const char*>(bytes.data()),
                static_cast<std::streamsize>(bytes.size()));
   }
-  /// What the file gives, against what went in.
+  /// Compares the records that are read with the content that was written.
   void expectAllOfIt(const std::string& variant) const {
     const Content& content = GetParam();
     if (content.messages == 0) {

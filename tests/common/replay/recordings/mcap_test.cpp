@@ -1,4 +1,5 @@
-// The container: what is written is read again, whole, cut anywhere, or with bytes changed.
+// Tests the MCAP container: written files are read again, whole, truncated at any byte, or with
+// changed bytes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -40,7 +41,7 @@ class Mcap : public testing::Test {
   }
   void TearDown() override { fs::remove(file); }
 
-  /// Five chunks of twenty messages, by two channels; their data are their numbers.
+  /// Five chunks of twenty messages on two channels. The data of each message are its number.
   static Draft draftOf(int chunk) {
     Draft draft;
     for (int i = 0; i < 20; ++i) {
@@ -58,7 +59,7 @@ class Mcap : public testing::Test {
     if (finish) (void)writer->finish();
     return data_end;
   }
-  /// Sequence numbers of all messages that can be read.
+  /// Returns the sequence numbers of all readable messages.
   static std::vector<std::uint32_t> numbersIn(const Reader& reader) {
     std::vector<std::uint32_t> numbers;
     for (const ChunkIndex& chunk : reader.chunks()) {
@@ -115,7 +116,7 @@ TEST_F(Mcap, EveryFieldOfAMessageComesBack) {
 TEST_F(Mcap, AFileThatIsCutAnywhereYieldsEveryWholeChunk) {
   writeChunks(false);
   const auto whole = contentsOf(file);
-  std::vector<std::uint64_t> ends;  // of chunks
+  std::vector<std::uint64_t> ends;  // ends of the chunks
   {
     const auto reader = Reader::open(file);
     for (const ChunkIndex& chunk : reader->chunks()) ends.push_back(chunk.offset + chunk.length);
@@ -179,7 +180,7 @@ TEST_F(Mcap, AnyBytesGiveAReasonOrMessagesThatWereWritten) {
   for (int i = 0; i < 1500; ++i) {
     auto bytes = whole;
     for (std::uint64_t n = 1 + random() % 5; n > 0; --n) {
-      // Lengths and offsets are where a reader can be led astray: large numbers too.
+      // Damaged lengths and offsets are the greatest risk for a reader; they include large numbers.
       const std::size_t at = random() % bytes.size();
       bytes[at] = random() % 3 == 0 ? 0xFF : static_cast<std::uint8_t>(random());
     }

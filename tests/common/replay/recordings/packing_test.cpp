@@ -1,4 +1,4 @@
-// Chunks as programs of others pack them: in one go, as they go (no size in zstd's frame), in
+// Chunks as other programs compress them: at once, as a stream (no size in zstd's frame), in
 // several frames, by LZ4, with damage.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 using Buffer = std::vector<std::uint8_t>;
 
-constexpr std::uint32_t kMessages = 3000;  // some megabytes: more than one step
+constexpr std::uint32_t kMessages = 3000;  // several megabytes: more than one step
 
 Buffer zstdInOneGo(const Buffer& bytes) {
   Buffer packed(ZSTD_compressBound(bytes.size()));
@@ -27,7 +27,7 @@ Buffer zstdInOneGo(const Buffer& bytes) {
   return packed;
 }
 
-/// As the writers of Rust and Go do: the frame does not say how much it is.
+/// A zstd frame without its content size, as writers in Rust and Go make it.
 Buffer zstdAsItGoes(const Buffer& bytes) {
   ZSTD_CCtx* context = ZSTD_createCCtx();
   Buffer packed(ZSTD_compressBound(bytes.size()) + 100);
@@ -100,8 +100,8 @@ class PackedChunks : public testing::TestWithParam<Packing> {
         .write(reinterpret_cast<const char*>(bytes.data()),
                static_cast<std::streamsize>(bytes.size()));
   }
-  /// How many messages come, or why none do: without an index a damaged chunk is looked into at the
-  /// opening already, and is none.
+  /// Returns the number of messages, or the error. Without an index, the reader checks chunks when
+  /// it opens the file, and leaves out a damaged chunk.
   Result<std::uint32_t> read() {
     const auto reader = Reader::open(file_);
     if (!reader) return tl::unexpected(reader.error());

@@ -1,6 +1,6 @@
 #!/bin/bash
-# What is done in the guest; the host judges what is left in /share. /share/options: SECONDS_OF_FLOW, UNPLUGS,
-# MISTAKES, UNPLUGS_WITH_VIO, STOPS, SEED.
+# The job of the guest. The host judges the files that it leaves in /share. /share/options sets
+# SECONDS_OF_FLOW, UNPLUGS, MISTAKES, UNPLUGS_WITH_VIO, STOPS, SEED.
 set -u
 export PATH=/guest:/usr/sbin:/usr/bin LC_ALL=C.UTF-8
 modprobe -a 9p 9pnet_virtio
@@ -16,7 +16,7 @@ keep() {
   journalctl -o short-monotonic --no-pager -u 'perdure-*' > /share/journal
   dmesg > /share/dmesg
 }
-# until_frames SECONDS: one that is newer than /run/told.
+# until_frames SECONDS: waits for a frame that is newer than /run/told.
 until_frames() {
   for ((i = 0; i < 10 * $1; ++i)); do
     [ ! /run/frame -nt /run/told ] || return 0
@@ -37,8 +37,9 @@ mark booted
   systemd-analyze time; systemd-analyze blame | head -12
 } > /share/facts 2>&1
 
-# When the kernel sees a plug, capture opens the camera and starts it, the kernel gives an image, and asks for a
-# sample; when udev has told of a node, as those hear it who wait for that. On CLOCK_MONOTONIC.
+# Records times on CLOCK_MONOTONIC. The kernel's events are: a plug, the opening and the start of
+# the camera by capture, an image, and a trigger of a sample. udevadm gives the time at which udev
+# reports a node to its listeners.
 cd /sys/kernel/tracing || exit
 echo mono > trace_clock
 echo 16384 > buffer_size_kb
@@ -51,7 +52,7 @@ for event in kprobes/{plugged,unplugged,triggered,opened,streamed} v4l2/v4l2_dqb
 cd /
 
 udevadm monitor > /run/udev_events &
-# It is to be late no more than capture is: both before all that the test itself does.
+# The listener must not be later than capture, so that both have priority over the test itself.
 chrt --rr 5 guest_listener "$notes" /run/frame & listener=$!
 touch /run/told
 systemctl start perdure-capture
@@ -66,7 +67,7 @@ sleep "$SECONDS_OF_FLOW"
 mark flow_ends
 keep
 
-# The driver loses images while capture stands still; and it calls half images broken.
+# The driver loses images while capture is stopped; it marks incomplete images as broken.
 kill -STOP "$first"
 sleep .9
 kill -CONT "$first"
@@ -89,22 +90,23 @@ for ((n = 1; n <= UNPLUGS; ++n)); do
   case $((n % 8)) in
     3) tell silent 2; sleep 1.5 ;;              # capture has begun to open it again
     5) tell silent 2; sleep 1.$((RANDOM % 10)) ;;
-    1) udev_stands_still 4 ;;                   # capture has given it up by then
+    1) udev_stands_still 4 ;;                   # capture has given up the camera by then
   esac
   tell unplug 1.$((RANDOM % 10))
   while [ -e /share/command ]; do sleep .1; done
-  sleep .5                                      # what was on its way comes
+  sleep .5                                      # pending frames arrive
   touch /run/told
   [ $((n % 10)) -ne 0 ] || { mark "reached_$n"; cp -f "$notes" /share/; }
   case $((n % 8)) in
-    6) sleep 1.$((RANDOM % 10)) ;;              # soon again: while it is opened, or before
+    6) sleep 1.$((RANDOM % 10)) ;;              # the next unplug comes soon: during the opening, or
+                                                # before it
     *) until_frames 40 || mark "no_frames_after_$n"; sleep "0.$((RANDOM % 10))" ;;
   esac
 done
 mark "unplugged_$((n - 1))"
 keep
 
-# Odometry goes on after the camera was opened again.
+# Odometry must continue after the camera is opened again.
 if [ "$UNPLUGS_WITH_VIO" -gt 0 ]; then
   systemctl start perdure-vio
   sleep 20
@@ -123,10 +125,12 @@ if [ "$UNPLUGS_WITH_VIO" -gt 0 ]; then
 fi
 mark end
 
-# udev says that a camera is gone which is there: so it does, late, of the one before that had the same node.
+# udev reports a present camera as removed. This really happens: udev reports the removal of the
+# previous camera late, and both have the same node.
 for ((n = 1; n <= MISTAKES; ++n)); do
   [ -d "/proc/$first" ] || break
-  [ $((n % 2)) -eq 0 ] || kill -STOP "$first"   # libcamera finds both at once: that it is gone, and its images
+  [ $((n % 2)) -eq 0 ] || kill -STOP "$first"   # libcamera then finds the removal and new images at
+                                                # the same time
   udevadm trigger --settle --action=remove --subsystem-match=media
   sleep .5
   kill -CONT "$first"
@@ -138,7 +142,7 @@ for ((n = 1; n <= MISTAKES; ++n)); do
 done
 mark "mistaken_$((n - 1))"
 systemctl show -P NRestarts perdure-capture > /share/restarts
-# stop_capture KIND: how long it took by systemd, and what came of it.
+# stop_capture KIND: writes the stop times that systemd measured, and the result.
 stop_capture() {
   systemctl stop perdure-capture
   # shellcheck disable=SC2046 # words

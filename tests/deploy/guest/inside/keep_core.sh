@@ -1,3 +1,4 @@
 #!/bin/bash
-# The kernel hands a core dump over. usage: keep_core.sh PID NAME
+# Saves a core dump that the kernel passes on standard input.
+# usage: keep_core.sh PID NAME
 cat > "/share/core.$2.$1"

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0 OR GPL-2.0-only
-// A BMI160 on the bus of i2c-stub, with a mount matrix: what a device tree says on a board, and what
-// writing to `new_device` cannot say. The driver is the kernel's own bmi160.
+// Registers a BMI160 with a mount matrix on the bus of i2c-stub. On a board the device tree gives
+// the matrix; writing to `new_device` cannot give it. The driver is the kernel's own bmi160.
 #include <linux/i2c.h>
 #include <linux/module.h>
 #include <linux/property.h>
 
-/* Device x is the body's y, device y its −x. */
+/* The device's x axis is the body's y axis, its y axis the body's −x axis. */
 static const char *const mount[] = {"0", "-1", "0", "1", "0", "0", "0", "0", "1"};
 
 static const struct property_entry properties[] = {

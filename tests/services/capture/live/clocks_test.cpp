@@ -51,8 +51,8 @@ TEST(CameraStamp, IsTheMiddleOfTheMiddleRowsExposure) {
   EXPECT_EQ(middleOfExposure(kSecond, 10'000, 0.02), kSecond + 5 * kMs + 10 * kMs);
 }
 
-/// A clock that is an hour ahead and 100 ppm fast, seen through messages that come 2 ms late and
-/// more.
+/// A clock that is one hour ahead and 100 ppm fast, observed through messages with a delay of 2 ms
+/// or more.
 struct Elsewhere {
   ClockMap map;
   std::mt19937 random{7};
@@ -63,7 +63,7 @@ struct Elsewhere {
     return ours + ahead + std::llround(fast * static_cast<double>(ours));
   }
   void run(std::int64_t from, std::int64_t until) {
-    std::exponential_distribution<double> late(1.0 / 3.0);  // ms beyond the least
+    std::exponential_distribution<double> late(1.0 / 3.0);  // ms above the minimum
     for (std::int64_t t = from; t < until; t += 5 * kMs) {
       map.observe(theirs(t), t + 2 * kMs + static_cast<std::int64_t>(kMs * late(random)));
     }

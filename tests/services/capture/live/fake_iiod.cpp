@@ -56,7 +56,7 @@ void append(std::string& bytes, T value) {
 
 std::size_t axesOf(const FakeImu& d) { return (d.gyro ? 3U : 0U) + (d.accel ? 3U : 0U); }
 
-/// The stamp stands at a multiple of eight bytes.
+/// The stamp is aligned to eight bytes.
 std::size_t scanBytes(const FakeImu& d) {
   return d.stamps ? (2 * axesOf(d) + 7) / 8 * 8 + 8 : 2 * axesOf(d);
 }
@@ -208,7 +208,7 @@ double FakeIiod::rateOf(const FakeImu& device) const {
   return device.needs_trigger ? triggerRate() : device.rate_hz;
 }
 
-/// A block is sent when its last scan has been made.
+/// Sends a block as soon as its last scan exists.
 bool FakeIiod::sendScans(int socket, const FakeImu& device, std::size_t bytes, std::int64_t& next) {
   const std::size_t scans = bytes / scanBytes(device);
   std::string data;

@@ -1,5 +1,5 @@
-// An iiod of the test's own: enough of its text protocol for the real libiio to find an IMU in the
-// network and to stream it. What it measures is known; it can go away and come back.
+// A simulated iiod with the part of its text protocol that the real libiio needs to find a network
+// IMU and to stream it. Its measurements are known. It can disappear and return.
 #pragma once
 
 #include <atomic>
@@ -16,29 +16,29 @@ struct FakeImu {
   std::string id = "iio:device0", name = "imu";
   bool gyro = true, accel = true, stamps = true;
   double rate_hz = 200.0;
-  std::int64_t clock_ns = 0;   ///< its clock less CLOCK_BOOTTIME
-  std::string mount = {};      ///< matrix, in IIO's text; empty: it has none
+  std::int64_t clock_ns = 0;   ///< its clock minus CLOCK_BOOTTIME
+  std::string mount = {};      ///< mount matrix in IIO's text form; empty: none
   bool shared_mount = false;   ///< as in_mount_matrix, which libiio shows as a channel "mount"
-  bool needs_trigger = false;  ///< and scans come at its rate
+  bool needs_trigger = false;  ///< scans come at the trigger's rate
   bool frozen_clock = false;   ///< every scan has the stamp of the first one
 };
 
 /// Raw values of scan i: gyro x, y, z = i % 1000, −7, 3 (scale .001), accel 5, −6, 981 (scale .01).
 class FakeIiod {
  public:
-  /// Listens on port 30431 of a loopback address, as "127.0.7.1".
+  /// Listens on port 30431 of a loopback address such as "127.0.7.1".
   FakeIiod(std::string address, std::vector<FakeImu> devices);
   ~FakeIiod();
   FakeIiod(const FakeIiod&) = delete;
   FakeIiod& operator=(const FakeIiod&) = delete;
 
   const std::string& address() const { return address_; }
-  /// From now on it answers nothing, as behind a cable that was cut.
+  /// Stops all answers, as if the cable were cut.
   void fallSilent() { silent_ = true; }
   void stepClock(std::int64_t ns) { step_ns_ += ns; }
   double rateAskedFor() const { return rate_asked_; }
   std::string triggerSet() const;
-  /// Of "trigger0", the hrtimer; it takes no more than 500 Hz.
+  /// Rate of "trigger0", an hrtimer; it accepts at most 500 Hz.
   double triggerRate() const { return trigger_rate_; }
 
  private:

@@ -42,7 +42,7 @@ TEST(FrameNumbers, GoOnWhereTheDriversNumberWrapsOrGoesBack) {
   EXPECT_EQ(numbers.lost(), 0U);
 }
 
-/// Frames of so many seconds, at this rate.
+/// Adds the frames of `seconds` at this rate.
 void run(RateWatch& watch, double hz, double seconds) {
   for (int i = 0; i <= static_cast<int>(seconds * hz); ++i) {
     watch.frame(static_cast<std::uint64_t>(i), static_cast<std::int64_t>(kSecond / hz * i));

@@ -1,4 +1,4 @@
-// The real libiio against an iiod of the test's own, over loopback.
+// Tests the real libiio with a simulated iiod over loopback.
 #include "services/capture/live/iio_stream.h"
 
 #include <gmock/gmock.h>
@@ -19,7 +19,7 @@ using testing::FakeIiod;
 using testing::FakeImu;
 using ::testing::HasSubstr;
 
-/// Of the process and of the test: tests run beside each other.
+/// Returns an address for this process and test, because tests run in parallel.
 std::string ownAddress() {
   static int tests = 0;
   const int pid = getpid();
@@ -178,7 +178,7 @@ TEST_F(Stream, GoesOnWhenTheImuComesBack) {
       << "nothing came, and the connection stood";
 }
 
-// libiio writes into a URI that has a port: a later try must have it whole.
+// libiio writes into a URI that has a port, so that a later attempt must get a complete URI.
 TEST_F(Stream, BehindAPortTheImuIsFoundWhenItComes) {
   port_ = ":30431";
   open();

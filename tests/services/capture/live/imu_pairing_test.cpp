@@ -27,7 +27,8 @@ TEST(ImuPairing, PutsTheAccelerationBetweenItsReadings) {
   ImuPairing pairing;
   std::vector<InertialPair> all;
   const auto keep = [&](const auto& more) { all.insert(all.end(), more.begin(), more.end()); };
-  for (int i = 0; i < 100; ++i) {  // the accelerometer ticks every 4 ms, the gyroscope every 5
+  for (int i = 0; i < 100; ++i) {  // the accelerometer has a sample every 4 ms, the gyroscope every
+                                   // 5 ms
     if (i % 4 == 0) keep(pairing.accel(at(i, ramp(i))));
     if (i % 5 == 1) keep(pairing.gyro(at(i, {double(i), 0, 0})));
   }

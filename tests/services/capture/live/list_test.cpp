@@ -1,4 +1,4 @@
-// What --list says: of sensors that are described here, of an iiod, and of none.
+// Tests the output of --list: for simulated sensors, for an iiod, and without sensors.
 #include "services/capture/list.h"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// LiveCamera with cameras of the test's own.
+// Tests LiveCamera with simulated cameras.
 #include "services/capture/live/live_camera.h"
 
 #include <gmock/gmock.h>
@@ -16,9 +16,9 @@ CameraShot shot(std::uint32_t sequence, std::int64_t time_ns = 0) {
   return {sequence, time_ns, Frame{}};
 }
 
-/// What a session answers, call by call: a shot, or nothing; after all of it, it is unplugged or
-/// silent. `gone_after` so many answers it says that it is unplugged, and has the rest
-/// nevertheless.
+/// The answers of a session, call by call: a shot, or nothing. After the last one, the camera is
+/// unplugged or silent. With `gone_after`, it reports the unplug after that many answers, but still
+/// has the rest.
 struct Script {
   std::vector<std::optional<CameraShot>> answers;
   bool unplugged = false;
@@ -48,7 +48,7 @@ class ScriptedSession : public CameraSession {
 
 class Camera : public ::testing::Test {
  protected:
-  /// The sessions one after the other; then there is no camera, and no more comes.
+  /// Plays the sessions in sequence; then no camera is left.
   void play(std::vector<Script> scripts, double rate_hz = 20.0) {
     scripts_ = std::move(scripts);
     camera_ = std::make_unique<LiveCamera>(
@@ -76,7 +76,7 @@ class Camera : public ::testing::Test {
   std::promise<void> played_;
 
  protected:
-  std::unique_ptr<LiveCamera> camera_;  // its thread uses all of the above
+  std::unique_ptr<LiveCamera> camera_;  // its thread uses all members above
 };
 
 TEST_F(Camera, NumbersGoOnWhenItWasUnplugged) {
@@ -118,7 +118,7 @@ TEST_F(Camera, IsOpenedAgainWhereItIsSilent) {
   EXPECT_EQ(counted("camera_lost"), 1U);
 }
 
-/// Who was stopped wakes from one wait, however long that was by the clock.
+/// A stopped process wakes from a single wait, even if the clock has advanced far.
 TEST_F(Camera, IsNotSilentForAProcessThatWasStopped) {
   play({{.answers = {shot(0), std::nullopt, shot(40), std::nullopt, std::nullopt, shot(41)},
          .unplugged = true}});
@@ -126,7 +126,7 @@ TEST_F(Camera, IsNotSilentForAProcessThatWasStopped) {
   EXPECT_EQ(counted("camera_silent"), 0U);
 }
 
-/// It flows until the test ends it.
+/// Produces images until the test ends.
 class EndlessSession : public CameraSession {
  public:
   explicit EndlessSession(double hz) : hz_(hz) {}

@@ -1,4 +1,4 @@
-// perdure-capture with live sensors: an IMU behind an iiod, and no camera at all.
+// Tests perdure-capture with live sensors: an IMU behind an iiod, and no camera.
 #include <arpa/inet.h>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -75,7 +75,7 @@ class LiveProcess : public ::testing::Test {
   Health last_health_;
 };
 
-/// Two devices that tick apart; the camera is missing all the time.
+/// Uses two devices with different sample times; the camera is missing throughout.
 TEST_F(LiveProcess, GivesWhatThereIsSaysWhatIsMissingAndGoesOnWhenItComesBack) {
   const std::vector<FakeImu> imus = {
       {.id = "iio:device0", .name = "gyro", .accel = false, .rate_hz = 200.0},
@@ -111,7 +111,7 @@ TEST_F(LiveProcess, GivesWhatThereIsSaysWhatIsMissingAndGoesOnWhenItComesBack) {
   })) << last_health_.message;
 }
 
-/// Through libcamera itself, with one manager for both.
+/// Uses libcamera itself, with one manager for both cameras.
 TEST_F(LiveProcess, NamesBothCamerasThatAreMissing) {
   Calibration both = rig();
   both.cameras.push_back(both.cameras.front());
@@ -142,7 +142,7 @@ TEST_F(LiveProcess, SaysThatAnImuWithAFrozenClockGivesNoSamples) {
   EXPECT_GT(last_health_.reasons["imu_out_of_order"], 0U);
 }
 
-/// Datagrams to the addresses that capture listens to.
+/// Sends datagrams to the addresses on which capture listens.
 class Vehicle {
  public:
   explicit Vehicle(const std::string& host) { (void)inet_aton(host.c_str(), &host_); }
@@ -161,7 +161,7 @@ class Vehicle {
   int socket_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
 };
 
-/// RMC and GGA of a drive to the east at 10 m/s.
+/// Returns RMC and GGA sentences of a drive to the east at 10 m/s.
 std::string sentencesOf(int second) {
   const auto whole = [](const std::string& text) {
     unsigned sum = 0;

@@ -10,7 +10,8 @@ namespace {
 
 constexpr int kWidth = 32, kHeight = 16, kPadding = 24;
 
-/// Smooth, so that halved colours lose little; red to the right, green downwards.
+/// A smooth image, so that chroma subsampling loses little: red increases to the right, green
+/// downwards.
 cv::Mat picture() {
   cv::Mat image(kHeight, kWidth, CV_8UC3);
   for (int y = 0; y < kHeight; ++y) {
@@ -22,7 +23,7 @@ cv::Mat picture() {
   return image;
 }
 
-/// A plane as a driver gives it: rows padded by what is no image.
+/// A plane with padded rows, as drivers give it.
 struct Padded {
   std::vector<std::uint8_t> bytes;
   std::size_t stride;
@@ -43,7 +44,7 @@ cv::Mat matOf(const Frame& frame) {
       .clone();
 }
 
-/// Largest difference of a channel from the picture.
+/// Returns the largest difference of a channel from the picture.
 double differenceFrom(const cv::Mat& expected, const Frame& frame) {
   return cv::norm(expected, matOf(frame), cv::NORM_INF);
 }
@@ -75,7 +76,7 @@ TEST(Pixels, OfPackedColoursAreExact) {
   expectPicture(PixelLayout::kRgbx, {rgbx.plane()}, 0, 1);
 }
 
-/// Video range: 16 to 235 stands for black to white, and grey is taken from Y as it is.
+/// In video range, 16 to 235 represent black to white; grey is Y unchanged.
 constexpr double kHalved = 8, kVideoRange = 20;
 
 TEST(Pixels, OfPlanesWithHalvedColours) {

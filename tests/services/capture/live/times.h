@@ -1,4 +1,4 @@
-// Stretches of time as the kernel counts them, in nanoseconds.
+// Durations in nanoseconds, as the kernel counts them.
 #pragma once
 
 #include <cstdint>

@@ -39,7 +39,7 @@ TEST(CanSignal, ReadsALineOfADbcFileAsItStandsThere) {
 }
 
 TEST(CanSignal, KnowsIdsOf29Bits) {
-  // J1939's wheel speeds, PGN 65215: as DBC files write it, and in hexadecimal.
+  // J1939's wheel speeds, PGN 65215, in DBC syntax and in hexadecimal.
   for (const char* id : {"2566831870", "0x98febf0b", "0x18febf0b"}) {
     const auto parsed = parseCanSignal(std::string(id) + " 0|16@1+ (1,0)");
     ASSERT_TRUE(parsed) << id;
@@ -52,7 +52,7 @@ TEST(CanSignal, KnowsIdsOf29Bits) {
   EXPECT_FALSE(parseCanSignal("0x5fffffff 0|8@1+ (1,0)")) << "30 bits";
 }
 
-/// Worked by hand from the numbering of the DBC format: byte · 8 + bit.
+/// Computed by hand from the numbering of the DBC format: byte · 8 + bit.
 TEST(CanSignal, TakesBitsOfBothOrders) {
   EXPECT_EQ(raw("0|16@1+ (1,0)", {0x34, 0x12}), 0x1234);
   EXPECT_EQ(raw("7|16@0+ (1,0)", {0x12, 0x34}), 0x1234);
@@ -63,7 +63,7 @@ TEST(CanSignal, TakesBitsOfBothOrders) {
   EXPECT_EQ(raw("7|64@0- (1,0)", {0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xfe}), -2);
   EXPECT_EQ(raw("0|64@1- (1,0)", {0xfe, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff}), -2);
   EXPECT_EQ(raw("3|4@0- (1,0)", {0x0a}), -6);
-  // Behind the eight bytes of a classic frame.
+  // Beyond the eight bytes of a classic frame.
   Bytes flexible(64);
   flexible[63] = 0x7f;
   EXPECT_EQ(raw("504|8@1+ (1,0)", flexible), 0x7f);
@@ -76,8 +76,8 @@ TEST(CanSignal, EveryBitOfBothOrdersComesBack) {
     s.length = 13;
     for (s.start = little ? 0 : 7; s.start < 40; ++s.start) {
       for (unsigned k = 0; k < s.length; ++k) {
-        // The bit that the format's picture names: on from the start, or down and into the next
-        // byte's top.
+        // Position of bit k by the format's numbering: little-endian counts upwards from the start
+        // bit, big-endian downwards and then from the top of the next byte.
         unsigned at = s.start;
         for (unsigned step = little ? k : s.length - 1 - k; step > 0; --step) {
           at = little ? at + 1 : at % 8 == 0 ? at + 15 : at - 1;
@@ -126,7 +126,7 @@ TEST(CanSignal, SaysWhatIsWrongInALine) {
   EXPECT_THAT(why("0x1a0 0|8@1+ (1,-1e300)"), HasSubstr("too large"));
 }
 
-// A regular expression takes stack for each character.
+// A regular expression uses stack for each character.
 TEST(CanSignal, ALineOfAnyLengthIsReadOrRefused) {
   const std::string line = "0x1a0 0|8@1+ (1,0) ";
   EXPECT_TRUE(parseCanSignal(line + std::string(900, 'R')));

@@ -10,14 +10,14 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 
-/// A drive of five fixes a second.
+/// A drive with five fixes per second.
 struct Drive {
   GnssFix fix{0, 49.0, 8.4, 110.0, 2.0, 10.0, 0.5};
   std::optional<EarthPlace> next(EarthAnchor& anchor, bool backwards = false) {
     fix.time_ns += 200'000'000;
     return anchor.offer(fix, backwards);
   }
-  /// How many fixes until one is taken; 0: none in so many.
+  /// Returns the number of fixes until one is accepted; 0 if none of the first `most` is.
   int until(EarthAnchor& anchor, int most, std::optional<EarthPlace>* place = nullptr) {
     for (int n = 1; n <= most; ++n) {
       const auto taken = next(anchor);
@@ -75,13 +75,13 @@ TEST(EarthAnchor, IsNotTakenWhereItsHeadingIsNotKnown) {
 }
 
 TEST(EarthAnchor, TellsWhereTheBodyIsByItsAntenna) {
-  // Heading north; the antenna 2 m ahead, 1 m to the left (west), 1.5 m up.
+  // Heading north; the antenna is 2 m ahead, 1 m to the left (west) and 1.5 m up.
   EarthAnchor anchor({5.0, {2.0, 1.0, 1.5}});
   Drive drive;
   drive.fix.course = std::numbers::pi / 2;
   std::optional<EarthPlace> place;
   ASSERT_NE(drive.until(anchor, 40, &place), 0);
-  // A degree of latitude is 111 200.8 m at 49°, one of longitude 73 172.8 m (WGS 84).
+  // One degree of latitude is 111 200.8 m at 49°, one degree of longitude 73 172.8 m (WGS 84).
   EXPECT_NEAR((place->latitude_deg - 49.0) * 111200.8, -2.0, 1e-3);
   EXPECT_NEAR((place->longitude_deg - 8.4) * 73172.8, 1.0, 1e-3);
   EXPECT_NEAR(place->height_m, 108.5, 1e-5);

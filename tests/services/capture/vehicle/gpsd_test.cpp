@@ -6,7 +6,7 @@ namespace perdure::capture {
 namespace {
 
 TEST(Gpsd, ReadsATpvReport) {
-  // As gpsd_json(5) shows it, with the height over the ellipsoid of later versions.
+  // The example of gpsd_json(5), with the ellipsoidal height of later versions.
   const auto fix = readGpsd(
       R"({"class":"TPV","device":"/dev/pts/1","time":"2005-06-08T10:34:48.283Z","ept":0.005,)"
       R"("lat":46.498293369,"lon":7.567411672,"alt":1343.127,"altHAE":1392.5,"eph":36.0,)"

@@ -8,7 +8,7 @@
 namespace perdure::capture {
 namespace {
 
-/// With its sum behind it.
+/// Appends the checksum.
 std::string sentence(const std::string& text) {
   unsigned sum = 0;
   for (const char c : text) sum ^= static_cast<unsigned char>(c);
@@ -19,7 +19,7 @@ std::string sentence(const std::string& text) {
 
 TEST(Nmea, RmcAndGgaOfOneTimeAreAFix) {
   NmeaReader reader;
-  // From the description of u-blox's receivers; their own sums.
+  // Examples from the description of u-blox's receivers, with their checksums.
   auto said =
       reader.read("$GPRMC,083559.00,A,4717.11437,N,00833.91522,E,0.004,77.52,091202,,,A*57", 1000);
   ASSERT_TRUE(said) << said.error().detail;
@@ -37,7 +37,7 @@ TEST(Nmea, RmcAndGgaOfOneTimeAreAFix) {
   EXPECT_NEAR(said->fix->height_m, 547.6, 1e-9);
   EXPECT_NEAR(said->fix->sigma_m, 3.03 / std::numbers::sqrt2, 1e-9);
   EXPECT_NEAR(said->fix->course.value(), (90.0 - 77.52) * std::numbers::pi / 180.0, 1e-12);
-  // Each once; and of one time alone.
+  // A fix needs both sentences, each once and of the same time.
   EXPECT_FALSE(
       reader.read(sentence("GNGGA,083600.00,4717.1,S,00833.9,W,4,12,0.6,1.0,M,2.0,M,,"), 3)->fix);
   EXPECT_FALSE(
@@ -67,7 +67,7 @@ TEST(Nmea, VtgHasASpeed) {
   EXPECT_NEAR(reader.read(sentence("GPVTG,77.52,T,,M,36.0,N,,K,A"), 1)->speed.value(),
               36.0 * 1852.0 / 3600.0, 1e-12);
   EXPECT_FALSE(reader.read(sentence("GPVTG,,T,,M,,N,,K,A"), 1)->speed);
-  // Of the same moment as an RMC it says nothing new.
+  // A VTG of the same time as an RMC gives no further speed.
   ASSERT_TRUE(reader.read(sentence("GPRMC,083559.00,A,4717.1,N,00833.9,E,1,90,091202,,,A"), 2));
   const std::string vtg = sentence("GPVTG,77.52,T,,M,0.004,N,36.0,K,A");
   EXPECT_FALSE(reader.read(vtg, 1'000'000'000)->speed);

@@ -28,7 +28,7 @@ bool waitFor(const std::function<bool()>& done, std::chrono::milliseconds most =
   return false;
 }
 
-/// A UDP socket of ours, and a port that nobody else has.
+/// A UDP socket of this test, and a port that no other program uses.
 struct Sender {
   Sender() : socket(::socket(AF_INET, SOCK_DGRAM, 0)) {
     sockaddr_in any{};
@@ -72,7 +72,7 @@ TEST(SocketStream, GivesDatagramsWithTheTimeOfTheirArrival) {
   EXPECT_LT(std::abs(HostClock::nowNs() - time_ns), 5'000'000'000);
   EXPECT_EQ(stream.state().problem(), "");
   EXPECT_EQ(stream.state().name(), "speed at test");
-  sender.send("");  // an empty datagram is no end
+  sender.send("");  // an empty datagram does not end the stream
   ASSERT_TRUE(waitFor([&] { return stream.state().reasons().of("speed_silent") == 1; }));
   EXPECT_THAT(stream.state().problem(), HasSubstr("says nothing"));
   EXPECT_EQ(stream.state().reasons().of("speed_lost"), 0U);

@@ -1,5 +1,5 @@
-// The vehicle's speed and place from sockets; a pair of sockets stands for a CAN bus, which few
-// kernels of test machines have.
+// Tests speed and position of the vehicle from sockets. A pair of sockets replaces a CAN bus, which
+// few kernels of test machines have.
 #include "services/capture/vehicle/vehicle.h"
 
 #include <gmock/gmock.h>
@@ -97,7 +97,8 @@ TEST(Vehicle, HearsItsSpeedInLines) {
   Vehicle vehicle(speed, {}, heard.outputs(), lines.open(), {});
   lines.send("2.5");
   lines.send("-1.5, 0.3\n");
-  lines.send("7\n8\n$GPVTG,77.52,T,,M,0.004,N,0.008,K,A*06\r\n");  // of one moment: the last
+  lines.send("7\n8\n$GPVTG,77.52,T,,M,0.004,N,0.008,K,A*06\r\n");  // all at one time: the last one
+                                                                   // counts
   lines.send("fast");
   ASSERT_TRUE(heard.wait([](const Heard& h) { return h.speeds.size() == 3; }));
   EXPECT_DOUBLE_EQ(heard.speeds[0].speed, 2.5);
@@ -166,7 +167,7 @@ TEST(Vehicle, KnowsItsPlaceAndSpeedByGpsd) {
   ASSERT_TRUE(heard.wait([&](const Heard&) {
     return vehicle.problem().find("no fix") != std::string::npos;
   })) << vehicle.problem();
-  for (int i = 0; i < 12; ++i) {  // its times are those of arrival
+  for (int i = 0; i < 12; ++i) {  // their times are the times of arrival
     gpsd.send(R"({"class":"TPV","mode":3,"lat":49.0,"lon":8.4,"altHAE":110,"eph":4,"speed":5,)"
               "\"track\":90}\n");
     std::this_thread::sleep_for(220ms);

@@ -32,7 +32,7 @@ TEST(JsonWriter, EscapesWhateverTextComes) {
   std::string every;
   for (int c = 1; c < 256; ++c) every += static_cast<char>(c);
   const std::string valid = "straße \xe2\x82\xac \xf0\x9f\x9a\x97";
-  // Overlong, a surrogate, cut short, beyond the last character.
+  // Overlong encodings, a surrogate, truncated sequences, and a code point beyond the last one.
   const std::string invalid = "\xc0\xaf \xed\xa0\x80 \xe2\x82 \xf4\x90\x80\x80";
   JsonWriter json;
   json.begin('{').textKey("a\"b").text(every).key("v").text(valid).key("i").text(invalid).end('}');

@@ -1,4 +1,4 @@
-// What goes out, read again: scene, beliefs, annotations, poses, health.
+// Reads the outgoing messages again: scene, beliefs, annotations, poses, health.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -30,7 +30,7 @@ std::set<std::string> idsIn(const json& list) {
   return ids;
 }
 
-/// "/objects.objects[:].r" and the like name a topic before the first dot.
+/// A path such as "/objects.objects[:].r" names a topic before the first dot.
 void gatherTopics(const json& node, std::set<std::string>& topics) {
   const auto take = [&](const std::string& text) {
     const std::string name = text.substr(0, text.find_first_of(".{["));
@@ -184,7 +184,7 @@ TEST(Annotations, AreTheProjectedCuboid) {
     right = std::max(right, p["x"].get<double>());
     top = std::min(top, p["y"].get<double>());
   }
-  // Its rear face is 8 m away, 1.8 m wide and 1.5 m high.
+  // The rear face is 8 m away, 1.8 m wide and 1.5 m high.
   EXPECT_NEAR(left, 320 - 400 * 0.9 / 8, 0.1);
   EXPECT_NEAR(right, 320 + 400 * 0.9 / 8, 0.1);
   EXPECT_NEAR(top, 240 - 400 * 0.75 / 8, 0.1);
@@ -220,19 +220,20 @@ TEST(Likelihood, IsTheBrightnessOfTheRegionWhoseBoxMeetsIt) {
   near.classes[0].mean[3] = 0;
   Detections detections;
   detections.detections = {
-      test::detectionOf({275, 202, 365, 278}, {0.F, 3.F, 1.F}),   // the near one's
-      test::detectionOf({300, 210, 330, 260}, {0.F, -9.F, 9.F}),  // inside, of too little overlap
+      test::detectionOf({275, 202, 365, 278}, {0.F, 3.F, 1.F}),   // the near object's box
+      test::detectionOf({300, 210, 330, 260}, {0.F, -9.F, 9.F}),  // inside, but the overlap is too
+                                                                  // small
       test::detectionOf({1, 2, 3, 4}, {0.F, 9.F, 9.F})};
   const ModelInfo model = carsAndPersons();
   const json message =
       json::parse(likelihoodRegions(frameOf(1, {near, far}), camera, &detections, &model));
   ASSERT_EQ(message["points"].size(), 2u);
-  // The farther one is drawn first, and black: the network says nothing of it.
+  // The farther object is drawn first, in black, because the network has no box for it.
   EXPECT_EQ(message["points"][0]["fill_color"]["r"], 0);
   EXPECT_EQ(message["texts"][0]["text"], "car 5 nothing said");
   EXPECT_NEAR(message["points"][1]["fill_color"]["r"], 1 / (1 + std::exp(-1.0)), 1e-3);
   EXPECT_EQ(message["texts"][1]["text"], "car 4 0.73");
-  // The hull is that of its rear face, 8 m away.
+  // The hull is that of the rear face, 8 m away.
   double left = 1e9, right = -1e9;
   for (const auto& p : message["points"][1]["points"]) {
     left = std::min(left, p["x"].get<double>());
@@ -287,9 +288,9 @@ TEST(World, ThinsALongWayAndKeepsItsShape) {
   EXPECT_GE(poses.size(), 1500u);
   EXPECT_EQ(poses.front()["position"]["x"], 0);
   EXPECT_NEAR(poses.back()["position"]["x"], 9999.9, 1e-3);
-  way.add(fromNanoseconds(90000), {1, 1}, {});  // a little late
+  way.add(fromNanoseconds(90000), {1, 1}, {});  // slightly late
   EXPECT_GT(json::parse(way.posesInFrame())["poses"].size(), 2u);
-  way.add(fromNanoseconds(-3'000'000'000), {1, 1}, {});  // it begins again
+  way.add(fromNanoseconds(-3'000'000'000), {1, 1}, {});  // the drive starts again
   EXPECT_EQ(json::parse(way.posesInFrame())["poses"].size(), 2u);
   way.add(fromNanoseconds(1), {2, 1}, {});
   EXPECT_EQ(json::parse(way.posesInFrame())["poses"].size(), 2u);

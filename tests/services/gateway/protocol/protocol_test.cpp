@@ -70,7 +70,7 @@ TEST(ClientMessage, CallsAServiceInBinary) {
     ASSERT_FALSE(cut) << length;
     EXPECT_EQ(cut.error().code, "binary_short");
   }
-  bytes[12] = 0xff;  // an encoding of 4 GB
+  bytes[12] = 0xff;  // an encoding name of 4 GB
   EXPECT_EQ(parseBinary(bytes).error().code, "binary_short");
   EXPECT_EQ(parseBinary({}).error().code, "binary_empty");
   const std::vector<std::uint8_t> unknown{200};
@@ -97,7 +97,7 @@ TEST(ClientMessage, ControlsAPlaybackWithinReason) {
   wrong[4] = 0xc0, wrong[5] = 0x7f;  // not a number
   EXPECT_EQ(parseBinary(wrong).error().code, "playback_malformed");
   wrong = bytes;
-  wrong[14] = 0xff;  // beyond every time
+  wrong[14] = 0xff;  // beyond the range of time
   EXPECT_EQ(parseBinary(wrong).error().code, "playback_malformed");
 }
 

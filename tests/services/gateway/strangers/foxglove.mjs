@@ -1,5 +1,5 @@
-// Foxglove's own client against the gateway: every channel that is advertised is subscribed, decoded
-// and compared with Foxglove's schemas; every service is called.
+// Runs Foxglove's own client against the gateway. It subscribes to every advertised channel,
+// decodes it and compares it with Foxglove's schemas. It calls every service.
 // usage: node foxglove.mjs NODE_MODULES PORT SUBPROTOCOL
 import { readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
@@ -20,7 +20,7 @@ const socket = new WebSocket(`ws://127.0.0.1:${port}/`, [subprotocol]);
 const client = new FoxgloveClient({ ws: socket });
 const fail = (what) => { problems.push(what); };
 
-/** Foxglove's schemas allow more than they list; that ours names no member that they lack is checked too. */
+/** Foxglove's schemas allow additional members; this also checks that no listed member is missing. */
 function compare(channel, value) {
   const known = schemas[channel.schemaName.replace('::', '.')];
   if (channel.schemaName.startsWith('foxglove') && !known) fail(`${channel.topic}: Foxglove has no ${channel.schemaName}`);
@@ -36,7 +36,7 @@ function compare(channel, value) {
   }
 }
 
-/** The test publishes these numbers. */
+/** Compares with the numbers that the test publishes. */
 function expectRaw(channel, value) {
   const expected = { '/raw/imu': (v) => v.accel?.[2] === 9.8 || v.accel?.z === 9.8, '/raw/speed': (v) => v.speed === 1,
     '/raw/odometry': (v) => v.state === 1, '/raw/landmarks': (v) => Object.values(v).some((x) => x?.length === 5) }[channel.topic];
@@ -100,7 +100,7 @@ for (const topic of channels.keys()) if (!got.has(topic)) fail(`${topic}: nothin
 for (const { service, answer } of answers.values()) if (answer === null) fail(`${service.name}: no answer`);
 if (times === 0) fail('no time was told');
 if (socket.protocol !== subprotocol) fail(`it speaks ${socket.protocol}`);
-// The layout for Foxglove names nothing that is not advertised, and nothing of another schema.
+// The layout for Foxglove must name only advertised topics, each with the right schema.
 const layout = JSON.parse(readFileSync(new URL('../../../../tools/viewer/src/foxglove_layout.json', import.meta.url)));
 let named = 0;
 function expectChannel(where, topic, ...kinds) {
@@ -110,7 +110,7 @@ function expectChannel(where, topic, ...kinds) {
   else if (kinds.length > 0 && !kinds.includes(channel.schemaName.replace('::', '.'))) fail(`layout: ${where} shows ${topic} of ${channel.schemaName}`);
   return channel;
 }
-/** "/objects.objects[:]{id==$object}.r": each member is in the schema, also of the filters. */
+/** Checks a path such as "/objects.objects[:]{id==$object}.r": the schema must have each member, also those of filters. */
 function expectPath(where, path) {
   const [topic] = path.match(/^[\w/]+/);
   const channel = expectChannel(where, topic);

@@ -1,5 +1,6 @@
-// The page in a real browser: what it draws, what a click and keys do, how it looks on a phone.
-// usage: node page.mjs NODE_MODULES PORT OUT [WAIT_S]   — OUT: folder for pictures
+// Tests the page in a real browser: its drawing, the effects of clicks and keys, its layout on a
+// phone. Writes pictures into the folder OUT.
+// usage: node page.mjs NODE_MODULES PORT OUT [WAIT_S]
 import { createRequire } from 'node:module';
 import { mkdirSync } from 'node:fs';
 import { join } from 'node:path';
@@ -12,7 +13,7 @@ const check = (holds, what) => { if (!holds) problems.push(what); };
 
 const browser = await puppeteer.launch({ executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium', headless: true, protocolTimeout: 120000,
   args: ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-dev-shm-usage'] });
-// Before the test ends this script and leaves the browser behind.
+// Ends the browser before the test would kill this script and leave the browser running.
 setTimeout(() => {
   browser.process()?.kill('SIGKILL');
   console.log(JSON.stringify({ problems: [...problems, 'the browser was too slow: it was ended'], ...figures }));
@@ -28,7 +29,7 @@ await page.goto(`http://127.0.0.1:${port}/`, { waitUntil: 'domcontentloaded' });
 await page.waitForFunction(() => window.perdure?.world?.things.size > 0 && window.perdure.world.drawn > 0, { timeout: 60000 });
 figures.first_object_ms = await page.evaluate(() => Math.round(performance.now()));
 const pause = (ms) => new Promise((r) => setTimeout(r, ms));
-// What a slow machine shows later; what does not come at all is a problem below.
+// Waits longer for a slow machine; the checks below report elements that never appear.
 await page.waitForFunction(() => window.perdure.camera.drawn > 0 && window.perdure.world.remembered.size > 0
   && document.querySelectorAll('#events li[data-kind]').length > 0 && document.querySelectorAll('#services article').length > 0
   && document.querySelectorAll('#labels span').length > 0 && document.querySelectorAll('#list tr').length > 0, { timeout: 30000, polling: 100 }).catch(() => {});
@@ -52,7 +53,7 @@ check(figures.page.events > 0, 'there are events');
 check(figures.page.services > 0, 'there are services');
 await page.screenshot({ path: join(out, 'live.png') });
 
-// What is not there is said.
+// The page must state what is missing.
 const words = await page.evaluate(async () => {
   const { wordsOfImage, wordsOfNoImage, wordsOfPlace } = await import('./words.js');
   return { figures: document.getElementById('figures').innerText, live: wordsOfImage('live', 0.1), late: wordsOfImage('live', 3), last: wordsOfImage('stale', 0),
@@ -63,13 +64,14 @@ check(/σ in map\s*not known/.test(words.figures), `how well the place is known 
 check(words.live === '' && words.late.includes('3.0 s before') && words.last === 'the last image' && words.place === '0.25 m', `an image that is old (${JSON.stringify(words)})`);
 check(words.ended.includes('since this page is open: the camera has stopped') && words.silent.includes('capture is not heard') && words.opened === 'no image yet', `no image (${JSON.stringify(words)})`);
 
-// How often objects come is told also where several were heard at once; names stay clear of buttons.
+// The rate of objects must be right even if several arrive at once; names must not be covered by
+// buttons.
 const kept = await page.evaluate(async () => {
   const { Model } = await import('./model.js');
   const { wordsOfTime } = await import('./words.js');
   const model = new Model();
   for (let i = 0; i < 100; ++i) {
-    model.takeObjects({ objects: [], timestamp: { sec: i, nsec: 0 }, world: 'a', epoch: 1 }, 500 * Math.floor(i / 10)); // ten each half second
+    model.takeObjects({ objects: [], timestamp: { sec: i, nsec: 0 }, world: 'a', epoch: 1 }, 500 * Math.floor(i / 10)); // ten every half second
   }
   const bar = document.getElementById('tools').getBoundingClientRect();
   const under = [...document.querySelectorAll('#labels span')].filter((e) => { const b = e.getBoundingClientRect(); return b.left < bar.right && b.right > bar.left && b.top < bar.bottom && b.bottom > bar.top; });
@@ -79,7 +81,7 @@ check(kept.rate > 18 && kept.rate < 23, `a rate of 20 Hz is told as ${kept.rate}
 check(kept.under === 0, `${kept.under} names lie under the buttons`);
 check(String(kept.times) === '2.0 s,−3.3 s,before', `times of events (${kept.times})`);
 
-// A pixel that is not the background: the map is drawn, not only there.
+// Counts pixels that differ from the background, because the map must really be drawn.
 const lit = await page.evaluate(() => {
   const { world } = window.perdure;
   world.orbit.apply();
@@ -94,7 +96,7 @@ const lit = await page.evaluate(() => {
 figures.lit = lit;
 check(lit > 0.003, `the map is lit (${lit})`);
 
-// A click in the list, and everything about the object.
+// Clicks an object in the list, and checks the object's panel.
 await page.evaluate(() => { window.clicked = performance.now(); document.querySelector('#list tr').click(); });
 await page.waitForFunction(() => document.querySelector('#object .pmf') && document.querySelector('#object .ledger'), { timeout: 20000, polling: 10 });
 figures.click_ms = await page.evaluate(() => Math.round(window.perdure_panel_latency ?? performance.now() - window.clicked));
@@ -103,7 +105,7 @@ for (const words of ['exists', 'WHAT IT IS', 'WHY IT IS BELIEVED TO EXIST', 'sho
 await pause(700);
 await page.screenshot({ path: join(out, 'object.png') });
 
-// Keys.
+// Tests the keys.
 await page.keyboard.press('Escape');
 await page.keyboard.press('/');
 await page.keyboard.type('zzzz');
@@ -121,7 +123,7 @@ check(await page.$eval('[data-panel=events]', (e) => !e.hidden), '3 opens the ev
 await page.screenshot({ path: join(out, 'events.png') });
 await page.keyboard.press('4');
 await pause(1200);
-// The test writes what three services would.
+// The test publishes the topics of three services.
 const services = await page.$eval('#services', (e) => e.innerText);
 for (const topic of ['frame/cam0', 'odometry', 'detections']) check(services.includes(`test stands in for it: it writes ${topic}`), `who writes ${topic} stands in (${services})`);
 await page.screenshot({ path: join(out, 'services.png') });
@@ -136,8 +138,8 @@ await pause(300);
 check(await page.$eval('#camera', (e) => e.hidden), 'C closes the camera');
 await page.keyboard.press('c');
 
-// B: objects as bright as their class is likely. The test's network says exp(2) : 1 of the first car,
-// nothing of the second; the third is hidden.
+// Key B shows objects with the brightness of their class likelihood. The test's network gives
+// exp(2) : 1 for the first car, and no box for the second; the third is hidden.
 await page.keyboard.press('b');
 const shown = await page.evaluate(() => window.perdure.camera.drawn);
 await page.waitForFunction((n) => window.perdure.camera.annotations?.message.texts.some((t) => /said|\d\.\d\d/.test(t.text)) && window.perdure.camera.drawn > n + 2, { timeout: 20000, polling: 50 }, shown).catch(() => {});
@@ -166,7 +168,8 @@ await page.keyboard.press('Escape');
 await page.keyboard.press('b');
 check(await page.$eval('[data-key=b]', (e) => e.getAttribute('aria-pressed')) === 'false', 'B again closes it');
 
-// A pole whose event is heard before the objects of its W stays; poles of another W go.
+// A marker remains if its event arrives before the objects of its W; markers of another W
+// disappear.
 const poles = await page.evaluate(() => {
   const { model, world } = window.perdure, shown = model.world;
   world.addMark([1, 2, 0], '#ffffff', 'ab/1');
@@ -180,7 +183,8 @@ const poles = await page.evaluate(() => {
 });
 check(String(poles) === '1,1,0', `poles stay with their W (${poles})`);
 
-// The graph of the map: where it is drawn, what a click on a loop and on an anchor tells, G.
+// Tests the graph of the map: its drawing, the texts after clicks on a loop and on an anchor, and
+// key G.
 await page.waitForFunction(() => window.perdure.world.graph.anchors.size > 0, { timeout: 20000, polling: 100 }).catch(() => {});
 figures.graph = await page.evaluate(() => {
   const { graph } = window.perdure.world;
@@ -195,7 +199,7 @@ figures.graph = await page.evaluate(() => {
 });
 check(figures.graph.balls === 3 && figures.graph.way === 4, `three anchors and the way between them (${JSON.stringify(figures.graph)})`);
 check(figures.graph.ties === 16, `the tie is one line (${figures.graph.ties})`);
-/** Pixels of a colour, also where a thin line is blended with the dark behind it. */
+/** Counts pixels of a colour, also of thin lines that are blended with the dark background. */
 const pixelsOf = (...wanted) => page.evaluate((wanted) => {
   const { world } = window.perdure;
   world.renderer.render(world.scene, world.camera);
@@ -245,7 +249,7 @@ for (const words of ['Anchor 3', 'not known']) check(told.includes(words), `a cl
 const balls = await page.evaluate(() => [...window.perdure.world.graph.balls.instanceColor.array].map((x) => x.toFixed(3)));
 check(String(balls.slice(0, 3)) === String(balls.slice(3, 6)) && new Set(balls.slice(6, 9)).size === 1, `an anchor without σ is grey (${balls})`);
 await page.screenshot({ path: join(out, 'graph_unknown.png') });
-await overTheLoop('anchor', 2, 0); // pixels below are compared from there
+await overTheLoop('anchor', 2, 0); // the pixels below are compared with this view
 await page.evaluate(() => document.querySelector('#object [data-part=loop][data-id="3"]').click());
 check((await page.$eval('#object', (e) => e.innerText)).includes('Loop 3'), 'from an anchor to its loop');
 const legend = () => page.$$eval('#legend [data-graph]', (items) => items.filter((i) => !i.hidden).map((i) => i.dataset.graph).join());
@@ -261,7 +265,7 @@ check(await page.evaluate(() => ![...window.perdure.connection.topics.values()].
 await page.keyboard.press('g');
 await page.keyboard.press('f');
 
-// A phone.
+// Tests the layout on a phone.
 await page.setViewport({ width: 390, height: 844, isMobile: true, hasTouch: true, deviceScaleFactor: 1 });
 await page.waitForFunction(() => window.perdure?.world?.things.size > 0 && window.perdure.world.drawn > 0, { timeout: 120000 });
 await pause(1500);

@@ -1,4 +1,4 @@
-// Subscriptions and queues without sockets.
+// Tests subscriptions and queues without sockets.
 #include "services/gateway/web/hub.h"
 
 #include <gmock/gmock.h>
@@ -23,7 +23,7 @@ class TestViewer : public Viewer {
   using Viewer::Viewer;
   void flush() override {}
   void cut(const std::string& why) override { cut_ = why; }
-  /// Everything that waits, as if it were sent.
+  /// Takes all queued messages, as if they were sent.
   std::vector<std::string> read() {
     std::vector<std::string> all;
     while (const auto one = outbox().take()) all.push_back(*one->payload);

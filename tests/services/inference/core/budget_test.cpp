@@ -9,7 +9,8 @@ namespace {
 
 const std::vector<double> kShares = {1.0, 0.72, 0.49, 0.25};
 
-/// A network that takes `full_ms` at its own size, with noise; how often the size changed.
+/// Simulates a network that takes `full_ms` at its own size, with noise; returns how often the size
+/// changed.
 int run(Budget& budget, double full_ms, int frames, std::mt19937& random) {
   std::normal_distribution<double> noise(1.0, 0.05);
   int changes = 0;

@@ -85,7 +85,7 @@ TEST(Estimator, FindsTheTimeOffset) {
 
 TEST(Estimator, PoseErrorsLieInTheBandOfTheirCovarianceOverSeededRuns) {
   constexpr int kRuns = 12;
-  Options options;  // the drive's calibration is exact
+  Options options;  // the calibration of the drive is exact
   options.calibration.estimate_extrinsics = options.calibration.estimate_time_offset = false;
   double sum = 0.0;
   for (int seed = 1; seed <= kRuns; ++seed) {
@@ -94,7 +94,7 @@ TEST(Estimator, PoseErrorsLieInTheBandOfTheirCovarianceOverSeededRuns) {
     drive.walking_biases = true;
     sum += run(drive, options, {.seconds = 10.0}).nees_pose;
   }
-  // Frames of one run are correlated: the band is that of the runs alone, 99 %.
+  // Frames of one run are correlated. The band is therefore the 99 % band of the number of runs.
   const double mean = sum / kRuns;
   EXPECT_GT(mean, chi2Quantile(0.005, 6 * kRuns) / kRuns);
   EXPECT_LT(mean, chi2Quantile(0.995, 6 * kRuns) / kRuns);
@@ -115,7 +115,7 @@ TEST(Estimator, TheIncrementExplainsThePoseCovariance) {
 
 TEST(Estimator, SpeedHoldsTheScaleOfOneCamera) {
   test::DriveOptions drive;
-  drive.noise.accel = 0.1;  // an accelerometer that tells nothing of the scale
+  drive.noise.accel = 0.1;  // accelerometer noise that hides the scale
   Options options;
   options.imu.accel = 0.1;
   const RunResult without = run(drive, options, {.seconds = 20.0});
@@ -163,7 +163,7 @@ TEST(Estimator, ImageMotionAloneDoesNotMakeARestOfADrive) {
   estimator.start(test::startAt(drive, 0.2, 3, 1.0));
   for (std::uint64_t k = 1; k < 40; ++k) {
     const double t = 0.2 + 0.05 * static_cast<double>(k);
-    // A lorry ahead fills the image and moves along.
+    // A lorry ahead fills the image and moves with the body.
     const auto out = estimator.process({k, drive.time(t), drive.see(t), 0.1, {}}, imu);
     ASSERT_TRUE(out);
     EXPECT_FALSE(out->at_rest);

@@ -9,7 +9,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-/// A vehicle at 20 Hz whose everything is well.
+/// A vehicle at 20 Hz without any fault.
 StatusSeen sound() {
   StatusSeen seen;
   seen.vehicle = "ego";
@@ -49,7 +49,7 @@ const StatusNode& find(const StatusNode& node, const std::string& name) {
   return kNone;
 }
 
-/// The level of `name`, where it is also the root's.
+/// Returns the level of `name`; checks that it is also the root's level.
 Level dominating(const StatusSeen& seen, const std::string& name) {
   const StatusNode root = judge(seen);
   EXPECT_EQ(root.level, find(root, name).level) << toText(root, false);
@@ -83,7 +83,7 @@ TEST(Status, AServiceThatIsMissingOrSilentHasFailed) {
   EXPECT_THAT(find(judge(seen), "map_store").text, HasSubstr("says nothing for 1.6 s"));
 }
 
-/// The bridge to ROS 2 takes a camera, an IMU and a foreign odometry.
+/// The bridge to ROS 2 receives a camera, an IMU and a foreign odometry.
 StatusSeen bridged() {
   StatusSeen seen = sound();
   seen.services["ros2"] = seen.services.at("capture");
@@ -138,7 +138,7 @@ TEST(Status, AServiceThatIsHeardIsJudgedItself) {
   seen.services["vio"] = sound().services.at("vio");
   seen.services["vio"].health.state = HealthState::kFailed;
   EXPECT_EQ(dominating(seen, "vio"), Level::kFailed);
-  seen.services["vio"].age_s = 60.0;  // it was stopped, and the bridge took over
+  seen.services["vio"].age_s = 60.0;  // it was stopped, and the bridge has replaced it
   EXPECT_EQ(judge(seen).level, Level::kOk);
 }
 

@@ -54,10 +54,10 @@ TEST(Board, TheSvgIsBlackWhereTheBoardIs) {
   EXPECT_THAT(svg, testing::HasSubstr("--board chessboard:9x6:0.05"));
   std::size_t squares = 0;
   for (std::size_t at = 0; (at = svg.find("<rect x", at)) != std::string::npos; ++at) ++squares;
-  EXPECT_EQ(squares, 35u);  // of 10×7
+  EXPECT_EQ(squares, 35u);  // half of the 10×7 squares
 }
 
-/// Drawn images, developed by the sensor with its noise, looked at by the detectors.
+/// Renders images with the sensor's noise, and detects the corners in them.
 void expectExactCorners(const Board& board, DistortionModel model, double rms_px) {
   SimulatedOptions options;
   options.board = board;

@@ -16,7 +16,7 @@ struct Case {
   CameraImuInput input;
 };
 
-/// Corners with noise, the lens a little off, the place as a data sheet has it.
+/// Makes noisy corners, a lens with a small error, and the camera's pose from a data sheet.
 Case caseOf(const char* board, std::uint64_t seed, double readout_s = 0.0) {
   SimulatedOptions options;
   options.board = Board::parse(board);
@@ -35,7 +35,8 @@ Case caseOf(const char* board, std::uint64_t seed, double readout_s = 0.0) {
 
 constexpr char kSmallGrid[] = "aprilgrid:4x3:0.1";
 
-/// Within the bars, and within the stated covariance: the 0.01 % … 99.99 % of χ² with 15 degrees.
+/// Checks the errors against fixed limits and against the stated covariance: 0.01 % … 99.99 % of χ²
+/// with 15 degrees of freedom.
 void expectTruth(const Case& c, const CameraImu& found) {
   const CameraCalibration& truth = c.simulated.truth();
   Eigen::Matrix<double, 15, 1> error;

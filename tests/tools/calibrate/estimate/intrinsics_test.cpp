@@ -23,8 +23,8 @@ CameraCalibration sizeOf(const SimulatedCalibration& simulated) {
   return camera;
 }
 
-/// Focal lengths and principal point within 0.2 % of the focal length, and every coefficient
-/// within four of the stated deviations.
+/// Checks that focal lengths and principal point are within 0.2 % of the focal length, and every
+/// coefficient within four stated standard deviations.
 void expectTruth(const char* board, DistortionModel lens) {
   double nees = 0.0;
   for (const std::uint64_t seed : {1, 2}) {
@@ -93,7 +93,7 @@ TEST(Intrinsics, ViewsFromOneSideAreNotBelieved) {
   const std::vector<View> same(12, views[5]);
   const auto found = estimateIntrinsics(simulated.options.board, same, sizeOf(simulated),
                                         {DistortionModel::kRadialTangential, 60});
-  // Either it says so, or its stated error is large.
+  // The estimate must either fail, or state a large error.
   if (found) {
     EXPECT_GT(std::sqrt(found->covariance(0, 0)), 0.002 * simulated.truth().fx);
   }

@@ -78,7 +78,7 @@ TEST(Spline, LogAndExpHaveFiniteDerivativesAtZero) {
 }
 
 TEST(RightRotation, KeepsTheLawsOfAManifold) {
-  using namespace ceres;  // the macro below needs it
+  using namespace ceres;  // required by the macro below
   const RightRotation manifold;
   const Eigen::Quaterniond q = expQuaternion({0.3, -1.0, 0.5}), other = expQuaternion({1, 0.2, -1});
   const ceres::Vector x = q.coeffs(), y = other.coeffs();

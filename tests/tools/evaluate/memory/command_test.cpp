@@ -1,4 +1,4 @@
-// `perdure evaluate memory` as it is called, over a hand-made folder of five frames.
+// Tests the command `perdure evaluate memory` on a hand-made folder of five frames.
 #include "tools/evaluate/command.h"
 
 #include <gmock/gmock.h>
@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 using replay::writeText;
 using ::testing::HasSubstr;
 
-/// A body that stands at the origin, and a car ten metres ahead; frames each 50 ms from 1 s.
+/// A body at rest at the origin, and a car ten metres ahead; one frame every 50 ms from 1 s on.
 fs::path tinySimulated(const std::string& name) {
   const auto root = replay::tinyEuroc(name);
   std::string states = "#timestamp, p, q w x y z, v, b_w, b_a\n";
@@ -43,7 +43,7 @@ std::string poses(double drift) {
   return text;
 }
 
-/// It reported the car in the last four frames.
+/// A run that reported the car in the last four frames.
 fs::path tinyRun(const fs::path& root, const std::string& name) {
   std::string rows = "sequence,frame,timestamp_ns,object_id,class,score,x,y,z,l,w,h,yaw,visible\n";
   for (int i = 1; i < 5; ++i) {

@@ -24,7 +24,7 @@ TimePoint at(double seconds) {
   return fromNanoseconds(static_cast<std::int64_t>(std::llround(seconds * 1e9)));
 }
 
-/// Twice round a circle of 400 m, ten metres a second; the body leans by .2 rad.
+/// Twice around a circle of 400 m at ten metres per second, with a roll of .2 rad.
 RigidTransform bodyAt(double seconds) {
   const double radius = 400.0 / (2.0 * std::numbers::pi), angle = kSpeed * seconds / radius;
   const Eigen::Matrix3d R =
@@ -42,8 +42,8 @@ LevelPose levelAt(double seconds) {
   return mapping::levelOf(mapping::levelled(bodyAt(seconds), Eigen::Vector3d::UnitZ()));
 }
 
-/// An anchor each second, of an odometry whose ways are longer by `scale`; T_MA is the truth's, in
-/// an M that is turned and moved.
+/// Returns a map with one anchor per second. The odometry's distances are too long by `scale`. T_MA
+/// is the truth, in a rotated and shifted M.
 mapping::SavedMap mapOf(double scale) {
   const LevelPose T_MW{{30, -7, 2}, 0.8};
   mapping::SavedMap map;
@@ -62,7 +62,7 @@ mapping::SavedMap mapOf(double scale) {
   return map;
 }
 
-/// Of anchors at two seconds; `off` is added to what is true.
+/// Returns a loop between the anchors at two times; `off` is its error.
 mapping::SavedEdge loop(int a, int b, const mapping::LevelError& off, double sigma_m = 0.1) {
   mapping::SavedEdge saved;
   saved.edge.a = static_cast<AnchorId>(a + 1);
@@ -138,13 +138,13 @@ TEST(Loops, TheAnchorsErrorIsThatBeforeAndThatAfterLoops) {
   const auto errors = scoreAnchors(mapOf(0.05), drivenWay());
   EXPECT_EQ(errors.anchors, static_cast<std::uint64_t>(kSeconds + 1));
   EXPECT_LT(errors.map_m, 1e-6);
-  // A circle that is larger by a twentieth, about its own middle.
+  // The odometry gives a circle that is larger by a twentieth, about its own centre.
   EXPECT_NEAR(errors.odometry_m, 0.05 * 400.0 / (2.0 * std::numbers::pi), 0.02);
 }
 
 TEST(Loops, PartsThatNothingJoinsAreAlignedApart) {
   mapping::SavedMap map = mapOf(0.0);
-  map.anchors.at(41).anchor.previous = 0;  // another session, anywhere in M
+  map.anchors.at(41).anchor.previous = 0;  // another session at another place in M
   for (AnchorId id = 41; id <= 81; ++id) {
     auto& T_MA = map.anchors.at(id).T_MA;
     T_MA = LevelPose{{500, 80, 0}, 1.0} * T_MA;
@@ -157,7 +157,7 @@ TEST(Loops, PartsThatNothingJoinsAreAlignedApart) {
   EXPECT_LT(scoreAnchors(map, drivenWay()).map_m, 1e-6);
 }
 
-/// Frames of the drive, one a second, of which each object is seen in some.
+/// Frames of the drive, one per second; each object is visible in some of them.
 struct Seen {
   std::vector<MemoryFrame> frames;
   MemoryOptions memory;
@@ -192,7 +192,7 @@ TEST(Loops, AReturnIsAWayAmongObjectsOfAnEarlierVisit) {
     seen.see(object, 0, 3);
     seen.see(object, 40 + object, 42 + object);
   }
-  seen.see(5, 0, 3), seen.see(5, 60, 61);  // one object alone is no return
+  seen.see(5, 0, 3), seen.see(5, 60, 61);  // a single object is not a return
   const auto returns = seen.returns({});
   ASSERT_EQ(returns.size(), 1U);
   EXPECT_EQ(returns[0].first, 41U);
@@ -223,7 +223,7 @@ TEST(Loops, TheWayToCloseGoesToTheFirstTrueLoopThatIsBelieved) {
   doubted.believed = false;
   std::vector<JudgedLoop> loops{closedAt(46), closedAt(45), wrong, doubted, closedAt(20)};
   EXPECT_THAT(seen.returns(loops)[0].closed_after_m, Optional(DoubleNear(40.0, 1e-9)));
-  loops.push_back(closedAt(40));  // its anchor was set before the first object came in sight
+  loops.push_back(closedAt(40));  // its anchor was set before the first object came into view
   EXPECT_THAT(seen.returns(loops)[0].closed_after_m, Optional(DoubleNear(0.0, 1e-9)));
   EXPECT_EQ(seen.returns({closedAt(39)})[0].closed_after_m, std::nullopt);
 }

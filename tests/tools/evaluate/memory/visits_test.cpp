@@ -14,8 +14,8 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::Optional;
 
-/// A body that stands at (100, 50), heading north, and looks once in ten seconds. Its run took
-/// where it stood for the origin, and may drift from there.
+/// A body at rest at (100, 50), heading north, with a frame every ten seconds. The run's W begins
+/// at the body, and may drift.
 struct Drive {
   SimulatedTruth truth{{},
                        replay::PoseFile(replay::PoseFormat::kTum, {}),
@@ -48,7 +48,7 @@ struct Drive {
     for (const auto frame : frames)
       truth.truth.views[frame].push_back({object, fraction, Box{10, 10, 50, 50}});
   }
-  /// In the run's W, by the body's pose in it.
+  /// Adds a row in the run's W, by the run's pose of the body.
   void report(std::uint64_t id, std::uint64_t frame, double ahead, double left,
               const std::string& class_name = "car") {
     EstimateRow row;
@@ -181,8 +181,8 @@ TEST(Memory, ARunThatStartsWithAMapIsComparedWithTheOneThatMadeIt) {
   now.truth.truth.views.clear();
   now.see(1, {0, 3}), now.see(2, {2}), now.see(3, {2, 3}), now.see(4, {2});
   now.report(90, 0, 10, 5);                              // not recognised yet
-  now.report(12, 2, 10, 10);                             // itself
-  now.report(11, 2, 10, 15), now.report(11, 3, 10, 15);  // another one
+  now.report(12, 2, 10, 10);                             // the same object
+  now.report(11, 2, 10, 15), now.report(11, 3, 10, 15);  // another object
   const auto score = scoreReturn(before.frames(), now.frames(), {});
   EXPECT_EQ(score.ids, 3U);
   EXPECT_EQ(score.known, 3U) << "the fourth was never reported";

@@ -23,7 +23,8 @@ TruthTrack standing(std::uint64_t id, const Eigen::Vector3d& centre) {
   return track;
 }
 
-/// 40 frames: a car always in sight, a second car for 20, a chair hidden from 10 to 19, a guess.
+/// 40 frames with four objects: a car always in view, a car in 20 frames, a chair hidden from 10 to
+/// 19, and an unconfirmed one.
 DriveLog drive() {
   DriveLog log;
   for (std::uint64_t i = 0; i < 40; ++i) {
@@ -97,7 +98,7 @@ TEST(Evolution, HiddenPhasesAreShadedAndOthersAreNot) {
 TEST(Chart, TicksAreRoundAndCoverTheRange) {
   EXPECT_THAT(ticksOf(0, 1.05, 4), Pointwise(DoubleNear(1e-12), {0.0, 0.5, 1.0}));
   EXPECT_THAT(ticksOf(-3, 17, 6), Pointwise(DoubleNear(1e-12), {0.0, 5.0, 10.0, 15.0}));
-  EXPECT_THAT(ticksOf(100, 1300, 8), SizeIs(6));  // by 200
+  EXPECT_THAT(ticksOf(100, 1300, 8), SizeIs(6));  // steps of 200
   for (const double high : {0.13, 1.0, 3.7, 99.0, 100.0, 2040.0}) {
     EXPECT_LE(ticksOf(0, high, 8).size(), 8u) << high;
     EXPECT_GE(ticksOf(0, high, 8).size(), 4u) << high;
@@ -190,7 +191,7 @@ TEST(Truth, OfLabelsStandsInTheWorldWhereverTheBodyIs) {
     label.track = i == 9 ? 5 : 4;
     label.length = 4, label.width = 1.6, label.height = 1.5;
     label.centre = T_RI * (T_WB.inverse() * car);
-    // A car that faces 0.3 rad left of x in W: rotation_y 0 is right, -pi/2 ahead.
+    // A car that heads 0.3 rad left of x in W: rotation_y is 0 to the right and -pi/2 ahead.
     label.rotation_y = -std::numbers::pi / 2 - (0.3 - 0.1 * static_cast<double>(i));
     labels.push_back(label);
   }

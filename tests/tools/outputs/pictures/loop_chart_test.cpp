@@ -18,7 +18,8 @@ TimePoint timeOf(std::uint64_t frame) {
   return fromNanoseconds(100'000'000 * static_cast<std::int64_t>(frame));
 }
 
-/// Along x; W drifts by 0.1 m a frame to the left. The map finds out at frame 60.
+/// A drive along x. W drifts to the left by 0.1 m per frame; the map corrects the drift at frame
+/// 60.
 struct MovedRun {
   MovedRun() {
     for (std::uint64_t i = 0; i < kRunFrames; ++i) {
@@ -62,7 +63,7 @@ TEST(LoopChart, WithoutTruthItTellsHowFarTheMapMovedTheBody) {
 }
 
 TEST(LoopChart, ErrorsAreThoseOfTheWaySinceTheSessionBegan) {
-  MovedRun run;  // found on an older map, which lies elsewhere
+  MovedRun run;  // relocalised on an older map with another origin
   const RigidTransform T_MW(Eigen::Quaterniond::Identity(), {500.0, 40.0, 0.0});
   for (auto& [time, T] : run.in_map.along) T = T_MW * T;
   EXPECT_NEAR(*run.errors(&run.truth).points[80].at_end, 0.0, 1e-9);

@@ -25,7 +25,7 @@ TruthTrack trackAt(const Eigen::Vector3d& centre) {
   return track;
 }
 
-/// The long lower side of the outline of an object that faces x.
+/// Coverage of the long lower side of the outline, for an object that heads along x.
 double sideCoverage(const MapContent& content, const ObjectGlance& object) {
   const MapView view = viewOf(content);
   const Eigen::Vector2d p = object.p_W.head<2>();
@@ -45,7 +45,7 @@ TEST(MapPicture, WhatIsInSightIsFilledWhatIsOutOfViewPalelyAndWhatIsHiddenIsNot)
   const MapContent content = street();
   const MapView view = viewOf(content);
   const cv::Mat picture = drawMap(content, view);
-  const auto inside = [&](const ObjectGlance& o) {  // off the line that shows where it faces
+  const auto inside = [&](const ObjectGlance& o) {  // away from the line that shows the heading
     return picture.at<cv::Vec3b>(view.at(o.p_W.head<2>() + Eigen::Vector2d(-1.0, 0.5)));
   };
   EXPECT_LT(apart(inside(content.objects[0]), mixed(classColour("car"), kPaper, 0.35)), 8.0);
@@ -204,7 +204,7 @@ TEST(Drawing, LinesToFarAwayPointsAreDrawnAsFarAsTheImageGoes) {
 TEST(Drawing, DashesRunOnOverTheJointsOfALine) {
   cv::Mat image(20, 400, CV_8UC3, kPaper);
   Polyline line;
-  for (int x = 10; x <= 390; x += 3) line.emplace_back(x, 10);  // shorter than a dash
+  for (int x = 10; x <= 390; x += 3) line.emplace_back(x, 10);  // segments shorter than a dash
   drawLine(image, line, {kInk, 1, true, 8.0, 8.0});
   int changes = 0;
   for (int x = 11; x < 390; ++x) {

@@ -21,7 +21,7 @@ Colour onImage(const std::string& class_name) {
 
 cv::Mat black() { return cv::Mat::zeros(480, 640, CV_8UC3); }
 
-/// The image's part of the picture of one frame over black.
+/// Draws one frame over a black image and returns the image part of the picture.
 cv::Mat drawn(const FrameGlance& frame, const CameraCalibration& camera = aheadCamera()) {
   const OverlayPicture picture(camera, {});
   return picture.draw(black(), frame, {}, {})(picture.imageArea()).clone();
@@ -32,7 +32,8 @@ cv::Point2d pixelOf(const CameraCalibration& camera, const Eigen::Vector3d& p_W)
   return {pixel->x(), pixel->y()};
 }
 
-/// The lower edge of the object's rear: nearest to the camera, no other edge crosses it.
+/// Coverage of the lower edge of the object's rear, which is nearest to the camera and crosses no
+/// other edge.
 double coverageOfRearEdge(Visibility visibility) {
   const ObjectGlance car = objectAt(1, kAhead, visibility);
   const auto corners = cornersOf(car);
@@ -52,7 +53,7 @@ TEST(Overlay, AHiddenObjectIsSeenOverTheOneThatHidesIt) {
   ObjectGlance near = objectAt(1, {8.0, 0.0, 0.0}, Visibility::kVisible, "van");
   ObjectGlance behind = objectAt(2, {12.65, 0.0, 0.0}, Visibility::kOccluded);
   near.size = {0.5, 1.0, 1.0};
-  behind.size = {0.5, 1.6, 1.6};  // as large in the image: the lines coincide
+  behind.size = {0.5, 1.6, 1.6};  // as large in the image, so that the lines coincide
   const auto corners = cornersOf(behind);
   const cv::Mat image = drawn(frameOf(0, {behind, near}));
   EXPECT_GT(coverage(image, pixelOf(aheadCamera(), corners[0]), pixelOf(aheadCamera(), corners[2]),
@@ -110,7 +111,7 @@ TEST(Overlay, ManyLabelsAtTheBorderStayInTheImageAndOffEachOther) {
     const cv::Rect place = placeFor({110, 17}, at, image, taken);
     EXPECT_EQ(place & image, place) << i;
     EXPECT_EQ(place.size(), cv::Size(110, 17));
-    if (i >= 12) continue;  // later there may be no room nearby
+    if (i >= 12) continue;  // later there may be no free place nearby
     for (const auto& other : taken) EXPECT_TRUE((place & other).empty()) << i;
     taken.push_back(place);
   }
@@ -121,7 +122,7 @@ TEST(Overlay, ALabelOfAnObjectAtEachBorderIsDrawnWhole) {
   const int width = sizeOf(text, {0.42}).width + 8;
   for (const double y : {-3.7, 0.0, 3.7}) {
     const cv::Mat image = drawn(frameOf(0, {objectAt(1, {8.0, y, 2.5})}));
-    int longest = 0;  // run of pixels that are not black: the label's ground is not
+    int longest = 0;  // run of non-black pixels, as the label has a background
     for (int row = 0; row < image.rows; ++row) {
       for (int col = 0, run = 0; col < image.cols; ++col) {
         const auto& p = image.at<cv::Vec3b>(row, col);
@@ -161,7 +162,7 @@ TEST(Overlay, ThePlanShowsAnObjectAheadAboveTheBodyAndOneToTheLeftOnItsLeft) {
     return cv::Point2d(body_x - scale * y, body_y - scale * x);
   };
   const Colour car = classColour("car");
-  // The rear edge of the outline, 4 m long and 2 m wide.
+  // The rear edge of the outline, which is 4 m long and 2 m wide.
   EXPECT_EQ(coverage(plan({10, 0, 0}), at(8, 1), at(8, -1), car), 1.0);
   EXPECT_EQ(coverage(plan({10, 4, 0}), at(8, 5), at(8, 3), car), 1.0);
   EXPECT_EQ(coverage(plan({10, 4, 0}), at(8, 1), at(8, -1), car), 0.0);

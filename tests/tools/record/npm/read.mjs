@@ -1,4 +1,4 @@
-// Reads a recording by its index and prints one JSON line for each message, and one for the file.
+// Reads a recording by its index. Prints one JSON line for each message, and one for the file.
 import { open } from "node:fs/promises";
 import { McapIndexedReader } from "@mcap/core";
 import { parseIDL } from "@foxglove/omgidl-parser";

@@ -1,4 +1,4 @@
-// The renderer's parts that need no scene.
+// Tests the renderer's parts that need no scene.
 #include <gtest/gtest.h>
 
 #include <atomic>

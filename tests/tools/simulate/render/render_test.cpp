@@ -1,4 +1,4 @@
-// What the renderer draws, against what geometry says.
+// Compares rendered images with geometry.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -72,7 +72,7 @@ TEST(Renderer, DrawsAThingWhereTheCameraModelProjectsItsCorners) {
 TEST(Outline, SaysHowMuchOfAThingAWallLeavesToBeSeen) {
   sim::Scene scene = emptyWorld(320, 240);
   scene.objects = {thing(5, "couch", {0.9, 2.0, 0.9}, {6.0, 0.0, 1.2})};
-  // Its edge is in the plane y = 0 that holds the camera and the middle of the couch.
+  // Its edge is in the plane y = 0, which contains the camera and the centre of the couch.
   scene.props = {wall({0.02, 4.0, 4.0}, {3.0, -2.0, 1.2})};
   Drawn drawn(scene);
   ASSERT_EQ(drawn.views().size(), 1U);
@@ -166,12 +166,12 @@ TEST(Renderer, MovesWhatMovesAndDropsWhatIsGone) {
   const Box before = drawn.boxOf(1);
   drawn.renderer.render(drawn.lens, shotAt(scene, 0, 0.8), drawn.picture);
   const Box after = drawn.boxOf(1);
-  EXPECT_LT(after.x1, before.x1 - 10.0);  // y of W is left
+  EXPECT_LT(after.x1, before.x1 - 10.0);  // y of W points to the left
   drawn.renderer.render(drawn.lens, shotAt(scene, 0, 0.95), drawn.picture);
   EXPECT_EQ(std::count(drawn.picture.instance.begin(), drawn.picture.instance.end(), 1U), 0);
 }
 
-/// Brightness changes across the upright edge of a dark wall before the sky.
+/// Width of the vertical edge between a dark wall and the sky, in pixels.
 double edgeWidth(const Picture& picture) {
   double sum = 0.0, largest = 0.0;
   const int row = picture.height / 2;
@@ -198,7 +198,7 @@ TEST(Renderer, SmearsWhatMovesDuringTheExposure) {
   EXPECT_GT(edgeWidth(moving.picture), 1.5 * edgeWidth(still.picture));
 }
 
-/// Middle of the first object's pixels in a row, or nothing.
+/// Returns the mean column of the first object's pixels in a row, or nothing.
 std::optional<double> middleOf(const Picture& picture, int row) {
   double sum = 0.0, count = 0.0;
   for (int column = 0; column < picture.width; ++column) {
@@ -226,7 +226,7 @@ TEST(Renderer, ExposesRowsInTurnWithARollingShutter) {
   for (int row = 0; row < 120; ++row) {
     const auto before = middleOf(at_once.picture, row), after = middleOf(in_turn.picture, row);
     if (!before || !after) continue;
-    // Turning left at 2 rad/s moves things right, 96 px per radian.
+    // A left turn at 2 rad/s moves objects to the right, by 96 px per radian.
     EXPECT_NEAR(*after - *before, 2.0 * 0.05 * 96.0 * (row / 119.0 - 0.5), 1.0) << row;
     ++rows;
   }
@@ -275,7 +275,7 @@ TEST(Sensor, NoiseGrowsWithTheRootOfTheLightAndIsTheSameAgain) {
   double squares = 0.0;
   for (const auto value : image) squares += (value - mean) * (value - mean);
   const double sigma = std::sqrt(squares / static_cast<double>(image.size()));
-  // 0.16 of 10 000 electrons: σ = √(1600 + 12²) = 41.8; the slope of the gamma curve there.
+  // 0.16 of 10 000 electrons: σ = √(1600 + 12²) = 41.8, times the slope of the gamma curve there.
   const double slope = 255.0 / 2.2 * std::pow(0.16, 1.0 / 2.2 - 1.0);
   EXPECT_NEAR(sigma, 41.8e-4 * slope, 0.25);
 }

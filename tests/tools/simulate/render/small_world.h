@@ -1,5 +1,4 @@
-// A few things before a camera that stands still, made by hand: what a scene's generator would
-// hide.
+// A few objects before a camera at rest, placed by hand, so that the expected images are simple.
 #pragma once
 
 #include "common/sim/scene.h"
@@ -7,7 +6,7 @@
 
 namespace perdure::tools {
 
-/// The camera looks along +x of W from (0, 0, 1.2); 80° wide, distorted. No objects yet.
+/// A world without objects. The camera looks along +x of W from (0, 0, 1.2); 80° wide, distorted.
 inline sim::Scene emptyWorld(std::uint32_t width = 160, std::uint32_t height = 120) {
   sim::Scene scene;
   scene.name = "by hand";

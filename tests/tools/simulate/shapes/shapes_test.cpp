@@ -1,4 +1,5 @@
-// The generated shapes: exact sizes, sound meshes, looks that follow from the seed.
+// Tests the generated shapes: exact sizes, valid meshes, an appearance that depends only on the
+// seed.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -97,7 +98,7 @@ sim::Prop propOf(const Scenery& thing, std::uint64_t seed) {
 
 constexpr std::array<std::uint64_t, 4> kSeeds{1, 7, 23, 0x0200000000000011ULL};
 
-/// Every class, every shape, all scenery, with several looks.
+/// Makes every class, every shape and all scenery, with several appearances.
 std::vector<Sample> makeAll() {
   std::vector<Sample> all;
   for (const std::uint64_t seed : kSeeds) {
@@ -143,7 +144,7 @@ bool sameBytes(const Mesh& a, const Mesh& b) {
          same(a.triangles, b.triangles) && same(a.material_of, b.material_of);
 }
 
-/// The number of each vertex's place: equal where positions are equal.
+/// Returns the index of each vertex's position; equal positions have equal indices.
 std::vector<std::size_t> placesOf(const Mesh& mesh) {
   std::map<std::array<float, 3>, std::size_t> known;
   std::vector<std::size_t> places;
@@ -158,8 +159,8 @@ struct Part {
   bool closed = true;
 };
 
-/// Pieces of the mesh that hang together by corners; closed where every edge is walked once in
-/// either direction.
+/// Returns the connected parts of the mesh. A part is closed if every edge occurs once in each
+/// direction.
 std::vector<Part> partsOf(const Mesh& mesh) {
   const std::vector<std::size_t> places = placesOf(mesh);
   std::vector<std::size_t> parent(mesh.positions.size());
@@ -249,7 +250,8 @@ struct Ray {
   Vector3f from, way;
 };
 
-/// Distance along the ray (Möller and Trumbore, 1997), if it meets the triangle.
+/// Returns the distance along the ray to the triangle (Möller and Trumbore, 1997), if it
+/// intersects.
 std::optional<float> meets(const Mesh& mesh, std::size_t triangle, const Ray& ray) {
   const auto& t = mesh.triangles[triangle];
   const Vector3f a = mesh.positions[t[0]], u = mesh.positions[t[1]] - a,
@@ -261,7 +263,7 @@ std::optional<float> meets(const Mesh& mesh, std::size_t triangle, const Ray& ra
   return v.dot(s.cross(u)) / det;
 }
 
-/// Does the ray see the back of a face that has only one side?
+/// Returns whether the ray first meets the back of a one-sided face.
 bool seesAnInside(const Mesh& mesh, const Ray& ray, float tolerance) {
   float nearest = 1e9F, nearest_front = 1e9F;
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {

@@ -1,4 +1,5 @@
-// The generated textures: they tile, keep their mean, follow from their seed and are shared.
+// Tests the generated textures: they tile, keep their mean, depend only on their seed, and are
+// shared.
 #include "tools/simulate/shapes/texture.h"
 
 #include <gtest/gtest.h>
@@ -19,8 +20,8 @@ constexpr std::array kTiling{
     TextureKind::kFabric,   TextureKind::kMetal,  TextureKind::kCarPaint, TextureKind::kSkin,
     TextureKind::kMarkings, TextureKind::kTiles,  TextureKind::kEarth,    TextureKind::kTimber};
 
-/// How much steeper the seam is than the steepest step inside, where the picture is cut off at
-/// `share` and begun anew.
+/// Returns the ratio of the seam's step to the largest step inside, for a texture that is cut off
+/// at `share` and repeated.
 float seamOf(const Texture& texture, float share, bool rows) {
   constexpr int kSteps = 128;
   const float step = share / kSteps;

@@ -1,4 +1,4 @@
-// A camera that a test plugs in, unplugs, and lets take images.
+// A simulated camera that a test plugs in, unplugs, and triggers.
 #pragma once
 
 #include <atomic>
@@ -21,7 +21,8 @@ class FakeCamera {
       return std::make_unique<Session>(state);
     };
   }
-  /// An image of an empty scene; `sequence` as the driver counts. None where it is not plugged in.
+  /// Adds an image of an empty scene, unless the camera is unplugged; `sequence` is the driver's
+  /// count.
   void shoot(std::uint32_t sequence, std::int64_t time_ns) const {
     if (!state_->plugged) return;
     Frame frame;
@@ -31,9 +32,9 @@ class FakeCamera {
   }
   void plug() const { state_->plugged = true; }
   void unplug() const { state_->plugged = false; }
-  /// Asks its session to be opened again for another camera's sake.
+  /// Makes the session request its reopening, as if for another camera.
   void askAside() const { state_->aside = true; }
-  /// How often it was opened.
+  /// Returns how often the camera was opened.
   unsigned openings() const { return state_->openings; }
 
  private:

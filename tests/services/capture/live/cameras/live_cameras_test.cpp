@@ -1,4 +1,4 @@
-// LiveCameras with two cameras of the test's own, on their threads, in a time of the test's own.
+// Tests LiveCameras with two simulated cameras in their threads, in simulated time.
 #include "services/capture/live/cameras/live_cameras.h"
 
 #include <gmock/gmock.h>
@@ -30,7 +30,8 @@ class TwoCameras : public ::testing::Test {
     }
     (void)moment();
   }
-  /// The next moment: images of those cameras that are to take one, and what then goes out.
+  /// Advances to the next moment, lets the selected cameras take an image, and returns the
+  /// published images.
   Numbers moment(bool left = true, bool right = true) {
     const std::int64_t t = kSecond + 50 * kMs * ++moment_;
     if (left) left_.shoot(moment_, t);
@@ -51,7 +52,7 @@ class TwoCameras : public ::testing::Test {
     note(cameras_.due(t + 30 * kMs));
     return out;
   }
-  /// Both of the next moment go out, with one number, which is returned.
+  /// Publishes a pair at the next moment and returns its common number.
   std::uint64_t pairedNumber() {
     const Numbers out = moment();
     EXPECT_THAT(out, ElementsAre(Pair("cam0", _), Pair("cam1", _)));
@@ -59,7 +60,8 @@ class TwoCameras : public ::testing::Test {
     EXPECT_EQ(out[0].second, out[1].second);
     return out[0].second;
   }
-  /// Moments of the one that is left, which would be silent without, until it is so.
+  /// Takes images with the selected cameras until `so` returns true. Without images, the remaining
+  /// camera would count as silent.
   void waitWith(bool left, bool right, const std::function<bool()>& so) {
     const auto end = std::chrono::steady_clock::now() + 20s;
     while (!so()) {

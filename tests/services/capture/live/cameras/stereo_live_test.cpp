@@ -1,4 +1,4 @@
-// Live capture on the bus with two cameras of the test's own, one of which is unplugged.
+// Tests live capture on the bus with two simulated cameras, one of which is unplugged.
 #include <gmock/gmock.h>
 #include <spdlog/sinks/null_sink.h>
 
@@ -61,7 +61,7 @@ class StereoLive : public ::testing::Test {
     all.resize(settings.size());
     return all;
   }
-  /// Runs the service until the test has seen what it waits for.
+  /// Runs the service until `look` returns.
   void serve(const Config& config, const std::function<void()>& look) {
     const auto log =
         std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::null_sink_mt>());
@@ -73,7 +73,8 @@ class StereoLive : public ::testing::Test {
     context.stop();
     service.join();
   }
-  /// Both take an image, twenty times a second; cam1 first, which then waits for cam0.
+  /// Takes an image with both cameras twenty times per second. The image of cam1 comes first and
+  /// waits for cam0.
   void shoot() {
     const auto now = std::chrono::steady_clock::now();
     if (now < next_) return;

@@ -1,4 +1,4 @@
-// Which images of two cameras are of one moment, by stamps in a time of the test's own.
+// Tests which images of two cameras are paired, by their stamps in simulated time.
 #include "services/capture/live/cameras/stereo_pairing.h"
 
 #include <gmock/gmock.h>
@@ -22,9 +22,8 @@ class Pairing : public ::testing::Test {
     CameraImage result{time_ns, number, {}};
     return result;
   }
-  /// Of cam0 and cam1, `number` intervals after the start and `late_ns` more; there `kLatency`
-  /// later unless that is said. What goes out is noted as "cam0 number", or "cam1 number@its
-  /// stamp".
+  /// An image of cam0 or cam1, with a stamp `number` intervals after the start plus `late_ns`. It
+  /// arrives `latency` after its stamp.
   void first(std::uint64_t number, std::int64_t late_ns = 0, std::int64_t latency = kLatency) {
     const std::int64_t t = at(number) + late_ns;
     note(pairing_.first(image(number, t), t + latency));
@@ -37,8 +36,8 @@ class Pairing : public ::testing::Test {
   static std::int64_t at(std::uint64_t number) {
     return kSecond + kInterval * static_cast<std::int64_t>(number);
   }
-  /// Numbers of the images that went out, in pairs (n, n) and alone (n); the moment of each partner
-  /// is checked to be within the tolerance.
+  /// Returns the numbers of the published images: "n+" before its partner, otherwise "n". Checks
+  /// that partners are within the tolerance.
   std::vector<std::string> taken() { return std::exchange(out_, {}); }
   std::uint64_t counted(const std::string& reason) { return pairing_.reasons().of(reason); }
   StereoPairing pairing_{20.0};
@@ -76,7 +75,7 @@ TEST_F(Pairing, OfOneMomentHaveOneNumberWhicheverComesFirst) {
   EXPECT_EQ(pairing_.note(), "");
 }
 
-/// Free-running cameras of one rate have a constant phase; USB's stamps jitter.
+/// Free-running cameras of the same rate have a constant phase. Stamps over USB have jitter.
 TEST_F(Pairing, AConstantPhaseWithinTheToleranceIsPairedAndTold) {
   std::mt19937 random(7);
   std::uniform_int_distribution<std::int64_t> jitter(-kMs / 2, kMs / 2);
@@ -233,7 +232,8 @@ TEST_F(Pairing, AStampOfTheFutureSpoilsNoOther) {
   EXPECT_THAT(taken(), ElementsAre("3+"));
 }
 
-/// 100 images a second where 20 are asked for: the next image is a tenth of the asked interval off.
+/// Cameras give 100 images per second, although 20 are requested. The next image is only a fifth of
+/// the requested interval away.
 TEST_F(Pairing, TheToleranceIsOfTheRateThatTheCamerasKeep) {
   EXPECT_EQ(StereoPairing(50.0).toleranceNs(), 6'666'667);
   EXPECT_EQ(pairing_.toleranceNs(), 10 * kMs) << "no more than vio pairs";

@@ -1,4 +1,4 @@
-// The last call to an object of libcamera's thread, with a thread of libcamera's and no camera.
+// Tests the last call to an object of libcamera's thread, with such a thread but without a camera.
 #include "services/capture/live/libcamera/last_of_all.h"
 
 #include <dlfcn.h>
@@ -15,7 +15,7 @@ namespace {
 
 using ::testing::ElementsAre;
 
-/// As a session: a call from outside makes the thread ask something of itself, which comes later.
+/// Like a session: a call from outside queues another call in the thread itself.
 class Asked : public libcamera::Object {
  public:
   void ask() {
@@ -38,7 +38,7 @@ class Asked : public libcamera::Object {
   std::vector<std::string> done_;
 };
 
-/// A thread of libcamera's. Its header is not for others, and is not packaged from 0.1 on; its
+/// A thread of libcamera. Its header is private, and not packaged from version 0.1 on; its
 /// functions are in the library.
 class LastOfAll : public ::testing::Test {
  protected:
@@ -70,7 +70,7 @@ class LastOfAll : public ::testing::Test {
   const Function<std::int64_t> wait_ = named<Function<std::int64_t>>(
       "_ZN9libcamera6Thread4waitENSt6chrono8durationIlSt5ratioILl1ELl1000000000EEEE");
   const Function<> end_ = named<Function<>>("_ZN9libcamera6ThreadD1Ev");
-  alignas(std::max_align_t) std::array<std::byte, 4096> memory_{};  // more than it needs
+  alignas(std::max_align_t) std::array<std::byte, 4096> memory_{};  // larger than the object
   libcamera::Thread* thread_ = nullptr;
   Asked asked_;
 };

@@ -1,4 +1,4 @@
-// What of libcamera can be asked without a camera.
+// Tests the use of libcamera as far as possible without a camera.
 #include <gmock/gmock.h>
 #include <libcamera/libcamera.h>
 #include <libcamera/version.h>
@@ -21,7 +21,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 namespace controls = libcamera::controls;
 
-/// As those of a UVC camera: no rate.
+/// The controls of a UVC camera, which has no frame rate control.
 libcamera::ControlInfoMap webcam(bool with_gain = true) {
   libcamera::ControlInfoMap::Map map = {
       {&controls::AeEnable, libcamera::ControlInfo(false, true, true)},
@@ -137,7 +137,7 @@ TEST(LibcameraControls, ExposureAndGainAreMadeManualEachWhereTheCameraHasThatApa
 }
 #endif
 
-/// A camera that cannot turn its images.
+/// A camera that cannot flip its images.
 class Fixed : public libcamera::CameraConfiguration {
  public:
   Status validate() override {
@@ -159,7 +159,7 @@ TEST(LibcameraControls, AFlipIsAskedForAndItIsSeenWhereTheCameraTakesItBack) {
   }
 }
 
-/// A camera that is mounted at 90°: nothing turns its images upright, which libcamera says.
+/// A camera mounted at 90°. No flip makes its images upright, and libcamera reports that.
 class Rolled : public libcamera::CameraConfiguration {
  public:
   Status validate() override {
@@ -221,7 +221,8 @@ TEST(LibcameraLog, GetsLibcamerasLinesWithoutColours) {
   {
     const LibcameraLog log([&](const std::string& line) { lines.push_back(line); });
     const libcamera::ControlList empty(controls::controls);
-    (void)empty.get(controls::AeEnable.id());  // it complains of what is not in a list
+    (void)empty.get(controls::AeEnable.id());  // libcamera logs an error for a control that is not
+                                               // in the list
   }
   EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
   ASSERT_FALSE(lines.empty());
@@ -277,7 +278,7 @@ TEST(SharedManager, AsksTheCamerasThatRunAsideForOneThatCameAndIsNotFound) {
   std::filesystem::remove_all(folder);
 }
 
-/// It is over at a try, or never.
+/// A camera whose shutdown is complete at the attempt `over_at`, or never.
 class Lingering : public Unended {
  public:
   struct Story {

@@ -1,4 +1,4 @@
-// Which camera is opened, and when libcamera is to look for cameras anew.
+// Tests which camera is opened, and when libcamera must search for cameras again.
 #include <gmock/gmock.h>
 #include <unistd.h>
 

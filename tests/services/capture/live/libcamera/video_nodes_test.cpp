@@ -1,4 +1,4 @@
-// What is read of open video nodes, and how one is taken away.
+// Tests the reading of open video nodes, and the removal of one.
 #include "services/capture/live/libcamera/video_nodes.h"
 
 #include <gtest/gtest.h>

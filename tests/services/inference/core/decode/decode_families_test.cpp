@@ -1,4 +1,4 @@
-// The decode rules of the networks that people bring, on known values.
+// Tests the decode rules of common network families on known values.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using Values = std::vector<float>;
 
-/// A model.json of 32×16 pixels and two classes; `rest` goes on after a comma.
+/// Parses a model.json of 32×16 pixels and two classes; `rest` is appended after a comma.
 ModelDescription parsed(const std::string& family, const std::string& rest,
                         const std::string& file = "m.json") {
   return parseModelDescription(
@@ -75,7 +75,7 @@ const std::string kAnchored =
     kSigmoid + R"("levels": [{"stride": 16, "tensor": "head", "anchors": [[10, 20], [30, 5]]}])";
 
 TEST(DecodeYolov5, DoublesTheSigmoidsOfItsRawHeads) {
-  const Values rows = randomValues(2 * 2 * 7, 3, 1.0F);  // anchor, cell, value
+  const Values rows = randomValues(2 * 2 * 7, 3, 1.0F);  // dimensions: anchor, cell, value
   const auto out = decoded(parsed("yolov5", kAnchored), {{{1, 2, 1, 2, 7}, rows}});
   ASSERT_EQ(out.size(), 4u);
   for (std::size_t a = 0; a < 2; ++a) {
@@ -132,7 +132,7 @@ TEST(DecodeYolov5, AProbabilityOfOneIsNotCertainty) {
   EXPECT_NEAR(out[0].activations[2], std::log(kLeastProbability), 1e-3);
 }
 
-/// Raw YOLOv8 heads of 2×1 cells with 4 bins: the sides of a cell by hand.
+/// Raw YOLOv8 heads of 2×1 cells with 4 bins; the expected sides are computed directly.
 TEST(DecodeYolov8, SidesAreTheMeansOfTheirBins) {
   const auto split = parsed(
       "yolov8", kSigmoid + R"("bins": 4, "levels": [{"stride": 16, "box": "b", "classes": "c"}])");
@@ -181,7 +181,7 @@ TEST(DecodeYolov8, ReadsTheExportedPlanesAndTheTwoPartsBeforeTheSigmoid) {
   EXPECT_NEAR(sure[0].activations[2], -25.0, 1e-4);
 }
 
-// Two cells, one bin: the values are the distances themselves (YOLO26, RTMDet).
+// Two cells with one bin: the values are the distances themselves (YOLO26, RTMDet).
 TEST(DecodeYolov8, OfOneBinTheValueIsTheDistanceOrItsLogarithm) {
   const std::string level = R"("levels": [{"stride": 16, "box": "b", "classes": "c"}])";
   const Values sides = {0.5F, 1, 0.25F, -3, 0.75F, 1, 0.5F, 1}, classes = {1, 2, -1, 0};
@@ -229,14 +229,14 @@ TEST(DecodeNanoDet, HasItsClassesFirstAndCellsBeyondTheBorder) {
   const auto whole =
       parsed("nanodet", kApplied + R"("bins": 2, "outputs": {"predictions": "output"},
                                "levels": [{"stride": 16}, {"stride": 64}])");
-  // (2×1 + 1×1) cells of 2 classes and 4·2 bins; the last one is sure of distance 1.
+  // (2×1 + 1×1) cells of 2 classes and 4·2 bins. The last cell has probability 1 for distance 1.
   Values rows(3 * 10, 0.0F);
   rows[10] = 0.25F;
   rows[20 + 1] = 0.5F;
   for (const std::size_t side : {0u, 1u, 2u, 3u}) rows[20 + 2 + 2 * side + 1] = 80.0F;
   const auto out = decoded(whole, {{{1, 3, 10}, rows}});
   ASSERT_EQ(out.size(), 2u);
-  expectBox(out[0].box, 16 - 8, -8, 16 + 8, 8);  // every distance half a cell
+  expectBox(out[0].box, 16 - 8, -8, 16 + 8, 8);  // all distances are half a cell
   EXPECT_NEAR(out[0].activations[1], logOdds(0.25), 1e-5);
   expectBox(out[1].box, -64, -64, 64, 64);
   EXPECT_NEAR(out[1].activations[2], 0.0, 1e-5);
@@ -313,7 +313,7 @@ TEST(DecodeBoxes, RefusesWhatIsNotAsMany) {
   EXPECT_THAT(wide.error().detail, HasSubstr("s is 1x2x3, not 1xNx2"));
 }
 
-/// A list that some other file was named for is not read to its end.
+/// A list with the name of a wrong, large file is rejected before it is read completely.
 TEST(DescriptionOfFamilies, RefusesListsThatAreTooLarge) {
   const fs::path folder = fs::path(::testing::TempDir()) / "perdure_large_lists";
   fs::create_directories(folder);

@@ -22,7 +22,7 @@ ModelDescription tinyDescription() {
   return parseModelDescription(testing::TinyOnnx{}.json(), "tiny.json");
 }
 
-/// What decodes from heads that are the same in all four cells.
+/// Returns the decoded candidates of heads with the same values in all four cells.
 std::vector<Candidate> decodedHeads(const testing::TinyOnnx& tiny, const DecodeOptions& options,
                                     ModelDescription model = tinyDescription()) {
   std::vector<std::vector<float>> values;

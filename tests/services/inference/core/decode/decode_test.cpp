@@ -10,7 +10,7 @@
 namespace perdure::inference {
 namespace {
 
-/// Raw tensors of one level that hold nothing, and their views.
+/// Raw tensors of one level without any detection, and their views.
 struct Head {
   explicit Head(const ModelDescription& model) {
     for (const auto& shape : expectedShapes(model)) {
@@ -53,7 +53,7 @@ DecodeOptions all() { return {0.05, {0, 1, 2}}; }
 
 double sigma(double x) { return 1.0 / (1.0 + std::exp(-x)); }
 
-/// Puts box, objectness and classes of cell (column 3, row 1) of a 4×2 grid.
+/// Sets box, objectness and class values of cell (column 3, row 1) of a 4×2 grid.
 void putPlanes(Head& head, std::vector<float> box, float objectness, std::vector<float> classes) {
   const std::size_t cell = 7, cells = 8;
   for (std::size_t i = 0; i < 4; ++i) head.values[0][i * cells + cell] = box[i];
@@ -106,7 +106,7 @@ TEST(Decode, FastestDetWeighsObjectnessAndSoftMaxByTheirExponents) {
 TEST(Decode, YoloFastestScalesTheAnchorOfItsRow) {
   const auto m = model(Family::kYoloFastest);
   Head head(m);
-  // Row of (1, 2, 4, 2·8): cell (2, 1), second anchor.
+  // Row of the shape (1, 2, 4, 2·8): cell (2, 1), second anchor.
   const std::size_t at = ((1 * 4 + 2) * 2 + 1) * 8;
   const std::vector<float> row = {0.5F, -1.0F, 0.2F, -0.3F, 2.0F, -3.0F, 1.0F, 0.0F};
   std::copy(row.begin(), row.end(), head.values[0].begin() + static_cast<std::ptrdiff_t>(at));
@@ -188,7 +188,7 @@ TEST(Evidence, CalibrationDividesByTemperatureAndRemovesThePriorOddsOfClutter) {
   const double log_p = std::log(0.8);
   EXPECT_NEAR(activation({1.0, 0.5}, log_p), std::log(4.0), 1e-6);
   EXPECT_NEAR(activation({2.0, 0.5}, log_p), std::log(4.0) / 2, 1e-6);
-  // Nine of ten boxes are clutter: p = 0.1 is then no evidence at all.
+  // If nine of ten boxes are clutter, p = 0.1 is no evidence.
   EXPECT_NEAR(activation({1.0, 0.9}, std::log(0.1)), 0.0, 1e-6);
 }
 

@@ -1,4 +1,4 @@
-// Top-down answers: which candidate speaks for which expectation, and what it is worth.
+// Tests top-down answers: which candidate answers which expectation, and with what evidence.
 #include "services/inference/core/decode/prime.h"
 
 #include <gtest/gtest.h>
@@ -61,7 +61,7 @@ TEST(Prime, TheActivationOfTheExpectedClassCounts) {
 }
 
 TEST(Prime, WhatBelongsToAStrangersBoxDoesNotSpeakForAGhostBesideIt) {
-  const Box stranger{112, 100, 152, 130};  // reported, on no map
+  const Box stranger{112, 100, 152, 130};  // a reported box without an expectation
   const auto answers = prime(kEven, {expectation(kPlace)}, {candidate(stranger, 4.0F)},
                              {candidate({111, 100, 151, 130}, 3.0F)});
   ASSERT_EQ(answers.size(), 1U);

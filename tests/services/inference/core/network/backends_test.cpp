@@ -1,4 +1,4 @@
-// One network, computed by each backend that this build has.
+// Computes one network with each backend of this build.
 #include <gmock/gmock.h>
 #include <unistd.h>
 

@@ -1,4 +1,5 @@
-// When a newcomer's detections are nonsense beside those of the process that it follows.
+// Tests when the detections of a newcomer count as nonsense, compared with those of the current
+// process.
 #include "services/inference/core/takeover/judge.h"
 
 #include <gtest/gtest.h>
@@ -20,7 +21,7 @@ TEST(Judge, AsksForNonsenseOnlyWhereThereIsEnoughToCompare) {
   EXPECT_EQ(judge.complaint()->code, "empty");
   judge.reset();
   EXPECT_FALSE(judge.complaint());
-  for (std::size_t i = 0; i < 50; ++i) {  // half of what the old one sees is enough
+  for (std::size_t i = 0; i < 50; ++i) {  // half of the current process's objects are enough
     judge.compare(listOf(kOld, i, kStreet), listOf(kNew, i, {boxAt(21, 0.1F)}));
     EXPECT_FALSE(judge.complaint());
   }

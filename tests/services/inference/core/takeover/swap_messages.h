@@ -1,4 +1,4 @@
-// What an old inference process and a newcomer say, for tests of swaps and of their judge.
+// Messages of an old inference process and of a newcomer, for tests of swaps and of their judge.
 #pragma once
 
 #include <string>

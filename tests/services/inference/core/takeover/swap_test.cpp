@@ -1,5 +1,5 @@
-// A newcomer and the old one as two state machines on one simulated topic: what each says, who is
-// heard, and that no frame is lost whatever the newcomer does.
+// Runs a newcomer and the old process as two state machines on one simulated topic. Tests the
+// messages of each, the owner of the topic, and that no frame is lost whatever the newcomer does.
 #include "services/inference/core/takeover/swap.h"
 
 #include <gmock/gmock.h>
@@ -20,14 +20,14 @@ using ::testing::HasSubstr;
 constexpr Duration kShortLease = milliseconds(100);
 constexpr auto kPeriod = milliseconds(33);
 
-/// What a process answers to a frame; nothing: it is stopped, or dead.
+/// The answer of a process to a frame; nothing if the process is stopped or dead.
 using Answer = std::function<std::optional<Result<Detections>>(std::uint64_t frame)>;
 
 Answer sees(InstanceId who, std::vector<Detection> boxes) {
   return [=](std::uint64_t frame) { return listOf(who, frame, boxes); };
 }
 
-/// The topic, with the ownership of DDS: the strongest that was heard within a lease.
+/// The topic with DDS ownership: the strongest writer that has written within a lease is the owner.
 struct Bus {
   struct Process {
     Process(Swap swap_of, Answer answer_of, int strength_of)
@@ -68,7 +68,7 @@ struct Bus {
     }
     return best;
   }
-  /// Stopped or dead, it hears nothing either.
+  /// Returns whether the process runs; a stopped or dead process receives no messages.
   bool lives(const Process& p) const { return !p.ended && p.answer(frame); }
   void deliver(const Detections& d) {
     processes.at(d.instance).wrote = now;
@@ -314,7 +314,7 @@ TEST(Swap, WhatASpareMadeBeforeItHeardItselfIsSaidAgainToo) {
   for (std::uint64_t k = 1; k < 4; ++k) {
     spare.ownResult(listOf(kNew, k, kStreet), true, now += kPeriod);
   }
-  spare.heard(listOf(kNew, 2, kStreet), now);  // it comes back after frame 3 was written
+  spare.heard(listOf(kNew, 2, kStreet), now);  // it arrives after frame 3 was written
   (void)spare.take();
   spare.tick(now + kShortLease);
   const auto said = spare.take().again;

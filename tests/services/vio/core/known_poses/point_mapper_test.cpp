@@ -1,4 +1,5 @@
-// Points where somebody else knows the poses: where they are, how sure, and what is left out.
+// Tests the mapping of points with poses from another program: positions, covariances, and rejected
+// points.
 #include "services/vio/core/known_poses/point_mapper.h"
 
 #include <gtest/gtest.h>
@@ -24,10 +25,10 @@ test::DriveOptions seeded(unsigned seed) {
 }
 
 struct Errors {
-  double rotation = 0.0, position = 0.0;  ///< of each pose alone, rad and m
+  double rotation = 0.0, position = 0.0;  ///< errors of each pose, independent, rad and m
 };
 
-/// A drive of which the poses are given, in turn.
+/// A drive with given poses, which are used in turn.
 class GivenDrive {
  public:
   explicit GivenDrive(const test::DriveOptions& options, Errors errors = {})
@@ -53,7 +54,7 @@ class GivenDrive {
   void play(PointMapper& mapper, double from, double until) {
     for (double t = from; t < until; t += kStep) mapper.add(poseAt(t), drive_.see(t));
   }
-  /// The point whose image at `t` is nearest to what was seen.
+  /// Returns the drive's point with the image at `t` nearest to the landmark's pixel.
   Vector3d truthOf(const LandmarkEstimate& landmark, double t) const {
     std::size_t best = 0;
     double least = 1e9;
@@ -80,7 +81,8 @@ class GivenDrive {
 };
 
 struct Honesty {
-  std::vector<double> relative, nees;  ///< error over distance; of three degrees of freedom
+  std::vector<double> relative, nees;  ///< error relative to distance; NEES with three degrees of
+                                       ///< freedom
   double medianRelative() { return median(relative); }
   double medianNees() { return median(nees); }
   static double median(std::vector<double>& v) {
@@ -105,7 +107,7 @@ Honesty honestyOf(GivenDrive& given, PointMapper& mapper, double from, double un
   return honesty;
 }
 
-constexpr double kMedianOfChi2 = 2.366;  // of three degrees of freedom
+constexpr double kMedianOfChi2 = 2.366;  // with three degrees of freedom
 
 TEST(PointMapper, PointsAreWhereTheyAreAndAsSureAsTheySay) {
   GivenDrive given(seeded(3));
@@ -122,7 +124,7 @@ TEST(PointMapper, PosesThatErrWidenWhatIsSaid) {
   GivenDrive given(seeded(4), {.rotation = 0.004, .position = 0.01});
   PointMapper mapper = given.mapper();
   given.play(mapper, 0.0, 3.0);
-  // 4 mrad are 1.8 pixels of this camera.
+  // 4 mrad correspond to 1.8 pixels of this camera.
   EXPECT_GT(mapper.noisePx(), 1.0);
   EXPECT_LT(mapper.noisePx(), 3.5);
   Honesty honesty = honestyOf(given, mapper, 3.0, 8.0);
@@ -155,7 +157,7 @@ TEST(PointMapper, ALongTrackDoesNotTakeTheViewsOfYoungOnes) {
   options.place = test::DrivePlace::kStreet;
   GivenDrive given(options);
   PointMapper mapper = given.mapper();
-  // Far ahead on the way: seen all the time.
+  // A point far ahead, visible all the time.
   constexpr std::uint64_t kFar = 1'000'000'000, kLife = 6;
   const Vector3d far(2000.0, 30.0, 10.0);
   const CameraModel& camera = given.drive().cameras()[0];
@@ -163,7 +165,7 @@ TEST(PointMapper, ALongTrackDoesNotTakeTheViewsOfYoungOnes) {
   std::uint64_t frame = 0;
   for (double t = 0.0; t < 12.0; t += kStep, ++frame) {
     TrackedFrame tracked = given.drive().see(t);
-    // All others end after six images, and begin anew.
+    // All other tracks end after six images, and their points start new tracks.
     for (TrackedPoint& p : tracked.points) p.id = 1000 * p.id + (frame + p.id) / kLife;
     TrackedPoint long_track{kFar, {}};
     long_track.seen[0] = imagePoint(camera, given.drive().project(0, far, t).value());
@@ -182,7 +184,7 @@ TEST(PointMapper, WhatMovesIsLeftOut) {
   bool seen = false;
   for (double t = 0.0; t < 3.0; t += kStep) {
     TrackedFrame tracked = given.drive().see(t);
-    // Across the image, up and down, wherever the body goes.
+    // The point moves across the image, independently of the body.
     TrackedPoint moving{kMoving, {}};
     moving.seen[0] = imagePoint(camera, {300.0 + 20.0 * t, 240.0 + 25.0 * std::sin(3.0 * t)});
     ASSERT_TRUE(moving.seen[0]);
@@ -224,7 +226,7 @@ TEST(PointMapper, AWhileOfBadPosesIsForgotten) {
   options.place = test::DrivePlace::kStreet;
   GivenDrive good(options), bad(options, {.rotation = 0.13, .position = 0.4});
   PointMapper mapper = good.mapper();
-  // Short tracks and images close together, as of a slow robot: few pixels of parallax.
+  // Short tracks and closely spaced images, as of a slow robot, give few pixels of parallax.
   constexpr std::uint64_t kLife = 6;
   std::uint64_t frame = 0;
   const auto play = [&](GivenDrive& poses, double from, double until) {

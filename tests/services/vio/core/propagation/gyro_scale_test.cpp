@@ -1,5 +1,5 @@
-// The gyroscope's scale as a part of the state: its derivatives, how the covariance carries it,
-// that it is saved, and that it is found.
+// Tests the gyroscope's scale as a part of the state: its derivatives, its propagation in the
+// covariance, its storage, and its estimation.
 #include <gtest/gtest.h>
 
 #include "common/math/numeric_jacobian.h"
@@ -21,14 +21,14 @@ ImuIncrement scaledIncrement(const Nav& nav, const Vector3d& scale) {
   return integrate(test::turningReadings(), nav.gyro_bias, nav.accel_bias, ImuNoise{}, scale);
 }
 
-/// [θ, p, v] of the prediction.
+/// Difference of two states in [θ, p, v].
 VectorXd poseDifference(const Nav& a, const Nav& b) {
   VectorXd d(9);
   d << logSo3(b.q_WB.conjugate() * a.q_WB), a.p_WB - b.p_WB, a.v_WB - b.v_WB;
   return d;
 }
 
-/// d [θ, p, v] at the end by [b_g, scale] at the start, by finite differences.
+/// Derivative of [θ, p, v] at the end by [b_g, scale] at the start, by finite differences.
 Eigen::MatrixXd numericByGyro(const Nav& nav) {
   const Nav reference = predict(nav, scaledIncrement(nav, kScale), 9.81);
   const auto f = [&](const VectorXd& d) -> VectorXd {
@@ -138,10 +138,10 @@ TEST(GyroScale, ComesBackFromASavedStateWhereItIsEstimated) {
 }
 
 struct Found {
-  Vector3d error, sigma;  ///< of the scale, at the end
+  Vector3d error, sigma;  ///< error of the scale at the end
 };
 
-/// Twenty seconds round a room with a gyroscope whose scale is `scale`.
+/// Drives through a room for twenty seconds with a gyroscope of scale `scale`.
 Found findScale(unsigned seed, const Vector3d& scale) {
   test::DriveOptions drive_options;
   drive_options.seed = seed;
@@ -163,8 +163,8 @@ Found findScale(unsigned seed, const Vector3d& scale) {
           P.diagonal().segment<kScaleSize>(state.scaleAt().value()).cwiseSqrt()};
 }
 
-// The drive nods and leans to and fro. It turns about the vertical at one rate: there scale and
-// bias are one thing, and the covariance says so.
+// Pitch and roll of the drive oscillate. Its yaw rate is constant, so that scale and bias about the
+// vertical are not separable, and the covariance must show that.
 TEST(GyroScale, IsFoundAboutTheAxesThatTurnToAndFro) {
   std::mt19937 random(5);
   std::normal_distribution<double> draw(1.0, 0.01);

@@ -1,4 +1,4 @@
-// A fifth of a second of fast turning, and a state to begin it with, for derivatives.
+// A fifth of a second of fast rotation and an initial state, for tests of derivatives.
 #pragma once
 
 #include <cmath>

@@ -45,7 +45,7 @@ TEST(StartAtRest, TiltAndAccelerometerBiasAreCorrelated) {
   test::SimulatedDrive drive(options);
   const auto start = startAtRest(bufferOf(drive.imu(1.0)), drive.time(0.9), Options{});
   ASSERT_TRUE(start);
-  // What remains unknown is the tilt that a horizontal bias would explain: σ_b / g.
+  // The remaining uncertainty is the tilt that a horizontal bias would cause: σ_b / g.
   const double tilt = std::sqrt(start->covariance(0, 0));
   EXPECT_NEAR(tilt, Options{}.start.accel_bias_sigma / 9.81, 0.003);
   EXPECT_GT(std::abs(start->covariance(0, kAccelBias + 1)),
@@ -69,7 +69,7 @@ TEST(StartAtRest, RefusesAShortWindowAFallAndATurn) {
 }
 
 TEST(StartWithSpeed, LevelsInSpiteOfAccelerationAndTurn) {
-  // 8 m/s, speeding up by 2 m/s² and turning by 0.4 rad/s on a level street.
+  // 8 m/s, with an acceleration of 2 m/s² and a yaw rate of 0.4 rad/s on a level street.
   std::vector<ImuReading> readings;
   std::vector<TimedSpeed> speeds;
   for (int i = 0; i <= 20; ++i) {
@@ -140,7 +140,7 @@ TEST(MotionStart, FindsVelocityWithTwoCameras) {
   EXPECT_LT((v_B - truth.q_WB.conjugate() * truth.v_WB).norm(), 0.15);
 }
 
-/// The body turns and its speed changes all the while, from 2 s on.
+/// A start from 2 s on; the body rotates and its speed changes all the time.
 struct RoomStart {
   test::SimulatedDrive drive{{}};
   ImuBuffer imu;
@@ -157,7 +157,7 @@ struct RoomStart {
   void addFrame(double t) {
     initialiser.add({++frame, drive.time(t), drive.see(t), {}, {}}, drive.time(t));
   }
-  /// The time of the first start from `from` on; nothing where there is none before `until`.
+  /// Returns the time of the first start from `from` on; nothing if there is none before `until`.
   std::optional<double> startsAt(double from, double until) {
     for (double t = from; t < until; t += 0.05) {
       addFrame(t);

@@ -22,11 +22,11 @@ constexpr double kPatience = 2.5;  // s
 
 struct Attempt {
   Result<Start> start = fail("start_waits");
-  Nav truth;  ///< there, with yaw 0
+  Nav truth;  ///< at the time of the start, with yaw 0
 };
 
-/// Images and samples begin `from` seconds into the drive; biases as far off as their priors say.
-/// `noise`: of the samples, relative to what the options say.
+/// Images and samples begin `from` seconds into the drive; biases are drawn from their priors.
+/// `noise` scales the samples' noise relative to the options.
 Attempt startIn(test::DrivePlace place, unsigned seed, double from, double noise = 1.0,
                 double camera_ahead_m = 0.0) {
   std::mt19937 random(seed);
@@ -60,7 +60,7 @@ Attempt startIn(test::DrivePlace place, unsigned seed, double from, double noise
   return attempt;
 }
 
-/// `beyond`: share on either side of the band in which the mean NEES has to lie.
+/// `beyond`: probability on either side of the band in which the mean NEES must be.
 void expectHonestStarts(int runs, double beyond) {
   int started = 0;
   double velocity = 0.0, tilt = 0.0, gyro = 0.0;
@@ -95,7 +95,8 @@ void expectHonestStarts(int runs, double beyond) {
 TEST(MotionRefinement, AFewStartsKnowHowWell) { expectHonestStarts(8, 5e-4); }
 TEST(LongMotionRefinement, StartsKnowHowWell) { expectHonestStarts(40, 5e-3); }
 
-// An airframe that shakes: the few rows of the samples have to show beside the many of the images.
+// A vibrating airframe: the few rows of the samples must have an effect beside the many rows of the
+// images.
 TEST(MotionRefinement, SamplesThatFitBadlyWidenTheStart) {
   int started = 0;
   double nees = 0.0;
@@ -115,14 +116,14 @@ TEST(MotionRefinement, GivesNoStartAtConstantVelocity) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     const Attempt a = startIn(test::DrivePlace::kStreet, seed, 2.0);
     ASSERT_FALSE(a.start) << seed;
-    // The search found no minimum along the scale, or one that is too wide.
+    // The search found no minimum along the scale, or only a wide one.
     EXPECT_THAT(a.start.error().code, testing::AnyOf("start_unobservable", "start_inconsistent"))
         << seed;
   }
 }
 
-// That the camera stands and the body goes round it explains a short window as well as the truth
-// does: the body rests, and the camera goes round.
+// A short window has two explanations: a camera that rests while the body orbits it, and the truth,
+// in which the body rests and the camera orbits.
 TEST(MotionRefinement, GivesNoWrongStartWhereACameraFarFromTheBodyTurns) {
   for (const unsigned seed : {2u, 3u, 18u, 26u, 27u}) {
     const Attempt a = startIn(test::DrivePlace::kSpot, seed, 1.0 + 0.3 * seed, 1.0, 2.0);
@@ -188,7 +189,7 @@ TEST(MotionRefinement, FindsTheScaleFromFarOff) {
   }
 }
 
-// Yaw of a body whose x points up is undefined, and must not be what W is turned by.
+// If the body's x axis points up, its yaw is undefined and must not determine the rotation of W.
 TEST(MotionRefinement, WIsNotTurnedByAnErrorOfTilt) {
   for (unsigned seed = 1; seed <= 3; ++seed) {
     const Attempt a = startIn(test::DrivePlace::kRoom, seed, 1.0 + 0.4 * seed);

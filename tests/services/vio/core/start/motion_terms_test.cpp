@@ -18,8 +18,9 @@ constexpr double kStep = 1e-6;
 
 TimePoint timeAt(double seconds) { return fromNanoseconds(std::llround(1e9 * seconds)); }
 
-/// Three poses a tenth of a second apart that turn and accelerate as the samples say; biases and
-/// a velocity that are not 0. Positions and velocities are off a little, so that residuals are not.
+/// Three poses, a tenth of a second apart, that rotate and accelerate according to the samples.
+/// Biases and a velocity are nonzero. Positions and velocities have small errors, so that the
+/// residuals are nonzero.
 struct Case {
   Case() {
     for (int k = 0; k <= 60; ++k) {
@@ -85,7 +86,7 @@ TEST(MotionTerms, TheInertialJacobianAgreesWithTheNumericOne) {
   const ImuNoise noise = Options{}.imu;
   const auto residualAt = [&](std::size_t i, Index at, double by) {
     const MotionWindow w = c.moved(at, by);
-    // Biases change what the samples say: they are integrated anew.
+    // Biases change the readings, so that the readings are integrated again.
     return inertialResidual(w, i, inertialOf(w, c.imu, noise)->increments[i]);
   };
   const auto inertial = inertialOf(c.estimate.window, c.imu, noise);

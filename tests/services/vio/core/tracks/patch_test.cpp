@@ -123,7 +123,7 @@ TEST(Tracker, DoesNotDriftAlongATrack) {
   View view;
   view.noise = 3;
   constexpr unsigned kImages = 60;
-  for (unsigned k = 0; k < kImages; ++k) {  // a wall that comes nearer
+  for (unsigned k = 0; k < kImages; ++k) {  // an approaching wall
     const double grown = 1.0 + 0.6 * k / (kImages - 1);
     view.A = {grown, 0, 0, grown};
     last = tracker.track(view.of(image, k), {}, {});
@@ -140,7 +140,7 @@ TEST(Tracker, DoesNotDriftAlongATrack) {
       ++kept;
     }
   }
-  EXPECT_GT(kept, 40);  // of 150, those within two fifths of the image
+  EXPECT_GT(kept, 40);  // the points within two fifths of the image remain, out of 150
   EXPECT_LT(std::sqrt(squares / kept), 0.2);
 }
 
@@ -163,7 +163,7 @@ TEST(Tracker, APatchThatHasGrownIsANewPoint) {
   };
   EXPECT_GT(of_first(before), 20);
   EXPECT_LT(of_first(after), 3);
-  EXPECT_GT(after.size(), before.size() / 2);  // they are still followed
+  EXPECT_GT(after.size(), before.size() / 2);  // points are still tracked
 }
 
 }  // namespace

@@ -39,7 +39,7 @@ TEST(TwoPointRansac, KeepsWhatMovesWithTheCameraAndDropsTheRest) {
   int wrong = 0;
   for (std::size_t i = 0; i < 80; ++i) EXPECT_TRUE(good[i]) << i;
   for (std::size_t i = 80; i < 110; ++i) wrong += good[i];
-  EXPECT_LE(wrong, 4);  // some lie on their epipolar line by chance
+  EXPECT_LE(wrong, 4);  // some are on their epipolar line by chance
 }
 
 TEST(TwoPointRansac, KeepsAllUnderPureRotation) {
@@ -79,7 +79,7 @@ TEST(Tracker, FollowsAShiftedImageToATenthOfAPixel) {
   EXPECT_FALSE(tracker.motionSince(2));
 }
 
-/// What a camera sees that has turned by R_C(row) when it sees a row, −½ … ½.
+/// Returns the image of a camera with rotation R_C(row) at the time of each row, −½ … ½.
 template <class Turn>
 cv::Mat turnedRowByRow(const cv::Mat& image, const CameraModel& camera, const Turn& R_C) {
   cv::Mat map_x(image.size(), CV_32FC1), map_y(image.size(), CV_32FC1), turned;
@@ -117,7 +117,7 @@ TEST(Tracker, TheRotationSeedsALargeMotion) {
 
 TEST(Tracker, ARollingShutterThatTurnsContradictsNoRotation) {
   const CameraModel camera(test::testCamera(0));
-  const Vector3d turn_C(0.01, 0.0, 0.06);  // over the read-out
+  const Vector3d turn_C(0.01, 0.0, 0.06);  // during the read-out
   const cv::Mat image = texture();
   const cv::Mat turned =
       turnedRowByRow(image, camera, [&](double row) { return expSo3(-row * turn_C); });
@@ -145,7 +145,7 @@ TEST(Tracker, FindsTheSecondCamerasPointsOnTheirEpipolarLines) {
   first.distortion_coefficients.clear();
   Tracker tracker(TrackerOptions{}, {CameraModel(first), CameraModel(second)});
   const cv::Mat image = texture();
-  // A wall at such a depth that the baseline of 11 cm is 12.5 px.
+  // A wall at the depth at which the baseline of 11 cm gives 12.5 px.
   const TrackedFrame seen = tracker.track(image, shifted(image, -12.5, 0), {});
   int paired = 0;
   for (const TrackedPoint& p : seen.points) {
@@ -199,7 +199,7 @@ TEST(Descriptor, ComparesWhatOpenCvsBoxFilterWouldGive) {
   const cv::Mat image = texture();
   cv::Mat smooth;
   cv::blur(image, smooth, {5, 5});
-  // The pattern, drawn as its definition says.
+  // Draws the pattern by its definition.
   std::uint64_t seed = 20111129;
   const auto draw = [&seed] {
     int sum = 0;

@@ -1,4 +1,4 @@
-// Every analytic Jacobian of the updates against a numeric one.
+// Compares every analytic Jacobian of the updates with a numeric one.
 #include <gtest/gtest.h>
 
 #include "common/math/numeric_jacobian.h"

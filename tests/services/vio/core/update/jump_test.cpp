@@ -1,5 +1,5 @@
-// Images that contradict the IMU for a moment: what the cameras see jumps. Afterwards the error has
-// to be what the jump itself is, and the covariance has to say so.
+// Images that contradict the IMU for a moment, because the view of the cameras jumps. Afterwards
+// the error must equal the jump itself, and the covariance must cover it.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -19,14 +19,16 @@ constexpr int kSeeds = 4;
 constexpr double kJumpAt = 12.025, kSeconds = 20.0;
 
 struct AfterJump {
-  double before_m = 0.0, after_m = 0.0;  ///< rms error over the seeds, before and long after
-  double soon_m = 0.0;                   ///< a second after the jump
-  double nees = 0.0;   ///< of position and rotation at the end, for each dimension
-  double gated = 0.0;  ///< of points in the state, from the jump on, for each run
-  int noticed = 0;     ///< runs in which the jump was counted
+  double before_m = 0.0, after_m = 0.0;  ///< rms error over the seeds, before the jump and at the
+                                         ///< end
+  double soon_m = 0.0;                   ///< one second after the jump
+  double nees = 0.0;                     ///< NEES of position and rotation at the end, per
+                                         ///< dimension
+  double gated = 0.0;                    ///< gated points of the state from the jump on, per run
+  int noticed = 0;                       ///< runs in which the jump was counted
 };
 
-/// Errors are those from where the images say that the body is.
+/// The errors are relative to the pose that the images show.
 AfterJump run(const RigidTransform& jump, double lasts_s, const Options& options) {
   AfterJump result;
   for (unsigned seed = 1; seed <= kSeeds; ++seed) {
@@ -75,7 +77,7 @@ RigidTransform moved() {
   return RigidTransform(Eigen::Quaterniond::Identity(), {0.1, -0.08, 0.06});
 }
 
-/// About the vertical through the room's middle.
+/// A rotation about the vertical through the middle of the room.
 RigidTransform turned() {
   return RigidTransform(Eigen::Quaterniond(rotationAboutZ(M_PI / 180.0)), Vector3d::Zero());
 }
@@ -109,7 +111,8 @@ TEST(Jump, ATurnOfTheSceneByADegreeIsFollowed) {
   expectRecovery(run(turned(), 100.0, Options{}), undisturbed());
 }
 
-// What the widening is there for: the error stays, and the covariance does not say so.
+// Shows the purpose of the widening: without it the error remains, and the covariance does not
+// cover it.
 TEST(Jump, WithoutWideningTheErrorStays) {
   Options options;
   options.vision.jump_position_m = options.vision.jump_rotation = 0.0;

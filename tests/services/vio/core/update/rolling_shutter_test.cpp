@@ -1,5 +1,5 @@
-// A camera whose rows are exposed in turn: the motion within an image, its Jacobians, the read-out
-// as a part of the state, and what becomes of a filter that does not know of it.
+// Tests a camera whose rows are exposed in sequence: the motion within an image, its Jacobians, the
+// read-out time as a part of the state, and the errors of a filter that ignores it.
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -78,7 +78,7 @@ TEST(RowCamera, ItsDerivativeByTimeAgreesWithTheNumericOne) {
   }
 }
 
-/// One clone of a rolling camera, and a point that it sees in the lower part of its image.
+/// One clone of a rolling-shutter camera, and a point in the lower part of its image.
 struct OneView {
   State state;
   ImagePoint seen;
@@ -114,7 +114,7 @@ TEST(RollingView, JacobiansAgreeWithNumericOnes) {
   const View view = one.view();
   Eigen::MatrixXd analytic(2, 16);
   analytic << view.J.pose, view.J.extrinsic, view.readout, view.J.point;
-  // The residual is what is seen less what is predicted.
+  // The residual is the observation minus the prediction.
   const Eigen::MatrixXd numeric = -numericJacobian(f, VectorXd::Zero(16));
   EXPECT_LT((numeric - analytic).cwiseAbs().maxCoeff(), 1e-4 * analytic.cwiseAbs().maxCoeff());
   EXPECT_LT((numeric - analytic).col(12).norm(), 1e-5 * analytic.col(12).norm());
@@ -175,12 +175,12 @@ TEST(RollingState, ComesBackOnlyToTheSameShutter) {
 }
 
 struct RollingRun {
-  double readout_error = 0.0, readout_nees = 0.0;  ///< at the end
+  double readout_error = 0.0, readout_nees = 0.0;  ///< errors at the end
   double pose_nees = 0.0;                          ///< mean over the frames, of [θ, p]
   double position_rms = 0.0;
 };
 
-/// A drive of a camera with `readout_s` by a filter that is told `told` of it.
+/// Runs a drive of a camera with `readout_s`, and a filter that is configured with `told`.
 RollingRun roll(unsigned seed, double told, const Options& options, double seconds,
                 double readout_s = kReadout) {
   test::DriveOptions drive_options = rollingDrive(seed);
@@ -276,7 +276,8 @@ TEST(LongRollingShutter, IsAsGoodAsAGlobalOne) {
   EXPECT_LT(rolling.pose_nees, 1.2 * global.pose_nees);
 }
 
-/// Errors of a start in motion that is told `told`: of velocity in B in m/s, of the bias in rad/s.
+/// Mean errors of starts in motion with the configured read-out time `told`: velocity in B in m/s,
+/// gyroscope bias in rad/s.
 struct RollingStart {
   int started = 0;
   double velocity = 0.0, velocity_nees = 0.0, gyro_bias = 0.0;  ///< means
@@ -330,8 +331,8 @@ TEST(RollingStart, InMotionIsAsGoodAsItsCovarianceSays) {
   EXPECT_LT(start.gyro_bias, 0.02);
 }
 
-// Over a second a point hardly leaves its row, and much of what the rows do looks like another
-// place of the point: it shows where pixels are exact.
+// Within a second, a point hardly changes its row. The effect of the rows then resembles another
+// position of the point, and is visible only with exact pixels.
 TEST(RollingStart, WhoDoesNotKnowOfItStartsWorse) {
   const RollingStart known = startRolling(kReadout, 0.05), unknown = startRolling(0.0, 0.05);
   print(known);
