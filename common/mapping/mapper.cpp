@@ -223,7 +223,11 @@ void Mapper::forgetUnconfirmed() {
   for (const ObjectId id : state_.unconfirmed()) {
     if (isOld(state_.records().at(id))) old.push_back(id);
   }
-  for (const ObjectId id : old) state_.erase(id);
+  for (const ObjectId id : old) {
+    const std::vector<TrackId> tracks = state_.identity().tracksOf(id);
+    state_.erase(id);
+    for (const TrackId track : tracks) state_.erase(track);
+  }
 }
 
 void Mapper::onMerged(TrackId survivor, TrackId absorbed) {

@@ -60,7 +60,9 @@ void Mapper::settle() {
 void Mapper::join(const LoopClosure& loop) {
   const Identity& identity = state_.identity();
   for (const auto& [known, seen] : loop.match.pairs) {
-    const bool both = state_.recordOfTrack(known) && state_.recordOfTrack(seen);
+    const ObjectRecord *of_known = state_.recordOfTrack(known),
+                       *of_seen = state_.recordOfTrack(seen);
+    const bool both = of_known && of_seen && !of_known->gone && !of_seen->gone;
     if (known == seen || !both) continue;  // one may be gone since the loop was found
     const auto [survivor, absorbed] =
         std::minmax({identity.objectOf(known), identity.objectOf(seen)});

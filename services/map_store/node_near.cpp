@@ -70,6 +70,11 @@ void Node::publish(MapNear near) {
   }
   if (near_ && sameContent(near, *near_)) return;
   near.revision = ++near_revision_;
+  for (const ObjectBelief& belief : near.placed) {
+    placed_[belief.track] = {mapper_.revision(), near.revision};
+    const auto join = joins_.find(belief.track);
+    if (join != joins_.end() && join->second.near == 0) join->second.near = near.revision;
+  }
   outputs_.near(near);
   near_ = std::move(near);
 }
@@ -79,9 +84,16 @@ MapNear Node::nearNow() {
   near.corrects_drift = graph_ && mapper_.follows(newest_->world);
   if (newest_->near_m > 0.0) near.corrects_drift ? putNearByGraph(near) : putNearAsStored(near);
   const auto most = static_cast<std::size_t>(config_.query_limit);
+  const auto distance_m = [&](const ObjectBelief& belief) {
+    return (belief.best().mean.head<3>() - newest_->T_WB.p).norm();
+  };
   for (auto* list : {&near.placed, &near.as_published}) {
-    near.more = near.more || list->size() > most;
-    if (list->size() > most) list->resize(most);
+    if (list->size() <= most) continue;
+    near.more = true;
+    std::stable_sort(list->begin(), list->end(), [&](const auto& a, const auto& b) {
+      return distance_m(a) < distance_m(b);
+    });
+    list->resize(most);
   }
   return near;
 }
@@ -113,8 +125,7 @@ void Node::putNearByGraph(MapNear& near) {
     return isTaken(join.second.near) || working.contains(join.first) ||
            !working.contains(join.second.seen);
   });
-  for (auto& [known, join] : joins_) {
-    if (join.near == 0) join.near = near_revision_ + 1;
+  for (const auto& [known, join] : joins_) {
     if (const auto there = mapper_.placeOf(known)) give(*there, near);
   }
 }
@@ -125,7 +136,8 @@ void Node::putNearAsStored(MapNear& near) {
   for (const ObjectBelief& belief : newest_->objects) {
     present.insert(mapper_.identity().objectOf(belief.id));
   }
-  const auto limit = static_cast<std::uint32_t>(config_.query_limit);
+  // The working set may be the nearest.
+  const auto limit = static_cast<std::uint32_t>(config_.query_limit + present.size());
   auto found =
       database_.reader().inFullNear(newest_->T_WB.p, newest_->near_m, newest_->world, limit);
   if (!found) return blame(found.error());
@@ -137,7 +149,6 @@ void Node::putNearAsStored(MapNear& near) {
       near.as_published.push_back(std::move(belief));
       continue;
     }
-    placed_[belief.id] = {mapper_.revision(), near_revision_ + 1};
     for (ClassBelief& c : belief.classes) c.cross_pose.setZero();
     near.placed.push_back(notLaterThan(newest_->stamp.time, std::move(belief)));
   }
@@ -156,7 +167,6 @@ void Node::give(const mapping::Recallable& there, MapNear& near) {
   belief = mapping::relativeToBody(std::move(belief), there.pose_error);
   if (there.T_now) belief = mapping::turned(*there.T_now, std::move(belief));
   belief = mapping::withFrameError(std::move(belief), there.covariance, there.about_W);
-  placed_[there.track] = {mapper_.revision(), near_revision_ + 1};
   near.placed.push_back(notLaterThan(newest_->stamp.time, std::move(belief)));
 }
 
@@ -176,7 +186,6 @@ void Node::restore(const MapQuery& query) {
     for (const auto& belief : set->objects) {
       if (removed_.contains(belief.id)) continue;
       near.placed.push_back(mapping::relativeToBody(belief, set->pose_error));
-      placed_[belief.id] = {mapper_.revision(), near_revision_ + 1};
     }
   }
   reasons_.add("restores");
