@@ -7,43 +7,45 @@ namespace perdure::inference {
 void describe(Config& config, config::Fields& fields) {
   using config::between;
   fields.text("model.path", config.model.path,
-              {"the network: an .onnx file, or a Darknet .cfg with its .weights beside it"});
+              {"network: an .onnx file, or a Darknet .cfg with its .weights beside it"});
   fields.text("model.description", config.model.description,
-              {"its model.json; empty: PATH.model.json, model.json beside it, or "
+              {"model.json of the network; empty: PATH.model.json, model.json beside it, or "
                "config/models/<stem>.json"});
   fields.choice("model.backend", config.model.backend, {"auto", "opencv", "onnxruntime"},
-                {"what computes it; auto: OpenCV, and ONNX Runtime for a file that OpenCV does not "
-                 "take, where the program was built with it"});
+                {"library that runs the network; auto: OpenCV, or ONNX Runtime (if the program was "
+                 "built with it) for files that OpenCV does not support"});
   fields.integer("model.threads", config.model.threads, between(1, 64),
-                 {"threads for one image", "", "use at most the cores of the machine"});
+                 {"number of threads for one image", "", "use at most the cores of the machine"});
   fields.number("model.budget_ms", config.model.budget_ms, between(0.0, 10000.0),
-                {"most time of a frame, picture to detections: where it is not kept the input is "
-                 "made smaller, and larger again; 0: always the network's own size",
+                {"largest time of a frame, from image to detections; the input size is reduced to "
+                 "keep it; 0: always the network's own size",
                  "ms"});
-  fields.text("detection.camera", config.detection.camera,
-              {"the camera whose frames are looked at"});
-  fields.number("detection.score_threshold", config.detection.score_threshold,
-                between(0.001, 0.999),
-                {"lax: boxes whose best class scores less are left out", "",
-                 "0.05 keeps the evidence that the filter wants; above 0.3 objects are lost"});
-  fields.number("detection.merge_iou", config.detection.merge_iou, between(0.1, 1.0),
-                {"boxes that overlap more are merged into one, of whatever class"});
-  fields.integer("detection.limit", config.detection.limit, between(1, 512),
-                 {"most detections of one frame; those of most evidence are kept"});
+  fields.text("detection.camera", config.detection.camera, {"camera whose frames are read"});
+  fields.number(
+      "detection.score_threshold", config.detection.score_threshold, between(0.001, 0.999),
+      {"smallest score of the best class of a box; low, because the filter also uses weak evidence",
+       "", "0.05 keeps the weak evidence that the filter uses; above 0.3 objects are lost"});
+  fields.number(
+      "detection.merge_iou", config.detection.merge_iou, between(0.1, 1.0),
+      {"boxes with a larger overlap (IoU) are merged into one, regardless of their classes"});
+  fields.integer(
+      "detection.limit", config.detection.limit, between(1, 512),
+      {"largest number of detections in one frame; those with the most evidence are kept"});
   fields.texts("detection.classes", config.detection.classes,
-               {"classes to report, by the network's names; empty: all"});
+               {"classes to report, with the network's names; empty: all"});
   fields.boolean("detection.prime", config.detection.prime,
-                 {"report the best activation where semantic_filter expects an object and no box "
-                  "is; needs calibration.primed in model.json"});
+                 {"report the best activation at a predicted object without a box; requires "
+                  "calibration.primed in model.json"});
   fields.integer("ownership.strength", config.ownership.strength, between(2, 1000000),
-                 {"of several living inference processes the strongest is heard"});
+                 {"the running inference process with the highest strength is used"});
   fields.boolean("ownership.standby", config.ownership.standby,
-                 {"stand by: offer one less than the strength, and take over when the owner dies"});
-  fields.number("ownership.period_s", config.ownership.period_s, between(0.005, 10.0),
-                {"expected time between frames; the lease is three of them, at least 100 ms", "s"});
+                 {"use one less than the strength, and take over when the owner ends"});
+  fields.number(
+      "ownership.period_s", config.ownership.period_s, between(0.005, 10.0),
+      {"expected interval between frames; the lease is three intervals, at least 100 ms", "s"});
   fields.number("ownership.probation_s", config.ownership.probation_s, between(0, 86400),
-                {"above 0: follow the process that is heard: rehearse beside it, take over, be "
-                 "watched by it for so long, and then tell it to retire",
+                {"above 0: rehearse beside the active process, take over, be checked by it for "
+                 "this time, and then replace it",
                  "s"});
 }
 

@@ -13,59 +13,101 @@ void describeRos(Config& c, config::Fields& fields) {
   fields.integer("ros.domain", c.domain, config::between(-1, 230),
                  {"ROS_DOMAIN_ID; -1: the bus's own domain, with its interface"});
   fields.text("ros.interface", c.interface,
-              {"of a ros.domain of its own: the network interface; empty: that of the bus"});
+              {"network interface of a separate ros.domain; empty: the bus's interface"});
   fields.texts("ros.peers", c.peers,
-               {"of a ros.domain of its own: addresses of ROS' hosts; none: multicast"});
+               {"addresses of the ROS hosts in a separate ros.domain; empty: multicast"});
 }
 
 void describeOut(Config& c, config::Fields& fields) {
-  fields.boolean("out.enabled", c.out, {"Perdure's topics go to ROS"});
-  fields.text("out.prefix", c.prefix, {"before all topics but /tf and /tf_static"});
-  fields.texts("out.cameras", c.shown_cameras, {"cameras whose images may be subscribed"});
+  fields.boolean("out.enabled", c.out, {"publish Perdure's topics in ROS"});
+  fields.text("out.prefix", c.prefix, {"prefix of all topics except /tf and /tf_static"});
+  fields.texts("out.cameras", c.shown_cameras, {"cameras whose images are available"});
   fields.boolean("out.tf", c.tf,
-                 {"writes /tf and /tf_static; false where another node says odom to base_link"});
-  fields.text(
-      "out.tracked_objects", c.tracked_objects,
-      {"topic of autoware_perception_msgs/TrackedObjects, as Autoware hears it; empty: none"});
-  fields.integer("out.image_quality", c.image_quality, config::between(1, 100),
-                 {"of the JPEG of image_raw/compressed; what is JPEG already stays as it is"});
-}
-
-void describeClock(std::string& clock, const std::string& input, config::Fields& fields) {
-  fields.choice("in." + input + ".clock", clock, {kSameClock, kOwnClock},
-                {"same: stamps are of the clock that the other inputs have; own: of another one"});
+                 {"publish /tf and /tf_static; false if another node publishes odom to base_link"});
+  fields.text("out.tracked_objects", c.tracked_objects,
+              {"topic of autoware_perception_msgs/TrackedObjects, which Autoware reads; empty: "
+               "none"});
 }
 
 void describeCamera(CameraInput& camera, config::Fields& fields) {
   const std::string key = "in." + camera.name + ".";
   fields.text(key + "image", camera.image,
               {"topic of sensor_msgs/Image or CompressedImage; empty: none"});
-  fields.choice(key + "type", camera.type, {"auto", "raw", "compressed"},
-                {"which of the two; auto: by the topic's name, …/compressed"});
   fields.text(key + "info", camera.info,
               {"topic of its CameraInfo; empty: camera_info beside the image"});
-  describeClock(camera.clock, camera.name, fields);
-  fields.integer(
-      key + "bits", camera.bits, config::between(0, 16),
-      {"used bits of images with 16 (8 … 16); 0: as many as the brightest so far needs"});
 }
 
-void describeDetections(DetectionsInput& d, config::Fields& fields) {
+void describeIn(Config& c, config::Fields& fields) {
+  describeCamera(c.cam0, fields);
+  describeCamera(c.cam1, fields);
+  fields.text("in.imu.topic", c.imu.topic, {"topic of sensor_msgs/Imu; empty: none"});
+  fields.text("in.odometry.topic", c.odometry.topic,
+              {"topic of nav_msgs/Odometry, instead of perdure-vio; empty: none"});
+  DetectionsInput& d = c.detections;
   fields.text("in.detections.topic", d.topic,
               {"topic of vision_msgs/Detection2DArray; empty: none"});
-  fields.text("in.detections.camera", d.camera, {"the camera on whose images it looks"});
-  fields.texts("in.detections.classes", d.classes,
-               {"its classes, by the names of class_priors.yaml; a class_id is a name, or the "
-                "number of one in this list"});
-  fields.number("in.detections.other_share", d.other_share, config::between(0.0, 0.9),
-                {"of the probability that its scores leave: so much is for classes that it does "
-                 "not name, the rest for clutter"});
-  fields.number("in.detections.box_sigma", d.box_sigma, config::between(0.0, 1.0),
-                {"deviation of a side of its boxes, relative to their size; 0: not known"});
+  fields.text("in.detections.camera", d.camera, {"camera whose images the detector reads"});
+  fields.texts(
+      "in.detections.classes", d.classes,
+      {"the detector's classes, with the names of class_priors.yaml; a class_id is a name, "
+       "or an index in this list"});
   fields.choice("in.detections.boxes", d.boxes, {"outline", "cuboid"},
-                {"what they enclose: the visible outline (COCO), or the projected cuboid (KITTI)"});
+                {"boxes enclose the visible outline (COCO), or the projected cuboid (KITTI)"});
+  fields.text("in.rig", c.rig,
+              {"file with cameras or IMU, written by `perdure calibrate`; overrides CameraInfo and "
+               "/tf_static"});
+  fields.text("in.body", c.body,
+              {"frame of the body; empty: the IMU's frame, or without an IMU the child frame of "
+               "the odometry"});
+}
+
+void describeExpertClock(std::string& clock, const std::string& input, config::Fields& fields) {
+  fields.choice("in." + input + ".clock", clock, {kSameClock, kOwnClock},
+                {"same: stamps are on the clock of the other inputs; own: on another clock"});
+}
+
+void describeExpertCamera(CameraInput& camera, config::Fields& fields) {
+  const std::string key = "in." + camera.name + ".";
+  fields.choice(key + "type", camera.type, {"auto", "raw", "compressed"},
+                {"raw: Image; compressed: CompressedImage; auto: compressed if the topic's name "
+                 "ends with /compressed"});
+  describeExpertClock(camera.clock, camera.name, fields);
+  fields.integer(key + "bits", camera.bits, config::between(0, 16),
+                 {"used bits of 16-bit images (8 … 16); 0: derived from the brightest pixel so "
+                  "far"});
+}
+
+void describeExpertDetections(DetectionsInput& d, config::Fields& fields) {
+  fields.number("in.detections.other_share", d.other_share, config::between(0.0, 0.9),
+                {"share of the remaining probability of the scores for classes without a score; "
+                 "the rest is clutter"});
+  fields.number("in.detections.box_sigma", d.box_sigma, config::between(0.0, 1.0),
+                {"standard deviation of a box side, relative to the size of the box; 0: unknown"});
   fields.integer("in.detections.strength", d.strength, config::between(0, 1000000),
-                 {"against perdure-inference on the same topic; the highest that lives is heard"});
+                 {"strength compared with perdure-inference on the same topic; the running process "
+                  "with the highest strength is used"});
+}
+
+void describeExpertIn(Config& c, config::Fields& fields) {
+  describeExpertCamera(c.cam0, fields);
+  describeExpertCamera(c.cam1, fields);
+  describeExpertClock(c.imu.clock, "imu", fields);
+  describeExpertClock(c.odometry.clock, "odometry", fields);
+  fields.number("in.odometry.sigma_position", c.odometry.sigma_position, config::positive(),
+                {"standard deviation of the position, if the message has no covariance", "m"});
+  fields.number("in.odometry.sigma_rotation", c.odometry.sigma_rotation, config::positive(),
+                {"standard deviation of the rotation, if the message has no covariance", "rad"});
+  fields.number("in.odometry.jump", c.odometry.jump_m, config::positive(),
+                {"a pose farther from its prediction begins a new frame of reference; the limit "
+                 "increases with speed",
+                 "m"});
+  describeExpertDetections(c.detections, fields);
+  fields.number("in.apart_s", c.apart_s, config::positive(),
+                {"largest difference of arrival − stamp between inputs on one clock; messages "
+                 "beyond it are dropped",
+                 "s"});
+  fields.boolean("in.reliable", c.reliable,
+                 {"request lost messages again; this excludes best-effort drivers"});
 }
 
 }  // namespace
@@ -95,30 +137,12 @@ bool Config::anyInput() const {
 void describe(Config& c, config::Fields& fields) {
   describeRos(c, fields);
   describeOut(c, fields);
-  describeCamera(c.cam0, fields);
-  describeCamera(c.cam1, fields);
-  fields.text("in.imu.topic", c.imu.topic, {"topic of sensor_msgs/Imu; empty: none"});
-  describeClock(c.imu.clock, "imu", fields);
-  fields.text("in.odometry.topic", c.odometry.topic,
-              {"topic of nav_msgs/Odometry, in place of perdure-vio; empty: none"});
-  describeClock(c.odometry.clock, "odometry", fields);
-  fields.number("in.odometry.sigma_position", c.odometry.sigma_position, config::positive(),
-                {"where its covariance says nothing", "m"});
-  fields.number("in.odometry.sigma_rotation", c.odometry.sigma_rotation, config::positive(),
-                {"where its covariance says nothing", "rad"});
-  fields.number(
-      "in.odometry.jump", c.odometry.jump_m, config::positive(),
-      {"a pose so far from where its velocity leads begins a new frame of reference", "m"});
-  describeDetections(c.detections, fields);
-  fields.text("in.rig", c.rig,
-              {"file with cameras or IMU, as `perdure calibrate` writes it; goes before "
-               "CameraInfo and /tf_static"});
-  fields.text("in.body", c.body,
-              {"frame of the body; empty: the IMU's, without one the odometry's child"});
-  fields.number("in.apart_s", c.apart_s, config::positive(),
-                {"stamps of one clock that come so far apart are of two", "s"});
-  fields.boolean("in.reliable", c.reliable,
-                 {"asks that lost messages be sent again; best-effort drivers are then not heard"});
+  describeIn(c, fields);
+  fields.expert(true);
+  fields.integer("out.image_quality", c.image_quality, config::between(1, 100),
+                 {"quality of JPEG in image_raw/compressed; JPEG images are sent unchanged"});
+  describeExpertIn(c, fields);
+  fields.expert(false);
 }
 
 namespace {
