@@ -67,10 +67,10 @@ struct Street : Pair {
     }
     return nullptr;
   }
-  /// A car of the street that was confirmed.
+  /// A confirmed track of the street.
   ObjectBelief seen(const std::string& name = "car") const {
     for (const ObjectBelief& o : objects.back().objects) {
-      if (o.confirmed && o.best().name == name) return o;
+      if (o.confirmed && !o.recalled && o.best().name == name) return o;
     }
     ADD_FAILURE() << "no " << name;
     return objects.back().objects.front();
