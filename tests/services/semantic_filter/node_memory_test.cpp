@@ -2,6 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <deque>
+#include <set>
+#include <utility>
+#include <vector>
 
 #include "services/semantic_filter/object_states.h"
 #include "tests/services/semantic_filter/memory_run.h"
