@@ -60,6 +60,7 @@ struct Pair {
   Predictions predictions;  ///< of the newest frame
   std::vector<std::function<void()>> to_map;
   bool deaf = false;
+  bool precise = false;  ///< the odometry reports increments that are precise to .1 mm a frame
   std::unique_ptr<map_store::Node> map;
   std::uint64_t frame = 0;
   double x = 0.0;
@@ -69,7 +70,7 @@ struct Pair {
   Node filter;
 
   explicit Pair(const Config& config = configWith(kMemory),
-                const std::vector<TrueObject>& street = kStreet)
+                const std::vector<TrueObject>& street = kStreet, bool graph = true)
       : things(street),
         filter(config, makePriors(), 9,
                {.objects =
@@ -79,17 +80,16 @@ struct Pair {
                     },
                 .events = [this](const Event& e) { events.push_back(e); },
                 .predictions = [this](const Predictions& p) { predictions = p; }}) {
-    map = std::make_unique<map_store::Node>(storeIn(folder), 5,
-                                            outputsTo([this](const MapNear& m) {
-                                              filter.onNear(m);
-                                            }));
+    map = std::make_unique<map_store::Node>(
+        storeIn(folder, graph), 5, outputsTo([this](const MapNear& m) { filter.onNear(m); }));
     map->onQuery(helloOf(filter));
     filter.onCalibration(calibrationOf(makeCamera()));
     filter.onModel(makeModelInfo());
   }
 
-  static map_store::Config storeIn(const TemporaryFolder& folder) {
+  static map_store::Config storeIn(const TemporaryFolder& folder, bool graph = true) {
     map_store::Config store;
+    store.graph = graph;
     store.store_path = folder.file("map.sqlite");
     return store;
   }
@@ -110,14 +110,23 @@ struct Pair {
     for (const auto& message : std::exchange(to_map, {})) message();
     if (!deaf) map->tick(stampOf(frame).time.time_since_epoch());
   }
+  /// The pose of the frame, to both.
+  void move() {
+    Odometry odometry = odometryAt(frame, T_W * bodyAt(x));
+    odometry.world = world;
+    if (precise) {
+      odometry.has_increment = frame > 0;
+      odometry.increment_from = frame - 1;
+      odometry.increment_covariance.diagonal() << 1e-14, 1e-14, 1e-14, 1e-8, 1e-8, 1e-8;
+    }
+    if (!deaf) to_map.push_back([this, odometry] { map->onOdometry(odometry); });
+    filter.onOdometry(odometry);
+  }
   /// Drives to `until`, so many metres per frame. What the camera views is detected.
   void driveTo(double until, double step = 0.4) {
     const double way = until > x ? step : -step;
     for (; std::abs(until - x) > 0.5 * step; x += way, ++frame) {
-      Odometry odometry = odometryAt(frame, T_W * bodyAt(x));
-      odometry.world = world;
-      if (!deaf) to_map.push_back([this, odometry] { map->onOdometry(odometry); });
-      filter.onOdometry(odometry);
+      move();
       filter.onDetections(detectionsAt(frame, boxesFrom(bodyAt(x), frame, things)));
       talk();
     }

@@ -2,6 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <deque>
+#include <set>
+#include <utility>
+#include <vector>
 
 #include "services/semantic_filter/object_states.h"
 #include "tests/services/semantic_filter/memory_run.h"
@@ -11,10 +15,17 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace)
 
+/// The graph neither moves what is on the map nor doubts where it is.
+struct PrecisePair : Pair {
+  explicit PrecisePair(bool graph = true) : Pair(configWith(kMemory), kStreet, graph) {
+    precise = true;
+  }
+};
+
 bool sameBits(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 
 TEST(NodeMemory, AFarTrackIsArchivedAndRecalledUnderItsId) {
-  Pair pair;
+  PrecisePair pair;
   pair.driveTo(14);
   const auto street = pair.confirmed();
   ASSERT_EQ(street.size(), 3u);
@@ -34,8 +45,8 @@ TEST(NodeMemory, AFarTrackIsArchivedAndRecalledUnderItsId) {
   EXPECT_EQ(pair.count(EventKind::kBorn), street.size());
 }
 
-TEST(NodeMemory, ABeliefIsRecalledBitForBitAndItsLedgerSaysSo) {
-  Pair pair;
+void expectRecallBitForBit(bool graph) {
+  PrecisePair pair(graph);
   pair.driveTo(14);
   pair.driveTo(100, 2.0);
   const Objects before = pair.objects.back();
@@ -72,8 +83,12 @@ TEST(NodeMemory, ABeliefIsRecalledBitForBitAndItsLedgerSaysSo) {
   EXPECT_NE(pair.filter.belief().tracks[0].pose.product, Matrix6d::Identity());
 }
 
+TEST(NodeMemory, ABeliefIsRecalledBitForBitAndItsLedgerSaysSo) { expectRecallBitForBit(true); }
+
+TEST(NodeMemory, ABeliefIsRecalledBitForBitWithoutAGraphToo) { expectRecallBitForBit(false); }
+
 TEST(NodeMemory, NothingIsArchivedWhileNoMapStoreAnswers) {
-  Pair pair;
+  PrecisePair pair(false);
   pair.deaf = true;
   pair.driveTo(14);
   const auto street = pair.confirmed();
@@ -88,7 +103,7 @@ TEST(NodeMemory, NothingIsArchivedWhileNoMapStoreAnswers) {
 }
 
 TEST(NodeMemory, TheStatesOfArchivedObjectsAreDisposed) {
-  Pair pair;
+  PrecisePair pair;
   pair.driveTo(14);
   pair.driveTo(200, 2.0);
   ObjectStates states;
@@ -98,14 +113,14 @@ TEST(NodeMemory, TheStatesOfArchivedObjectsAreDisposed) {
 }
 
 TEST(NodeMemory, LateDetectionsAcrossAnArchivingGiveThePosteriorOfThoseOnTime) {
-  Pair on_time, late;
+  PrecisePair on_time, late;
   on_time.driveTo(14), late.driveTo(14);
   std::deque<Detections> waiting;
   const auto frames = [&](double until) {
     on_time.driveTo(until, 2.0);
     const double way = until > late.x ? 2.0 : -2.0;
     for (; std::abs(until - late.x) > 1.0; late.x += way, ++late.frame) {
-      late.filter.onOdometry(odometryAt(late.frame, bodyAt(late.x)));
+      late.move();
       waiting.push_back(detectionsAt(late.frame, boxesFrom(bodyAt(late.x), late.frame)));
       if (waiting.size() > 3) late.filter.onDetections(waiting.front()), waiting.pop_front();
       late.talk();
@@ -127,7 +142,7 @@ TEST(NodeMemory, LateDetectionsAcrossAnArchivingGiveThePosteriorOfThoseOnTime) {
 }
 
 TEST(NodeMemory, ANewTrackInThePlaceOfARecalledOneMergesIntoIt) {
-  Pair pair;
+  PrecisePair pair;
   pair.driveTo(14);
   const auto street = pair.confirmed();
   pair.driveTo(200, 2.0);
@@ -150,7 +165,7 @@ TEST(NodeMemory, ANewTrackInThePlaceOfARecalledOneMergesIntoIt) {
 }
 
 TEST(NodeMemory, ARestartedFilterRecallsWhatItsPredecessorArchived) {
-  Pair pair;
+  PrecisePair pair;
   pair.driveTo(14);
   const auto street = pair.confirmed();
   pair.driveTo(200, 2.0);
@@ -185,7 +200,7 @@ TEST(NodeMemory, ARestartedFilterRecallsWhatItsPredecessorArchived) {
 }
 
 TEST(NodeMemory, ARestartedFilterHasTheWorkingSetOfItsPredecessorInItsFirstMessage) {
-  Pair pair;
+  PrecisePair pair;
   pair.driveTo(14);
   std::set<ObjectId> before;
   for (const auto& o : pair.objects.back().objects) before.insert(o.id);

@@ -1,6 +1,15 @@
 // What the map has near, in the filter that receives it. The map is the test.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <deque>
+#include <optional>
+#include <random>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
 #include "services/semantic_filter/core/belief/pose_correlation.h"
 #include "services/semantic_filter/core/belief/track_message.h"
 #include "tests/services/semantic_filter/memory_run.h"
@@ -67,10 +76,10 @@ struct Street : Pair {
     }
     return nullptr;
   }
-  /// A car of the street that was confirmed.
+  /// A confirmed track of the street.
   ObjectBelief seen(const std::string& name = "car") const {
     for (const ObjectBelief& o : objects.back().objects) {
-      if (o.confirmed && o.best().name == name) return o;
+      if (o.confirmed && !o.recalled && o.best().name == name) return o;
     }
     ADD_FAILURE() << "no " << name;
     return objects.back().objects.front();
@@ -282,9 +291,8 @@ TEST(NodeNear, AnUnseenTrackOfAnotherKindLeavesAndTheDetectedOneHasTheId) {
 }
 
 TEST(NodeNear, OfTwoDetectedTracksOfDifferentKindsOneAloneHasTheIdOfTheirObject) {
-  const std::vector<TrueObject> street = {
-      {makeState(18, 3.5, 0.75, 0.1, 4.3, 1.75, 1.5), "car"},
-      {makeState(22, -4.0, 1.05, 3.0, 5.0, 1.9, 2.1), "van"}};
+  const std::vector<TrueObject> street = {{makeState(18, 3.5, 0.75, 0.1, 4.3, 1.75, 1.5), "car"},
+                                          {makeState(22, -4.0, 1.05, 3.0, 5.0, 1.9, 2.1), "van"}};
   Street run(configWith(kMemory), street);
   run.driveTo(14);
   const ObjectId car = run.seen("car").id, van = run.seen("van").id;

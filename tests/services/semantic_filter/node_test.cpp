@@ -392,8 +392,7 @@ TEST(Node, ABoxOfAPartialViewIsNotThatOfARemovedObjectBesideIt) {
 TEST(Node, ARestartedNodeContinuesWithTheSameIds) {
   Harness first;
   drive(first, 0, 20);
-  const MapNear near =
-      nearOf(first.objects.back().objects, first.objects.back().next_id, 77);
+  const MapNear near = nearOf(first.objects.back().objects, first.objects.back().next_id, 77);
   Harness second({}, 77), stranger({}, 78);
   second.node.onNear(near);
   stranger.node.onNear(near);

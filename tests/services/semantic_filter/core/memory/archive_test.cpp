@@ -90,8 +90,7 @@ TEST(Archive, ATrackWaitsUntilTheMapHasAFrameFromWhenItCouldLeave) {
     EXPECT_EQ(memory.kept(), at(14.0)) << "a late message changes nothing";
   }
   memory.onKept(at(16.0));
-  EXPECT_FALSE(
-      memory.leaving(things, Eigen::Vector3d::Zero(), at(18), at(15)).archived.empty());
+  EXPECT_FALSE(memory.leaving(things, Eigen::Vector3d::Zero(), at(18), at(15)).archived.empty());
 }
 
 TEST(Archive, ObjectsComeNearerThanTheyLeave) {

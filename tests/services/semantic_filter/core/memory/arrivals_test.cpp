@@ -3,7 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <memory>
+#include <random>
 #include <set>
+#include <utility>
+#include <vector>
 
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/track_message.h"
@@ -232,8 +236,7 @@ class SteppedAgain {
     arrivals.placed = {known(50, beside), known(60, makeState(-9, 2, 0.75, 0, 4, 1.75, 1.5))};
     arrivals.members = {{1, 50}};
     for (std::size_t k = 0; k < 12; ++k) {
-      HistoryFrame& frame = history_.add(
-          testing::odometryAt(k, testing::driveTo(k, 0.1)), camera_);
+      HistoryFrame& frame = history_.add(testing::odometryAt(k, testing::driveTo(k, 0.1)), camera_);
       frame.input.model = model_;
       if (!late_.contains(k)) frame.input.boxes = boxesAt(frame.input.view, k);
       if (k == 5) history_.arrive(std::make_shared<const Arrivals>(arrivals));
