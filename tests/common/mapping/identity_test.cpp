@@ -143,7 +143,7 @@ TEST(Identity, FactsOfTheFilterStayWhateverLoopsEnd) {
 
 // Records.
 
-constexpr EdgeId kLoop = 50;
+constexpr EdgeId kOneLoop = 50;
 const WorldId kSessions[] = {{1, 0}, {2, 0}};
 
 MapState emptyMap() {
@@ -198,7 +198,7 @@ class JoinedTracks : public ::testing::Test {
     put(2, 20.0);
     put(3, 30.0);
     alone_ = state_;
-    state_.unite({kLoop, 2, 1});
+    state_.unite({kOneLoop, 2, 1});
   }
   /// In the session that is followed.
   ObjectRecord now(double seconds) {
@@ -227,7 +227,7 @@ TEST_F(JoinedTracks, TheRecordOfAnObjectIsThatOfItsNewestTrack) {
 }
 
 TEST_F(JoinedTracks, AreAsBeforeAfterTheRetraction) {
-  state_.removeLoop(kLoop);
+  state_.removeLoop(kOneLoop);
   expectSameRecords(state_, alone_, "both");
 }
 
@@ -237,7 +237,7 @@ TEST_F(JoinedTracks, WhatWasDetectedInBetweenStaysWithItsTrack) {
     const ObjectRecord record = now(40.0);
     for (MapState* state : {&joined, &alone}) state->put(again, record);
     EXPECT_EQ(joined.records().at(1).sighting.in_anchor.id, again);
-    joined.removeLoop(kLoop);
+    joined.removeLoop(kOneLoop);
     expectSameRecords(joined, alone, "detected again: " + std::to_string(again));
   }
 }
@@ -254,10 +254,10 @@ TEST_F(JoinedTracks, ATrackThatEndedEndsItsObjectOnlyWhileItIsTheNewest) {
   again.put(1, now(40.0));
   EXPECT_TRUE(again.records().contains(1)) << "detected since as the other track";
 
-  older.removeLoop(kLoop);
+  older.removeLoop(kOneLoop);
   EXPECT_FALSE(older.records().contains(1));
   expectSame(older.records().at(2), alone_.records().at(2), "the other one is there");
-  newer.removeLoop(kLoop);
+  newer.removeLoop(kOneLoop);
   EXPECT_FALSE(newer.records().contains(2));
   expectSame(newer.records().at(1), alone_.records().at(1), "the other one is there again");
 }
@@ -268,7 +268,7 @@ TEST_F(JoinedTracks, AMergeOfTheFilterOutlivesTheLoop) {
     state->unite({0, 2, 3});
   }
   EXPECT_EQ(state_.identity().objectOf(3), 1u);
-  state_.removeLoop(kLoop);
+  state_.removeLoop(kOneLoop);
   EXPECT_EQ(state_.identity().objectOf(3), 2u);
   expectSameRecords(state_, alone_, "two and three");
 }
@@ -300,14 +300,14 @@ TEST(Records, AreAfterTheRetractionAsTheyWouldBeWithoutTheLoop) {
         both([&](MapState& s) { s.removeLoop(ended); });
       } else if (a != b && isThere(a) && isThere(b)) {
         if (random() % 2 == 0) {
-          state.unite({kLoop, a, b});
+          state.unite({kOneLoop, a, b});
         } else {
           const EdgeId loop = random() % (kLoops + 1);
           both([&](MapState& s) { s.unite({loop, a, b}); });
         }
       }
     }
-    state.removeLoop(kLoop);
+    state.removeLoop(kOneLoop);
     expectSameRecords(state, without, "seed " + std::to_string(seed));
   });
 }

@@ -95,17 +95,21 @@ TEST(OdometryReset, KnownObjectsKeepTheirIds) {
   EXPECT_GT(pair->count(EventKind::kMerged), 0u) << "objects that had new ids meanwhile";
 }
 
-/// A search among the working set of before, in the filter itself, needed 5.6 to 7.6 m.
+/// When the filter itself searched for its working set of before, it needed 9.6, 29.6, 14.4, 21.2,
+/// 17.6 and 19.6 m on these streets.
 TEST(OdometryReset, IdsAreBackAfterAFewMetres) {
-  for (const unsigned seed : {3u, 4u, 5u, 6u}) {
+  const std::vector<unsigned> seeds{3, 4, 5, 6, 7, 8};
+  double sum_m = 0.0;
+  for (const unsigned seed : seeds) {
     const auto pair = onStreet(kMemory, seed);
     pair->driveTo(60);
     const auto before = idsOf(*pair);
     beginAnew(*pair);
-    const double way_m = metresUntilBack(*pair, before, 110.0, 4);
-    std::printf("[ way until four ids are back, seed %u: %.1f m ]\n", seed, way_m);
-    EXPECT_LT(way_m, 10.0) << seed;
+    const double distance_m = metresUntilBack(*pair, before, 110.0, 4);
+    EXPECT_LT(distance_m, 20.0) << seed;
+    sum_m += distance_m;
   }
+  EXPECT_LT(sum_m / static_cast<double>(seeds.size()), 14.0);
 }
 
 TEST(OdometryReset, ArchivedObjectsComeBackIntoTheNewFrameOfReference) {
