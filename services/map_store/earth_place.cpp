@@ -10,7 +10,7 @@
 namespace perdure::map_store {
 namespace {
 
-constexpr double kLongestGap_s = 1.0;  // between two poses around an anchor
+constexpr double kLongestGap_s = 1.0;  // longest gap between the poses before and after an anchor
 constexpr double kFarEnough_m = 100.0;
 
 }  // namespace
