@@ -142,7 +142,7 @@ void describeExpertTracks(Parameters& p, Fields& fields) {
                  {"tracks that are fitted in one frame at most; the others wait"});
 }
 
-/// Keys of earlier versions, by the sentence that refuses them.
+/// Declares keys of earlier versions with the message that refuses them.
 void describeFormer(Fields& fields) {
   using Pairs = std::vector<std::pair<const char*, const char*>>;
   static const Pairs renamed{{"box.sigma_doubt", "box.sigma_weak"},
@@ -173,7 +173,7 @@ void describeFormer(Fields& fields) {
                              {"pose.drift_rotation", "pose.walk_rotation, of all odometry"}};
   for (const auto& [old, now] : renamed) fields.formerly(old, std::string("is now ") + now);
   fields.formerly("context", "is gone: context is no longer laid over the classes; leave it out");
-  // Constants in the rooms' parameters.h.
+  // Former keys that are constants in the rooms' parameters.h now.
   static const Pairs fixed{{"box.tail", "5"},
                            {"box.iterations", "3"},
                            {"box.bias_log_distance", "0.3"},
@@ -228,8 +228,8 @@ void describeFormer(Fields& fields) {
   for (const auto& [old, value] : fixed) {
     fields.formerly(old, std::string("is fixed at ") + value + "; leave it out");
   }
-  for (const char* old : {"alignment.nats", "alignment.margin_nats", "alignment.pairs",
-                          "alignment.known_share"}) {
+  for (const char* old :
+       {"alignment.nats", "alignment.margin_nats", "alignment.pairs", "alignment.known_share"}) {
     fields.formerly(old, "is gone: the map store alone searches for earlier maps; leave it out");
   }
   for (const char* old : {"drift.position", "drift.rotation", "drift.things", "drift.within_m"}) {
