@@ -129,8 +129,8 @@ void Node::onObjects(const Objects& objects) {
 /// Takes the ended tracks that were not in the previous message.
 void Node::takeEnded(const std::vector<EndedTrack>& ended) {
   for (const EndedTrack& each : ended) {
-    if (newest_ &&
-        std::find(newest_->ended.begin(), newest_->ended.end(), each) != newest_->ended.end()) {
+    if (newest_ && std::find(newest_->ended.begin(), newest_->ended.end(), each) !=
+                       newest_->ended.end()) {
       continue;
     }
     const bool merged = each.into != 0;

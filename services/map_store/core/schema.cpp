@@ -121,9 +121,10 @@ Result<void> adopt(const Connection& connection, const Identity& identity) {
   const auto version = connection.integer("PRAGMA user_version");
   if (!version) return tl::unexpected<Reason>(version.error());
   if (*version == kSchemaVersion) return {};  // another process was faster
-  const auto made = connection.execute(
-      std::string(*version < kFirstSchemaWithGraph ? kGraphSchema : "") + kAddedSchema +
-      "PRAGMA user_version=" + std::to_string(kSchemaVersion) + ";");
+  const auto made =
+      connection.execute(std::string(*version < kFirstSchemaWithGraph ? kGraphSchema : "") +
+                         kAddedSchema + "PRAGMA user_version=" + std::to_string(kSchemaVersion) +
+                         ";");
   if (!made) return made;
   return transaction->commit();
 }
