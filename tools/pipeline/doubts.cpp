@@ -5,7 +5,7 @@
 namespace perdure::tools {
 namespace {
 
-/// A message that is due if more than one frame in `frames` has the reason.
+/// A message that is due if more than one frame in `one_of` has the reason.
 struct Doubt {
   const char* code;
   std::uint64_t one_of;

@@ -1,4 +1,4 @@
-// A filter with a map store, connected as by the bus, on a drive along a street.
+// A filter and a map store, connected as by the bus, on a drive along a street.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ inline Config configWith(const MemoryParameters& memory) {
   return config;
 }
 
-/// The body always looks along x. It weaves, which gives parallax.
+/// The body always faces along x. It weaves, which gives parallax.
 inline RigidTransform bodyAt(double x) {
   return RigidTransform(
       Eigen::Quaterniond(Eigen::AngleAxisd(0.05 * std::sin(0.1 * x), Eigen::Vector3d::UnitZ())),
@@ -52,7 +52,7 @@ inline std::vector<Detection> boxesFrom(const RigidTransform& T_WB, std::uint64_
   return list;
 }
 
-/// A filter and a map store, connected as by the bus. A deaf pair exchanges nothing.
+/// A filter and a map store, connected as by the bus. While `deaf`, they exchange nothing.
 struct Pair {
   TemporaryFolder folder;
   std::vector<Objects> objects;
@@ -65,7 +65,7 @@ struct Pair {
   double x = 0.0;
   std::vector<TrueObject> things;
   WorldId world{5, 0};
-  RigidTransform T_W;  ///< the frame of the objects, in that of the odometry
+  RigidTransform T_W;  ///< the frame of the objects in the frame of the odometry
   Node filter;
 
   explicit Pair(const Config& config = configWith(kMemory),
@@ -97,7 +97,7 @@ struct Pair {
     return {[](const MapTile&) {}, [](const MapTile&) {}, [](const MapHeader&) {},
             [](const MapReply&) {}, std::move(near)};
   }
-  /// What a filter asks before its first frame.
+  /// The query of a filter before its first frame.
   static MapQuery helloOf(const Node& filter) {
     MapQuery query;
     query.client = filter.instance();
@@ -110,7 +110,8 @@ struct Pair {
     for (const auto& message : std::exchange(to_map, {})) message();
     if (!deaf) map->tick(stampOf(frame).time.time_since_epoch());
   }
-  /// Drives to `until`, so many metres per frame. What the camera views is detected.
+  /// Drives to `until` in steps of `step` metres per frame. Objects in the camera's view are
+  /// detected.
   void driveTo(double until, double step = 0.4) {
     const double way = until > x ? step : -step;
     for (; std::abs(until - x) > 0.5 * step; x += way, ++frame) {

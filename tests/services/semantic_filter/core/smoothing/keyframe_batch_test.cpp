@@ -11,8 +11,8 @@
 namespace perdure::semantic_filter {
 namespace {
 
-/// A pose error that walks as the body turns and drives on: products of transitions and covariances
-/// at each keyframe, propagated from one to the next.
+/// A pose error that walks while the body turns and moves. Has products of transitions, and
+/// covariances at each keyframe, propagated from one keyframe to the next.
 class Walk {
  public:
   Walk(unsigned seed, double shrinks) : random_(seed) {
@@ -37,7 +37,7 @@ class Walk {
     now = error;
   }
 
-  /// Covariance of keyframe i with an earlier j, from each transition.
+  /// Covariance of keyframe i with an earlier j, from the individual transitions.
   Matrix6d covariance(std::size_t i, std::size_t j) const {
     return errors[i].product * inverse(errors[j].product) * errors[j].covariance;
   }
