@@ -25,7 +25,7 @@ struct Whereabouts {
   bool others_only = false;   ///< search only among objects of other sessions
 
   const Anchor& here() const { return *way.last(); }
-  /// Whether objects detected from the anchor are searched.
+  /// Whether the search includes objects that were detected from the anchor.
   bool asks(AnchorId anchor) const;
   /// Whether the object is of another session, or was not detected within the last `visit_m`
   /// travelled.
@@ -45,8 +45,8 @@ bool isOneVisit(const MapState& state, AnchorId a, AnchorId b, double visit_m);
 /// Transforms the object to M.
 PlacedObject inM(const MapState& state, const Sighting& sighting);
 
-/// The last position before the odometry lost its frame of reference. It supports the search of the
-/// next session.
+/// The last position before the odometry lost its frame of reference. It is a prior for locating
+/// the next session.
 struct LastPlace {
   AnchorId anchor = 0;  ///< newest anchor of the session that ended
   AnchorId begins = 0;  ///< F, the first anchor of the next session

@@ -31,7 +31,7 @@ struct ObjectRecord {
   WorldId session;
   double way_m = 0.0;  ///< distance travelled in the session at its last detection
   TimePoint last_seen;
-  Matrix6d pose_error = Matrix6d::Zero();  ///< of the body at that time, [θ, p]
+  Matrix6d pose_error = Matrix6d::Zero();  ///< the body's pose error at that time, [θ, p]
   Sighting sighting;                       ///< the newest sighting
   std::optional<Sighting> earlier;         ///< on the visit before, if it was detected again
   bool confirmed = false;                  ///< ever confirmed, so it is on the map; others are not
@@ -50,7 +50,7 @@ struct SavedEdge {
   double weight = 1.0;  ///< at the last optimisation, (0, 1]
 };
 
-/// The whole state, or changes that replace what is stored under the same ids.
+/// The whole state, or changes that replace the stored rows of the same ids.
 struct SavedMap {
   std::vector<std::string> classes;  ///< names by the numbers in ClassShare; never only a part
   std::map<AnchorId, SavedAnchor> anchors;

@@ -48,7 +48,7 @@ struct MapHeader {
 /// The pose of W, the odometry's frame of reference, in M, the frame of the whole map. It
 /// compensates the drift near the body. W never jumps; T_MW jumps at loop closures.
 struct MapFrame {
-  FrameStamp stamp;  ///< of the frame whose pose it applies to
+  FrameStamp stamp;  ///< stamp of the frame at which it applies
   InstanceId instance = 0;
   WorldId world;  ///< W
   WorldId map;    ///< M; initially the W of the oldest session that is connected with this one
@@ -128,7 +128,7 @@ struct MapLoop {
   Eigen::Vector4d residual = Eigen::Vector4d::Zero();
   Eigen::Vector4d sigma = Eigen::Vector4d::Zero();  ///< standard deviations of the measurement; all
                                                     ///< 0: not known
-  double chi2 = 0.0;                                ///< of the residual
+  double chi2 = 0.0;                                ///< χ² of the residual
   double weight = 0.0;                              ///< weight in the graph, [0, 1]
   std::vector<MapLoopPair> pairs;                   ///< empty: not known, or none
   std::uint32_t landmarks = 0;                      ///< number of matched landmarks; 0: not known,
@@ -160,12 +160,12 @@ struct Member {
 /// The map's knowledge of the body's surroundings, for one filter. Complete: a later message
 /// replaces it.
 struct MapNear {
-  FrameStamp stamp;  ///< of the newest working set in use
+  FrameStamp stamp;  ///< stamp of the newest working set in use
   InstanceId instance = 0;
   InstanceId client = 0;       ///< the filter that owns the working set or sent kRestore
   WorldId world;               ///< W
   std::uint64_t revision = 0;  ///< grows by one with each message of an instance
-  /// The map has on disk what the client published up to this time; 0: nothing.
+  /// The map has all messages of the client up to this time on disk; 0: none.
   TimePoint kept;
   ObjectId next_id = 1;         ///< smaller ids are in use
   bool corrects_drift = false;  ///< the map's graph receives this odometry

@@ -146,7 +146,7 @@ struct Prediction {
   /// Velocity of the sides x1, y1, x2, y2, in pixels per second, to predict the box in a later
   /// frame.
   std::array<double, 4> velocity{};
-  /// Standard deviation of each side in pixels; 0 if the writer does not know it.
+  /// Standard deviation of each side in pixels; 0: not known.
   std::array<double, 4> side_sigma{};
 };
 struct Predictions {

@@ -120,8 +120,8 @@ void Node::onObjects(const Objects& objects) {
   newest_ = std::move(next);
   dirty_ = true;
   if (graph_) followGraph();
-  constexpr double kStep_m = 20.0 / 3.0;  // the filter keeps objects this much farther than it
-                                          // requests
+  constexpr double kStep_m = 20.0 / 3.0;  // the filter's working set reaches this much farther than
+                                          // its requests
   const bool moved = !near_from_W_ || (newest_->T_WB.p - *near_from_W_).norm() > kStep_m;
   if (moved || !same_filter) sendNear();
 }

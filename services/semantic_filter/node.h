@@ -88,7 +88,7 @@ class Node {
   std::optional<WorldId> world_;
   std::deque<Detections> early_;
   std::optional<MapNear> waiting_near_;  ///< arrived before the first odometry
-  InstanceId near_source_ = 0;           ///< of the newest message in use
+  InstanceId near_source_ = 0;           ///< instance of the newest message in use
   std::uint64_t near_revision_ = 0;
   std::map<TrackId, ObjectId> members_;    ///< as reported by the map
   std::map<TrackId, ObjectId> object_of_;  ///< as published; tracks with their own id are left out

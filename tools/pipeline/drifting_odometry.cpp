@@ -115,9 +115,9 @@ void DriftingOdometry::begin(const RigidTransform& true_T_WB) {
                          Eigen::Vector3d::Zero());
 }
 
-/// The true increment, seen from the body's estimated attitude and multiplied by the scale,
-/// followed by the yaw walk. A rotation about gravity is the same in the body and when it precedes
-/// all rotations of W.
+/// The true increment, in the axes of the estimated attitude and multiplied by the scale; then the
+/// yaw walks. A rotation about gravity is the same in the body and when it precedes all rotations
+/// of W.
 void DriftingOdometry::advance(const RigidTransform& true_T_WB, double seconds) {
   const Eigen::Vector3d true_step = true_T_WB.p - true_T_WB_.p;
   const double walk = config_.yaw_walk * std::sqrt(true_step.norm());

@@ -23,7 +23,7 @@ struct PipelineOptions {
   std::string detections;  ///< model, simulated, recorded, none, or a CSV
   std::string model, class_name;
   std::vector<std::uint32_t> image_size;
-  std::vector<std::string> topics;  ///< of a ROS recording: "cam0=/left/image_raw"
+  std::vector<std::string> topics;  ///< topics of a ROS recording: "cam0=/left/image_raw"
   double box_origin = 0.0;
   bool outline_boxes = false;
   bool landmarks = false;  ///< with given poses: also compute landmarks from the images

@@ -26,7 +26,7 @@ inline constexpr std::int64_t kOutboxTables = 8;
 
 /// The state of an outbox. Each change has a larger number than all earlier ones.
 struct OutboxMark {
-  std::string file;    ///< 32 hexadecimal digits that the file keeps for ever; its copies have the
+  std::string file;    ///< 32 hexadecimal digits that never change; copies of the file have the
                        ///< same digits
   std::string outbox;  ///< 32 digits that change when the outbox restarts after missed changes
   std::int64_t acknowledged = 0;  ///< entries up to this one were removed

@@ -120,7 +120,7 @@ Result<void> adopt(const Connection& connection, const Identity& identity) {
   if (!transaction) return tl::unexpected<Reason>(transaction.error());
   const auto version = connection.integer("PRAGMA user_version");
   if (!version) return tl::unexpected<Reason>(version.error());
-  if (*version == kSchemaVersion) return {};  // another process was faster
+  if (*version == kSchemaVersion) return {};  // another process has upgraded the file already
   const auto made =
       connection.execute(std::string(*version < kFirstSchemaWithGraph ? kGraphSchema : "") +
                          kAddedSchema + "PRAGMA user_version=" + std::to_string(kSchemaVersion) +

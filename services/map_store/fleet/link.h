@@ -45,8 +45,8 @@ class Answer {
  public:
   explicit Answer(pg_result* result) : result_(result) {}
   int rows() const;
-  std::int64_t integer(int row, int column) const;  ///< of a bigint column
-  double real(int row, int column) const;           ///< of a float8 column
+  std::int64_t integer(int row, int column) const;  ///< the value of a bigint column
+  double real(int row, int column) const;           ///< the value of a float8 column
   bool boolean(int row, int column) const;
   std::string text(int row, int column) const;
   std::span<const std::uint8_t> blob(int row, int column) const;

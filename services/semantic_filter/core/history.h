@@ -24,7 +24,7 @@ struct HistoryFrame {
   Belief before;
   bool stepped = false;
   std::shared_ptr<const Arrivals> arrivals = {};  ///< from the map; null: none
-  std::vector<MergeRecord> merges = {};           ///< of its last step
+  std::vector<MergeRecord> merges = {};           ///< merges of its last step
 };
 
 class History {
@@ -39,7 +39,7 @@ class History {
   void beginWorld();
   /// Adds a frame that is newer than all others and not yet stepped. Removes the oldest frame.
   HistoryFrame& add(const Odometry& odometry, std::shared_ptr<const CameraModel> camera);
-  /// The next frame that is stepped for the first time takes these in.
+  /// The next frame that is stepped for the first time takes the arrivals in.
   void arrive(std::shared_ptr<const Arrivals> arrivals) { arrivals_ = std::move(arrivals); }
   /// Steps the newest frame.
   void step();

@@ -1,5 +1,5 @@
-// The other process of the bus tests: publishes what its arguments select until it ends or is
-// killed.
+// The other process of the bus tests. Its arguments select the messages that it publishes until it
+// ends or is killed.
 #include <iostream>
 #include <thread>
 

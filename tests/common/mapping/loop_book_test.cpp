@@ -149,7 +149,7 @@ class WithdrawnLoop : public ::testing::Test {
 
   Drive drive_{{.seed = 2, .yaw_walk = 0.002}}, without_fact_{{.seed = 2, .yaw_walk = 0.002}};
   TrackId known_ = 0, seen_ = 0;
-  ObjectRecord before_;  ///< of the track in sight
+  ObjectRecord before_;  ///< record of the track in view
 };
 
 TEST_F(WithdrawnLoop, IsContradictedByLaterOnesAndTakenOutWithItsFacts) {

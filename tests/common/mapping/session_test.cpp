@@ -215,7 +215,7 @@ TEST_F(TwoParts, ABodyOfTheOlderOneStaysAndWhatItMeetsMoves) {
   Settings on = first(3);
   on.way_m = 420.0;
   Drive drive(on, two_->whole(), two_->archive());
-  // It starts again 180 m further, in the same W.
+  // The session restarts 180 m along the lap, in the same W.
   on.from_m = 180.0;
   on.T_WB = one_->odometry();
   on.noise = 77;

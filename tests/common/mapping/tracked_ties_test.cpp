@@ -107,8 +107,8 @@ TEST(TrackedTies, SayWhereTheBodyIsByDetectionsAlone) {
   const LevelPose x = back.state().graph().pose(back.here());
   const Eigen::Vector3d found = tie->T_Mb.mean.p - x.p;
   EXPECT_LT((found - off).head<2>().norm(), 0.15) << found.transpose();
-  // Five detections of .1 m: the variance is not much smaller than theirs, and must not contain the
-  // prior as information.
+  // The deviation must be close to that of five detections of .1 m alone: the prior does not count
+  // as information.
   const double alone = 0.1 / std::sqrt(5.0);
   EXPECT_GT(planeSigma(tie->T_Mb.covariance), 0.9 * alone);
   EXPECT_LT(planeSigma(tie->T_Mb.covariance), 2.0 * alone);

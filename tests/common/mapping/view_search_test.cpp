@@ -26,7 +26,7 @@ class Marks {
       for (auto& byte : mark.descriptor) byte = static_cast<std::uint8_t>(random_());
       marks_.push_back(mark);
     }
-    if (alike) {  // each side of the lap looks like the first
+    if (alike) {  // each side of the lap resembles the first
       const std::size_t side = marks_.size() / 4;
       for (std::size_t k = side; k < marks_.size(); ++k) {
         marks_[k].descriptor = marks_[k % side].descriptor;

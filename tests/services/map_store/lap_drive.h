@@ -1,4 +1,4 @@
-// A drive around a block with a map store with a graph, for tests of the effects of the graph.
+// A drive around a block, and a map store that has a graph. For tests of the effects of the graph.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@
 namespace perdure::map_store::test {
 
 inline constexpr double kSide_m = 60.0, kLap_m = 4.0 * kSide_m, kReach_m = 25.0;
-inline constexpr double kDrift = 2e-4;  ///< of yaw, rad/m
+inline constexpr double kDrift = 2e-4;  ///< drift of the yaw, rad/m
 inline const WorldId kHere{77, 1};
 
 inline RigidTransform planar(double x, double y, double yaw) {
@@ -60,9 +60,9 @@ inline std::vector<Thing> things(const Path& path = onLap, double length_m = kLa
   return result;
 }
 
-/// A drive around a block with a map store with a graph, and with a simulated filter. The filter
-/// initiates a track for each detected object without one, and follows map/near. Detections are
-/// exact.
+/// A drive around a block, with a map store that has a graph and with a simulated filter. The
+/// filter initiates a track for each detected object without one, and follows map/near. Detections
+/// are exact.
 class LapDrive : public ::testing::Test {
  protected:
   LapDrive() {

@@ -118,8 +118,8 @@ TEST_F(MapStoreNode, GivesANewFilterTheWholeWorkingSetAfterItsOwnRestartToo) {
   }
 }
 
-/// The pose error of a new process begins at zero, so the part that the old pose error explains is
-/// not an error of the objects.
+/// The pose error of a new process begins at zero. The part that the old pose error explains is
+/// therefore not an error of the objects.
 TEST_F(MapStoreNode, AHelloDuringARunGivesAllOfTheFilterBeforeRelativeToTheBody) {
   const auto node = start();
   auto unsure = carAt(2, {1, 0, 0}), moving = carAt(3, {4, 0, 0});
@@ -291,7 +291,7 @@ TEST_F(MapStoreNode, AnObjectThatTheFilterMergedKeepsTheLowestId) {
   ASSERT_EQ(heard_.replies.at(0).objects.size(), 1u);
   EXPECT_EQ(heard_.replies[0].objects[0].id, 1u);
   EXPECT_EQ(heard_.replies[0].objects[0].mean, carAt(2, {1, 0, 0}).best().mean);
-  next = workingSet(3, {});  // and then it ends
+  next = workingSet(3, {});  // the object is gone from here on
   next.ended = {{2, 0, next.stamp.time}};
   node->onObjects(next);
   node->tick(2000ms);

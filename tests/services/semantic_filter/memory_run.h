@@ -57,7 +57,7 @@ struct Pair {
   TemporaryFolder folder;
   std::vector<Objects> objects;
   std::vector<Event> events;
-  Predictions predictions;  ///< of the newest frame
+  Predictions predictions;  ///< predictions of the newest frame
   std::vector<std::function<void()>> to_map;
   bool deaf = false;
   std::unique_ptr<map_store::Node> map;

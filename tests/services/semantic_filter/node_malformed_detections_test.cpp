@@ -121,7 +121,7 @@ std::vector<Attack> attacks() {
             }),
       sound("detections_too_late",
             [](Detections& d) {
-              d.stamp.source = 4711;  // of no frame, with a time in the past
+              d.stamp.source = 4711;  // belongs to no frame; its time is in the past
               d.stamp.time -= std::chrono::seconds(1);
             }),
       {"detections_repeated",

@@ -136,8 +136,8 @@ TEST_F(RealRoom, WhatStandsThereIsOneObjectOfItsClassButForKnownFailures) {
   EXPECT_EQ(judged, 11U);
 }
 
-// Known failure: the bar allows no ghost. A "chair" on the floor in the corner, at (-2.10, 2.94),
-// appears or not if the vertical of the poses' frame changes by a quarter of a degree.
+// Known failure: the bar allows no ghost. A quarter of a degree in the vertical of the poses' frame
+// decides whether a "chair" appears on the floor at (-2.10, 2.94).
 TEST_F(RealRoom, NothingIsTwiceAndAtMostOneThingIsWhereNothingStands) {
   constexpr std::size_t kKnownGhosts = 1;
   const auto things = readRoom();

@@ -20,7 +20,7 @@ extern const char* const kGraphSchema;
 extern const char* const kAddedSchema;
 
 /// The graph in a file. The ends of edges, the anchors of sightings and predecessors of the same
-/// session exist. One anchor of each component is held fast.
+/// session exist. One anchor of each component is fixed.
 struct SavedGraph {
   mapping::SavedMap map;
   /// Number of parts that were left out because they, or parts that they depend on, could not be
@@ -42,8 +42,8 @@ Result<std::set<mapping::SameObject>> readFacts(const Connection& connection);
 /// Writes within the caller's transaction.
 Result<void> writeFacts(const Connection& connection, const mapping::Unsaved& unsaved);
 
-/// Deletes, within the caller's transaction, what readGraph leaves out, because a mapper that
-/// starts from the graph reuses those ids.
+/// Deletes, within the caller's transaction, the rows that readGraph leaves out, because a mapper
+/// that starts from the graph reuses their ids.
 Result<void> sweepGraph(const Connection& connection);
 
 }  // namespace perdure::map_store

@@ -10,8 +10,7 @@ namespace {
 constexpr std::size_t kMostReferences = 20000;  // about 8 MB
 
 /// The map has the track, or will have it with the next commit. A track may be unconfirmed now
-/// because its position relative to the body is too uncertain. It is still worth storing as the map
-/// has it.
+/// because its position relative to the body is too uncertain. Its stored row remains useful.
 bool onTheMap(const Track& track) {
   return track.life.confirmed || (track.life.once_confirmed && track.existence >= 0.5);
 }

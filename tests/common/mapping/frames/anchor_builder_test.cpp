@@ -190,8 +190,8 @@ double meanNees(const Errors& errors) {
   return sum;
 }
 
-constexpr double kBand = 3.3 * 0.0447;  // of the mean of 4,000 draws from χ² with 4 degrees of
-                                        // freedom: √(8 / 4000)
+constexpr double kBand = 3.3 * 0.0447;  // deviation of the mean of 4,000 draws from χ² with 4
+                                        // degrees of freedom: √(8 / 4000)
 
 TEST(AnchorBuilder, TellsTheErrorOfAWalkThatIncrementsDescribe) {
   EXPECT_NEAR(meanNees(Errors(1.0, 0.0, 0.0005, 0.005)), 4.0, kBand);

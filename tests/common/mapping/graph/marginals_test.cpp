@@ -172,8 +172,8 @@ TEST(Marginals, KnowWhatALoopMeasures) {
   const double closed = marginals.to(1)->covariance.trace();
   EXPECT_LT(closed, 3.0 * 0.051 * 0.051);
   EXPECT_GT(closed, 3.0 * 0.04 * 0.04);
-  // The far side of the loop has the largest variance. It is still much smaller than half of the
-  // loop gave before the closure.
+  // The far side of the loop has the largest variance. The loop closure makes it much smaller than
+  // without.
   const double half = marginals.to(30)->covariance.trace();
   EXPECT_GT(half, 10.0 * closed);
   EXPECT_LT(half, 0.5 * Marginals(chain(60), 60).to(30)->covariance.trace());

@@ -29,7 +29,7 @@ class Walk {
       Matrix6d A = Matrix6d::Identity();
       A.topLeftCorner<3, 3>() = rotationAboutZ(0.3 * normal_(random_));
       A.bottomLeftCorner<3, 3>() = 0.2 * skew(Eigen::Vector3d(normal_(random_), 0.5, 0.1));
-      A *= shrinks;  // as corrections of the odometry cause
+      A *= shrinks;  // an effect of odometry corrections
       error.product = (A * error.product).eval();
       error.covariance = (A * error.covariance * A.transpose()).eval();
       error.covariance.diagonal().array() += 1e-5;

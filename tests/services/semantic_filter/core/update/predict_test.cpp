@@ -10,7 +10,7 @@
 namespace perdure::semantic_filter {
 namespace {
 
-/// A camera `metres` along z, looking along z.
+/// A camera `metres` along z that faces along z.
 RigidTransform viewFrom(double metres) {
   RigidTransform T_WC;
   T_WC.p = Eigen::Vector3d(0, 0, metres);
