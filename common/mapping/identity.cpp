@@ -43,7 +43,7 @@ std::vector<SameObject> Identity::factsOf(EdgeId loop) const {
   return result;
 }
 
-/// Union of sets whose root is their lowest track.
+/// Union of sets; the root of each set is its lowest track.
 void Identity::connect() {
   object_of_.clear();
   tracks_of_.clear();

@@ -1,6 +1,6 @@
-// Which tracks are one object. The facts are kept, and the object ids are computed from them: the
-// object id of a track is the lowest id among the tracks that facts connect with it. A fact that
-// rests on a loop closure ends with it; nothing else has to be undone.
+// Which tracks are one object. The facts are stored, and the object ids follow from them. The
+// object id of a track is the lowest id among the tracks that facts connect with it. A fact from a
+// loop closure ends with this loop closure; nothing else must be undone.
 #pragma once
 
 #include <compare>
@@ -15,12 +15,12 @@ namespace perdure::mapping {
 
 /// Two tracks are one object.
 struct SameObject {
-  EdgeId loop = 0;  ///< by which they were found to be one; 0: by the filter, which is final
+  EdgeId loop = 0;  ///< loop closure that shows it; 0: found by the filter, which is final
   TrackId a = 0, b = 0;
   auto operator<=>(const SameObject&) const = default;
 };
 
-/// Two objects became one, or are two again.
+/// Two objects became one, or were separated again.
 struct MergeOrder {
   EdgeId loop = 0;
   ObjectId survivor = 0;  ///< the older one, with the lower id
@@ -35,11 +35,11 @@ class Identity {
   void add(const SameObject& fact);
   /// Ends the facts of a loop closure.
   void endLoop(EdgeId loop);
-  /// Another loop closure takes its place.
+  /// Moves the facts of a loop closure to the one that replaces it.
   void replaceLoop(EdgeId loop, EdgeId by);
 
   ObjectId objectOf(TrackId track) const;
-  /// The tracks of an object that has several, in order; empty for any other.
+  /// The tracks of an object that has several, in order; empty for all other objects.
   const std::vector<TrackId>& tracksOf(ObjectId object) const;
   const std::set<SameObject>& facts() const { return facts_; }
   std::vector<SameObject> factsOf(EdgeId loop) const;

@@ -1,6 +1,5 @@
-// Which loops are told, and which are no longer believed. A loop that the graph does not believe
-// when it is closed waits for others that agree; one that was told and is contradicted later is
-// withdrawn.
+// The states of loop closures. A loop closure that the graph does not accept at once is tentative
+// until others agree with it. An accepted one that is contradicted later is retracted.
 #pragma once
 
 #include <map>
@@ -14,45 +13,46 @@
 
 namespace perdure::mapping {
 
-/// A loop that was closed.
+/// A loop closure.
 struct LoopClosure {
   EdgeId id = 0;
-  AnchorId a = 0, b = 0;  ///< b: where the body was
+  AnchorId a = 0, b = 0;  ///< b: the anchor of the body
   PlaceMatch match;
-  bool joins = false;         ///< a session that belonged to nothing, with the map
-  double correction_m = 0.0;  ///< how far the body's place in M moved
+  bool joins = false;         ///< connects a session without a place to the map
+  double correction_m = 0.0;  ///< change of the body's position in M
 };
 
 class LoopBook {
  public:
   explicit LoopBook(const LoopParameters& parameters) : parameters_(parameters) {}
 
-  /// Another session, or the same one again: loops that wait are given up. Their ids.
+  /// Begins a session, or continues one. Drops tentative loop closures and returns their ids.
   std::vector<EdgeId> begin();
-  /// Closed at `way_m` of the session, not told yet. `before`: the pose of its b in M until then.
+  /// Adds a tentative loop closure at `way_m` of the session. `before`: the earlier pose of its b
+  /// in M.
   void add(LoopClosure loop, const LevelPose& before, double way_m);
   void remove(EdgeId id);
-  /// Whether it was told; so is what an earlier process has left.
+  /// Whether it was reported. True for all loop closures of earlier processes.
   bool isTold(EdgeId id) const;
-  /// How it was found; null where that was before the last start or session. Valid until the next
-  /// call of another function.
+  /// Returns null if it was found before the last start or session. Valid until the next call of
+  /// another function.
   const LoopClosure* closureOf(EdgeId id) const;
 
   struct Verdict {
-    std::vector<LoopClosure> told;  ///< believed, for the first time
-    std::vector<EdgeId> withdrawn;  ///< told before, and contradicted for some way
-    std::vector<EdgeId> given_up;   ///< not believed, and never told
+    std::vector<LoopClosure> told;  ///< accepted for the first time
+    std::vector<EdgeId> withdrawn;  ///< reported, but contradicted for some distance
+    std::vector<EdgeId> given_up;   ///< rejected, and never reported
   };
-  /// After an optimisation, `way_m` on the session's way.
+  /// Call it after an optimisation. `way_m`: distance travelled in the session.
   Verdict judge(const PoseGraph& graph, double way_m);
 
  private:
   struct Entry {
-    std::optional<LoopClosure> loop;  ///< nothing: told in an earlier process
+    std::optional<LoopClosure> loop;  ///< nothing: reported by an earlier process
     LevelPose before;
     double closed_m = 0.0;
     bool told = false;
-    std::optional<double> doubted_m;  ///< on the way, since when it is not believed
+    std::optional<double> doubted_m;  ///< distance travelled when the graph stopped accepting it
   };
 
   LoopParameters parameters_;

@@ -14,10 +14,11 @@
 namespace perdure::mapping {
 namespace {
 
-/// Than from the first anchor of its component no place is known worse than by this factor.
+/// Bound on a place's uncertainty, relative to its uncertainty from the first anchor of its
+/// component.
 constexpr double kFarther = 1.5;
 
-/// As wide as a map of which nothing says where in it the body is.
+/// A prior as wide as the map, for a body whose position on the map is unknown.
 LevelGaussian anywhereOn(const MapIndex& map) {
   LevelGaussian prior;
   prior.mean.p << map.centre(), 0.0;
@@ -41,15 +42,15 @@ const PlacedObject& withId(const std::vector<PlacedObject>& objects, ObjectId id
                        [id](const PlacedObject& o) { return o.id == id; });
 }
 
-/// By how much worse than by the nearest anchor the body is known by this one: so much less is
-/// known of how what both have seen lies to each other.
+/// By how much T_ba is less certain than the transform to the nearest anchor. The relative
+/// positions of the objects near both anchors are uncertain by this amount.
 double varianceBeyond(const LevelGaussian& T_ba, const LevelGaussian& nearest) {
   const double sigma = planeSigma(T_ba.covariance), least = planeSigma(nearest.covariance);
   return std::max(0.0, sigma * sigma - least * least);
 }
 
-/// An edge says how the body lies to the anchors of one visit. What other visits' objects have
-/// moved in the match is how M had these lie to each other, which no object measured.
+/// An edge relates the body to the anchors of one visit. Objects of other visits changed the match
+/// by their relative positions in M, which no object measured. Their part is removed here.
 void restOnOneVisit(LoopSearch::Found& found, const std::vector<PlacedObject>& objects,
                     const std::map<ObjectId, AnchorId>& homes,
                     const std::vector<PlacedObject>& seen, const MapState& state, double visit_m) {
@@ -96,7 +97,7 @@ bool Whereabouts::isOld(const ObjectRecord& record, double visit_m) const {
   return record.session != here().session || std::abs(way.way_m() - record.way_m) > visit_m;
 }
 
-/// Ids of a session's anchors follow each other.
+/// A session's anchors have consecutive ids.
 std::vector<AnchorId> Whereabouts::anchorsOfVisit(double visit_m) const {
   std::vector<AnchorId> ids;
   const auto& all = state.anchors();
@@ -111,7 +112,7 @@ std::vector<AnchorId> Whereabouts::anchorsOfVisit(double visit_m) const {
 
 std::vector<ObjectId> Whereabouts::objectsOfVisit(double visit_m) const {
   std::vector<ObjectId> ids;
-  // An object belongs to the anchor before the place from which it was detected.
+  // An object belongs to the last anchor before the position from which it was detected.
   constexpr double kAnchors_m = 15.0;
   for (const AnchorId anchor : anchorsOfVisit(visit_m + kAnchors_m)) {
     for (const ObjectId id : state.seenFrom(anchor)) {
@@ -155,8 +156,8 @@ std::vector<std::pair<double, AnchorId>> anchorsOfBefore(const Whereabouts& body
   return anchors;
 }
 
-/// What was detected on the way of late, in the body's newest anchor: without what is known to have
-/// been seen before.
+/// Objects that were detected on this visit, in the frame of the body's newest anchor. Leaves out
+/// objects that are known from earlier visits.
 std::vector<PlacedObject> LoopSearch::seenOfLate(const Whereabouts& body) const {
   std::vector<PlacedObject> seen;
   bool fresh = false;
@@ -173,7 +174,7 @@ std::vector<PlacedObject> LoopSearch::seenOfLate(const Whereabouts& body) const 
   return seen;
 }
 
-/// Confirmed objects that were last seen from the anchor before this visit.
+/// Confirmed objects that were last detected from the anchor before this visit.
 std::set<ObjectId> LoopSearch::objectsSeenFrom(AnchorId anchor, const Whereabouts& body) const {
   std::set<ObjectId> ids;
   for (const ObjectId object : body.state.seenFrom(anchor)) {
@@ -229,7 +230,7 @@ std::optional<LoopSearch::Found> LoopSearch::nearby(const Whereabouts& body) con
   return found;
 }
 
-/// Where the body is known well, what is asked is only which object is which.
+/// If the body's position is well known, only the pairs of objects are in question.
 bool LoopSearch::isBelieved(const PlaceMatch& match, double sigma_m) const {
   const LoopParameters& loop = parameters_.loop;
   const bool near = sigma_m < loop.near_m;
@@ -274,7 +275,8 @@ std::optional<LoopSearch::Found> LoopSearch::nearLast(const Whereabouts& body,
   return Found{std::move(*match), home, std::nullopt, kNowhere};
 }
 
-/// Against chance, beyond the number of ways inside the prior, and against the best other way.
+/// Compares the match with chance, given the number of possible poses in the prior, and with the
+/// second-best pose.
 bool LoopSearch::isSureAtOnce(const PlaceMatch& match) const {
   const LoopParameters& loop = parameters_.loop;
   return match.pairs.size() >= loop.least_elsewhere &&
@@ -315,7 +317,7 @@ std::optional<LoopSearch::Found> LoopSearch::elsewhere(const Whereabouts& body) 
   for (const auto& [component, other] : others_) {
     auto match = bestMatch(seen, *other.index, anywhereOn(*other.index), parameters_.place);
     if (!match) continue;
-    // Another component is another way to lay it.
+    // a match in another component is an alternative pose
     if (best) {
       match->next = std::max(match->next, best->match.score);
       best->match.next = std::max(best->match.next, match->score);

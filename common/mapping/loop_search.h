@@ -1,5 +1,5 @@
-// Looks for the body among the objects of earlier visits and of other sessions, and says which are
-// what it sees.
+// Searches for the body's position among objects of earlier visits and other sessions. Finds which
+// of them the body detects now.
 #pragma once
 
 #include <map>
@@ -16,48 +16,49 @@
 
 namespace perdure::mapping {
 
-/// Where the body is, and what has been asked of it.
+/// The position of the body, and the objects to search among.
 struct Whereabouts {
   const MapState& state;
   const AnchorBuilder& way;
-  const Marginals& relative;  ///< to the body's newest anchor
+  const Marginals& relative;  ///< transforms relative to the body's newest anchor
   double deviation_m = 0.0;   ///< in the plane, from the first anchor of its component
-  bool others_only = false;   ///< asked is what other sessions have seen
+  bool others_only = false;   ///< search only among objects of other sessions
 
   const Anchor& here() const { return *way.last(); }
-  /// Whether what was seen from the anchor is asked.
+  /// Whether the search includes objects that were detected from the anchor.
   bool asks(AnchorId anchor) const;
-  /// Of another session, or not detected within `visit_m` of way.
+  /// Whether the object is of another session, or was not detected within the last `visit_m`
+  /// travelled.
   bool isOld(const ObjectRecord& record, double visit_m) const;
-  /// Anchors of the session within so much way, in order.
+  /// Anchors of the session within this distance travelled, in order.
   std::vector<AnchorId> anchorsOfVisit(double visit_m) const;
-  /// Objects that were detected within so much way, by id.
+  /// Objects that were detected within this distance travelled, by id.
   std::vector<ObjectId> objectsOfVisit(double visit_m) const;
 };
 
-/// What is known of an object from before this visit; nothing if it is new.
+/// The last sighting of an object before this visit; nothing if the object is new.
 const Sighting* sightingOfBefore(const ObjectRecord& record, const Whereabouts& body,
                                  double visit_m);
-/// Whether a body set both anchors on one way of less than visit_m. How the anchors of two visits
-/// lie to each other is not measured by objects of both.
+/// Whether both anchors are of one session, less than visit_m of travel apart. No object measured
+/// the relative pose of anchors of different visits.
 bool isOneVisit(const MapState& state, AnchorId a, AnchorId b, double visit_m);
-/// The object in M.
+/// Transforms the object to M.
 PlacedObject inM(const MapState& state, const Sighting& sighting);
 
-/// Where the body was when the odometry lost its frame of reference, for the search of a session
-/// that begins after that.
+/// The last position before the odometry lost its frame of reference. It is a prior for locating
+/// the next session.
 struct LastPlace {
-  AnchorId anchor = 0;  ///< the newest one of the session that ended
-  AnchorId begins = 0;  ///< F, the first one of the session that follows
-  LevelGaussian T_MF;   ///< in the M of the component of `anchor`; the yaw is not known
+  AnchorId anchor = 0;  ///< newest anchor of the session that ended
+  AnchorId begins = 0;  ///< F, the first anchor of the next session
+  LevelGaussian T_MF;   ///< in the M of the component of `anchor`; the yaw is unknown
 };
 
-/// T_Mb as an anchor sees it: the anchor's own error in M does not count.
+/// T_Mb relative to an anchor, without the anchor's own error in M.
 LevelGaussian bodyByGraph(const Whereabouts& body, const LevelGaussian& T_ba);
 
-/// Anchors of earlier visits, nearest first, with their distance in the plane, as far as the body
-/// may be off. How far that is, is asked of the first anchor of its component: nearer ones are
-/// known better.
+/// Anchors of earlier visits within the body's uncertainty, nearest first, with their distance in
+/// the plane. The uncertainty is that from the first anchor of the component, because nearer
+/// anchors are better known.
 std::vector<std::pair<double, AnchorId>> anchorsOfBefore(const Whereabouts& body,
                                                          const Parameters& parameters);
 
@@ -66,20 +67,21 @@ class LoopSearch {
   explicit LoopSearch(const Parameters& parameters) : parameters_(parameters) {}
 
   struct Found {
-    PlaceMatch match;                    ///< T_MB in the M of the component that it is found in
-    AnchorId home = 0;                   ///< to which most of the known objects belong
-    std::optional<LevelGaussian> prior;  ///< by odometry and graph; nothing: it was nowhere known
+    PlaceMatch match;                    ///< T_MB in the M of the component of the match
+    AnchorId home = 0;                   ///< the anchor of most of the known objects
+    std::optional<LevelGaussian> prior;  ///< by odometry and graph; nothing: no prior position
     double sigma_m = 0.0;                ///< deviation of the prior in the plane
   };
 
-  /// Among what hangs together with the body by the graph. Returns what is believed.
+  /// Searches the part of the map that is connected with the body. Returns a match that is
+  /// accepted.
   std::optional<Found> nearby(const Whereabouts& body) const;
-  /// In the components of the graph that the body's session does not hang together with.
+  /// Searches the components of the graph that are not connected with the body's session.
   std::optional<Found> elsewhere(const Whereabouts& body);
-  /// In the component of the session that ended, around the place where it ended. Returns a match
+  /// Searches the component of the session that ended, around its last position. Returns a match
   /// that needs no second search.
   std::optional<Found> nearLast(const Whereabouts& body, const LastPlace& last) const;
-  /// The graph or the objects of other components have changed.
+  /// Call it if the graph or the objects of other components have changed.
   void forget() { others_.clear(); }
 
  private:
@@ -88,7 +90,7 @@ class LoopSearch {
     std::vector<PlacedObject> objects;
     std::map<ObjectId, AnchorId> homes;
     std::vector<Eigen::Vector2d> driven;
-    std::optional<LevelGaussian> nearest;  ///< T_ba of its nearest place
+    std::optional<LevelGaussian> nearest;  ///< T_ba of the nearest anchor
   };
   Around mapAround(const Whereabouts& body) const;
   std::set<ObjectId> objectsSeenFrom(AnchorId anchor, const Whereabouts& body) const;

@@ -17,7 +17,7 @@ MapState::MapState(const GraphParameters& parameters, SavedMap saved)
   for (std::size_t k = 0; k < saved.classes.size(); ++k) {
     class_numbers_[saved.classes[k]] = static_cast<std::uint32_t>(k);
   }
-  // Loops first: they keep their ids.
+  // Loop closures come first, because they have fixed ids.
   for (const auto& [id, edge] : saved.edges) {
     if (edge.edge.kind == EdgeKind::kOdometry) continue;
     graph_.restore(id, edge.edge, edge.weight);
@@ -159,7 +159,7 @@ void MapState::erase(TrackId id) {
   combine(identity_.objectOf(id));
 }
 
-/// Clocks of sessions do not compare.
+/// The clocks of different sessions cannot be compared.
 bool MapState::isNewer(const ObjectRecord& a, const ObjectRecord& b) const {
   if (a.session != b.session && (a.session == session_ || b.session == session_)) {
     return a.session == session_;
@@ -167,8 +167,8 @@ bool MapState::isNewer(const ObjectRecord& a, const ObjectRecord& b) const {
   return a.last_seen >= b.last_seen;
 }
 
-/// The newest track decides whether the object is there, and where. What was seen of it before is
-/// of the same track, or of the newest other one.
+/// The newest track decides whether the object exists, and its position. `earlier` is of the same
+/// track, or of the newest other one.
 std::optional<ObjectRecord> MapState::combined(ObjectId object) const {
   const ObjectRecord *newest = nullptr, *before = nullptr;
   bool confirmed = false;
@@ -208,7 +208,7 @@ void MapState::endFactsOf(EdgeId loop) {
   regroup(before);
 }
 
-/// All tracks of the objects of both.
+/// All tracks of the objects of tracks a and b.
 MapState::Groups MapState::groupsOf(TrackId a, TrackId b) const {
   Groups groups;
   for (const TrackId track : {a, b}) {
@@ -219,7 +219,7 @@ MapState::Groups MapState::groupsOf(TrackId a, TrackId b) const {
   return groups;
 }
 
-/// Moves records between tracks and objects where a track shares its object now, or no longer.
+/// Moves the records of tracks that begin or cease to share an object.
 void MapState::regroup(const Groups& before) {
   std::map<ObjectId, std::size_t> sizes;
   std::set<ObjectId> objects;
@@ -282,7 +282,7 @@ Unsaved MapState::unsaved() const {
     const ObjectRecord& record = records_.at(id);
     if (record.confirmed) result.changed.records[id] = record;
   }
-  // One that was begun again under its id is gone until it is confirmed.
+  // An object that restarted under its id does not exist on the map until it is confirmed.
   for (const ObjectId id : erased_) {
     if (!result.changed.records.contains(id)) result.records_gone.insert(id);
   }

@@ -1,6 +1,6 @@
-// What the mapper knows: anchors, the graph over them, which tracks are one object, and from where
-// each object was seen. Records of objects that have several tracks are computed from those of the
-// tracks. Keeps book of what has changed since it was saved.
+// The state of the mapper: anchors, their graph, which tracks are one object, and the anchors from
+// which objects were detected. Records of objects with several tracks are computed from those of
+// the tracks. Records all changes since it was last saved.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ class MapState {
   std::uint32_t numberOf(const std::string& class_name);
 
   AnchorId nextAnchor() const { return anchors_.empty() ? 1 : anchors_.rbegin()->first + 1; }
-  /// Its increment's covariance as it is to count.
+  /// The covariance of the anchor's increment must be scaled already.
   void add(const Anchor& anchor);
   const std::map<AnchorId, Anchor>& anchors() const { return anchors_; }
   /// The newest anchor of a session.
@@ -29,46 +29,46 @@ class MapState {
 
   const PoseGraph& graph() const { return graph_; }
   EdgeId addLoop(const Edge& edge) { return graph_.add(edge); }
-  /// Ends the facts that rest on it, too.
+  /// Also ends the facts that depend on it.
   void removeLoop(EdgeId id);
   void scaleOdometry(double factor, const WorldId& session);
   void optimise() { (void)graph_.optimise(); }
-  /// Moves a component as one: T_MA = T_MN T_NA.
+  /// Moves a component as a whole: T_MA = T_MN T_NA.
   void move(const std::set<AnchorId>& anchors, const LevelPose& T_MN);
 
-  /// What an anchor looks like; empty where no landmark was seen.
+  /// The view from an anchor; empty if no landmark was observed.
   const View& viewFrom(AnchorId id) const;
   void putView(AnchorId id, View view);
 
-  /// Of objects. `earlier` of an object that has several tracks may be of another track than
-  /// `sighting`: the id in `in_anchor` names it.
+  /// Records by object. If an object has several tracks, `earlier` and `sighting` may be of
+  /// different tracks; the id in `in_anchor` names the track.
   const std::map<ObjectId, ObjectRecord>& records() const { return records_; }
-  /// Null: the track is not known.
+  /// Returns null if the track is unknown.
   const ObjectRecord* recordOfTrack(TrackId id) const;
   void put(TrackId id, ObjectRecord record);
-  /// The object of the track has ended, as far as this track is concerned.
+  /// The object has ended, according to this track.
   void end(TrackId id);
-  /// The track was merged into another one: it leaves no record.
+  /// The track was merged into another one. Removes its record.
   void erase(TrackId id);
-  /// The session whose records count as newer than any other's.
+  /// Records of this session count as newer than those of any other.
   void follow(const WorldId& session) { session_ = session; }
   bool isNewer(const ObjectRecord& a, const ObjectRecord& b) const;
   const std::set<ObjectId>& unconfirmed() const { return unconfirmed_; }
-  /// Objects that were seen from an anchor, on the newest visit or on the one before.
+  /// Objects that were detected from an anchor, on the newest visit or on the one before.
   const std::set<ObjectId>& seenFrom(AnchorId id) const;
 
   const Identity& identity() const { return identity_; }
   void unite(const SameObject& fact);
-  /// The facts that rest on a loop closure rest on another one.
+  /// Moves the facts of a loop closure to another one.
   void replaceLoop(EdgeId loop, EdgeId by) { identity_.replaceLoop(loop, by); }
-  /// Tracks whose object has changed since markSaved(), or that share it now, or no longer.
+  /// Tracks whose object has changed since markSaved(), or that have begun or ceased to share it.
   const std::set<TrackId>& regrouped() const { return regrouped_; }
 
   Unsaved unsaved() const;
   void markSaved();
 
  private:
-  /// As it was saved last.
+  /// The state at the last save.
   struct Kept {
     LevelPose T_MA;
     double scale2 = 1.0;
@@ -80,7 +80,7 @@ class MapState {
   std::optional<ObjectRecord> combined(ObjectId object) const;
   void combine(ObjectId object);
   void endFactsOf(EdgeId loop);
-  /// Tracks, each with its object.
+  /// The object of each track.
   using Groups = std::map<TrackId, ObjectId>;
   Groups groupsOf(TrackId a, TrackId b) const;
   void regroup(const Groups& before);
@@ -90,14 +90,14 @@ class MapState {
   PoseGraph graph_;
   std::map<AnchorId, Anchor> anchors_;
   std::map<ObjectId, ObjectRecord> records_;
-  std::map<TrackId, ObjectRecord> tracks_;  ///< of objects that have several
+  std::map<TrackId, ObjectRecord> tracks_;  ///< records of tracks that share an object
   Identity identity_;
   WorldId session_;
   std::map<AnchorId, std::set<ObjectId>> seen_from_;
   std::set<ObjectId> unconfirmed_;
   std::map<std::string, std::uint32_t> class_numbers_;
   std::map<AnchorId, Kept> saved_anchors_;
-  std::map<EdgeId, double> saved_edges_;  ///< weights of loops
+  std::map<EdgeId, double> saved_edges_;  ///< weights of loop closures at the last save
   std::set<ObjectId> touched_, erased_;
   std::set<TrackId> tracks_touched_, tracks_erased_, regrouped_;
   std::set<SameObject> saved_facts_;

@@ -13,7 +13,7 @@
 namespace perdure::mapping {
 namespace {
 
-constexpr double kOverlap_m = 3.0;  // of way, that the views of two anchors share
+constexpr double kOverlap_m = 3.0;  // overlap of the views of two anchors, along the trajectory
 
 }  // namespace
 
@@ -27,7 +27,8 @@ Mapper::Mapper(const Parameters& parameters, SavedMap saved)
       loop_book_(parameters.loop),
       drift_scale_(parameters.drift_scale) {}
 
-/// The body has moved on since by what its speed and the gap allow.
+/// Records the last position. The body may have moved since then, as far as its speed and the gap
+/// allow.
 void Mapper::rememberLastPlace(const Odometry& next) {
   constexpr double kAtRest_m = 2.0, kLeastSpeed = 1.0, kLongest_s = 60.0;
   const auto before = std::exchange(newest_odometry_, std::nullopt);
@@ -39,7 +40,7 @@ void Mapper::rememberLastPlace(const Odometry& next) {
             kAtRest_m + gap_s * std::max(kLeastSpeed, before->speed)};
 }
 
-/// Where the session began. The yaw of this W in M is not known.
+/// The position at which the session began. The yaw of this W in M is unknown.
 std::optional<LastPlace> Mapper::lastPlace() const {
   constexpr double kTurns_rad = 10.0, kFarthest_m = 150.0;
   if (!ended_ || ended_->begins == 0 || builder_.way_m() > kFarthest_m) return std::nullopt;
@@ -50,7 +51,7 @@ std::optional<LastPlace> Mapper::lastPlace() const {
   return last;
 }
 
-/// Of a session that is known already it goes on from its newest anchor.
+/// A session that is already known continues from its newest anchor.
 void Mapper::begin(const Odometry& odometry) {
   rememberLastPlace(odometry);
   session_ = odometry.world;
@@ -69,14 +70,15 @@ void Mapper::begin(const Odometry& odometry) {
   tracked_ties_.begin();
 }
 
-/// Those that took the place of accepted ones stay, because object ids rest on them.
+/// Tentative loop closures that replaced accepted ones remain, because object ids depend on them.
 void Mapper::dropTentativeLoops() {
   for (const EdgeId id : loop_book_.begin()) {
     if (state_.identity().factsOf(id).empty()) state_.removeLoop(id);
   }
 }
 
-/// How far a session's odometry errs is learned anew; what was learned of it stays until then.
+/// Restarts learning the scale of the session's odometry errors. The learned scale stays in use
+/// until then.
 void Mapper::learnAnew(const WorldId& session) {
   drift_scale_ = DriftScale(parameters_.drift_scale);
   const auto last = state_.newestOf(session);
@@ -104,7 +106,7 @@ void Mapper::replay(const WorldId& session) {
   learnAnew(session);
   tracked_ties_.begin();
   searched_elsewhere_at_m_ = -parameters_.loop.elsewhere_each_m;
-  learned_at_m_ = std::numeric_limits<double>::infinity();  // it was learned when it was driven
+  learned_at_m_ = std::numeric_limits<double>::infinity();  // it was learned during the drive
   loop_search_.forget();
   replays_ = true;
   for (const AnchorId id : way) {
@@ -122,7 +124,7 @@ void Mapper::onOdometry(const Odometry& odometry) {
   const auto before = builder_.last();
   auto anchor = builder_.add(odometry, state_.nextAnchor());
   if (!anchor) return;
-  if (before) {  // what was seen from there until now
+  if (before) {  // objects and landmarks observed from that anchor until now
     state_.putView(before->id,
                    view_builder_.viewFrom(before->T_WA, builder_.way_m(),
                                           builder_.way_m() - before->way_m + kOverlap_m));
@@ -145,7 +147,7 @@ bool Mapper::isOld(const ObjectRecord& record) const {
          std::abs(builder_.way_m() - record.way_m) > parameters_.loop.visit_m;
 }
 
-/// Given the pose: what the pose error explains of the covariance is not the object's.
+/// The object given the pose: the part of its covariance that the pose error explains is removed.
 PlacedObject Mapper::placedOf(const ObjectBelief& belief, const Matrix6d& pose_error) {
   const ClassBelief& best = belief.best();
   PlacedObject o;
@@ -207,7 +209,7 @@ void Mapper::onObjects(const Objects& objects) {
                           known->session != *session_;
     if (seen_now) see(belief, objects);
   }
-  // A body that lost its place and stands still may learn it by more objects alone.
+  // A body that lost its position and does not move can be located by additional objects.
   const bool more = ended_ && seen_ > searched_with_;
   if (!more && builder_.way_m() - searched_at_m_ < parameters_.loop.search_each_m) return;
   searched_at_m_ = builder_.way_m();
@@ -217,7 +219,7 @@ void Mapper::onObjects(const Objects& objects) {
   search();
 }
 
-/// Of earlier visits.
+/// Removes unconfirmed objects of earlier visits.
 void Mapper::forgetUnconfirmed() {
   std::vector<ObjectId> old;
   for (const ObjectId id : state_.unconfirmed()) {
@@ -268,7 +270,7 @@ std::vector<Recallable> Mapper::near(const Eigen::Vector3d& centre_W, double rad
   if (!builder_.last()) return result;
   const Anchor& here = *builder_.last();
   const Eigen::Vector3d centre_M = state_.graph().pose(here.id) * (here.T_WA.inverse() * centre_W);
-  constexpr double kSeenWithin_m = 60.0;  // of the anchor from which an object was seen
+  constexpr double kSeenWithin_m = 60.0;  // largest distance of an object from its anchor
   for (const auto& [anchor, pose] : state_.graph().poses()) {
     if ((pose.p - centre_M).norm() > radius_m + kSeenWithin_m) continue;
     std::optional<Recallable> of_anchor;
@@ -307,7 +309,7 @@ const ObjectRecord* Mapper::recordOf(ObjectId id) const {
 
 bool Mapper::holds(ObjectId id) const { return recordOf(id) != nullptr; }
 
-/// How what belongs to anchor `a` is laid beside `here`; nothing where that is not known well.
+/// The relative pose of anchor `a` to `here`; nothing if it is too uncertain.
 std::optional<Recallable> Mapper::relativeTo(const Anchor& here, const Anchor& a) {
   const auto T_ba = marginals().to(a.id);
   const LoopParameters& loop = parameters_.loop;

@@ -1,8 +1,8 @@
-// The map as one map: anchors along the way, the pose graph over them, the objects that belong to
-// them, and the loops that are found by objects. It hears odometry and the working set, and says
-// where objects of earlier visits lie now, which of them are one, and how W lies in M.
+// The map: anchors along the trajectory, their pose graph, the objects that belong to them, and
+// loop closures. Inputs are odometry and the working set. Outputs are the present positions of
+// objects of earlier visits, the tracks that are one object, and the pose of W in M.
 //
-// No files, threads or clock. The same messages in the same order give the same map.
+// It uses no files, threads or clock. The same messages in the same order give the same map.
 #pragma once
 
 #include <cstddef>
@@ -29,113 +29,117 @@
 
 namespace perdure::mapping {
 
-/// A loop that was told, and that later ones contradict.
+/// An accepted loop closure that later ones contradict.
 struct LoopWithdrawal {
   EdgeId id = 0;
   AnchorId a = 0, b = 0;
-  Edge edge;                                              ///< as it was
-  std::vector<std::pair<ObjectId, ObjectId>> pairs = {};  ///< that it found to be one: known, seen
-  std::size_t points = 0;                                 ///< landmarks by which it was found
+  Edge edge;                                              ///< at the time of its removal
+  std::vector<std::pair<ObjectId, ObjectId>> pairs = {};  ///< objects that it identified: known,
+                                                          ///< seen
+  std::size_t points = 0;                                 ///< number of landmarks that support it
 };
 
-/// What has changed since it was asked for last.
+/// Changes since the last call of takeChange.
 struct MapChange {
   std::vector<LoopClosure> loops;
-  std::vector<SameObject> facts;   ///< of these loops: a was known, b was seen as new
-  std::vector<MergeOrder> merges;  ///< the objects that have become one by them
+  std::vector<SameObject> facts;   ///< from these loop closures; a was known, b was detected as new
+  std::vector<MergeOrder> merges;  ///< objects that became one by the facts
   std::vector<LoopWithdrawal> withdrawn;
-  std::vector<MergeOrder> splits;  ///< the objects that are two again
+  std::vector<MergeOrder> splits;  ///< objects that were separated again
 
   bool empty() const { return loops.empty() && withdrawn.empty(); }
 };
 
-/// An object of the map that lies near the body.
+/// A map object near the body.
 struct Recallable {
   ObjectId id = 0;
-  TrackId track = 0;  ///< under which it was detected last
-  /// Maps what is stored of it in its session's W into today's W; nothing: it is in today's W, and
-  /// its relation to the body is the odometry's own.
+  TrackId track = 0;  ///< its id when it was last detected
+  /// Maps the stored belief from its session's W into the present W. Nothing: the belief is in the
+  /// present W, and odometry alone relates it to the body.
   std::optional<RigidTransform> T_now;
-  /// Of the error of T_now: [δp, δyaw] in W, turning about `about_W`.
+  /// Error of T_now: [δp, δyaw] in W, with rotations about `about_W`.
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
-  Eigen::Vector3d about_W = Eigen::Vector3d::Zero();  ///< the object's anchor
-  Matrix6d pose_error = Matrix6d::Zero();             ///< of the body when it was last detected
+  Eigen::Vector3d about_W = Eigen::Vector3d::Zero();  ///< position of the object's anchor
+  Matrix6d pose_error = Matrix6d::Zero();             ///< pose error of the body when it last
+                                                      ///< detected the object
 };
 
 class Mapper {
  public:
-  /// `saved`: what was known at the last end.
+  /// `saved`: the state at the end of the last process.
   explicit Mapper(const Parameters& parameters, SavedMap saved = {});
 
-  /// Poses come before the working set of the same frame.
+  /// Must precede the working set of the same frame.
   void onOdometry(const Odometry& odometry);
   void onObjects(const Objects& objects);
-  /// What the places of the way look like. May be left out: then objects alone say where it is.
+  /// Landmarks show the appearance of places. Without them, only objects locate the body.
   void onLandmarks(const Landmarks& landmarks);
-  /// The filter has merged two confirmed tracks, or has deleted one.
+  /// The filter has merged two confirmed tracks, or deleted one.
   void onMerged(TrackId survivor, TrackId absorbed);
   void onGone(TrackId id);
-  /// Drives along a saved session again and looks for its places among what other sessions have
-  /// seen, with what was seen a little later, too. For maps that are brought together. Afterwards
-  /// the mapper stands at its end.
+  /// Repeats a saved session and searches for its places on the maps of other sessions, also with
+  /// later observations. Used when maps are combined. Afterwards the mapper is at the end of the
+  /// session.
   void replay(const WorldId& session);
   MapChange takeChange() { return std::exchange(change_, {}); }
 
-  /// Whether it hears the odometry of this frame of reference.
+  /// Whether it receives the odometry of this frame of reference.
   bool follows(const WorldId& world) const { return session_ == world && builder_.last(); }
 
-  /// Objects within radius_m of a place in W whose place relative to the body is known well enough
-  /// to be taken for what is seen there.
+  /// Objects within radius_m of a position in W. Only objects are returned whose position relative
+  /// to the body is certain enough to match them with detections.
   std::vector<Recallable> near(const Eigen::Vector3d& centre_W, double radius_m);
-  /// The same of one track as it was detected last; nothing if its place is not known well enough.
+  /// The same for one track as last detected; nothing if its position is too uncertain.
   std::optional<Recallable> placeOf(TrackId track);
 
   /// Whether the object belongs to an anchor.
   bool holds(ObjectId id) const;
-  /// Its record, if it belongs to one.
+  /// The record of the object; null if it does not belong to an anchor.
   const ObjectRecord* recordOf(ObjectId id) const;
 
   const Identity& identity() const { return state_.identity(); }
-  /// Tracks whose object has changed since markSaved(), or that share it now, or no longer.
+  /// Tracks whose object has changed since markSaved(), or that have begun or ceased to share it.
   const std::set<TrackId>& regrouped() const { return state_.regrouped(); }
 
-  /// What is to be saved, and that it has been.
+  /// unsaved() returns the changes to save. Call markSaved() once they are saved.
   Unsaved unsaved() const { return state_.unsaved(); }
   void markSaved() { state_.markSaved(); }
 
-  /// How today's W lies in M beside the body.
+  /// The pose of the present W in M, near the body.
   RigidTransform T_MW() const;
-  /// All of that frame: nothing before the first pose.
+  /// Details of that transform; nothing before the first pose.
   struct Frame {
     WorldId map;  ///< M: W of the first session of the component
     RigidTransform T_MW;
-    Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();  ///< of the body in M, [δp, δyaw]
-    std::uint32_t sessions = 0;                            ///< of the component
-    std::uint32_t loops = 0;                               ///< believed, of all
+    Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();  ///< covariance of the body's pose in M,
+                                                           ///< [δp, δyaw]
+    std::uint32_t sessions = 0;                            ///< number of sessions in the component
+    std::uint32_t loops = 0;                               ///< number of accepted loop closures on
+                                                           ///< the whole map
   };
   std::optional<Frame> frame();
-  /// The same along the way of a session, at each anchor.
+  /// The same transform along a session, at each anchor.
   struct Along {
     TimePoint time;
     RigidTransform T_MW;
   };
   std::vector<Along> along(const WorldId& session) const;
 
-  /// A loop or tie that is in the graph.
+  /// A loop closure or tie in the graph.
   struct Loop {
     EdgeId id = 0;
     Edge edge;
     double weight = 1.0;
-    bool told = false;  ///< a loop waits until the graph believes it; a tie is never told
-    std::vector<std::pair<ObjectId, ObjectId>> pairs = {};  ///< known, seen; empty: not known
+    bool told = false;  ///< false while it is tentative; always false for a tie
+    std::vector<std::pair<ObjectId, ObjectId>> pairs = {};  ///< known, seen; empty: unknown
     std::size_t points = 0;
   };
   std::vector<Loop> loops() const;
-  /// Of every anchor as Marginals::variances has it; nothing without anchors.
+  /// Variances of every anchor, as in Marginals::variances; empty without anchors.
   std::map<AnchorId, Eigen::Vector4d> variances();
-  /// How many objects of the map were last seen from an anchor.
+  /// Number of map objects that were last detected from an anchor.
   std::size_t objectsOf(AnchorId anchor) const;
-  /// The newest anchor of a session; of any session where that has none.
+  /// The newest anchor of a session; if it has none, of any session.
   std::optional<AnchorId> newestAnchor(const WorldId& session) const;
 
   const PoseGraph& graph() const { return state_.graph(); }
@@ -183,28 +187,30 @@ class Mapper {
   TrackedTies tracked_ties_;
   LoopBook loop_book_;
   DriftScale drift_scale_;
-  double odometry_variance_ = 1.0;  ///< by which the session's odometry edges are multiplied
+  double odometry_variance_ = 1.0;  ///< factor on the covariances of the session's odometry edges
   std::optional<WorldId> session_;
-  std::unique_ptr<Marginals> marginals_;  ///< from the newest anchor
+  std::unique_ptr<Marginals> marginals_;  ///< relative to the newest anchor
   MapChange change_;
-  /// The newest loop. One that rests on the same objects takes its place.
+  /// The newest loop closure. A later one with the same objects replaces it.
   struct ActiveLoop {
     EdgeId id = 0;
     std::set<std::pair<ObjectId, ObjectId>> pairs;
   };
   std::optional<ActiveLoop> active_;
-  /// Where a session that belongs to nothing lies by one search.
+  /// The pose of an unlocated session by one search.
   struct Tentative {
     LevelPose T_MN;
     AnchorId component = 0;
     double way_m = 0.0;
   };
   std::optional<Tentative> tentative_;
-  /// Where the session before ended, until this one is connected with it.
+  /// The end of the previous session, until this session is connected with it.
   struct Ended {
-    AnchorId anchor = 0, begins = 0;  ///< its newest one, and the first one of this session
-    LevelPose T_AB;                   ///< the body beside its newest anchor
-    double sigma_m = 0.0;             ///< of the place at which this session begins
+    AnchorId anchor = 0, begins = 0;  ///< newest anchor of the previous session, and first one of
+                                      ///< this session
+    LevelPose T_AB;                   ///< pose of the body relative to that anchor
+    double sigma_m = 0.0;             ///< standard deviation of the position where this session
+                                      ///< begins
   };
   std::optional<Ended> ended_;
   struct Moment {
@@ -213,8 +219,9 @@ class Mapper {
   };
   std::optional<Moment> newest_odometry_;
   bool replays_ = false;
-  AnchorId looked_from_ = 0;  ///< the anchor whose view was searched last
-  std::size_t seen_ = 0, searched_with_ = 0;  ///< objects of the session; those at the last search
+  AnchorId looked_from_ = 0;                  ///< the anchor whose view was searched last
+  std::size_t seen_ = 0, searched_with_ = 0;  ///< number of objects of the session, now and at the
+                                              ///< last search
   double searched_at_m_ = 0.0, searched_elsewhere_at_m_ = 0.0, learned_at_m_ = 0.0;
   std::uint64_t revision_ = 0;
 };

@@ -1,4 +1,4 @@
-// Loops: searched, closed, told, withdrawn.
+// Loop closures of the mapper: search, acceptance and retraction.
 #include <algorithm>
 #include <cmath>
 
@@ -16,7 +16,7 @@ std::set<std::pair<ObjectId, ObjectId>> pairsOf(const PlaceMatch& match) {
 
 }  // namespace
 
-/// By objects seen again under their old ids.
+/// Adds edges from objects that were detected again under their old ids.
 void Mapper::tie() {
   const auto tie = tracked_ties_.find(body());
   if (!tie) return;
@@ -25,7 +25,7 @@ void Mapper::tie() {
   const double chi2 = state_.graph().chi2(edge);
   state_.addLoop(edge);
   marginals_.reset();
-  constexpr double kAgrees = 4.0;  // the next solve takes it along
+  constexpr double kAgrees = 4.0;  // the next optimisation includes it
   if (chi2 > kAgrees) graphMoved();
 }
 
@@ -41,7 +41,7 @@ void Mapper::graphMoved() {
 void Mapper::settle() {
   const LoopBook::Verdict verdict = loop_book_.judge(state_.graph(), builder_.way_m());
   for (const EdgeId id : verdict.given_up) {
-    if (!state_.identity().factsOf(id).empty()) {  // it took the place of an accepted one
+    if (!state_.identity().factsOf(id).empty()) {  // it replaced an accepted one
       withdraw(id);
       continue;
     }
@@ -89,7 +89,7 @@ void Mapper::withdraw(EdgeId loop) {
   if (active_ && active_->id == loop) active_.reset();
 }
 
-/// What is seen now, in the newest anchor; a stored view where the way is driven along again.
+/// The present view, in the newest anchor. A replayed session uses the stored view.
 View Mapper::viewOfNow() const {
   constexpr double kBack_m = 15.0;
   const Anchor& here = *builder_.last();
@@ -97,7 +97,7 @@ View Mapper::viewOfNow() const {
   return view_builder_.viewFrom(here.T_WA, builder_.way_m(), kBack_m);
 }
 
-/// By objects; where these say nothing, by what the place looks like, once for each anchor.
+/// Searches by objects. If they give no match, searches by appearance, once for each anchor.
 std::optional<LoopSearch::Found> Mapper::searchNearby(const Whereabouts& here, bool new_view) {
   auto found = loop_search_.nearby(here);
   if (found && view_search_.contradicts(*found, here, viewOfNow())) return std::nullopt;
@@ -119,8 +119,7 @@ std::optional<LoopSearch::Found> Mapper::searchElsewhere(const Whereabouts& here
   return found && isAgreedOn(*found) ? found : std::nullopt;
 }
 
-/// By way of its own map first; then, more rarely, in the parts of the map that it does not hang
-/// together with.
+/// Searches the connected part of the map first. Searches the other components less often.
 void Mapper::search() {
   const Whereabouts here = body();
   const AnchorId newest = builder_.last()->id;
@@ -145,7 +144,7 @@ void Mapper::learnDrift(const PlaceMatch& match, const LevelGaussian& prior) {
   odometry_variance_ = variance;
 }
 
-/// In streets that are alike one search may find the wrong one. The next one sees more objects.
+/// In similar streets one search may find the wrong street. A second search uses more objects.
 bool Mapper::isAgreedOn(const LoopSearch::Found& found) {
   constexpr double kSame_m = 3.0, kSame_rad = 0.1;
   const LevelPose T_Nb = state_.graph().pose(builder_.last()->id);
@@ -188,7 +187,7 @@ void Mapper::close(const LoopSearch::Found& found) {
   graphMoved();
 }
 
-/// Moves the younger of two components to where the edge says that it lies in the older one's M.
+/// Moves the younger of two components into the older one's M, as the edge determines.
 void Mapper::bringTogether(const Edge& edge) {
   const auto components = componentsOf(state_.graph());
   const bool b_is_younger = components.at(edge.b) > components.at(edge.a);
@@ -203,7 +202,7 @@ void Mapper::bringTogether(const Edge& edge) {
   state_.move(moving, b_is_younger ? T_MN : T_MN.inverse());
 }
 
-/// The measured T_Mb as an edge. What M says of a is not a part of its error.
+/// Converts the measured T_Mb to an edge. The error of a in M is not a part of the edge's error.
 Edge Mapper::edgeFrom(AnchorId a, AnchorId b, const LevelGaussian& T_Mb, EdgeKind kind) const {
   Edge edge{a, b, {}, kind};
   const LevelPose T_Ma = state_.graph().pose(a);

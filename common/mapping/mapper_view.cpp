@@ -1,11 +1,11 @@
-// What people see of the graph.
+// Read access to the graph, for display.
 #include <algorithm>
 
 #include "common/mapping/mapper.h"
 
 namespace perdure::mapping {
 
-/// By what a loop was found; of one of an earlier process by the facts that rest on it.
+/// Sets the evidence of a loop closure. For one of an earlier process, its facts are the evidence.
 void Mapper::putWitnesses(EdgeId loop, std::vector<std::pair<ObjectId, ObjectId>>& pairs,
                           std::size_t& points) const {
   if (const LoopClosure* closure = loop_book_.closureOf(loop)) {

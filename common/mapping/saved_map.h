@@ -1,6 +1,6 @@
-// What of the map outlives the process, beside the objects themselves: anchors, edges, and where
-// each object was seen from. `Mapper` says what has changed; the store keeps it in the transaction
-// in which it keeps the objects, and gives all of it back at the next start, bit for bit.
+// The part of the map that outlives the process, besides the objects: anchors, edges, and the
+// sightings of each object. `Mapper` reports the changes. The store commits them in the same
+// transaction as the objects, and returns them bit by bit at the next start.
 #pragma once
 
 #include <cstdint>
@@ -20,44 +20,45 @@
 
 namespace perdure::mapping {
 
-/// An object as it was seen on one visit, in the axes of an anchor.
+/// An object as detected on one visit, in the axes of an anchor.
 struct Sighting {
   AnchorId anchor = 0;
   PlacedObject in_anchor;
 };
 
-/// What the mapper knows of a track, or of an object by all of its tracks.
+/// The record of a track, or of an object from all of its tracks.
 struct ObjectRecord {
   WorldId session;
-  double way_m = 0.0;  ///< of the session when it was last detected
+  double way_m = 0.0;  ///< distance travelled in the session at its last detection
   TimePoint last_seen;
-  Matrix6d pose_error = Matrix6d::Zero();  ///< of the body then, [θ, p]
-  Sighting sighting;                       ///< the newest
-  std::optional<Sighting> earlier;         ///< of the visit before, if it came back
-  bool confirmed = false;                  ///< once: it is on the map. Others are not saved
-  bool gone = false;                       ///< of a track alone: its object has ended
+  Matrix6d pose_error = Matrix6d::Zero();  ///< the body's pose error at that time, [θ, p]
+  Sighting sighting;                       ///< the newest sighting
+  std::optional<Sighting> earlier;         ///< on the visit before, if it was detected again
+  bool confirmed = false;                  ///< ever confirmed, so it is on the map; others are not
+                                           ///< saved
+  bool gone = false;                       ///< for a track only: its object has ended
 };
 
 struct SavedAnchor {
   Anchor anchor;
-  LevelPose T_MA;          ///< as the graph has it
-  bool held_fast = false;  ///< the first one of its component
+  LevelPose T_MA;          ///< by the graph
+  bool held_fast = false;  ///< whether it is the fixed anchor of its component
 };
 
 struct SavedEdge {
-  Edge edge;            ///< its covariance as it counts, learned scale included
-  double weight = 1.0;  ///< of the last optimisation, (0, 1]
+  Edge edge;            ///< its covariance includes the learned scale
+  double weight = 1.0;  ///< at the last optimisation, (0, 1]
 };
 
-/// All of it, or what has changed and replaces what is stored under the same ids.
+/// The whole state, or changes that replace the stored rows of the same ids.
 struct SavedMap {
-  std::vector<std::string> classes;  ///< names by the numbers in ClassShare; always all of them
+  std::vector<std::string> classes;  ///< names by the numbers in ClassShare; never only a part
   std::map<AnchorId, SavedAnchor> anchors;
   std::map<EdgeId, SavedEdge> edges;
-  std::map<ObjectId, ObjectRecord> records;     ///< of objects
-  std::map<TrackId, ObjectRecord> tracks = {};  ///< of objects that have several tracks
+  std::map<ObjectId, ObjectRecord> records;     ///< records by object
+  std::map<TrackId, ObjectRecord> tracks = {};  ///< records of tracks that share an object
   std::set<SameObject> facts = {};
-  std::map<AnchorId, View> views = {};        ///< what anchors look like, where landmarks were seen
+  std::map<AnchorId, View> views = {};  ///< views from anchors with landmarks
 };
 
 struct Unsaved {

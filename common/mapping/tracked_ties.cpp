@@ -86,7 +86,7 @@ std::optional<TrackedTies::Tie> TrackedTies::find(const Whereabouts& body) const
   const Eigen::Vector4d step = equationsAt(x, pairs).stepNear(inverseSymmetric(by_graph.covariance),
                                                               Eigen::Vector4d::Zero());
   tie.T_Mb.mean = {x.p + step.head<3>(), wrapAngle(x.yaw + step[3])};
-  // At this pose the residuals contain the errors of detections only, without the drift.
+  // At this pose the residuals contain the errors of detections, but not the drift.
   tie.T_Mb.covariance = equationsAt(tie.T_Mb.mean, pairs).covariance();
   if (planeSigma(tie.T_Mb.covariance) > loop.tracked_gain * laid_m) return std::nullopt;
   return tie;

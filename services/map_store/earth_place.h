@@ -1,5 +1,5 @@
-// Where on Earth the map lies: of a place that a receiver of satellites gave, and of the pose
-// there.
+// The position of the map on Earth, from the position of a satellite receiver and the pose of the
+// body at that time.
 #pragma once
 
 #include <functional>
@@ -12,24 +12,24 @@
 
 namespace perdure::map_store {
 
-/// "LATITUDE LONGITUDE HEIGHT YAW" of M's origin: degrees of WGS 84, metres over the ellipsoid, and
-/// degrees of its x axis from east, as `perdure map export --anchor` and `store.earth_anchor` have
-/// them. `T_MB`: where the body was at the anchor's time.
+/// "LATITUDE LONGITUDE HEIGHT YAW" of M's origin: degrees of WGS 84, metres above the ellipsoid,
+/// and degrees of M's x axis from east. `perdure map export --anchor` and `store.earth_anchor` use
+/// the same format. `T_MB`: the body's pose at the anchor's time.
 std::string earthAnchorOfMap(const GeoAnchor& anchor, const RigidTransform& T_MB);
 
-/// Waits for the pose at the time of the newest anchor. Single-threaded.
+/// Waits for the pose at the time of the newest anchor. Not thread-safe.
 class EarthPlace {
  public:
-  /// How W lay in M when the body was at a time of it, as is known today; nothing: it does not lie
-  /// in the map's M yet.
+  /// The pose of W in M at a time of the body, by today's graph; nothing if W is not yet located in
+  /// the map's M.
   using FrameAt = std::function<std::optional<RigidTransform>(TimePoint)>;
 
-  /// Of each calibration; one with another anchor than the last begins the wait.
+  /// Call it for each calibration. A new anchor restarts the wait.
   void onCalibration(const Calibration& calibration);
   void onOdometry(const Odometry& odometry);
-  /// The time of the newest anchor that a pose is known of.
+  /// The time of the newest anchor whose pose is known.
   std::optional<TimePoint> known() const;
-  /// earthAnchorOfMap() of that anchor, where its pose is of `world`; else nothing.
+  /// earthAnchorOfMap() of that anchor if its pose is in `world`; else nothing.
   std::optional<std::string> ofMap(const WorldId& world, const FrameAt& T_MW) const;
 
  private:
@@ -43,7 +43,7 @@ class EarthPlace {
     Pose pose;
   };
   std::optional<GeoAnchor> awaited_;
-  std::optional<TimePoint> heard_;  ///< of the last anchor
+  std::optional<TimePoint> heard_;  ///< time of the last anchor
   std::optional<Pose> last_;
   std::optional<Known> known_;
 };

@@ -14,8 +14,8 @@ namespace {
 using namespace perdure;
 namespace topics = bus::topics;
 
-/// The fleet's server: it gets each commit, and the log and Health say how that goes. Does nothing
-/// where `store.url` names none.
+/// The fleet's server: it receives each commit, and the log and Health report the progress. Does
+/// nothing if `store.url` is empty.
 class FleetServer {
  public:
   explicit FleetServer(const map_store::Config& config) {
@@ -31,7 +31,7 @@ class FleetServer {
     const auto progress = replicator_->progress();
     for (const auto& [code, count] : progress.reasons.all()) counts.add(code, count);
   }
-  /// The trouble, or nothing. Each kind is logged once, and its end.
+  /// Returns the failure, or nothing. Logs the begin and the end of each kind of failure once.
   std::string tell(spdlog::logger& log) {
     if (!replicator_) return {};
     const auto progress = replicator_->progress();
@@ -44,7 +44,8 @@ class FleetServer {
     failing_ = progress.failing;
     return progress.trouble;
   }
-  /// The last commit, where the server takes it at once; the rest goes after the next start.
+  /// Sends the last commit if the server accepts it at once; otherwise it is sent after the next
+  /// start.
   void finish() {
     if (!replicator_) return;
     constexpr std::chrono::milliseconds kLastWords{300};

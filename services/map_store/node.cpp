@@ -41,7 +41,7 @@ std::string faultOf(const MapQuery& query) {
 
 namespace {
 
-/// With the ids of tracks in place of those of objects.
+/// Replaces object ids by track ids.
 Objects byTrack(Objects objects) {
   for (ObjectBelief& belief : objects.objects) {
     belief.id = belief.trackId();
@@ -107,7 +107,7 @@ void Node::onObjects(const Objects& objects) {
   }
   Objects next = byTrack(objects);
   for (const auto& belief : next.objects) {
-    // A place that the graph gave, and that was not seen since, is not a new observation.
+    // A position from the graph without a detection since then is not a new observation.
     if (!belief.recalled) placed_.erase(belief.id);
   }
   std::erase_if(next.objects, [this](const ObjectBelief& b) { return !acceptable(b); });
@@ -115,17 +115,18 @@ void Node::onObjects(const Objects& objects) {
   leaveBehind(next);
   if (!same_filter || newest_->world != next.world) client_since_ = next.stamp.time;
   if (newest_ && !same_filter) previous_ = std::move(newest_);
-  // The filter whose ids these are knows the next one; another one may not have been restored yet.
+  // The filter that gave these ids has the next id. Another filter may not be restored yet.
   next_id_ = same_filter ? next.next_id : std::max(next_id_, next.next_id);
   newest_ = std::move(next);
   dirty_ = true;
   if (graph_) followGraph();
-  constexpr double kStep_m = 20.0 / 3.0;  // the filter keeps this much more than it asks for
+  constexpr double kStep_m = 20.0 / 3.0;  // the filter's working set reaches this much farther than
+                                          // its requests
   const bool moved = !near_from_W_ || (newest_->T_WB.p - *near_from_W_).norm() > kStep_m;
   if (moved || !same_filter) sendNear();
 }
 
-/// What was not in the message before.
+/// Takes the ended tracks that were not in the previous message.
 void Node::takeEnded(const std::vector<EndedTrack>& ended) {
   for (const EndedTrack& each : ended) {
     if (newest_ && std::find(newest_->ended.begin(), newest_->ended.end(), each) !=
@@ -138,7 +139,7 @@ void Node::takeEnded(const std::vector<EndedTrack>& ended) {
   }
 }
 
-/// Confirmed objects that `next` no longer holds: their last belief may not have been written.
+/// Confirmed objects that `next` does not contain: their last beliefs may not be stored.
 void Node::leaveBehind(const Objects& next) {
   std::set<ObjectId> alive;
   for (const auto& belief : next.objects) alive.insert(belief.id);
@@ -146,7 +147,7 @@ void Node::leaveBehind(const Objects& next) {
   if (!newest_) return;
   for (auto& belief : newest_->objects) {
     if (alive.contains(belief.id)) continue;
-    const bool as_it_was = placed_.erase(belief.id) > 0;  // it left without being seen
+    const bool as_it_was = placed_.erase(belief.id) > 0;  // it left without a detection
     if (belief.confirmed && !as_it_was) left_[belief.id] = {newest_->world, belief};
   }
 }
@@ -171,7 +172,7 @@ void Node::flush() {
 }
 
 void Node::commit() {
-  if (!newest_) {  // only events so far: they wait for a working set
+  if (!newest_) {  // only events so far: they need a working set first
     dirty_ = false;
     return;
   }
@@ -184,7 +185,7 @@ void Node::commit() {
                                         mapper_.regrouped(), acknowledged_, earth.text});
   if (!written) {
     blame(written.error());
-    return;  // still dirty: it is tried again
+    return;  // still marked as changed: the next tick tries again
   }
   mapper_.markSaved();
   if (written->unsound > 0) reasons_.add("graph_unsound", written->unsound);

@@ -1,5 +1,5 @@
-// Long-term memory: keeps what semantic_filter confirmed, publishes it as tiles, answers questions,
-// and gives a filter that starts anew its working set back (the paper's "semantic map").
+// Long-term memory: stores confirmed objects of semantic_filter, publishes them as tiles and
+// answers queries. A filter that restarts gets its working set back (the paper's "semantic map").
 #pragma once
 
 #include <algorithm>
@@ -25,20 +25,20 @@
 
 namespace perdure::map_store {
 
-/// Ids that a restored filter leaves out, because the last ones given may not have been written.
+/// Number of ids that a restored filter skips, because the last ids in use may not be stored.
 inline constexpr ObjectId kIdReserve = 4096;
 
-/// Nothing, or why the query cannot be answered.
+/// Returns why the query cannot be answered; empty if it can.
 std::string faultOf(const MapQuery& query);
 
 struct Outputs {
   Sink<MapTile> tile;
-  Sink<MapTile> emptied;  ///< a key to dispose of
+  Sink<MapTile> emptied;  ///< only the key is valid: to be disposed of
   Sink<MapHeader> header;
   Sink<MapReply> reply;
   Sink<MapNear> near;
   Sink<MapFrame> frame = [](const MapFrame&) {};
-  Sink<Event> event = [](const Event&) {};  ///< of the graph
+  Sink<Event> event = [](const Event&) {};  ///< events of the graph
 };
 
 class Node {
@@ -50,27 +50,27 @@ class Node {
 
   void onObjects(const Objects& objects);
   void onOdometry(const Odometry& odometry);
-  /// What it says of the vehicle's place on Earth is kept with the map.
+  /// The vehicle's position on Earth in it is stored with the map.
   void onCalibration(const Calibration& calibration) { earth_.onCalibration(calibration); }
   void onLandmarks(const Landmarks& landmarks);
   void onQuery(const MapQuery& query);
-  /// Commits and publishes what is due. `now`: a monotonic time since any origin; call it ten
-  /// times a second or more often.
+  /// Commits and publishes changes that are due. `now`: a monotonic time with any origin. Must be
+  /// called at least ten times a second.
   void tick(Duration now);
-  /// A server has what the outbox holds up to this entry: the next commit takes it away.
+  /// A server has the outbox's entries up to this one; the next commit removes them.
   void onAcknowledged(std::int64_t number) { acknowledged_ = std::max(acknowledged_, number); }
-  /// Commits what is left. Call it before the end.
+  /// Commits the remaining changes. Must be called before the end.
   void flush();
 
   const ReasonCounts& reasons() const { return reasons_; }
   const mapping::Mapper& mapper() const { return mapper_; }
-  /// What a person should know: a sentence with the mend, or nothing.
+  /// A sentence with the fix for the user, or nothing.
   std::string trouble() const { return failure_.empty() ? notice_ : failure_; }
   std::uint64_t received() const { return received_; }
   std::uint64_t commits() const { return commits_; }
 
  private:
-  // In node_graph.cpp.
+  // These are in node_graph.cpp.
   void loadGraph();
   void loadFacts();
   void followGraph();
@@ -78,7 +78,7 @@ class Node {
   void reportFrame();
   void reportWithdrawals(const mapping::MapChange& change);
   struct NewEarth {
-    std::string text;  ///< empty: as it is stored
+    std::string text;  ///< empty: not changed
     std::pair<std::uint64_t, TimePoint> of{};
   };
   NewEarth newEarthAnchor();
@@ -90,14 +90,14 @@ class Node {
   MapReply answer(const MapQuery& query);
   MapReply emptyReply(const MapQuery& query) const;
   void answerGraph(const MapQuery& query);  ///< in node_graph.cpp
-  // In node_view.cpp.
+  // These are in node_view.cpp.
   bool loadView();
   void followView(const std::vector<ObjectId>& changed);
   void publish();
   bool publishSquare(const Square& square, const std::vector<ObjectId>& ids);
   Result<Found> find(const MapQuery& query);
 
-  // In node_near.cpp.
+  // These are in node_near.cpp.
   void sendNear();
   void restore(const MapQuery& query);
   const Objects* workingSetFor(const MapQuery& query) const;
@@ -115,35 +115,36 @@ class Node {
   MapDatabase database_;
   mapping::Mapper mapper_;
   EarthPlace earth_;
-  bool earth_stored_ = false;  ///< by another process: it stays
+  bool earth_stored_ = false;  ///< written by another process; not overwritten
   std::optional<std::pair<std::uint64_t, TimePoint>>
-      told_earth_;      ///< revision of the graph, known()
-  bool graph_ = false;  ///< it is on, and what is stored of it was read
+      told_earth_;      ///< revision of the graph and known(), at the last write
+  bool graph_ = false;  ///< whether the graph is enabled and its stored state was read
   ReplyCache replies_;
   TileBook tiles_;
   MapInM view_;                      ///< as of the last commit
-  std::uint64_t view_revision_ = 0;  ///< of the graph
+  std::uint64_t view_revision_ = 0;  ///< revision of the graph
   std::size_t view_anchors_ = 0;
-  std::map<Square, std::vector<ObjectId>> stale_squares_;  ///< to be published
-  std::optional<Objects> newest_;    ///< as received, or as loaded, by the ids of tracks
-  std::optional<Objects> previous_;  ///< the last one of the filter before this one
-  TimePoint client_since_;           ///< of the first one of this filter in this W
+  std::map<Square, std::vector<ObjectId>> stale_squares_;  ///< squares to publish
+  std::optional<Objects> newest_;    ///< as received or loaded, with track ids
+  std::optional<Objects> previous_;  ///< the last one of the previous filter
+  TimePoint client_since_;           ///< time of this filter's first message in this W
   std::map<TrackId, PlacedBelief> left_;
   std::map<TrackId, Removal> removed_;
   struct Given {
-    std::uint64_t graph = 0;  ///< revision by which it was placed
+    std::uint64_t graph = 0;  ///< revision of the graph that placed it
     std::uint64_t near = 0;   ///< revision of the message
   };
-  std::map<TrackId, Given> placed_;  ///< given to the filter, and not detected since
+  std::map<TrackId, Given> placed_;  ///< tracks that were given to the filter and not detected
+                                     ///< since
   struct Join {
     TrackId seen = 0;
-    std::uint64_t near = 0;  ///< revision of the first message that gave it; 0: none yet
+    std::uint64_t near = 0;  ///< revision of the first message that gave it; 0: not given yet
   };
-  /// By a known track: the track that was seen as new, with which the filter is to fuse it.
+  /// Key: a known track. Value: a new track of the same object, which the filter must fuse with it.
   std::map<TrackId, Join> joins_;
   std::uint64_t near_revision_ = 0;
-  std::optional<MapNear> near_;                ///< as sent last
-  std::optional<Eigen::Vector3d> near_from_W_;  ///< where the body was then
+  std::optional<MapNear> near_;                 ///< as last sent
+  std::optional<Eigen::Vector3d> near_from_W_;  ///< position of the body at that time
   struct ReportedFrame {
     WorldId world;
     std::uint64_t revision = 0;
@@ -151,12 +152,12 @@ class Node {
     bool operator==(const ReportedFrame&) const = default;
   };
   std::optional<ReportedFrame> reported_frame_;
-  std::deque<mapping::LoopWithdrawal> withdrawn_;  ///< the newest, for who asks for the graph
+  std::deque<mapping::LoopWithdrawal> withdrawn_;  ///< the newest ones, for queries about the graph
   ObjectId next_id_ = 1;
-  InstanceId kept_of_ = 0;  ///< the filter whose working set is on the disk
-  TimePoint kept_;          ///< of its newest frame there
+  InstanceId kept_of_ = 0;  ///< the filter whose working set is on disk
+  TimePoint kept_;          ///< time of its newest frame on disk
   std::uint64_t revision_ = 0;
-  std::int64_t acknowledged_ = 0;  ///< of the outbox, not yet taken away
+  std::int64_t acknowledged_ = 0;  ///< entries of the outbox up to this one are to be removed
   bool dirty_ = false, published_once_ = false, header_stale_ = false;
   std::optional<Duration> committed_at_, published_at_;
   ReasonCounts reasons_;

@@ -1,4 +1,4 @@
-// What the map's graph does to what is stored: it is loaded, followed, and told.
+// The graph of the map in the node: loading, updates, events and queries.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,9 +12,9 @@ namespace perdure::map_store {
 namespace {
 
 constexpr std::size_t kMostWithdrawn = 256;
-constexpr std::size_t kMostNamed = 8;  // objects, in the words of an event
+constexpr std::size_t kMostNamed = 8;  // largest number of objects in the text of an event
 
-/// By what a loop was found, for people.
+/// The evidence of a loop closure, as text for users.
 std::string witnessesOf(const mapping::PlaceMatch& match) {
   if (match.pairs.empty()) return fmt::format("{} landmarks that look alike", match.points);
   std::string names = fmt::format("{} objects (", match.pairs.size());
@@ -28,7 +28,7 @@ std::string witnessesOf(const mapping::PlaceMatch& match) {
 
 void Node::loadGraph() {
   auto saved = database_.takeGraph();
-  if (!saved) {  // a new graph would be written over it
+  if (!saved) {  // a new graph would overwrite it
     notice_ =
         "The map's graph cannot be read (" + saved.error().detail +
         "); objects are kept without it. Restart map_store once the disk of store.path is well.";
@@ -38,8 +38,8 @@ void Node::loadGraph() {
   if (saved->malformed > 0) reasons_.add("graph_malformed", saved->malformed);
   mapper_ = mapping::Mapper(config_.mapping, std::move(saved->map));
   if (!newest_) return;
-  // Beliefs that the graph had placed when the map was written last are in the working set alone:
-  // the stored one, in the W of its session, is another belief.
+  // If the graph placed a belief before the last write, the position is in the working set only.
+  // The stored belief is in the W of its session and differs.
   for (const ObjectBelief& belief : newest_->objects) {
     if (!belief.recalled) continue;
     const auto stored = database_.reader().beliefOf(belief.id);
@@ -48,7 +48,7 @@ void Node::loadGraph() {
   }
 }
 
-/// Object ids without a graph.
+/// Loads object ids without a graph.
 void Node::loadFacts() {
   auto facts = database_.reader().facts();
   if (!facts) return blame(facts.error());
@@ -62,7 +62,7 @@ void Node::onOdometry(const Odometry& odometry) {
   if (graph_) mapper_.onOdometry(odometry);
 }
 
-/// Where on Earth M lies, where that has changed since it was written last; else empty.
+/// The position of M on Earth if it has changed since the last write; else empty.
 Node::NewEarth Node::newEarthAnchor() {
   const auto known = earth_.known();
   if (!known || earth_stored_ || told_earth_ == std::pair(mapper_.revision(), *known)) return {};
@@ -70,7 +70,7 @@ Node::NewEarth Node::newEarthAnchor() {
   const mapping::MapFrames frames(mapper_.graph(), mapper_.anchors());
   const auto place = earth_.ofMap(world, [&](TimePoint time) -> std::optional<RigidTransform> {
     const auto anchor = frames.anchorOf(nullptr, world, time);
-    const bool alone = mapper_.anchors().empty();  // without a graph W is M
+    const bool alone = mapper_.anchors().empty();  // without a graph, W is M
     const auto frame = frames.at(anchor, world);
     if (frame.provisional || (anchor == 0 && !alone)) return std::nullopt;
     return frame.T_MW;
@@ -89,7 +89,8 @@ void Node::followGraph() {
   for (const mapping::SameObject& fact : change.facts) joins_[fact.a] = {fact.b, 0};
   reportLoops(change);
   reportWithdrawals(change);
-  commit();  // sends what is near now; the belief of a track that shares its object is in its row
+  commit();  // sends the objects near the body; the row of a track that shares its object has its
+             // belief
 }
 
 void Node::reportWithdrawals(const mapping::MapChange& change) {
@@ -134,7 +135,8 @@ void Node::reportLoops(const mapping::MapChange& change) {
   }
 }
 
-/// Where it changes: after a loop, in a new session, and now and then as the way goes on.
+/// Reports map alignment if it may have changed: in a new session, after a change of the graph, and
+/// with each new anchor.
 void Node::reportFrame() {
   if (!newest_ || !mapper_.follows(newest_->world)) return;
   const ReportedFrame now{newest_->world, mapper_.revision(), mapper_.anchors().size()};
@@ -156,7 +158,8 @@ void Node::reportFrame() {
   outputs_.frame(frame);
 }
 
-/// As it is now, however often the same is asked: it is not kept among the answers.
+/// Always gives the current state, even to a repeated request, so it is not stored in the reply
+/// cache.
 void Node::answerGraph(const MapQuery& query) {
   MapReply reply = emptyReply(query);
   reply.error = faultOf(query);

@@ -1,4 +1,4 @@
-// What people see of the map: tiles and answers, in M.
+// The published map: tiles and answers, in M.
 #include <algorithm>
 #include <utility>
 
@@ -18,7 +18,7 @@ bool Node::loadView() {
   return true;
 }
 
-/// Directly after a commit: what is stored and what the graph knows belong together.
+/// Must directly follow a commit: stored rows and the graph must have the same state.
 void Node::followView(const std::vector<ObjectId>& changed) {
   const bool moved = mapper_.revision() != view_revision_;
   if (moved || mapper_.anchors().size() != view_anchors_) {
@@ -48,7 +48,7 @@ bool Node::publishSquare(const Square& square, const std::vector<ObjectId>& ids)
   auto found = view_.objects(ids);
   if (!found) {
     blame(found.error());
-    header_stale_ = true;  // it is tried again
+    header_stale_ = true;  // the next tick tries again
     return false;
   }
   if (found->malformed > 0) reasons_.add("belief_malformed", found->malformed);
@@ -58,7 +58,7 @@ bool Node::publishSquare(const Square& square, const std::vector<ObjectId>& ids)
   return true;
 }
 
-/// A question that names a W is answered in that W.
+/// A query with a W is answered in that W.
 Result<Found> Node::find(const MapQuery& query) {
   const WorldId newest = newest_ ? newest_->world : WorldId{};
   const auto limit = std::min(query.limit, static_cast<std::uint32_t>(config_.query_limit));

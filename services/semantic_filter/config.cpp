@@ -142,7 +142,7 @@ void describeExpertTracks(Parameters& p, Fields& fields) {
                  {"tracks that are fitted in one frame at most; the others wait"});
 }
 
-/// Keys of earlier versions, by the sentence that refuses them.
+/// Declares keys of earlier versions with the message that refuses them.
 void describeFormer(Fields& fields) {
   using Pairs = std::vector<std::pair<const char*, const char*>>;
   static const Pairs renamed{{"box.sigma_doubt", "box.sigma_weak"},
@@ -173,7 +173,7 @@ void describeFormer(Fields& fields) {
                              {"pose.drift_rotation", "pose.walk_rotation, of all odometry"}};
   for (const auto& [old, now] : renamed) fields.formerly(old, std::string("is now ") + now);
   fields.formerly("context", "is gone: context is no longer laid over the classes; leave it out");
-  // Constants in the rooms' parameters.h.
+  // Former keys that are constants in the rooms' parameters.h now.
   static const Pairs fixed{{"box.tail", "5"},
                            {"box.iterations", "3"},
                            {"box.bias_log_distance", "0.3"},

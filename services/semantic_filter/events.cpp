@@ -8,7 +8,8 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kResolved = 0.9;      // probability of a class
-constexpr double kMissingBelow = 0.5;  // existence of an object that was confirmed
+constexpr double kMissingBelow = 0.5;  // existence below which a confirmed object is reported as
+                                       // missing
 
 bool isHidden(Visibility v) { return v != Visibility::kVisible && v != Visibility::kPartial; }
 
@@ -86,7 +87,7 @@ void EventTracker::merge(const MergeRecord& m, const Objects& objects, const Eve
   e.other_id = it->second.id;
   e.class_name = it->second.class_name;
   e.probability = 1.0;
-  if (m.by_map) {  // the older id may have been its own
+  if (m.by_map) {  // the older id may have been the survivor's own
     if (e.object_id != e.other_id) changes.events.push_back(e);
     known_.erase(it);
     return;
@@ -99,7 +100,7 @@ void EventTracker::merge(const MergeRecord& m, const Objects& objects, const Eve
   if (m.moved) {
     e.kind = EventKind::kMoved;
     changes.events.push_back(e);
-    known_[m.survivor].moving = true;  // a moving object gives no second event
+    known_[m.survivor].moving = true;  // a moving object causes no second event
   }
   if (m.returned) {
     e.kind = EventKind::kReappeared;

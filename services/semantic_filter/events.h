@@ -1,4 +1,4 @@
-// Makes events from the differences between two published frames.
+// Derives events from the differences between two published frames.
 #pragma once
 
 #include <map>
@@ -18,11 +18,11 @@ class EventTracker {
     std::vector<Event> events;      ///< ordered by track
     std::vector<EndedTrack> ended;  ///< confirmed tracks
   };
-  /// Returns what has changed since the last call. `merges`: those since then.
+  /// Returns the changes since the last call. `merges`: the merges since then.
   Changes update(const Objects& objects, const std::vector<MergeRecord>& merges);
-  /// The track comes from the map. The next update that has it makes the event.
+  /// The track comes from the map. The next update that has the track creates the event.
   void recalled(TrackId id, bool restored) { recalled_[id] = restored; }
-  /// The track is archived from now on. The next update makes its event.
+  /// The track is archived from now on. The next update creates its event.
   void archived(TrackId id) { archived_.insert(id); }
   void clear();
 

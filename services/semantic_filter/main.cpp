@@ -16,8 +16,8 @@ namespace {
 using namespace perdure;
 namespace topics = bus::topics;
 
-/// Holds messages back, in order, until the map store has been asked for the working set of an
-/// earlier run. Otherwise new tracks would get ids that are already in use.
+/// Delays messages, in order, until the map store has answered with the working set of an earlier
+/// run. Otherwise new tracks would get ids that are already in use.
 class Gate {
  public:
   void pass(std::function<void()> message) {

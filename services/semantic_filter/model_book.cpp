@@ -6,9 +6,9 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr std::size_t kMaxModels = 64;
-constexpr std::size_t kMaxNamed = 8;  // classes named in a sentence
+constexpr std::size_t kMaxNamed = 8;  // largest number of classes in a sentence
 
-/// Text for the classes that `model` has and `other` lacks, such as "; new classes: a, b and 3
+/// Text for the classes that `model` has and `other` lacks, for example "; new classes: a, b and 3
 /// more".
 std::string beyond(const Model& model, const Model& other, const std::string& title) {
   std::string text;

@@ -1,5 +1,5 @@
-// The models whose detections may arrive and the one in use; it says what changes when inference is
-// swapped.
+// The models whose detections may arrive, and the model in use. Describes the changes when
+// inference is swapped.
 #pragma once
 
 #include <cstdint>
@@ -20,12 +20,12 @@ class ModelBook {
   explicit ModelBook(ClassPriors priors = {}) : priors_(std::move(priors)) {}
   const ClassPriors& priors() const { return priors_; }
 
-  /// Reason of failure: "model_contradicts_its_hash". The first information for a hash stays valid.
+  /// Reason of failure: "model_contradicts_its_hash". The first model of a hash remains valid.
   Result<void> add(const ModelInfo& info);
   /// Returns nullptr if no model of this hash was added, or if too many were added since.
   std::shared_ptr<const Model> find(std::uint64_t hash) const;
-  /// Detections of this (known) model are used in a frame at `time`. If the frame is the newest and
-  /// the model has changed, returns a sentence that says what changes.
+  /// Detections of this known model are used in a frame at `time`. If the frame is the newest and
+  /// the model has changed, returns a sentence that describes the changes.
   std::optional<std::string> use(std::uint64_t hash, TimePoint time);
   /// Returns the hash of the model of the newest frame; 0 before the first.
   std::uint64_t used() const { return used_; }

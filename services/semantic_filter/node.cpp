@@ -17,7 +17,7 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr std::size_t kMaxEarly = 16;
-constexpr std::chrono::seconds kFuture{10};  // further ahead of odometry nothing waits for it
+constexpr std::chrono::seconds kFuture{10};  // detections further ahead of odometry are not stored
 
 }  // namespace
 
@@ -80,7 +80,7 @@ void Node::onOdometry(const Odometry& odometry) {
   if (frame.input.boxes || !config_.history.wait_for_detections) flush();
 }
 
-/// Where the filter's camera has it; its vio may lead with another one.
+/// The pixel of a landmark in the filter's camera. vio's first camera may be another one.
 std::optional<Eigen::Vector2d> Node::pixelOf(const Landmark& landmark, const std::string& camera,
                                              const View& view) const {
   if (camera.empty() || camera == camera_name_) return landmark.pixel;
@@ -110,7 +110,7 @@ void Node::onLandmarks(const Landmarks& landmarks) {
   reasons_.add("landmarks_of_unknown_frame");
 }
 
-/// Why a message is no evidence, as Health counts it; nullptr where it may be.
+/// The reason why a message is refused, as Health counts it; nullptr if it is accepted.
 const char* Node::refusalOf(const Detections& detections) const {
   if (camera_ && !detections.camera.empty() && detections.camera != camera_name_) {
     return "detections_of_other_camera";
@@ -128,7 +128,7 @@ bool Node::attach(Frame& frame, const Detections& detections) {
     reasons_.add(refusal);
     return false;
   }
-  if (isInDoubt(frame, detections)) return true;  // the frame stays without evidence
+  if (isInDoubt(frame, detections)) return true;  // the frame remains without detections
   return use(frame, detections);
 }
 
@@ -184,7 +184,8 @@ void Node::onDetections(const Detections& detections) {
   keepEarly(detections);
 }
 
-/// Of too many the furthest ahead goes: invented stamps must not drive out what is needed next.
+/// If there are too many, the one furthest ahead is dropped: false stamps must not displace the
+/// next detections.
 void Node::keepEarly(const Detections& detections) {
   for (const auto& d : early_) {
     if (d.stamp.sameFrame(detections.stamp)) return reasons_.add("detections_repeated");

@@ -1,8 +1,8 @@
-// The semantic filter as a node: odometry, landmarks, detections and what the map has near in;
-// objects, events and predictions out. Single-threaded; time enters by messages only.
+// The semantic filter as a node. Inputs: odometry, landmarks, detections and the map's objects near
+// the body. Outputs: objects, events and predictions. Single-threaded; time comes from messages
+// only.
 //
-// What is estimated is core/history's. The node checks messages, waits for detections, and
-// publishes.
+// core/history does the estimation. The node checks messages, waits for detections, and publishes.
 #pragma once
 
 #include <deque>
@@ -40,14 +40,14 @@ class Node {
   void onLandmarks(const Landmarks& landmarks);
   void onDetections(const Detections& detections);
   void onNear(const MapNear& near);
-  /// Publishes the newest frame even though its detections have not come: the end of the data, or
-  /// a tick of a service whose detections have stopped.
+  /// Publishes the newest frame although its detections have not arrived. For the end of the data,
+  /// and for the tick of a service whose detections have stopped.
   void flush();
 
   const ReasonCounts& reasons() const { return reasons_; }
   InstanceId instance() const { return instance_; }
   const Belief& belief() const { return history_.belief(); }
-  /// For people: how far the network's boxes err.
+  /// The noise scale of the network's boxes, as text for users.
   std::string note() const;
 
  private:
@@ -63,11 +63,11 @@ class Node {
   void forgetEarlyBefore(TimePoint time);
   void publish(const Frame& frame);
   void publishPredictions(const Frame& frame, const std::optional<ComingFrame>& coming);
-  // In node_swap.cpp.
+  // These are in node_swap.cpp.
   void reportModelChange(const FrameStamp& stamp, const std::string& detail);
   bool isInDoubt(const Frame& frame, const Detections& detections);
   void settleProbation(bool believed);
-  // In node_memory.cpp.
+  // These are in node_memory.cpp.
   void letGo(const Frame& frame);
   void take(const MapNear& near, ExistenceEvidence evidence);
   Arrivals arrivalsOf(const MapNear& near, ExistenceEvidence evidence);
@@ -81,20 +81,20 @@ class Node {
   Outputs outputs_;
   ReasonCounts reasons_;
   History history_;
-  std::shared_ptr<const CameraModel> camera_;  // shared with the frames that were made with it
+  std::shared_ptr<const CameraModel> camera_;  // shared with the frames that use it
   std::string camera_name_;
   ModelBook models_;
   Probation probation_;
   std::optional<WorldId> world_;
   std::deque<Detections> early_;
-  std::optional<MapNear> waiting_near_;  ///< came before the first odometry
-  InstanceId near_source_ = 0;           ///< of the newest message that was used
+  std::optional<MapNear> waiting_near_;  ///< arrived before the first odometry
+  InstanceId near_source_ = 0;           ///< instance of the newest message in use
   std::uint64_t near_revision_ = 0;
-  std::map<TrackId, ObjectId> members_;    ///< as the map says
+  std::map<TrackId, ObjectId> members_;    ///< as reported by the map
   std::map<TrackId, ObjectId> object_of_;  ///< as published; tracks with their own id are left out
   std::map<ObjectId, TrackId> track_of_;
   std::deque<EndedTrack> ended_;
-  Objects published_;  ///< the newest message, whose memory the next one takes
+  Objects published_;  ///< the newest message; the next one reuses its memory
   EventTracker events_;
   ReappearanceMonitor returns_;
   Archive archive_;

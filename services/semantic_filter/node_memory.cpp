@@ -1,4 +1,4 @@
-// What leaves the working set of the node for the map, and what the map gives.
+// Exchange of tracks between the working set and the map.
 #include <algorithm>
 #include <set>
 #include <utility>
@@ -12,8 +12,8 @@ bool isMalformed(const ObjectBelief& belief) { return belief.classes.empty() || 
 
 }  // namespace
 
-/// A track that leaves was detected in no frame that may be stepped again, and leaves those too: a
-/// late detection does not bring it back.
+/// A track that leaves was not detected in any frame that may be stepped again. It leaves those
+/// frames too, so a late detection cannot bring it back.
 void Node::letGo(const Frame& frame) {
   const TimePoint now = frame.input.stamp.time, oldest = history_.oldestTime();
   const auto leaving =
@@ -29,7 +29,7 @@ void Node::letGo(const Frame& frame) {
   history_.erase(ids);
 }
 
-/// The tracks that a message gives. An id in it is not given out again.
+/// The tracks of a message. The node does not assign their ids again.
 Arrivals Node::arrivalsOf(const MapNear& near, ExistenceEvidence evidence) {
   Arrivals arrivals;
   arrivals.evidence = evidence;
@@ -52,7 +52,7 @@ Arrivals Node::arrivalsOf(const MapNear& near, ExistenceEvidence evidence) {
       arrivals.as_published.push_back({std::move(belief), *product});
       continue;
     }
-    // How its error depends on today's pose error is not known: the covariance holds both.
+    // The covariance contains both errors, so the correlation with today's pose error is not known.
     for (ClassBelief& c : belief.classes) c.cross_pose.setZero();
     arrivals.as_published.push_back({std::move(belief), history_.poseError().product});
   }
@@ -73,7 +73,7 @@ void Node::onNear(const MapNear& near) {
   take(near, ExistenceEvidence::kRecall);
 }
 
-/// A message that comes before the next frame replaces it.
+/// A message that arrives before the next frame replaces it.
 void Node::take(const MapNear& near, ExistenceEvidence evidence) {
   near_source_ = near.instance;
   near_revision_ = near.revision;
@@ -84,8 +84,9 @@ void Node::take(const MapNear& near, ExistenceEvidence evidence) {
   history_.arrive(arrivals);
 }
 
-/// The objects of tracks that have another id. If two tracks of one object are in the working set
-/// and are not fused, the one with its own id, or else the first, has the id of the object.
+/// Assigns object ids to tracks that have another id. If the working set has two tracks of one
+/// object that are not fused, one of them gets the id of the object: the track with that id, or
+/// else the first.
 void Node::nameObjects() {
   object_of_.clear();
   track_of_.clear();
@@ -111,7 +112,7 @@ TrackId Node::trackOf(ObjectId object) const {
   return at == track_of_.end() ? object : at->second;
 }
 
-/// Confirmed tracks that ended, until the map has them on disk.
+/// Stores confirmed tracks that ended until the map has them on disk.
 void Node::keepEnded(const std::vector<EndedTrack>& ended) {
   ended_.insert(ended_.end(), ended.begin(), ended.end());
   while (ended_.size() > kMostEnded) ended_.pop_front();

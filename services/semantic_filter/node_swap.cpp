@@ -1,10 +1,10 @@
-// What a swap of inference means to the filter.
+// Effects of a swap of inference on the filter.
 #include "services/semantic_filter/node.h"
 
 namespace perdure::semantic_filter {
 
-/// Who looks at the frames is inference's business; a newcomer is heard with care until it has
-/// passed, and that it failed is told as an event.
+/// Inference decides which process answers. The detections of a new process are delayed in case of
+/// doubt until it passes its probation. A failure is reported as an event.
 void Node::onSwap(const SwapNotice& notice) {
   if (notice.step == SwapStep::kTookOver && notice.about != 0) {
     settleProbation(true);
@@ -34,9 +34,9 @@ void Node::reportModelChange(const FrameStamp& stamp, const std::string& detail)
   if (outputs_.events) outputs_.events(event);
 }
 
-/// Whether these detections of a newcomer are kept back. What was kept before is used as soon as it
-/// sees one of the things again, or has been on trial for so long that the old one would have
-/// said.
+/// Whether these detections of a new process must be delayed. The delayed ones are used once the
+/// process detects an expected object again, or after a time within which the old process would
+/// have decided.
 bool Node::isInDoubt(const Frame& frame, const Detections& detections) {
   if (!probation_.isOf(detections.instance)) return false;
   const auto model = models_.find(detections.model_hash);
@@ -56,7 +56,8 @@ bool Node::isInDoubt(const Frame& frame, const Detections& detections) {
   return false;
 }
 
-/// Late detections where they are believed; no evidence where not.
+/// Applies the delayed detections late if they are accepted; otherwise these frames have no
+/// detections.
 void Node::settleProbation(bool believed) {
   const auto kept = probation_.take();
   if (!believed && !kept.empty()) reasons_.add("detections_rolled_back", kept.size());
@@ -64,7 +65,7 @@ void Node::settleProbation(bool believed) {
   auto& frames = history_.frames();
   std::size_t first = frames.size();
   for (const Detections& detections : kept) {
-    if (refusalOf(detections) != nullptr) continue;  // its model was forgotten meanwhile
+    if (refusalOf(detections) != nullptr) continue;  // its model was removed meanwhile
     for (std::size_t i = 0; i < frames.size(); ++i) {
       if (!frames[i].input.stamp.sameFrame(detections.stamp)) continue;
       if (use(frames[i], detections) && frames[i].stepped) first = std::min(first, i);

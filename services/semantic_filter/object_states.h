@@ -1,4 +1,4 @@
-// Derives `object_state` from `objects`: the keyed states to write and to dispose of.
+// Derives `object_state` from `objects`: the keyed states to write or to dispose of.
 #pragma once
 
 #include <map>
@@ -11,9 +11,9 @@ namespace perdure::semantic_filter {
 class ObjectStates {
  public:
   struct Changes {
-    /// new, updated by a frame, or of changed visibility or confirmation
+    /// new, updated by a frame, or changed in visibility or confirmation
     std::vector<ObjectState> written;
-    std::vector<ObjectState> gone;  ///< only their key is valid
+    std::vector<ObjectState> gone;  ///< only the key is valid
   };
   Changes update(const Objects& objects);
 

@@ -16,7 +16,7 @@
 namespace perdure::semantic_filter {
 namespace {
 
-/// The numbers of a list; nothing where it is no list of numbers.
+/// Returns the numbers of a list, or nothing if it is not a list of numbers.
 std::optional<std::vector<double>> numbersOf(const YAML::Node& list) {
   if (!list.IsSequence()) return std::nullopt;
   std::vector<double> numbers;
@@ -68,7 +68,7 @@ class PriorsReader {
     }
   }
 
-  /// Of a class or a key; empty where it is none.
+  /// Returns the name of a class or key; empty if it is not a name.
   std::string name(const YAML::Node& node) {
     if (node.IsScalar() && !node.Scalar().empty()) return node.Scalar();
     complain(node, "names of classes and keys are texts; write NAME: VALUE");

@@ -1,6 +1,6 @@
-// Detections of a new inference process that are held back. If it misses everything that should be
-// visible, either it does not work or the objects are gone. The process that it replaces will soon
-// decide (services/inference/README.md, roll-backs).
+// Delayed detections of a new inference process. If it misses everything that should be visible,
+// either it does not work or the objects are gone. The process that it replaces will soon decide
+// (services/inference/README.md, roll-backs).
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@ namespace perdure::semantic_filter {
 
 class Probation {
  public:
-  /// At most so many frames are held back. The old process decides within fewer, and the history
+  /// The largest number of delayed frames. The old process decides within fewer, and the history
   /// can repeat more (history.frames).
   static constexpr std::size_t kLongest = 24;
 
@@ -31,8 +31,8 @@ class Probation {
   std::vector<Detections> kept_;
 };
 
-/// Whether at least one object is likely to be detected and no detection lies at any of the likely
-/// ones.
+/// Whether at least one object is likely to be detected, and no detection overlaps any of the
+/// likely ones.
 bool missesAll(const std::vector<Prediction>& expected, const Detections& detections);
 
 }  // namespace perdure::semantic_filter

@@ -10,21 +10,22 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kRemembered_s = 8.0;
-constexpr double kLongestPause_s = 0.5;  // at most, until the time is computed again
-constexpr double kNewShare = 0.2;        // relative change of the remaining time that is published
+constexpr double kLongestPause_s = 0.5;  // longest interval until the time is computed again
+constexpr double kNewShare = 0.2;        // relative change of the remaining time above which it is
+                                         // published
 
 TimePoint later(TimePoint time, double seconds) {
   return time + std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 * seconds));
 }
 
-constexpr double kShortestPause_s = 0.2;  // for an object that should already be visible
+constexpr double kShortestPause_s = 0.2;  // minimum interval for an object that should already be
+                                          // visible
 
 bool inSight(const Track& o) { return o.visibility.fraction > 0.0; }
 
 }  // namespace
 
-/// Waits until the object is detected again. That it should be visible by now may be a misjudged
-/// edge.
+/// Whether to wait for the next detection: the time has passed, so an edge may be misjudged.
 bool ReappearanceMonitor::waits(const Track& o, const Parameters& parameters) const {
   if (!o.life.confirmed || movingProbability(o, parameters.motion.min_speed) >= 0.5) return false;
   if (o.visibility.state == Visibility::kOccluded) return true;
@@ -44,8 +45,8 @@ void ReappearanceMonitor::addKeyframe(const FrameInput& now, const Way& way) {
   }
 }
 
-/// The largest random walk of the velocity over several lags. A swaying body wanders less in a
-/// second than its single steps suggest; an accelerating body wanders more.
+/// The largest random walk of the velocity over several lags. A swaying body drifts less in a
+/// second than its single steps suggest; an accelerating body drifts more.
 double ReappearanceMonitor::speedWalk() const {
   double most = 0.0;
   for (const double lag : {0.1, 0.5, 1.0, 2.0, 4.0}) {

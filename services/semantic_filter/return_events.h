@@ -1,6 +1,6 @@
 // Publishes the reappearance times of occluded objects: at the beginning of an occlusion, and again
-// when the time has changed or half of it has passed. So the prediction gets better as it comes
-// near. Derivation: tools/docs/maths/reappearance_time.md.
+// when the time has changed or half of it has passed. The prediction therefore improves as the time
+// approaches. Derivation: tools/docs/maths/reappearance_time.md.
 #pragma once
 
 #include <deque>
@@ -15,8 +15,8 @@ namespace perdure::semantic_filter {
 
 class ReappearanceMonitor {
  public:
-  /// Returns events of kind kPredictedReturn for one published frame. `blank`: has the stamp and
-  /// the writer.
+  /// Returns events of kind kPredictedReturn for one published frame. `blank`: an event with stamp
+  /// and writer.
   std::vector<Event> update(const std::vector<Track>& objects, const FrameInput& now,
                             const std::optional<ComingFrame>& coming, const Parameters& parameters,
                             const Event& blank);
@@ -32,8 +32,8 @@ class ReappearanceMonitor {
   double speedWalk() const;
 
   struct Waiting {
-    std::uint32_t hits = 0;             ///< when it was occluded
-    TimePoint asked_again;              ///< not computed again before
+    std::uint32_t hits = 0;             ///< number of hits when it became occluded
+    TimePoint asked_again;              ///< earliest time of the next computation
     std::optional<TimePoint> expected;  ///< as last published
     double then_s = 0.0;                ///< remaining time as last published, s
   };

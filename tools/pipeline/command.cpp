@@ -74,7 +74,7 @@ void addOptions(CLI::App& app, PipelineOptions& options) {
   app.add_flag("--quiet", options.quiet, "No progress");
 }
 
-/// A line that rewrites itself on a terminal; elsewhere one line each 50 frames.
+/// Updates one line on a terminal; otherwise prints a line every 50 frames.
 void showProgress(const Pipeline& pipeline, const PipelineCounts& counts) {
   const bool terminal = isatty(STDERR_FILENO) != 0;
   if (!terminal && counts.frames % 50 != 0) return;
@@ -108,7 +108,8 @@ void printReasons(const Pipeline& pipeline) {
   }
 }
 
-/// Writes to options.out. Where nothing came out, what is to be said of that once it is kept.
+/// Writes to options.out. If there are no results, returns the error to report after the outputs
+/// are stored.
 std::optional<StartupError> runInto(const PipelineOptions& options, const std::string& named) {
   Pipeline pipeline(options);
   printDoubts(pipeline.dataset().recording(), pipeline.findings());

@@ -1,4 +1,4 @@
-// `perdure pipeline`: the services' nodes in one process, over a dataset folder.
+// `perdure pipeline`: runs the services' nodes in one process on a dataset folder.
 #pragma once
 
 namespace CLI {

@@ -5,7 +5,7 @@
 namespace perdure::tools {
 namespace {
 
-/// What is told where its reason was counted at more than one frame of so many.
+/// A message that is due if more than one frame in `one_of` has the reason.
 struct Doubt {
   const char* code;
   std::uint64_t one_of;

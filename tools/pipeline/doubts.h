@@ -1,5 +1,4 @@
-// What a run that ended well has counted, and a person must be told all the same: sentences with
-// the mend.
+// Problems of a run that ended normally, for the user: sentences with the fix.
 #pragma once
 
 #include <cstdint>
@@ -11,12 +10,12 @@
 
 namespace perdure::tools {
 
-/// vio: reasons of vio, or of what makes points where poses are given; frames: of the first camera;
-/// without_pose: of those, where poses are given.
+/// vio: reasons of vio, or, with given poses, of the node that computes landmarks. frames: of the
+/// first camera; without_pose: those of them without a given pose.
 std::vector<std::string> doubtsOfRun(const ReasonCounts& vio, std::uint64_t frames,
                                      std::uint64_t without_pose);
 
-/// What vio came to believe of the rig that the rig cannot be. `check`: of the run.
+/// Estimates of vio that the rig cannot have. `check`: the check of the run.
 std::vector<std::string> doubtsOfRig(const calibrate::RigCheck& check);
 
 }  // namespace perdure::tools

@@ -9,17 +9,17 @@
 namespace perdure::tools {
 namespace {
 
-/// Added in each frame, so that a body at rest has an increment with a covariance, too.
+/// Added in each frame, so that the increments of a body at rest have a covariance.
 constexpr double kLeastYaw = 1e-7, kLeastPosition = 1e-6;
 
 double declaredScale(const DriftConfig& config) {
   return config.scale_sigma > 0.0 ? config.scale_sigma : std::abs(config.scale);
 }
 
-/// What a small turn about the vertical does to `v`.
+/// The derivative of `v` by a small rotation about the vertical.
 Eigen::Vector3d turned(const Eigen::Vector3d& v) { return {-v.y(), v.x(), 0.0}; }
 
-/// [yaw, p] as [θ, p] with θ in W.
+/// Maps [yaw, p] to [θ, p] with θ in W.
 Eigen::Matrix<double, 6, 4> intoPose() {
   Eigen::Matrix<double, 6, 4> M = Eigen::Matrix<double, 6, 4>::Zero();
   M(2, 0) = 1.0;
@@ -27,14 +27,14 @@ Eigen::Matrix<double, 6, 4> intoPose() {
   return M;
 }
 
-/// Takes [θ, p] with θ in W to θ in the body.
+/// Maps [θ, p] with θ in W to θ in the body.
 Matrix6d intoBody(const RigidTransform& T_WB) {
   Matrix6d D = Matrix6d::Identity();
   D.topLeftCorner<3, 3>() = T_WB.R().transpose();
   return D;
 }
 
-/// Of roll and pitch in W: their error stays.
+/// Covariance of roll and pitch in W, whose error is constant.
 Matrix6d tilt(double value) {
   Matrix6d T = Matrix6d::Zero();
   T(0, 0) = T(1, 1) = value;
@@ -69,7 +69,7 @@ void DriftCovariance::advance(const Eigen::Vector3d& step_W, double sigma_yaw) {
   Eigen::Vector4d least = Eigen::Vector4d::Constant(kLeastPosition * kLeastPosition);
   least(0) = kLeastYaw * kLeastYaw + sigma_yaw * sigma_yaw;
 
-  // What the error so far says of the scale, and what it leaves open.
+  // The estimate of the scale given the error so far, and its remaining variance.
   const Eigen::Matrix4d P = joint_.topLeftCorner<4, 4>();
   const Eigen::Vector4d with_scale = joint_.topRightCorner<4, 1>();
   const Eigen::Vector4d gain = solveSymmetric(P, with_scale);
@@ -115,8 +115,9 @@ void DriftingOdometry::begin(const RigidTransform& true_T_WB) {
                          Eigen::Vector3d::Zero());
 }
 
-/// The true increment, seen from the body as it believes to stand, longer by the scale; then the
-/// yaw walks. A turn about gravity is the same in the body and before all turns of W.
+/// The true increment, in the axes of the estimated attitude and multiplied by the scale; then the
+/// yaw walks. A rotation about gravity is the same in the body and when it precedes all rotations
+/// of W.
 void DriftingOdometry::advance(const RigidTransform& true_T_WB, double seconds) {
   const Eigen::Vector3d true_step = true_T_WB.p - true_T_WB_.p;
   const double walk = config_.yaw_walk * std::sqrt(true_step.norm());

@@ -1,5 +1,5 @@
-// Odometry that drifts as vio does, made from true poses: a scale error and a walk of the yaw, with
-// the covariances that belong to them.
+// Odometry with the drift of vio, generated from true poses: a scale error and a random walk of the
+// yaw, with their covariances.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,26 +11,26 @@
 
 namespace perdure::tools {
 
-/// As people configure it; service `drifting`.
+/// The configuration of service `drifting`.
 struct DriftConfig {
-  double scale = 0.005;        ///< the way is reported longer by this share
-  double scale_sigma = 0.0;    ///< deviation that is declared of it; 0: |scale|
+  double scale = 0.005;        ///< relative error of the reported distance
+  double scale_sigma = 0.0;    ///< its declared standard deviation; 0: |scale|
   double yaw_walk = 5.236e-4;  ///< rad/√m
   std::int64_t seed = 1;
   bool own_frame = false;
 };
 void describe(DriftConfig& config, config::Fields& fields);
 
-/// How the error of [yaw, p] (u) and of the scale (s) grows, in W: u' = A u + Δ s + noise. Between
-/// frames s is not kept, so the transition that is given is the best one for u alone:
-/// Φ = E[u' uᵀ] P⁻¹ and Q = P' − Φ P Φᵀ.
+/// Growth of the errors of [yaw, p] (u) and of the scale (s) in W: u' = A u + Δ s + noise. Odometry
+/// does not contain s, so its transition is the best one for u alone: Φ = E[u' uᵀ] P⁻¹ and Q = P' −
+/// Φ P Φᵀ.
 class DriftCovariance {
  public:
   DriftCovariance(double sigma_yaw, double sigma_position, double sigma_scale);
-  /// The body went by `step_W`, as reported, and then its yaw walked by `sigma_yaw`.
+  /// The body moved by `step_W`, as reported; then its yaw walked with deviation `sigma_yaw`.
   void advance(const Eigen::Vector3d& step_W, double sigma_yaw);
 
-  /// Of [yaw, p, s].
+  /// Covariance of [yaw, p, s].
   const Eigen::Matrix<double, 5, 5>& joint() const { return joint_; }
   /// Φ and Q of the last step.
   const Eigen::Matrix4d& transition() const { return transition_; }
@@ -41,14 +41,14 @@ class DriftCovariance {
   Eigen::Matrix4d transition_ = Eigen::Matrix4d::Identity(), noise_ = Eigen::Matrix4d::Zero();
 };
 
-/// Gravity stays exact: z of W is up. W is the poses' frame, or with `own_frame` the level one in
-/// which the first pose that is asked for has position and yaw 0.
+/// Gravity remains exact: z of W is up. W is the frame of the poses. With `own_frame` it is the
+/// level frame in which the first requested pose has position and yaw 0.
 class DriftingOdometry {
  public:
-  /// `accuracy`: what is declared of the poses before they drift.
+  /// `accuracy`: the declared accuracy of the poses before the drift is added.
   DriftingOdometry(replay::PoseFile truth, InstanceId instance, const WorldId& session,
                    const PoseAccuracy& accuracy, const DriftConfig& config);
-  /// Nothing where there is no pose for the frame. Frames come in order.
+  /// Returns nothing if there is no pose for the frame. Frames must come in order.
   std::optional<Odometry> at(const FrameStamp& stamp);
 
  private:
@@ -63,7 +63,7 @@ class DriftingOdometry {
   DriftConfig config_;
   sim::Dice dice_;
   DriftCovariance covariance_;
-  double turn_ = 0.0;  ///< of W against the truth's, about z
+  double turn_ = 0.0;  ///< yaw of W relative to the true frame
   RigidTransform true_T_WB_, T_WB_, T_WB_before_;
   Eigen::Vector3d v_WB_ = Eigen::Vector3d::Zero();
   std::optional<FrameStamp> last_, before_;

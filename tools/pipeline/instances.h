@@ -1,5 +1,5 @@
-// Who speaks in a run of the pipeline. Fixed, so that nothing in the outputs depends on the run;
-// another run on the same map has others (Pipeline::instanceOf).
+// Instance ids of the nodes in a pipeline run. They are fixed, so that outputs do not depend on the
+// run. Another run on the same map has other ids (Pipeline::instanceOf).
 #pragma once
 
 #include "common/base/ids.h"

@@ -10,8 +10,8 @@ namespace {
 
 using mapping::LevelPose;
 
-/// T_MW that lays a belief where the graph has the object: `placed` in M. Its yaw is known modulo
-/// 180°; `turn` is what T_MW turns by, about.
+/// T_MW that transforms a belief to the object's pose in the graph: `placed` in M. Its yaw is known
+/// modulo 180°; `turn` is the approximate yaw of T_MW.
 RigidTransform layingOf(const ObjectBelief& belief, const mapping::PlacedObject& placed,
                         double turn) {
   const Vector7d& mean = belief.best().mean;
@@ -50,12 +50,13 @@ DriveInMap MapFollower::finish(const mapping::Mapper& mapper,
   for (const ObjectBelief& belief : last) {
     const mapping::ObjectRecord* record = mapper.recordOf(belief.id);
     const bool of_its_own = record != nullptr && record->session.world == session_.world;
-    const WorldId world = of_its_own ? record->session : session_;  // a later epoch, perhaps
+    const WorldId world = of_its_own ? record->session : session_;  // possibly of a later epoch
     const RigidTransform T_MW =
         frames.at(frames.anchorOf(record, world, belief.last_seen), world).T_MW;
     drive.objects[belief.id] = T_MW;
     if (!belief.recalled || record == nullptr) continue;
-    // Laid, and not seen since: what the session's W was then is not what counts.
+    // The graph placed it and it was not detected since, so its position does not depend on the
+    // session's W.
     const mapping::Sighting& sighting = record->sighting;
     if (!isDrawn(frames, sighting.anchor, map)) continue;
     const auto placed =

@@ -1,4 +1,4 @@
-// Where a run lies in M: followed while it goes, and told in the end.
+// The pose of a run in M: tracked during the run and evaluated at the end.
 #pragma once
 
 #include <optional>
@@ -13,7 +13,7 @@ class MapFollower {
  public:
   explicit MapFollower(const WorldId& session) : session_(session) {}
 
-  /// A frame of the session, when the map has heard of it.
+  /// Call it for each frame of the session after the mapper has received the frame.
   void follow(const Odometry& odometry, const mapping::Mapper& mapper);
 
   /// `last`: the last belief of each object, in the session's W.
@@ -21,7 +21,7 @@ class MapFollower {
 
  private:
   WorldId session_;
-  std::optional<mapping::Anchor> first_;  ///< of the session
+  std::optional<mapping::Anchor> first_;  ///< first anchor of the session
   std::map<std::uint64_t, Eigen::Vector3d> then_;
 };
 

@@ -38,7 +38,7 @@ std::optional<Odometry> PoseOdometry::at(const FrameStamp& stamp) {
   return odometry;
 }
 
-/// The error stays what it is in W: an error of rotation, which is the body's, turns against it.
+/// The error is constant in W. The rotation error is in body axes, so it rotates relative to W.
 void PoseOdometry::addIncrement(Odometry& odometry) const {
   odometry.has_increment = true;
   odometry.increment_from = last_->stamp.sequence;

@@ -1,4 +1,4 @@
-// Odometry from poses that are given, as the services would get it from vio.
+// Odometry from given poses, in the form of vio's output.
 #pragma once
 
 #include <optional>
@@ -9,21 +9,22 @@
 
 namespace perdure::tools {
 
-/// What is declared of poses that do not say how good they are.
+/// Declared accuracy of poses that have none of their own.
 struct PoseAccuracy {
   double sigma_rotation = 2e-3, sigma_position = 0.02, sigma_velocity = 0.2;
-  /// The error neither grows nor is forgotten from frame to frame (truth). Otherwise no increment
-  /// is given and the filter lets the error walk.
+  /// The error neither grows nor decays from frame to frame (truth). If false, no increment is
+  /// given and the filter lets the error walk.
   bool bounded = false;
-  /// W's z axis is against gravity. Otherwise `up_W` is the mean of the body's z axis over the
-  /// poses so far: a vehicle stands upright on average.
+  /// W's z axis is opposite to gravity. If false, `up_W` is the mean of the body's z axis over the
+  /// poses so far, because a vehicle is upright on average.
   bool z_up = false;
 };
-/// Of a pose file: 2 mrad, 2 cm, 0.2 m/s.
+/// For a pose file: 2 mrad, 2 cm, 0.2 m/s.
 inline PoseAccuracy ofPoseFile() { return {}; }
-/// Of truth that was measured (EuRoC's motion capture, KITTI's OXTS): the same, but bounded.
+/// For measured truth (EuRoC's motion capture, KITTI's OXTS): the same, but bounded.
 inline PoseAccuracy ofMeasuredTruth() { return {.bounded = true, .z_up = true}; }
-/// Of a simulated folder's states, which are exact. Not zero: covariances are inverted.
+/// For the states of a simulated folder, which are exact. The values are not zero, because
+/// covariances are inverted.
 inline PoseAccuracy ofExactTruth() {
   return {.sigma_rotation = 1e-5,
           .sigma_position = 1e-4,
@@ -32,12 +33,13 @@ inline PoseAccuracy ofExactTruth() {
           .z_up = true};
 }
 
-/// W is the poses' frame, never re-levelled; velocity comes from the pose before.
+/// W is the frame of the poses and is never levelled again; velocity is computed from the previous
+/// pose.
 class PoseOdometry {
  public:
   PoseOdometry(replay::PoseFile poses, InstanceId instance, const WorldId& session,
                PoseAccuracy accuracy = {});
-  /// Nothing where there is no pose for the frame. Frames come in order.
+  /// Returns nothing if there is no pose for the frame. Frames must come in order.
   std::optional<Odometry> at(const FrameStamp& stamp);
 
  private:

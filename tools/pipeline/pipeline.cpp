@@ -30,8 +30,8 @@ void Pipeline::hear(const ModelInfo& model) {
   filter_->onModel(model);
 }
 
-/// What people may look at later: how W lies in M, and the graph, which is asked for as a gateway
-/// asks that is looked at.
+/// Records map alignment and the graph for later display. The graph is requested as a gateway does
+/// for its viewers.
 void Pipeline::keepMap(const MapFrame& frame) {
   if (!run_) return;
   keep("map/frame", frame, frame.stamp.time);
@@ -53,7 +53,7 @@ void Pipeline::askForGraph() {
   map_->onQuery(query);
 }
 
-/// What the filter has said reaches the map, and its questions are answered.
+/// Delivers the filter's messages to the map, and the map's answers to the filter.
 void Pipeline::remember() {
   timer_.timeTowardsNext("map_store", [&] { map_->work(); });
 }
@@ -108,7 +108,8 @@ void Pipeline::handleFrame(const Frame& frame) {
     started_ms_[frame.stamp.sequence] = wallMs();
   }
   if (first_camera && pose_at_) givePose(frame);
-  constexpr std::uint64_t kEach = 20;  // frames; a state is dear to write
+  constexpr std::uint64_t kEach = 20;  // frames between stored states, because a state is costly to
+                                       // write
   if (first_camera && vio_ && counts_.frames % kEach == 0) rig_watch_->remember(*vio_);
   if (vio_ || known_poses_) {
     const auto work = [&] { vio_ ? vio_->onFrame(frame) : known_poses_->onFrame(frame); };
@@ -126,7 +127,7 @@ void Pipeline::handleFrame(const Frame& frame) {
   timer_.time("outputs", [] {});
 }
 
-/// A pose waits for its landmarks, which wait for the second camera.
+/// A pose waits for its landmarks, and these wait for the second camera.
 void Pipeline::givePose(const Frame& frame) {
   const auto odometry = pose_at_(frame.stamp);
   if (!odometry) return reasons_.add("frame_without_pose");
@@ -135,7 +136,7 @@ void Pipeline::givePose(const Frame& frame) {
   timer_.timeTowardsNext("vio", [&] { known_poses_->onOdometry(*odometry); });
 }
 
-/// Those for whose frames nothing more comes.
+/// Releases poses of frames that will get no further data.
 void Pipeline::releasePoses() {
   if (!known_poses_) return;
   const auto waits_for = known_poses_->waitsFor();
@@ -195,7 +196,7 @@ void Pipeline::offer(Detections detections) {
   waiting_[detections.stamp.sequence] = std::move(detections);
 }
 
-/// Hands on what has come, each frame's odometry first, then its landmarks, then its detections.
+/// Delivers received data by frame: first odometry, then landmarks, then detections.
 void Pipeline::deliver() {
   for (const Odometry& odometry : std::exchange(new_odometry_, {})) {
     const std::uint64_t frame = odometry.stamp.sequence;

@@ -1,4 +1,4 @@
-// What is known of the data before a run, and what must be said when nothing came out of it.
+// Checks of the data before a run, and the causes of a run without results.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@
 namespace perdure::tools {
 namespace {
 
-/// How far it came from where it was first, m.
+/// Largest distance from the first pose, m.
 double wayOf(const std::map<std::uint64_t, replay::StampedPose>& poses) {
   double farthest = 0.0;
   for (const auto& [frame, pose] : poses) {
@@ -35,7 +35,7 @@ std::string listOf(const ReasonCounts& reasons) {
   return list;
 }
 
-/// What a person can do about vio's reason for not starting.
+/// The fix for vio's reason for not starting.
 std::string mendOfStart(const ReasonCounts& reasons) {
   std::string most;
   std::uint64_t times = 0;
@@ -49,7 +49,7 @@ std::string mendOfStart(const ReasonCounts& reasons) {
   return "`perdure doctor --data` says more, and the README of vio what the reasons mean";
 }
 
-/// Reasons of the store for which what it was given is not in its file.
+/// Reasons of the store that mean that data is missing in its file.
 const std::set<std::string> kUnwritable{"disk_full", "io_error", "read_only", "cannot_open",
                                         "database_error"};
 
@@ -76,7 +76,7 @@ void Pipeline::checkData() {
   findings_.insert(findings_.end(), of_poses.begin(), of_poses.end());
 }
 
-/// Rows of other frames would be left out in silence.
+/// Rows of other frames would be ignored without a message.
 void Pipeline::checkDetectionFile() const {
   const auto& frames = dataset_->recording().frames;
   if (!detection_file_ || frames.empty() || detection_file_->rows() == 0) return;
@@ -140,7 +140,7 @@ void Pipeline::refuseNothing() const {
                        counted.empty() ? "" : "; ", listOf(reasons), mendOfStart(reasons)));
   }
   if (options_.detections == "none") return;
-  // What came and went was there; nothing to find is no fault of the data then.
+  // Objects existed during the run, so an empty map at the end is no fault of the data.
   const ObjectHistory& history = outputs_->history();
   if (!history.lastBeliefs().empty() || !history.inst().empty()) return;
   if (counts_.detections == 0) {

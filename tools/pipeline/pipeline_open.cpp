@@ -1,4 +1,4 @@
-// How the pipeline begins: data, odometry, detections, filter, map and recording are opened.
+// Start of the pipeline: opens data, odometry, detections, filter, map and recording.
 #include <opencv2/core/utility.hpp>
 
 #include "common/base/errors.h"
@@ -66,9 +66,9 @@ Pipeline::Pipeline(const PipelineOptions& options)
 
 void Pipeline::openRun() {
   const auto file = outputs_->folder() / "run.mcap";
-  std::filesystem::remove(file);  // of an earlier run
+  std::filesystem::remove(file);  // remove the file of an earlier run
   run_ = std::make_unique<replay::RecordingWriter>(file);
-  // What is known before the first frame is logged at its time.
+  // Messages from before the first frame are logged at the time of this frame.
   run_ns_ = toNanoseconds(dataset_->frameTime(first_index_).value_or(TimePoint()));
   if (!recorded_) keep("calibration", dataset_->calibration(), TimePoint());
 }
@@ -182,7 +182,7 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
   sinks.innovations = [this](const std::vector<vio::Innovation>& all) {
     rig_watch_->onInnovations(all);
   };
-  constexpr double kWatched_s = 60.0;  // as perdure doctor does
+  constexpr double kWatched_s = 60.0;  // the same time as in perdure doctor
   rig_watch_.emplace(dataset_->calibration().cameras.front(), kWatched_s);
   sinks.landmarks = [this](const Landmarks& landmarks) {
     landmarks_[landmarks.stamp.sequence] = landmarks;

@@ -1,5 +1,5 @@
-// The filter on what was recorded of odometry and detections: the same messages in the same order
-// as `perdure play` gives to the service.
+// Runs the filter on recorded odometry and detections, with the same messages in the same order
+// that `perdure play` gives to the service.
 #include "common/base/errors.h"
 #include "tools/pipeline/pipeline.h"
 
@@ -8,13 +8,14 @@ namespace {
 
 constexpr char kRecorded[] = "recorded";
 
-/// What semantic_filter listens to; what the map store answered then is answered by the map of now.
+/// Inputs of semantic_filter. The recorded answers of the map store are not used; the present map
+/// answers instead.
 bool isFiltersInput(const std::string& topic) {
   return topic == "calibration" || topic == "model" || topic == "inference/swap" ||
          topic == "odometry" || topic == "landmarks" || topic == "detections";
 }
 
-/// Returns the time of a message; the least one where it has none.
+/// Returns the time of a message; the epoch if it has none.
 template <class T>
 TimePoint timeOf(const T& message) {
   if constexpr (requires { message.stamp.time; }) return message.stamp.time;

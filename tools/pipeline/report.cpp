@@ -55,7 +55,7 @@ void copyTruth(const fs::path& from, const fs::path& to, const std::string& sequ
   }
 }
 
-/// Those of the data that the run was over, by the numbers that the CSV has.
+/// Frames of the data in this run, by their numbers in the CSV.
 std::set<std::uint64_t> usedFrames(const Pipeline& pipeline) {
   if (const auto& recorded = pipeline.recordedFrames()) return *recorded;
   std::set<std::uint64_t> used;

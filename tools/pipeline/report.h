@@ -7,8 +7,9 @@
 
 namespace perdure::tools {
 
-/// Counts by service, latency, what was left out and why; where the folder has labels (KITTI
-/// tracking) the objects' recall and precision at 1 m, with the labels copied to OUT/truth.
+/// Counts by service, latency, and data that was left out, with reasons. If the folder has labels
+/// (KITTI tracking): recall and precision of the objects at 1 m; the labels are copied to
+/// OUT/truth.
 nlohmann::ordered_json makeReport(const Pipeline& pipeline, const PipelineOptions& options);
 
 }  // namespace perdure::tools

@@ -32,7 +32,7 @@ std::vector<Service> describeAll(ServiceConfigs& configs) {
   return services;
 }
 
-/// Splits `text` at the first `separator`; the service of the part before it.
+/// Splits `text` at the first `separator` and returns the service named before it.
 Service& serviceOf(std::vector<Service>& services, const std::string& text, char separator,
                    const char* option) {
   const std::string name = text.substr(0, text.find(separator));

@@ -1,4 +1,4 @@
-// What `perdure pipeline` is told, and the configuration of the services that it runs.
+// Options of `perdure pipeline`, and the configurations of its services.
 #pragma once
 
 #include <cstdint>
@@ -18,24 +18,24 @@ namespace perdure::tools {
 
 struct PipelineOptions {
   std::string data, sequence, rig, out;
-  std::string map;         ///< a stored map to begin with; empty: an empty one
+  std::string map;         ///< a stored map to start from; empty: start with an empty map
   std::string odometry;    ///< vio, truth, drifting, recorded, or a pose file
   std::string detections;  ///< model, simulated, recorded, none, or a CSV
   std::string model, class_name;
   std::vector<std::uint32_t> image_size;
-  std::vector<std::string> topics;  ///< of a recording of ROS: "cam0=/left/image_raw"
+  std::vector<std::string> topics;  ///< topics of a ROS recording: "cam0=/left/image_raw"
   double box_origin = 0.0;
   bool outline_boxes = false;
-  bool landmarks = false;  ///< with poses that are given: points from the images too
-  std::size_t every = 1;   ///< each N-th frame alone
-  double from = 0.0;       ///< seconds after the first frame at which to begin
+  bool landmarks = false;  ///< with given poses: also compute landmarks from the images
+  std::size_t every = 1;   ///< use every N-th frame only
+  double from = 0.0;       ///< start, seconds after the first frame
   std::optional<double> seconds;
-  std::optional<std::int64_t> seed;      ///< of --detections simulated and --odometry drifting
+  std::optional<std::int64_t> seed;      ///< for --detections simulated and --odometry drifting
   std::vector<std::string> configs;      ///< service=FILE
   std::vector<std::string> assignments;  ///< service.key=value
   bool quiet = false;
-  bool record = false;    ///< run.mcap too
-  bool pictures = false;  ///< overlay.mp4; map.png and evolution.png come always
+  bool record = false;    ///< also write run.mcap
+  bool pictures = false;  ///< also write overlay.mp4; map.png and evolution.png are always written
 };
 
 /// The services' configurations after files and assignments.
@@ -43,19 +43,19 @@ struct ServiceConfigs {
   vio::Config vio;
   semantic_filter::Config semantic_filter;
   inference::Config inference;
-  map_store::Config map_store;  ///< its path is OUT/map.sqlite, whatever it says
-  DetectorConfig detector;      ///< of --detections simulated; service `detector`
-  DriftConfig drifting;         ///< of --odometry drifting
-  std::uint64_t digest = 0;     ///< of all values
+  map_store::Config map_store;  ///< its path is always OUT/map.sqlite
+  DetectorConfig detector;      ///< for --detections simulated; service `detector`
+  DriftConfig drifting;         ///< for --odometry drifting
+  std::uint64_t digest = 0;     ///< digest of all values
 };
 
-/// Throws StartupError: kConfiguration with all that is wrong, kUsage for an unknown service.
-/// Files: config/SERVICE.yaml of the configuration folder where there is one, or --config; the
-/// simulated detector's is simulated_detector.yaml.
+/// Throws StartupError: kConfiguration with all errors, kUsage for an unknown service. Files:
+/// config/SERVICE.yaml of the configuration folder, if it exists, or --config. The file of the
+/// simulated detector is simulated_detector.yaml.
 ServiceConfigs readServiceConfigs(const PipelineOptions& options);
 
-/// The folder `config`: $PERDURE_CONFIG_DIR, else the one of the working directory, of the source
-/// tree or installation above the program. Throws StartupError(kUnavailable) with the mend.
+/// The folder `config`: $PERDURE_CONFIG_DIR, or else that of the working directory, or of the
+/// source tree or installation above the program. Throws StartupError(kUnavailable) with the fix.
 std::filesystem::path configFolder();
 
 }  // namespace perdure::tools

@@ -1,4 +1,4 @@
-// Detections drawn from a simulated folder's truth, as the pipeline gets them from inference.
+// Detections drawn from a simulated folder's truth, in the form of inference's output.
 #pragma once
 
 #include <map>
@@ -13,28 +13,29 @@
 
 namespace perdure::tools {
 
-/// The detector model as people configure it; pairs that are confused are "first/second=share".
+/// The configuration of the detector model. Pairs of confused classes have the form
+/// "first/second=share".
 struct DetectorConfig {
   sim::DetectorModel model;
   std::int64_t seed = 1;
   std::vector<std::string> confusion{"car/van=0.08", "chair/couch=0.05"};
 };
 void describe(DetectorConfig& config, config::Fields& fields);
-/// With the seed and the pairs taken in. Throws StartupError(kConfiguration) for a pair that is
-/// none.
+/// The detector model with seed and pairs. Throws StartupError(kConfiguration) for a malformed
+/// pair.
 sim::DetectorModel modelOf(const DetectorConfig& config);
 
 class SimulatedDetections {
  public:
-  /// Throws StartupError(kUnavailable) where the folder has no truth.
+  /// Throws StartupError(kUnavailable) if the folder has no truth.
   SimulatedDetections(const DetectorConfig& config, const std::string& folder,
                       const replay::Dataset& dataset, InstanceId instance);
 
   ModelInfo info() const;
-  /// Looks at the frame; what it saw is due `latency_s` later. A frame without a true pose is not
-  /// looked at.
+  /// Creates the detections of the frame; they are due `latency_s` later. Ignores frames without a
+  /// true pose.
   void look(const Frame& frame);
-  /// What is due up to then, in the order of frames.
+  /// The detections that are due at `now`, in the order of frames.
   std::vector<Detections> due(TimePoint now);
 
  private:

@@ -6,7 +6,7 @@ namespace perdure::map_store {
 namespace {
 
 constexpr std::size_t kMostClasses = 4096;
-constexpr std::size_t kMostKinds = 4096;  // of evidence
+constexpr std::size_t kMostKinds = 4096;  // largest number of kinds of evidence
 
 void putClass(ByteWriter& out, const ClassBelief& belief) {
   out.put(belief.name);

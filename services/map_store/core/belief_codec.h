@@ -1,4 +1,5 @@
-// Beliefs as bytes, for the database: versioned, little-endian, exact (a double keeps its bits).
+// Converts beliefs to bytes and back for the database. The format is versioned, little-endian and
+// exact: a double keeps its bits.
 #pragma once
 
 #include <cstdint>
@@ -10,15 +11,16 @@
 
 namespace perdure::map_store {
 
-/// The first two bytes of every blob. A reader refuses versions that it does not know. 1 has no
-/// ledger, 2 no pose error in the header.
+/// The first two bytes of every blob. A reader refuses unknown versions. Version 1 has no ledger;
+/// version 2 has no pose error in the header.
 inline constexpr std::uint16_t kBeliefFormat = 3;
 
 Bytes encodeBelief(const ObjectBelief& belief);
-/// Refuses ("belief_malformed") what is cut short, too long, of another version or without class.
+/// Refuses ("belief_malformed") bytes that are truncated, too long, of another version or without a
+/// class.
 Result<ObjectBelief> decodeBelief(std::span<const std::uint8_t> bytes);
 
-/// All of `objects` but its beliefs.
+/// Encodes all members of `objects` except the beliefs.
 Bytes encodeHeader(const Objects& objects);
 Result<Objects> decodeHeader(std::span<const std::uint8_t> bytes);
 

@@ -1,5 +1,5 @@
-// Values as bytes and back, for blobs of the database: little-endian, exact (a double keeps its
-// bits).
+// Converts values to bytes and back for blobs of the database. The format is little-endian and
+// exact: a double keeps its bits.
 #pragma once
 
 #include <Eigen/Core>
@@ -48,7 +48,7 @@ class ByteWriter {
   Bytes bytes_;
 };
 
-/// Reads past the end give zero and leave ok() false.
+/// Reads past the end return zero and make ok() false.
 class ByteReader {
  public:
   explicit ByteReader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
@@ -65,7 +65,7 @@ class ByteReader {
   }
   double takeReal() { return std::bit_cast<double>(take<std::uint64_t>()); }
   bool takeFlag() { return take<std::uint8_t>() != 0; }
-  /// Of a time; not ok() where a message could not carry it.
+  /// Reads a time. Makes ok() false if a message could not carry it.
   std::int64_t takeNanoseconds() {
     const auto ns = static_cast<std::int64_t>(take<std::uint64_t>());
     if (!isTime(ns)) ok_ = false;
@@ -82,7 +82,7 @@ class ByteReader {
     at_ += size;
     return value;
   }
-  /// Of a list; nothing, and not ok(), where there are more than `most`.
+  /// Reads the length of a list. Returns 0 and makes ok() false if it exceeds `most`.
   std::size_t takeCount(std::size_t most) {
     const std::size_t count = take<std::uint32_t>();
     if (count > most) ok_ = false;

@@ -1,4 +1,4 @@
-// A database that is written beside its place and renamed when it is whole.
+// Writes a database to a draft file and renames it when it is complete.
 #pragma once
 
 #include <filesystem>
@@ -6,10 +6,10 @@
 
 namespace perdure::map_store {
 
-/// What SQLite may leave beside a file.
+/// Suffixes of the files that SQLite may leave beside a database.
 inline constexpr const char* kBeside[] = {"-wal", "-shm", "-journal"};
 
-/// The file `path`.part. It is removed at the end, with what lies beside it, unless it was renamed.
+/// The file `path`.part. The destructor removes it and its SQLite files unless it was renamed.
 class DraftFile {
  public:
   explicit DraftFile(const std::string& path);
@@ -23,7 +23,7 @@ class DraftFile {
   std::string path_;
 };
 
-/// Of a file or a folder; not every file system can do the latter.
+/// Syncs a file or a folder to disk. Not every file system can sync a folder.
 bool sync(const std::filesystem::path& path);
 
 }  // namespace perdure::map_store

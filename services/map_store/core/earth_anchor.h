@@ -1,5 +1,5 @@
-// Where on Earth M lies, as the map's file and settings say it: latitude, longitude, height, yaw,
-// in degrees and metres (earth_place.h).
+// The position of M on Earth, as stored in the map's file and the settings: latitude, longitude,
+// height and yaw, in degrees and metres (earth_place.h).
 #pragma once
 
 #include <string>
@@ -7,9 +7,9 @@
 
 namespace perdure::map_store {
 
-/// Four numbers that are a place on Earth.
+/// Whether `numbers` are four numbers that form a valid place on Earth.
 bool isEarthAnchor(const std::vector<double>& numbers);
-/// Those of the file's text; none where it is no such place.
+/// Parses the text of the map's file. Returns an empty vector if it is not a valid place.
 std::vector<double> earthAnchorFrom(const std::string& text);
 
 }  // namespace perdure::map_store

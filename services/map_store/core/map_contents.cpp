@@ -20,9 +20,9 @@ using mapping::MapContents;
 using mapping::Origin;
 using mapping::StoredObject;
 
-// Whose object each one was: `map_first`, `map_second` are digests of the first session's first
-// anchor and first two. What one drive saw and another one did not find any more; kind 0: gone, 1:
-// moved; the place is in M of `map_world`.
+// `map_first` and `map_second` are digests that identify the map of an object: of the first
+// session's first anchor, and of its first two. Changes: objects that one drive detected and
+// another one did not find again. kind 0: gone, 1: moved. The position is in M of `map_world`.
 constexpr char kFusionSchema[] = R"sql(
 CREATE TABLE provenance(
   map_first INTEGER NOT NULL, map_second INTEGER NOT NULL, old_id INTEGER NOT NULL,
@@ -125,7 +125,7 @@ Result<void> readWhole(const Connection& connection, WholeMap& map) {
   if (!graph) return tl::unexpected<Reason>(graph.error());
   map.malformed += graph->malformed;
   map.contents.graph = std::move(graph->map);
-  // What is united is not parted: each object goes on as one track.
+  // A united map cannot be divided again: each object becomes one track.
   map.contents.graph.tracks.clear();
   map.contents.graph.facts.clear();
   for (auto& [id, record] : map.contents.graph.records) {
@@ -136,15 +136,13 @@ Result<void> readWhole(const Connection& connection, WholeMap& map) {
   if (done) done = readProvenance(connection, map.contents);
   if (done) done = readChanges(connection, map.contents);
   if (done) done = readMeta(connection, map);
-  // What the mapper has seen and the map has no row of, or a row of history.
+  // Records of objects without a row in the map, or with a row of history only.
   std::erase_if(map.contents.graph.records, [&](const auto& each) {
     const auto object = map.contents.objects.find(each.first);
     return object == map.contents.objects.end() || object->second.ended.has_value();
   });
   return done;
 }
-
-// Writing.
 
 Batch wholeBatch(const WholeMap& map, const Objects& working, const mapping::Unsaved& graph) {
   Batch batch;
@@ -160,7 +158,7 @@ Batch wholeBatch(const WholeMap& map, const Objects& working, const mapping::Uns
   return batch;
 }
 
-/// Nothing is in sight; a service that begins with the map gives ids above its own.
+/// No object is visible. A service that starts with the map assigns ids above these.
 Objects emptyWorkingSet(const WholeMap& map) {
   Objects working;
   const auto& anchors = map.contents.graph.anchors;
@@ -203,7 +201,7 @@ Result<void> writeChanges(const Connection& connection, const MapContents& map) 
   return {};
 }
 
-/// Beside what MapDatabase writes; then all of it is in one file.
+/// Adds the tables that MapDatabase does not write, and puts all data into one file.
 Result<void> completeFile(const WholeMap& map, const std::string& path) {
   auto connection = Connection::open(path, Connection::Mode::kReadWriteCreate);
   if (!connection) return tl::unexpected<Reason>(connection.error());
@@ -278,12 +276,12 @@ void writeWholeMap(const WholeMap& map, const std::string& path, bool replace,
   const DraftFile draft(path);
   writeWholeDraft(map, path, draft.path(), max_size_mb);
   if (!sync(draft.path())) cannotWriteWhole(path, {"io_error", "it cannot be synced"});
-  // The log of the map that is replaced would be taken for this one's.
+  // SQLite would take the log of the replaced map for the log of this one.
   std::error_code error;
   for (const char* suffix : kBeside) fs::remove(path + suffix, error);
   fs::rename(draft.path(), path, error);
   if (error) cannotWriteWhole(path, {"io_error", error.message()});
-  (void)sync(fs::absolute(path).parent_path());  // not every file system can
+  (void)sync(fs::absolute(path).parent_path());  // not every file system can sync a folder
 }
 
 }  // namespace perdure::map_store

@@ -1,4 +1,4 @@
-// A map's file as a whole, history included: read into memory, and written as a new file.
+// A whole map file with its history: read into memory, or written as a new file.
 #pragma once
 
 #include <cstdint>
@@ -15,24 +15,25 @@ struct WholeMap {
   double tile_size_m = 32.0;
   std::uint64_t revision = 0;
   std::int64_t schema = 0;
-  std::string earth_anchor;  ///< where M lies (earth_place.h); empty: not known
-  /// Rows and parts of the graph that could not be read; left out.
+  std::string earth_anchor;  ///< position of M on Earth (earth_place.h); empty if not known
+  /// Number of rows and parts of the graph that were left out because they could not be read.
   std::uint64_t malformed = 0;
 };
 
-/// One state of the file, also while a service writes it. Of an older map without graph or
-/// provenance these are empty. The working set that a filter had is not read: what of it was
-/// confirmed is among the objects, and like all of them out of sight.
+/// Reads one state of the file, even if a service writes to it. Graph or provenance are empty if an
+/// older map has none. The filter's working set is not read: its confirmed tracks are among the
+/// objects, and no object is visible.
 Result<WholeMap> readWholeMap(const Connection& connection);
 
-/// Writes a new file, whole and synced, or nothing. `path` must not exist, or is replaced where
-/// `replace`; a draft lies at `path`.part until it is renamed. The tables `provenance` and
-/// `changes` are added; their columns are what mapping::Origin and mapping::Change say.
-/// `max_size_mb`: 0, or the file grows no further. Throws StartupError with the mend.
+/// Writes a new file, complete and synced, or nothing. `path` must not exist unless `replace` is
+/// true. Until it is renamed, the draft is `path`.part. The tables `provenance` and `changes` are
+/// added; mapping::Origin and mapping::Change describe their columns. `max_size_mb`: the largest
+/// size of the file; 0: no limit. Throws StartupError with the fix.
 void writeWholeMap(const WholeMap& map, const std::string& path, bool replace,
                    std::int64_t max_size_mb = 0);
 
-/// Why a new file cannot be written at `path`; throws StartupError. For commands that take long.
+/// Throws StartupError if a new file cannot be written at `path`. Commands that take long call it
+/// first.
 void checkNewFile(const std::string& path, bool replace);
 
 }  // namespace perdure::map_store

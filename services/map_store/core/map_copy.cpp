@@ -68,7 +68,7 @@ Connection openSource(const std::string& from) {
   return *std::move(connection);
 }
 
-/// The log of another database would be taken for the copy's.
+/// Refuses remaining files: SQLite would take the log of another database for the copy's.
 void refuseWhatIsThere(const std::string& to) {
   const auto refuse = [](const std::string& file) {
     if (!fs::exists(fs::symlink_status(file))) return;
@@ -81,7 +81,7 @@ void refuseWhatIsThere(const std::string& to) {
   for (const char* suffix : kBeside) refuse(to + suffix);
 }
 
-/// The draft is closed, so that all of it is in its one file.
+/// Closes the draft, so that all data is in one file.
 void writeDraft(const std::string& from, const std::string& to, const DraftFile& draft) {
   const Connection source = openSource(from);
   const auto target = Connection::open(draft.path(), Connection::Mode::kReadWriteCreate);
@@ -111,7 +111,7 @@ void copyMap(const std::string& from, const std::string& to) {
   if (!sync(draft.path())) cannotWrite(to, {"io_error", "it cannot be synced"});
   fs::rename(draft.path(), to, error);
   if (error) cannotWrite(to, {"io_error", error.message()});
-  (void)sync(folder);  // not every file system can
+  (void)sync(folder);  // not every file system can sync a folder
 }
 
 }  // namespace perdure::map_store

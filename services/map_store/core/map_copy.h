@@ -1,13 +1,13 @@
-// A map begun with all that another one holds.
+// Starts a map from a copy of another one.
 #pragma once
 
 #include <string>
 
 namespace perdure::map_store {
 
-/// Copies the map `from` to `to`, which must not exist: whole and synced, or not at all. `from` is
-/// only read, and may be written by a service meanwhile: what was committed when the copy began is
-/// in it. Older schemas stay what they are. Throws StartupError with the mend.
+/// Copies the map `from` to `to`, which must not exist: complete and synced, or not at all. `from`
+/// is only read; a service may write to it meanwhile. The copy has the state that was committed
+/// when it began. Older schemas are not upgraded. Throws StartupError with the fix.
 void copyMap(const std::string& from, const std::string& to);
 
 }  // namespace perdure::map_store

@@ -40,7 +40,8 @@ Result<void> runOnce(const Connection& connection, std::string_view sql,
   return statement ? run(*statement, parameters...) : failed(statement.error());
 }
 
-/// A statement for many rows of one commit: prepared with the first, which takes longer than a row.
+/// A statement for many rows of one commit. It is prepared with the first row, because preparing
+/// takes longer than writing a row.
 Result<void> runAgain(const Connection& connection, std::optional<Statement>& statement,
                       std::string_view sql, const auto&... parameters) {
   if (!statement) {
@@ -56,12 +57,12 @@ std::int64_t asStored(std::uint64_t id) { return static_cast<std::int64_t>(id); 
 }  // namespace
 
 struct MapDatabase::Change {
-  std::set<ObjectId> objects;    ///< whose rows have changed
-  std::map<TrackId, Row> rows;   ///< to be remembered once committed
-  std::set<TrackId> shut_out;    ///< removed later than this frame
-  std::set<TrackId> alive;       ///< in the working set
-  std::set<ObjectId> to_derive;  ///< from the rows of their tracks
-  std::uint64_t revision = 0;    ///< that this commit makes
+  std::set<ObjectId> objects;    ///< objects whose rows have changed
+  std::map<TrackId, Row> rows;   ///< rows that become valid with the commit
+  std::set<TrackId> shut_out;    ///< tracks that were removed later than this frame
+  std::set<TrackId> alive;       ///< tracks of the working set
+  std::set<ObjectId> to_derive;  ///< objects whose rows follow from the rows of their tracks
+  std::uint64_t revision = 0;    ///< revision of this commit
   std::optional<Statement> put_object, put_place;
 };
 
@@ -89,7 +90,7 @@ MapDatabase::MapDatabase(OpenedStore opened, const StoreOptions& options)
   }
 }
 
-/// The columns tile_x and tile_y follow the configured size.
+/// Updates the columns tile_x and tile_y to the configured tile size.
 Result<void> MapDatabase::keepTileSize() {
   const std::string size = std::to_string(tile_size_m_);
   auto stored = connection_.prepare("SELECT 1 FROM meta WHERE key = 'tile_size_m' AND value = ?1");
@@ -149,7 +150,7 @@ Result<MapDatabase::Row> MapDatabase::rowOf(ObjectId id) const {
   row.stored = true;
   if (statement->integer(0) != 0) row.gone = fromNanoseconds(statement->integer(1));
   const WorldId world{statement->id(3), static_cast<std::uint32_t>(statement->integer(4))};
-  // One that had left the working set is written again, whatever its belief.
+  // A track that had left the working set is written again even if its belief is the same.
   if (statement->integer(2) == 0) row.digest = digestOf(statement->blob(5), world);
   return row;
 }
@@ -219,7 +220,7 @@ Result<void> MapDatabase::putObjects(const Batch& batch, Change& change) {
   return {};
 }
 
-/// Moves rows where a track shares its object now, or no longer.
+/// Moves the rows of tracks that begin or cease to share an object.
 Result<void> MapDatabase::regroup(const Batch& batch, Change& change) {
   for (const TrackId id : batch.regrouped) {
     committed_.erase(id);
@@ -244,7 +245,7 @@ Result<void> MapDatabase::regroup(const Batch& batch, Change& change) {
   return {};
 }
 
-/// The row of a track that is not its object's own is history: what was seen of that track.
+/// If a track does not have its object's id, its row is history: the detections of that track.
 Result<void> MapDatabase::hide(const StoredTrack* track, TrackId id, ObjectId object,
                                TimePoint time, Change& change) {
   const auto row = rowOf(id);
@@ -265,8 +266,8 @@ Result<void> MapDatabase::hide(const StoredTrack* track, TrackId id, ObjectId ob
   return remove(id, {EventKind::kMerged, time, object}, change);
 }
 
-/// The row of an object is that of its newest track: one of the working set, one of this W that was
-/// detected last, or else the one that was written last. If that track is gone, so is the object.
+/// An object has the row of its newest track: one of the working set, else the one of this W that
+/// was detected last, else the one that was written last. If that track is gone, so is the object.
 Result<void> MapDatabase::derive(ObjectId object, const Batch& batch, Change& change) {
   std::optional<StoredTrack> newest;
   const auto rank = [&](const StoredTrack& track) {
@@ -300,12 +301,12 @@ Result<void> MapDatabase::end(TrackId id, const Removal& removal, const Batch& b
   if (!isShared(id, batch)) return remove(id, removal, change);
   change.rows.erase(id);
   change.to_derive.insert(batch.identity->objectOf(id));
-  // What is known of a merged track is in the one that goes on.
+  // The surviving track holds the information of a merged track.
   if (removal.kind == EventKind::kMerged) return deleteTrack(connection_, id);
   return endTrack(connection_, id, removal.time);
 }
 
-/// Those of the last working set that are on the map and were no longer confirmed.
+/// Adds the tracks of the last working set that are on the map but were not confirmed any more.
 Result<void> MapDatabase::addDoubtful(std::set<ObjectId>& ids) const {
   auto rows = connection_.prepare("SELECT id FROM working WHERE belief IS NOT NULL");
   if (!rows) return failed(rows.error());
@@ -374,7 +375,7 @@ Result<Written> MapDatabase::write(const Batch& batch) {
   check(batch.working != nullptr, "a batch has a working set");
   auto transaction = Transaction::begin(connection_);
   if (!transaction) return tl::unexpected<Reason>(transaction.error());
-  if (batch.graph != nullptr && !graph_is_whole_) {  // before ids are given again
+  if (batch.graph != nullptr && !graph_is_whole_) {  // must precede the reuse of ids
     const auto swept = sweepGraph(connection_);
     if (!swept) return tl::unexpected<Reason>(swept.error());
   }

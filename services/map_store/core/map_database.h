@@ -1,4 +1,4 @@
-// The durable map: what was confirmed, the newest working set, and answers to questions about them.
+// The durable map: confirmed objects, the newest working set, and the answers to queries.
 #pragma once
 
 #include <compare>
@@ -19,7 +19,7 @@
 
 namespace perdure::map_store {
 
-/// A square of the map, tile_size_m wide: [x, x + 1) × [y, y + 1) times the size.
+/// A square of the map with sides of tile_size_m: [x, x + 1) × [y, y + 1) times the size.
 struct Square {
   std::int32_t x = 0, y = 0;
   auto operator<=>(const Square&) const = default;
@@ -30,7 +30,7 @@ struct PlacedBelief {
   ObjectBelief belief;
 };
 
-/// Why an object is no longer on the map: kGone, or kMerged into another.
+/// The reason why an object left the map: kGone, or kMerged into another one.
 struct Removal {
   EventKind kind = EventKind::kGone;
   TimePoint time;
@@ -39,80 +39,83 @@ struct Removal {
 
 struct StoredTrack;  // core/track_rows.h
 
-/// What one commit writes. Ids are those of tracks. `left`: last beliefs of confirmed tracks that
-/// left the working set.
+/// The content of one commit. Ids are track ids. `left`: last beliefs of confirmed tracks that left
+/// the working set.
 struct Batch {
   const Objects* working = nullptr;  ///< not null
   std::map<TrackId, PlacedBelief> left;
   std::map<TrackId, Removal> removed;
-  /// Of the working set: placed by the graph and not seen since. What is stored of them stays.
+  /// Tracks of the working set that the graph placed and that were not detected since. Their stored
+  /// rows do not change.
   std::set<TrackId> placed = {};
-  const mapping::Unsaved* graph = nullptr;  ///< what of it has changed; null: nothing
-  /// Which tracks are one object, what has changed of that, and the tracks that this concerns.
-  /// Null: each track is an object of its own.
+  const mapping::Unsaved* graph = nullptr;  ///< changed parts of the graph; null: no changes
+  /// Which tracks are one object, the changes to this, and the affected tracks. Null: each track is
+  /// an object of its own.
   const mapping::Identity* identity = nullptr;
   const mapping::Unsaved* facts = nullptr;
   std::set<TrackId> regrouped = {};
-  std::int64_t acknowledged = 0;  ///< entries of the outbox that a server has
-  std::string earth_anchor = {};  ///< of M (earth_place.h); empty: as it is stored
+  std::int64_t acknowledged = 0;  ///< the server has the entries of the outbox up to this one
+  std::string earth_anchor = {};  ///< position of M on Earth (earth_place.h); empty: not changed
 };
 
 struct Written {
-  std::vector<ObjectId> objects;  ///< that changed, came or went, each once
+  std::vector<ObjectId> objects;  ///< objects that changed, came or left, each once
   std::uint64_t revision = 0;
-  std::uint64_t unsound = 0;  ///< parts of the graph that are not finite; left as they are stored
+  std::uint64_t unsound = 0;  ///< parts of the graph that are not finite; their stored values do
+                              ///< not change
 };
 
 struct Found {
   std::vector<MapObject> objects;
-  std::vector<ObjectBelief> beliefs;  ///< of kById and inFullNear: the objects in full
+  std::vector<ObjectBelief> beliefs;  ///< the objects in full, for kById and inFullNear
   bool truncated = false;
-  std::uint64_t malformed = 0;  ///< rows whose belief could not be read; left out
+  std::uint64_t malformed = 0;  ///< rows that were left out because their belief could not be read
 };
 
-/// Where an object on the map was stored.
+/// The stored position of an object on the map.
 struct StoredPlace {
   ObjectId id = 0;
-  WorldId world;  ///< W
+  WorldId world;  ///< the W of the position
   Eigen::Vector3d p_W = Eigen::Vector3d::Zero();
   TimePoint last_seen;
 };
 
-/// Where the centre of a belief lies on the map; nothing where it is not finite or too far away.
+/// The square of a belief's centre; nothing if the centre is not finite or too far away.
 std::optional<Square> squareOf(const Eigen::Vector3d& p, double tile_size_m);
 MapObject mapObjectOf(const ObjectBelief& belief, const WorldId& world);
 
-/// Questions about a map file. Spatial ones concern one frame of reference.
+/// Answers queries about a map file. Spatial queries concern one frame of reference.
 class MapReader {
  public:
   explicit MapReader(const Connection* connection) : connection_(connection) {}
 
-  /// Of kById, kByClass, kByRadius (nearest first), kByBox and kAll (by id); at most `limit`.
-  /// kByRadius and kByBox look in query.world, or where that is 0 in `newest`.
+  /// Answers kById, kByClass, kByRadius (nearest first), kByBox and kAll (by id) with at most
+  /// `limit` objects. kByRadius and kByBox search in query.world, or in `newest` if query.world is
+  /// 0.
   Result<Found> find(const MapQuery& query, const WorldId& newest, std::uint32_t limit) const;
   /// All objects on the map, in full, by id; rows that cannot be read are left out.
   Result<std::vector<PlacedBelief>> beliefs() const;
-  /// What is nearer than radius, nearest first, in full.
+  /// The objects nearer than the radius, in full, nearest first.
   Result<Found> inFullNear(const Eigen::Vector3d& centre, double radius, const WorldId& world,
                            std::uint32_t limit) const;
   /// The last belief of a track; nothing if it is not on the map.
   Result<std::optional<PlacedBelief>> beliefOf(TrackId track) const;
-  /// Of the objects with these ids, in their order, those that are on the map; at most `limit`.
+  /// Those of the objects `ids` that are on the map, in this order; at most `limit`.
   Result<Found> byIds(const std::vector<ObjectId>& ids, std::size_t limit) const;
-  /// Of all objects on the map, by id.
+  /// The places of all objects on the map, by id.
   Result<std::vector<StoredPlace>> places() const;
-  /// Nothing: the object is not on the map.
+  /// Nothing if the object is not on the map.
   Result<std::optional<StoredPlace>> placeOf(ObjectId id) const;
-  /// What was merged into an object, by id.
+  /// The objects that were merged into an object, by id.
   Result<std::vector<ObjectId>> mergedInto(ObjectId id) const;
-  /// The working set as it was at the last commit; nothing on an empty map.
+  /// The working set of the last commit; nothing on an empty map.
   Result<std::optional<Objects>> working() const;
-  /// The pose graph as it was at the last commit; an empty one on a map without.
+  /// The pose graph of the last commit; empty if the map has none.
   Result<SavedGraph> graph() const { return readGraph(*connection_); }
   Result<std::set<mapping::SameObject>> facts() const { return readFacts(*connection_); }
-  /// Frames of reference that the map has something of.
+  /// Frames of reference of the map's objects.
   Result<std::set<std::uint64_t>> worlds() const;
-  /// Where on Earth M lies, as earthAnchorOfMap() writes it; empty: not known.
+  /// The position of M on Earth, as earthAnchorOfMap() writes it; empty if not known.
   Result<std::string> earthAnchor() const;
   Result<std::uint64_t> revision() const;
   Result<ObjectId> largestId() const;
@@ -126,25 +129,25 @@ class MapDatabase {
   /// Throws StartupError.
   explicit MapDatabase(const StoreOptions& options);
 
-  /// All of it or nothing, durable when it returns. Beliefs that did not change are not written;
-  /// nor are those of objects removed at `working`'s time or later.
+  /// Commits everything or nothing; the data is durable on return. Beliefs that did not change, or
+  /// whose objects were removed at `working`'s time or later, are not written.
   Result<Written> write(const Batch& batch);
 
-  /// The graph to go on with. What had to be left out of it is deleted at the next write of a
-  /// graph, because its ids are given again.
+  /// Returns the graph to continue with. The next write of a graph deletes the parts that were left
+  /// out, because their ids are reused.
   Result<SavedGraph> takeGraph();
 
   MapReader reader() const { return MapReader(&connection_); }
   const std::string& notice() const { return notice_; }
 
  private:
-  /// What the file holds of one track, or of an object.
+  /// The stored row of a track or an object.
   struct Row {
-    std::uint64_t digest = 0;  ///< of the belief; 0: not known
+    std::uint64_t digest = 0;  ///< digest of the belief; 0: not known
     bool stored = false;
     std::optional<TimePoint> gone;
   };
-  struct Change;  ///< what one write has done so far
+  struct Change;  ///< changes of one write
 
   MapDatabase(OpenedStore opened, const StoreOptions& options);
   Result<void> keepTileSize();
@@ -172,9 +175,9 @@ class MapDatabase {
   Connection connection_;
   std::string notice_;
   double tile_size_m_;
-  /// Of the confirmed tracks of the working set, as committed.
+  /// Rows of the working set's confirmed tracks, as committed.
   std::map<TrackId, Row> committed_;
-  bool graph_is_whole_ = false;  ///< nothing in the file that readGraph leaves out
+  bool graph_is_whole_ = false;  ///< whether readGraph leaves out nothing of the file
 };
 
 }  // namespace perdure::map_store

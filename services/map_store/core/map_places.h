@@ -1,5 +1,5 @@
-// Where every object on the map lies in M, kept in memory: the squares that the map is published in
-// are cut by it, and questions about places are answered by it.
+// The positions in M of all objects on the map, in memory. They determine the published squares and
+// answer spatial queries.
 #pragma once
 
 #include <functional>
@@ -19,22 +19,21 @@ class MapPlaces {
  public:
   explicit MapPlaces(double tile_size_m) : tile_size_m_(tile_size_m) {}
 
-  /// An object on the map that is new or has changed. `record`: what the graph knows of it, or
-  /// null.
+  /// Adds or updates an object on the map. `record`: its record in the graph, or null.
   void put(const StoredPlace& stored, const mapping::ObjectRecord* record,
            const mapping::MapFrames& frames);
-  /// It is no longer on the map.
+  /// Removes an object that left the map.
   void erase(ObjectId id);
-  /// The graph has changed: everything lies where `frames` says. The squares of what has moved by
-  /// less than 0.1 m since they were taken are not stale.
+  /// The graph has changed: places all objects as `frames` defines. A square becomes stale if an
+  /// object moved 0.1 m or more since the square was taken.
   void lay(const mapping::MapFrames& frames);
 
-  /// The anchor that an object belongs to; 0: none, or it is not on the map.
+  /// The anchor of an object; 0: it has none, or is not on the map.
   mapping::AnchorId anchorOf(ObjectId id) const;
-  /// Of kByRadius, nearest first, and kByBox, by id: what lies there in this M.
+  /// The objects in this M for kByRadius (nearest first) and kByBox (by id).
   std::vector<ObjectId> find(const MapQuery& query, const WorldId& map) const;
-  /// Squares whose contents have changed since they were taken last, each with the ids in it, in
-  /// order; none: it is empty.
+  /// Squares whose contents have changed since they were last taken, with their ids in order. A
+  /// square without ids is empty.
   std::map<Square, std::vector<ObjectId>> takeStale();
   std::size_t size() const { return places_.size(); }
 
@@ -42,10 +41,11 @@ class MapPlaces {
   struct Place {
     mapping::AnchorId anchor = 0;
     Eigen::Vector3d p_W = Eigen::Vector3d::Zero(), p_M = Eigen::Vector3d::Zero();
-    WorldId map;  ///< M
+    WorldId map;  ///< the M of the position
     bool provisional = false;
-    std::optional<Square> square;  ///< in which it was shown; nothing: beyond all squares
-    double moved_m = 0.0;          ///< since then, at most
+    std::optional<Square> square;  ///< square in which it was published; nothing: beyond all
+                                   ///< squares
+    double moved_m = 0.0;          ///< upper bound of its motion since then
   };
   void show(Place& place);
 
@@ -54,25 +54,25 @@ class MapPlaces {
   std::set<Square> stale_;
 };
 
-/// A map as it lies in M: what is stored, turned by the anchors that it belongs to.
+/// A map in M: the stored objects, transformed by their anchors.
 class MapInM {
  public:
   using Records = std::function<const mapping::ObjectRecord*(ObjectId)>;
-  /// `records`: what the graph knew when it was stored.
+  /// `records`: the graph's records at the time of storage.
   MapInM(MapReader reader, double tile_size_m, Records records)
       : reader_(reader), places_(tile_size_m), records_(std::move(records)) {}
 
-  /// Before anything is asked. All of it or nothing.
+  /// Must precede all queries. Loads everything or nothing.
   Result<void> load(mapping::MapFrames frames);
   bool isLoaded() const { return loaded_; }
-  /// What a commit has changed, by ids, directly after it. What cannot be read is read by the next
-  /// call.
+  /// Takes the changes of a commit, by ids, directly after it. Rows that cannot be read now are
+  /// read by the next call.
   Result<void> refresh(const std::vector<ObjectId>& changed);
-  /// The graph has grown. `moved`: what it has of before lies elsewhere.
+  /// The graph has grown. `moved`: earlier parts of it have moved too.
   void follow(mapping::MapFrames frames, bool moved);
 
-  /// Answers by id, class, radius, box and all as MapReader::find does, in M. Places are looked for
-  /// in the M that `newest` lies in.
+  /// Answers queries by id, class, radius and box, and for all objects, as MapReader::find does, in
+  /// M. Spatial queries search in the M of `newest`.
   Result<Found> find(const MapQuery& query, const WorldId& newest, std::uint32_t limit) const;
   /// The objects of a square.
   Result<Found> objects(const std::vector<ObjectId>& ids) const;

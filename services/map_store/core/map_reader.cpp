@@ -31,7 +31,7 @@ StoredPlace placeFrom(const Statement& row) {
           fromNanoseconds(row.integer(6))};
 }
 
-/// Reads rows up to `limit`, and one more to know whether there are more.
+/// Reads rows up to `limit`, and one more to detect that there are more.
 Result<Found> collect(Statement& statement, std::size_t limit, bool in_full = false) {
   Found found;
   for (;;) {
@@ -62,7 +62,7 @@ void bindBox(Statement& statement, const Eigen::Vector3d& low, const Eigen::Vect
 }
 
 Result<Statement> byBox(const Connection& connection, const MapQuery& query, const WorldId& world) {
-  // The tree holds single-precision bounds that enclose the points: the columns decide.
+  // The tree has single-precision bounds that enclose the points, so the columns decide.
   auto statement = connection.prepare(std::string(kColumns) + kInBox +
                                       "AND o.x BETWEEN ?1 AND ?2 AND o.y BETWEEN ?3 AND ?4 AND "
                                       "o.z BETWEEN ?5 AND ?6 ORDER BY o.id");
@@ -111,9 +111,9 @@ Result<Statement> statementFor(const Connection& connection, const MapQuery& que
   return fail("query_invalid", "a restore or the graph is no question about objects");
 }
 
-/// The beliefs of the working set; confirmed ones are in `tracks` or `objects`.
+/// Returns the beliefs of the working set. Confirmed ones are in `tracks` or `objects`.
 Result<std::vector<ObjectBelief>> workingBeliefs(const Connection& connection) {
-  const auto has_tracks = connection.has("tracks");  // older maps have none
+  const auto has_tracks = connection.has("tracks");  // older maps have no such table
   if (!has_tracks) return tl::unexpected<Reason>(has_tracks.error());
   auto rows = connection.prepare(
       *has_tracks ? "SELECT coalesce(w.belief, t.belief, o.belief) FROM working w "

@@ -1,5 +1,5 @@
-// Which rows of a map's file have changed and are not known to be on a fleet's server: an outbox,
-// written by the file's own triggers within the transaction that changes the row.
+// The outbox: rows of a map's file that have changed and are not known to be on a fleet's server.
+// The file's triggers write it within the transaction that changes the row.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@
 
 namespace perdure::map_store {
 
-/// Tables whose rows the outbox names, by their number there. Ends of edges and anchors of
-/// sightings come before what hangs on them.
+/// Numbers of the tables in the outbox. Ends of edges and anchors of sightings come before the rows
+/// that refer to them.
 enum class OutboxTable : std::int64_t {
   kClasses = 0,
   kAnchors = 1,
@@ -24,22 +24,22 @@ enum class OutboxTable : std::int64_t {
 };
 inline constexpr std::int64_t kOutboxTables = 8;
 
-/// Where an outbox stands. Each change has a number larger than all before it.
+/// The state of an outbox. Each change has a larger number than all earlier ones.
 struct OutboxMark {
-  std::string file;    ///< 32 hexadecimal digits that the file keeps for ever; copies have the same
-  std::string outbox;  ///< 32 that change when the outbox is begun anew, having missed changes
-  std::int64_t acknowledged = 0;  ///< entries up to this one were taken away
-  std::int64_t last = 0;          ///< the newest number given
+  std::string file;    ///< 32 hexadecimal digits that never change; copies of the file have the
+                       ///< same digits
+  std::string outbox;  ///< 32 digits that change when the outbox restarts after missed changes
+  std::int64_t acknowledged = 0;  ///< entries up to this one were removed
+  std::int64_t last = 0;          ///< number of the newest change
 };
 
-/// Makes the outbox where there is none, and anew where it does not follow every table. All or
-/// nothing.
+/// Creates the outbox if there is none, or again if it does not follow every table. All or nothing.
 Result<void> openOutbox(const Connection& connection);
-/// Removes it: without a server it would gather what nobody takes.
+/// Removes the outbox: without a server it would only grow.
 Result<void> dropOutbox(const Connection& connection);
-/// Within the caller's transaction: takes entries up to `number` away.
+/// Removes the entries up to `number`, within the caller's transaction.
 Result<void> acknowledge(const Connection& connection, std::int64_t number);
-/// "no_outbox" where the file has none.
+/// Reason of failure: "no_outbox" if the file has none.
 Result<OutboxMark> outboxMark(const Connection& connection);
 
 }  // namespace perdure::map_store

@@ -1,4 +1,4 @@
-// Answers that were given, so that a request that comes again gets the same one.
+// Stores answers, so that a repeated request gets the same answer.
 #pragma once
 
 #include <cstddef>
@@ -9,12 +9,13 @@
 
 namespace perdure::map_store {
 
-/// Keeps the newest `capacity` replies by (client, request).
+/// Stores the newest `capacity` replies by (client, request).
 class ReplyCache {
  public:
   explicit ReplyCache(std::size_t capacity) : capacity_(capacity) {}
 
-  /// Null where the request was not answered, or long ago. Valid until the next call of keep.
+  /// Returns null if the request was not answered, or if its reply is no longer stored. Valid until
+  /// the next call of keep.
   const MapReply* find(InstanceId client, std::uint64_t request) const {
     for (const auto& reply : replies_) {
       if (reply.client == client && reply.request == request) return &reply;

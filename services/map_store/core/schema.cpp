@@ -14,9 +14,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// One row for each object that was ever confirmed. `gone` is 0, or 1 + the EventKind that ended it;
-// the row then stays as history. `belief` is what core/belief_codec.h says; the other columns are
-// there to be asked for. `tile_*` follow from x, y and meta.tile_size_m.
+// One row for each object that was ever confirmed. `gone` is 0, or 1 + the EventKind that ended the
+// object; the row then stays as history. `belief` is encoded by core/belief_codec.h. The other
+// columns are for queries. `tile_*` follow from x, y and meta.tile_size_m.
 constexpr char kSchema[] = R"sql(
 CREATE TABLE meta(key TEXT PRIMARY KEY, value) WITHOUT ROWID;
 CREATE TABLE objects(
@@ -51,7 +51,7 @@ bool damaged(const Reason& reason) {
   return reason.code == "corrupt" || reason.code == "not_a_database";
 }
 
-/// A file that begins neither like SQLite nor with zeros was put there by someone else.
+/// A file that begins neither like SQLite nor with zeros belongs to another program.
 bool beginsLikeAnotherFile(const std::string& path) {
   static constexpr std::array<char, 16> kMagic = {'S', 'Q', 'L', 'i', 't', 'e', ' ', 'f',
                                                   'o', 'r', 'm', 'a', 't', ' ', '3', '\0'};
@@ -63,7 +63,7 @@ bool beginsLikeAnotherFile(const std::string& path) {
          !std::all_of(head.begin(), end, [](char c) { return c == '\0'; });
 }
 
-/// The name that the damaged file has now.
+/// Renames the damaged file and returns its new name.
 std::string setAside(const std::string& path) {
   int number = 1;
   while (fs::exists(path + ".damaged-" + std::to_string(number))) ++number;
@@ -90,7 +90,7 @@ void refuseForeign(const std::string& path, const Identity& identity) {
 }
 
 Result<void> prepareForWriting(const Connection& connection, const StoreOptions& options) {
-  // FULL: a commit is on the disk when it returns, after a loss of power too.
+  // FULL: a commit is on disk when it returns, even if the power fails.
   auto done = connection.execute(
       "PRAGMA busy_timeout=250; PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL;"
       "PRAGMA journal_size_limit=16777216;");
@@ -112,7 +112,7 @@ Result<void> create(const Connection& connection) {
   return transaction->commit();
 }
 
-/// Tables of older versions are the same, and their beliefs are read as they are; some are new. All
+/// Upgrades a file of an older version. Its tables and beliefs stay valid; some tables are new. All
 /// or nothing.
 Result<void> adopt(const Connection& connection, const Identity& identity) {
   if (identity.version == kSchemaVersion) return connection.execute(kAddedSchema);
@@ -120,7 +120,7 @@ Result<void> adopt(const Connection& connection, const Identity& identity) {
   if (!transaction) return tl::unexpected<Reason>(transaction.error());
   const auto version = connection.integer("PRAGMA user_version");
   if (!version) return tl::unexpected<Reason>(version.error());
-  if (*version == kSchemaVersion) return {};  // another process was first
+  if (*version == kSchemaVersion) return {};  // another process has upgraded the file already
   const auto made =
       connection.execute(std::string(*version < kFirstSchemaWithGraph ? kGraphSchema : "") +
                          kAddedSchema + "PRAGMA user_version=" + std::to_string(kSchemaVersion) +
@@ -129,7 +129,7 @@ Result<void> adopt(const Connection& connection, const Identity& identity) {
   return transaction->commit();
 }
 
-/// A reason where the file is damaged; StartupError where it is not ours.
+/// Returns a reason if the file is damaged. Throws StartupError if it is not a map of ours.
 Result<Connection> tryOpen(const StoreOptions& options) {
   auto connection = Connection::open(options.path, Connection::Mode::kReadWriteCreate);
   if (!connection) return connection;

@@ -1,4 +1,5 @@
-// The map's file: opened, checked, created; what is damaged is set aside and never overwritten.
+// The map's file is opened, checked and created here. A damaged file is renamed and never
+// overwritten.
 #pragma once
 
 #include <cstdint>
@@ -8,40 +9,40 @@
 
 namespace perdure::map_store {
 
-/// "PERD" in the database's header: tells our files from other programs'.
+/// "PERD" in the database's header distinguishes our files from those of other programs.
 inline constexpr int kApplicationId = 0x50455244;
-/// 2: beliefs with ledgers. 3: the pose graph. 4: tracks that are one object. Older maps are read as
-/// they are, and become one of 4 when they are opened to be written.
+/// 2: beliefs with ledgers. 3: the pose graph. 4: tracks that share an object. Older maps can be
+/// read; opening them for writing upgrades them to 4.
 inline constexpr int kSchemaVersion = 4;
 
 struct StoreOptions {
   std::string path;
   double tile_size_m = 32.0;
-  std::int64_t max_size_mb = 0;  ///< 0: as large as the disk
+  std::int64_t max_size_mb = 0;  ///< 0: limited by the disk
   bool check_at_start = true;
-  bool outbox = false;  ///< changes are gathered for a server (core/outbox.h)
+  bool outbox = false;  ///< record changes for a server (core/outbox.h)
 };
 
 struct OpenedStore {
   Connection connection;
-  std::string notice;  ///< a sentence where a damaged file was set aside, else empty
+  std::string notice;  ///< a sentence if a damaged file was renamed, else empty
 };
 
-/// What a database says of itself.
+/// Application id and version in a database's header.
 struct Identity {
   std::int64_t application = 0, version = 0, tables = 0;
   bool empty() const { return application == 0 && version == 0 && tables == 0; }
 };
 Result<Identity> identityOf(const Connection& connection);
 
-/// Reads the whole file: "corrupt" where it is damaged.
+/// Reads the whole file. Reason of failure: "corrupt" if it is damaged.
 Result<void> wholeFileIsSound(const Connection& connection);
 
-/// Opens for the service. Throws StartupError with the mend where the place cannot be written, the
-/// file is not a map of Perdure's, or a newer version made it.
+/// Opens the file for the service. Throws StartupError with the fix if the folder is not writable,
+/// the file is not a map of ours, or a newer version wrote it.
 OpenedStore openStore(const StoreOptions& options);
 
-/// Opens an existing map for reading only, also while the service runs. Throws StartupError.
+/// Opens an existing map read-only, even while the service runs. Throws StartupError.
 Connection openStoreForReading(const std::string& path);
 
 }  // namespace perdure::map_store

@@ -1,4 +1,5 @@
-// SQLite behind RAII: a connection, prepared statements, a transaction that rolls back by itself.
+// RAII wrappers for SQLite: a connection, prepared statements, and a transaction that rolls back
+// automatically.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +20,8 @@ namespace perdure::map_store {
 /// SQLite's sentence.
 Reason reasonOf(int code, std::string_view detail);
 
-/// One prepared statement. Bind from 1, read columns from 0. Valid while its connection lives.
+/// One prepared statement. Parameters count from 1, columns from 0. Valid for the lifetime of its
+/// connection.
 class Statement {
  public:
   Statement() = default;
@@ -31,9 +33,9 @@ class Statement {
   Statement& bindNull(int index);
   Statement& bindId(int index, std::uint64_t value);  ///< stored as the same 64 bits
 
-  /// True: there is a row; false: done (and reset for the next use).
+  /// True: a row was read; false: done, and reset for the next use.
   Result<bool> step();
-  /// Runs to the end and resets; bindings are cleared.
+  /// Runs the statement to its end, resets it and clears its bindings.
   Result<void> run();
   void reset();
 
@@ -63,11 +65,11 @@ class Connection {
   Result<Statement> prepare(std::string_view sql) const;
   /// Runs statements without results, separated by semicolons.
   Result<void> execute(const std::string& sql) const;
-  /// The first column of the first row of a query that has one.
+  /// The first column of the first row. The query must have one.
   Result<std::int64_t> integer(std::string_view sql) const;
-  /// Whether the file has a table or trigger of this name.
+  /// Whether the file has a table or trigger with this name.
   Result<bool> has(const std::string& name) const;
-  /// Makes `target` the same, page by page: one state, also while others write this one.
+  /// Copies one state to `target`, page by page, even while other processes write to this one.
   Result<void> copyInto(const Connection& target) const;
 
  private:
@@ -78,7 +80,7 @@ class Connection {
   std::unique_ptr<sqlite3, Close> connection_;
 };
 
-/// Rolls back at the end of its scope unless it was committed.
+/// Rolls back at the end of its scope unless committed.
 class Transaction {
  public:
   static Result<Transaction> begin(const Connection& connection);

@@ -1,4 +1,5 @@
-// The map in pieces for late joiners: squares cut into tiles of at most kMapTileCapacity objects.
+// The map in parts for late joiners: squares, divided into tiles of at most kMapTileCapacity
+// objects.
 #pragma once
 
 #include <cstdint>
@@ -11,14 +12,14 @@
 namespace perdure::map_store {
 
 struct TileChanges {
-  std::vector<MapTile> tiles;    ///< new contents; never empty of objects
-  std::vector<MapTile> emptied;  ///< keys only: no such tile any more
+  std::vector<MapTile> tiles;    ///< new contents; each has at least one object
+  std::vector<MapTile> emptied;  ///< only keys are valid: these tiles do not exist any more
 };
 
-/// Remembers how many tiles each square has, so that what was emptied can be disposed of.
+/// Stores the number of tiles of each square, so that emptied tiles can be disposed of.
 class TileBook {
  public:
-  /// The contents of `square` now, ordered by id. Instance and revision go into each tile.
+  /// Sets the contents of `square`, ordered by id. Each tile gets the instance and the revision.
   TileChanges replace(const Square& square, std::vector<MapObject> objects, InstanceId instance,
                       std::uint64_t revision);
   std::uint32_t tiles() const { return tiles_; }

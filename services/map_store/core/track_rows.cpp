@@ -6,7 +6,7 @@
 namespace perdure::map_store {
 namespace {
 
-/// Prepares, binds the id to ?1, and lets `bind` do the rest.
+/// Prepares the statement, binds the id to ?1, and calls `bind` for the other parameters.
 template <class Bind>
 Result<void> runFor(const Connection& connection, std::string_view sql, TrackId id, Bind bind) {
   auto statement = connection.prepare(sql);

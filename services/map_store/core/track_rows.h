@@ -1,4 +1,4 @@
-// Rows of tracks that share an object with others. The row of the object is computed from them.
+// Rows of tracks that share an object. The row of the object is computed from them.
 #pragma once
 
 #include <optional>
@@ -11,15 +11,16 @@ namespace perdure::map_store {
 struct StoredTrack {
   TrackId id = 0;
   PlacedBelief placed;
-  std::uint64_t written = 0;  ///< revision of the map that its detections were written with
+  std::uint64_t written = 0;  ///< revision of the map in which its last detections were written
   std::optional<TimePoint> gone;
 };
 
-// All within the caller's transaction.
+// All functions run within the caller's transaction.
 
 Result<std::optional<StoredTrack>> readTrack(const Connection& connection, TrackId id);
 Result<void> writeTrack(const Connection& connection, const StoredTrack& track);
-/// From here on it shares its object: takes what the row of the object says, if there is none yet.
+/// The track shares its object from now on. Copies the object's row unless the track already has
+/// one.
 Result<void> shareTrack(const Connection& connection, TrackId id);
 Result<void> endTrack(const Connection& connection, TrackId id, TimePoint time);
 Result<void> deleteTrack(const Connection& connection, TrackId id);

@@ -13,7 +13,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr int kBinary = 1;
-/// Raised by the server's functions of ours.
+/// SQLSTATE that our functions on the server raise.
 constexpr std::string_view kOvertaken = "PE001";
 
 std::string inBigEndian(std::uint64_t value) {
@@ -29,7 +29,7 @@ std::uint64_t fromBigEndian(const char* bytes) {
   return value;
 }
 
-/// How many bytes the UTF-8 character at the beginning of `text` has; 0 where there is none.
+/// The number of bytes of the UTF-8 character at the start of `text`; 0 if there is none.
 std::size_t lengthOfCharacter(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(text[i]); };
   const std::uint8_t first = byte(0);
@@ -55,7 +55,8 @@ std::string onlyUtf8(std::string_view text) {
   return clean;
 }
 
-/// The first line of libpq's words, which never hold the password: it is in no URL (server_url.h).
+/// The first line of libpq's message. It never holds the password, because no URL has one
+/// (server_url.h).
 std::string firstLine(const char* message) {
   const std::string text = message == nullptr ? "" : message;
   return text.substr(0, text.find('\n'));
@@ -215,7 +216,8 @@ Result<void> Link::finishConnecting() {
   return fail(code, firstLine(message.c_str()));
 }
 
-/// A commit is on the server's disk when it is answered, and no transaction outlives a lost link.
+/// A commit is on the server's disk when it is acknowledged. A transaction ends if the link is
+/// lost.
 Result<void> Link::setUp() {
   if (PQsetnonblocking(connection_.get(), 1) != 0) return tl::unexpected<Reason>(lost());
   const std::string milliseconds = std::to_string(patience_.answer.count());
@@ -238,10 +240,10 @@ Result<void> Link::wait(short events, Clock::time_point until) const {
       poll(files.data(), files.size(), static_cast<int>(std::max<std::int64_t>(left.count(), 0)));
   if (files[1].revents != 0 && ready > 0) return fail("stopped");
   if (ready == 0) return fail("server_unreachable", "the server does not answer");
-  return {};  // interrupted: the caller asks again
+  return {};  // interrupted: the caller repeats the call
 }
 
-/// The next result; null where one statement's results end.
+/// Returns the next result, or null at the end of a statement's results.
 Result<pg_result*> Link::next() {
   auto until = Clock::now() + patience_.answer;
   for (;;) {
@@ -255,7 +257,7 @@ Result<pg_result*> Link::next() {
   }
 }
 
-/// The last result of what was sent, once all have come.
+/// Waits for all results and returns the last one.
 Result<Answer> Link::last() {
   Answer answer(nullptr);
   std::optional<Reason> wrong;

@@ -1,5 +1,5 @@
-// A connection to PostgreSQL that never waits longer than it is told to: libpq behind RAII, without
-// blocking, values by their bits.
+// A connection to PostgreSQL with bounded waits: non-blocking libpq behind RAII. Values keep their
+// bits.
 #pragma once
 
 #include <chrono>
@@ -19,18 +19,18 @@ struct pg_result;
 
 namespace perdure::map_store::fleet {
 
-/// How long is waited. A name server's answer is waited for as the system's resolver does.
+/// Time limits of waits. Name resolution uses the limits of the system's resolver.
 struct Patience {
   std::chrono::milliseconds connect{10'000};
   std::chrono::milliseconds answer{20'000};  ///< while nothing is sent or received
 };
 
-/// Parameters of one statement, in their order.
+/// Parameters of one statement, in order.
 class Values {
  public:
   Values& put(std::int64_t value);
   Values& put(double value);
-  /// What is not UTF-8, or zero, becomes "?": the server would refuse it.
+  /// Replaces bytes that are zero or not UTF-8 by "?", because the server would refuse them.
   Values& put(std::string_view value);
   Values& put(std::span<const std::uint8_t> value);
   Values& null();
@@ -40,13 +40,13 @@ class Values {
   std::vector<std::optional<std::string>> bytes_;
 };
 
-/// What a statement returned.
+/// The result of a statement.
 class Answer {
  public:
   explicit Answer(pg_result* result) : result_(result) {}
   int rows() const;
-  std::int64_t integer(int row, int column) const;  ///< of bigint
-  double real(int row, int column) const;           ///< of float8
+  std::int64_t integer(int row, int column) const;  ///< the value of a bigint column
+  double real(int row, int column) const;           ///< the value of a float8 column
   bool boolean(int row, int column) const;
   std::string text(int row, int column) const;
   std::span<const std::uint8_t> blob(int row, int column) const;
@@ -59,30 +59,30 @@ class Answer {
   std::unique_ptr<pg_result, Clear> result_;
 };
 
-/// Reasons: "server_unreachable" (no connection, no answer, or it was lost), "server_login" (name,
-/// password or database), "server_rights", "server_full", "server_busy", "server_refused" (any
-/// other), "server_overtaken" (another process has written this map meanwhile), "stopped". After
-/// "server_unreachable" and "stopped" the link is of no more use.
+/// Reasons: "server_unreachable" (no connection, no answer, or the connection was lost),
+/// "server_login" (name, password or database), "server_rights", "server_full", "server_busy",
+/// "server_refused" (any other), "server_overtaken" (another process has written this map
+/// meanwhile), "stopped". After "server_unreachable" and "stopped" the link cannot be used any
+/// more.
 class Link {
  public:
-  /// `stop` must outlive the link; once it is raised every wait ends.
+  /// `stop` must outlive the link; raising it ends every wait.
   static Result<Link> open(const std::string& url, const Patience& patience, const Stop& stop);
 
-  /// One statement; its answer.
+  /// Runs one statement and returns its answer.
   Result<Answer> ask(const std::string& sql, const Values& values = {});
-  /// Statements without parameters or answers, in one transaction.
+  /// Runs statements without parameters or answers in one transaction.
   Result<void> run(const std::string& sql);
   Result<void> prepare(const std::string& name, const std::string& sql);
 
-  /// Statements that are sent together: begun, queued, then done. They are one transaction, or part
-  /// of the one that is open.
+  /// Statements that are sent together: begin, queue, then end. They are one transaction, or part
+  /// of the open one.
   void beginBatch(bool as_transaction = true);
   void queue(const std::string& prepared, const Values& values);
-  /// Committed (as a transaction) when it returns without a reason. With "server_unreachable" it is
-  /// not known.
+  /// Success means that the transaction is committed. After "server_unreachable" this is unknown.
   Result<void> endBatch();
 
-  /// Waits for a notification: its payload, or nothing where none came in time.
+  /// Waits for a notification. Returns its payload, or nothing after the time limit.
   Result<std::optional<std::string>> notification(std::chrono::milliseconds patience);
 
  private:

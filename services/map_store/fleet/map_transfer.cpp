@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 constexpr int kRowsAtOnce = 2000;
-/// In place of a file's identity: of maps that were pushed, one for each name.
+/// Replaces a file's identity for maps that were pushed; there is one for each name.
 constexpr char kPushed[] = "pushed";
 
 std::string mendOf(const Reason& reason) {
@@ -98,7 +98,7 @@ Chosen choose(Link& link, const std::string& name, bool unfinished) {
   return chosen;
 }
 
-/// All rows of one table, portion by portion.
+/// Copies all rows of one table, portion by portion.
 void pullTable(Link& link, std::int64_t map, const Table& table, const Connection& to) {
   const std::string what = "The map cannot be written";
   auto insertion = orGiveUp(to.prepare(insertionOf(table)), what);
@@ -151,7 +151,7 @@ void pullInto(Link& link, const std::string& name, bool unfinished, const std::s
   orGiveUp(link.run("COMMIT"), kUnread);
 }
 
-/// A file beside the one that is wanted, gone at the end.
+/// A temporary file beside the destination; removed at the end.
 class Draft {
  public:
   explicit Draft(std::string path) : path_(std::move(path)) { remove(); }
@@ -220,7 +220,7 @@ void pullMap(const std::string& url, const std::string& name, const std::string&
 std::vector<std::string> pullVehicles(const std::string& url, const std::string& folder,
                                       bool unfinished) {
   std::vector<std::string> files;
-  std::string last;  // the newest of each name comes first
+  std::string last;  // the newest map of each name comes first
   for (const ServerMap& map : listMaps(url)) {
     const bool wanted = map.file != kPushed && map.vehicle != last && (map.whole || unfinished);
     if (map.file != kPushed) last = map.vehicle;

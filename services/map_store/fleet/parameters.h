@@ -1,4 +1,4 @@
-// Where a fleet's maps are gathered, and as what.
+// Parameters of the fleet's server and of the map's name on it.
 #pragma once
 
 #include <string>
@@ -7,10 +7,10 @@
 namespace perdure::map_store::fleet {
 
 struct Parameters {
-  std::string url;      ///< of a PostgreSQL database; empty: there is no server
-  std::string vehicle;  ///< the name that the map has there; empty: the host's
-  /// Of M: latitude and longitude [°, WGS 84], height over the ellipsoid [m], yaw of the x axis
-  /// from east [°]. Empty: as the map's file knows it, if it does.
+  std::string url;      ///< URL of a PostgreSQL database; empty: no server
+  std::string vehicle;  ///< name of the map on the server; empty: the host name
+  /// Position of M: latitude and longitude [°, WGS 84], height above the ellipsoid [m], yaw of the
+  /// x axis from east [°]. Empty: as in the map's file, if present.
   std::vector<double> earth_anchor;
 };
 

@@ -67,7 +67,7 @@ class Snapshot {
   const Connection* connection_;
 };
 
-/// As the file knows it; empty where it does not.
+/// The position in the map's file; empty if it has none.
 std::vector<double> earthAnchorOf(const Connection& connection) {
   return earthAnchorFrom(MapReader(&connection).earthAnchor().value_or(""));
 }
@@ -104,7 +104,8 @@ Result<void> Pusher::attach(Link& link) {
   return opened ? introduce(link) : opened;
 }
 
-/// The server's row of this map; where it is new, or of another outbox, it is empty after this.
+/// Finds or creates the server's row of this map. If the row is new, or belongs to another outbox,
+/// the map on the server is empty afterwards.
 Result<void> Pusher::introduce(Link& link) {
   Values values;
   values.put(std::string_view(vehicle_)).put(std::string_view(mark_.file));
@@ -162,7 +163,7 @@ Result<Portion> Pusher::pushPortion(Link& link, std::int64_t most_rows, bool as_
   link.beginBatch(as_transaction);
   const auto read =
       at_.next_table < kOutboxTables ? readWhole(link, draft) : readChanges(link, draft);
-  // Where the file could not be read to the end the server refuses, and takes nothing of it.
+  // If the file could not be read to the end, the server refuses the portion and stores none of it.
   queueAdvance(link, draft, read.has_value() ? mark_.outbox : "");
   const auto done = link.endBatch();
   if (!read) return tl::unexpected<Reason>(read.error());
@@ -234,7 +235,7 @@ Result<void> Pusher::queueWorking(Link& link) const {
   }
 }
 
-/// Row by row through the tables. Entries of the outbox that came since it began follow then.
+/// Reads the tables row by row. Then the entries follow that the outbox received meanwhile.
 Result<void> Pusher::readWhole(Link& link, Draft& draft) const {
   while (draft.next.next_table + 1 < kOutboxTables &&
          draft.rows < static_cast<std::uint64_t>(draft.most)) {

@@ -1,7 +1,7 @@
-// Sends what changed in a map's file to the server, in portions that are each one transaction
-// there: rows as they are now, in the order of their last change. The server says up to where it
-// has come, so that a portion whose answer was lost is neither sent again nor left out. A map that
-// the server does not have, or has missed changes of, is sent whole.
+// Sends the changes in a map's file to the server, in portions that are one transaction each: the
+// current rows, in the order of their last change. The server reports its last entry, so a portion
+// whose answer was lost is neither repeated nor left out. The whole map is sent if the server has
+// none or has missed changes.
 #pragma once
 
 #include <cstdint>
@@ -18,35 +18,35 @@ namespace perdure::map_store::fleet {
 
 struct Portion {
   std::uint64_t rows = 0;
-  std::int64_t sent = 0;  ///< entries of the outbox up to this one are on the server
-  bool whole = false;     ///< the server has all of a state that the file had
+  std::int64_t sent = 0;  ///< the server has the entries of the outbox up to this one
+  bool whole = false;     ///< whether the server has a complete state of the file
 };
 
 class Pusher {
  public:
-  /// `earth_anchor`: four numbers (parameters.h), or empty: as the file knows it. The file is
-  /// opened for reading only.
+  /// `earth_anchor`: four numbers (parameters.h), or empty: as in the file. The file is opened
+  /// read-only.
   Pusher(std::string file, std::string vehicle, std::vector<double> earth_anchor);
 
-  /// Asks the server where it stands. Before the first push of each link, and after a push that
-  /// failed with any reason.
+  /// Reads the server's last entry. Must precede the first push on each link, and the first push
+  /// after any failure.
   Result<void> attach(Link& link);
-  /// Sends at most so many rows; fewer, and whole, where there are no more.
+  /// Sends at most `most_rows` rows. If fewer remain, the portion is smaller, and `whole`.
   Result<Portion> push(Link& link, std::int64_t most_rows);
-  /// Instead of attach and push, for a file without outbox: makes the map of this vehicle and
-  /// `file` what the file holds, in one transaction.
+  /// Replaces attach and push for a file without outbox: copies `file` to this vehicle's map, in
+  /// one transaction.
   Result<void> replaceAll(Link& link, const std::string& file);
-  /// Whether the file has what was not sent.
+  /// Whether the file has entries that were not sent.
   Result<bool> hasMore() const;
 
   std::int64_t sent() const { return at_.sent; }
-  std::int64_t number() const { return map_; }  ///< of the map, on the server
+  std::int64_t number() const { return map_; }  ///< number of the map on the server
 
  private:
   struct Place {
     std::int64_t sent = 0, next_table = kOutboxTables, next_id = 0;
   };
-  struct Draft;  ///< a portion that is being put together
+  struct Draft;  ///< a portion under construction
   Result<void> openFile(bool with_outbox);
   Result<void> introduce(Link& link);
   Result<void> readChanges(Link& link, Draft& draft) const;
@@ -59,7 +59,7 @@ class Pusher {
 
   const std::string file_, vehicle_;
   const std::vector<double> earth_anchor_;
-  std::vector<double> told_earth_;  ///< what the server was told, that or the file's own
+  std::vector<double> told_earth_;  ///< position on Earth as last sent: the given one or the file's
   std::optional<Connection> connection_;
   OutboxMark mark_;
   bool has_outbox_ = true;

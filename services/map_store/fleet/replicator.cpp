@@ -46,7 +46,7 @@ std::string mendOf(const std::string& code) {
   return "look at the disk of store.path";
 }
 
-/// Whether another try may pass by itself with fewer rows.
+/// Whether a retry with fewer rows may succeed.
 bool isSlowness(const std::string& code) {
   return code == "server_busy" || code == "server_unreachable";
 }
@@ -75,7 +75,7 @@ struct Replicator::Work {
   Result<void> sendAll();
   void fail(const Reason& reason);
   void succeed(const Portion& portion, std::uint64_t wakes_before);
-  /// False: it is to end.
+  /// Returns false if the thread must end.
   bool rest(std::optional<Clock::duration> time);
 
   const std::string url;
@@ -90,11 +90,12 @@ struct Replicator::Work {
   mutable std::mutex mutex;
   std::condition_variable woken, advanced;
   bool stopping = false;
-  std::uint64_t wakes = 1, served = 0;  ///< how often it was woken; and up to which all is sent
+  std::uint64_t wakes = 1, served = 0;  ///< number of wakes, and of those whose changes are all
+                                        ///< sent
   std::optional<Clock::time_point> woken_at;
   Progress progress;
 
-  std::thread thread;  // last: it uses the others
+  std::thread thread;  // last member: it uses the others
 };
 
 void Replicator::Work::run() {

@@ -1,6 +1,6 @@
-// Keeps a fleet's server up to date with a map's file, in a thread of its own. The file is the
-// buffer: the service never waits for the server, and what the server has not confirmed stays in
-// the file's outbox, over restarts of either.
+// Keeps a fleet's server up to date with a map's file, in its own thread. The file is the buffer:
+// the service never waits for the server. Entries that the server has not confirmed stay in the
+// file's outbox, even if either side restarts.
 #pragma once
 
 #include <chrono>
@@ -13,38 +13,38 @@
 
 namespace perdure::map_store::fleet {
 
-/// How long is waited, and how much is sent at once.
+/// Time limits, and the size of a transaction.
 struct Pace {
-  std::chrono::milliseconds connect{10'000};   ///< for a connection
+  std::chrono::milliseconds connect{10'000};   ///< limit for a connection
   std::chrono::milliseconds answer{20'000};    ///< while nothing is sent or received
-  std::chrono::milliseconds first_retry{250};  ///< doubled with each failure
+  std::chrono::milliseconds first_retry{250};  ///< doubles with each failure
   std::chrono::milliseconds longest_retry{8'000};
-  std::int64_t most_rows = 2'000;  ///< of one transaction; halved where the server is too slow
+  std::int64_t most_rows = 2'000;  ///< in one transaction; halved if the server is too slow
 };
 
 struct Progress {
-  std::int64_t sent = 0;  ///< entries of the outbox up to this one are on the server
-  bool whole = false;     ///< the server has all that the file had when it was last woken
+  std::int64_t sent = 0;  ///< the server has the entries of the outbox up to this one
+  bool whole = false;     ///< whether the server has all that the file had at the last wake
   std::uint64_t rows = 0, portions = 0;
-  double latency_s = 0.0;  ///< from the last wake whose changes are there until they were
-  ReasonCounts reasons;    ///< of link.h and pusher.h, and "postgis_missing"
-  std::string failing;     ///< the reason for which nothing is sent now, or nothing
-  std::string trouble;     ///< the same as a sentence with the mend
-  std::string notice;      ///< a sentence that is no trouble, or nothing
+  double latency_s = 0.0;  ///< from the last served wake until its changes were on the server
+  ReasonCounts reasons;    ///< reasons of link.h and pusher.h, and "postgis_missing"
+  std::string failing;     ///< the reason why sending fails now; empty: none
+  std::string trouble;     ///< the same as a sentence with the fix
+  std::string notice;      ///< a sentence that reports no failure; may be empty
 };
 
 class Replicator {
  public:
-  /// Of a file whose outbox is open (core/outbox.h). Throws StartupError as server_url.h does.
+  /// The outbox of `file` must be open (core/outbox.h). Throws StartupError as server_url.h does.
   Replicator(const Parameters& parameters, std::string file, const Pace& pace = {});
-  ~Replicator();  ///< ends within a moment, whatever the server does
+  ~Replicator();  ///< ends quickly, even if the server does not answer
   Replicator(const Replicator&) = delete;
   Replicator& operator=(const Replicator&) = delete;
 
   /// The file has changed. Returns at once.
   void wake();
   Progress progress() const;
-  /// Waits until all that has changed is sent, or the time is over.
+  /// Waits until all changes are sent, or until `patience` has passed.
   bool finish(std::chrono::milliseconds patience);
 
  private:

@@ -7,11 +7,12 @@
 namespace perdure::map_store::fleet {
 namespace {
 
-/// One at a time makes the schema.
+/// Only one process at a time creates the schema.
 constexpr char kLock[] = "SELECT pg_advisory_xact_lock(1346720324)";
 
-// A map is one file's under one vehicle's name. `sent`: entries of the file's outbox up to this one
-// are here. While next_table is below 7 the whole file is being sent: up to row next_id of it.
+// A map belongs to one file under one vehicle's name. `sent`: the server has the file's outbox
+// entries up to this one. While next_table is below 7, the whole file is being sent, and has
+// arrived up to row next_id of that table.
 constexpr char kMaps[] = R"sql(
 CREATE TABLE perdure.about(version bigint NOT NULL);
 CREATE TABLE perdure.maps(
@@ -90,7 +91,7 @@ CREATE TRIGGER tell_tile AFTER INSERT OR UPDATE ON perdure.objects
   FOR EACH ROW EXECUTE FUNCTION perdure.tell_tile();
 )sql";
 
-// Where a map has no graph its newest frame of reference is taken for M.
+// Without a graph, the map's newest frame of reference serves as M.
 constexpr char kPlaces[] = R"sql(
 CREATE INDEX objects_by_class ON perdure.objects(map, class);
 CREATE VIEW perdure.objects_in_map AS
@@ -107,9 +108,9 @@ CREATE VIEW perdure.objects_in_map AS
     NOT EXISTS (SELECT 1 FROM perdure.anchors a WHERE a.map = o.map)));
 )sql";
 
-// M lies at (latitude, longitude, height), its x axis turned by yaw from east: by way of ECEF, as
-// common/earth/geodesy.cpp does it. EPSG:4978 is ECEF, 4979 WGS 84 with heights. @ is where
-// PostGIS lives.
+// M's origin is at (latitude, longitude, height); its x axis is turned by yaw from east. Conversion
+// by ECEF as in common/earth/geodesy.cpp. EPSG:4978 is ECEF, 4979 is WGS 84 with heights. @ is the
+// schema of PostGIS.
 constexpr char kOnEarth[] = R"sql(
 CREATE FUNCTION perdure.on_earth(x float8, y float8, z float8, latitude float8, longitude float8,
     above float8, yaw float8) RETURNS @geometry LANGUAGE sql IMMUTABLE PARALLEL SAFE AS $$
@@ -173,7 +174,7 @@ std::string wholeSchema() {
          std::to_string(kServerSchema) + ");";
 }
 
-/// By the catalogue, not by to_regclass: that one may answer from before another process's commit.
+/// Uses the catalogue, because to_regclass may give an answer from before another process's commit.
 Result<bool> exists(Link& link, std::string_view name) {
   const auto answer = link.ask(
       "SELECT EXISTS(SELECT 1 FROM pg_catalog.pg_class c JOIN pg_catalog.pg_namespace n ON n.oid = "
@@ -183,7 +184,7 @@ Result<bool> exists(Link& link, std::string_view name) {
   return answer->boolean(0, 0);
 }
 
-/// Runs `sql` unless schema perdure has `name`, one process at a time.
+/// Runs `sql` unless schema perdure has `name`; one process at a time.
 Result<void> makeOnce(Link& link, std::string_view name, const std::string& sql) {
   const auto before = exists(link, name);
   if (!before) return tl::unexpected<Reason>(before.error());
@@ -198,7 +199,7 @@ Result<void> makeOnce(Link& link, std::string_view name, const std::string& sql)
   return done;
 }
 
-/// The schema that PostGIS is in; empty where there is none.
+/// The schema of PostGIS; empty if it is not installed.
 Result<std::string> schemaOfPostgis(Link& link) {
   const auto answer = link.ask(
       "SELECT quote_ident(n.nspname) FROM pg_extension e JOIN pg_namespace n "

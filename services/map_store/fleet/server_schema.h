@@ -1,5 +1,5 @@
-// What the server has: schema `perdure` with a row for each map and the rows of the maps' files,
-// its functions, and where PostGIS is there, views with geometry.
+// The schema `perdure` on the server: a row for each map, the rows of the maps' files, functions,
+// and, with PostGIS, views with geometry.
 #pragma once
 
 #include <cstdint>
@@ -10,13 +10,14 @@
 namespace perdure::map_store::fleet {
 
 inline constexpr std::int64_t kServerSchema = 2;
-/// Payload: "MAP X Y", the map's number and the tile that changed there.
+/// Payload: "MAP X Y": the map's number and the changed tile.
 inline constexpr char kTilesChannel[] = "perdure_tiles";
-/// Payload: "MAP REVISION VEHICLE", once a commit, when all of it is there.
+/// Payload: "MAP REVISION VEHICLE", once for each complete commit.
 inline constexpr char kMapsChannel[] = "perdure_maps";
 
-/// Makes what is missing; several may try at once. False where there is no PostGIS, hence no
-/// geometry. Besides the link's reasons: "server_schema" (a newer one, or another encoding).
+/// Creates missing parts; several processes may call it at once. Returns false without PostGIS (no
+/// geometry). Reasons: those of the link, and "server_schema" (a newer schema, or another
+/// encoding).
 Result<bool> prepareServer(Link& link);
 
 }  // namespace perdure::map_store::fleet

@@ -1,4 +1,4 @@
-// What the configuration says of a server, checked before anything is tried.
+// Checks the configuration of a server before the first connection.
 #pragma once
 
 #include <string>
@@ -11,21 +11,22 @@ namespace perdure::map_store::fleet {
 /// Whether this program was built with PostgreSQL's library.
 bool isBuilt();
 
-/// Throws StartupError (78) with the mend: not a URL of PostgreSQL's, a password in it, no library.
-/// `key`: what it is called to whoever gave it ("store.url", "--url"). The URL is not repeated: who
-/// puts a password there by mistake should not find it in a log.
+/// Throws StartupError (78) with the fix: not a URL of PostgreSQL, a password in it, no library.
+/// `key`: the setting or option that has the URL ("store.url", "--url"). The message does not
+/// repeat the URL, so that a password in it does not reach a log.
 void checkUrl(const std::string& url, const std::string& key);
 
-/// Of a map, on the server and as a file's name: 1 to 100 bytes, no "/", no control characters, no
-/// dot in front. Throws StartupError (78).
+/// Checks the name of a map, on the server and as a file: 1 to 100 bytes, no "/", no control
+/// characters, no leading dot. Throws StartupError (78).
 void checkName(const std::string& name, const std::string& key);
-/// Nothing, or four numbers (parameters.h) that are a place. Throws StartupError (78).
+/// Accepts an empty vector, or four numbers (parameters.h) that form a valid place. Throws
+/// StartupError (78).
 void checkEarthAnchor(const std::vector<double>& anchor, const std::string& key);
 
-/// All of the parameters; does nothing where there is no server.
+/// Checks all parameters; does nothing without a server.
 void check(const Parameters& parameters);
 
-/// The vehicle's name, the host's where none is given.
+/// The vehicle's name, or the host name if none is configured.
 std::string vehicleOf(const Parameters& parameters);
 
 }  // namespace perdure::map_store::fleet

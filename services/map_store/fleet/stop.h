@@ -1,4 +1,4 @@
-// Ends another thread's waiting.
+// Ends the waits of another thread.
 #pragma once
 
 #include <sys/eventfd.h>
@@ -18,12 +18,12 @@ class Stop {
   ~Stop() { close(file_); }
   Stop(const Stop&) = delete;
   Stop& operator=(const Stop&) = delete;
-  /// From any thread; for good.
+  /// May be called from any thread; cannot be undone.
   void raise() const {
     const std::uint64_t one = 1;
     (void)!write(file_, &one, sizeof one);
   }
-  int file() const { return file_; }  ///< readable once it was raised
+  int file() const { return file_; }  ///< becomes readable once raised
 
  private:
   int file_;

@@ -1,5 +1,4 @@
-// The tables that a map's file and the server have in common, and their rows from one to the other,
-// by their bits.
+// The tables that a map's file and the server share, and the bit-exact transfer of their rows.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +19,7 @@ struct Column {
   Kind kind;
 };
 
-/// One of OutboxTable but kWorking. The first column is the key.
+/// A table of OutboxTable except kWorking. The first column is the key.
 struct Table {
   std::string name;
   std::vector<Column> columns;
@@ -28,22 +27,22 @@ struct Table {
 };
 
 const Table& tableOf(OutboxTable table);
-/// `working`: positions, ids and beliefs that are nowhere else.
+/// `working`: positions, ids and beliefs that no other table has.
 const Table& workingTable();
 
 /// "CREATE TABLE perdure.…" for the server.
 std::string creationOf(const Table& table);
 /// "INSERT … ON CONFLICT …" with the map's number as $1 and the columns from $2.
 std::string upsertOf(const Table& table);
-/// "SELECT …" of all columns, of the file.
+/// "SELECT …" of all columns from the file.
 std::string selectionOf(const Table& table);
 /// "INSERT …" of all columns, into a file.
 std::string insertionOf(const Table& table);
 std::string columnsOf(const Table& table);
 
-/// The row that `row` stands at, as parameters of upsertOf.
+/// The current row of `row`, as parameters of upsertOf.
 Values valuesOf(const Table& table, std::int64_t map, const Statement& row);
-/// The other way: binds insertionOf with a row of the server's, columns as in `table`.
+/// The reverse: binds a row of the server to insertionOf, with columns as in `table`.
 void bindRow(const Table& table, const Answer& answer, int row, Statement& to);
 
 }  // namespace perdure::map_store::fleet

@@ -1,4 +1,5 @@
-// What a program without PostgreSQL's library says. Nothing of it is reached past checkUrl.
+// Messages of a program without PostgreSQL's library. checkUrl throws first, so the other functions
+// are never called.
 #include "common/base/errors.h"
 #include "services/map_store/fleet/map_transfer.h"
 #include "services/map_store/fleet/replicator.h"

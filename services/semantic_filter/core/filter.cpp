@@ -24,7 +24,7 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// A frame in which the track is not visible, for its ledger.
+/// Notes a frame in which the track is not visible in its ledger.
 void noteNotVisible(Track& track, Visibility why, TimePoint now, double min_speed) {
   if (track.unused.count() == 0) stopSlowHypotheses(track, min_speed);
   const bool away = why == Visibility::kOutOfView || why == Visibility::kBehind;
@@ -204,7 +204,7 @@ void SemanticFilter::manageAll(Belief& belief, ScratchVector<ScoredTrack>& score
 void SemanticFilter::dropBroken(Belief& belief, StepReport& report) {
   std::erase_if(belief.tracks, [](const Track& t) { return t.hypotheses.empty(); });
   report.broken = std::erase_if(belief.tracks, [](const Track& t) {
-    return t.visibility.fraction > 0.0 && !sound(t);  // nothing changed in the others
+    return t.visibility.fraction > 0.0 && !sound(t);  // the other tracks did not change
   });
 }
 
@@ -231,23 +231,23 @@ StepReport SemanticFilter::step(Belief& belief, const FrameInput& heard, IdBook&
   StepReport report;
   const TimePoint now = heard.stamp.time;
   belief.path.advance(heard.view.T_WB.p);
-  // Visibility is published with every frame, evidence or not.
+  // Visibility is published with every frame, with or without detections.
   auto visibilities = updateVisibility(belief, heard);
   if (!heard.boxes) return report;
   FrameInput input = withLearnedNoise(belief, heard);
   markSidesBesideNearer(*input.boxes, input.view);
-  // Both change what a box or a miss means, so that they come before any score.
+  // Both change the meaning of a box or a miss, so they precede all scores.
   explainPartialViews(belief, visibilities, input, parameters_, priors_);
   const FrameContext frame = contextOf(belief, input);
   reviseOcclusion(belief, visibilities, input, parameters_);
-  // Scores of all tracks come before the first update: association weighs them against each other.
+  // All tracks are scored before the first update, because association compares their scores.
   auto scored = scoreAll(belief, visibilities, input, frame);
   const auto explained = associateAndUpdate(belief, scored, input, frame);
-  // A track that lost its shape may take its box again before that box starts another track.
+  // A track that lost its shape may take its box again before this box initiates another track.
   manageAll(belief, scored, input, frame);
   initiateTracks(belief, visibilities, explained, input, frame, ids);
   dropBroken(belief, report);
-  // Identity asks who was detected in this frame, and new tracks take part.
+  // Track management uses the detections of this frame and includes new tracks.
   recordDetections(belief, now);
   resolveIdentities(belief, frame, now, report);
   return report;

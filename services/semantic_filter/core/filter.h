@@ -1,6 +1,6 @@
-// One step of the semantic filter: from the belief before a frame and the frame to the belief after
-// it (eq. 4, 8, 9). The belief is a plain value, so that a late frame is applied by taking the
-// belief before it and stepping again (core/history.h).
+// One step of the semantic filter: computes the belief after a frame from the belief before it and
+// the frame (eq. 4, 8, 9). The belief is a plain value. A late frame is applied by repeating the
+// steps from the belief before it (core/history.h).
 #pragma once
 
 #include <map>
@@ -16,7 +16,7 @@ namespace perdure::semantic_filter {
 
 struct StepReport {
   std::vector<MergeRecord> merges;
-  std::size_t broken = 0;  ///< tracks whose numbers went bad, and which were dropped
+  std::size_t broken = 0;  ///< tracks that were dropped because their numbers became invalid
 };
 
 class SemanticFilter {
@@ -24,9 +24,9 @@ class SemanticFilter {
   SemanticFilter(const Parameters& parameters, const ClassPriors& priors)
       : parameters_(parameters), priors_(priors) {}
 
-  /// Makes the belief before a frame the one after it.
+  /// Replaces the belief before a frame by the belief after it.
   StepReport step(Belief& belief, const FrameInput& heard, IdBook& ids) const;
-  /// Fuses two tracks of one object as of that frame; `id` goes on. Returns false and does nothing
+  /// Fuses two tracks of one object as of that frame; `id` survives. Returns false and does nothing
   /// if their classes exclude each other. Both must exist.
   bool join(Belief& belief, TrackId id, TrackId absorbed, const FrameInput& input) const;
 
@@ -37,18 +37,19 @@ class SemanticFilter {
   struct ScoredTrack {
     std::size_t track;  ///< index in Belief::tracks
     TrackScore score;
-    std::optional<std::size_t> assigned = {};  ///< box of the frame
-    /// The track before its update, if it was confirmed, is static, and a box is near: one bad box
-    /// must not deform it.
+    std::optional<std::size_t> assigned = {};  ///< the box of the frame that is assigned to the
+                                               ///< track
+    /// The track before its update, if it was confirmed, is static, and a box is near. One bad box
+    /// must not deform the track.
     std::optional<Track> before = {};
-    bool sound = true;  ///< after its update
+    bool sound = true;  ///< state of its numbers after the update
   };
 
   NoiseScale noiseScaleOf(const Belief& belief, const FrameInput& input) const;
-  /// The input with boxes whose noise is as it was learned for their network.
+  /// Returns the input with the learned noise of the network in its boxes.
   FrameInput withLearnedNoise(const Belief& belief, FrameInput input) const;
   FrameContext contextOf(const Belief& belief, const FrameInput& input) const;
-  /// Sets the visibility of all tracks; returns it, one for each.
+  /// Sets the visibility of all tracks and returns it in the order of the tracks.
   ScratchVector<TrackVisibility> updateVisibility(Belief& belief, const FrameInput& input) const;
   /// Predicts and scores the visible tracks.
   ScratchVector<ScoredTrack> scoreAll(Belief& belief,
@@ -59,8 +60,8 @@ class SemanticFilter {
                                      const FrameInput& input, const FrameContext& frame) const;
   void manageAll(Belief& belief, ScratchVector<ScoredTrack>& scored, const FrameInput& input,
                  const FrameContext& frame) const;
-  /// Reduces the mixture of one track after its update. Where nothing is left of it, the box counts
-  /// as a miss, or the state begins anew from the box; otherwise existence is 0.
+  /// Reduces the mixture of one track after its update. If no hypothesis remains, the box counts as
+  /// a miss, or the box re-initialises the state; otherwise existence becomes 0.
   void manage(Track& track, ScoredTrack& scored, const FrameInput& input,
               const FrameContext& frame) const;
   static void dropBroken(Belief& belief, StepReport& report);

@@ -11,7 +11,7 @@ namespace {
 
 using SharedArrivals = std::shared_ptr<const Arrivals>;
 
-/// The same ones if none of these tracks is among them.
+/// Returns `arrivals` without these tracks; the same object if it has none of them.
 SharedArrivals without(const std::set<TrackId>& ids, const SharedArrivals& arrivals) {
   const auto isOne = [&](const ObjectBelief& b) { return ids.contains(b.trackId()); };
   const auto isPublished = [&](const Arrivals::Published& p) { return isOne(p.belief); };

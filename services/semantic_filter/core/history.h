@@ -1,5 +1,5 @@
-// The latest frames, each with the belief before it, so that late detections give the posterior
-// that they would have given on time. Also: the pose error from frame to frame.
+// The latest frames, each with the belief before it. Late detections therefore give the same
+// posterior as detections in time. The history also has the pose error of each frame.
 #pragma once
 
 #include <cstddef>
@@ -24,30 +24,30 @@ struct HistoryFrame {
   Belief before;
   bool stepped = false;
   std::shared_ptr<const Arrivals> arrivals = {};  ///< from the map; null: none
-  std::vector<MergeRecord> merges = {};  ///< of its latest step
+  std::vector<MergeRecord> merges = {};           ///< merges of its last step
 };
 
 class History {
  public:
-  /// Keeps `frames` frames. Counts in `reasons`, which outlives this.
+  /// Stores `frames` frames. Counts in `reasons`, which must outlive the history.
   History(const Parameters& parameters, const ClassPriors& priors, std::size_t frames,
           ReasonCounts& reasons);
   History(const History&) = delete;
   History& operator=(const History&) = delete;
 
-  /// Another frame of reference begins: what was learned of networks and streets stays.
+  /// Begins another frame of reference. The learned values of networks and streets remain.
   void beginWorld();
-  /// Adds a frame that is newer than all before, not yet stepped. The oldest leaves.
+  /// Adds a frame that is newer than all others and not yet stepped. Removes the oldest frame.
   HistoryFrame& add(const Odometry& odometry, std::shared_ptr<const CameraModel> camera);
-  /// Takes these in with the next frame that is stepped for the first time.
+  /// The next frame that is stepped for the first time takes the arrivals in.
   void arrive(std::shared_ptr<const Arrivals> arrivals) { arrivals_ = std::move(arrivals); }
   /// Steps the newest frame.
   void step();
   /// Steps frame `index` and all stepped ones after it again.
   void stepAgainFrom(std::size_t index);
 
-  /// From the newest belief and those that late detections may go back to, with what arrived of
-  /// them.
+  /// Removes tracks and their arrivals from the newest belief and from those that late detections
+  /// may return to.
   void erase(const std::set<TrackId>& ids);
 
   std::deque<HistoryFrame>& frames() { return frames_; }
@@ -55,7 +55,7 @@ class History {
   bool empty() const { return frames_.empty(); }
   HistoryFrame& newest() { return frames_.back(); }
   TimePoint oldestTime() const { return frames_.front().input.stamp.time; }
-  /// The frame after `frame`, if body and clock go on as since the frame before it.
+  /// Predicts the frame after `frame`, with the motion and the time step since the previous frame.
   std::optional<ComingFrame> comingAfter(const HistoryFrame& frame) const;
   /// Merges of frames that were stepped again, since the last call.
   std::vector<MergeRecord> takeLateMerges();
@@ -76,7 +76,7 @@ class History {
   SemanticFilter filter_;
   std::deque<HistoryFrame> frames_;
   Belief belief_;
-  Belief spare_;  ///< an old one, whose memory the next copy takes
+  Belief spare_;  ///< an old belief, whose memory the next copy reuses
   IdBook ids_;
   PoseError pose_error_;
   std::optional<RigidTransform> last_T_WB_;

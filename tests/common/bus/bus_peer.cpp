@@ -1,4 +1,5 @@
-// The other process of the bus tests: publishes what its arguments say until it is killed or done.
+// The other process of the bus tests. Its arguments select the messages that it publishes until it
+// ends or is killed.
 #include <iostream>
 #include <thread>
 
@@ -9,7 +10,8 @@ namespace {
 
 void pause(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
 
-/// Detections at 20 Hz for ever; the process's instance is its strength.
+/// Publishes detections at 20 Hz without end; the instance of the process is its ownership
+/// strength.
 void publishDetections(const Participant& participant, std::int32_t strength) {
   constexpr double kRate = 20.0;
   Writer<Detections> writer(participant, topics::kDetections,

@@ -1,4 +1,4 @@
-// The bus within one process: what is counted, what is disposed, and how the loop ends.
+// The bus within one process: counts, disposal, and the end of the loop.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -63,7 +63,7 @@ TEST_F(Bus, RefusesToSendWhatIsNotSoundAndCountsIt) {
   EXPECT_EQ(reportOf(writer).of("imu_refused_not_finite"), 1u);
 }
 
-/// A program of somebody else: Cyclone's C API and the generated type, no checks.
+/// A writer of another program: Cyclone's C API and the generated type, without checks.
 class RawDetections {
  public:
   explicit RawDetections(const Participant& participant)
@@ -199,7 +199,7 @@ TEST_F(Bus, AnOwnerThatLetsTheTopicGoIsFollowedAtOnceByTheNextStrongest) {
   Reader<Detections> reader(here, topics::kDetections);
   std::vector<InstanceId> heard;
   loop.on(reader, [&](const Detections& m) { heard.push_back(m.instance); });
-  constexpr double kLongLease = 60.0;  // it cannot be what decides here
+  constexpr double kLongLease = 60.0;  // too long to decide these tests
   Writer<Detections> owner(here, topics::kDetections, {.strength = 10, .lease_s = kLongLease});
   Writer<Detections> spare(there, topics::kDetections, {.strength = 9, .lease_s = kLongLease});
   const auto say = [&](Writer<Detections>& writer, InstanceId who) {

@@ -1,4 +1,5 @@
-// Programs of the first version of the IDL beside those of today: each reads what the other writes.
+// Programs of the first version of the IDL together with present ones: each reads the other's
+// messages.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -16,7 +17,7 @@
 namespace perdure::bus {
 namespace {
 
-/// Waits until `done`, or gives up after ten seconds.
+/// Waits until `done` returns true, but at most ten seconds.
 template <class Done>
 bool eventually(WaitLoop& loop, Done done) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
@@ -77,7 +78,7 @@ TEST_F(Evolution, ABeliefOfTheFirstVersionHasAnEmptyLedgerAndItsOwnTrack) {
   message.items = {2, 2, items.data(), false};
   ASSERT_EQ(dds_write(writer, &message), DDS_RETCODE_OK);
   ASSERT_TRUE(eventually(loop, [&] { return !got.empty(); }));
-  // What a recording of that version holds.
+  // The messages that a recording of that version contains.
   const auto recorded =
       wire::decodeCdr<Objects>(wire::writeCdr(&message, perdure_first_Objects_desc), nullptr);
   ASSERT_TRUE(recorded) << recorded.error().detail;

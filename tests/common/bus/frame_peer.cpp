@@ -1,6 +1,6 @@
-// A process that writes images, or looks at them, and says in one line what it saw: how many came
-// through shared memory, how many of their bytes it copied, how old they were.
-//   perdure_frame_peer write|look COUNT SIDE MB [HOLD]
+// A process that writes or reads images and prints one line of results: the number that came
+// through shared memory, the bytes that it copied, and their age. perdure_frame_peer write|look
+// COUNT SIDE MB [HOLD]
 #include <fmt/format.h>
 #include <time.h>
 
@@ -22,7 +22,7 @@ std::atomic<std::uint64_t> copied_bytes{0};
 }  // namespace
 
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-// What is copied in large pieces, by any library of this process.
+// Counts the bytes that any library of this process copies in large pieces.
 namespace {
 
 constexpr std::size_t kLarge = 16 << 10;
@@ -60,7 +60,7 @@ namespace perdure::bus {
 namespace {
 
 constexpr double kRate = 60.0;
-constexpr std::chrono::seconds kSilence{2};  // then nothing more is expected
+constexpr std::chrono::seconds kSilence{2};  // after this time without an image the process ends
 
 std::int64_t monotonicNs() {
   timespec t{};
@@ -68,7 +68,7 @@ std::int64_t monotonicNs() {
   return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
 }
 
-/// All bytes are of the frame's number; the first and last pixel are looked at.
+/// All bytes have the value of the frame's number; the reader checks the first and last pixel.
 Frame makeFrame(std::uint64_t sequence, std::uint32_t side) {
   Frame frame;
   frame.camera = "cam0";
@@ -105,7 +105,8 @@ int write(const Participant& participant, int count, std::uint32_t side) {
   while (writer.matched() == 0 && std::chrono::steady_clock::now() < patience) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-  // That we know the reader does not say that it knows us, and until then it hears nothing.
+  // The writer has discovered the reader, but the reader may not have discovered the writer yet.
+  // Until then it receives nothing.
   std::this_thread::sleep_for(std::chrono::milliseconds(500));
   std::cout << "ready" << std::endl;
   std::uint64_t copied = 0, failed = 0;

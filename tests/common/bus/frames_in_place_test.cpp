@@ -1,5 +1,5 @@
-// Frames are read where Cyclone has them: every field, at every length of name and image, and
-// nothing beyond the end of what is cut off.
+// Frames are read in Cyclone's memory: every field, at every length of name and image, and nothing
+// beyond the end of truncated data.
 #include <gtest/gtest.h>
 
 #include "common/bus/dds.h"
@@ -38,7 +38,7 @@ TEST_F(FramesInPlace, ComeAsTheyWereWritten) {
     }
     ASSERT_EQ(got.size(), i + 1);
   }
-  for (unsigned i = 0; i < kFrames; ++i) {  // while all of them are held
+  for (unsigned i = 0; i < kFrames; ++i) {  // while the test holds all of them
     const Frame sent = example(i);
     EXPECT_EQ(wire::toJson(got[i]), wire::toJson(sent));
     EXPECT_TRUE(

@@ -29,12 +29,13 @@ bool loopbackUp() {
   return up;
 }
 
-/// A domain whose lock this process holds as long as it lives.
+/// Selects a domain and locks it for the lifetime of this process.
 void leaseDomain() {
   constexpr int kFirst = 100, kLast = 199;
   for (int domain = kFirst; domain <= kLast; ++domain) {
     const std::string path = "/tmp/perdure-test-domain-" + std::to_string(domain) + ".lock";
-    const int file = open(path.c_str(), O_CREAT | O_RDWR, 0666);  // children hold it too
+    const int file = open(path.c_str(), O_CREAT | O_RDWR, 0666);  // child processes inherit the
+                                                                  // lock
     if (file >= 0 && flock(file, LOCK_EX | LOCK_NB) == 0) {
       setenv("PERDURE_DOMAIN", std::to_string(domain).c_str(), 1);
       return;

@@ -1,10 +1,11 @@
-// Tests that speak DDS run beside each other: each in a network namespace of its own where the
-// system allows it, else in a domain that no other test holds.
+// Isolates tests that use DDS from each other. Each gets its own network namespace if the system
+// allows it, or else a domain that no other test uses.
 #pragma once
 
 namespace perdure::tests {
 
-/// Call it first in main or in a test environment, while there is one thread. Children inherit it.
+/// Must be called first in main or in a test environment, while there is only one thread. Child
+/// processes inherit the isolation.
 void isolateNetwork();
 
 }  // namespace perdure::tests

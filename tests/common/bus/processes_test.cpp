@@ -16,7 +16,7 @@
 namespace perdure::bus {
 namespace {
 
-/// Waits for the first line of what a process prints.
+/// Waits until a process has printed its first line.
 bool saysALine(const std::string& log) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
   while (std::chrono::steady_clock::now() < end) {
@@ -34,7 +34,7 @@ class Processes : public testing::Test {
     if (std::getenv("PERDURE_BUS_PEER") == nullptr) GTEST_SKIP() << "run by ctest";
   }
   ~Processes() override { std::remove(log_.c_str()); }
-  /// Killed at the end of its scope at the latest.
+  /// Starts a peer, which is killed at the end of its scope at the latest.
   ProgramOptions peer(const std::string& what, const std::string& argument) const {
     return {.command = {std::getenv("PERDURE_BUS_PEER"), what, argument}, .log = log_};
   }

@@ -1,4 +1,4 @@
-// Waiting in tests of the bus.
+// Waits in tests of the bus.
 #pragma once
 
 #include <chrono>
@@ -7,7 +7,7 @@
 
 namespace perdure::bus {
 
-/// Steps the loop until `done`, or gives up after twenty seconds.
+/// Steps the loop until `done` returns true, but at most twenty seconds.
 template <class Done>
 bool runUntil(WaitLoop& loop, Done done) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);

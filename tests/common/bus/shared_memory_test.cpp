@@ -1,5 +1,5 @@
-// Images through shared memory: where RouDi runs, where it does not, and where it is killed and
-// started anew. Everything runs in other processes, with /tmp and /dev/shm of their own.
+// Images through shared memory: with RouDi, without RouDi, and with RouDi killed and started again.
+// All participants are other processes, with their own /tmp and /dev/shm.
 #include "common/bus/shared_memory.h"
 
 #include <gmock/gmock.h>
@@ -20,7 +20,7 @@ using namespace std::chrono_literals;
 using test::Child;
 using test::eventually;
 
-/// "got 60 wrong 0 …": the number after a word in what a peer said.
+/// Returns the number after a word in a peer's output, for example in "got 60 wrong 0 …".
 double said(const Child& peer, const std::string& word) {
   std::smatch match;
   const std::string log = peer.log();
@@ -49,7 +49,7 @@ class SharedMemory : public testing::Test {
     folder_ = std::make_unique<test::Folder>();
   }
 
-  /// Ready for processes.
+  /// Returns once processes can connect.
   std::unique_ptr<Child> roudi(const std::string& chunks = "size = 4194304\ncount = 24") {
     const std::string config = folder_->file("roudi.toml"), log = nextLog();
     std::ofstream(config) << "[general]\nversion = 1\n[[segment]]\n[[segment.mempool]]\n"
@@ -138,7 +138,7 @@ TEST_F(SharedMemory, RouDiIsKilledAndStartedAnewAndNoProcessLosesAFrame) {
   std::this_thread::sleep_for(300ms);
   broker->signal(SIGKILL);
   EXPECT_EQ(broker->wait(5s), 128 + SIGKILL);
-  auto between = peer("look", 30);  // while there is none
+  auto between = peer("look", 30);  // while RouDi is not running
   broker = roudi();
   auto after = peer("look", 30);
   for (Child* child : {between.get(), after.get(), old_reader.get(), writer.get()}) {
@@ -153,14 +153,14 @@ TEST_F(SharedMemory, RouDiIsKilledAndStartedAnewAndNoProcessLosesAFrame) {
     EXPECT_EQ(said(*late, "shared"), 0) << "of another RouDi: over the network";
   }
   EXPECT_EQ(said(*writer, "failed"), 0) << writer->log();
-  // Who starts after all of them shares memory again.
+  // A process that starts after all of them shares memory again.
   auto new_reader = peer("look", 30);
   auto new_writer = peer("write", 30);
   expectEnd(*new_reader), expectEnd(*new_writer);
   EXPECT_EQ(said(*new_reader, "shared"), 30) << new_reader->log();
 }
 
-/// iceoryx aborts a process that asks for a chunk that no pool has.
+/// iceoryx aborts a process that requests a chunk larger than those of all pools.
 TEST_F(LongSharedMemory, AnImageThatIsTooLargeGoesOverTheNetwork) {
   const auto broker = roudi();
   auto reader = peer("look", 10, 2100);
@@ -171,7 +171,7 @@ TEST_F(LongSharedMemory, AnImageThatIsTooLargeGoesOverTheNetwork) {
   EXPECT_EQ(said(*reader, "shared"), 0);
 }
 
-/// A reader that keeps more images than there are chunks.
+/// A reader that holds more images than there are chunks.
 TEST_F(LongSharedMemory, WhereChunksAreUsedUpImagesGoOverTheNetwork) {
   const auto broker = roudi("size = 1048576\ncount = 8");
   auto reader = peer("look", 40, kSide, 1, 100);

@@ -1,4 +1,4 @@
-// Facts and the objects that follow from them, and the records of objects that have several tracks.
+// Facts, the objects that follow from them, and the records of objects with several tracks.
 #include "common/mapping/identity.h"
 
 #include <gtest/gtest.h>
@@ -60,7 +60,7 @@ TEST(Identity, TheSameFactsInAnyOrderGiveTheSameObjects) {
   forSeeds([](std::mt19937& random, std::uint32_t seed) {
     auto facts = anyFacts(random);
     const Identity identity = of(facts);
-    facts.insert(facts.end(), facts.begin(), facts.end());  // each twice
+    facts.insert(facts.end(), facts.begin(), facts.end());  // each fact twice
     std::shuffle(facts.begin(), facts.end(), random);
     expectSameIdentity(of(facts), identity, seed);
     expectSameIdentity(Identity(identity.facts()), identity, seed);
@@ -71,7 +71,7 @@ TEST(Identity, TheIdOfAnObjectIsTheLowestOfItsTracks) {
   forSeeds([](std::mt19937& random, std::uint32_t seed) {
     const auto facts = anyFacts(random);
     const Identity identity = of(facts);
-    std::map<TrackId, TrackId> lowest;  // spread along the facts until nothing changes
+    std::map<TrackId, TrackId> lowest;  // propagated along the facts until nothing changes
     for (TrackId track = 1; track <= kTracks; ++track) lowest[track] = track;
     for (TrackId round = 0; round < kTracks; ++round) {
       for (const SameObject& fact : facts) {
@@ -103,7 +103,7 @@ TEST(Identity, WhenALoopEndsAllIsAsItWouldBeWithoutIt) {
       EXPECT_TRUE(identity.factsOf(loop).empty()) << seed;
       facts = without(loop, facts);
       expectSameIdentity(identity, of(facts), seed);
-      for (const SameObject& fact : anyFacts(random)) {  // and others come
+      for (const SameObject& fact : anyFacts(random)) {  // and other facts are added
         identity.add(fact);
         facts.push_back(fact);
       }
@@ -190,7 +190,7 @@ void expectSameRecords(const MapState& a, const MapState& b, const std::string& 
   }
 }
 
-/// Two tracks of one object, the second of which was detected later, and a third one.
+/// Two tracks of one object, of which the second was detected later, and a third track.
 class JoinedTracks : public ::testing::Test {
  protected:
   JoinedTracks() {
@@ -200,7 +200,7 @@ class JoinedTracks : public ::testing::Test {
     alone_ = state_;
     state_.unite({kOneLoop, 2, 1});
   }
-  /// In the session that is followed.
+  /// A record in the session that is followed.
   ObjectRecord now(double seconds) {
     ObjectRecord record = detected(random_, seconds);
     record.session = kSessions[1];

@@ -1,4 +1,4 @@
-// What becomes of loops that the graph does not believe, and of the facts that rest on them.
+// Loop closures that the graph rejects, and the facts that depend on them.
 #include "common/mapping/loop_book.h"
 
 #include <gmock/gmock.h>
@@ -17,7 +17,7 @@ using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-/// Anchors 1 to 30 along a line, 10 m apart, and loops between the first and the last one.
+/// Anchors 1 to 30 along a line, 10 m apart, and loop closures between the first and the last one.
 class LoopBookTest : public ::testing::Test {
  protected:
   LoopBookTest() {
@@ -25,7 +25,7 @@ class LoopBookTest : public ::testing::Test {
     LevelGaussian step{{{10.0, 0.0, 0.0}, 0.0}, 1e-3 * Eigen::Matrix4d::Identity()};
     for (AnchorId id = 2; id <= 30; ++id) graph_.add(id, id - 1, step);
   }
-  /// A loop that says that the end lies `off_m` beside the line.
+  /// A loop closure that places the end `off_m` beside the line.
   EdgeId loop(double off_m) {
     Edge edge{1, 30, {{{290.0, off_m, 0.0}, 0.0}, 0.01 * Eigen::Matrix4d::Identity()}};
     return graph_.add(edge);
@@ -105,8 +105,8 @@ TEST_F(LoopBookTest, SaysWhichLoopsAreToldAndHowTheyWereFound) {
   EXPECT_EQ(book_.closureOf(sound)->match.pairs, match.pairs);
 }
 
-/// Four fifths of a lap, and in its map a loop closure that is wrong by 25 m, and by which a track
-/// in sight and one of 200 m before are one object.
+/// Four fifths of a lap with a loop closure that is wrong by 25 m. By it, a track in view and one
+/// from 200 m before are one object.
 class WithdrawnLoop : public ::testing::Test {
  protected:
   static constexpr EdgeId kWrong = 100'000;
@@ -149,7 +149,7 @@ class WithdrawnLoop : public ::testing::Test {
 
   Drive drive_{{.seed = 2, .yaw_walk = 0.002}}, without_fact_{{.seed = 2, .yaw_walk = 0.002}};
   TrackId known_ = 0, seen_ = 0;
-  ObjectRecord before_;  ///< of the track in sight
+  ObjectRecord before_;  ///< record of the track in view
 };
 
 TEST_F(WithdrawnLoop, IsContradictedByLaterOnesAndTakenOutWithItsFacts) {

@@ -1,4 +1,4 @@
-// How W lies in M, and how well that is known: against drawn errors.
+// The pose of W in M and its covariance, compared with drawn errors.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kWalkPosition = 0.05, kWalkYaw = 0.004;  // m/√m, rad/√m
 
-/// An angle of two streets, a metre a step, in a W that is turned.
+/// Two streets that meet at an angle, one metre per step, in a W that is rotated.
 LevelPose stepOf(int i) { return {{1.0, 0.0, 0.0}, i == 60 ? 1.4 : 0.0}; }
 
 const LevelPose kBegin{{30.0, -20.0, 2.0}, 2.3};
@@ -85,7 +85,7 @@ TEST(MapFrame, ItsCovarianceIsThatOfDrawnErrors) {
     drawn += error * error.transpose() / kRuns;
     nees += squaredMahalanobis(error, told) / kRuns;
   }
-  // Well away from round: it says something in which direction.
+  // The covariance is far from isotropic, so its direction matters.
   EXPECT_GT(eigenvalues(told.topLeftCorner<2, 2>()).maxCoeff(),
             3.0 * eigenvalues(told.topLeftCorner<2, 2>()).minCoeff());
   EXPECT_NEAR(nees, 4.0, 0.3) << "told\n" << told << "\ndrawn\n" << drawn;
@@ -105,7 +105,7 @@ TEST(MapFrame, ASessionThatBelongsToNothingHasAFrameOfItsOwn) {
   EXPECT_FALSE(mapper.follows({3, 1}));
 }
 
-/// The first session is a leaning vehicle's, whose W leans too.
+/// The first session is that of a tilted vehicle, so its W is tilted too.
 TEST(MapFrame, IsLevelWhereWLeans) {
   Mapper mapper{{}};
   Odometry o = at(0, {});

@@ -12,7 +12,8 @@ constexpr double kSpacing_m = 10.0;
 
 TimePoint at(double seconds) { return TimePoint{} + durationFromSeconds(seconds); }
 
-/// Anchors 1 to 4 of one session along x, a second apart, then 5 and 6 of another one.
+/// Anchors 1 to 4 of one session along x, a second apart, followed by anchors 5 and 6 of another
+/// session.
 std::map<AnchorId, Anchor> anchors() {
   std::map<AnchorId, Anchor> result;
   for (AnchorId id = 1; id <= 6; ++id) {

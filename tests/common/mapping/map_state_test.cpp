@@ -1,4 +1,4 @@
-// What is to be saved, step by step, against all of it.
+// Compares the changes to save, step by step, with the whole state.
 #include "common/mapping/map_state.h"
 
 #include <gtest/gtest.h>
@@ -30,7 +30,8 @@ Anchor anchorAt(AnchorId id, AnchorId previous, const WorldId& session, double x
   return anchor;
 }
 
-/// Two states that hear the same. One is never told that something is saved: it knows all of it.
+/// Two states with the same inputs. One is never marked as saved, so its changes are the whole
+/// state.
 class Pair {
  public:
   template <class Act>
@@ -202,7 +203,7 @@ TEST(MapState, AnyStepsLeaveWhatOneSaveWouldHaveWritten) {
       }
     }
     pair.save();
-    // And what was stored is where another one goes on.
+    // Another state continues from the stored one.
     MapState again({}, pair.stored());
     EXPECT_TRUE(isEmpty(again.unsaved())) << seed;
     ObjectRecord one_more =

@@ -1,4 +1,4 @@
-// The map along a drive: twice around a block with odometry that drifts.
+// The map of a drive: two laps around a block with odometry that drifts.
 #include "common/mapping/mapper.h"
 
 #include <gtest/gtest.h>
@@ -17,13 +17,13 @@ TEST(Mapper, ClosesTheLoopOfASecondLap) {
     drive.toTheEnd();
     ASSERT_FALSE(drive.loops().empty()) << seed;
     EXPECT_EQ(drive.wrong(), 0u) << seed;
-    // As far as it was off, it was corrected.
+    // The correction is as large as the error was.
     EXPECT_NEAR(drive.loops().front().correction_m, drive.offBefore(),
                 0.3 + 0.15 * drive.offBefore())
         << seed;
     EXPECT_LT(drive.offAfter(), 0.8) << seed << ", before: " << drive.offBefore();
     EXPECT_LT(drive.off(), 3.0) << seed << ": what is seen under its old id closes no loop";
-    // What came after the loop came under the ids of the first lap.
+    // After the loop closure most objects got the ids of the first lap.
     EXPECT_GT(drive.recalled(), drive.renamed()) << seed;
     right += drive.right();
   }
@@ -52,7 +52,7 @@ TEST(Mapper, CorrectsTheWayBehindAsWell) {
 
 TEST(Mapper, HoldsTheFirstLapBackUntilItsPlaceIsKnown) {
   Drive drive({.seed = 4, .yaw_walk = 0.002, .told_yaw_walk = 0.004});
-  drive.to(kLap_m - 40.0);  // it does not see the beginning yet
+  drive.to(kLap_m - 40.0);  // the start of the lap is not in view yet
   const double last_of_before_m = 250.0;
   const auto early = [&] {
     std::vector<Recallable> result;
@@ -105,7 +105,7 @@ TEST(Mapper, AnObjectThatIsGoneIsNotRecalled) {
   const auto after = drive.mapper().near(drive.odometry().p, 40.0);
   EXPECT_EQ(after.size() + 1, before.size());
   for (const Recallable& there : after) EXPECT_NE(there.id, gone);
-  // Nor is it taken for one that is seen from then on.
+  // Nor is it matched with an object that is detected later.
   const std::size_t wrong = drive.wrong();
   drive.to(drive.way_m() + 60.0);
   EXPECT_EQ(drive.wrong(), wrong);

@@ -1,4 +1,4 @@
-// Two maps that are brought together: a session is driven again on the map that it did not know.
+// Two maps are combined: a session is replayed on the map that it did not have.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -11,7 +11,7 @@ namespace {
 
 using namespace test;
 
-/// One map of two that know nothing of each other. Ids of objects differ already.
+/// Combines two independent maps. The ids of their objects differ already.
 SavedMap together(SavedMap older, const SavedMap& younger) {
   const AnchorId shift = older.anchors.rbegin()->first;
   const EdgeId edge_shift = older.edges.empty() ? 0 : older.edges.rbegin()->first;
@@ -68,7 +68,7 @@ class Replay : public ::testing::Test {
 
   Replay() : one_(first()) {
     one_.toTheEnd();
-    // The other vehicle, which knows nothing of the first one.
+    // The other vehicle, which has no map of the first one.
     auto archive = std::make_shared<Archive>();
     archive->next_id = one_.archive()->next_id;
     alone_ = std::make_unique<Drive>(second(), SavedMap(), archive);
@@ -95,7 +95,7 @@ TEST_F(Replay, OfASessionGivesTheComponentThatDrivingItGives) {
   EXPECT_EQ(mapper.frame()->map, (WorldId{1, 0}));
   EXPECT_TRUE(mapper.follows({2, 0})) << "it stands at the session's end";
 
-  // The same anchors, where driving has them.
+  // The replay has the same anchors as the drive.
   ASSERT_EQ(mapper.anchors().size(), driven.mapper().anchors().size());
   for (const auto& [id, anchor] : driven.mapper().anchors()) {
     const LevelError off = difference(mapper.graph().pose(id), driven.mapper().graph().pose(id));
@@ -106,7 +106,7 @@ TEST_F(Replay, OfASessionGivesTheComponentThatDrivingItGives) {
     EXPECT_LT((mapper.graph().pose(id).p - truth.p).head<2>().norm(), 1.5) << id;
   }
 
-  // And objects are one that are one.
+  // Merged objects are the same true object.
   std::size_t right = 0;
   const auto thingOf = [&](ObjectId id) {
     return one_.things().contains(id) ? one_.things().at(id) : alone_->things().at(id);

@@ -1,4 +1,4 @@
-// A mapper whose process ends and begins again, and what is saved until then.
+// A mapper whose process ends and starts again, and the state that is saved until then.
 #include <gtest/gtest.h>
 
 #include "common/mapping/graph/components.h"
@@ -9,7 +9,7 @@ namespace {
 
 using namespace test;
 
-/// As far as something was off that was driven with and without a restart.
+/// Largest differences between drives with and without a restart.
 struct Apart {
   double metres = 0.0, radians = 0.0;
 };
@@ -35,7 +35,7 @@ void expectSameLoops(const Drive& a, const Drive& b) {
   }
 }
 
-/// Where an anchor was just set, so that no way lies behind it that is not saved.
+/// Drives until an anchor was just set, so that no distance travelled is unsaved.
 void toTheNextAnchor(Drive& drive) {
   const std::size_t before = drive.mapper().anchors().size();
   while (drive.mapper().anchors().size() == before) drive.to(drive.way_m() + 1.0);
@@ -92,7 +92,8 @@ TEST(Restart, AfterALoopTheMapIsAsItWasAndCountsNoLoopTwice) {
   EXPECT_LT(std::abs(broken.off() - whole.off()), 0.5);
 }
 
-/// Loops scale the odometry's covariance; the scale is of the way behind and of what comes.
+/// Loop closures scale the odometry's covariance. The scale applies to the past and the future
+/// trajectory.
 TEST(Restart, DoesNotScaleTheOdometryTwice) {
   const Settings timid{
       .seed = 4, .yaw_walk = 0.0015, .told_yaw_walk = 0.008, .way_m = 1.3 * kLap_m};
@@ -112,7 +113,8 @@ TEST(Restart, DoesNotScaleTheOdometryTwice) {
   whole.toTheEnd();
   broken.toTheEnd();
   ASSERT_GT(broken.loops().size(), loops);
-  // What is learned after it holds for the way before as well, and all of it is told as one scale.
+  // The scale learned after it also applies to the trajectory before it. Both together are reported
+  // as one scale.
   const double scale2 = broken.mapper().anchors().rbegin()->second.scale2;
   for (const auto& [id, anchor] : broken.mapper().anchors()) EXPECT_EQ(anchor.scale2, scale2) << id;
   EXPECT_NE(share(broken, 5), before) << "a loop came after it";
@@ -171,7 +173,7 @@ TEST(Restart, EventsBeforeTheFirstPoseAreTaken) {
   EXPECT_EQ(mapper.unsaved().records_gone, (std::set<ObjectId>{absorbed, gone}));
 }
 
-/// The index of the other session must not offer what is no longer there.
+/// The index of the other session must not offer objects that do not exist any more.
 TEST(Restart, WhatIsMergedAwayWhileTheMapIsSearchedIsNotFound) {
   const Settings one{.seed = 1, .yaw_walk = 0.0005, .way_m = 300.0, .world = {1, 0}};
   Drive before(one);
@@ -187,7 +189,7 @@ TEST(Restart, WhatIsMergedAwayWhileTheMapIsSearchedIsNotFound) {
     Drive drive(two, saved, std::make_shared<Archive>(*before.archive()));
     drive.to(late_m);
     ASSERT_TRUE(drive.loops().empty()) << "it is being searched";
-    // A third of the older objects are one with the first of them, an event says.
+    // An event merges a third of the older objects into the first of them.
     const ObjectId survivor = saved.records.begin()->first;
     for (const auto& [id, record] : saved.records) {
       if (id != survivor && id % 3 == 0) drive.mapper().onMerged(survivor, id);

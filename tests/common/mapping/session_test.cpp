@@ -1,4 +1,5 @@
-// Sessions in frames of their own on one map: they find it, join it, and leave ids as they were.
+// Sessions with their own frames on one map: they are located on it, join it, and ids do not
+// change.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -16,12 +17,12 @@ constexpr double kWalk = 0.0005;
 
 WorldId session(std::uint64_t number) { return {number, 0}; }
 
-/// One lap and a bit, so that its own loop is closed.
+/// A little more than one lap, so that its own loop is closed.
 Settings first(std::uint32_t seed) {
   return {.seed = seed, .yaw_walk = kWalk, .way_m = 1.1 * kLap_m, .world = session(1)};
 }
 
-/// In a W that begins anywhere.
+/// A later session, in a W with an arbitrary origin.
 Settings later(std::uint32_t seed, std::uint64_t number, double from_m, double way_m) {
   const double turn = 1.3 * from_m + static_cast<double>(number);
   return {.seed = seed,
@@ -44,12 +45,12 @@ std::size_t componentsIn(Drive& drive) {
   return firsts.size();
 }
 
-/// [p, yaw] of the body in M against the truth, in deviations.
+/// Error of the body's [p, yaw] in M, in deviations.
 double sigmasOff(Drive& drive) {
   const RigidTransform T_MB = drive.mapper().T_MW() * drive.odometry().rigid();
   LevelError error = difference(levelOf(T_MB), drive.truth());
   Eigen::Matrix4d P = drive.mapper().frame()->covariance;
-  // The body is up to an anchor's distance from where that holds.
+  // The body is up to an anchor's distance from the position for which the covariance holds.
   P.diagonal() += Eigen::Vector4d(0.01, 0.01, 0.01, 1e-5);
   return std::sqrt(squaredMahalanobis(error, P));
 }
@@ -60,7 +61,8 @@ TEST_P(Sessions, FindTheMapWhereverTheyBegin) {
   Drive before(first(GetParam()));
   before.toTheEnd();
   for (const double from_m : {0.0, 95.0, 260.0, 410.0, 555.0}) {
-    const auto archive = std::make_shared<Archive>(*before.archive());  // each begins on the same
+    const auto archive = std::make_shared<Archive>(*before.archive());  // each starts from the same
+                                                                        // archive
     Drive drive(later(GetParam(), 2, from_m, 130.0), before.whole(), archive);
     drive.toTheFirstLoop();
     ASSERT_EQ(joins(drive), 1u) << from_m;
@@ -75,7 +77,7 @@ TEST_P(Sessions, FindTheMapWhereverTheyBegin) {
     const std::size_t merged = drive.right();
     EXPECT_GE(merged, 3u) << from_m;
     EXPECT_EQ(drive.wrong(), 0u) << from_m;
-    // What comes after it comes under its old id.
+    // Objects that are detected afterwards get their old ids.
     drive.to(drive.way_m() + 150.0);
     EXPECT_EQ(joins(drive), 1u) << from_m;
     EXPECT_EQ(drive.wrong(), 0u) << from_m;
@@ -106,7 +108,7 @@ TEST(Session, ForeignObjectsAreNotTakenForTheMap) {
       EXPECT_EQ(drive.mapper().frame()->map, session(2));
       EXPECT_EQ(drive.mapper().frame()->sessions, 1u);
       EXPECT_EQ(drive.wrong() + drive.right(), 0u);
-      // What no loop has joined is not offered either.
+      // Objects without a loop closure are not offered either.
       for (const Recallable& there : drive.mapper().near(drive.odometry().p, 1e4)) {
         EXPECT_EQ(drive.mapper().recordOf(there.id)->session, session(2)) << there.id;
       }
@@ -131,7 +133,7 @@ TEST(Session, AThirdOneJoinsTheOtherTwo) {
   EXPECT_EQ(three.mapper().frame()->sessions, 3u);
   EXPECT_EQ(three.mapper().frame()->map, session(1));
   EXPECT_LT(three.off(), 1.5);
-  // Ids are those of the first session, whoever saw the object last.
+  // Ids are those of the first session, whichever session detected the object last.
   std::size_t of_the_first = 0;
   for (const TrackId track : three.inSight()) {
     const ObjectId id = three.objectOf(track);
@@ -143,7 +145,7 @@ TEST(Session, AThirdOneJoinsTheOtherTwo) {
   EXPECT_GE(of_the_first, 3u);
 }
 
-/// One object has one id on the map, or fails to have been found again.
+/// An object has one id on the map, unless it was not re-identified.
 TEST(Session, WhatIsJoinedIsOnTheMapOnce) {
   Drive one(first(2));
   one.toTheEnd();
@@ -166,7 +168,7 @@ TEST(Session, WhatIsJoinedIsOnTheMapOnce) {
   EXPECT_LE(10 * twice, seen_again);
 }
 
-/// Two streets that no way joins, and one that drives along both.
+/// Two separate streets, and a drive along both of them.
 class TwoParts : public ::testing::Test {
  protected:
   TwoParts() {
@@ -200,7 +202,7 @@ TEST_F(TwoParts, AreJoinedByAThirdAndTheYoungerMoves) {
   EXPECT_EQ(three.wrong(), 0u);
   EXPECT_EQ(difference(three.mapper().graph().pose(1), oldest).norm(), 0.0);
   EXPECT_LT(three.off(), 3.0);
-  // The second street lies where it is.
+  // The second street has its true position.
   for (const auto& [id, anchor] : three.mapper().anchors()) {
     if (anchor.session != session(2)) continue;
     const LevelPose truth = onLap(330.0 + anchor.way_m);
@@ -209,11 +211,11 @@ TEST_F(TwoParts, AreJoinedByAThirdAndTheYoungerMoves) {
 }
 
 TEST_F(TwoParts, ABodyOfTheOlderOneStaysAndWhatItMeetsMoves) {
-  // The first session goes on, with the second one on the map.
+  // The first session continues with the second one on the map.
   Settings on = first(3);
   on.way_m = 420.0;
   Drive drive(on, two_->whole(), two_->archive());
-  // It drove these 180 m before: here again from the beginning, in the same W.
+  // The session restarts 180 m along the lap, in the same W.
   on.from_m = 180.0;
   on.T_WB = one_->odometry();
   on.noise = 77;

@@ -1,4 +1,4 @@
-// The store of a mapper, in memory: what it is told has changed, and what two maps have in common.
+// The store of a mapper, in memory: applies the reported changes and compares two maps.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 
 namespace perdure::mapping::test {
 
-/// As the store does it.
+/// Applies changes as the store does.
 inline void apply(const Unsaved& unsaved, SavedMap& map) {
   map.classes = unsaved.changed.classes;
   for (const auto& [id, anchor] : unsaved.changed.anchors) map.anchors[id] = anchor;
@@ -87,7 +87,7 @@ inline void expectSame(const std::map<ObjectId, ObjectRecord>& a,
   }
 }
 
-/// To the last bit.
+/// Compares bit by bit.
 inline void expectSame(const SavedMap& a, const SavedMap& b) {
   EXPECT_EQ(a.classes, b.classes);
   ASSERT_EQ(keysOf(a.anchors), keysOf(b.anchors));

@@ -1,6 +1,6 @@
-// A body that drives laps among objects, with odometry that drifts, and a filter that takes the
-// tracks that the mapper has near. Sessions can follow each other on one map, each in a W of its
-// own.
+// A body that drives laps among objects, with odometry that drifts, and a filter that recalls the
+// tracks that the mapper has near the body. Several sessions on one map are possible, each with its
+// own W.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -27,14 +27,14 @@ inline constexpr double kSide_m = 150.0, kLap_m = 4.0 * kSide_m;
 inline constexpr double kReach_m = 30.0;
 inline const WorldId kWorld{7, 1};
 
-/// An object beside the way, as it is.
+/// A true object beside the road.
 struct Thing {
   Eigen::Vector3d p = Eigen::Vector3d::Zero();
   double yaw = 0.0;
   std::string name;
 };
 
-/// Where the body is after `way_m` of laps, anticlockwise.
+/// The body's pose after `way_m` of laps, anticlockwise.
 inline LevelPose onLap(double way_m) {
   const double s = std::fmod(way_m, kLap_m);
   const double side = std::floor(s / kSide_m), along = s - side * kSide_m;
@@ -62,33 +62,33 @@ inline std::vector<Thing> thingsAlong(std::mt19937& random) {
 }
 
 struct Settings {
-  std::uint32_t seed = 1;      ///< of the objects, and of the noise
+  std::uint32_t seed = 1;      ///< for the objects and the noise
   double yaw_walk = 0.0;       ///< true, rad/√m
-  double told_yaw_walk = 0.0;  ///< 0: the same
+  double told_yaw_walk = 0.0;  ///< declared; 0: the true value
   double way_m = 1.4 * kLap_m;
-  std::uint32_t noise = 0;  ///< seed of the noise alone; 0: goes on from `seed`
+  std::uint32_t noise = 0;  ///< seed of the noise only; 0: continues from `seed`
   WorldId world = kWorld;
-  double from_m = 0.0;       ///< on the lap
-  LevelPose T_WB = {};       ///< at the beginning
-  double clock_s = 0.0;      ///< at the beginning
-  std::size_t tracked = 99;  ///< `least_tracked`, where it is not 99
+  double from_m = 0.0;       ///< start on the lap
+  LevelPose T_WB = {};       ///< at the start
+  double clock_s = 0.0;      ///< at the start
+  std::size_t tracked = 99;  ///< `least_tracked`, unless it is 99
 };
 
 inline const Settings kDrifting{.seed = 4, .yaw_walk = 0.002};
 
-/// What outlasts a session: the store's file has it.
+/// The state that outlives a session, as in the store's file.
 struct Archive {
   struct Stored {
     WorldId world;
-    ObjectBelief belief;  ///< in W of `world`
+    ObjectBelief belief;  ///< in the W of `world`
   };
   std::map<TrackId, Stored> stored;
   std::map<TrackId, std::size_t> thing_of;
   ObjectId next_id = 1;
 };
 
-/// Drives as the filter does: keeps tracks of objects in sight, draws ids for new ones, and goes on
-/// with a track that the mapper places where it detects an object. A track never changes its id.
+/// Acts as the filter: has tracks of objects in view and draws ids for new ones. If it detects an
+/// object at a position from the mapper, it continues that track. A track never changes its id.
 class Drive {
  public:
   explicit Drive(const Settings& settings, SavedMap saved = {},
@@ -103,7 +103,7 @@ class Drive {
     in_sight_.resize(things_.size());
     if (settings.noise > 0) random_.seed(settings.noise);
   }
-  /// On the map that another drive has left.
+  /// Starts with the map of another drive.
   Drive(const Settings& settings, const Drive& before)
       : Drive(settings, before.whole(), before.archive_) {}
 
@@ -123,23 +123,23 @@ class Drive {
     while (loops_.empty() && way_m_ < settings_.way_m) step();
   }
 
-  /// The mapper's process ends and begins again with what was saved.
+  /// The mapper's process ends and starts again with the saved state.
   void restart() {
     begun_with_ = whole();
     mapper_ = std::make_unique<Mapper>(parametersOf(settings_), begun_with_);
   }
-  /// All that the mapper knows and saves, unless it was told that something is saved.
+  /// The complete state of the mapper, unless it was marked as saved.
   SavedMap whole() const {
     SavedMap map = begun_with_;
     apply(mapper_->unsaved(), map);
     return map;
   }
-  /// The same, on another map.
+  /// The same with another map.
   void restartOn(SavedMap map) {
     begun_with_ = std::move(map);
     mapper_ = std::make_unique<Mapper>(parametersOf(settings_), begun_with_);
   }
-  /// The filter exchanges the ids of two tracks from now on.
+  /// From now on the filter exchanges the ids of two tracks.
   void confuse(TrackId a, TrackId b) {
     told_as_[a] = b;
     told_as_[b] = a;
@@ -154,18 +154,19 @@ class Drive {
   const std::vector<LoopClosure>& loops() const { return loops_; }
   const std::vector<LoopWithdrawal>& withdrawn() const { return withdrawn_; }
   const std::vector<MergeOrder>& splits() const { return splits_; }
-  /// How far the body was off in M before the message that closed the first loop, and after.
+  /// Error of the body's position in M before the message that closed the first loop; the next
+  /// function returns the error after it.
   double offBefore() const { return off_before_; }
   double offAfter() const { return off_after_; }
   double off() const { return (mapper_->T_MW() * T_WB_.p - truth().p).norm(); }
-  /// The thing of each track.
+  /// The true object of each track.
   const std::map<TrackId, std::size_t>& things() const { return archive_->thing_of; }
   const Thing& thing(TrackId id) const { return things_[things().at(id)]; }
   ObjectId objectOf(TrackId id) const { return mapper_->identity().objectOf(id); }
-  /// Objects that became one and are one, and those that are two.
+  /// Number of merges of the same true object; the next function counts merges of two true objects.
   std::size_t right() const { return right_; }
   std::size_t wrong() const { return wrong_; }
-  /// Objects of the first lap that were detected again as the same track.
+  /// Number of objects of the first lap that were detected again as the same track.
   std::size_t recalled() const { return recalled_; }
   std::size_t renamed() const { return renamed_; }
   /// The last belief of a track, in W.

@@ -1,4 +1,5 @@
-// Objects that are seen again under their old ids: what they say of the body, and how often.
+// Objects that are detected again under their old ids: the resulting ties and how often they are
+// used.
 #include "common/mapping/tracked_ties.h"
 
 #include <gtest/gtest.h>
@@ -16,8 +17,8 @@ namespace {
 
 using namespace test;
 
-/// There and back on a straight: the body stands beside where it began, and knows that by odometry
-/// alone.
+/// A straight drive there and back. The body is beside its starting point, and only odometry
+/// determines its position.
 class Back {
  public:
   Back() : state_(parameters_.graph, {}), way_(parameters_.anchor) {
@@ -35,8 +36,8 @@ class Back {
     relative_ = std::make_unique<Marginals>(state_.graph(), way_.last()->id);
   }
 
-  /// An object of the first anchor, known there exactly but for `known_m`; laid by the graph,
-  /// and then detected at `detected` (in B) with the deviation `detected_m`.
+  /// Adds an object of the first anchor whose position has the deviation `known_m`. The graph
+  /// places it, and it is then detected at `detected` (in B) with the deviation `detected_m`.
   void seeAgain(ObjectId id, const Eigen::Vector3d& at_M, const Eigen::Vector3d& detected,
                 double detected_m, double known_m = 0.01, AnchorId home = 1) {
     ObjectRecord record;
@@ -81,8 +82,8 @@ class Back {
   double x_ = 0.0;
 };
 
-/// Five objects about the body that belong to its first anchor, detected as if it stood `off` from
-/// where the graph has it.
+/// Five objects around the body that belong to its first anchor. They are detected as if the body
+/// were displaced by `off` from its pose in the graph.
 void seeFive(Back& back, const Eigen::Vector3d& off, double detected_m) {
   const LevelPose x = back.state().graph().pose(back.here());
   const LevelPose really{x.p + off, x.yaw};
@@ -106,14 +107,14 @@ TEST(TrackedTies, SayWhereTheBodyIsByDetectionsAlone) {
   const LevelPose x = back.state().graph().pose(back.here());
   const Eigen::Vector3d found = tie->T_Mb.mean.p - x.p;
   EXPECT_LT((found - off).head<2>().norm(), 0.15) << found.transpose();
-  // Five detections of .1 m: not much surer than that, and not as sure as with what they were laid
-  // with on top.
+  // The deviation must be close to that of five detections of .1 m alone: the prior does not count
+  // as information.
   const double alone = 0.1 / std::sqrt(5.0);
   EXPECT_GT(planeSigma(tie->T_Mb.covariance), 0.9 * alone);
   EXPECT_LT(planeSigma(tie->T_Mb.covariance), 2.0 * alone);
 }
 
-/// P / (1 − r) of a place whose prior and detections are round is the detections' covariance.
+/// For a position with isotropic prior and detections, P / (1 − r) is the detections' covariance.
 TEST(TrackedTies, TakeTheShareOfWhatAnObjectWasLaidWithOutOfItsCovariance) {
   const double L = 0.5, D = 0.1, P = L * D / (L + D), r = P / L;
   EXPECT_NEAR(P / (1.0 - r), D, 1e-12);
@@ -132,12 +133,12 @@ TEST(TrackedTies, TakeTheShareOfWhatAnObjectWasLaidWithOutOfItsCovariance) {
   EXPECT_NEAR(planeSigma(with->T_Mb.covariance), planeSigma(expected), 0.2 * planeSigma(expected));
 }
 
-/// How the map has two visits lie to each other is no measurement.
+/// The relative position of two visits in the map is not a measurement.
 TEST(TrackedTies, RestOnTheObjectsOfOneVisit) {
   Back back;
   const Eigen::Vector3d off(0.4, -0.3, 0.0);
   seeFive(back, off, 0.1);
-  AnchorId far = 1;  // set 140 m later
+  AnchorId far = 1;  // created 140 m later
   for (const auto& [id, anchor] : back.state().anchors()) far = anchor.way_m < 145.0 ? id : far;
   const LevelPose x = back.state().graph().pose(back.here());
   ObjectId id = 100;
@@ -166,7 +167,7 @@ TEST(TrackedTies, OfOneObjectAreNone) {
   EXPECT_FALSE(TrackedTies(back.parameters()).find(back.body()));
 }
 
-/// The loop closure that joined the tracks has said the same already.
+/// The loop closure that joined the tracks contains the same information already.
 TEST(TrackedTies, OfWhatALoopHasJoinedAreNone) {
   for (const bool joined : {false, true}) {
     Back back;
@@ -215,7 +216,7 @@ TEST(TrackedTies, OfWhatWasNotSeenOfLateAreNone) {
   EXPECT_FALSE(TrackedTies(back.parameters()).find(back.body()));
 }
 
-/// A lap and what is driven again of it.
+/// One lap and a part of the next.
 Settings again(std::uint32_t seed) {
   return {.seed = seed, .yaw_walk = 0.002, .way_m = 1.75 * kLap_m};
 }
@@ -226,7 +227,7 @@ bool isKnownAsOneTrack(Drive& drive, TrackId id) {
          record->earlier->in_anchor.id == id;
 }
 
-/// Two cars that the filter takes for each other, one time after another.
+/// The filter repeatedly confuses two cars.
 TEST(TrackedTies, ASwappedIdentityBendsTheMapNoMoreThanTheKernelLets) {
   for (const std::uint32_t seed : {1u, 2u}) {
     Drive right(again(seed)), swapped(again(seed));
@@ -237,7 +238,7 @@ TEST(TrackedTies, ASwappedIdentityBendsTheMapNoMoreThanTheKernelLets) {
       const double next = right.way_m() + 60.0;
       right.to(next);
       swapped.to(next);
-      // Two of a class that were detected before as the same track.
+      // Two objects of a class that were detected before as the same tracks.
       const auto ids = swapped.inSight();
       for (std::size_t i = 0; i + 1 < ids.size() && swaps < 6; ++i) {
         for (std::size_t k = i + 1; k < ids.size(); ++k) {

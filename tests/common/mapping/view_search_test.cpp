@@ -1,4 +1,4 @@
-// Loops by what places look like alone: a drive without any object.
+// Loop closures from the appearance of places only: a drive without objects.
 #include "common/mapping/view_search.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ namespace {
 
 using namespace test;
 
-/// A wall of marks along the lap; the body sees those ahead, with odometry that drifts.
+/// A wall of marks along the lap. The body observes the marks ahead, with odometry that drifts.
 class Marks {
  public:
   explicit Marks(std::uint32_t seed, bool alike = false) : random_(seed) {
@@ -26,7 +26,7 @@ class Marks {
       for (auto& byte : mark.descriptor) byte = static_cast<std::uint8_t>(random_());
       marks_.push_back(mark);
     }
-    if (alike) {  // each side of the lap looks like the first
+    if (alike) {  // each side of the lap resembles the first
       const std::size_t side = marks_.size() / 4;
       for (std::size_t k = side; k < marks_.size(); ++k) {
         marks_[k].descriptor = marks_[k % side].descriptor;
@@ -61,7 +61,7 @@ class Marks {
       loops_.insert(loops_.end(), change.loops.begin(), change.loops.end());
     }
   }
-  /// Another session, from the present place on, in a W of its own.
+  /// Begins another session at the present position, with its own W.
   void beginAnew() { T_WB_ = {{40.0, -7.0, 0.0}, 1.1}; }
 
   const std::vector<LoopClosure>& loops() const { return loops_; }
@@ -185,7 +185,7 @@ TEST(ViewSearch, WhereFourStreetsLookAlikeItDoesNotGuess) {
   for (const LoopClosure& loop : marks.loops()) EXPECT_FALSE(loop.joins);
 }
 
-/// At an anchor of the second lap, with what was seen from there.
+/// At an anchor of the second lap, with the landmarks observed from there.
 TEST(ViewSearch, AViewContradictsALoopThatLeadsElsewhereAndNotATrueOne) {
   Marks marks(4);
   Mapper mapper(drifting());

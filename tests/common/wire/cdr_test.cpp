@@ -57,8 +57,8 @@ TYPED_TEST(Cdr, TakesAnyBytesAndGivesAValueOrAReason) {
   EXPECT_GT(refused, 100);
 }
 
-/// What an older writer, or one that lies about the length of its message, would send: the first
-/// `size` bytes of a delimited struct.
+/// The first `size` bytes of a delimited struct, as from an older writer or one that declares a
+/// wrong length.
 template <class T>
 std::vector<std::uint8_t> shortened(std::uint32_t size) {
   T message;
@@ -70,7 +70,7 @@ std::vector<std::uint8_t> shortened(std::uint32_t size) {
   return bytes;
 }
 
-// Cyclone 0.10.2 aborts where such a struct is not there.
+// Cyclone 0.10.2 aborts if such a struct is missing.
 TEST(CdrLengths, RefusesAMessageThatEndsBeforeAStructThatMayGrow) {
   constexpr std::uint32_t kBeforeBelief = 8 + 32 + 8 + 12;
   for (std::uint32_t size = 0; size <= kBeforeBelief; size += 4) {
@@ -80,7 +80,8 @@ TEST(CdrLengths, RefusesAMessageThatEndsBeforeAStructThatMayGrow) {
   }
 }
 
-// Cyclone turns eight bytes where it has asked for four: behind the message, if that is cut there.
+// Cyclone swaps eight bytes although it requested four. If the message ends there, it writes beyond
+// the end.
 TEST(CdrLengths, RefusesACutMessageOfTheOtherByteOrderAndWritesNowhereElse) {
   ImuSample sample;
   Examples(3).fill(sample);

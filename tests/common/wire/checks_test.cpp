@@ -19,7 +19,7 @@ TEST(Checks, TextIsUtf8WithoutNul) {
   EXPECT_TRUE(isText("plain, grün, 車, 🚗"));
   EXPECT_FALSE(isText(std::string_view("a\0b", 3)));
   EXPECT_FALSE(isText("\xff"));
-  EXPECT_FALSE(isText("\xc3"));              // cut off
+  EXPECT_FALSE(isText("\xc3"));              // truncated
   EXPECT_FALSE(isText("\xc0\xaf"));          // over-long
   EXPECT_FALSE(isText("\xe0\x80\xaf"));      // over-long
   EXPECT_FALSE(isText("\xed\xa0\x80"));      // a surrogate

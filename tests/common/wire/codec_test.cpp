@@ -31,7 +31,7 @@ TYPED_TEST(Codec, BringsEveryFieldThereAndBackToTheBit) {
   }
 }
 
-/// Converts to anything but T's own kind: counts the members of an aggregate.
+/// Converts to any type but T itself: counts the members of an aggregate.
 template <class Not>
 struct Any {
   template <class X>
@@ -54,13 +54,13 @@ constexpr std::size_t members() {
   }
 }
 
-/// Members of the domain type, corrected by fields that are one member but several names.
+/// Number of members of the domain type, corrected for members that have several names on the wire.
 template <class T>
 constexpr int kNamesBeyondMembers = 0;
 template <>
 constexpr int kNamesBeyondMembers<ObjectState> = 1;  // the key beside the object
 template <>
-constexpr int kNamesBeyondMembers<Event> = 2;  // three times of a return, in one array
+constexpr int kNamesBeyondMembers<Event> = 2;  // three times of a return in one array
 
 TYPED_TEST(Codec, DescribesAsManyFieldsAsTheTypeHas) {
   TypeParam message;
@@ -96,7 +96,7 @@ TEST(CodecOfElements, DescribeAsManyFieldsAsTheirTypesHave) {
   ledger.classes = {{"car", {1.0}}};
   ledger.ousted = {{"van", "car", examples.time(), {2.0}}};
   const auto why = toJson(explained)["objects"][0]["why"];
-  EXPECT_EQ(why.size(), 3u);  // its members but for logOdds() and empty(), which are functions
+  EXPECT_EQ(why.size(), 3u);  // all members except logOdds() and empty(), which are functions
   EXPECT_EQ(why["existence"][0].size(), members<LedgerEntry>());
   EXPECT_EQ(why["classes"][0].size(), members<ClassLedger>());
   EXPECT_EQ(why["ousted"][0].size(), members<OustedClass>());
@@ -147,7 +147,7 @@ TEST(CodecOfObjects, IsValidForAsLongAsTheValueAndTheArenaLive) {
   examples.fill(big);
   for (int i = 0; i < 500; ++i) big.objects.push_back(examples.belief());
   perdure_msg_Objects wire;
-  for (int round = 0; round < 3; ++round) {  // the arena's memory is used again
+  for (int round = 0; round < 3; ++round) {  // the arena reuses its memory
     ASSERT_TRUE(encode(big, wire, arena));
     ASSERT_EQ(toJson(*decode<Objects>(wire)), toJson(big));
   }

@@ -1,4 +1,4 @@
-// Valid messages of every type with random content from a seed; for tests only.
+// Valid messages of every type with random content from a seed. For tests only.
 #pragma once
 
 #include <Eigen/Cholesky>

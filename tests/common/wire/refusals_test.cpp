@@ -11,7 +11,7 @@
 namespace perdure::wire {
 namespace {
 
-/// "code detail" of the refusal of a message, on both ways; "" where it is accepted.
+/// "code detail" of a message's refusal, for encoding and decoding; "" if it is accepted.
 template <class T>
 std::string refusal(const T& message) {
   Arena arena;
@@ -140,7 +140,7 @@ TEST(Refusals, OfCovariancesThatAreNone) {
   odometry.covariance(0, 3) = NAN;
   EXPECT_EQ(refusal(odometry), "not_finite covariance");
   odometry = example<Odometry>();
-  odometry.covariance.setZero();  // known exactly, as a truth file says
+  odometry.covariance.setZero();  // exact, as in a truth file
   EXPECT_EQ(refusal(odometry), "");
   ObjectState state = example<ObjectState>();
   state.object.classes[0].covariance.setZero();
@@ -186,7 +186,7 @@ TEST(Refusals, OfDistancesBelowZero) {
   Objects objects = example<Objects>();
   objects.near_m = -1.0;
   EXPECT_EQ(refusal(objects), "out_of_range near_m");
-  objects.near_m = 0.0;  // the map is to give nothing
+  objects.near_m = 0.0;  // the map must give no objects
   EXPECT_EQ(refusal(objects), "");
 }
 

@@ -1,5 +1,5 @@
-// Fuzzing: random fields of valid messages are damaged; the decoder must answer with a sound value
-// or with a reason, and what it accepts must be sound enough to be encoded again.
+// Fuzzing: random fields of valid messages are damaged. The decoder must return a sound value or a
+// reason, and each accepted value must be sound enough to be encoded again.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -13,7 +13,7 @@
 namespace perdure::wire {
 namespace {
 
-/// An archive that damages the wire value here and there.
+/// An archive that damages random wire values.
 class Vandal {
  public:
   explicit Vandal(unsigned seed) : random_(seed) {}
@@ -112,7 +112,8 @@ class Vandal {
                          X(1.0000001) * w};
     if (strikes()) w = choices[random_.below(std::size(choices))];
   }
-  /// A length may shrink, or lose its buffer; Cyclone never gives one beyond the buffer.
+  /// A length may decrease, or the buffer may be missing; Cyclone never gives a length beyond the
+  /// buffer.
   template <class S>
   void shorten(S& w) {
     if (!strikes()) return;

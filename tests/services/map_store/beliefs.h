@@ -1,4 +1,4 @@
-// Beliefs, working sets and a folder of its own for the tests of map_store.
+// Beliefs, working sets and a temporary folder for the tests of map_store.
 #pragma once
 
 #include <unistd.h>

@@ -1,4 +1,5 @@
-// A process that writes the map is killed at any moment: what it said was written is there.
+// A process that writes the map is killed at any moment: everything that it reported as written is
+// on disk.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -14,7 +15,7 @@ namespace {
 using namespace std::chrono_literals;
 using test::carAt;
 
-/// Confirms one more object a frame and says through `pipe` which id is durable.
+/// Confirms one more object per frame and reports through `pipe` which id is durable.
 [[noreturn]] void writeUntilKilled(const std::string& path, int pipe) {
   Config config;
   config.store_path = path;

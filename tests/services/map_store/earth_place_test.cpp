@@ -54,7 +54,7 @@ TEST(EarthAnchor, ATextOfTheFileThatIsNoPlaceIsNone) {
   }
 }
 
-/// The anchor of the map puts the body where the receiver saw it.
+/// With the anchor of the map, the body is at the receiver's position.
 TEST(EarthPlace, TheMapsOriginAndAxisLeadBackToTheBody) {
   const RigidTransform T_MB(rotationAboutZ(1.1), Eigen::Vector3d(700.0, -900.0, 4.0));
   const GeoAnchor anchor = anchorAt(TimePoint());
@@ -105,7 +105,7 @@ TEST(EarthPlace, WaitsForNoPoseThatWillNotCome) {
   EXPECT_FALSE(known(milliseconds(-50), milliseconds(100), world)) << "before the first pose";
 }
 
-/// The next session says nothing until it is found on the map: its W is not M.
+/// The next session gives no position until it is located on the map, because its W is not M.
 TEST(EarthPlace, IsKeptInTheMapsFile) {
   const auto folder = std::filesystem::temp_directory_path() / "perdure_earth_place_test";
   std::filesystem::remove_all(folder);

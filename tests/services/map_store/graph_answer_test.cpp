@@ -1,4 +1,4 @@
-// What map_store says of its graph to who asks for it.
+// The answers of map_store to queries about its graph.
 #include "services/map_store/core/graph/graph_answer.h"
 
 #include <gmock/gmock.h>
@@ -163,7 +163,7 @@ TEST_F(GraphAnswer, ShowsWithdrawnLoopsWithWhatTheySaid) {
   EXPECT_EQ(reply.loops[0].landmarks, 3u);
 }
 
-/// What a damaged file may hold, and is finite.
+/// Values that are finite but only a damaged file can have.
 TEST_F(GraphAnswer, SaysWhereHowWellAPlaceIsKnownCannotBeTold) {
   start();
   driveTo(0.8 * kLap_m);

@@ -15,7 +15,7 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 mapping::SavedMap someMap(std::uint32_t seed) { return test::RandomGraph(seed).map({}); }
 
-/// One of each kind of blob, with whether it decodes.
+/// A blob of each kind, and whether it can be decoded.
 struct Blob {
   Bytes bytes;
   std::function<Result<void>(const Bytes&)> decode;

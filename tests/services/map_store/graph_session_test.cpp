@@ -1,5 +1,5 @@
-// The graph over restarts of the map store and of the body: what is told of it, and what it does
-// not touch.
+// The graph over restarts of the map store and of the body: its reports, and the data that it does
+// not change.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@ const WorldId kElsewhere{78, 1};
 
 class GraphSession : public LapDrive {
  protected:
-  /// A lap, and the store's process ends.
+  /// Drives a lap, then ends the store's process.
   void mapOfALap() {
     start();
     driveTo(1.2 * kLap_m);
@@ -140,7 +140,7 @@ TEST_F(GraphSession, TheFrameIsToldWhereItChangesAndNotEachSecond) {
   }
   node_->flush();
   EXPECT_EQ(frames_.size(), 1u);
-  // On its way: with the anchors.
+  // While driving, with the anchors.
   driveTo(0.5 * kLap_m);
   node_->flush();
   EXPECT_GE(frames_.size(), 5u);
@@ -161,7 +161,7 @@ TEST_F(GraphSession, OfAFrameThatHasEndedNothingIsToldAsIfItWereToday) {
   driveTo(60.0);
   node_->flush();
   const auto before = frames_.size();
-  // Odometry is of another frame already, objects are not.
+  // Odometry is already in another frame, objects are not.
   Odometry odometry;
   odometry.stamp = stamp(sequence_ + 1);
   odometry.world = kElsewhere;
@@ -186,7 +186,7 @@ TEST_F(GraphSession, ItCorrectsDriftOnlyIfItReceivesTheOdometry) {
   for (const MapNear& near : nears_) EXPECT_THAT(near.placed, IsEmpty());
   driveTo(way_m_ + 6.0);
   EXPECT_TRUE(nears_.back().corrects_drift);
-  world_ = kElsewhere;  // objects are of another frame than the odometry
+  world_ = kElsewhere;  // objects are in another frame than the odometry
   rest();
   EXPECT_EQ(nears_.back().world, kElsewhere);
   EXPECT_FALSE(nears_.back().corrects_drift);

@@ -1,5 +1,5 @@
-// The pose graph in the map's file: all of it comes back, and what is damaged takes nothing along
-// that does not hang on it.
+// The pose graph in the map's file: it is restored completely, and damage affects only parts that
+// depend on the damaged ones.
 #include "services/map_store/core/graph/graph_tables.h"
 
 #include <gtest/gtest.h>
@@ -35,7 +35,7 @@ class GraphTables : public ::testing::Test {
     const auto written = write(database, graph);
     ASSERT_TRUE(written.has_value()) << written.error().detail;
   }
-  /// A map of forty anchors in two sessions, the second from 21 on.
+  /// Writes a map of forty anchors in two sessions; the second begins at anchor 21.
   mapping::SavedMap writeSome() {
     Unsaved all{RandomGraph(7).map({}), {}, {}};
     write(all);
@@ -186,7 +186,7 @@ TEST_F(GraphTables, AnswerWhereObjectsLieInTheMap) {
   EXPECT_NEAR(row->real(3), 22.0, 1e-12);
   EXPECT_NEAR(row->real(4), 30.5, 1e-12);
   EXPECT_NEAR(row->real(5), 0.25 - std::numbers::pi / 2, 1e-12);
-  EXPECT_FALSE(row->step().value());  // the others are no objects of the map
+  EXPECT_FALSE(row->step().value());  // the others are not objects of the map
 }
 
 TEST_F(GraphTables, LeaveOutDamagedBlobsOfEdgesAndSightingsAlone) {
@@ -199,7 +199,7 @@ TEST_F(GraphTables, LeaveOutDamagedBlobsOfEdgesAndSightingsAlone) {
   EXPECT_EQ(graph.malformed, 5u);
   for (const mapping::EdgeId id : {5u, 6u, 7u}) map.edges.erase(id);
   for (const ObjectId id : {12u, 13u}) map.records.erase(id);
-  // Where an edge of the odometry is missing a component has come apart.
+  // If an edge of the odometry is missing, its component is divided.
   for (const mapping::AnchorId id : {6u, 7u, 8u}) {
     map.anchors.at(id).held_fast = graph.map.anchors.at(id).held_fast;
   }
@@ -269,7 +269,7 @@ TEST_F(GraphTables, LeaveOutASuccessorOfAnotherSession) {
   more.changed.anchors[30].anchor.session.epoch += 1;
   write(more);
   const auto graph = read();
-  EXPECT_EQ(graph.map.anchors.size(), 29u);  // 30 … 40 and what hangs on them
+  EXPECT_EQ(graph.map.anchors.size(), 29u);  // 30 … 40 and the parts that depend on them
   expectConsistent(graph);
 }
 
@@ -316,7 +316,7 @@ TEST_F(GraphTables, DeleteWhatWasLeftOutBeforeItsIdsAreGivenAgain) {
   const auto graph = database.takeGraph();
   ASSERT_TRUE(graph.has_value());
   ASSERT_EQ(graph->map.anchors.rbegin()->first, 24u);
-  // Another way begins at the next id; nothing of the old 25 … 40 may belong to it.
+  // Another trajectory begins at the next id; no part of the old 25 … 40 may belong to it.
   Unsaved more;
   more.changed.classes = graph->map.classes;
   RandomGraph random(9);
@@ -371,7 +371,7 @@ TEST_F(GraphTables, AFactOfALoopThatIsLeftOutStaysForGoodAndIsSwept) {
   EXPECT_EQ(read().map.facts, final);
   MapDatabase database({path()});
   map.facts = database.takeGraph().value().map.facts;
-  // Another loop gets the id, and a fact of its own.
+  // Another loop closure gets the id, and its own fact.
   Unsaved more;
   more.changed.classes = map.classes;
   more.changed.edges[60] = map.edges[60] = RandomGraph(8).edge(4, 30, mapping::EdgeKind::kLoop);

@@ -1,4 +1,4 @@
-// Pose graphs with random contents for the tests of map_store, and what they are bit by bit.
+// Pose graphs with random contents for the tests of map_store, and their bit patterns.
 #pragma once
 
 #include <algorithm>
@@ -98,7 +98,7 @@ class RandomGraph {
   }
 
  private:
-  /// The object gets a second track, by the newest loop or by the filter.
+  /// The object gets a second track, from the newest loop closure or from the filter.
   void share(ObjectId id, mapping::SavedMap& map) {
     const TrackId other = 1000 + id;
     map.tracks[id] = trackRecord(id, map);
@@ -146,7 +146,7 @@ inline void putBits(ByteWriter& out, const mapping::SavedAnchor& saved) {
   out.put(saved.held_fast);
 }
 
-/// Every bit of a map, in an order that depends on its contents only.
+/// All bits of a map, in an order that depends only on its contents.
 inline std::string bitsOf(const mapping::SavedMap& map) {
   ByteWriter out;
   std::string bits;

@@ -1,4 +1,4 @@
-// A drive around a block with a map store that keeps a graph, for the tests of what the graph does.
+// A drive around a block, and a map store that has a graph. For tests of the effects of the graph.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -21,14 +21,14 @@
 namespace perdure::map_store::test {
 
 inline constexpr double kSide_m = 60.0, kLap_m = 4.0 * kSide_m, kReach_m = 25.0;
-inline constexpr double kDrift = 2e-4;  ///< of yaw, rad/m
+inline constexpr double kDrift = 2e-4;  ///< drift of the yaw, rad/m
 inline const WorldId kHere{77, 1};
 
 inline RigidTransform planar(double x, double y, double yaw) {
   return {rotationAboutZ(yaw), Eigen::Vector3d(x, y, 0.0)};
 }
 
-/// Where the body is after `way_m` of laps around a block, anticlockwise.
+/// The body's pose after `way_m` of laps around a block, anticlockwise.
 inline RigidTransform onLap(double way_m) {
   const double s = std::fmod(way_m, kLap_m);
   const int side = static_cast<int>(s / kSide_m);
@@ -42,10 +42,10 @@ struct Thing {
   const char* name;
 };
 
-/// Where the body is after `way_m`.
+/// The body's pose after a distance travelled.
 using Path = std::function<RigidTransform(double)>;
 
-/// Along a path, at gaps that no other place has.
+/// Objects along a path, at gaps that differ from place to place.
 inline std::vector<Thing> things(const Path& path = onLap, double length_m = kLap_m) {
   const char* names[] = {"car", "person", "car", "van", "car", "car", "person"};
   std::vector<Thing> result;
@@ -60,9 +60,9 @@ inline std::vector<Thing> things(const Path& path = onLap, double length_m = kLa
   return result;
 }
 
-/// A drive around the block with a map store that keeps a graph, and with a filter that is played
-/// here: it begins a new track for each object that it sees and does not have, and does what
-/// map/near says. Objects have exact detections.
+/// A drive around a block, with a map store that has a graph and with a simulated filter. The
+/// filter initiates a track for each detected object without one, and follows map/near. Detections
+/// are exact.
 class LapDrive : public ::testing::Test {
  protected:
   LapDrive() {
@@ -71,7 +71,7 @@ class LapDrive : public ::testing::Test {
     config_.mapping.anchor.walk_yaw = 0.003;
   }
 
-  /// Each process has an instance of its own.
+  /// Each process has its own instance id.
   void start() {
     ++store_;
     node_ = std::make_unique<Node>(
@@ -91,7 +91,7 @@ class LapDrive : public ::testing::Test {
                 [this](const Event& e) { events_.push_back(e); }});
   }
 
-  /// The body is lost, and begins elsewhere in a W of its own; nothing is in the working set.
+  /// The body loses its position and continues elsewhere in its own W, with an empty working set.
   void beginAnew(const WorldId& world, double way_m, const RigidTransform& T_WB) {
     world_ = world;
     way_m_ = way_m;
@@ -103,7 +103,8 @@ class LapDrive : public ::testing::Test {
   void driveTo(double way_m) {
     while (way_m_ < way_m) step();
   }
-  /// Returns what was sent when the first loop was closed. The filter has not used it yet.
+  /// Returns the message that was sent when the first loop was closed. The filter has not used it
+  /// yet.
   MapNear driveToTheLoop() {
     const std::size_t before = loops();
     while (loops() == before && way_m_ < 1.5 * kLap_m) step();
@@ -149,7 +150,7 @@ class LapDrive : public ::testing::Test {
     letGo();
   }
 
-  /// Tracks that are far away leave the working set once the map has them on disk.
+  /// Removes distant tracks from the working set once the map has them on disk.
   void letGo() {
     constexpr double kMargin_m = 15.0;
     std::erase_if(working_, [&](const auto& each) {
@@ -175,7 +176,7 @@ class LapDrive : public ::testing::Test {
     return belief;
   }
 
-  /// The working set under the ids of objects. One track of an object has its id.
+  /// The working set with object ids. One track of each object has its object's id.
   Objects objects() const {
     std::vector<ObjectBelief> beliefs;
     std::set<ObjectId> given;
@@ -208,7 +209,7 @@ class LapDrive : public ::testing::Test {
     hear();
     send(objects());
   }
-  /// So many frames at rest.
+  /// Publishes this number of frames at rest.
   void rest(int frames = 6) {
     for (int i = 0; i < frames; ++i) {
       ++sequence_;
@@ -220,7 +221,7 @@ class LapDrive : public ::testing::Test {
     node_->onObjects(objects);
     node_->tick(objects.stamp.time.time_since_epoch());
   }
-  /// Uses what has come from the map since the frame before.
+  /// Uses the map's messages since the previous frame.
   virtual void hear() {
     for (const MapNear& near : std::exchange(coming_, {})) use(near);
   }
@@ -247,7 +248,7 @@ class LapDrive : public ::testing::Test {
     fuse();
   }
 
-  /// Not detected yet. A track that was detected since stays as it is.
+  /// Takes up an object that is not detected yet. A track that was detected since stays unchanged.
   void takeUp(const ObjectBelief& belief) {
     const TrackId track = belief.trackId();
     const auto there = working_.find(track);
@@ -259,7 +260,7 @@ class LapDrive : public ::testing::Test {
     }
   }
 
-  /// The tracks of an object become one: the one that was detected goes on.
+  /// Fuses the tracks of an object: the detected one survives.
   void fuse() {
     std::map<ObjectId, std::vector<TrackId>> tracks_of;
     for (const auto& [track, belief] : working_) {
@@ -294,7 +295,7 @@ class LapDrive : public ::testing::Test {
     fused_.clear();
     coming_.clear();
   }
-  /// The filter's process ends, and another one asks for its working set.
+  /// The filter's process ends, and another one requests its working set.
   void restartFilter() {
     ++filter_;
     forgetTracks();
@@ -303,7 +304,7 @@ class LapDrive : public ::testing::Test {
     next_id_ = 1;
     kept_ = {};
     sayHello();
-    hear();  // it waits for the answer before its first frame
+    hear();  // a filter waits for the answer before its first frame
   }
   void sayHello() {
     MapQuery query;
@@ -314,7 +315,7 @@ class LapDrive : public ::testing::Test {
     query.limit = 1;
     node_->onQuery(query);
   }
-  /// The store's process is killed, and another one begins with the file.
+  /// The store's process is killed, and another one starts with the file.
   void restartStore() {
     node_.reset();
     start();
@@ -327,7 +328,7 @@ class LapDrive : public ::testing::Test {
     query.request = ++request_;
     query.kind = MapQueryKind::kById;
     query.object_id = id;
-    query.world = world_;  // as stored, each in its own W
+    query.world = world_;  // as stored, each object in its own W
     query.limit = 1;
     node_->onQuery(query);
     EXPECT_EQ(replies_.back().beliefs.size(), 1u) << id;
@@ -341,7 +342,7 @@ class LapDrive : public ::testing::Test {
     node_->onQuery(query);
     return replies_.back();
   }
-  /// Ids of the objects on the map, by what they are in truth.
+  /// Ids of the objects on the map, for each true object.
   std::map<std::size_t, std::set<ObjectId>> idsOnTheMap() {
     node_->flush();
     std::map<std::size_t, std::set<ObjectId>> ids;
@@ -367,7 +368,7 @@ class LapDrive : public ::testing::Test {
   static bool hasAny(const MapNear& near, ObjectId id) {
     return has(near.placed, id) || has(near.as_published, id);
   }
-  /// The object of a track, by a message.
+  /// The object of a track, by `near`.
   static ObjectId objectOf(const MapNear& near, TrackId track) {
     const auto at = std::find_if(near.members.begin(), near.members.end(),
                                  [track](const Member& m) { return m.track == track; });
@@ -378,7 +379,7 @@ class LapDrive : public ::testing::Test {
                        [&](const MapNear& near) { return hasAny(near, id); });
   }
 
-  /// One of what was placed that the body does not see now.
+  /// A placed object that the body does not detect now.
   const ObjectBelief* unseenOf(const MapNear& near) const {
     for (const ObjectBelief& belief : near.placed) {
       if (!in_sight_.contains(thing_of_.at(belief.trackId()))) return &belief;
@@ -390,10 +391,10 @@ class LapDrive : public ::testing::Test {
   Config config_;
   InstanceId store_ = 4, filter_ = 11;
   std::unique_ptr<Node> node_;
-  std::map<std::array<std::int32_t, 3>, MapTile> tiles_;  ///< as a late joiner sees them
+  std::map<std::array<std::int32_t, 3>, MapTile> tiles_;  ///< as a late joiner receives them
   std::vector<MapReply> replies_;
-  std::vector<MapNear> nears_;   ///< all that were sent
-  std::vector<MapNear> coming_;  ///< of these, what the filter has not used yet
+  std::vector<MapNear> nears_;   ///< all messages so far
+  std::vector<MapNear> coming_;  ///< those that the filter has not used yet
   Path path_ = onLap;
   std::vector<Thing> things_ = things();
   std::map<std::size_t, TrackId> in_sight_;

@@ -24,7 +24,7 @@ class MapCopy : public ::testing::Test {
  protected:
   MapCopy() : from_(folder_.file("from.sqlite")), to_(folder_.file("new/to.sqlite")) {}
 
-  /// `count` objects, and a graph.
+  /// Writes `count` objects and a graph.
   void write(MapDatabase& database, std::size_t count) {
     std::vector<ObjectBelief> cars;
     for (ObjectId id = 1; id <= count; ++id) {
@@ -52,7 +52,7 @@ class MapCopy : public ::testing::Test {
     ADD_FAILURE() << "it was not refused";
     return {ExitCode::kOk, ""};
   }
-  /// Nothing of a copy that failed is left.
+  /// Whether no files of a failed copy are left.
   bool nothingThere() const {
     for (const char* suffix : {"", ".part", ".part-wal", ".part-shm", ".part-journal"}) {
       if (std::filesystem::exists(to_ + suffix)) return false;
@@ -85,7 +85,7 @@ TEST_F(MapCopy, HasAllAndLeavesTheOtherAsItWas) {
 TEST_F(MapCopy, HasWhatAServiceHasCommittedThatGoesOnWriting) {
   MapDatabase database({from_});
   write(database, 20);
-  ASSERT_GT(std::filesystem::file_size(from_ + "-wal"), 0u);  // not in the file itself yet
+  ASSERT_GT(std::filesystem::file_size(from_ + "-wal"), 0u);  // not in the main file yet
   copyMap(from_, to_);
   write(database, 25);
   expectCopy(20);
@@ -205,7 +205,7 @@ TEST_F(MapCopy, SaysWhereItCannotBeWrittenAndLeavesNoPart) {
   std::ofstream(folder_.file("file")) << "x";
   EXPECT_THROW(copyMap(from_, folder_.file("file/to.sqlite")), StartupError);
   const pid_t child = fork();
-  if (child == 0) {  // no file may grow beyond 100 kB here
+  if (child == 0) {  // in this process no file may exceed 100 kB
     signal(SIGXFSZ, SIG_IGN);
     const rlimit small{100'000, 100'000};
     if (setrlimit(RLIMIT_FSIZE, &small) != 0) _exit(2);

@@ -1,4 +1,4 @@
-// What people see of a map whose graph has taken drift out: answers and tiles, in M.
+// The published map of a graph that corrected drift: answers and tiles, in M.
 #include <gtest/gtest.h>
 
 #include <set>

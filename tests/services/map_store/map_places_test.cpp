@@ -20,7 +20,7 @@ using ::testing::Pair;
 const WorldId kSession{7, 0}, kOther{8, 0};
 constexpr double kTile_m = 10.0;
 
-/// One anchor a session, at the origin of W and, in M, where `T_MA` says.
+/// One anchor for each session, at the origin of its W, and at `T_MA` in M.
 MapFrames framesWith(const LevelPose& T_MA, const LevelPose& T_NA = {}) {
   mapping::SavedMap map;
   for (const AnchorId id : {1, 2}) {

@@ -1,4 +1,4 @@
-// Answers of the R*Tree against a walk over all objects.
+// Compares answers of the R*Tree with a search of all objects.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -28,7 +28,7 @@ class MapQueries : public ::testing::Test {
  protected:
   MapQueries() {
     std::mt19937 random(5);
-    // On a coarse grid, so that many centres lie exactly on the limits of the questions.
+    // On a coarse grid, so that many centres lie exactly on the limits of the queries.
     std::uniform_int_distribution<int> grid(-40, 40);
     std::vector<ObjectBelief> cars;
     for (ObjectId id = 1; id <= 400; ++id) {

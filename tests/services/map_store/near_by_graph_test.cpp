@@ -1,5 +1,6 @@
-// What the map store gives by its graph: objects of this drive that are near again, those of
-// earlier visits beside the body after a loop, and what of that is kept in the file.
+// Objects that the map store gives by its graph: objects of this drive that are near again, and
+// objects of earlier visits near the body after a loop closure. Also the part of this that is
+// stored in the file.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -19,7 +20,7 @@ using ::testing::Not;
 
 class NearByGraph : public LapDrive {
  protected:
-  /// A straight street, there and back.
+  /// A drive along a straight street and back.
   void onAStreet(double length_m) {
     path_ = [length_m](double way_m) {
       const double s = std::fmod(way_m, 2.0 * length_m);
@@ -86,7 +87,7 @@ TEST_F(NearByGraph, AfterALoopObjectsAreSeenUnderTheirOldIds) {
   }
 }
 
-/// Drives away and returns, while the place in M is known well enough all the time.
+/// The body drives away and returns while its position in M remains well known.
 TEST_F(NearByGraph, AnObjectThatLeftComesBackAsSoonAsItIsNearWithoutALoop) {
   onAStreet(100.0);
   start();
@@ -223,7 +224,7 @@ TEST_F(NearByGraph, WhatIsGoneIsNotPlaced) {
   for (const Member& member : near.members) EXPECT_NE(member.object, 2u);
 }
 
-/// Its newest track decides; an end under one id does not end what the other track was.
+/// The newest track decides; an end under one id does not end the object of the other track.
 TEST_F(NearByGraph, AJoinedObjectThatEndsIsGone) {
   start();
   const MapNear near = driveToTheLoop();
@@ -267,8 +268,8 @@ TEST_F(NearByGraph, AJoinedObjectShowsOnceUnderItsLowerId) {
   check();
 }
 
-/// Four fifths of a lap, and in its map a loop that is wrong by 25 m: by it the first object and
-/// the newest one are one.
+/// Four fifths of a lap with a loop closure that is wrong by 25 m: by it, the first object and the
+/// newest one are one object.
 class NearByAWrongLoop : public NearByGraph {
  protected:
   void SetUp() override {
@@ -340,7 +341,7 @@ TEST_F(NearByAWrongLoop, AJoinedObjectShowsOnceAndAfterTheRetractionBothShowAgai
   EXPECT_EQ(idsOnTheMap(), ids);
 }
 
-/// States between the store and the filter are lost, doubled or come late.
+/// Messages between the store and the filter are lost, repeated or late.
 class NearWithFaults : public NearByGraph {
  protected:
   void send(const Objects& objects) override {
@@ -368,14 +369,14 @@ class NearWithFaults : public NearByGraph {
   }
   bool happens() { return share_ > 0.0 && std::bernoulli_distribution(share_)(random_); }
 
-  /// Ids by what they are in truth, at the end of a drive; states arrive in the end.
+  /// Ids by true object at the end of a drive, after all messages have arrived.
   std::map<std::size_t, std::set<ObjectId>> idsAfter(double way_m, std::uint32_t seed,
                                                      double share) {
     beginWith(seed, share);
     driveTo(way_m);
     return idsInTheEnd();
   }
-  /// The filter publishes them, too.
+  /// The ids that the filter publishes at the end.
   std::map<std::size_t, std::set<ObjectId>> idsInTheEnd() {
     share_ = 0.0;
     rest(12);
@@ -428,7 +429,7 @@ TEST_F(NearWithFaults, LostDoubledAndReorderedStatesLeadToTheSameIdsAfterALoop) 
   }
 }
 
-/// The store or the filter is killed between two messages, and begins again at once.
+/// The store or the filter is killed between two messages and restarts at once.
 class NearWithKills : public NearWithFaults {
  protected:
   enum class Side { kStore, kFilter };

@@ -1,4 +1,4 @@
-// What the map store gives a filter unasked without a graph: the state on map/near.
+// The messages on map/near that the map store sends to a filter without a graph.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -29,7 +29,7 @@ class Near : public ::testing::Test {
                 [this](const MapReply& r) { replies_.push_back(r); },
                 [this](const MapNear& n) { nears_.push_back(n); }});
   }
-  /// A filter at `p` that wants what is nearer than 100 m.
+  /// The working set of a filter at `p` that requests objects nearer than 100 m.
   static Objects setAt(const Eigen::Vector3d& p, std::uint64_t sequence,
                        std::vector<ObjectBelief> beliefs, InstanceId filter = 11) {
     Objects objects = workingSet(sequence, std::move(beliefs), filter);
@@ -79,7 +79,7 @@ TEST_F(Near, GivesWhatIsInNoWorkingSetNearestFirstBitForBit) {
   EXPECT_EQ(near.world, (WorldId{77, 1}));
   EXPECT_TRUE(near.stamp.sameFrame(set(2, {}).stamp));
   EXPECT_EQ(near.as_published[0].track, 4u);
-  ObjectBelief expected = nearer;  // but for where it was kept meanwhile
+  ObjectBelief expected = nearer;  // except its memory and visibility
   expected.memory = Memory::kLongTerm;
   expected.visibility = Visibility::kOutOfView;
   EXPECT_EQ(encodeBelief(near.as_published[0]), encodeBelief(expected));
@@ -139,7 +139,8 @@ TEST_F(Near, WhatIsGoneOrOfAnotherFrameOfReferenceStaysAway) {
   EXPECT_THAT(nears_.back().placed, IsEmpty());
 }
 
-/// How its errors depend on those of today's pose is known to the process that detected it alone.
+/// Only the process that detected it has the correlation of its errors with those of the present
+/// pose.
 TEST_F(Near, WhatAFilterBeforeHasDetectedIsPlacedWithoutACorrelation) {
   const auto node = start();
   const auto known = carAt(3, {9, 0, 0});

@@ -118,7 +118,8 @@ TEST_F(MapStoreNode, GivesANewFilterTheWholeWorkingSetAfterItsOwnRestartToo) {
   }
 }
 
-/// The pose error of its process begins at zero: what the old one explains is no error of objects.
+/// The pose error of a new process begins at zero. The part that the old pose error explains is
+/// therefore not an error of the objects.
 TEST_F(MapStoreNode, AHelloDuringARunGivesAllOfTheFilterBeforeRelativeToTheBody) {
   const auto node = start();
   auto unsure = carAt(2, {1, 0, 0}), moving = carAt(3, {4, 0, 0});
@@ -167,7 +168,7 @@ TEST_F(MapStoreNode, NeverGivesOutAnIdAgainThatMayHaveBeenGivenBeforeItDied) {
     const auto node = start();
     node->onObjects(workingSet(1, {carAt(10, {0, 0, 0})}));
     node->tick(0ms);
-    node->onObjects(workingSet(2, {carAt(500, {0, 0, 0})}));  // never written
+    node->onObjects(workingSet(2, {carAt(500, {0, 0, 0})}));  // this object is never written
   }
   const auto node = start();
   node->onQuery(restoreFor(12));
@@ -255,7 +256,7 @@ TEST_F(MapStoreNode, TakesMergedAndGoneObjectsOffTheMap) {
   EXPECT_EQ(heard_.headers.back().objects, 1u);
 }
 
-/// The filter says it until it is on the disk, and the store may have begun anew meanwhile.
+/// The filter repeats it until it is on disk, and the store may have restarted meanwhile.
 TEST_F(MapStoreNode, AnEndThatIsSaidAgainChangesNothing) {
   Objects next = workingSet(2, {carAt(1, {0, 0, 0})});
   next.ended = {{2, 1, next.stamp.time}, {3, 0, next.stamp.time}};
@@ -290,7 +291,7 @@ TEST_F(MapStoreNode, AnObjectThatTheFilterMergedKeepsTheLowestId) {
   ASSERT_EQ(heard_.replies.at(0).objects.size(), 1u);
   EXPECT_EQ(heard_.replies[0].objects[0].id, 1u);
   EXPECT_EQ(heard_.replies[0].objects[0].mean, carAt(2, {1, 0, 0}).best().mean);
-  next = workingSet(3, {});  // and then it is gone
+  next = workingSet(3, {});  // the object is gone from here on
   next.ended = {{2, 0, next.stamp.time}};
   node->onObjects(next);
   node->tick(2000ms);

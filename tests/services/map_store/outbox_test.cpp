@@ -27,7 +27,7 @@ std::vector<Entry> entriesOf(const std::string& path) {
   return entries;
 }
 
-/// Ids of one table, in the order of their numbers.
+/// Ids of one table, in the order of their change numbers.
 std::vector<std::int64_t> idsOf(const std::string& path, OutboxTable table) {
   std::vector<std::int64_t> ids;
   for (const Entry& entry : entriesOf(path)) {
@@ -114,7 +114,7 @@ TEST_F(Outbox, AFileWithoutServerHasNothingOfIt) {
   { const MapDatabase no_longer({.path = other}); }
   EXPECT_EQ(made(path_).second, 0);
   EXPECT_EQ(made(other).second, 0);
-  EXPECT_LE(made(other).first, made(path_).first + 1);  // sqlite_sequence stays
+  EXPECT_LE(made(other).first, made(path_).first + 1);  // sqlite_sequence remains
 }
 
 TEST_F(Outbox, IsAnotherOneAfterATimeWithoutServer) {

@@ -116,7 +116,7 @@ TEST(Schema, RefusesAMapOfANewerVersion) {
   EXPECT_THAT(refusalOf([&] { openStore({path}); }).what(), HasSubstr("schema 99"));
 }
 
-/// As Perdure made maps of schemas 1 and 2.
+/// The tables of schema 2 as Perdure created them.
 constexpr char kSecondSchema[] = R"sql(
 CREATE TABLE meta(key TEXT PRIMARY KEY, value) WITHOUT ROWID;
 CREATE TABLE objects(
@@ -136,7 +136,7 @@ CREATE TABLE working(position INTEGER PRIMARY KEY, id INTEGER NOT NULL, belief B
 PRAGMA application_id=1346720324; PRAGMA user_version=2; PRAGMA journal_mode=WAL;
 )sql";
 
-/// A map of schema 2 or 1 with `count` objects in it.
+/// Creates a map of schema 1 or 2 with `count` objects.
 void makeOlder(const std::string& path, std::int64_t count, int version) {
   const auto connection = Connection::open(path, Connection::Mode::kReadWriteCreate);
   ASSERT_TRUE(connection->execute(kSecondSchema).has_value());
@@ -171,7 +171,7 @@ TEST(Schema, TakesOverMapsOfOlderVersionsWithAllTheirObjects) {
       EXPECT_EQ(reader.beliefs().value().size(), 60u);
       EXPECT_TRUE(reader.graph().value().map.anchors.empty());
     }
-    EXPECT_EQ(versionOf(path), version);  // a reader changes nothing
+    EXPECT_EQ(versionOf(path), version);  // reading does not change the version
     MapDatabase database({path});
     EXPECT_TRUE(database.notice().empty());
     EXPECT_EQ(versionOf(path), 4);
@@ -188,7 +188,7 @@ TEST(Schema, TakesOverMapsOfOlderVersionsWithAllTheirObjects) {
   }
 }
 
-/// As Perdure made it of schema 3: object 9 was merged into 3, which the map could undo.
+/// Creates a map of schema 3: object 9 was merged into 3, and the map could undo this.
 void makeThird(const std::string& path) {
   {
     MapDatabase database({path});
@@ -228,7 +228,7 @@ TEST(Schema, TakesOverAMapOfTheThirdVersionWhoseMergesAreFinal) {
     EXPECT_EQ(reader.working().value()->objects.size(), 1u);
     graph_as_it_was = test::bitsOf(graph.map);
   }
-  EXPECT_EQ(versionOf(path), 3);  // a reader changes nothing
+  EXPECT_EQ(versionOf(path), 3);  // reading does not change the version
   MapDatabase database({path});
   EXPECT_EQ(versionOf(path), 4);
   const MapReader reader = database.reader();
@@ -242,7 +242,7 @@ TEST(Schema, TakesOverAMapOfTheThirdVersionWhoseMergesAreFinal) {
                 .integer("SELECT count(*) FROM sqlite_master WHERE name = 'merges'")
                 .value(),
             0);
-  // It goes on: a loop is withdrawn, and nothing is parted.
+  // It continues: a loop closure is retracted, and no object is separated.
   const mapping::Unsaved withdrawn{{}, {60}, {}};
   const Objects objects = workingSet(3, {carAt(3, {1, 2, 0})});
   const mapping::Identity identity;
@@ -258,7 +258,7 @@ TEST(Schema, LeavesAnOlderMapAsItWasWhereItCannotBeTakenOver) {
   const std::string path = folder.file("map.sqlite");
   makeOlder(path, 400, 2);
   {
-    // Not a page is left within 1 MiB, and the tables of the graph need some.
+    // No page is free within 1 MiB, and the tables of the graph need some.
     const auto connection = Connection::open(path, Connection::Mode::kReadWriteCreate);
     ASSERT_TRUE(connection->execute("CREATE TABLE filler(x)").has_value());
     const auto page = connection->integer("PRAGMA page_size").value();

@@ -1,4 +1,4 @@
-// The row of an object is derived from its tracks: it follows the facts, and nothing is lost.
+// The row of an object is derived from its tracks. It follows the facts, and no row is lost.
 #include "services/map_store/core/track_rows.h"
 
 #include <gmock/gmock.h>
@@ -26,7 +26,7 @@ struct ObjectRow {
   bool operator==(const ObjectRow&) const = default;
 };
 
-/// A file, and the facts that a mapper would have; `commit` says what of them has changed.
+/// A file, and the facts that a mapper would have; `commit` passes on their changes.
 class Store {
  public:
   void join(const SameObject& fact) { identity_.add(fact); }
@@ -55,7 +55,7 @@ class Store {
     ASSERT_TRUE(written.has_value()) << written.error().detail;
     stored_ = identity_;
   }
-  /// The next process, which knows what the file says.
+  /// The next process, which starts from the file.
   void restart() {
     database_.reset();
     database_ = std::make_unique<MapDatabase>(StoreOptions{path_});
@@ -120,7 +120,8 @@ Bytes bytesOf(ObjectBelief belief, ObjectId as) {
   return encodeBelief(belief);
 }
 
-/// 3 was seen on an earlier visit; 9 is in the working set; loop 7 shows that they are one.
+/// Track 3 was detected on an earlier visit; 9 is in the working set; loop closure 7 shows that
+/// they are one object.
 class TrackRows : public ::testing::Test {
  protected:
   TrackRows() {
@@ -274,7 +275,7 @@ TEST_F(TrackRows, ATrackThatTheFilterMergedIsInTheOtherOneForGood) {
 }
 
 TEST(TrackRowsInAnyOrder, FactsGiveTheSameRows) {
-  // 1 … 5 are remembered, 6 and 7 are in the working set; 8 is alone.
+  // Tracks 1 … 5 are archived, 6 and 7 are in the working set; 8 shares no object.
   const std::vector<SameObject> facts = {{20, 1, 4}, {21, 4, 6}, {0, 2, 3}, {22, 2, 5}, {23, 3, 7}};
   const auto driven = [] {
     auto store = std::make_unique<Store>();
@@ -299,7 +300,7 @@ TEST(TrackRowsInAnyOrder, FactsGiveTheSameRows) {
       store->commit(working);
     }
     EXPECT_TRUE(store->rows() == at_once->rows()) << ::testing::PrintToString(order);
-    // And away again in the other order: but what the filter has found to be one stays.
+    // The facts end in the reverse order, but those from the filter remain.
     for (const std::size_t k : order) {
       if (facts[k].loop == 0) continue;
       store->withdraw(facts[k].loop);

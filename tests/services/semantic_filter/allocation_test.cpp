@@ -1,5 +1,5 @@
-// What a running filter allocates on the heap: next to nothing once it has seen a place, however
-// many things it looks at.
+// Heap allocations of a running filter: almost none once it has observed a place, however many
+// objects it observes.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 namespace perdure::semantic_filter {
 namespace {
 
-/// Median of a frame, publishing and fits included.
+/// Median number of allocations per frame, including publishing and fits.
 double allocationsOfAFrame(std::size_t in_view) {
   bench::Drive drive(Config{}, in_view, 1);
   constexpr std::uint64_t kWarmUp = 60, kFrames = 60;

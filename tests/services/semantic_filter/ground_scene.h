@@ -1,4 +1,4 @@
-// A street of cars that stand on the ground, and the priors of classes that do.
+// A street of cars on the ground, and the priors of classes on the ground.
 #pragma once
 
 #include <vector>

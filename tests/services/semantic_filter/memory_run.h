@@ -1,4 +1,4 @@
-// A filter with a map store, connected as by the bus, on a drive along a street.
+// A filter and a map store, connected as by the bus, on a drive along a street.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ inline Config configWith(const MemoryParameters& memory) {
   return config;
 }
 
-/// The body always looks along x. It weaves, which gives parallax.
+/// The body always faces along x. It weaves, which gives parallax.
 inline RigidTransform bodyAt(double x) {
   return RigidTransform(
       Eigen::Quaterniond(Eigen::AngleAxisd(0.05 * std::sin(0.1 * x), Eigen::Vector3d::UnitZ())),
@@ -52,12 +52,12 @@ inline std::vector<Detection> boxesFrom(const RigidTransform& T_WB, std::uint64_
   return list;
 }
 
-/// A filter and a map store, connected as by the bus. A deaf pair exchanges nothing.
+/// A filter and a map store, connected as by the bus. While `deaf`, they exchange nothing.
 struct Pair {
   TemporaryFolder folder;
   std::vector<Objects> objects;
   std::vector<Event> events;
-  Predictions predictions;  ///< of the newest frame
+  Predictions predictions;  ///< predictions of the newest frame
   std::vector<std::function<void()>> to_map;
   bool deaf = false;
   bool precise = false;  ///< the odometry reports increments that are precise to .1 mm a frame
@@ -66,7 +66,7 @@ struct Pair {
   double x = 0.0;
   std::vector<TrueObject> things;
   WorldId world{5, 0};
-  RigidTransform T_W;  ///< the frame of the objects, in that of the odometry
+  RigidTransform T_W;  ///< the frame of the objects in the frame of the odometry
   Node filter;
 
   explicit Pair(const Config& config = configWith(kMemory),
@@ -97,7 +97,7 @@ struct Pair {
     return {[](const MapTile&) {}, [](const MapTile&) {}, [](const MapHeader&) {},
             [](const MapReply&) {}, std::move(near)};
   }
-  /// What a filter asks before its first frame.
+  /// The query of a filter before its first frame.
   static MapQuery helloOf(const Node& filter) {
     MapQuery query;
     query.client = filter.instance();

@@ -63,8 +63,8 @@ TrueObject anyObject(std::mt19937& random) {
   }
 }
 
-/// A world in which everything happens: objects drive off and stop, boxes are missed, doubled, of
-/// another class, or false; the camera turns away, detections are late or lost, the filter
+/// A world with all kinds of events. Objects drive off and stop. Boxes are missed, doubled, of
+/// another class, or false. The camera turns away, detections are late or lost, and the filter
 /// restarts.
 class Restless {
  public:
@@ -101,8 +101,8 @@ class Restless {
     node_->onModel(testing::makeModelInfo());
   }
 
-  /// The working set comes back before the first frame or in it, with its ledgers or from a peer
-  /// that has none.
+  /// The working set returns before the first frame or in it, with its ledgers or from a peer
+  /// without ledgers.
   void restart(bool before_odometry, bool without_ledgers) {
     node_->flush();
     MapNear near;
@@ -169,7 +169,7 @@ class Restless {
   std::vector<Objects> published_;
   std::size_t audited_ = 0;
   std::unique_ptr<Node> node_;
-  std::optional<MapNear> near_;  ///< for the frame that comes
+  std::optional<MapNear> near_;  ///< for the next frame
 };
 
 TEST(NodeLedger, SumsAreTheBeliefInEveryFrame) {
@@ -180,13 +180,13 @@ TEST(NodeLedger, SumsAreTheBeliefInEveryFrame) {
     EXPECT_EQ(world.node().reasons().of("object_numbers_bad"), 0U);
   }
   EXPECT_GT(met.beliefs, 5000U);
-  // A run without a cause proves nothing about it.
+  // If a cause did not occur in any run, the test proves nothing about it.
   for (std::size_t i = 0; i < kExistenceEvidences; ++i) {
     const char* name = nameOf(static_cast<ExistenceEvidence>(i));
     EXPECT_TRUE(met.existence.contains(name)) << name;
   }
   for (std::size_t i = 0; i < kClassEvidences; ++i) {
-    // Of earlier versions alone.
+    // Only earlier versions have this cause.
     if (static_cast<ClassEvidence>(i) == ClassEvidence::kContext) continue;
     const char* name = nameOf(static_cast<ClassEvidence>(i));
     EXPECT_TRUE(met.classes.contains(name)) << name;
@@ -212,7 +212,8 @@ TEST(NodeLedger, UnusedFramesAreCountedWhenTheObjectIsNextVisible) {
   Ledger before, hidden;
   for (std::uint64_t k = 0; k < 20; ++k) before = look(k, false);
   for (std::uint64_t k = 20; k < 50; ++k) hidden = look(k, true);
-  EXPECT_EQ(before, hidden);  // the ledger of an invisible track keeps every bit, like its belief
+  EXPECT_EQ(before, hidden);  // the ledger of an invisible track does not change by a bit, nor does
+                              // its belief
   const Ledger after = look(50, false);
   const LedgerEntry& away = after.existence[static_cast<std::size_t>(ExistenceEvidence::kAway)];
   EXPECT_EQ(away.count, 30U);

@@ -1,5 +1,5 @@
-// Malformed and hostile `detections`, through the checks of the wire into the node. Each kind is
-// counted by its reason, and the belief keeps every bit.
+// Malformed and hostile `detections` pass the checks of the wire to the node. Each kind is counted
+// by its reason, and no bit of the belief changes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -63,7 +63,7 @@ struct Gateway {
 };
 
 struct Attack {
-  std::string reason;  ///< that counts it
+  std::string reason;  ///< the reason under which it is counted
   std::function<void(Gateway&, std::uint64_t frame)> send;
 };
 
@@ -71,7 +71,7 @@ Attack damaged(const std::string& reason, const std::function<void(Wire&)>& dama
   return {reason, [damage](Gateway& g, std::uint64_t k) { g.send(truthAt(k), damage); }};
 }
 
-/// A valid message; `change` makes it one that must not be used.
+/// A valid message; `change` makes it one that must be refused.
 Attack sound(const std::string& reason, const std::function<void(Detections&)>& change) {
   return {reason, [change](Gateway& g, std::uint64_t k) {
             Detections d = truthAt(k);
@@ -121,12 +121,12 @@ std::vector<Attack> attacks() {
             }),
       sound("detections_too_late",
             [](Detections& d) {
-              d.stamp.source = 4711;  // of no frame, at a time that is over
+              d.stamp.source = 4711;  // belongs to no frame; its time is in the past
               d.stamp.time -= std::chrono::seconds(1);
             }),
       {"detections_repeated",
        [](Gateway& g, std::uint64_t k) {
-         Detections d = truthAt(k - 1);  // a frame that has its detections already, with other ones
+         Detections d = truthAt(k - 1);  // other detections for a frame that already has some
          d.detections.clear();
          g.send(d);
        }},
@@ -152,7 +152,7 @@ void expectSameBits(const Belief& a, const Belief& b) {
   }
 }
 
-/// Drives with true detections; `before` may send others before those of each frame.
+/// Drives with true detections; `before` may send other messages before those of each frame.
 void drive(Gateway& g, const std::function<void(std::uint64_t)>& before = {}) {
   for (std::uint64_t k = 0; k < kFrameCount; ++k) {
     g.filter.node.onOdometry(odometryAt(k, driveTo(k, 0.4)));

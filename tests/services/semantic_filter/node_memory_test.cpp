@@ -1,4 +1,5 @@
-// What leaves the working set for the map and is recalled, with the real map store behind the node.
+// Tracks that leave the working set for the map and are recalled, with the real map store behind
+// the node.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -95,7 +96,7 @@ TEST(NodeMemory, NothingIsArchivedWhileNoMapStoreAnswers) {
   pair.driveTo(300, 2.0);
   EXPECT_EQ(pair.confirmed(), street);
   EXPECT_EQ(pair.count(EventKind::kArchived), 0u);
-  pair.deaf = false;  // the map store starts: it gets the working set before anything leaves
+  pair.deaf = false;  // the map store starts: it receives the working set before any track leaves
   pair.driveTo(360, 2.0);
   EXPECT_TRUE(pair.confirmed().empty());
   pair.driveTo(100, 2.0);

@@ -1,4 +1,4 @@
-// What the map has near, in the filter that receives it. The map is the test.
+// Map objects near the body, in the filter that receives them. The test acts as the map.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +21,7 @@ using namespace testing;  // NOLINT(google-build-using-namespace)
 
 constexpr ObjectId kKnown = 900, kNext = 1000;
 
-/// A car that the map knows, as its store sends it: known relative to the body.
+/// A car of the map, as the store sends it: relative to the body.
 ObjectBelief knownCar(ObjectId id, const Eigen::Vector3d& p, const std::string& name = "car") {
   ObjectBelief belief = map_store::test::carAt(id, p, name);
   belief.recalled = true;
@@ -34,7 +34,7 @@ ObjectBelief knownCar(ObjectId id, const Eigen::Vector3d& p, const std::string& 
   return belief;
 }
 
-/// A filter on the street. The map gave out the ids below kNext, so that what it knows is older.
+/// A filter on the street. The map assigned the ids below kNext, so its objects are older.
 struct Street : Pair {
   std::uint64_t revision = 0;
 
@@ -69,7 +69,7 @@ struct Street : Pair {
     }
     return nullptr;
   }
-  /// As published last.
+  /// The object as last published.
   const ObjectBelief* object(ObjectId id) const {
     for (const ObjectBelief& o : objects.back().objects) {
       if (o.id == id) return &o;
@@ -84,7 +84,7 @@ struct Street : Pair {
     ADD_FAILURE() << "no " << name;
     return objects.back().objects.front();
   }
-  /// The ids that were absorbed, with the id that has them.
+  /// The absorbed ids, each with the id that survived.
   std::vector<std::pair<ObjectId, ObjectId>> merged() const {
     std::vector<std::pair<ObjectId, ObjectId>> pairs;
     for (const Event& e : events) {
@@ -95,7 +95,7 @@ struct Street : Pair {
 };
 using Merged = std::vector<std::pair<ObjectId, ObjectId>>;
 
-/// Where none of the street's cars is, and no camera looks.
+/// A position without cars and outside the camera's view.
 const Eigen::Vector3d kBehind(2.0, -9.0, 0.75);
 
 Eigen::Vector3d beside(const ObjectBelief& object) {
@@ -380,7 +380,7 @@ TEST(NodeNear, IdsThatTheMapKnowsAreNotDrawnAgain) {
   EXPECT_GE(run.objects.back().next_id, 8000u) << "a state of another world takes ids, too";
 }
 
-/// A car that drives off behind the body, seen until now.
+/// A car that drives off behind the body and was last detected now.
 ObjectBelief leaving(ObjectId id, const FrameStamp& now, double y) {
   ObjectBelief car = knownCar(id, {-40.0, y, 0.75});
   car.moving = 0.99;
@@ -434,7 +434,7 @@ TEST(NodeNear, TheNewestOfTooManyEndedTracksArePublished) {
   EXPECT_EQ(ended.back().track, kMostEnded + 50);
 }
 
-/// A table that the image border cuts, and a chair of the object kKnown that hides most of it.
+/// A table that the image border cuts, and a chair, object kKnown, that hides most of it.
 struct ChairBeforeTable : Street {
   static constexpr TrackId kTable = 1001, kChair = 1002;
 
@@ -452,7 +452,8 @@ struct ChairBeforeTable : Street {
     filter.onOdometry(odometryAt(0, bodyAt(0)));
     filter.flush();
   }
-  /// Its existence after a frame with no box but this answer to a prediction of the chair.
+  /// The chair's existence after a frame without boxes, except this answer to a prediction of the
+  /// chair.
   double chairAfter(std::optional<ObjectId> primed_for) {
     View view;
     const CameraModel camera{makeCamera()};

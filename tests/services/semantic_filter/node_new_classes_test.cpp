@@ -1,5 +1,5 @@
-// A swap of the network under existing tracks: classes are mapped by name, new ones enter at their
-// prior, and classes that the new network does not know are kept.
+// A swap of the network under existing tracks. Classes are mapped by name, new ones start at their
+// prior, and classes that the new network lacks remain.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -21,11 +21,11 @@ using testing::TrueObject;
 const TrueObject kVan = {makeState(18, 3.5, 1.05, 0.1, 5.0, 1.9, 2.1), "van"};
 const TrueObject kChair = {makeState(9, -2.0, 0.45, 0.3, 0.5, 0.5, 0.9), "chair"};
 
-/// A network that names each object's class if it knows it, and otherwise a class that the object
+/// A network that names each object's class if it has it, and otherwise a class that the object
 /// resembles.
 struct Network {
   ModelInfo info;
-  std::map<std::string, std::string> says;  ///< for objects of classes that it does not know
+  std::map<std::string, std::string> says;  ///< for objects of classes that it does not have
 
   Network(std::uint64_t hash, const std::string& name, std::vector<std::string> classes,
           std::map<std::string, std::string> lookalike_class = {})
@@ -96,7 +96,8 @@ TEST(NodeNewClasses, EnterATrackAtTheirPriorWhenItIsNextDetected) {
   const auto van = std::find_if(ledger.begin(), ledger.end(),
                                 [](const ClassLedger& c) { return c.name == "van"; });
   ASSERT_NE(van, ledger.end());
-  // Between car and van, which are equally frequent. Other differences have reasons of their own.
+  // Between car and van, which are equally frequent. Differences to other classes have other
+  // causes.
   const double prior = van->log_odds[static_cast<std::size_t>(ClassEvidence::kPrior)];
   EXPECT_NEAR(prior, std::log(0.5 * (1.0 - ClutterParameters{}.other_prior)), 0.1);
   EXPECT_GT(van->log_odds[static_cast<std::size_t>(ClassEvidence::kActivation)], 0.0);

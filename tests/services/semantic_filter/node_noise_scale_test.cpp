@@ -69,8 +69,8 @@ double learnedFrom(double noise) {
 }
 
 TEST(NodeNoiseScale, LearnsTheNoiseScaleOfBoxes) {
-  // The errors are drawn again for each observation: none of them stays with the object, although a
-  // part is assumed to.
+  // The errors are drawn again for each observation, so none of them stays with the object,
+  // although the model assumes that a part does.
   const double third = learnedFrom(0.35), once = learnedFrom(1.0), twice = learnedFrom(1.6);
   EXPECT_GT(third, 0.08);
   EXPECT_LT(third, 0.5);

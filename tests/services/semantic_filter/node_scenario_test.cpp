@@ -1,5 +1,5 @@
-// Small scenes with exact truth: what the filter must distinguish, and whether its covariances are
-// honest.
+// Small scenes with exact truth: the cases that the filter must distinguish, and the consistency of
+// its covariances.
 #include <gtest/gtest.h>
 
 #include "common/math/chi2.h"
@@ -42,7 +42,7 @@ double probabilityOfCar(const ObjectBelief& o) {
 }
 
 TEST(NodeScenario, AToyThatResemblesACarIsDistinguishedByItsSize) {
-  // The toy is a car of half a metre, 5 m ahead. Its image is that of a car 42 m ahead.
+  // The toy is a car of half a metre, 5 m ahead. Its image equals that of a car 42 m ahead.
   const TrueObject toy{makeState(5.3, 0.9, 0.75, 0.5, 0.5, 0.21, 0.18), "car"};
   const TrueObject car{makeState(16.0, -3.5, 0.75, 0.3, 4.2, 1.75, 1.5), "car"};
   Harness h;
@@ -70,11 +70,10 @@ TEST(NodeScenario, WithoutParallaxNoClassIsRejectedAndTheCovarianceIsWide) {
 }
 
 TEST(NodeScenario, PositionErrorsMatchTheirCovariance) {
-  // Sizes are drawn from the prior, boxes are true projections plus the declared noise of the whole
+  // Sizes are drawn from the prior. Boxes are true projections plus the declared noise of the whole
   // car, and observations are independent. 19 of 20 squared normalised errors must lie below the 95
-  // % quantile of χ², within the band of 600 draws, and their mean must not exceed the expected
-  // one. The mean has no lower band: one car of 600 with a wrong state would compensate for the
-  // others.
+  // % quantile of χ², within the band of 600 draws. Their mean must not exceed the expected one.
+  // The mean has no lower band: one car of 600 with a wrong state would compensate for the others.
   Config config;
   config.filter.tempering.correlation = 0.0;
   config.filter.box.bias_share = 0.0;
@@ -146,8 +145,8 @@ TEST(NodeScenario, AMovingCarIsReportedMovingAndLessCertainUnobservedAndAParkedO
   const ObjectBelief driving = at(true), standing = at(false);
   EXPECT_GT(driving.moving, 0.9);
   EXPECT_LT(standing.moving, 0.1);
-  // After two seconds without an observation it is published at its predicted place, with less
-  // certainty.
+  // After two seconds without an observation it is published at its predicted position, with larger
+  // variance.
   for (std::uint64_t k = 30; k < 50; ++k) node.onOdometry(odometryAt(k, driveTo(k, 0.5)));
   node.flush();
   const double seconds = 2.0, sigma_v = 0.3;

@@ -101,8 +101,7 @@ TEST(Node, MapsAStreetOfParkedCars) {
   EXPECT_EQ(confirmed, 3);
 }
 
-/// Points on the fronts of the cars, as `camera` has them; of another camera its pixels are
-/// elsewhere.
+/// Points on the fronts of the cars, in pixels of `camera`; another camera has other pixels.
 Landmarks landmarksAt(std::uint64_t k, const std::string& camera) {
   static const CameraModel model{testing::makeCamera()};
   Landmarks m;
@@ -226,7 +225,8 @@ TEST(Node, DetectionOnAnotherVisitRaisesExistence) {
   EXPECT_LE(surest(h), parameters.certain_again);
 }
 
-/// The camera views the street, turns away for three seconds, and then views all of it again.
+/// The camera views the street, turns away for three seconds, and then views the whole street
+/// again.
 std::vector<ObjectId> missForAWhile(Harness& h) {
   drive(h, 0, 20);
   std::vector<ObjectId> ids;
@@ -317,7 +317,7 @@ MapNear nearOf(std::vector<ObjectBelief> placed, ObjectId next_id, InstanceId cl
   return near;
 }
 
-/// Map objects with the given variance, in place of a first frame.
+/// Map objects with the given variance, which replace a first frame.
 MapNear restored(const std::vector<TrueObject>& things, const std::vector<double>& variances) {
   std::vector<ObjectBelief> placed;
   for (std::size_t i = 0; i < things.size(); ++i) {

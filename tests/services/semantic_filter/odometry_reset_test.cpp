@@ -1,5 +1,5 @@
 // Ids survive when the odometry begins a new frame of reference. The map store is the real one; it
-// receives the odometry and finds the earlier map.
+// receives the odometry and locates the session on the earlier map.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -12,7 +12,7 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace)
 
-/// Cars at uneven gaps and a few people on both sides of a street of 120 m.
+/// Cars at irregular gaps and a few people on both sides of a street of 120 m.
 std::vector<TrueObject> longStreet(double least_gap = 7.0, unsigned seed = 3) {
   std::vector<TrueObject> things;
   std::mt19937 random(seed);
@@ -30,7 +30,7 @@ std::vector<TrueObject> longStreet(double least_gap = 7.0, unsigned seed = 3) {
   return things;
 }
 
-/// The odometry restarts: from here on it has another frame of reference.
+/// The odometry restarts with another frame of reference.
 void beginAnew(Pair& pair) {
   ++pair.world.epoch;
   pair.T_W = RigidTransform(Eigen::Quaterniond(Eigen::AngleAxisd(2.2, Eigen::Vector3d::UnitZ())),
@@ -128,7 +128,7 @@ TEST(OdometryReset, ArchivedObjectsComeBackIntoTheNewFrameOfReference) {
   EXPECT_EQ(ids.changed, 0u);
 }
 
-/// A body that stands still receives its ids by the objects alone.
+/// A body at rest gets its ids back from the objects alone.
 TEST(OdometryReset, ABodyThatHardlyMovesIsFound) {
   const auto pair = onStreet();
   pair->driveTo(60);

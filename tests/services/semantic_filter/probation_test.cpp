@@ -1,5 +1,5 @@
-// A swap of inference: a new process that detects nothing makes no track doubtful, and one that
-// rightly detects nothing is trusted in the end.
+// A swap of inference. A new process that detects nothing does not lower the existence of tracks.
+// One that correctly detects nothing is accepted in the end.
 #include <gtest/gtest.h>
 
 #include "tests/services/semantic_filter/scene.h"
@@ -23,7 +23,7 @@ const std::vector<TrueObject> kParked = {{makeState(14, 3.5, 0.75, 0.1, 4.3, 1.7
                                          {makeState(16, -4.0, 0.75, 3.0, 4.0, 1.7, 1.45), "car"},
                                          {makeState(24, 5.0, 0.75, 0.0, 4.4, 1.8, 1.5), "car"}};
 
-/// Slower after the swap, so that everything stays in view.
+/// Slower after the swap, so that all objects stay in view.
 RigidTransform bodyAt(std::uint64_t k) {
   const auto fast = static_cast<double>(std::min(k, kSwapAt));
   return driveTo(1, 0.3 * fast + 0.1 * (static_cast<double>(k) - fast));
@@ -64,7 +64,7 @@ struct Watch : Harness {
       node.onDetections(look(next, seen, who));
     }
   }
-  /// Twenty frames by the old process, then the new one takes over.
+  /// Twenty frames from the old process, then the new one takes over.
   explicit Watch(bool told = true) {
     frames(kSwapAt, kParked, kOldModel);
     if (told) node.onSwap(notice(SwapStep::kTookOver, kNewModel, kOldModel));
@@ -98,7 +98,7 @@ TEST(Probation, ABlindNewProcessThatIsRolledBackCostsNothing) {
   EXPECT_EQ(w.confirmed().size(), before.size()) << "nothing was initiated a second time";
 }
 
-/// What the other tests would find if nothing were held back.
+/// The result of the other tests if no detections were delayed.
 TEST(Probation, WithoutASwapAsManyEmptyFramesLowerExistence) {
   Watch w(false);
   ASSERT_EQ(w.confirmed().size(), 3U);
@@ -111,7 +111,8 @@ TEST(Probation, BoxesElsewhereAreHeldBackAndInitiateNothing) {
   const std::vector<TrueObject> elsewhere = {
       {makeState(12, 0.2, 0.75, 0.1, 4.3, 1.75, 1.5), "car"}};
   w.frames(12, elsewhere, kNewModel);
-  w.node.onSwap(notice(SwapStep::kRolledBack, kNewModel, 0));  // it stopped by itself
+  w.node.onSwap(notice(SwapStep::kRolledBack, kNewModel, 0));  // the new process ended without an
+                                                               // external cause
   EXPECT_EQ(w.confirmed().size(), 3U);
   EXPECT_EQ(w.node.belief().tracks.size(), 3U);
 }

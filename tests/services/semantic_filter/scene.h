@@ -165,7 +165,7 @@ inline Calibration calibrationOf(const CameraCalibration& camera) {
   return c;
 }
 
-/// A node, and what it published.
+/// A node and its published messages.
 struct Harness {
   std::vector<Objects> objects;
   std::vector<Event> events;

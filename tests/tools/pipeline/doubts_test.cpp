@@ -51,7 +51,7 @@ TEST(Doubts, ARigThatTheRunContradictsIsTold) {
   check.turned = {0.3, 0, 0};
   EXPECT_THAT(doubtsOfRig(check), ElementsAre(AllOf(HasSubstr("does not fit the run"),
                                                     HasSubstr("the camera's rotation 17.19°"))));
-  check.innovations.clear();  // a run without a start is told elsewhere
+  check.innovations.clear();  // another check reports a run that did not start
   EXPECT_THAT(doubtsOfRig(check), IsEmpty());
 }
 

@@ -21,7 +21,7 @@ FrameStamp stampAt(std::uint64_t frame) {
   return stamp;
 }
 
-/// Two metres a frame, in bends and over hills, leaning a little.
+/// Two metres per frame, with bends and hills and a small roll.
 replay::PoseFile bends(std::size_t frames) {
   std::vector<replay::StampedPose> poses;
   Eigen::Vector3d p(3, -2, 1);
@@ -83,7 +83,7 @@ TEST(DriftingOdometry, AFrameOfItsOwnBeginsLevelAtTheBody) {
   EXPECT_LT(boxMinus(moved(own), moved(shared)).norm(), 1e-9) << "the same drift in either frame";
 }
 
-/// How u and s go on: yaw and position of the error, and the share by which the way is longer.
+/// The propagation of u and s: yaw and position error, and the relative excess of the distance.
 TEST(DriftCovariance, GrowsAsTheNumericJacobianOfAStepSays) {
   using Vector5 = Eigen::Matrix<double, 5, 1>;
   const Eigen::Vector3d step(1.5, -0.7, 0.2);
@@ -125,7 +125,7 @@ TEST(DriftingOdometry, ABodyAtRestHasAnIncrementWithACovariance) {
   EXPECT_FALSE(all[1].increment_covariance.isZero(0.0)) << "the filter takes zero for not known";
 }
 
-/// Roll and pitch have no error, and height hardly any.
+/// Roll and pitch have no error, and height has almost none.
 TEST(DriftingOdometry, TheErrorAtTheEndIsAsLargeAsItIsTold) {
   const auto truth = bends(300);
   constexpr int kSeeds = 200;

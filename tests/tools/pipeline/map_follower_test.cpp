@@ -1,4 +1,4 @@
-// Where a run lies in M, of a map whose graph has moved the newest of its anchors.
+// The pose of a run in M, for a map whose graph has moved its newest anchor.
 #include "tools/pipeline/map_follower.h"
 
 #include <gmock/gmock.h>
@@ -74,7 +74,7 @@ TEST_F(MapFollowerTest, TellsWhereTheMapHadTheBodyAndHasItInTheEnd) {
   mapping::Mapper map = mapper();
   MapFollower follower(kSession);
   const Odometry odometry = odometryAt(103.0, 11.0);
-  follower.follow(odometry, map);  // the map has not heard of it
+  follower.follow(odometry, map);  // the map has not received this frame
   EXPECT_THAT(follower.finish(map, {}).then, IsEmpty());
   map.onOdometry(odometry);
   follower.follow(odometry, map);
@@ -100,7 +100,7 @@ TEST_F(MapFollowerTest, AnchorsAndLoopsAreThoseOfTheSessionsOwnM) {
 TEST_F(MapFollowerTest, ObjectsLieByTheirAnchorsAndUnseenOnesWhereTheGraphHasThem) {
   mapping::Mapper map = mapper();
   ObjectBelief laid = carAt(5, {22.0, 9.0, 0.0}, 1.0);
-  laid.classes[0].mean[3] = -0.1;  // 180° from where the record has it, and a little
+  laid.classes[0].mean[3] = -0.1;  // 180° from the yaw in the record, and a little more
   laid.recalled = true;
   const ObjectBelief early = carAt(6, {30.0, 1.0, 0.0}, 3.0), late = carAt(7, {110, 1, 0}, 12.0);
   const DriveInMap drive = MapFollower(kSession).finish(map, {laid, early, late});

@@ -53,7 +53,7 @@ TEST(PoseOdometry, TruthHasAnErrorThatStaysInTheWorldAndAWorldWhoseZIsUp) {
   ASSERT_TRUE(second->has_increment);
   EXPECT_EQ(second->increment_from, 0U);
   EXPECT_TRUE(second->increment_covariance.isZero());
-  // An error of the body's attitude is the same turn of the world before and after.
+  // An error of the body's attitude is the same rotation of the world in both frames.
   const Eigen::Vector3d error(1e-4, 2e-4, 3e-4);
   const Eigen::Vector3d then = second->transition.topLeftCorner<3, 3>() * error;
   EXPECT_TRUE((second->T_WB.q * then).isApprox(first->T_WB.q * error, 1e-12));

@@ -1,4 +1,4 @@
-// The pipeline over a street of one parked car, made here: exact boxes of a known cuboid.
+// The pipeline on a generated street with one parked car: exact boxes of a known cuboid.
 #include "tools/pipeline/pipeline.h"
 
 #include <gmock/gmock.h>
@@ -37,8 +37,8 @@ RigidTransform poseOf(int frame) {
   return RigidTransform(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.4 * frame, 0, 0));
 }
 
-/// The box of the car in a frame, cut at the image's border as detectors do; nothing where less
-/// than a fifth of it is in the image.
+/// The box of the car in a frame, cut at the image border as detectors do; nothing if less than a
+/// fifth of it is in the image.
 std::optional<Box> boxOf(const CameraModel& camera, int frame) {
   const RigidTransform T_CW = (poseOf(frame) * camera.T_BC()).inverse();
   Box box{1e9, 1e9, -1e9, -1e9};
@@ -56,7 +56,7 @@ std::optional<Box> boxOf(const CameraModel& camera, int frame) {
   return cut;
 }
 
-/// The folder with a calibration, poses.txt and boxes.csv.
+/// Creates the folder with a calibration, poses.txt and boxes.csv.
 fs::path makeStreet(const std::string& name) {
   const fs::path root = replay::tinyKittiTracking(name);
   fs::remove_all(root / "label_02");
@@ -153,7 +153,7 @@ TEST(Pipeline, TwoRunsGiveIdenticalBytes) {
 TEST(Pipeline, InstUpToAFrameDoesNotDependOnWhatComesLater) {
   const auto street = makeStreet("prefix");
   runPipeline(streetOptions(street, "whole"));
-  // From frame 30 on there are only boxes of another class elsewhere.
+  // From frame 30 on, all boxes are of another class and elsewhere.
   std::string csv;
   for (const auto& line : replay::readLines(street / "boxes.csv", "")) {
     const auto frame = replay::parseInteger(replay::split(line.text, ',')[0]);
@@ -225,7 +225,7 @@ TEST(Pipeline, EachNthFrameIsARunOfALowerRate) {
   EXPECT_THAT(errorOf(options), HasSubstr("--every"));
 }
 
-/// The car's label in each frame in which its box is.
+/// Writes the car's label for each frame that has its box.
 void labelStreet(const fs::path& street) {
   auto calibration = replay::readTrackingCalibration(street / "calib/0000.txt");
   calibration.width = 1242, calibration.height = 375;
@@ -263,7 +263,7 @@ TEST(Pipeline, FramesThatItLeavesOutAreNoMisses) {
   auto options = streetOptions(street, "out");
   options.image_size = {1242, 375};
   const auto recall = [](const nlohmann::json& json) {
-    return json["cells"][5]["recall"].get<double>();  // a metre, any angle
+    return json["cells"][5]["recall"].get<double>();  // recall within a metre, at any angle
   };
   runPipeline(options);
   const auto whole = evaluated(options);
@@ -366,7 +366,7 @@ TEST(Pipeline, ANetworkFileThatIsNoneIsRefusedWithASentence) {
   EXPECT_THAT(errorOf(options), HasSubstr("net.onnx"));
 }
 
-/// Images for the street: discs of different greys on both sides of the way.
+/// Draws images of the street: discs of different greys on both sides of the road.
 void drawStreet(const fs::path& street) {
   auto calibration = replay::readTrackingCalibration(street / "calib/0000.txt");
   calibration.width = 1242, calibration.height = 375;
@@ -494,12 +494,12 @@ TEST(Pipeline, ARecordedRunGivesTheFilterTheSameAgain) {
   options.out = street / "second";
   options.odometry = options.detections = "recorded";
   run();
-  // What it heard is in its own recording, too.
+  // Its own recording also contains the messages that it received.
   options.data = street / "second" / "run.mcap";
   options.out = street / "third";
   options.record = false;
   run();
-  // Rows begin with the name of the data, which is another one.
+  // Rows begin with the name of the data, which differs.
   const auto rows = [&](const std::string& folder) {
     std::vector<std::string> lines;
     std::istringstream text(readText(street / folder / "objects_inst.csv"));

@@ -1,4 +1,4 @@
-// A real room with a real network, judged against what its depth images show (red_kitchen.csv).
+// A real room with a real network, compared with its depth images (red_kitchen.csv).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -23,7 +23,7 @@ struct RoomThing {
   double yaw = 0.0;
   bool judged = false;
 
-  /// 0 within the cuboid.
+  /// Returns 0 within the cuboid.
   double distanceTo(const Eigen::Vector3d& point) const {
     const Eigen::Vector3d in_thing =
         Eigen::AngleAxisd(-yaw, Eigen::Vector3d::UnitZ()) * (point - centre);
@@ -80,7 +80,7 @@ class RealRoom : public ::testing::Test {
     return folder;
   }
 
-  /// Once for all tests.
+  /// Runs once for all tests.
   static void run() {
     static const std::vector<ObjectBelief> once = [] {
       PipelineOptions options;
@@ -136,8 +136,8 @@ TEST_F(RealRoom, WhatStandsThereIsOneObjectOfItsClassButForKnownFailures) {
   EXPECT_EQ(judged, 11U);
 }
 
-// Known failure: the bar is no ghost. A "chair" on the floor in the corner, at (-2.10, 2.94), is
-// there or not as up in the poses' frame is turned by a quarter of a degree.
+// Known failure: the bar allows no ghost. A quarter of a degree in the vertical of the poses' frame
+// decides whether a "chair" appears on the floor at (-2.10, 2.94).
 TEST_F(RealRoom, NothingIsTwiceAndAtMostOneThingIsWhereNothingStands) {
   constexpr std::size_t kKnownGhosts = 1;
   const auto things = readRoom();

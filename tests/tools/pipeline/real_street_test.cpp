@@ -1,4 +1,4 @@
-// The pipeline on KITTI tracking with given poses and boxes, where the data are at hand.
+// The pipeline on KITTI tracking with given poses and boxes, if the data is available.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -51,9 +51,9 @@ class RealStreet : public ::testing::Test {
   }
 };
 
-// Which of two cars a box beside a van belongs to may hang on a quarter of a pixel: the street is
-// run five times, with its boxes shifted by that, and the middle run counts: one car seen twenty
-// frames late is let pass, one that is never seen is not.
+// A quarter of a pixel may decide to which of two cars a box beside a van belongs. The street is
+// therefore run five times with shifted boxes, and the median run counts. A car that is detected
+// twenty frames late is accepted; one that is never detected is not.
 TEST_F(RealStreet, TheParkedCarsOfSequence0000AreFound) {
   std::vector<double> recall, precision, inst_recall, inst_precision;
   for (const double origin : {0.0, 0.25, 0.5, 0.75, 1.0}) {

@@ -1,4 +1,4 @@
-// A run in which nothing comes out says why: before it begins, or at its end.
+// A run without results reports the cause: before it starts, or at its end.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -29,7 +29,7 @@ PipelineOptions optionsFor(const fs::path& root) {
   options.out = (root / "out").string();
   return options;
 }
-/// Sentence and status of a run; "" and 0 where it ends well.
+/// Message and status of a run; "" and 0 if it ends normally.
 std::pair<std::string, int> endOf(const PipelineOptions& options) {
   try {
     Pipeline pipeline(options);
@@ -130,7 +130,7 @@ TEST(PipelineRefusal, DetectionsOfOtherFramesAreRefusedBeforeTheRun) {
                                             65));
 }
 
-/// Twenty poses along x, so far apart.
+/// Twenty poses along x, `step_m` apart.
 std::string posesAlongX(double step_m) {
   std::string poses;
   for (int i = 0; i <= 20; ++i) {

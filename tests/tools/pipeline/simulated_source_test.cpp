@@ -1,4 +1,4 @@
-// Simulated detections in the pipeline, over a hand-made folder: one car, five frames.
+// Simulated detections in the pipeline, on a generated folder: one car, five frames.
 #include "tools/pipeline/simulated_source.h"
 
 #include <gmock/gmock.h>
@@ -16,7 +16,7 @@ using replay::startupErrorOf;
 using replay::writeText;
 using ::testing::HasSubstr;
 
-/// The tiny EuRoC folder with a truth: a car that fills a third of its 32×24 images.
+/// The tiny EuRoC folder with truth: a car that fills a third of its 32×24 images.
 fs::path tinySimulated(const std::string& name) {
   const auto root = replay::tinyEuroc(name);
   std::string states = "#timestamp, p, q w x y z, v, b_w, b_a\n";

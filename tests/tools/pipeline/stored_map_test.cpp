@@ -1,4 +1,4 @@
-// Runs that begin with a stored map (`--map`): what is refused, and a street that is met again in
+// Runs that start from a stored map (`--map`): refused maps, and a street that is visited again in
 // another frame.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -88,7 +88,7 @@ TEST(StoredMap, OfThisRunItselfIsRefusedAndStays) {
   options.map = own.string();
   EXPECT_THAT(errorOf(options), AllOf(HasSubstr("this run's own map"), HasSubstr("--out")));
   EXPECT_EQ(readText(own), kept);
-  // By another name.
+  // The same file under another name.
   const fs::path link = fs::path(options.data) / "link.sqlite";
   fs::create_symlink(own, link);
   options.map = link.string();
@@ -132,8 +132,8 @@ TEST(StoredMap, OfAnOlderVersionIsTakenOverInTheCopyAlone) {
             map_store::kSchemaVersion);
 }
 
-/// The simulated street: twice round a block. The first lap leaves a map; the second one begins
-/// with it, in a frame of its own, with drift.
+/// The simulated street: two laps around a block. The first lap creates a map. The second one
+/// starts from it, in its own frame, with drift.
 class StreetAgain : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -213,7 +213,7 @@ TEST_F(StreetAgain, WhatIsSeenAgainHasItsIdAndNoIdIsGivenTwice) {
   for (const ObjectId id : before) kept += after.contains(id) ? 1u : 0u;
   EXPECT_GE(10 * kept, 9 * before.size()) << "what was known is on the map";
   EXPECT_GE(2 * old.size(), before.size()) << "and is seen under its old id";
-  // Nothing that was known stands on the map a second time.
+  // No known object is on the map a second time.
   EXPECT_LE(after.size(), before.size() + before.size() / 4);
 }
 

@@ -13,7 +13,7 @@ using mapping::AnchorId;
 
 constexpr std::size_t kLoopsPerAnchor = 8;
 
-/// Of a component, those that are asked for: nearest first.
+/// Returns the requested anchors of a component, nearest first.
 std::vector<AnchorId> nearestAnchors(const mapping::PoseGraph& graph,
                                      const std::vector<AnchorId>& all, const MapQuery& query) {
   const double reach = query.radius > 0.0 ? query.radius : std::numeric_limits<double>::infinity();
@@ -28,9 +28,9 @@ std::vector<AnchorId> nearestAnchors(const mapping::PoseGraph& graph,
   return ids;
 }
 
-/// All 0, which is not known, where variances are none, or say as good as nothing.
+/// Returns zeros (not known) if the variances are not finite or are too large to be of use.
 Eigen::Vector4d sigmaOf(const Eigen::Vector4d& variances) {
-  constexpr double kNothing = 1e8;  // 10 km
+  constexpr double kNothing = 1e8;  // (10 km)², in m²
   const bool known = (variances.array() >= 0.0).all() && (variances.array() < kNothing).all();
   return known ? variances.cwiseSqrt().eval() : Eigen::Vector4d::Zero().eval();
 }
@@ -54,7 +54,7 @@ void putPairs(const std::vector<std::pair<ObjectId, ObjectId>>& pairs, std::size
   loop.landmarks = static_cast<std::uint32_t>(points);
 }
 
-/// Of a component, by id.
+/// Returns the loop closures of a component, ordered by id.
 std::vector<MapLoop> loopsOf(const mapping::Mapper& mapper,
                              const std::vector<mapping::LoopWithdrawal>& withdrawn,
                              const std::map<AnchorId, AnchorId>& components, AnchorId component) {

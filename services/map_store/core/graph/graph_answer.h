@@ -1,5 +1,5 @@
-// What is said of the graph to who asks for it: anchors where they lie in M with how well that is
-// known, and the loops between them.
+// Answers to queries about the graph: the anchors with their poses in M and standard deviations,
+// and the loop closures between them.
 #pragma once
 
 #include <vector>
@@ -9,12 +9,13 @@
 
 namespace perdure::map_store {
 
-/// So many anchors are told at most, whatever `limit` is; of loops eight times as many, the newest.
+/// The largest number of anchors in an answer, whatever `limit` is. For loop closures the limit is
+/// eight times as large; the newest are chosen.
 inline constexpr std::uint32_t kMostAnchors = 4096;
 
-/// Fills anchors, loops, their counts and `truncated`. They are those of the M that `session` lies
-/// in; where that has no anchor, of the M of the newest one. `withdrawn`: loops that are no part of
-/// the graph any more; those whose id is told again are left out.
+/// Fills anchors, loops, their counts and `truncated`. They belong to the M of `session`; if
+/// `session` has no anchor, to the M of the newest session. `withdrawn`: loop closures that were
+/// removed from the graph. Those whose id is in use again are left out.
 void putGraph(mapping::Mapper& mapper, const std::vector<mapping::LoopWithdrawal>& withdrawn,
               const WorldId& session, const MapQuery& query, MapReply& reply);
 

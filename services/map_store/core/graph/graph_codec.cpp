@@ -127,7 +127,7 @@ tl::unexpected<Reason> malformed(const std::string& what, const ByteReader& in) 
                                                        : ": bytes are missing or invalid"));
 }
 
-/// The version first; then all bytes are taken, and what they say is sound.
+/// Checks the version first, then that all bytes are read and the value is sound.
 template <class T, class TakeAll>
 Result<T> decode(const std::string& what, std::span<const std::uint8_t> bytes, TakeAll takeAll) {
   ByteReader in(bytes);

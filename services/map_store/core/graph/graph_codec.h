@@ -1,4 +1,5 @@
-// The pose graph as bytes, for the database: as beliefs are, versioned, little-endian, exact.
+// Converts the pose graph to bytes and back for the database. As for beliefs, the format is
+// versioned, little-endian and exact.
 #pragma once
 
 #include <cstdint>
@@ -11,19 +12,19 @@
 
 namespace perdure::map_store {
 
-/// The first two bytes of every blob. A reader refuses versions that it does not know.
+/// The first two bytes of every blob. A reader refuses unknown versions.
 inline constexpr std::uint16_t kGraphFormat = 1;
 
-/// Finite numbers, rotations of length 1, ids where there must be one, no PMF beyond bounds. What
-/// is not sound is neither written nor read. An anchor comes after its `previous`.
+/// Whether the value is sound: finite numbers, rotations of length 1, all required ids, PMFs within
+/// bounds, and no anchor before its `previous`. Unsound values are neither written nor read.
 bool isSound(const mapping::LevelPose& pose);
 bool isSound(const mapping::Anchor& anchor);
 bool isSound(const mapping::Edge& edge);
 bool isSound(const mapping::ObjectRecord& record);
 bool isSound(const mapping::View& view);
 
-// The decoders refuse ("graph_malformed") what is cut short, too long, of another version or not
-// sound.
+// The decoders refuse ("graph_malformed") bytes that are truncated, too long, of another version or
+// unsound.
 
 Bytes encodeAnchor(const mapping::Anchor& anchor);
 Result<mapping::Anchor> decodeAnchor(std::span<const std::uint8_t> bytes);
@@ -31,11 +32,11 @@ Result<mapping::Anchor> decodeAnchor(std::span<const std::uint8_t> bytes);
 Bytes encodeEdge(const mapping::Edge& edge);
 Result<mapping::Edge> decodeEdge(std::span<const std::uint8_t> bytes);
 
-/// `confirmed` and `gone` are not kept: the first comes back true.
+/// `confirmed` and `gone` are not stored; `confirmed` is true after decoding.
 Bytes encodeRecord(const mapping::ObjectRecord& record);
 Result<mapping::ObjectRecord> decodeRecord(std::span<const std::uint8_t> bytes);
 
-/// Exact: places and deviations are floats, as they are kept.
+/// Exact, because positions and deviations are stored as floats.
 Bytes encodeView(const mapping::View& view);
 Result<mapping::View> decodeView(std::span<const std::uint8_t> bytes);
 

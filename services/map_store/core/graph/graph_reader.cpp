@@ -15,7 +15,7 @@ namespace {
 using mapping::AnchorId;
 using mapping::SavedMap;
 
-/// Calls `take` at each row; false from it: the row is malformed.
+/// Calls `take` for each row. If it returns false, the row is malformed.
 template <class Take>
 Result<void> takeRows(const Connection& connection, std::string_view sql, std::uint64_t& malformed,
                       Take take) {
@@ -29,7 +29,8 @@ Result<void> takeRows(const Connection& connection, std::string_view sql, std::u
   }
 }
 
-/// Names by their numbers from 0 on; those after a gap cannot be placed.
+/// Reads class names by their numbers, from 0. Names after a gap cannot be assigned and are left
+/// out.
 Result<void> readClasses(const Connection& connection, SavedGraph& graph) {
   auto& classes = graph.map.classes;
   return takeRows(connection, "SELECT number, name FROM graph_classes ORDER BY number",
@@ -41,7 +42,7 @@ Result<void> readClasses(const Connection& connection, SavedGraph& graph) {
                   });
 }
 
-/// Where a column holds no number the pose is not finite.
+/// Returns a NaN if the column has no number, so that the pose is not finite.
 double numberAt(const Statement& row, int column) {
   return row.isNumber(column) ? row.real(column) : std::nan("");
 }
@@ -118,7 +119,8 @@ Result<void> readViews(const Connection& connection, SavedGraph& graph) {
                   });
 }
 
-/// A predecessor comes before, so that what hangs on one that was left out is left out too.
+/// Anchors come after their predecessors, so anchors that follow one that was left out are left out
+/// too.
 void leaveOutBrokenChains(SavedGraph& graph) {
   auto& anchors = graph.map.anchors;
   for (auto at = anchors.begin(); at != anchors.end();) {
@@ -163,8 +165,8 @@ void leaveOutDangling(SavedGraph& graph) {
   }
 }
 
-/// Facts of a loop that was left out stay for good. Where facts are missing (a map from a server),
-/// an object goes on as one track.
+/// Facts of a loop closure that was left out remain valid. If facts are missing (a map from a
+/// server), each object remains one track.
 void takeFacts(SavedGraph& graph, const std::set<mapping::SameObject>& facts) {
   SavedMap& map = graph.map;
   for (mapping::SameObject fact : facts) {
@@ -182,7 +184,7 @@ void takeFacts(SavedGraph& graph, const std::set<mapping::SameObject>& facts) {
   }
 }
 
-/// The first anchor of each component, over the edges between them.
+/// Finds the first anchor of each component, given the edges between anchors.
 class Components {
  public:
   explicit Components(const SavedMap& map) {
@@ -202,7 +204,8 @@ class Components {
   std::map<AnchorId, AnchorId> first_;
 };
 
-/// Where the anchor that was held fast, or an edge that led to it, has been left out.
+/// Fixes the first anchor of each component without a fixed anchor: that anchor, or an edge to it,
+/// may have been left out.
 void holdEachComponent(SavedMap& map) {
   Components components(map);
   std::set<AnchorId> held;
@@ -247,7 +250,7 @@ Result<std::set<mapping::SameObject>> readFacts(const Connection& connection) {
 }
 
 Result<SavedGraph> readGraph(const Connection& connection) {
-  // A savepoint is a transaction of its own where there is none: the tables belong together.
+  // Outside a transaction a savepoint acts as one. The tables must be read in one state.
   auto done = connection.execute("SAVEPOINT graph");
   if (!done) return tl::unexpected<Reason>(done.error());
   SavedGraph graph;

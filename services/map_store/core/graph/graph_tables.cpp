@@ -7,9 +7,9 @@
 
 namespace perdure::map_store {
 
-// Blobs are what core/graph/graph_codec.h says, and the columns beside them repeat what they hold,
-// to be asked for. What changes while its blob does not is in columns only: poses in M, held_fast,
-// weight. These have no type: REAL would lose the sign of zero.
+// The blobs are encoded by core/graph/graph_codec.h. The columns beside them repeat some of their
+// values for queries. Values that change without their blob are in columns only: poses in M,
+// held_fast, weight. These columns have no type, because REAL would lose the sign of zero.
 const char* const kGraphSchema = R"sql(
 CREATE TABLE graph_classes(number INTEGER PRIMARY KEY, name TEXT NOT NULL);
 CREATE TABLE anchors(
@@ -133,7 +133,8 @@ void bindView(Statement& to, const ViewRow& row) {
   to.bindId(1, row.first).bind(2, std::span<const std::uint8_t>(encodeView(row.second)));
 }
 
-/// Elements of `all` that may be written; how many may not is added to `refused`.
+/// Returns the elements of `all` that may be written, and adds the number of the others to
+/// `refused`.
 template <class All, class MayBeWritten>
 std::vector<std::reference_wrapper<const typename All::value_type>> soundOnes(
     const All& all, std::uint64_t& refused, MayBeWritten mayBeWritten) {
@@ -161,7 +162,7 @@ Result<void> deleteFrom(const Connection& connection, const std::string& table,
                     [](Statement& to, std::uint64_t id) { to.bindId(1, id); });
 }
 
-/// Rows of a table whose id is not among those of `known`.
+/// Returns the ids of a table's rows that are not in `known`.
 template <class Known>
 Result<void> deleteOthers(const Connection& connection, const std::string& table,
                           const Known& known, const std::string& key = "id") {

@@ -1,4 +1,5 @@
-// The pose graph in the map's file: its tables, written within a transaction and read whole.
+// The tables of the pose graph in the map's file. They are written within a transaction and read as
+// a whole.
 #pragma once
 
 #include <cstdint>
@@ -13,35 +14,36 @@ namespace perdure::map_store {
 /// Maps of older versions have no tables of the graph.
 inline constexpr int kFirstSchemaWithGraph = 3;
 
-/// SQL that makes the tables.
+/// SQL that creates the tables.
 extern const char* const kGraphSchema;
-/// The same of tables that came later: views, and tracks that share an object with others. Does
-/// nothing if they exist.
+/// SQL that creates the later tables if they do not exist: views, and tracks that share an object.
 extern const char* const kAddedSchema;
 
-/// What a file holds, such that the ends of edges, the anchors of sightings and predecessors of
-/// the same session exist, and one anchor of each component is held fast.
+/// The graph in a file. The ends of edges, the anchors of sightings and predecessors of the same
+/// session exist. One anchor of each component is fixed.
 struct SavedGraph {
   mapping::SavedMap map;
-  /// What could not be read, or hung on what could not. Left out; of some records `earlier` only.
+  /// Number of parts that were left out because they, or parts that they depend on, could not be
+  /// read. Some records lost only `earlier`.
   std::uint64_t malformed = 0;
   std::set<ObjectId> shortened;  ///< records that lost `earlier`
 };
 
-/// One state of the file, also while another process writes it. Of an older map: an empty one.
+/// Reads one state of the file, even if another process writes to it. Returns an empty graph for
+/// maps of older versions.
 Result<SavedGraph> readGraph(const Connection& connection);
 
-/// Within the caller's transaction. What is not sound (graph_codec.h) is left as it is stored;
-/// returns how many these are. Records of objects that were not confirmed are not written.
+/// Writes within the caller's transaction. Unsound parts (graph_codec.h) stay as they are stored;
+/// returns their number. Records of objects that were not confirmed are not written.
 Result<std::uint64_t> writeGraph(const Connection& connection, const mapping::Unsaved& unsaved);
 
-/// Which tracks are one object; empty for a map of an older version.
+/// Returns which tracks are one object; empty for maps of older versions.
 Result<std::set<mapping::SameObject>> readFacts(const Connection& connection);
-/// Within the caller's transaction.
+/// Writes within the caller's transaction.
 Result<void> writeFacts(const Connection& connection, const mapping::Unsaved& unsaved);
 
-/// Within the caller's transaction: deletes what readGraph leaves out. A mapper that begins with
-/// what was read gives those ids again.
+/// Deletes, within the caller's transaction, the rows that readGraph leaves out, because a mapper
+/// that starts from the graph reuses their ids.
 Result<void> sweepGraph(const Connection& connection);
 
 }  // namespace perdure::map_store

@@ -1,6 +1,6 @@
 // Archive: which tracks leave the working set for the map store (the paper's semantic map, line
-// 288). Nothing leaves before the map store reports that it is on disk. Without a map store, or with
-// a slow one, the working set grows and nothing is lost.
+// 288). Nothing leaves before the map store reports that it is on disk. Without a map store, or
+// with a slow one, the working set grows and nothing is lost.
 #pragma once
 
 #include <algorithm>
@@ -18,30 +18,30 @@ class Archive {
   Archive(const MemoryParameters& parameters, double min_speed)
       : parameters_(parameters), min_speed_(min_speed) {}
 
-  /// The tracks that leave the working set now, ordered by id.
+  /// The tracks that leave the working set, ordered by id.
   struct Leaving {
-    std::vector<TrackId> archived;   ///< at rest and on the map, where they wait
+    std::vector<TrackId> archived;   ///< at rest and on the map, until they are recalled
     std::vector<TrackId> forgotten;  ///< never confirmed, or moving and out of view
   };
-  /// Is called after the step of a frame at `now`, with the body at p_WB. Frames from `oldest` on
-  /// may be stepped again, so tracks detected in them stay.
+  /// Must be called after the step of a frame at `now`, with the body at p_WB. Tracks that were
+  /// detected in frames from `oldest` on stay, because these frames may be stepped again.
   Leaving leaving(const std::vector<Track>& tracks, const Eigen::Vector3d& p_WB, TimePoint now,
                   TimePoint oldest);
 
-  /// The map has everything on disk that was published up to this time.
+  /// The map has everything on disk that was published up to `time`.
   void onKept(TimePoint time) { kept_ = std::max(kept_, time); }
   TimePoint kept() const { return kept_; }
-  /// The distance from the body up to which the map is to give objects, m; 0: none. Tracks leave at
-  /// a greater distance, so that they do not come and go.
+  /// The distance from the body up to which the map gives objects, m; 0: none. Tracks leave at a
+  /// greater distance, so that they do not come and go.
   double nearRadius() const;
 
   /// Stores the product of pose error transitions that the cross-covariance of an archived track
   /// refers to. The map does not have it.
   void rememberReference(const Track& track);
-  /// Returns nothing if the belief is of another run, or if too many were archived since.
+  /// Returns nothing if the belief is of another run, or if too many tracks were archived since.
   std::optional<Matrix6d> referenceAt(TimePoint as_of) const;
 
-  /// Forgets everything: another frame of reference begins.
+  /// Deletes everything, because another frame of reference begins.
   void clear();
 
  private:
@@ -50,7 +50,8 @@ class Archive {
 
   MemoryParameters parameters_;
   double min_speed_;  ///< m/s; a slower track is at rest
-  /// Since when each track could leave. It leaves once the map has a frame from then on.
+  /// The time since when each track could leave. It leaves once the map has a frame of this time or
+  /// later.
   std::map<TrackId, TimePoint> waiting_;
   TimePoint kept_;
   std::map<TimePoint, Matrix6d> references_;

@@ -42,13 +42,13 @@ class Arrival {
     belief_.tracks.insert(later, std::move(track));
   }
 
-  /// The tracks of each object become one.
+  /// Fuses the tracks of each object.
   std::vector<MergeRecord> unite() {
     std::map<ObjectId, std::vector<TrackId>> objects;
     for (const auto& [track, object] : arrivals_.members) objects[object].push_back(track);
     std::vector<MergeRecord> fused;
     for (auto& [object, tracks] : objects) {
-      tracks.push_back(object);  // a track of its own, too
+      tracks.push_back(object);  // also a track of its own
       std::erase_if(tracks, [&](TrackId track) { return find(track) == end(); });
       std::stable_sort(tracks.begin(), tracks.end(), [&](TrackId a, TrackId b) {
         return find(a)->life.recalled < find(b)->life.recalled;

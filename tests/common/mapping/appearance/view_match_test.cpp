@@ -1,4 +1,4 @@
-// Views laid on each other: how well, how surely, and what is not taken for the same place.
+// Matches of views: their accuracy, their confidence, and views that must not match.
 #include "common/mapping/appearance/view_match.h"
 
 #include <gtest/gtest.h>
@@ -52,7 +52,7 @@ struct Two {
   LevelPose T_AB;
 };
 
-/// Views of which `common` points are the same, and others are not.
+/// Two views with `common` points that are the same, and others that are not.
 Two twoViews(std::uint32_t seed, std::size_t common, std::size_t others) {
   Street street(seed);
   Two two;
@@ -84,7 +84,8 @@ TEST(ViewMatch, LaysAViewWhereItLiesAndSaysHowWell) {
     EXPECT_LT(error.head<3>().norm(), 1.0) << seed;
     nees += squaredMahalanobis(error, match->T_AB.covariance) / kRuns;
   }
-  // Of four numbers. Less than 4: kPointError_m is added to what the points say of themselves.
+  // Four degrees of freedom. The value is below 4, because kPointError_m is added to the declared
+  // errors of the points.
   EXPECT_GT(nees, 1.5);
   EXPECT_LT(nees, 4.6);
 }

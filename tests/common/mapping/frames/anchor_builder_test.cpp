@@ -81,7 +81,7 @@ TEST(AnchorBuilder, SetsOneAfterATurnOfThirtyDegrees) {
   AnchorBuilder builder{{}};
   std::vector<Odometry> drive;
   for (int i = 0; i <= 40; ++i) {
-    const double yaw = 0.05 * i;  // a circle of two metres
+    const double yaw = 0.05 * i;  // a circle with a radius of two metres
     drive.push_back(at(i, {2.0 * std::sin(yaw), 2.0 - 2.0 * std::cos(yaw), 0.0}, yaw));
   }
   const auto anchors = anchorsOf(builder, drive);
@@ -91,7 +91,7 @@ TEST(AnchorBuilder, SetsOneAfterATurnOfThirtyDegrees) {
 
 TEST(AnchorBuilder, SetsOneWhereYawGetsUncertain) {
   AnchorParameters parameters;
-  parameters.walk_yaw = 0.0015;  // beyond 0.0026 rad after three metres
+  parameters.walk_yaw = 0.0015;  // exceeds 0.0026 rad after three metres
   AnchorBuilder builder(parameters);
   std::vector<Odometry> drive;
   for (int i = 0; i <= 100; ++i) drive.push_back(at(i, {0.1 * i, 0.0, 0.0}));
@@ -115,10 +115,11 @@ TEST(AnchorBuilder, AWalkActsThroughTheLeverArm) {
   EXPECT_NEAR(P(1, 3), metres * metres * yaw / 2.0, 2e-3 * P(1, 3));
 }
 
-/// A drive as the odometry tells it, with the errors that it tells of drawn in many ways.
+/// A drive as the odometry reports it, with errors drawn from several models.
 class Errors {
  public:
-  /// Errors last by `kept` a step; what is new has the deviations `tilt`, `yaw`, `position`.
+  /// Errors decay by the factor `kept` in each step. New errors have the deviations `tilt`, `yaw`,
+  /// `position`.
   Errors(double kept, double tilt, double yaw, double position) {
     const double kStep = 0.4;
     double heading = 0.3;
@@ -149,7 +150,7 @@ class Errors {
     }
   }
 
-  /// Where the body really was, at each frame.
+  /// The true pose of the body at each frame.
   std::vector<RigidTransform> truth(std::mt19937& random) const {
     std::vector<RigidTransform> poses;
     Eigen::Matrix<double, 6, 1> e = draw(drive[0].covariance.topLeftCorner<6, 6>(), random);
@@ -189,7 +190,8 @@ double meanNees(const Errors& errors) {
   return sum;
 }
 
-constexpr double kBand = 3.3 * 0.0447;  // of the mean of 4,000 χ² of 4: √(8 / 4000)
+constexpr double kBand = 3.3 * 0.0447;  // deviation of the mean of 4,000 draws from χ² with 4
+                                        // degrees of freedom: √(8 / 4000)
 
 TEST(AnchorBuilder, TellsTheErrorOfAWalkThatIncrementsDescribe) {
   EXPECT_NEAR(meanNees(Errors(1.0, 0.0, 0.0005, 0.005)), 4.0, kBand);

@@ -77,7 +77,7 @@ TEST(LaidBelief, IsTurnedAndTurnedBack) {
   }
 }
 
-/// The pose error keeps θ in the body and turns p with W.
+/// In the pose error, θ stays in the body's axes and p rotates with W.
 TEST(LaidBelief, TurnsItsCorrelationWithThePose) {
   std::mt19937 generator(3);
   const Matrix6d P = covariance<Matrix6d>(generator, 0.2);
@@ -107,7 +107,7 @@ TEST(LaidBelief, RelativeToTheBodyIsWhatIsItsOwn) {
   }
   const ObjectBelief relative = relativeToBody(belief, P);
   for (std::size_t i = 0; i < 2; ++i) {
-    // A thousandth of a millimetre squared is added.
+    // The transform adds a variance of 1e-6 m².
     EXPECT_LT((relative.classes[i].covariance - own[i] - 1e-6 * Matrix7d::Identity()).norm(), 1e-9);
     EXPECT_EQ(relative.classes[i].cross_pose.norm(), 0.0);
     EXPECT_EQ(relative.classes[i].mean, belief.classes[i].mean);
@@ -127,7 +127,7 @@ TEST(LaidBelief, OfAnUnknownPoseErrorKeepsItsCovariance) {
 
 TEST(LaidBelief, NeverBecomesLessThanACovariance) {
   ObjectBelief belief = car(7);
-  for (ClassBelief& c : belief.classes) c.cross_pose *= 100.0;  // more than there is
+  for (ClassBelief& c : belief.classes) c.cross_pose *= 100.0;  // larger than the covariance allows
   for (const ClassBelief& c : relativeToBody(belief, Matrix6d::Identity()).classes) {
     EXPECT_TRUE(isCovariance(c.covariance));
   }
@@ -136,7 +136,7 @@ TEST(LaidBelief, NeverBecomesLessThanACovariance) {
 TEST(LaidBelief, TheErrorOfTheFrameTurnsAboutItsPlace) {
   const Eigen::Vector3d about(3.0, 4.0, 0.5);
   const ObjectBelief belief = car(8);
-  // [δp, δyaw] moves the frame about `about`.
+  // Moves the frame by [δp, δyaw], with the rotation about `about`.
   const auto moved = [&](const Eigen::Vector4d& d) {
     const Eigen::Matrix3d R = rotationAboutZ(d[3]);
     return turned(RigidTransform(R, about - R * about + d.head<3>()), belief);

@@ -106,7 +106,7 @@ TEST(BeliefFusion, NeitherVetoesAClassThatItDoesNotConsider) {
   expectLedgerSums(both);
 }
 
-/// The same car as two sessions have it, whose frames and anchors lie apart.
+/// The same car in two sessions with different frames and anchors.
 TEST(BeliefFusion, AcrossFramesWhatIsTheSameStaysWhereItIs) {
   Anchor home, away;
   home.T_WA = {rotationAboutZ(0.3), {10, 2, 0.5}};
@@ -128,7 +128,7 @@ TEST(BeliefFusion, AcrossFramesWhatIsTheSameStaysWhereItIs) {
   const ObjectBelief both = fusedAcross(host, guest, {T_ha, Eigen::Matrix4d::Zero()});
   EXPECT_TRUE(both.best().mean.isApprox(at_home.best().mean, 1e-9));
   EXPECT_LT((both.best().covariance - at_home.best().covariance).norm(), 1e-5);
-  // What is known badly of the relation says little.
+  // An uncertain relation of the frames carries little information.
   const LevelGaussian vague{T_ha, 100.0 * Eigen::Matrix4d::Identity()};
   const ObjectBelief alone = fusedAcross(host, guest, vague);
   EXPECT_LT((alone.best().covariance.topLeftCorner<4, 4>() -
@@ -137,8 +137,8 @@ TEST(BeliefFusion, AcrossFramesWhatIsTheSameStaysWhereItIs) {
             0.05);
 }
 
-/// The pose error that the host's covariance contains is not fused away: the guest knows nothing
-/// of it.
+/// Fusion does not reduce the pose error in the host's covariance, because the guest has no
+/// information about it.
 TEST(BeliefFusion, KeepsTheErrorOfTheHostsPose) {
   Anchor anchor;
   ObjectBelief car = carAt({3, 4, 1});

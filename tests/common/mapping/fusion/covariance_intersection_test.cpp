@@ -33,7 +33,7 @@ class Draws {
   std::mt19937 random_;
 };
 
-/// Largest eigenvalue of what the errors are, measured by what is claimed of them.
+/// Largest eigenvalue of the true error covariance relative to the claimed one.
 double boast(const Matrix7d& errors, const Matrix7d& claimed) {
   const Matrix7d L = claimed.llt().matrixL();
   const Matrix7d half = L.triangularView<Eigen::Lower>().solve(errors);
@@ -81,8 +81,8 @@ TEST(CovarianceIntersection, HasTheLeastVolumeOfAllWeights) {
   }
 }
 
-/// Errors with a part in common, which nobody tells. The claim must hold whatever it is; that of
-/// independent errors does not.
+/// The errors have an unknown common part. The claim must hold for any such part. A claim that
+/// assumes independent errors does not.
 TEST(CovarianceIntersection, ClaimsNoMoreThanIsTrueUnderUnknownCorrelation) {
   Draws draws(4);
   double naive_boast = 0.0;
@@ -97,7 +97,7 @@ TEST(CovarianceIntersection, ClaimsNoMoreThanIsTrueUnderUnknownCorrelation) {
       const Vector7d common = draws.vector();
       const Vector7d own = std::sqrt(1.0 - correlation * correlation) * draws.vector();
       const Vector7d e_a = L_a * common, e_b = L_b * (correlation * common + own);
-      // Small, so that no draw contradicts and yaw does not wrap.
+      // Small enough that no draw contradicts and yaw does not wrap.
       constexpr double kSmall = 1e-3;
       const CuboidGaussian fused = intersect({kSmall * e_a, P_a}, {kSmall * e_b, P_b}, w);
       const Vector7d e = fused.mean / kSmall;

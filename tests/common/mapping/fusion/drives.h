@@ -1,5 +1,5 @@
-// Drives of vehicles along one street block, each with a frame, a drift and ids of its own, as the
-// maps that they would store.
+// Drives of vehicles along one street block, as the maps that they would store. Each vehicle has
+// its own frame, drift and ids.
 #pragma once
 
 #include <algorithm>
@@ -26,7 +26,7 @@ struct Thing {
 
 inline constexpr double kSide_m = 150.0;
 
-/// The body after `way_m` along a square block, anticlockwise.
+/// The body's pose after `way_m` along a square block, anticlockwise.
 inline LevelPose onBlock(double way_m) {
   const double side = std::floor(way_m / kSide_m), along = way_m - side * kSide_m;
   LevelPose corner;
@@ -56,13 +56,13 @@ inline std::vector<Thing> thingsAlongBlock(std::uint32_t seed) {
 struct DriveSettings {
   std::uint32_t seed = 1;
   double from_m = 0.0, to_m = 300.0;
-  double yaw_walk = 0.0015;  ///< rad/√m, told as it is
-  double clock_s = 0.0;      ///< of its first frame
+  double yaw_walk = 0.0015;  ///< rad/√m; the declared value is the true one
+  double clock_s = 0.0;      ///< time of its first frame
   WorldId world{1, 0};
-  std::set<std::size_t> not_there = {};  ///< things that have gone before
+  std::set<std::size_t> not_there = {};  ///< objects that left before the drive
 };
 
-/// A map, and which thing each of its ids is.
+/// A map, and the true object of each of its ids.
 struct Driven {
   MapContents map;
   std::map<ObjectId, std::size_t> thing_of;
@@ -86,7 +86,8 @@ class Vehicle {
     return parameters;
   }
 
-  /// What the store would hold when the body is there; it may go on from it.
+  /// The map that the store has when the body has travelled `way_m`. The drive can continue from
+  /// it.
   Driven to(double way_m) {
     while (way_m_ < way_m) step();
     Driven driven;

@@ -1,4 +1,4 @@
-// Two and three vehicles along one block: one map.
+// Maps of two or three vehicles along one block become one map.
 #include "common/mapping/fusion/map_fusion.h"
 
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ const Driven& third() {
   return drive;
 }
 
-/// As the command does.
+/// Fuses as the command does.
 MapContents fuseAll(std::vector<MapContents> maps, FusionReport* last = nullptr) {
   std::stable_sort(maps.begin(), maps.end(), comesFirst);
   MapContents fused = maps.front();
@@ -45,7 +45,8 @@ MapContents fuseAll(std::vector<MapContents> maps, FusionReport* last = nullptr)
   return fused;
 }
 
-/// How many present objects each thing has, and merges of two things; by where each id came from.
+/// Number of present objects for each true object, and of merges of two true objects, by the origin
+/// of each id.
 struct Tally {
   std::map<std::size_t, std::set<ObjectId>> objects_of;
   std::size_t mixed = 0;
@@ -116,7 +117,7 @@ TEST(MapFusion, TwoVehiclesHaveOneObjectForEachThing) {
   EXPECT_GE(report.loops, 1u);
   EXPECT_GT(report.merges, 10u);
   EXPECT_EQ(partsOf(fused).size(), 1u);
-  // Each object goes on as one track, under its own id.
+  // Each object becomes one track with its own id.
   EXPECT_TRUE(fused.graph.tracks.empty() && fused.graph.facts.empty());
   for (const auto& [id, record] : fused.graph.records) {
     EXPECT_EQ(record.sighting.in_anchor.id, id);
@@ -126,7 +127,7 @@ TEST(MapFusion, TwoVehiclesHaveOneObjectForEachThing) {
   EXPECT_EQ(both.mixed, 0u);
   EXPECT_LE(both.each(), 1.03);
   EXPECT_EQ(fused.present(), a.map.present() + b.map.present() - report.merges);
-  // Each stands where it is, in M, whose origin is the first vehicle's first place.
+  // Each object has its true position in M, whose origin is the first anchor of the first vehicle.
   double sum = 0.0;
   for (const auto& [thing, ids] : both.objects_of) {
     sum += apartInM(fused, *ids.begin(), things()[thing], test::onBlock(0.0).inverse());
@@ -154,14 +155,15 @@ TEST(MapFusion, TheOrderOfThreeMapsDoesNotMatter) {
   EXPECT_EQ(sessionsOf(fused.graph).size(), 3u);
   EXPECT_TRUE(bitsOf(fuseAll({c.map, b.map, a.map})) == bitsOf(fused));
   EXPECT_TRUE(bitsOf(fuseAll({b.map, c.map, a.map})) == bitsOf(fused));
-  // One after the other, as a server gets them.
+  // The maps are fused one by one, as a server receives them.
   EXPECT_TRUE(bitsOf(fuseAll({fuseAll({a.map, b.map}), c.map})) == bitsOf(fused));
   const Tally all = tally(fused, {a, b, c});
   EXPECT_EQ(all.mixed, 0u);
   EXPECT_LE(all.each(), 1.03);
 }
 
-/// The drive has said of its own objects which are one; the other map's are asked all the same.
+/// The drive has merged some of its own objects. They must still be compared with the other map's
+/// objects.
 TEST(MapFusion, WhatADriveSawTwiceIsFoundOnTheOtherMap) {
   const Driven& a = first();
   const Driven b = test::driven(things(), {.seed = 2,
@@ -178,7 +180,7 @@ TEST(MapFusion, WhatADriveSawTwiceIsFoundOnTheOtherMap) {
   EXPECT_LE(both.each(), 1.03);
 }
 
-/// Two servers, each with the maps of two vehicles, one vehicle of which both know.
+/// Two servers, each with the maps of two vehicles; both have the map of one of these vehicles.
 TEST(MapFusion, FusedMapsHaveOneObjectForWhatBothKnow) {
   const Driven a = first(), b = second(), c = third();
   for (const bool c_is_older : {false, true}) {
@@ -232,7 +234,7 @@ TEST(MapFusion, ADriveThatWentOnBringsWhatItHasSeenSince) {
   EXPECT_TRUE(bitsOf(fuseAll({grown, a.map})) == bitsOf(grown)) << "an older copy says nothing new";
 }
 
-/// The second vehicle sees a thing of the first one's go.
+/// The second vehicle observes that an object of the first one disappears.
 TEST(MapFusion, WhatAnotherDriveSawGoBecomesAChangeWithTimes) {
   const Driven a = first();
   Driven b = second();

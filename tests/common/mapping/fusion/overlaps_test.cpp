@@ -10,7 +10,7 @@ namespace {
 
 class Overlap : public ::testing::Test {
  protected:
-  /// Another object of the same class, that far along and across.
+  /// Adds an object of the same class at this distance along and across.
   ObjectId copy(ObjectId of, double along_m, double across_m) {
     const ObjectId id = map_.largestId() + 1;
     map_.objects[id] = map_.objects.at(of);
@@ -27,7 +27,7 @@ class Overlap : public ::testing::Test {
     return overlapping(map_, map_.graph, MapState(GraphParameters(), map_.graph).graph());
   }
 
-  /// The first one that is a car of 4.5 by 1.8 m, known well.
+  /// The first object that is a car of 4.5 by 1.8 m with a small covariance.
   ObjectId car() {
     for (auto& [id, object] : map_.objects) {
       if (object.belief.best().name != "car" || !map_.graph.records.contains(id)) continue;

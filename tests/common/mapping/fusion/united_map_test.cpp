@@ -105,7 +105,7 @@ TEST(UnitedMap, WhereASessionGoesOnItsAnchorsStillFollowEachOther) {
   }
 }
 
-/// Two vehicles went on from copies of one map: they gave the same ids to different objects.
+/// Two vehicles continued from copies of one map and gave the same ids to different objects.
 TEST(UnitedMap, IdsThatWereGivenAfterTwoMapsPartedAreOfDifferentObjects) {
   test::Vehicle vehicle(allThings(), {.seed = 1});
   const Driven base = vehicle.to(100.0);
@@ -115,7 +115,7 @@ TEST(UnitedMap, IdsThatWereGivenAfterTwoMapsPartedAreOfDifferentObjects) {
         allThings(), {.seed = seed, .from_m = from_m, .to_m = from_m + 100.0, .clock_s = 50.0});
     MapContents renumbered = drive.map;
     (void)unite(map, renumbered);
-    map.origins.clear();  // as a filter that was given the map would have numbered them
+    map.origins.clear();  // as a filter with this map would have numbered them
     return map;
   };
   MapContents one = wentOn(2, 200.0);

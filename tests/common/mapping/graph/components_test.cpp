@@ -14,7 +14,7 @@ const LevelGaussian kForward{{{12.0, 0.0, 0.0}, 0.0}, 0.01 * Eigen::Matrix4d::Id
 
 Edge loopOf(AnchorId a, AnchorId b) { return {a, b, kForward, EdgeKind::kLoop}; }
 
-/// By walking along believed edges from each anchor.
+/// Finds components by a walk along accepted edges from each anchor.
 std::map<AnchorId, AnchorId> walked(const PoseGraph& graph) {
   std::map<AnchorId, AnchorId> first;
   for (const auto& [begin, pose] : graph.poses()) {
@@ -49,7 +49,7 @@ TEST(Components, AreThoseThatOneCanWalk) {
     EdgeId edge = 1000;
     for (std::size_t k = random() % 7; k > 0; --k) {
       const AnchorId a = 1 + random() % id, b = 1 + random() % id;
-      // Believed or not; to either side of where belief begins.
+      // Weights on both sides of the limit for acceptance.
       if (a != b) graph.restore(++edge, loopOf(a, b), any(random) < 0.5 ? 0.299 : 0.3);
     }
     const auto found = componentsOf(graph);

@@ -15,8 +15,7 @@ Eigen::Matrix4d deviations(double plane, double height, double yaw) {
 
 const Eigen::Matrix4d kMeasured = deviations(0.03, 0.02, 0.0005);
 
-/// What the odometry says of itself where it has driven for a while: an error of yaw that the way
-/// has turned into one of place.
+/// The odometry's covariance after some distance: the error of yaw has become one of position.
 Eigen::Matrix4d odometryOf(std::mt19937& random) {
   std::uniform_real_distribution<double> any(0.5, 1.5);
   Eigen::Matrix4d P = deviations(0.4 * any(random), 0.2, 0.01);
@@ -56,14 +55,14 @@ TEST(DriftScale, IsAnUpperQuantile) {
     for (std::uint32_t seed = 1; seed <= 200; ++seed) {
       if (after(3, scale, seed).variance() >= scale * scale) ++above;
     }
-    // The grid and the prior add to the quantile of .8.
+    // The grid and the prior raise the result above the quantile of .8.
     EXPECT_GT(above, 140) << scale;
     EXPECT_LT(above, 196) << scale;
   }
 }
 
 TEST(DriftScale, WithoutLoopsIsThePriorsQuantile) {
-  // e^(.84 σ), less what the grid cuts off, to a step of the grid.
+  // e^(.84 σ), minus the part that the grid cuts off, to within a step of the grid.
   EXPECT_NEAR(std::sqrt(DriftScale({}).variance()), 2.3, 0.3);
   DriftScaleParameters middle;
   middle.quantile = 0.5;

@@ -23,7 +23,7 @@ PoseGraph chain(std::size_t anchors, const LevelGaussian& step = kOnward) {
   return graph;
 }
 
-/// An edge as the anchors lie, with errors that are alike in no two axes.
+/// An edge that agrees with the anchors, with a different variance in each axis.
 Edge loopBetween(const PoseGraph& graph, AnchorId a, AnchorId b) {
   Eigen::Matrix4d S = levelCovariance(0.2, 0.01);
   S(0, 1) = S(1, 0) = 0.01;
@@ -32,10 +32,10 @@ Edge loopBetween(const PoseGraph& graph, AnchorId a, AnchorId b) {
   return {a, b, {graph.pose(a).inverse() * graph.pose(b), S}, EdgeKind::kLoop};
 }
 
-/// What the optimiser adds to the covariance of each edge.
+/// The term that the optimiser adds to the covariance of each edge.
 Eigen::Matrix4d floorOfEdges() { return levelCovariance(1e-3, 1e-5); }
 
-/// d(error of T_AB) by the errors of the poses of A and of B.
+/// Derivatives of the error of T_AB with respect to the pose errors of A and of B.
 struct Jacobians {
   Eigen::Matrix4d by_a, by_b;
 };
@@ -43,8 +43,8 @@ Jacobians jacobians(const LevelPose& a, const LevelPose& b) {
   return {composedByFirst(a.inverse(), b) * invertedBy(a), composedBySecond(a.inverse())};
 }
 
-/// Covariance of T_from,to by the inverse of the whole normal equations, whose one fixed anchor is
-/// the first.
+/// Covariance of T_from,to from the inverse of the complete normal equations, in which only the
+/// first anchor is fixed.
 Eigen::Matrix4d dense(const PoseGraph& graph, AnchorId from, AnchorId to) {
   std::map<AnchorId, Eigen::Index> rows;
   for (const auto& [id, pose] : graph.poses()) {
@@ -70,7 +70,7 @@ Eigen::Matrix4d dense(const PoseGraph& graph, AnchorId from, AnchorId to) {
   return whole * S * whole.transpose();
 }
 
-/// Places and yaw each by its own size.
+/// Difference relative to the sizes of position and yaw.
 double relative(const Eigen::Matrix4d& a, const Eigen::Matrix4d& b) {
   const Eigen::Matrix4d off = a - b;
   return std::max(off.norm() / b.norm(), std::abs(off(3, 3)) / b(3, 3));
@@ -133,7 +133,7 @@ TEST(Marginals, ComposeAlongAChainWithoutLoops) {
   ASSERT_TRUE(backward);
   EXPECT_LT(difference(backward->mean, inverse(expected).mean).norm(), 1e-9);
   EXPECT_LT(relative(backward->covariance, inverse(expected).covariance), 1e-9);
-  // Also where neither end is the one that is held fast.
+  // Also between two ends of which neither is the fixed anchor.
   LevelGaussian part;
   for (int i = 0; i < 3; ++i) part = compose(part, step);
   const auto middle = Marginals(graph, 4).to(7);
@@ -172,7 +172,8 @@ TEST(Marginals, KnowWhatALoopMeasures) {
   const double closed = marginals.to(1)->covariance.trace();
   EXPECT_LT(closed, 3.0 * 0.051 * 0.051);
   EXPECT_GT(closed, 3.0 * 0.04 * 0.04);
-  // The other side of the loop is known worst, and much better than along half of it before.
+  // The far side of the loop has the largest variance. The loop closure makes it much smaller than
+  // without.
   const double half = marginals.to(30)->covariance.trace();
   EXPECT_GT(half, 10.0 * closed);
   EXPECT_LT(half, 0.5 * Marginals(chain(60), 60).to(30)->covariance.trace());
@@ -199,7 +200,7 @@ TEST(Marginals, SayNothingOfWhatCannotBeReached) {
   EXPECT_FALSE(marginals.to(101));
   EXPECT_FALSE(marginals.to(555));
   EXPECT_FALSE(Marginals(graph, 555).to(1));
-  // Two that are held fast do not know of each other by that.
+  // Two fixed anchors are not related to each other by being fixed.
   EXPECT_FALSE(Marginals(graph, 1).to(100));
   EXPECT_LT(relative(Marginals(graph, 100).to(101)->covariance,
                      compose({}, {kOnward.mean, kOnward.covariance + floorOfEdges()}).covariance),
@@ -213,8 +214,8 @@ TEST(Marginals, OfOneAnchorAlone) {
   EXPECT_FALSE(marginals.to(2));
 }
 
-/// Two sessions of which the loop was taken out: until the graph is optimised nothing holds the
-/// second one.
+/// The loop closure between two sessions was removed. Until the graph is optimised, nothing
+/// constrains the second session.
 TEST(Marginals, TellNothingWhereTheyCannotBeComputed) {
   PoseGraph graph = chain(3);
   graph.addFirst(10, {{50.0, 0.0, 0.0}, 0.0});

@@ -37,7 +37,7 @@ class Dice {
   std::normal_distribution<double> normal_;
 };
 
-/// Twice round a circle: anchor i + 60 stands where anchor i stands.
+/// Two laps of a circle: anchor i + 60 has the same position as anchor i.
 LevelPose truth(std::size_t i) {
   const double angle = 2.0 * pi * static_cast<double>(i) / 60.0;
   const double radius = 60.0 * kStep_m / (2.0 * pi);
@@ -49,7 +49,7 @@ LevelPose trueStep(std::size_t a, std::size_t b) { return truth(a).inverse() * t
 constexpr double kMetres = 0.1, kYaw = 0.004;
 constexpr double kLoopMetres = 0.15, kLoopYaw = 0.01;
 
-/// Anchors 1 to kAnchors by odometry with errors as stated.
+/// Anchors 1 to kAnchors from odometry with the declared errors.
 PoseGraph drive(Dice& dice, const GraphParameters& parameters = {}) {
   PoseGraph graph(parameters);
   graph.addFirst(1, truth(0));
@@ -201,7 +201,7 @@ TEST(PoseGraph, AWrongLoopAmongGoodOnesMovesLittle) {
   }
 }
 
-/// Each step turns half a deviation too far: 27 m in the end.
+/// Each step has a yaw error of half a deviation: 27 m at the end.
 PoseGraph drifted() {
   PoseGraph graph{{}};
   graph.addFirst(1, truth(0));
@@ -247,7 +247,8 @@ TEST(PoseGraph, AComponentThatIsJoinedMovesAndTheOlderOneStays) {
   EXPECT_TRUE(graph.isHeldFast(1) && graph.isHeldFast(1000));
   graph.add(
       {10, 1000, {{{1.0, 2.0, 0.0}, 0.5}, diagonal(kLoopMetres, kLoopYaw)}, EdgeKind::kTracking});
-  // What stands far from its place is put there first: the kernel would not believe it.
+  // A distant anchor is first moved to its place, because the kernel would reject the edge
+  // otherwise.
   graph.setPose(1000, graph.pose(10) * LevelPose{{1.5, 2.0, 0.0}, 0.5});
   const OptimiseReport report = graph.optimise();
   EXPECT_EQ(report.weights.size(), 1u);

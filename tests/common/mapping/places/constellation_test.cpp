@@ -1,4 +1,4 @@
-// Places found by constellations: towns that are met again, other towns, rows that repeat.
+// Recognition of places by constellations: known towns, other towns, and rows that repeat.
 #include "common/mapping/places/constellation.h"
 
 #include <gtest/gtest.h>
@@ -14,11 +14,12 @@
 namespace perdure::mapping {
 namespace {
 
-/// What is seen, and where it may be.
+/// The detected objects and the prior of the pose.
 struct PlaceQuery {
   std::vector<PlacedObject> seen;       ///< in the body's level frame B
   std::vector<PlacedObject> map;        ///< in M
-  std::vector<Eigen::Vector2d> driven;  ///< places in M from which the map's objects were seen
+  std::vector<Eigen::Vector2d> driven;  ///< positions in M from which the map's objects were
+                                        ///< detected
   LevelGaussian prior;
 };
 
@@ -31,10 +32,10 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr PlaceParameters kPlace;
 constexpr LoopParameters kLoop;
 constexpr std::uint32_t kCar = 0, kPerson = 1, kVan = 2, kOther = 3;
-constexpr ObjectId kSeen = 1000;  ///< what is seen of the object 7 is 1007
+constexpr ObjectId kSeen = 1000;  ///< the detected object 1007 is the map's object 7
 
-/// A grid of streets with objects beside them: parked cars along the kerb at uneven gaps, persons
-/// and vans between.
+/// A grid of streets with objects beside them: parked cars along the kerb at irregular gaps, with
+/// persons and vans between them.
 class Town {
  public:
   explicit Town(std::uint32_t seed, std::size_t objects = 90) : random_(seed) {
@@ -59,7 +60,7 @@ class Town {
     }
   }
 
-  /// As a filter believes them: with errors drawn from their covariance.
+  /// The objects as a filter estimates them, with errors drawn from their covariances.
   std::vector<PlacedObject> believed(std::vector<PlacedObject> objects) {
     for (PlacedObject& o : objects) {
       o.covariance = covariance();
@@ -78,7 +79,7 @@ class Town {
     return result;
   }
 
-  /// A prior that is off by a draw from its own covariance.
+  /// A prior with an error drawn from its own covariance.
   LevelGaussian priorOf(const LevelPose& truth, double metres, double yaw) {
     LevelGaussian prior{truth, Eigen::Matrix4d::Zero()};
     prior.covariance.diagonal() << metres * metres, metres * metres, 0.25, yaw * yaw;
@@ -99,7 +100,7 @@ class Town {
     return x;
   }
 
-  /// Less certain along the line of sight than across it.
+  /// The uncertainty is larger along the line of sight than across it.
   Eigen::Matrix4d covariance() {
     std::uniform_real_distribution<double> any(0.0, 1.0);
     const Eigen::Matrix3d R = rotationAboutZ(2.0 * std::numbers::pi * any(random_));
@@ -167,7 +168,7 @@ TEST(Constellation, AnotherTownOfTheSameKindIsNotTakenForIt) {
       if (match && isBelieved(*match)) ++taken;
     }
   }
-  // Their streets lie alike: once in 120 it happens.
+  // Their streets are similar once in 120 towns.
   EXPECT_LE(taken, 1u);
 }
 
@@ -242,7 +243,7 @@ TEST(Constellation, WhereTheBodyIsKnownWellOneObjectTellsWhichItIs) {
   ASSERT_EQ(match->pairs.size(), 1u);
   EXPECT_EQ(match->pairs.front(), (std::pair<ObjectId, ObjectId>(9, 9 + kSeen)));
   EXPECT_GT(match->score - match->next, 2.5);
-  // Where it may be the neighbour, nothing is told.
+  // No match is returned if the object may also be the neighbour.
   const auto either = bestMatch(queryOf(map, {map[8]}, 15.0), kPlace);
   EXPECT_TRUE(!either || either->score - either->next < 2.5);
 }

@@ -1,4 +1,4 @@
-// The index of a map against looking at all of it.
+// Compares the index of a map with a search of the whole map.
 #include "common/mapping/places/map_index.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ struct Scatter {
   std::vector<Eigen::Vector2d> driven;
 };
 
-/// About a middle that may lie on either side of the origin.
+/// Objects around a centre on either side of the origin.
 Scatter scatter(std::uint32_t seed, std::size_t count, const Eigen::Vector2d& middle) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;

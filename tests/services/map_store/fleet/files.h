@@ -1,4 +1,4 @@
-// Map files in tests of the fleet: vehicles that write them, and what is in them bit by bit.
+// Map files in tests of the fleet: vehicles that write them, and bit-exact access to their rows.
 #pragma once
 
 #include <unistd.h>
@@ -16,12 +16,12 @@
 
 namespace perdure::map_store::test {
 
-/// Tables that a vehicle and its server have in common, and what follows from them.
+/// Tables that a vehicle and its server share, and tables derived from them.
 inline constexpr const char* kCommonTables[] = {"graph_classes", "anchors", "anchor_poses",
                                                 "edges",         "objects", "sightings",
                                                 "views",         "working", "positions"};
 
-/// All rows of a table by their bits, in order.
+/// All rows of a table, bit by bit and in order.
 inline std::vector<std::string> rowsOf(const std::string& path, const std::string& table) {
   const auto connection = Connection::open(path, Connection::Mode::kReadOnly).value();
   const auto columns =
@@ -33,7 +33,7 @@ inline std::vector<std::string> rowsOf(const std::string& path, const std::strin
     for (int i = 0; i < columns; ++i) {
       const auto blob = rows.blob(i);
       row.put(rows.isNull(i));
-      // A number's bits; of others what SQLite gives as bytes.
+      // The bits of a number; for other values the bytes that SQLite returns.
       row.put(rows.isNumber(i) ? rows.real(i) : 0.0);
       row.put(rows.isNumber(i) ? rows.integer(i) : std::int64_t{0});
       row.put(rows.isNumber(i) ? std::string() : std::string(blob.begin(), blob.end()));
@@ -74,7 +74,7 @@ inline Outputs noOutputs() {
           [](const MapReply&) {}, [](const MapNear&) {}};
 }
 
-/// A vehicle's node and its replicator, as main.cpp ties them; each step is one commit.
+/// A vehicle's node and its replicator, connected as in main.cpp. Each step is one commit.
 class Vehicle {
  public:
   Vehicle(const Config& config, const fleet::Pace& pace, InstanceId filter = 11)
@@ -82,11 +82,11 @@ class Vehicle {
         fleet_(config.fleet, config.store_path, pace),
         filter_(filter) {}
 
-  /// Frame `n` of a drive past cars: twenty in the working set, the oldest leaves.
+  /// Frame `n` of a drive past cars: the working set has twenty cars, and the oldest leaves.
   void step(std::uint64_t n) {
     std::vector<ObjectBelief> cars;
     for (ObjectId id = n > 20 ? n - 19 : 1; id <= n; ++id) {
-      if (id % 10 == 5 && n >= id + 5) continue;  // it is gone
+      if (id % 10 == 5 && n >= id + 5) continue;  // this car is gone
       cars.push_back(carAt(id, {3.0 * static_cast<double>(id), 0.1 * static_cast<double>(n), 0}));
     }
     Objects objects = workingSet(n, cars, filter_);
@@ -105,7 +105,7 @@ class Vehicle {
   InstanceId filter_;
 };
 
-/// Impatient, so that tests are short.
+/// Short waits, so that tests are short.
 inline fleet::Pace quick() {
   using std::chrono::milliseconds;
   fleet::Pace pace;
@@ -116,9 +116,9 @@ inline fleet::Pace quick() {
   return pace;
 }
 
-constexpr std::chrono::milliseconds kLong{180'000};  // until a test gives up
+constexpr std::chrono::milliseconds kLong{180'000};  // time limit of a test
 
-/// False where it is not so within that time.
+/// Returns false if the condition does not become true within that time.
 template <class So>
 bool eventually(So so) {
   for (int tries = 0; tries < 6000; ++tries) {
@@ -130,7 +130,7 @@ bool eventually(So so) {
 
 }  // namespace perdure::map_store::test
 
-/// A test's server, or the test is skipped with a word.
+/// Gets the server for a test, or skips the test with a message.
 #define PERDURE_SERVER_OR_SKIP()                                            \
   test::PostgresServer::get();                                              \
   if (test::PostgresServer::get() == nullptr) {                             \

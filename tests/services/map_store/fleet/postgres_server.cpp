@@ -24,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 constexpr char kPassword[] = "hush-3c1f";
 
-/// The folder of initdb and postgres; empty where there is none.
+/// The folder of initdb and postgres; empty if they are not installed.
 std::string findPrograms() {
   std::error_code ignored;
   for (const auto& version : fs::directory_iterator("/usr/lib/postgresql", ignored)) {
@@ -61,7 +61,7 @@ pid_t spawn(std::vector<std::string> words, const std::string& log) {
       (setgroups(0, nullptr) != 0 || setgid(user->pw_gid) != 0 || setuid(user->pw_uid) != 0)) {
     _exit(126);
   }
-  prctl(PR_SET_PDEATHSIG, SIGQUIT);  // a change of user clears it
+  prctl(PR_SET_PDEATHSIG, SIGQUIT);  // a change of user clears this setting
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);

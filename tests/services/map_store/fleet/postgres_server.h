@@ -1,5 +1,5 @@
-// A PostgreSQL server of the tests' own: in a temporary folder, as a user without rights, on
-// 127.0.0.1 and a free port.
+// A PostgreSQL server for tests: in a temporary folder, as an unprivileged user, on 127.0.0.1 and a
+// free port.
 #pragma once
 
 #include <sys/types.h>
@@ -13,30 +13,30 @@ namespace perdure::map_store::test {
 
 class PostgresServer {
  public:
-  /// Nothing where PostgreSQL is not installed; the one of this process else. It ends with it.
+  /// The server of this process, which ends with it; null if PostgreSQL is not installed.
   static PostgresServer* get();
   ~PostgresServer();
 
   /// Whether PostGIS is installed.
   bool hasPostgis() const { return has_postgis_; }
-  /// A new empty database, with PostGIS where it is installed and wanted. Its URL, with the
-  /// administrator's passfile.
+  /// Creates an empty database, with PostGIS if it is installed and requested. Returns its URL with
+  /// the administrator's passfile.
   std::string makeDatabase(bool with_postgis = false);
   void dropDatabase(const std::string& url);
   std::string url(const std::string& database) const;
-  /// Through another port of 127.0.0.1, or with another passfile.
+  /// The same URL with another port of 127.0.0.1, or with another passfile.
   static std::string through(int port, const std::string& url);
   std::string passfile(const std::string& password) const;
   int port() const { return port_; }
 
-  /// SIGQUIT: as if it had crashed. Returns when it is gone.
+  /// Sends SIGQUIT, as in a crash. Returns when the server has ended.
   void crash();
-  /// Returns when it answers.
+  /// Returns when the server accepts connections.
   void start();
 
   /// Runs statements as the administrator.
   void run(const std::string& url, const std::string& sql);
-  /// The first number of an answer.
+  /// Returns the first number of an answer.
   std::int64_t number(const std::string& url, const std::string& sql);
 
  private:

@@ -1,4 +1,4 @@
-// What a vehicle has committed is on the server: all of it, once, whatever dies meanwhile.
+// The server has all commits of a vehicle, each once, whichever process ends meanwhile.
 #include "services/map_store/fleet/replicator.h"
 
 #include <gmock/gmock.h>
@@ -25,7 +25,7 @@ using test::quick;
 using test::TemporaryFolder;
 using test::Vehicle;
 
-/// The vehicle's file and the server's map are the same, bit by bit.
+/// Expects that the vehicle's file and the server's map are the same, bit by bit.
 void expectSame(const std::string& file, const std::string& url, const std::string& vehicle) {
   const TemporaryFolder folder;
   fleet::pullMap(url, vehicle, folder.file("pulled.sqlite"));
@@ -95,10 +95,10 @@ TEST(FleetReplicator, WhatTheServerHasLeavesTheOutbox) {
     vehicle.step(n);
     ASSERT_TRUE(vehicle.fleet().finish(kLong)) << vehicle.fleet().progress().trouble;
   }
-  const std::int64_t in_one_commit = 8 + 1;  // eight cars have moved, and the working set
+  const std::int64_t in_one_commit = 8 + 1;  // eight cars that moved, and the working set
   EXPECT_LE(entriesOf(file), 2 * in_one_commit);
   const std::uint64_t rows = vehicle.fleet().progress().rows;
-  EXPECT_LE(rows, 36u + 8u + 8u);  // each car that changed in each commit, once
+  EXPECT_LE(rows, 36u + 8u + 8u);  // each changed car in each commit, once
   vehicle.fleet().wake();
   ASSERT_TRUE(vehicle.fleet().finish(kLong));
   EXPECT_EQ(vehicle.fleet().progress().rows, rows);
@@ -141,7 +141,7 @@ TEST(FleetReplicator, AServerThatIsAwayForAWhileMissesNothing) {
   }
   EXPECT_GE(refused, 3u);
   while (n < 40) vehicle.step(++n);
-  EXPECT_EQ(vehicle.node().commits(), 40u);  // the node went on
+  EXPECT_EQ(vehicle.node().commits(), 40u);  // the node continued
   EXPECT_EQ(vehicle.node().trouble(), "");
   const std::string trouble = vehicle.fleet().progress().trouble;
   EXPECT_THAT(trouble, ::testing::HasSubstr("server_unreachable"));
@@ -154,7 +154,7 @@ TEST(FleetReplicator, AServerThatIsAwayForAWhileMissesNothing) {
   EXPECT_EQ(server->number(url, "SELECT count(*) FROM perdure.objects"), 40);
 }
 
-/// A vehicle in a process of its own that drives on until it is killed.
+/// A vehicle in its own process that drives until it is killed.
 class DrivingVehicle {
  public:
   DrivingVehicle(const Config& config, std::uint64_t from) : committed_(from) {
@@ -171,13 +171,13 @@ class DrivingVehicle {
   }
   DrivingVehicle(const DrivingVehicle&) = delete;
   DrivingVehicle& operator=(const DrivingVehicle&) = delete;
-  /// Waits until this frame is committed; false where the vehicle has ended.
+  /// Waits until this frame is committed; returns false if the vehicle has ended.
   bool reach(std::uint64_t n) {
     while (committed_ < n && readOne()) {
     }
     return committed_ >= n;
   }
-  /// SIGKILL. The last frame whose commit it told.
+  /// Sends SIGKILL. Returns the last frame whose commit the vehicle reported.
   std::uint64_t kill() {
     ::kill(child_, SIGKILL);
     int status = 0;
@@ -239,7 +239,7 @@ TEST(FleetReplicator, TwoVehiclesLoseNothingWhileTheServerAndOneOfThemDie) {
     ASSERT_TRUE(red.reach(10) && blue.reach(10));
     server->crash();
     ASSERT_TRUE(red.reach(30));
-    red_at = red.kill();  // what it had not sent is in its file only
+    red_at = red.kill();  // only its file has the changes that it had not sent
     DrivingVehicle red_again(config_a, red_at);
     ASSERT_TRUE(red_again.reach(red_at + 5) && blue.reach(40));
     server->start();

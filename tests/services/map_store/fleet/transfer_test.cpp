@@ -25,7 +25,7 @@ using test::TemporaryFolder;
 using test::Vehicle;
 using ::testing::HasSubstr;
 
-/// A map of a graph and some objects, as a service or a fusion would leave it.
+/// Writes a map with a graph and some objects, as a service or a fusion does.
 void writeMap(const std::string& path, std::uint32_t seed, bool outbox = false) {
   MapDatabase database({.path = path, .outbox = outbox});
   mapping::Unsaved graph{test::RandomGraph(seed).map({.shared = 0}), {}, {}};
@@ -52,7 +52,7 @@ TEST(FleetTransfer, AMapThatIsPushedAndPulledIsTheSame) {
   auto* server = PERDURE_SERVER_OR_SKIP();
   const TemporaryFolder folder;
   const std::string url = server->makeDatabase();
-  for (const std::uint32_t seed : {5u, 6u}) {  // the second replaces the first
+  for (const std::uint32_t seed : {5u, 6u}) {  // the second map replaces the first
     const std::string from = folder.file("from-" + std::to_string(seed));
     const std::string to = folder.file("to-" + std::to_string(seed));
     writeMap(from, seed);
@@ -202,7 +202,7 @@ TEST(FleetGeometry, WithoutAPlaceOnEarthThereAreLocalPlacesUntilItIsKnown) {
   EXPECT_EQ(server->number(url, "SELECT count(*) FROM perdure.objects_local"), 3);
   EXPECT_EQ(server->number(url, "SELECT count(*) FROM perdure.objects_wgs84"), 0);
 
-  // The vehicle's receiver finds itself while the server is attached.
+  // The vehicle's receiver gets a position while the server is attached.
   const Objects next = test::workingSet(4, {});
   Calibration rig;
   rig.anchor = GeoAnchor{next.stamp.time, 49.0, 8.4, 110.0, 0.0};
@@ -217,7 +217,7 @@ TEST(FleetGeometry, WithoutAPlaceOnEarthThereAreLocalPlacesUntilItIsKnown) {
   EXPECT_EQ(server->number(url, "SELECT count(*) FROM perdure.objects_wgs84"), 4);
 }
 
-/// For the README's table; says nothing about passing.
+/// For the README's table; not a criterion for passing.
 TEST(FleetFigures, DISABLED_OfThisMachine) {
   auto* server = PERDURE_SERVER_OR_SKIP();
   const TemporaryFolder folder;

@@ -1,5 +1,5 @@
-// What is wrong with a server is said with the mend, waited for no longer than allowed, and over
-// when it is mended. Passwords are in no sentence.
+// Failures of a server: the message has the fix, waits are bounded, and the failure ends when it is
+// fixed. No message has a password.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -74,7 +74,7 @@ TEST(FleetUrl, ANameThatCannotBeAFilesIsRefused) {
   EXPECT_EQ(refusalOf({"", "Wagen Süd-3", {}}), "");
 }
 
-/// The reason for which a vehicle's map is not sent to `url`, and the sentence about it.
+/// The reason why a vehicle's map is not sent to `url`, and the message about it.
 struct Trouble {
   ReasonCounts reasons;
   std::string sentence;
@@ -118,7 +118,7 @@ TEST(FleetTrouble, AWaitForASilentServerEndsWithTheService) {
   Vehicle vehicle(configOf(folder.file("map.sqlite"), "postgresql://boss@127.0.0.1:" +
                                                           std::to_string(silent.port()) + "/fleet"),
                   pace);
-  vehicle.step(1);  // and the end of the scope must not wait for an hour
+  vehicle.step(1);  // the destructor must not wait for an hour
 }
 
 TEST(FleetTrouble, AWrongPasswordIsSaidAndNotRepeated) {
@@ -172,7 +172,7 @@ TEST(FleetTrouble, AnotherVersionsSchemaIsLeftAlone) {
   }
 }
 
-/// The server refuses rows of objects with this SQLSTATE until it is mended.
+/// The server refuses rows of objects with this SQLSTATE until this is reverted.
 void refuseObjects(PostgresServer& server, const std::string& url, const std::string& state) {
   server.run(
       url,
@@ -246,12 +246,12 @@ TEST(FleetTrouble, AWaitForAServerThatHangsEndsWithTheService) {
   relay.hang(true);
   vehicle.step(2);
   EXPECT_FALSE(vehicle.fleet().finish(std::chrono::milliseconds(50)));
-}  // and the end of the scope must not wait for an hour
+}  // the destructor must not wait for an hour
 
 TEST(FleetTrouble, WithoutPostgisTheRowsAreThereAndItIsCounted) {
   auto* server = PERDURE_SERVER_OR_SKIP();
   const std::string url = server->makeDatabase();
-  // Who may not make extensions, as a vehicle may not.
+  // A user without the right to create extensions, like a vehicle's user.
   server->run(url, "CREATE ROLE plain LOGIN PASSWORD 'plain-1'; GRANT CREATE ON DATABASE " +
                        url.substr(url.find('/', 13) + 1, url.find('?') - url.find('/', 13) - 1) +
                        " TO plain");
@@ -282,7 +282,7 @@ TEST(FleetTrouble, ASlowServerGetsEverythingAndHoldsNobodyUp) {
   relay.slowTo(3'000'000);
   vehicle.step(40);
   EXPECT_EQ(vehicle.node().commits(), 40u);
-  EXPECT_FALSE(vehicle.fleet().progress().whole);  // the commit did not wait for it
+  EXPECT_FALSE(vehicle.fleet().progress().whole);  // the commit did not wait for the server
   relay.slowTo(20'000);
   ASSERT_TRUE(vehicle.fleet().finish(kLong)) << vehicle.fleet().progress().trouble;
   EXPECT_EQ(server->number(url, "SELECT count(*) FROM perdure.objects"), 40);

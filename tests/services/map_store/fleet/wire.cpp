@@ -71,7 +71,7 @@ void Relay::run() {
   }
 }
 
-/// One connection after the other: a vehicle has one.
+/// Handles one connection after the other, because a vehicle has only one.
 void Relay::carry(int client) {
   const int server = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in address = local(to_port_);
@@ -105,7 +105,7 @@ void Relay::carry(int client) {
     if (open && files[1].revents != 0) {
       const std::string bytes = take(server, answered);
       open = !bytes.empty() && (deaf || sendAll(client, bytes));
-      // It was done, and is said to nobody.
+      // The commit was done, but its answer is lost.
       if (deaf && answered.find("COMMIT") != std::string::npos) lost_an_answer_ = true;
       open = open && !(deaf && lost_an_answer_);
     }

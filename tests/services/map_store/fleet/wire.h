@@ -1,5 +1,5 @@
-// What lies between a vehicle and its server, in tests: a relay on 127.0.0.1 that can be slow, cut,
-// or deaf (what the server answers is lost); and a port that accepts and says nothing.
+// The network between a vehicle and its server, in tests: a relay on 127.0.0.1 that can be slow,
+// cut, or lose the server's answers; and a port that accepts connections and never answers.
 #pragma once
 
 #include <atomic>
@@ -16,7 +16,7 @@ class SilentPort {
   int port() const { return port_; }
 
  private:
-  int port_ = 0, file_ = -1;  // in this order: who listens says the port
+  int port_ = 0, file_ = -1;  // in this order: the listener determines the port
 };
 
 class Relay {
@@ -24,13 +24,13 @@ class Relay {
   explicit Relay(int to_port);
   ~Relay();
   int port() const { return port_; }
-  /// Each piece of up to 16 kB takes so long from here on.
+  /// From now on, each piece of up to 16 kB takes this long.
   void slowTo(int microseconds) { delay_us_ = microseconds; }
-  /// What the server answers to the next COMMIT is lost, and the connection with it.
+  /// Loses the server's answer to the next COMMIT and closes the connection.
   void loseAnswerToCommit() { lose_answer_ = true; }
   bool lostAnAnswer() const { return lost_an_answer_; }
-  void cut() { cut_ = true; }  ///< ends what is connected now
-  /// While it is set nothing is carried, and connections stay open: a server that hangs.
+  void cut() { cut_ = true; }  ///< closes the present connections
+  /// While set, no data is relayed and connections stay open, as with a server that hangs.
   void hang(bool set) { hanging_ = set; }
 
  private:

@@ -1,4 +1,4 @@
-// Top-down answers: what they may change at a track, and what they may not.
+// Top-down answers: the effects that they may have on a track, and those that they must not have.
 #include "services/semantic_filter/core/association/top_down.h"
 
 #include <gtest/gtest.h>
@@ -114,7 +114,7 @@ TEST_F(TopDown, IsNoHitConfirmsNothingAndMovesNothing) {
 }
 
 TEST_F(TopDown, EveryPredictedBoxIsAValidMessage) {
-  constexpr double kWire = 1e6;  // px; the wire refuses sides further away, with the whole message
+  constexpr double kWire = 1e6;  // px; the wire refuses a message with sides further away
   std::mt19937 random(3);
   std::uniform_real_distribution<double> u(-1.0, 1.0);
   FrameInput now;

@@ -62,7 +62,7 @@ TEST(GroundSurface, MovingOrDoubtfulObjectsOrThoseThatNeedNotStandDoNotContribut
   EXPECT_FALSE(groundOf(cars).below({8, 0, 0}, 0));
 }
 
-/// The ground below a body at `height` (m) that went along it for `metres`, rising by `slope`.
+/// The ground below a body at `height` (m) that travelled `metres` along it, rising by `slope`.
 GroundSurface groundOfBody(double height, double metres, double slope,
                            const std::vector<Track>& cars) {
   BodyPath path;

@@ -1,4 +1,4 @@
-// Single bookings: who is credited with what.
+// Single entries of the ledger: the cause that each change is attributed to.
 
 #include "services/semantic_filter/core/belief/ledger.h"
 

@@ -10,7 +10,7 @@
 namespace perdure::semantic_filter {
 namespace {
 
-/// A moving car after many observations: its yaw is correlated with place and speed.
+/// A moving car after many observations: its yaw is correlated with position and speed.
 Track drivingCar() {
   Hypothesis h;
   h.class_name = "car";
@@ -20,7 +20,8 @@ Track drivingCar() {
   h.x[kVelocity] = 8.0;
   h.P.setIdentity();
   h.P *= 0.04;
-  // Not observed recently: nearer goes with slower, and with a yaw to the left.
+  // Not observed recently: a smaller distance is correlated with a lower speed and a yaw to the
+  // left.
   h.P(0, kVelocity) = h.P(kVelocity, 0) = -0.03;
   h.P(0, kYaw) = h.P(kYaw, 0) = 0.032;
   h.P(kYaw, kVelocity) = h.P(kVelocity, kYaw) = -0.037;
@@ -47,7 +48,8 @@ TEST(ExtrapolatedTrack, HasTheFullPredictedCovariance) {
   EXPECT_NEAR(later.best().C(0, 4), 0.005, 1e-12);
   EXPECT_EQ(later.as_of, before.as_of);
 
-  // The block of the place alone is not enough: its correlation with the yaw has changed too.
+  // Replacing only the block of the position is not enough: its correlation with the yaw has
+  // changed too.
   Matrix7d place_alone = P.topLeftCorner<7, 7>();
   place_alone.topLeftCorner<3, 3>() = later.best().P.topLeftCorner<3, 3>();
   EXPECT_EQ(Eigen::LLT<Matrix7d>(place_alone).info(), Eigen::NumericalIssue);
@@ -77,7 +79,7 @@ TEST(StopSlowHypotheses, ASlowHypothesisStaysInPlaceAndAFastOneMovesOn) {
   const double fast = fasterThan(slow.hypotheses[1], 0.7);
   EXPECT_NEAR(slow.best().weight, 1.0 - fast, 1e-12);
   EXPECT_NEAR(slow.hypotheses[1].weight, fast, 1e-12);
-  // Its place is that of an object at rest: nearer goes with slower.
+  // Its position is that of an object at rest: a smaller distance is correlated with a lower speed.
   EXPECT_NEAR(slow.best().x[0], 20.0 + 0.03 / 0.16 * 0.5, 1e-9);
   const Track later = extrapolated(slow, slow.as_of + std::chrono::seconds(30), {});
   EXPECT_EQ(later.best().x, slow.best().x);

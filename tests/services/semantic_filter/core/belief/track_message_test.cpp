@@ -13,7 +13,7 @@ namespace {
 using testing::makeObject;
 using testing::makeState;
 
-/// *Other* starts from one yaw, and its boxes narrow that down too early.
+/// *Other* starts from one yaw, and its boxes reduce the variance of the yaw too early.
 TEST(TrackMessage, TheYawOfOtherIsUnknownBeforeAModeSearch) {
   const auto sigmaYaw = [](const char* name, bool sought) {
     Track object = makeObject(1, name, makeState(10, 0, 0.7, 0.3, 1, 1, 1), 0.004);
@@ -30,7 +30,7 @@ TEST(TrackMessage, ACovarianceThatRoundingMadeIndefiniteIsRepairedAndOthersAreNo
   Track object = makeObject(1, "car", makeState(1, 2, 3, 0.1, 4, 1.8, 1.5), 0.04);
   Matrix7d P = object.hypotheses[0].P.topLeftCorner<7, 7>();
   EXPECT_EQ(toBelief(object, makePriors(), 0.7).best().covariance, P) << "to the bit";
-  // Length and width differ by rounding only, far less than the place.
+  // Length and width differ only by rounding, far less than the position does.
   P.block<2, 2>(kSize, kSize).setConstant(1e-8);
   P(kSize + 1, kSize + 1) -= 1e-18;
   P(0, 0) = 1e4;

@@ -141,8 +141,8 @@ TEST(BoxLikelihood, ABoxOfTheWholeObjectIsLikelierThanOneThatEndsAnywhere) {
   EXPECT_TRUE(!beyond || beyond->log_density < at(340, 150) - 8.0) << "no end lies outside";
 }
 
-// A track that was lost behind a van has a wide prediction, half of which the van hides. Boxes of
-// parked cars that appear beside the van are not its boxes.
+// A track that was occluded by a van has a wide prediction, half of which is behind the van. Boxes
+// of parked cars that appear beside the van must not be assigned to it.
 TEST(BoxLikelihood, ANarrowPredictionBeatsAWideOne) {
   const auto z = measure({899, 187, 1012, 245}, kWidth, kHeight, {});
   const auto likelihood = [&](const ProjectedBox& p, double sigma,
@@ -185,8 +185,8 @@ TEST(BoxLikelihood, OutsideTheGateThereIsNoScore) {
 TEST(BoxLikelihood, ClutterOfMeasuredSidesIntegratesToItsExpectedNumber) {
   ClutterParameters clutter;
   clutter.per_frame = 3.0;
-  // Boxes are uniform in centre and log-uniform in size: the sum is over a grid of sizes, with any
-  // centre.
+  // Boxes are uniform in centre and log-uniform in size. The sum runs over a grid of sizes, with
+  // any centre.
   double total = 0.0;
   constexpr int kSteps = 400;
   const double lw = std::log(kWidth / clutter.min_size_px) / kSteps;
@@ -203,7 +203,8 @@ TEST(BoxLikelihood, ClutterOfMeasuredSidesIntegratesToItsExpectedNumber) {
   EXPECT_NEAR(total * kWidth * kHeight, clutter.per_frame, 1e-3 * clutter.per_frame);
 }
 
-/// Mean likelihood ratio, over the false boxes of an image, of being a box of this object.
+/// Mean ratio, over the false boxes of an image, of the likelihoods that a box is of this object or
+/// clutter.
 double ratioOfChanceBoxes(const ProjectedBox& predicted, double sigma,
                           const std::array<bool, 4>& hidden) {
   const Eigen::Matrix4d covariance = sigma * sigma * Eigen::Matrix4d::Identity();
@@ -233,7 +234,7 @@ double ratioOfChanceBoxes(const ProjectedBox& predicted, double sigma,
   return clutter.per_frame * sum / kBoxes;
 }
 
-// If it were larger, false boxes would make objects certain that do not exist.
+// Otherwise false boxes would make non-existing objects certain.
 TEST(BoxLikelihood, OverAllChanceBoxesTheRatioAveragesToOneAtMost) {
   EXPECT_NEAR(ratioOfChanceBoxes(predictedBox(500, 100, 800, 260), 25.0, {}), 1.0, 0.2);
   EXPECT_LT(ratioOfChanceBoxes(predictedBox(500, 100, 800, 260), 25.0, {false, false, true, false}),

@@ -72,8 +72,8 @@ TEST_F(CuboidProjection, DetectorBiasMovesEachSideByItsShareOfTheBox) {
             1e-4 * (1.0 + H_pose.cwiseAbs().maxCoeff()));
 }
 
-/// A car: its wheels are within its length, its corners are round, its roof is narrower than the
-/// rest.
+/// A car: its wheels are within its length, its corners are round, and its roof is narrower than
+/// its body.
 Shape roundShape() {
   return shapeOf({{-1.0, 0.65, 0.9, 1.0}, {0.0, 1.0, 1.0, 0.8}, {1.0, 0.2, 0.65, 0.7, -0.3}});
 }
@@ -187,8 +187,8 @@ TEST_F(CuboidProjection, AnObjectBehindTheCameraHasNoImage) {
 }
 
 TEST_F(CuboidProjection, AzimuthAndYawAgreeWhateverTheRollOfTheCamera) {
-  // A car across the view, straight ahead: with rotation_y = 0 its length is along the camera's x
-  // axis. That is the right of the body, yaw -90° in a level world.
+  // A car across the view, straight ahead. With rotation_y = 0 its length is along the camera's x
+  // axis. This is the body's right, yaw -90° in a level world.
   View level;
   level.camera = &camera;
   const Eigen::Vector3d ahead(10.3, 0.0, 0.5);

@@ -53,7 +53,8 @@ using Sides = std::array<bool, 4>;
 
 constexpr Sides kNone{};
 
-/// Boxes with sides at these pixels, in an image of a camera that leans to the left by `lean`, rad.
+/// Boxes with sides at these pixels, in an image of a camera that is rolled to the left by `lean`,
+/// rad.
 std::vector<BoxDetection> boxesAt(std::initializer_list<Eigen::Vector4d> sides, double lean = 0.0) {
   const CameraModel camera{makeCamera()};
   const Eigen::Quaterniond leaning(Eigen::AngleAxisd(-lean, Eigen::Vector3d::UnitX()));

@@ -1,4 +1,4 @@
-// What the border leaves of a box, against points sampled all over the cuboid.
+// Compares the box that the border leaves with points sampled over the whole cuboid.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,7 +27,8 @@ class ImageBorder : public ::testing::Test {
     at.T_WB = T_WB;
     return projectObserved(state, at, BoxStyle())->sides;
   }
-  /// Range of one coordinate of the cuboid's surface points whose other one is within the image.
+  /// Range of one coordinate over the cuboid's surface points whose other coordinate is within the
+  /// image.
   Eigen::Vector2d sampled(const State& state, int axis) const {
     constexpr int kSteps = 300;
     const double extent = axis == 0 ? camera.height() : camera.width();
@@ -100,7 +101,7 @@ TEST_F(ImageBorder, AnObjectBesideTheCameraHasExactSidesInsideTheImage) {
   use(makeCamera());
   const State x = makeState(2.5, 2.2, 0.75, 0.1, 5.0, 1.75, 1.5);
   const auto whole = projectCuboid(x, view), seen = projectObserved(x, view, BoxStyle());
-  ASSERT_FALSE(whole->exact[3]);  // a cut by the near plane
+  ASSERT_FALSE(whole->exact[3]);  // cut by the near plane
   const Eigen::Vector2d rows = sampled(x, 1);
   EXPECT_NEAR(seen->sides[1], rows[0], 2.0);
   EXPECT_NEAR(seen->sides[3], rows[1], 0.01 * rows[1]);  // far below the image

@@ -1,4 +1,4 @@
-// Which tracks leave the working set for the map store.
+// The tracks that leave the working set for the map store.
 #include "services/semantic_filter/core/memory/archive.h"
 
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ Track thingAt(ObjectId id, double x, double seen_s) {
 
 struct Leavers {
   Archive memory{kMemory, kStands};
-  /// A filter at the origin, and a map that has everything on disk at once.
+  /// A filter at the origin, and a map that stores everything at once.
   Archive::Leaving after(const std::vector<Track>& objects, double now_s = 20.0) {
     (void)memory.leaving(objects, Eigen::Vector3d::Zero(), at(now_s), at(now_s - 3.0));
     memory.onKept(at(now_s));

@@ -1,4 +1,4 @@
-// What the map gives to the working set, and tracks that it holds to be one object.
+// Tracks that the map gives to the working set, and tracks that it holds to be one object.
 #include "services/semantic_filter/core/memory/arrivals.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ using testing::makeState;
 
 const State kPlace = makeState(12, 3, 0.75, 0.2, 4.2, 1.75, 1.5);
 
-/// Some covariance of this size.
+/// An arbitrary covariance of this size.
 Matrix6d someCovariance(double variance) {
   std::mt19937 random(4);
   std::normal_distribution<double> normal;
@@ -79,7 +79,7 @@ TEST_F(ArrivalsTest, APlacedTrackIsAsUncertainAsTheBodyAndSharesItsError) {
   const Track& track = belief_.tracks.front();
   EXPECT_TRUE(track.life.recalled);
   EXPECT_EQ(track.pose.product, input_.pose_error.product);
-  // By numeric differences: the object moves with the body.
+  // Numeric derivative: the object moves with the body.
   constexpr double kStep = 1e-6;
   const RigidTransform& T_WB = input_.view.T_WB;
   const Matrix6d& P = input_.pose_error.covariance;
@@ -226,7 +226,7 @@ TEST_F(ArrivalsTest, ATrackHasItsOwnIdUnlessItIsAMember) {
   EXPECT_EQ(arrivals_.objectOf(31), 31u);
 }
 
-/// Frames from one place, of which the map gives something before the fifth.
+/// Frames from one place; the map gives an object before the fifth frame.
 class SteppedAgain {
  public:
   explicit SteppedAgain(std::set<std::size_t> late) : late_(std::move(late)) {

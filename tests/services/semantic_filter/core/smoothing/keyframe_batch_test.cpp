@@ -11,8 +11,8 @@
 namespace perdure::semantic_filter {
 namespace {
 
-/// A pose error that walks as the body turns and drives on: products of transitions and covariances
-/// at each keyframe, propagated from one to the next.
+/// A pose error that walks while the body turns and moves. Has products of transitions, and
+/// covariances at each keyframe, propagated from one keyframe to the next.
 class Walk {
  public:
   Walk(unsigned seed, double shrinks) : random_(seed) {
@@ -29,7 +29,7 @@ class Walk {
       Matrix6d A = Matrix6d::Identity();
       A.topLeftCorner<3, 3>() = rotationAboutZ(0.3 * normal_(random_));
       A.bottomLeftCorner<3, 3>() = 0.2 * skew(Eigen::Vector3d(normal_(random_), 0.5, 0.1));
-      A *= shrinks;  // as corrections of the odometry cause
+      A *= shrinks;  // an effect of odometry corrections
       error.product = (A * error.product).eval();
       error.covariance = (A * error.covariance * A.transpose()).eval();
       error.covariance.diagonal().array() += 1e-5;
@@ -37,7 +37,7 @@ class Walk {
     now = error;
   }
 
-  /// Covariance of keyframe i with an earlier j, from each transition.
+  /// Covariance of keyframe i with an earlier j, from the individual transitions.
   Matrix6d covariance(std::size_t i, std::size_t j) const {
     return errors[i].product * inverse(errors[j].product) * errors[j].covariance;
   }

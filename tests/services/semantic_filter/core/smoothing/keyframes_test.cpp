@@ -27,7 +27,7 @@ TEST(Keyframes, NewViewpointsAreKeptAndTheMostSimilarOneIsDropped) {
   EXPECT_TRUE(
       std::is_sorted(object.batch.keyframes.begin(), object.batch.keyframes.end(),
                      [](const auto& a, const auto& b) { return a->from->time < b->from->time; }));
-  // They span the whole drive, not only its end.
+  // Keyframes span the whole drive, not only its end.
   EXPECT_LT(toSeconds(object.batch.keyframes.front()->from->time), 1.5);
   Track other = object;
   other.batch.keyframes = {scene.keyframes()[1], scene.keyframes()[2]};

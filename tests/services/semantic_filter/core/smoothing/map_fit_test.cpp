@@ -13,7 +13,7 @@ namespace {
 
 using testing::Passing;
 
-/// The same keyframes with `factor` times the noise, taken when the noise scale of their network
+/// The same keyframes with `factor` times the noise, recorded when the noise scale of their network
 /// was `then`.
 Keyframes lookedAs(const Keyframes& looks, double factor, const NoiseScale& then) {
   Keyframes result;
@@ -107,8 +107,8 @@ TEST(MapFit, TheCovarianceIsHonest) {
     const Eigen::Vector3d e = placeError(*s, scene);
     nees += e.dot(s->hypothesis().P.topLeftCorner<3, 3>().ldlt().solve(e)) / kRuns;
   }
-  // Three degrees of freedom. The band is wide, because the true size is not drawn from the prior
-  // and b not from its process.
+  // Three degrees of freedom. The band is wide, because the true size is not drawn from the prior,
+  // nor b from its process.
   EXPECT_GT(nees, 1.0);
   EXPECT_LT(nees, 5.0);
 }
@@ -119,7 +119,8 @@ TEST(MapFit, ThePlaceIsCorrelatedWithThePresentPoseError) {
   const KeyframeBatch looks(scene.keyframes(), frame.pose_error);
   const auto s = MapFit::make(scene.start(false), looks, frame);
   ASSERT_TRUE(s);
-  // All poses share one error: the place is known far better relative to the body than in W.
+  // All poses share one error, so the position relative to the body is far more certain than the
+  // position in W.
   EXPECT_LT(placeSigma(s->hypothesis(), frame.pose_error.covariance),
             0.75 * std::sqrt(s->hypothesis().P.topLeftCorner<3, 3>().trace()));
 }
@@ -170,8 +171,8 @@ TEST(MapFit, RefusesAPlaceThatTheKeyframesDoNotDetermine) {
   EXPECT_FALSE(MapFit::make(scene.start(false), looks, frame));
 }
 
-/// The same keyframes with exact boxes of an object whose roof lies behind its middle, and azimuths
-/// if `with_azimuths`.
+/// The same keyframes with exact boxes of an object whose roof is behind its centre, and with
+/// azimuths if `with_azimuths`.
 Keyframes ofLeaning(const Keyframes& looks, const State& truth, bool with_azimuths) {
   auto styles = std::make_shared<BoxStyles>();
   styles->rest.shape = shapeOf({{-1, 1, 1, 1}, {0, 1, 1, 1}, {1, 0.3, 0.7, 1, -0.5}});

@@ -20,7 +20,7 @@ using testing::makeState;
 using testing::parkedCar;
 using testing::Passing;
 
-/// A track in the wrong mode of yaw, for which the boxes are less likely.
+/// A track in the wrong mode of yaw, under which the boxes are less likely.
 Track turnedBy(double angle, const Passing& scene) {
   Hypothesis h = scene.start(false);
   h.x[kYaw] = wrapAngle(h.x[kYaw] + angle);
@@ -40,7 +40,7 @@ TEST(ModeSearch, FindsTheYawThatTheFilterPruned) {
     refit(object, scene.frame());
     const double error = std::remainder(object.best().x[kYaw] - scene.truth()[kYaw], M_PI);
     found += std::abs(error) < 0.2 ? 1 : 0;
-    // The next mode search comes after as many new keyframes.
+    // The next mode search is due after the same number of new keyframes.
     EXPECT_EQ(object.batch.mode_search_due, 2 * scene.keyframes().size());
   }
   EXPECT_GE(found, 17) << "of " << kRuns;
@@ -98,7 +98,7 @@ TEST(ModeSearch, OtherBecomesTheClassItResemblesIfAllKeyframesFit) {
   EXPECT_GE(cars, 17) << "of " << kRuns;
 }
 
-/// The cabin of that car: what is seen of it above a hedge that is not on the map.
+/// The cabin of that car: the part that is visible above an unmapped hedge.
 State cabin() {
   const double top = parkedCar()[2] + 0.5 * std::exp(parkedCar()[kSize + 2]), height = 0.5;
   return makeState(32.0, 5.0, top - 0.5 * height, 0.15, 2.2, 1.8, height);

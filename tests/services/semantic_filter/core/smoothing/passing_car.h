@@ -16,7 +16,7 @@ namespace perdure::semantic_filter::testing {
 inline State parkedCar() { return makeState(32.0, 5.0, 0.8, 0.15, 4.3, 1.8, 1.45); }
 
 /// A car (or an object that moves like one) that the body passes. Its boxes are drawn from the
-/// model of the estimate. `seen`: the cuboid of what is seen of it.
+/// model of the estimate. `seen`: the cuboid of its visible part.
 class Passing {
  public:
   explicit Passing(unsigned seed, double speed = 0.0, double pose_sigma = 0.0,
@@ -40,7 +40,7 @@ class Passing {
   const State& truth() const { return truth_; }  ///< at the last keyframe
   Parameters& parameters() { return parameters_; }
 
-  /// A hypothesis as a filter may have it after a bad first box.
+  /// A hypothesis as after a bad first box.
   Hypothesis start(bool moving) const {
     Hypothesis h;
     h.class_name = "car";

@@ -26,9 +26,9 @@ TEST_F(FitCuboid, RecoversSizeAndPlaceFromAnExactBoxAtTheTrueYaw) {
   ASSERT_TRUE(fit);
   EXPECT_LT((fit->hypothesis.x - truth).head<3>().norm(), 0.05);
   EXPECT_LT((fit->hypothesis.x - truth).segment<3>(kSize).norm(), 0.01);
-  EXPECT_LT(fit->cost, 0.1);  // the rest is the weak prior at the start
+  EXPECT_LT(fit->cost, 0.1);  // the remainder is due to the weak prior at the start
   const double depth_sigma = std::sqrt(fit->hypothesis.P(0, 0));
-  EXPECT_GT(depth_sigma, 0.05 * 14.0);  // the size prior allows no better
+  EXPECT_GT(depth_sigma, 0.05 * 14.0);  // the size prior does not allow a smaller value
   EXPECT_LT(depth_sigma, 0.2 * 14.0);
 }
 

@@ -14,7 +14,8 @@ namespace {
 using testing::detect;
 using testing::makeState;
 
-/// Two cars in a row along the street. The network shows of the far one what the near one leaves.
+/// Two cars in a row along the street. The network's box of the far car is the part that the near
+/// car does not hide.
 class InitiationInARow : public ::testing::Test, protected testing::UsualFrame {
  protected:
   InitiationInARow() {
@@ -28,7 +29,7 @@ class InitiationInARow : public ::testing::Test, protected testing::UsualFrame {
     }
   }
 
-  /// Range of the car that the second box begins, m, and its deviation.
+  /// Range and deviation, m, of the car that the second box initiates.
   std::pair<double, double> born() const {
     const auto track = initiate(boxes_[1], std::nullopt, {}, frame);
     double mean = 0.0, square = 0.0, weight = 0.0;

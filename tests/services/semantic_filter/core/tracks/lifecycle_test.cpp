@@ -13,7 +13,7 @@ using testing::makeState;
 class Lifecycle : public ::testing::Test, protected testing::UsualFrame {};
 
 TEST_F(Lifecycle, ATrackWithTwoPossiblePlacesIsNotConfirmed) {
-  // A large object far away or a small one near by; each is well placed.
+  // A large distant object or a small near one; each has a certain position.
   const auto claimed = [&](double far_off, double weight) {
     Track o = makeObject(1, "car", makeState(30, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
     o.existence = {0.97, ExistenceEvidence::kPrior, o.as_of};

@@ -27,7 +27,7 @@ TEST_F(Merge, ACopyThatItsOriginalHidesIsMerged) {
       makeObject(5, "car", makeState(10.3, 0, 0.7, 0, 4, 1.8, 1.5), 0.004)};
   objects[1].visibility.fraction = 0.0;
   objects[1].visibility.state = Visibility::kOccluded;
-  objects[1].visibility.blocked_by = 7;  // another object: not yet
+  objects[1].visibility.blocked_by = 7;  // occluded by another object: not yet
   EXPECT_TRUE(mergeObjects(objects, frame).empty());
   objects[1].visibility.blocked_by = 2;
   const auto merges = mergeObjects(objects, frame);
@@ -52,7 +52,7 @@ TEST_F(Merge, OfTwoTracksOfOneClassInOnePlaceTheOlderSurvives) {
 }
 
 /// One frame for each letter of `pattern`, with two visible tracks: "a" or "b" was detected, "+"
-/// both, "-" none.
+/// both, "-" neither.
 void computeVisibility(std::vector<Track>& two, const std::string& pattern) {
   for (const char c : pattern) {
     two[0].history.add(true, c == 'a' || c == '+');
@@ -90,7 +90,7 @@ TEST_F(Merge, FramesInWhichOneIsNotVisibleDoNotCount) {
 }
 
 TEST_F(Merge, ContradictingTracksKeepTheHypothesesOfBoth) {
-  // The mean of two cuboids turned against each other is the cuboid of no object.
+  // The mean of two cuboids with different yaws is not the cuboid of an object.
   std::vector<Track> objects = {
       makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.1),
       makeObject(2, "car", makeState(10, 0.1, 0.7, 0.5, 4, 1.8, 1.5), 0.1)};

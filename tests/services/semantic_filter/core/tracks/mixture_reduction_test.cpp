@@ -16,7 +16,7 @@ using testing::makeState;
 class MixtureReduction : public ::testing::Test, protected testing::UsualFrame {};
 
 TEST_F(MixtureReduction, ASlowHypothesisStopsAndItsPlaceIsCorrected) {
-  // From far away, position and velocity along the ray have one common error.
+  // At a great distance, position and velocity along the ray have one common error.
   Track o = makeObject(1, "car", makeState(20, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
   Hypothesis& h = o.hypotheses[0];
   h.moving = true;

@@ -107,7 +107,7 @@ TEST_F(Reidentify, ACarThatDrivesFromThePlaceOfAMissingOneIsThatCar) {
   std::vector<Track> objects = {missing(3, "car", parked, 8.0), newcomer};
   EXPECT_EQ(reidentify(objects, none, frame).size(), 1u);
   objects = {missing(3, "car", parked, 8.0), newcomer};
-  objects[1].hypotheses[0].x[kVelocity] = -4.0;  // it comes from another place
+  objects[1].hypotheses[0].x[kVelocity] = -4.0;  // it comes from another position
   EXPECT_TRUE(reidentify(objects, none, frame).empty());
   objects = {missing(3, "car", parked, 4.0), newcomer};  // missing for too long
   EXPECT_TRUE(reidentify(objects, none, frame).empty());
@@ -117,7 +117,7 @@ TEST_F(Reidentify, ACarThatDrivesFromThePlaceOfAMissingOneIsThatCar) {
   EXPECT_TRUE(reidentify(objects, none, frame).empty());
 }
 
-/// A track whose place is wrong, and a new moving track at the true place.
+/// A track with a wrong position, and a new moving track at the true position.
 struct TakenOver {
   Track past, now;
 };

@@ -83,7 +83,7 @@ TEST_F(Attribution, AHitDividesIntoActivationAndGeometry) {
   EXPECT_NEAR(of(ClassEvidence::kPrior), std::log(0.7 / 0.3), 1e-9);
   // the first observation counts in full
   EXPECT_NEAR(of(ClassEvidence::kActivation), 1.5 - 0.5, 1e-3);
-  EXPECT_GT(of(ClassEvidence::kGeometry), 0.5);  // the box is the car's; the van is higher
+  EXPECT_GT(of(ClassEvidence::kGeometry), 0.5);  // the box fits the car; the van is higher
   EXPECT_EQ(of(ClassEvidence::kMiss), 0.0);
   EXPECT_EQ(object.existence.of(ExistenceEvidence::kHit).count, 1U);
   EXPECT_NEAR(object.existence.of(ExistenceEvidence::kHit).log_odds,

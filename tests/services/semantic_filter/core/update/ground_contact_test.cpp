@@ -19,14 +19,14 @@ using testing::street;
 
 class UpdateWithGround : public ::testing::Test {
  protected:
-  /// The frame knows a level street at height `level` (m).
+  /// The frame has estimated a level street at height `level` (m).
   void know(double level, int things = 8) {
     usual_.priors = standing();
     const auto cars = street([level](double, double) { return level; }, things);
     usual_.frame.ground = std::make_shared<const GroundSurface>(
         cars, BodyPath{}, GroundRoughness{}, kUp, usual_.priors, usual_.parameters.ground);
   }
-  /// A car ahead whose range only its size gives: its error is along the ray.
+  /// A car ahead whose range follows only from its size, so its error is along the ray.
   static Hypothesis farCar(double range_error) {
     const double truth = 30.0, camera = 1.6;
     Hypothesis h;
@@ -85,12 +85,12 @@ TEST_F(UpdateWithGround, NothingChangesWithoutGroundOrForAClassThatNeedNotStand)
   EXPECT_TRUE(h.x == before.x && h.P == before.P);
 }
 
-/// The pose error moves the ground and the object alike. So ground contact says nothing about where
-/// both are in W, and what they share stays as uncertain as before.
+/// The pose error moves the ground and the object together. Ground contact therefore gives no
+/// information about their positions in W, and their common error stays as uncertain as before.
 TEST_F(UpdateWithGround, ACommonPoseErrorDoesNotContradict) {
   know(0.0);
   const double sigma = 0.5;
-  usual_.frame.pose_error.covariance(5, 5) = sigma * sigma;  // up
+  usual_.frame.pose_error.covariance(5, 5) = sigma * sigma;  // the vertical axis
   usual_.frame.pose_error.covariance.diagonal().head<5>().setConstant(1e-8);
   Hypothesis h = farCar(0.1), exact = h;
   h.P(2, 2) += sigma * sigma;
@@ -107,7 +107,7 @@ TEST_F(UpdateWithGround, KeepsWhatTheBoxesAloneSay) {
   know(0.0);
   Hypothesis h = farCar(0.0);
   h.x[2] += 0.06;
-  h.P *= 0.04;  // known to 2 % of its distance
+  h.P *= 0.04;  // deviation of 2 % of its distance
   const double alone = h.x[2] - 0.5 * std::exp(h.x[kSize + 2]);
   updateWithGround(h, 99, usual_.frame);
   const double now = h.x[2] - 0.5 * std::exp(h.x[kSize + 2]);
@@ -116,7 +116,7 @@ TEST_F(UpdateWithGround, KeepsWhatTheBoxesAloneSay) {
   EXPECT_GT(h.ground_contact.variance, 0.0);
 }
 
-/// Its underside is not the one that the boxes show.
+/// Its underside differs from the one in the boxes.
 TEST_F(UpdateWithGround, AnotherHypothesisOfTheTrackDoesNotInheritIt) {
   Track o = testing::makeObject(1, "car", testing::makeState(20, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
   o.life.hits = 3;

@@ -10,7 +10,7 @@
 namespace perdure::semantic_filter {
 namespace {
 
-/// A camera `metres` along z, looking along z.
+/// A camera `metres` along z that faces along z.
 RigidTransform viewFrom(double metres) {
   RigidTransform T_WC;
   T_WC.p = Eigen::Vector3d(0, 0, metres);
@@ -38,7 +38,7 @@ ViewWalk walkWith(SideError lasting) {
   walk.T_WC = viewFrom(0.0);
   walk.focal = 500.0;
   walk.lasting = lasting;
-  walk.bias = {1e9, 1e9, 1e9};  // b does not decay; only the change of size acts
+  walk.bias = {1e9, 1e9, 1e9};  // b does not decay; only the change in size has an effect
   return walk;
 }
 
@@ -64,7 +64,8 @@ TEST(PredictBias, AViewChangeTurnsTheBiasIntoVariance) {
   ViewWalk walk = walkWith({.pixels = 2.0, .relative = 0.03});
   Track object = biasedCar(walk);
   walk.bias = {0.3, 0.01, 0.3};
-  walk.T_WC = viewFrom(20.0);  // log 2 of distance at 0.01 a length: b decays completely
+  walk.T_WC = viewFrom(20.0);  // log 2 of the distance, with a correlation length of 0.01: b decays
+                               // completely
   predict(object, {}, {}, {}, walk);
   const Hypothesis& h = object.best();
   const Eigen::Vector4d sigma =
@@ -81,7 +82,8 @@ TEST(PredictBias, ADetectorWithoutLastingErrorHasNoBias) {
   EXPECT_EQ((h.P.block<4, 4>(kBias, kBias).norm()), 0.0);
 }
 
-/// Nothing unmapped that is at rest can hide it from where an earlier visit detected it.
+/// An unmapped object at rest cannot hide it from a viewpoint from which an earlier visit detected
+/// it.
 TEST(Predict, KeyframesOfAnEarlierVisitExcludeAnUnmappedOccluder) {
   ViewWalk walk = walkWith({});
   walk.unmapped_occluder = 0.2;
@@ -108,7 +110,7 @@ TEST(Predict, KeyframesOfAnEarlierVisitExcludeAnUnmappedOccluder) {
   EXPECT_GT(occludedAt(40.0), 0.19);
 }
 
-/// How often it was detected from here says little about other viewpoints.
+/// Its detection rate from here gives little information about other viewpoints.
 TEST(Predict, DetectabilityFromAnotherViewpointReturnsToItsPrior) {
   ViewWalk walk = walkWith({});
   walk.unmapped_occluder = 0.2;

@@ -142,7 +142,7 @@ TEST_F(TrackUpdate, MissesFromOneViewpointShowAtMostAnUnmappedOccluder) {
   EXPECT_GT(object.detectability.unmapped_occluder, 0.99);
   const double odds = object.existence / (1.0 - object.existence);
   EXPECT_NEAR(odds, 0.25 * 99.0,
-              0.3);  // only the initial unmapped_occluder is left
+              0.3);  // only the initial unmapped_occluder remains
 }
 
 TEST_F(TrackUpdate, ADetectionExcludesAnUnmappedOccluder) {
@@ -152,7 +152,7 @@ TEST_F(TrackUpdate, ADetectionExcludesAnUnmappedOccluder) {
   EXPECT_LT(object.detectability.unmapped_occluder, 0.01);
 }
 
-/// Detected in one observation of five: the tenth shows that it is seldom detected.
+/// Detected in one observation of five: the tenth shows that its detection probability is low.
 TEST_F(TrackUpdate, ATrackSeldomDetectedFromHereKeepsItsExistence) {
   const std::vector<BoxDetection> box = {evidenceOf(object.hypotheses[0].x)}, nothing;
   parameters.visibility.hard_detection_share = 0.3;
@@ -178,7 +178,7 @@ TEST_F(TrackUpdate, ATrackSeldomDetectedFromHereKeepsItsExistence) {
   EXPECT_LT(least_plain, 0.2);
 }
 
-/// A mode weighed by all keyframes is not pruned by one box that it explains almost as well.
+/// One box does not prune a mode that explains it almost as well and is weighted by all keyframes.
 TEST_F(TrackUpdate, AModeWeighedByAllKeyframesStaysUntilTheNextModeSearch) {
   Hypothesis turned = object.hypotheses[0];  // each observation is ten times less likely under it
   turned.x[kYaw] += 1.0;
@@ -224,7 +224,7 @@ TEST_F(TrackUpdate, UsesTheDetectionRateOfThisViewpoint) {
   EXPECT_NEAR(object.detectability.hard_to_detect, 0.1 * (1.0 - 0.3 * P_D) / A, 1e-12);
 }
 
-/// One miss in five observations, from a camera that stands still.
+/// One miss in five observations, from a camera at rest.
 TEST_F(TrackUpdate, AnObservationWhoseBoxIsRefusedIsAMiss) {
   const std::vector<BoxDetection> boxes{evidenceOf(object.best().x)};
   const TrackScore seen = scoreHypothesis(boxes, 0.9);
@@ -266,13 +266,13 @@ TEST_F(TrackUpdate, MissesFromAViewpointThatDetectedItLowerExistenceAtOnce) {
 }
 
 TEST_F(TrackUpdate, OneObservationCountsInFullBetweenMotionsAndTemperedBetweenClasses) {
-  Hypothesis astray = object.hypotheses[0];  // of the same class, where the box is not
+  Hypothesis astray = object.hypotheses[0];  // of the same class, away from the box
   astray.moving = true;
   astray.x[1] += 0.8;
   object.hypotheses = {object.hypotheses[0], astray, object.hypotheses[1]};
   object.hypotheses[0].weight = object.hypotheses[1].weight = 0.35;
   const std::vector<BoxDetection> boxes = {evidenceOf(object.hypotheses[0].x)};
-  object.views.observed_from = {frame.view.T_WC(), 50.0};  // this observation counts almost nothing
+  object.views.observed_from = {frame.view.T_WC(), 50.0};  // this observation has almost no weight
   const TrackScore l = scoreHypothesis(boxes, 1.0);
   double A[3];
   for (int i = 0; i < 3; ++i) {
@@ -350,7 +350,7 @@ TEST_F(TrackUpdate, ManyObservationsUnderOnePoseErrorDoNotBeatIt) {
   Hypothesis h = object.hypotheses[0];
   const double before = h.P(1, 1);
   for (int k = 0; k < 100; ++k) h = updateWithBox(h, box.z, {}, 1.0, frame);
-  EXPECT_LT(h.P(1, 1), 0.5 * before);  // the observations did count
+  EXPECT_LT(h.P(1, 1), 0.5 * before);  // the observations had an effect
   EXPECT_GT(h.P(1, 1), 0.039);
 }
 

@@ -48,7 +48,7 @@ TEST_F(Occlusion, AHalfHiddenCarIsPartialAndItsHiddenSideIsKnown) {
   EXPECT_EQ(s[0].state, Visibility::kPartial);
   EXPECT_GT(s[0].fraction, 0.2);
   EXPECT_LT(s[0].fraction, 0.8);
-  EXPECT_TRUE(s[0].hidden_sides[0]);  // left in the body is left in the image
+  EXPECT_TRUE(s[0].hidden_sides[0]);  // the left of the body is the left of the image
   EXPECT_FALSE(s[0].hidden_sides[2]);
 }
 

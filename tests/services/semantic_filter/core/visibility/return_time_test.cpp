@@ -46,8 +46,8 @@ class ReturnTime : public ::testing::Test {
   std::optional<ReappearanceInterval> foresee() const {
     return reappearanceInterval(objects, objects[1], now, way, VisibilityParameters{});
   }
-  /// When the car may be detected, if the body moves as predicted and the objects are where they
-  /// are.
+  /// The time at which the car may be detected if the body moves as predicted and the objects do
+  /// not move.
   double seenAt(const std::vector<Track>& truth) const {
     View view = now.view;
     VisibilityParameters parameters;
@@ -82,7 +82,7 @@ TEST_F(ReturnTime, AnUndetectedSliverIsExpectedWhenMoreOfItIsVisible) {
   const auto first = foresee();
   ASSERT_TRUE(first);
   const double frames = first->expected / kFrame_s;
-  now.view.T_WB.p += frames * way.step.p;  // it might have been detected by now
+  now.view.T_WB.p += frames * way.step.p;  // it could have been detected by now
   const auto later = foresee();
   ASSERT_TRUE(later);
   EXPECT_GT(later->expected, 1.5 * kFrame_s);
@@ -178,7 +178,7 @@ TEST_F(ReturnTime, AnObjectThatShouldBeVisibleIsExpectedUntilItIsDetected) {
   oneFrame(0.1);
   ASSERT_EQ(said.size(), 1u);
   objects[1].visibility.state =
-      Visibility::kPartial;  // its visible fraction says so, but no box does
+      Visibility::kPartial;  // by its visible fraction, although there is no box
   objects[1].visibility.fraction = 0.3;
   now.view.T_WB.p.y() = 3.0;
   said.clear();

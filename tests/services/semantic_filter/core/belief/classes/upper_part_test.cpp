@@ -14,7 +14,7 @@ namespace {
 using testing::makePrior;
 using testing::makeState;
 
-/// A class whose width says much of its length and height.
+/// A class whose width is strongly correlated with its length and height.
 ClassPrior correlated() {
   ClassPrior prior = makePrior("car", 4.2, 1.75, 1.5, 0.1);
   prior.log_size_covariance.array() += 0.02;
@@ -45,7 +45,7 @@ TEST(UpperPart, TheWholeObjectHasTheMomentsOfWhatTheClassAllows) {
   for (int i = 0; i < 2'000'000; ++i) {
     const Eigen::Vector3d size =
         prior.log_size + L * Eigen::Vector3d(normal(random), normal(random), normal(random));
-    // Of this width, and at least as high as what is seen.
+    // Has this width, and at least the visible height.
     if (std::abs(size[1] - part.x[kSize + 1]) > 0.02 || size[2] < part.x[kSize + 2]) continue;
     Eigen::Matrix<double, 7, 1> e;
     for (int k = 0; k < 7; ++k) e[k] = normal(random);
