@@ -74,6 +74,11 @@ void EventTracker::compare(const ObjectBelief& o, Known& known, std::vector<Even
   known.class_name = o.best().name;
 }
 
+bool EventTracker::wasConfirmed(TrackId id) const {
+  const auto at = known_.find(id);
+  return at != known_.end() && at->second.ever_confirmed;
+}
+
 void EventTracker::merge(const MergeRecord& m, const Objects& objects, const Event& blank,
                          Changes& changes) {
   const auto it = known_.find(m.absorbed);
@@ -87,12 +92,12 @@ void EventTracker::merge(const MergeRecord& m, const Objects& objects, const Eve
   e.other_id = it->second.id;
   e.class_name = it->second.class_name;
   e.probability = 1.0;
-  if (m.by_map) {  // the older id may have been the survivor's own
-    if (e.object_id != e.other_id) changes.events.push_back(e);
+  // The survivor may have the older id of the absorbed one: its change of id is the event.
+  if (e.object_id != e.other_id) changes.events.push_back(e);
+  if (m.by_map) {
     known_.erase(it);
     return;
   }
-  changes.events.push_back(e);
   if (it->second.ever_confirmed) {
     changes.ended.push_back({m.absorbed, m.survivor, objects.stamp.time});
   }

@@ -25,6 +25,8 @@ class EventTracker {
   /// The track is archived from now on. The next update creates its event.
   void archived(TrackId id) { archived_.insert(id); }
   void clear();
+  /// Whether the track was published as confirmed.
+  bool wasConfirmed(TrackId id) const;
 
  private:
   struct Known {

@@ -213,6 +213,11 @@ void Node::flush() {
 
 void Node::publish(const Frame& frame) {
   const ScratchScope scope;
+  auto merges = history_.takeLateMerges();
+  merges.insert(merges.end(), frame.merges.begin(), frame.merges.end());
+  for (const MergeRecord& m : merges) {
+    if (!m.by_map && events_.wasConfirmed(m.absorbed)) noteMerge(m.survivor, m.absorbed);
+  }
   nameObjects();
   Objects& objects = published_;
   objects.stamp = frame.input.stamp;
@@ -246,8 +251,6 @@ void Node::publish(const Frame& frame) {
     std::sort(objects.objects.begin(), objects.objects.end(),
               [](const ObjectBelief& a, const ObjectBelief& b) { return a.id < b.id; });
   }
-  auto merges = history_.takeLateMerges();
-  merges.insert(merges.end(), frame.merges.begin(), frame.merges.end());
   auto [events, ended] = events_.update(objects, merges);
   keepEnded(ended);
   objects.ended.assign(ended_.begin(), ended_.end());

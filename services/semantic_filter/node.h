@@ -71,6 +71,7 @@ class Node {
   void letGo(const Frame& frame);
   void take(const MapNear& near, ExistenceEvidence evidence);
   Arrivals arrivalsOf(const MapNear& near, ExistenceEvidence evidence);
+  void noteMerge(TrackId survivor, TrackId absorbed);
   void nameObjects();
   ObjectId objectOf(TrackId track) const;
   TrackId trackOf(ObjectId object) const;

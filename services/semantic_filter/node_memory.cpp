@@ -81,7 +81,21 @@ void Node::take(const MapNear& near, ExistenceEvidence evidence) {
   while (!ended_.empty() && ended_.front().time <= near.kept) ended_.pop_front();
   const auto arrivals = std::make_shared<const Arrivals>(arrivalsOf(near, evidence));
   members_ = arrivals->members;
+  for (const EndedTrack& each : ended_) {  // the map may not have received these
+    if (each.into != 0) noteMerge(each.into, each.track);
+  }
   history_.arrive(arrivals);
+}
+
+/// The survivor of a merge of two confirmed tracks belongs to the older object, as the map will
+/// find.
+void Node::noteMerge(TrackId survivor, TrackId absorbed) {
+  const auto memberOf = [&](TrackId track) {
+    const auto at = members_.find(track);
+    return at == members_.end() ? track : at->second;
+  };
+  const ObjectId object = std::min(memberOf(survivor), memberOf(absorbed));
+  if (object != survivor) members_[survivor] = object;
 }
 
 /// Assigns object ids to tracks that have another id. If the working set has two tracks of one
