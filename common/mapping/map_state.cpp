@@ -1,14 +1,16 @@
 #include "common/mapping/map_state.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <utility>
 #include <vector>
 
 namespace perdure::mapping {
 
-MapState::MapState(const GraphParameters& parameters, SavedMap saved)
-    : graph_(parameters),
+MapState::MapState(const Parameters& parameters, SavedMap saved)
+    : visit_m_(parameters.loop.visit_m),
+      graph_(parameters.graph),
       records_(std::move(saved.records)),
       tracks_(std::move(saved.tracks)),
       identity_(saved.facts),
@@ -167,26 +169,31 @@ bool MapState::isNewer(const ObjectRecord& a, const ObjectRecord& b) const {
   return a.last_seen >= b.last_seen;
 }
 
-/// The newest track decides whether the object exists, and its position. `earlier` is of the same
-/// track, or of the newest other one.
+/// The newest track decides whether the object exists, and its position. `earlier` is the newest
+/// sighting of another visit.
 std::optional<ObjectRecord> MapState::combined(ObjectId object) const {
-  const ObjectRecord *newest = nullptr, *before = nullptr;
+  std::vector<const ObjectRecord*> records;
   bool confirmed = false;
   for (const TrackId track : identity_.tracksOf(object)) {
     const auto at = tracks_.find(track);
     if (at == tracks_.end()) continue;
-    const ObjectRecord& record = at->second;
-    confirmed = confirmed || record.confirmed;
-    if (newest == nullptr || isNewer(record, *newest)) {
-      before = std::exchange(newest, &record);
-    } else if (before == nullptr || isNewer(record, *before)) {
-      before = &record;
-    }
+    confirmed = confirmed || at->second.confirmed;
+    const auto older =
+        std::find_if(records.begin(), records.end(),
+                     [&](const ObjectRecord* r) { return isNewer(at->second, *r); });
+    records.insert(older, &at->second);
   }
-  if (newest == nullptr || newest->gone) return std::nullopt;
-  ObjectRecord result = *newest;
+  if (records.empty() || records.front()->gone) return std::nullopt;
+  const ObjectRecord& newest = *records.front();
+  ObjectRecord result = newest;
   result.confirmed = confirmed;
-  if (!result.earlier && before != nullptr && !before->gone) result.earlier = before->sighting;
+  for (const ObjectRecord* record : records) {
+    if (result.earlier) break;
+    if (record->gone) continue;
+    const bool another_visit =
+        record->session != newest.session || std::abs(record->way_m - newest.way_m) > visit_m_;
+    result.earlier = another_visit ? record->sighting : record->earlier;
+  }
   return result;
 }
 

@@ -16,7 +16,7 @@ namespace perdure::mapping {
 
 class MapState {
  public:
-  MapState(const GraphParameters& parameters, SavedMap saved);
+  MapState(const Parameters& parameters, SavedMap saved);
 
   std::uint32_t numberOf(const std::string& class_name);
 
@@ -87,6 +87,7 @@ class MapState {
   SavedAnchor savedAnchor(AnchorId id) const;
   bool isSaved(AnchorId id) const;
 
+  double visit_m_;  ///< distance travelled after which a new visit begins
   PoseGraph graph_;
   std::map<AnchorId, Anchor> anchors_;
   std::map<ObjectId, ObjectRecord> records_;

@@ -19,7 +19,7 @@ constexpr double kOverlap_m = 3.0;  // overlap of the views of two anchors, alon
 
 Mapper::Mapper(const Parameters& parameters, SavedMap saved)
     : parameters_(parameters),
-      state_(parameters.graph, std::move(saved)),
+      state_(parameters, std::move(saved)),
       builder_(parameters.anchor),
       loop_search_(parameters),
       view_search_(parameters),

@@ -122,7 +122,7 @@ FusionReport fuseInto(MapContents& map, const MapContents& other, const Paramete
 }
 
 std::vector<std::vector<WorldId>> partsOf(const MapContents& map) {
-  const MapState state(GraphParameters(), map.graph);
+  const MapState state(Parameters(), map.graph);
   std::map<AnchorId, std::size_t> anchors;
   std::map<AnchorId, std::vector<WorldId>> sessions;
   const auto components = componentsOf(state.graph());

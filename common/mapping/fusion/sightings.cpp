@@ -47,7 +47,7 @@ std::vector<Eigen::Vector2d> inPlane(const std::vector<Standing>& all) {
 }  // namespace
 
 PlacesInM::PlacesInM(const SavedMap& map)
-    : state_(GraphParameters(), map), components_(componentsOf(state_.graph())) {
+    : state_(Parameters(), map), components_(componentsOf(state_.graph())) {
   for (const auto& [id, saved] : map.anchors) {
     ways_[saved.anchor.session][saved.anchor.stamp.time] = id;
   }

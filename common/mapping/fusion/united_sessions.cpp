@@ -11,7 +11,7 @@ namespace perdure::mapping {
 namespace {
 
 std::map<AnchorId, AnchorId> componentsIn(const SavedMap& map) {
-  return componentsOf(MapState(GraphParameters(), map).graph());
+  return componentsOf(MapState(Parameters(), map).graph());
 }
 
 bool isSameAnchor(const Anchor& a, const Anchor& b) {

@@ -24,7 +24,7 @@ class Overlap : public ::testing::Test {
   }
 
   std::vector<MergeOrder> orders() const {
-    return overlapping(map_, map_.graph, MapState(GraphParameters(), map_.graph).graph());
+    return overlapping(map_, map_.graph, MapState(Parameters(), map_.graph).graph());
   }
 
   /// The first object that is a car of 4.5 by 1.8 m with a small covariance.
