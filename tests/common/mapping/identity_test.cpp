@@ -171,7 +171,7 @@ ObjectRecord detected(std::mt19937& random, double seconds, bool confirmed = tru
   ObjectRecord record;
   record.sighting = anySighting(random);
   record.session = kSessions[record.sighting.anchor > 3];
-  record.way_m = 10.0 * seconds;
+  record.way_m = 20.0 * seconds;
   record.last_seen = TimePoint(durationFromSeconds(seconds));
   record.pose_error = 0.01 * seconds * Matrix6d::Identity();
   record.confirmed = confirmed;
@@ -224,6 +224,23 @@ TEST_F(JoinedTracks, TheRecordOfAnObjectIsThatOfItsNewestTrack) {
   EXPECT_EQ(state_.records().at(1).sighting.in_anchor.id, 1u)
       << "detected again as the first track";
   EXPECT_EQ(state_.records().at(1).earlier->in_anchor.id, 2u);
+}
+
+/// The first track came back on this visit before the second one was joined with it.
+TEST_F(JoinedTracks, TheEarlierSightingIsOfAnotherVisit) {
+  MapState state = emptyMap();
+  ObjectRecord first = now(10.0);
+  state.put(1, first);
+  const Sighting before = state.recordOfTrack(1)->sighting;
+  first = now(20.0);
+  first.earlier = before;
+  state.put(1, first);
+  state.put(2, now(20.5));
+  state.unite({kOneLoop, 1, 2});
+  const ObjectRecord& object = state.records().at(1);
+  EXPECT_EQ(object.sighting.in_anchor.id, 2u);
+  ASSERT_TRUE(object.earlier);
+  expectSame(*object.earlier, before, "of the visit before");
 }
 
 TEST_F(JoinedTracks, AreAsBeforeAfterTheRetraction) {

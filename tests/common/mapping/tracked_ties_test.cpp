@@ -21,7 +21,7 @@ using namespace test;
 /// determines its position.
 class Back {
  public:
-  Back() : state_(parameters_.graph, {}), way_(parameters_.anchor) {
+  Back() : state_(parameters_, {}), way_(parameters_.anchor) {
     for (int i = 0; i <= 300; ++i) drive(i <= 150 ? i : 300 - i, i <= 150 ? 0.0 : kPi);
     relative_ = std::make_unique<Marginals>(state_.graph(), way_.last()->id);
   }

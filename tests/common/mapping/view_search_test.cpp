@@ -193,7 +193,7 @@ TEST(ViewSearch, AViewContradictsALoopThatLeadsElsewhereAndNotATrueOne) {
   SavedMap saved;
   apply(mapper.unsaved(), saved);
   const Parameters parameters = drifting();
-  const MapState state(parameters.graph, saved);
+  const MapState state(parameters, saved);
   const auto& [here, seen] = *saved.views.rbegin();
   AnchorBuilder way(parameters.anchor);
   way.resume(saved.anchors.at(here).anchor);
