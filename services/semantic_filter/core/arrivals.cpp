@@ -1,4 +1,4 @@
-#include "services/semantic_filter/core/memory/arrivals.h"
+#include "services/semantic_filter/core/arrivals.h"
 
 #include <algorithm>
 #include <set>

@@ -1,5 +1,5 @@
 // Tracks that the map gives to the working set, and tracks that it holds to be one object.
-#include "services/semantic_filter/core/memory/arrivals.h"
+#include "services/semantic_filter/core/arrivals.h"
 
 #include <gtest/gtest.h>
 
