@@ -72,6 +72,7 @@ class Arrival {
       belief_.fused[other] = goes_on;
       fused.push_back({.survivor = goes_on, .absorbed = other, .by_map = true});
     } else if (const auto unseen = find(other); unseen->life.recalled) {
+      find(goes_on)->life.merge(unseen->life);  // detections of one object, whatever its class
       belief_.tracks.erase(unseen);
       fused.push_back({.survivor = goes_on, .absorbed = other, .by_map = true});
     }

@@ -176,7 +176,9 @@ bool SemanticFilter::join(Belief& belief, TrackId id, TrackId absorbed,
   check(kept != belief.tracks.end() && other != belief.tracks.end() && kept != other,
         "two tracks of the working set are joined");
   if (!sameKind(*kept, *other)) return false;
+  if (other->id < kept->id) std::swap(*kept, *other);
   mergeTwo(*kept, *other, contextOf(belief, input));
+  kept->id = id;
   belief.tracks.erase(other);
   return true;
 }
