@@ -233,7 +233,9 @@ void Mapper::forgetUnconfirmed() {
 }
 
 void Mapper::onMerged(TrackId survivor, TrackId absorbed) {
+  bool named = true;  // an absorbed track that was never confirmed names no object
   if (const ObjectRecord* from = state_.recordOfTrack(absorbed)) {
+    named = from->confirmed;
     ObjectRecord merged = *from;
     if (const ObjectRecord* into = state_.recordOfTrack(survivor)) {
       const bool confirmed = merged.confirmed || into->confirmed;
@@ -249,7 +251,7 @@ void Mapper::onMerged(TrackId survivor, TrackId absorbed) {
     state_.erase(absorbed);
     state_.put(survivor, std::move(merged));
   }
-  state_.unite({0, survivor, absorbed});
+  if (named) state_.unite({0, survivor, absorbed});
   loop_search_.forget();
 }
 

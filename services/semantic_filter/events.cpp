@@ -98,9 +98,7 @@ void EventTracker::merge(const MergeRecord& m, const Objects& objects, const Eve
     known_.erase(it);
     return;
   }
-  if (it->second.ever_confirmed) {
-    changes.ended.push_back({m.absorbed, m.survivor, objects.stamp.time});
-  }
+  changes.ended.push_back({m.absorbed, m.survivor, objects.stamp.time});
   e.other_id = 0;
   if (m.moved) {
     e.kind = EventKind::kMoved;

@@ -216,7 +216,9 @@ void Node::publish(const Frame& frame) {
   auto merges = history_.takeLateMerges();
   merges.insert(merges.end(), frame.merges.begin(), frame.merges.end());
   for (const MergeRecord& m : merges) {
-    if (!m.by_map && events_.wasConfirmed(m.absorbed)) noteMerge(m.survivor, m.absorbed);
+    if (m.by_map || !events_.wasConfirmed(m.absorbed)) continue;
+    ended_confirmed_.insert(m.absorbed);
+    noteMerge(m.survivor, m.absorbed);
   }
   nameObjects();
   Objects& objects = published_;

@@ -9,6 +9,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 
 #include "common/base/result.h"
 #include "common/base/sink.h"
@@ -95,6 +96,7 @@ class Node {
   std::map<TrackId, ObjectId> object_of_;  ///< as published; tracks with their own id are left out
   std::map<ObjectId, TrackId> track_of_;
   std::deque<EndedTrack> ended_;
+  std::set<TrackId> ended_confirmed_;  ///< merged tracks of `ended_` that name their object
   Objects published_;  ///< the newest message; the next one reuses its memory
   EventTracker events_;
   ReappearanceMonitor returns_;

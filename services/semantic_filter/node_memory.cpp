@@ -82,7 +82,7 @@ void Node::take(const MapNear& near, ExistenceEvidence evidence) {
   const auto arrivals = std::make_shared<const Arrivals>(arrivalsOf(near, evidence));
   members_ = arrivals->members;
   for (const EndedTrack& each : ended_) {  // the map may not have received these
-    if (each.into != 0) noteMerge(each.into, each.track);
+    if (ended_confirmed_.contains(each.track)) noteMerge(each.into, each.track);
   }
   history_.arrive(arrivals);
 }
