@@ -60,7 +60,7 @@ struct ObjectBelief {
   TrackId trackId() const { return track != 0 ? track : id; }
 };
 
-/// A confirmed track that ended.
+/// A published track that was merged, or a confirmed one that is gone.
 struct EndedTrack {
   TrackId track = 0;
   TrackId into = 0;  ///< the track that it was merged into; 0: the object is gone

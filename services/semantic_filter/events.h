@@ -16,7 +16,7 @@ class EventTracker {
  public:
   struct Changes {
     std::vector<Event> events;      ///< ordered by track
-    std::vector<EndedTrack> ended;  ///< confirmed tracks
+    std::vector<EndedTrack> ended;  ///< merged, or confirmed and gone
   };
   /// Returns the changes since the last call. `merges`: the merges since then.
   Changes update(const Objects& objects, const std::vector<MergeRecord>& merges);

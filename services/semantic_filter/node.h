@@ -77,6 +77,7 @@ class Node {
   ObjectId objectOf(TrackId track) const;
   TrackId trackOf(ObjectId object) const;
   void keepEnded(const std::vector<EndedTrack>& ended);
+  void dropOldestEnded();
 
   Config config_;
   InstanceId instance_;

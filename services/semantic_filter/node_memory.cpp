@@ -78,7 +78,7 @@ void Node::take(const MapNear& near, ExistenceEvidence evidence) {
   near_source_ = near.instance;
   near_revision_ = near.revision;
   archive_.onKept(near.kept);
-  while (!ended_.empty() && ended_.front().time <= near.kept) ended_.pop_front();
+  while (!ended_.empty() && ended_.front().time <= near.kept) dropOldestEnded();
   const auto arrivals = std::make_shared<const Arrivals>(arrivalsOf(near, evidence));
   members_ = arrivals->members;
   for (const EndedTrack& each : ended_) {  // the map may not have received these
@@ -126,10 +126,15 @@ TrackId Node::trackOf(ObjectId object) const {
   return at == track_of_.end() ? object : at->second;
 }
 
-/// Stores confirmed tracks that ended until the map has them on disk.
+/// Stores tracks that ended until the map has them on disk.
 void Node::keepEnded(const std::vector<EndedTrack>& ended) {
   ended_.insert(ended_.end(), ended.begin(), ended.end());
-  while (ended_.size() > kMostEnded) ended_.pop_front();
+  while (ended_.size() > kMostEnded) dropOldestEnded();
+}
+
+void Node::dropOldestEnded() {
+  ended_confirmed_.erase(ended_.front().track);
+  ended_.pop_front();
 }
 
 }  // namespace perdure::semantic_filter
