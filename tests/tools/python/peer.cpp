@@ -31,18 +31,19 @@ void print(const std::string& topic, const nlohmann::ordered_json& value) {
 int writeAll(const Participant& participant, unsigned seed) {
   std::list<std::shared_ptr<RawWriter>> writers;
   std::list<std::function<void()>> writes;
+  std::list<std::pair<std::string, nlohmann::ordered_json>> messages;
   forEachTopic([&]<class T>(const Topic<T>& topic) {
     auto writer = std::make_shared<Writer<T>>(participant, topic, WriterOptions{.strength = 3});
     writers.push_back(writer);
     for (int i = 0; i < 500 && writer->matched() == 0; ++i) std::this_thread::sleep_for(20ms);
-    writes.push_back([writer, seed, name = topic.name] {
+    writes.push_back([writer, seed, &messages, name = topic.name] {
       T message;
       wire::Examples(seed).fill(message);
       if (const auto written = writer->write(message); !written) {
         std::cerr << name << ": " << written.error().code << ' ' << written.error().detail << '\n';
         std::exit(1);
       }
-      print(name, wire::toJson(message));
+      messages.emplace_back(name, wire::toJson(message));
     });
   });
   std::this_thread::sleep_for(300ms);  // predictions are best effort: both ends must be matched
@@ -51,6 +52,8 @@ int writeAll(const Participant& participant, unsigned seed) {
     if (!writer->waitForAcknowledgement(5)) return 1;
   }
   std::this_thread::sleep_for(200ms);
+  // Printed last: the test does not read the pipe while it waits for the messages.
+  for (const auto& [topic, value] : messages) print(topic, value);
   return 0;
 }
 
