@@ -232,13 +232,12 @@ void Mapper::forgetUnconfirmed() {
   }
 }
 
-void Mapper::onMerged(TrackId survivor, TrackId absorbed) {
-  bool named = true;  // an absorbed track that was never confirmed names no object
+void Mapper::onMerged(TrackId survivor, TrackId absorbed, bool confirmed) {
   if (const ObjectRecord* from = state_.recordOfTrack(absorbed)) {
-    named = from->confirmed;
+    confirmed = confirmed || from->confirmed;
     ObjectRecord merged = *from;
     if (const ObjectRecord* into = state_.recordOfTrack(survivor)) {
-      const bool confirmed = merged.confirmed || into->confirmed;
+      const bool either = merged.confirmed || into->confirmed;
       if (!state_.isNewer(merged, *into)) {
         merged = *into;
       } else if (isOld(*into)) {
@@ -246,12 +245,12 @@ void Mapper::onMerged(TrackId survivor, TrackId absorbed) {
       } else if (!merged.earlier) {
         merged.earlier = into->earlier;
       }
-      merged.confirmed = confirmed;
+      merged.confirmed = either;
     }
     state_.erase(absorbed);
     state_.put(survivor, std::move(merged));
   }
-  if (named) state_.unite({0, survivor, absorbed});
+  if (confirmed) state_.unite({0, survivor, absorbed});
   loop_search_.forget();
 }
 

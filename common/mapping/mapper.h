@@ -74,8 +74,9 @@ class Mapper {
   void onObjects(const Objects& objects);
   /// Landmarks show the appearance of places. Without them, only objects locate the body.
   void onLandmarks(const Landmarks& landmarks);
-  /// The filter has merged two confirmed tracks, or deleted one.
-  void onMerged(TrackId survivor, TrackId absorbed);
+  /// The filter has merged two tracks. An absorbed track that was never confirmed names no object.
+  void onMerged(TrackId survivor, TrackId absorbed, bool confirmed = true);
+  /// The filter has deleted a confirmed track.
   void onGone(TrackId id);
   /// Repeats a saved session and searches for its places on the maps of other sessions, also with
   /// later observations. Used when maps are combined. Afterwards the mapper is at the end of the

@@ -126,6 +126,14 @@ void Node::onObjects(const Objects& objects) {
   if (moved || !same_filter) sendNear();
 }
 
+/// Tracks that this store never received count as confirmed.
+bool Node::wasConfirmed(TrackId track) const {
+  if (!newest_) return true;
+  const auto at = std::find_if(newest_->objects.begin(), newest_->objects.end(),
+                               [&](const ObjectBelief& b) { return b.id == track; });
+  return at == newest_->objects.end() || at->confirmed;
+}
+
 /// Takes the ended tracks that were not in the previous message.
 void Node::takeEnded(const std::vector<EndedTrack>& ended) {
   for (const EndedTrack& each : ended) {
@@ -134,7 +142,8 @@ void Node::takeEnded(const std::vector<EndedTrack>& ended) {
       continue;
     }
     const bool merged = each.into != 0;
-    merged ? mapper_.onMerged(each.into, each.track) : mapper_.onGone(each.track);
+    merged ? mapper_.onMerged(each.into, each.track, wasConfirmed(each.track))
+           : mapper_.onGone(each.track);
     removed_[each.track] = {merged ? EventKind::kMerged : EventKind::kGone, each.time, each.into};
   }
 }

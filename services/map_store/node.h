@@ -83,6 +83,7 @@ class Node {
   };
   NewEarth newEarthAnchor();
 
+  bool wasConfirmed(TrackId track) const;
   void takeEnded(const std::vector<EndedTrack>& ended);
   void leaveBehind(const Objects& next);
   bool acceptable(const ObjectBelief& belief);
