@@ -1,0 +1,17 @@
+# Sourced: Debian's mirrors as apt's sources of this machine have them.
+# PERDURE_MIRROR and PERDURE_SECURITY_MIRROR replace them.
+
+# mirror_of RELEASE: the first source of it.
+mirror_of() {
+  apt-get indextargets --format '$(REPO_URI) $(RELEASE) $(COMPONENT)' 'Created-By: Packages' 2> /dev/null |
+    awk -v release="$1" '$2 == release && $3 == "main" { sub("/$", "", $1); print $1; exit }'
+}
+codename=$(. /etc/os-release && echo "${VERSION_CODENAME:-stable}")
+mirror=${PERDURE_MIRROR:-$(mirror_of "$codename")}
+security=${PERDURE_SECURITY_MIRROR:-$(mirror_of "$codename-security")}
+
+# debian_sources RELEASE: lines for a root's /etc/apt/sources.list.
+debian_sources() {
+  printf 'deb %s %s main\n' "$mirror" "$1" "$mirror" "$1-updates"
+  [ -z "$security" ] || printf 'deb %s %s main\n' "$security" "$1-security"
+}
