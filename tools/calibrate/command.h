@@ -7,7 +7,6 @@ class App;
 
 namespace perdure::tools {
 
-void addCalibrateCommand(CLI::App& app);
 /// Its part `import`.
 void addCalibrateImport(CLI::App& calibrate);
 

@@ -7,7 +7,6 @@ class App;
 
 namespace perdure::tools {
 
-void addModelCommand(CLI::App& app);
 /// Its parts `list` and `fetch`.
 void addFetch(CLI::App& model);
 /// Its part `calibrate`.
