@@ -19,6 +19,11 @@ namespace {
 using perdure::ExitCode;
 using Words = std::vector<std::string>;
 
+int refuse(ExitCode code, const std::string& why) {
+  std::fprintf(stderr, "%s\n", why.c_str());
+  return static_cast<int>(code);
+}
+
 int printHelp(const std::string& program) {
   std::printf(
       "Perdure: a persistent, metric map of objects from a camera and an IMU\n"
@@ -32,12 +37,10 @@ int printHelp(const std::string& program) {
     std::printf("  %-28s%s\n", name, summary);
   }
   std::printf("  %-28sThe same as SUBCOMMAND --help\n", "help SUBCOMMAND");
-  return static_cast<int>(std::fflush(stdout) == 0 ? ExitCode::kOk : ExitCode::kInputOutput);
-}
-
-int refuse(ExitCode code, const std::string& why) {
-  std::fprintf(stderr, "%s\n", why.c_str());
-  return static_cast<int>(code);
+  if (std::fflush(stdout) == 0) return static_cast<int>(ExitCode::kOk);
+  return refuse(
+      ExitCode::kInputOutput,
+      std::string("perdure: standard output could not be written: ") + std::strerror(errno));
 }
 
 int refuseUnknown(const std::string& word) {
