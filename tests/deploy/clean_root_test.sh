@@ -8,9 +8,10 @@ set -euo pipefail
 release=$1
 cd "$PERDURE_SOURCE"
 root=$PERDURE_SOURCE/build/clean/$release
-mirror=${PERDURE_MIRROR:-http://deb.debian.org/debian}
+. tests/deploy/mirror.sh
 skip() { echo "$1: skipped"; exit 77; }
 
+[ -n "$mirror" ] || skip "apt's sources have no mirror of Debian; PERDURE_MIRROR names one"
 [ "$(id -u)" -eq 0 ] || skip "not root, a root cannot be made"
 command -v debootstrap > /dev/null || skip "debootstrap is not here (deploy/install --package)"
 # A mount namespace, so that no mount remains if this script is killed.
@@ -23,11 +24,7 @@ if [ ! -e "$root/etc/debian_version" ]; then
   mkdir -p "$root.new"
   debootstrap --variant=minbase --include=ca-certificates "$release" "$root.new" "$mirror" > "$root.log" 2>&1 ||
     skip "debootstrap cannot make a root ($(tail -n 1 "$root.log"))"
-  cat > "$root.new/etc/apt/sources.list" <<TEXT
-deb $mirror $release main
-deb $mirror $release-updates main
-deb $mirror-security $release-security main
-TEXT
+  debian_sources "$release" > "$root.new/etc/apt/sources.list"
   mv "$root.new" "$root"
 fi
 cp /etc/resolv.conf "$root/etc/"

@@ -8,7 +8,7 @@ work=$PERDURE_SOURCE/build/vehicle
 packages=$PERDURE_SOURCE/build/packages
 drive=$work/drive
 root=$work/root
-mirror=${PERDURE_MIRROR:-http://deb.debian.org/debian}
+. tests/deploy/mirror.sh
 failed=0
 
 skip() { echo "$1: skipped"; exit 77; }
@@ -39,6 +39,7 @@ build_packages() {
 release=$(. /etc/os-release && echo "${VERSION_CODENAME:-bookworm}")
 make_base() {
   [ -e "$work/base/etc/debian_version" ] && return
+  [ -n "$mirror" ] || skip "apt's sources have no mirror of Debian; PERDURE_MIRROR names one"
   rm -rf "$work/base.new"
   debootstrap --variant=minbase --include=systemd,systemd-sysv,dbus,udev,procps,iproute2 \
     "$release" "$work/base.new" "$mirror" > "$work/debootstrap.log" 2>&1 ||

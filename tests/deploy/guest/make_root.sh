@@ -7,10 +7,11 @@ set -euo pipefail
 here=$(dirname "$(realpath "$0")")
 source=$(realpath "$here/../../..")
 folder=$1
-mirror=${PERDURE_MIRROR:-http://deb.debian.org/debian}
+. "$here/../mirror.sh"
 mkdir -p "$folder"
 folder=$(realpath "$folder")
 skip() { echo "$1: skipped"; exit 77; }
+[ -n "$mirror" ] || skip "apt's sources have no mirror of Debian; PERDURE_MIRROR names one"
 
 mapfile -t runtime < <("$source/deploy/install" --list --runtime)
 packages=(systemd systemd-sysv udev kmod initramfs-tools zstd procps python3-minimal
@@ -41,10 +42,7 @@ rm -rf "$root"
 trap 'rm -rf "$root"' EXIT
 debootstrap --variant=minbase --include=ca-certificates "$release" "$root" "$mirror" > "$folder/root.log" 2>&1 ||
   skip "debootstrap cannot make a root ($(tail -n 1 "$folder/root.log"))"
-cat > "$root/etc/apt/sources.list" <<TEXT
-deb $mirror $release main
-deb $mirror-security $release-security main
-TEXT
+debian_sources "$release" > "$root/etc/apt/sources.list"
 cp /etc/resolv.conf "$root/etc/"
 printf 'path-exclude=/usr/share/%s/*\n' doc man locale > "$root/etc/dpkg/dpkg.cfg.d/small"
 printf '#!/bin/sh\nexit 101\n' > "$root/usr/sbin/policy-rc.d"
