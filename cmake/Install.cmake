@@ -74,6 +74,8 @@ install(FILES config/ros2.yaml DESTINATION ${etc} COMPONENT ros2)
 
 # The command line tool, with the programs that `model import` runs.
 install(TARGETS perdure COMPONENT tools)
+get_property(commands GLOBAL PROPERTY PERDURE_COMMANDS)
+install(TARGETS ${commands} DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/perdure COMPONENT tools)
 install(DIRECTORY tools/model/perdure_model DESTINATION ${share} COMPONENT tools
   FILES_MATCHING PATTERN "*.py")
 install(FILES config/simulated_detector.yaml DESTINATION ${etc} COMPONENT tools)

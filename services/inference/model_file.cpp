@@ -41,7 +41,7 @@ std::vector<std::string> standardModelFolders() {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
   fs::path folder = program.parent_path();
-  for (int up = 0; up < 4 && folder.has_relative_path(); ++up, folder = folder.parent_path()) {
+  for (int up = 0; up < 5 && folder.has_relative_path(); ++up, folder = folder.parent_path()) {
     for (const char* there : {"config/models", "share/perdure/models"}) {
       if (fs::is_directory(folder / there, error)) folders.push_back((folder / there).string());
     }

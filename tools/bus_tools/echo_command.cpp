@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "common/wire/json.h"
-#include "tools/bus_tools/command.h"
 #include "tools/bus_tools/common.h"
+#include "tools/perdure/commands.h"
 
 namespace perdure::tools {
 namespace {
@@ -50,14 +50,13 @@ void runEcho(const EchoOptions& options) {
 
 }  // namespace
 
-void addEchoCommand(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("echo", "print a topic's messages as JSON lines");
+void setUpEcho(CLI::App& command) {
   auto options = std::make_shared<EchoOptions>();
-  command->add_option("topic", options->topic, "its name, as odometry or frame/cam0")->required();
-  command->add_option("--count", options->count, "end after so many messages");
-  command->add_option("--seconds", options->seconds, "end after this time");
-  addBusOptions(*command, options->bus);
-  command->callback([options] { runEcho(*options); });
+  command.add_option("topic", options->topic, "its name, as odometry or frame/cam0")->required();
+  command.add_option("--count", options->count, "end after so many messages");
+  command.add_option("--seconds", options->seconds, "end after this time");
+  addBusOptions(command, options->bus);
+  command.callback([options] { runEcho(*options); });
 }
 
 }  // namespace perdure::tools

@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "common/base/errors.h"
-#include "tools/bus_tools/command.h"
 #include "tools/bus_tools/common.h"
+#include "tools/perdure/commands.h"
 
 namespace perdure::tools {
 namespace {
@@ -29,12 +29,10 @@ void printEnvironment(const bus::Options& given) {
 
 }  // namespace
 
-void addEnvCommand(CLI::App& app) {
-  CLI::App* command = app.add_subcommand(
-      "env", "print the DDS configuration as shell variables: eval \"$(perdure env)\"");
+void setUpEnv(CLI::App& command) {
   auto options = std::make_shared<bus::Options>();
-  addBusOptions(*command, *options);
-  command->callback([options] { printEnvironment(*options); });
+  addBusOptions(command, *options);
+  command.callback([options] { printEnvironment(*options); });
 }
 
 }  // namespace perdure::tools

@@ -2,9 +2,9 @@
 #include <cstdio>
 #include <memory>
 
-#include "tools/bus_tools/command.h"
 #include "tools/bus_tools/common.h"
 #include "tools/bus_tools/rate_meter.h"
+#include "tools/perdure/commands.h"
 
 namespace perdure::tools {
 namespace {
@@ -46,13 +46,12 @@ void runHz(const HzOptions& options) {
 
 }  // namespace
 
-void addHzCommand(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("hz", "measure the rate of a topic, once a second");
+void setUpHz(CLI::App& command) {
   auto options = std::make_shared<HzOptions>();
-  command->add_option("topic", options->topic, "its name, as odometry or frame/cam0")->required();
-  command->add_option("--seconds", options->seconds, "end after this time");
-  addBusOptions(*command, options->bus);
-  command->callback([options] { runHz(*options); });
+  command.add_option("topic", options->topic, "its name, as odometry or frame/cam0")->required();
+  command.add_option("--seconds", options->seconds, "end after this time");
+  addBusOptions(command, options->bus);
+  command.callback([options] { runHz(*options); });
 }
 
 }  // namespace perdure::tools

@@ -5,8 +5,8 @@
 #include <set>
 
 #include "common/bus/discovery.h"
-#include "tools/bus_tools/command.h"
 #include "tools/bus_tools/common.h"
+#include "tools/perdure/commands.h"
 
 namespace perdure::tools {
 namespace {
@@ -81,14 +81,12 @@ void runTopics(const TopicsOptions& options) {
 
 }  // namespace
 
-void addTopicsCommand(CLI::App& app) {
-  CLI::App* command =
-      app.add_subcommand("topics", "list all topics, and who writes and reads them now");
+void setUpTopics(CLI::App& command) {
   auto options = std::make_shared<TopicsOptions>();
-  command->add_option("--seconds", options->seconds, "how long to look for processes")
+  command.add_option("--seconds", options->seconds, "how long to look for processes")
       ->capture_default_str();
-  addBusOptions(*command, options->bus);
-  command->callback([options] { runTopics(*options); });
+  addBusOptions(command, options->bus);
+  command.callback([options] { runTopics(*options); });
 }
 
 }  // namespace perdure::tools

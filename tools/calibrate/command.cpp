@@ -157,42 +157,37 @@ void addSimulate(CLI::App& app, const std::shared_ptr<CommandLine>& line) {
 
 }  // namespace
 
-void addCalibrateCommand(CLI::App& app) {
+void setUpCalibrate(CLI::App& command) {
   auto line = std::make_shared<CommandLine>();
-  CLI::App* command = app.add_subcommand(
-      "calibrate",
-      "Lens, place and time offset of a camera on an IMU, from a recording of a board");
-  addCommon(*command, *line, "Folder for rig.yaml, calibration.json and pictures");
-  addLens(*command, *line,
-          "Model of the lens; as the drive's own calibration says where not given");
-  command->add_option("--data", line->read.data,
-                      "Drive in front of the board (dataset folder or .mcap), or a folder of "
-                      "pictures for the lens alone");
-  command->add_option("--rig", line->read.rig,
-                      "Rig file to begin with, instead of the drive's own");
-  command->add_option("--every", line->read.every, "Look at each N-th image only")
+  addCommon(command, *line, "Folder for rig.yaml, calibration.json and pictures");
+  addLens(command, *line, "Model of the lens; as the drive's own calibration says where not given");
+  command.add_option("--data", line->read.data,
+                     "Drive in front of the board (dataset folder or .mcap), or a folder of "
+                     "pictures for the lens alone");
+  command.add_option("--rig", line->read.rig, "Rig file to begin with, instead of the drive's own");
+  command.add_option("--every", line->read.every, "Look at each N-th image only")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  command->add_flag("--intrinsics-only", line->calibrate.intrinsics_only, "The lens alone");
-  command->add_flag("--hold-lens", line->calibrate.place.hold_lens,
-                    "The lens stays as the most different views have it");
-  command->add_option("--gravity", line->calibrate.place.gravity, "At the place of recording, m/s²")
+  command.add_flag("--intrinsics-only", line->calibrate.intrinsics_only, "The lens alone");
+  command.add_flag("--hold-lens", line->calibrate.place.hold_lens,
+                   "The lens stays as the most different views have it");
+  command.add_option("--gravity", line->calibrate.place.gravity, "At the place of recording, m/s²")
       ->check(CLI::Range(9.7, 9.9))
       ->capture_default_str();
   command
-      ->add_option("--max-offset", line->calibrate.place.widest_offset_s,
-                   "Camera and IMU clocks differ by no more, s")
+      .add_option("--max-offset", line->calibrate.place.widest_offset_s,
+                  "Camera and IMU clocks differ by no more, s")
       ->check(CLI::Range(0.01, 5.0))
       ->capture_default_str();
   CLI::App* board =
-      command->add_subcommand("board", "Write a board to print, as SVG, with a scale to measure");
+      command.add_subcommand("board", "Write a board to print, as SVG, with a scale to measure");
   addCommon(*board, *line, "FILE.svg");
   board->callback([line] { runBoard(*line); });
-  addSimulate(*command, line);
-  addCalibrateImport(*command);
-  command->require_subcommand(0, 1);
-  command->final_callback([command, line] {
-    if (command->get_subcommands().empty()) runCalibrate(*line);
+  addSimulate(command, line);
+  addCalibrateImport(command);
+  command.require_subcommand(0, 1);
+  command.final_callback([&command, line] {
+    if (command.get_subcommands().empty()) runCalibrate(*line);
   });
 }
 

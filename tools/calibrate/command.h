@@ -7,7 +7,6 @@ class App;
 
 namespace perdure::tools {
 
-void addCalibrateCommand(CLI::App& app);
 /// Adds the subcommand `import`.
 void addCalibrateImport(CLI::App& calibrate);
 

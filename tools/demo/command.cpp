@@ -1,5 +1,3 @@
-#include "tools/demo/command.h"
-
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -16,6 +14,7 @@
 #include "common/service/signals.h"
 #include "tools/demo/demo.h"
 #include "tools/demo/embedded_drive.h"
+#include "tools/perdure/commands.h"
 
 namespace perdure::tools {
 namespace {
@@ -34,8 +33,6 @@ void showRendering(const SimulateProgress& progress) {
             << std::flush;
 }
 
-fs::path folderOfPrograms() { return fs::read_symlink("/proc/self/exe").parent_path(); }
-
 /// Folder for the rendered drives of an installed Perdure.
 fs::path userCache() {
   const char* cache = std::getenv("XDG_CACHE_HOME");
@@ -46,8 +43,8 @@ fs::path userCache() {
 
 /// Sets the missing options: folders, the demo's own drive and its network.
 void complete(DemoOptions& options, const std::atomic<bool>& interrupted) {
-  if (options.programs.empty()) options.programs = folderOfPrograms().string();
-  const fs::path installed = folderOfPrograms().parent_path() / "share" / "perdure";
+  if (options.programs.empty()) options.programs = programFolder().string();
+  const fs::path installed = programFolder().parent_path() / "share" / "perdure";
   if (options.root.empty()) {
     options.root = fs::exists("config") || !fs::exists(installed) ? "." : installed.string();
   }
@@ -108,44 +105,42 @@ void runDemo(DemoOptions options) {
 
 }  // namespace
 
-void addDemoCommand(CLI::App& app) {
+void setUpDemo(CLI::App& demo) {
   auto options = std::make_shared<DemoOptions>();
   options->out = "out/demo";
   options->root.clear();
-  CLI::App* demo = app.add_subcommand(
-      "demo", "The five services under supervision over a drive; deploy/demo builds and calls it");
-  demo->add_option("--data", options->data, "folder of the drive; default: one that is rendered")
+  demo.add_option("--data", options->data, "folder of the drive; default: one that is rendered")
       ->type_name("DIR");
-  demo->add_option("--rig", options->rig, "rig file instead of the drive's own calibration");
-  demo->add_option(
+  demo.add_option("--rig", options->rig, "rig file instead of the drive's own calibration");
+  demo.add_option(
           "--topic", options->topics,
           "of a recording of ROS where there are several: cam0=TOPIC, cam1=TOPIC, imu=TOPIC")
       ->take_all();
-  demo->add_option("--sequence", options->sequence, "of KITTI tracking, for example 0000");
-  demo->add_option("--model", options->model, "the network; default: the one in models/")
+  demo.add_option("--sequence", options->sequence, "of KITTI tracking, for example 0000");
+  demo.add_option("--model", options->model, "the network; default: the one in models/")
       ->type_name("FILE.onnx");
-  demo->add_option("--seconds", options->seconds, "of the drive; default: all of it")
+  demo.add_option("--seconds", options->seconds, "of the drive; default: all of it")
       ->check(CLI::PositiveNumber);
-  demo->add_option("--rate", options->rate,
-                   "seconds of the drive in one second, or max: as fast as the services answer")
+  demo.add_option("--rate", options->rate,
+                  "seconds of the drive in one second, or max: as fast as the services answer")
       ->capture_default_str();
-  demo->add_option("--out", options->out, "folder for what comes out")->capture_default_str();
-  demo->add_flag("--keep", options->keep,
-                 "leave everything running at the end of the drive, until Ctrl-C");
-  demo->add_flag("--headless", options->headless, "open no window (this version has none to open)");
-  demo->add_option("--shared-memory-mb", options->shared_memory_mb,
-                   "images up to this size go through shared memory, where iox-roudi runs")
+  demo.add_option("--out", options->out, "folder for what comes out")->capture_default_str();
+  demo.add_flag("--keep", options->keep,
+                "leave everything running at the end of the drive, until Ctrl-C");
+  demo.add_flag("--headless", options->headless, "open no window (this version has none to open)");
+  demo.add_option("--shared-memory-mb", options->shared_memory_mb,
+                  "images up to this size go through shared memory, where iox-roudi runs")
       ->check(CLI::Range(0, 256));
-  demo->add_option("--truth", options->truth, "root of KITTI tracking with label_02 and calib");
-  demo->add_option("--truth-sequence", options->truth_sequence, "in --truth, for example 0000");
-  demo->add_option("--root", options->root,
-                   "folder that has config/ and models/; default: this one, else the installation");
-  demo->add_option("--cache", options->cache,
-                   "folder where rendered drives are kept; default: ROOT/out, or ~/.cache/perdure "
-                   "of an installation");
-  demo->add_option("--programs", options->programs,
-                   "folder of the services; default: that of this program");
-  demo->callback([options] { runDemo(*options); });
+  demo.add_option("--truth", options->truth, "root of KITTI tracking with label_02 and calib");
+  demo.add_option("--truth-sequence", options->truth_sequence, "in --truth, for example 0000");
+  demo.add_option("--root", options->root,
+                  "folder that has config/ and models/; default: this one, else the installation");
+  demo.add_option("--cache", options->cache,
+                  "folder where rendered drives are kept; default: ROOT/out, or ~/.cache/perdure "
+                  "of an installation");
+  demo.add_option("--programs", options->programs,
+                  "folder of the services; default: that of this program");
+  demo.callback([options] { runDemo(*options); });
 }
 
 }  // namespace perdure::tools

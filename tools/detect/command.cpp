@@ -1,5 +1,3 @@
-#include "tools/detect/command.h"
-
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -7,6 +5,7 @@
 #include <memory>
 
 #include "tools/detect/detect.h"
+#include "tools/perdure/commands.h"
 
 namespace perdure::tools {
 namespace {
@@ -29,27 +28,25 @@ void run(const DetectOptions& options, bool quiet) {
 
 }  // namespace
 
-void addDetectCommand(CLI::App& app) {
+void setUpDetect(CLI::App& detect) {
   auto options = std::make_shared<DetectOptions>();
   auto quiet = std::make_shared<bool>(false);
-  CLI::App* detect = app.add_subcommand(
-      "detect", "Write a network's detections of a dataset to a CSV that --detections reads");
-  detect->add_option("--data", options->data, "Dataset folder")->required();
-  detect->add_option(
+  detect.add_option("--data", options->data, "Dataset folder")->required();
+  detect.add_option(
       "--sequence", options->sequence,
       "Of a KITTI tracking folder, for example 0000, or a 7-Scenes one, for example seq-01");
-  detect->add_option("--model", options->inference.model.path, "Network (.onnx, .cfg)")->required();
-  detect->add_option("--out", options->out, "The CSV")->required();
+  detect.add_option("--model", options->inference.model.path, "Network (.onnx, .cfg)")->required();
+  detect.add_option("--out", options->out, "The CSV")->required();
   detect
-      ->add_option("--threshold", options->inference.detection.score_threshold,
-                   "Boxes whose best class scores less are left out")
+      .add_option("--threshold", options->inference.detection.score_threshold,
+                  "Boxes whose best class scores less are left out")
       ->check(CLI::Range(0.001, 0.999))
       ->capture_default_str();
-  detect->add_option("--threads", options->inference.model.threads, "Of OpenCV")
+  detect.add_option("--threads", options->inference.model.threads, "Of OpenCV")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
-  detect->add_flag("--quiet", *quiet, "No progress");
-  detect->callback([options, quiet] { run(*options, *quiet); });
+  detect.add_flag("--quiet", *quiet, "No progress");
+  detect.callback([options, quiet] { run(*options, *quiet); });
 }
 
 }  // namespace perdure::tools

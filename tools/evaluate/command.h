@@ -8,7 +8,6 @@ class App;
 
 namespace perdure::tools {
 
-void addEvaluateCommand(CLI::App& app);
 void addEvaluateObjects(CLI::App& evaluate);
 void addEvaluateTrajectory(CLI::App& evaluate);
 void addEvaluateConsistency(CLI::App& evaluate);

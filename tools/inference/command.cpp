@@ -1,5 +1,3 @@
-#include "tools/inference/command.h"
-
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -13,6 +11,7 @@
 #include "common/service/signals.h"
 #include "tools/bus_tools/common.h"
 #include "tools/inference/newcomer.h"
+#include "tools/perdure/commands.h"
 
 namespace perdure::tools {
 namespace {
@@ -37,10 +36,6 @@ struct SwapRequest {
   double probation_s = 30.0, patience_s = 60.0;
   std::vector<std::string> settings;
 };
-
-std::string programBeside() {
-  return (fs::read_symlink("/proc/self/exe").parent_path() / "perdure-inference").string();
-}
 
 std::vector<std::string> commandOf(const SwapRequest& request) {
   std::vector<std::string> command = {request.program};
@@ -162,7 +157,7 @@ std::string follow(bus::WaitLoop& loop, const SwapRequest& request, Newcomer& ne
 }
 
 void runSwap(SwapRequest request) {
-  if (request.program.empty()) request.program = programBeside();
+  if (request.program.empty()) request.program = (programFolder() / "perdure-inference").string();
   for (const std::string& file : {request.program, request.model}) {
     if (!fs::exists(file)) throw StartupError(ExitCode::kUnavailable, file + " is missing");
   }
@@ -207,11 +202,10 @@ void runSwap(SwapRequest request) {
 
 }  // namespace
 
-void addInferenceCommand(CLI::App& app) {
-  CLI::App* inference = app.add_subcommand("inference", "inference processes while they run");
-  inference->require_subcommand(1);
+void setUpInference(CLI::App& inference) {
+  inference.require_subcommand(1);
   CLI::App* command =
-      inference->add_subcommand("swap", "another network takes over while frames go on");
+      inference.add_subcommand("swap", "another network takes over while frames go on");
   command->footer(kSwapHelp);
   auto request = std::make_shared<SwapRequest>();
   command->add_option("--model", request->model, "the new network: .onnx, or a Darknet .cfg")

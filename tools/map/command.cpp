@@ -1,5 +1,3 @@
-#include "tools/map/command.h"
-
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -20,6 +18,7 @@
 #include "tools/map/render.h"
 #include "tools/map/why.h"
 #include "tools/outputs/ledger_json.h"
+#include "tools/perdure/commands.h"
 
 namespace perdure::tools {
 namespace {
@@ -251,16 +250,15 @@ void addSource(CLI::App& command, Request& request) {
 
 }  // namespace
 
-void addMapCommand(CLI::App& app) {
+void setUpMap(CLI::App& map) {
   auto request = std::make_shared<Request>();
-  CLI::App* map = app.add_subcommand("map", "What the map holds: over DDS, or from its file");
-  map->require_subcommand(1);
+  map.require_subcommand(1);
 
-  CLI::App* listing = map->add_subcommand("list", "All objects, one a line");
+  CLI::App* listing = map.add_subcommand("list", "All objects, one a line");
   listing->add_flag("--json", request->json, "as JSON, with covariances");
   listing->callback([request] { list(*request); });
 
-  CLI::App* showing = map->add_subcommand("show", "Everything about one object");
+  CLI::App* showing = map.add_subcommand("show", "Everything about one object");
   showing->add_option("ID", request->query.object_id, "the object's id")->required();
   showing->add_flag("--json", request->json, "as JSON, with covariances");
   showing->callback([request] {
@@ -268,7 +266,7 @@ void addMapCommand(CLI::App& app) {
     show(*request);
   });
 
-  CLI::App* explaining = map->add_subcommand("why", "Why an object is believed, entry by entry");
+  CLI::App* explaining = map.add_subcommand("why", "Why an object is believed, entry by entry");
   explaining->add_option("ID", request->query.object_id, "the object's id")->required();
   explaining->add_flag("--json", request->json, "the ledger as JSON");
   explaining->callback([request] {
@@ -276,7 +274,7 @@ void addMapCommand(CLI::App& app) {
     why(*request);
   });
 
-  CLI::App* query = map->add_subcommand("query", "Objects of a class, or in a place");
+  CLI::App* query = map.add_subcommand("query", "Objects of a class, or in a place");
   query->add_option("--class", request->query.class_name, "of this most probable class");
   query->add_option("--radius", request->radius, "X Y Z R: centres within R metres, nearest first")
       ->expected(4);
@@ -288,7 +286,7 @@ void addMapCommand(CLI::App& app) {
     list(*request);
   });
 
-  CLI::App* graph = map->add_subcommand(
+  CLI::App* graph = map.add_subcommand(
       "graph", "How well the map's places are known, and on what its loops rest");
   graph->add_flag("--json", request->json, "anchors and loops as JSON");
   graph->callback([request] {
@@ -298,7 +296,7 @@ void addMapCommand(CLI::App& app) {
   });
   addPlace(*graph, *request);
 
-  CLI::App* exporting = map->add_subcommand("export", "The map as JSON or GeoJSON");
+  CLI::App* exporting = map.add_subcommand("export", "The map as JSON or GeoJSON");
   exporting->add_flag("--geojson", request->geojson, "GeoJSON (RFC 7946)");
   exporting
       ->add_option("--anchor", request->anchor,
@@ -308,8 +306,8 @@ void addMapCommand(CLI::App& app) {
   exporting->add_option("--out", request->out, "into this file")->type_name("FILE");
   exporting->callback([request] { exportMap(*request); });
 
-  addServerCommands(*map);
-  addFuseCommand(*map);
+  addServerCommands(map);
+  addFuseCommand(map);
 
   for (CLI::App* command : {listing, showing, explaining, query, exporting})
     addSource(*command, *request);

@@ -189,11 +189,9 @@ void addLook(CLI::App& model, const std::shared_ptr<ImportOptions>& request) {
 
 }  // namespace
 
-void addModelCommand(CLI::App& app) {
-  CLI::App* model = app.add_subcommand(
-      "model", "Bring a detector of your own: make it ready, and see what it sees");
-  model->require_subcommand(1);
-  model->footer(
+void setUpModel(CLI::App& model) {
+  model.require_subcommand(1);
+  model.footer(
       "\nA network is an ONNX file and a model.json that says what its numbers mean. `import` "
       "writes\nboth from the file that a training framework exports; `look` shows what one sees; "
       "`calibrate`\nfits what it says to labelled frames. `list` tells networks that are known to "
@@ -203,10 +201,10 @@ void addModelCommand(CLI::App& app) {
       "  perdure model look yolov8n.perdure.onnx --image other.jpg --out other.png\n"
       "\nperdure model import --help tells the options; services/inference/README.md the "
       "families.");
-  addImport(*model, std::make_shared<ImportOptions>());
-  addLook(*model, std::make_shared<ImportOptions>());
-  addFetch(*model);
-  addCalibrate(*model);
+  addImport(model, std::make_shared<ImportOptions>());
+  addLook(model, std::make_shared<ImportOptions>());
+  addFetch(model);
+  addCalibrate(model);
 }
 
 }  // namespace perdure::tools

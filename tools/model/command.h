@@ -7,7 +7,6 @@ class App;
 
 namespace perdure::tools {
 
-void addModelCommand(CLI::App& app);
 /// Adds the subcommands `list` and `fetch`.
 void addFetch(CLI::App& model);
 /// Adds the subcommand `calibrate`.

@@ -19,7 +19,7 @@ constexpr const char* kPython = "/usr/bin/python3";
 std::optional<fs::path> pythonFolder() {
   std::error_code error;
   fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path();
-  for (int up = 0; up < 4 && folder.has_relative_path(); ++up, folder = folder.parent_path()) {
+  for (int up = 0; up < 5 && folder.has_relative_path(); ++up, folder = folder.parent_path()) {
     for (const char* there : {"tools/model", "share/perdure"}) {
       if (fs::is_regular_file(folder / there / "perdure_model/__main__.py", error)) {
         return folder / there;

@@ -1,76 +1,101 @@
-// The `perdure` command. Each subcommand is one line here; its code is in its own folder of tools/.
-#include <CLI/CLI.hpp>
+// The `perdure` command. It replaces its own process with the executable of a subcommand. These are
+// in libexec/perdure beside the folder of this program, in a build folder as in an installation.
+#include <unistd.h>
+
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <exception>
-#include <iostream>
+#include <filesystem>
 #include <string>
+#include <vector>
 
+#include "common/base/algorithms/nearest_word.h"
 #include "common/base/errors.h"
-#include "tools/bus_tools/command.h"
-#include "tools/calibrate/command.h"
-#include "tools/demo/command.h"
-#include "tools/detect/command.h"
-#include "tools/evaluate/command.h"
-#include "tools/inference/command.h"
-#include "tools/map/command.h"
-#include "tools/model/command.h"
-#include "tools/pipeline/command.h"
-#include "tools/record/command.h"
-#include "tools/security/command.h"
-#include "tools/simulate/command.h"
+#include "tools/perdure/commands.h"
 
 namespace {
 
-/// Checks that all output was written. A full disk or a closed file is an error.
-int checkedOutput(int status) {
-  errno = 0;
-  std::cout.flush();
-  const bool written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good();
-  if (written || status != static_cast<int>(perdure::ExitCode::kOk)) return status;
-  std::cerr << "perdure: standard output could not be written whole"
-            << (errno != 0 ? std::string(" (") + std::strerror(errno) + ")" : std::string())
-            << "; free space, or send it elsewhere" << std::endl;
-  return static_cast<int>(perdure::ExitCode::kInputOutput);
+using perdure::ExitCode;
+using Words = std::vector<std::string>;
+
+int refuse(ExitCode code, const std::string& why) {
+  std::fprintf(stderr, "%s\n", why.c_str());
+  return static_cast<int>(code);
 }
 
-int run(CLI::App& app, int argc, char** argv) {
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::RuntimeError& error) {
-    return error.get_exit_code();
-  } catch (const CLI::ParseError& error) {
-    const bool asked_for_help = app.exit(error) == 0;
-    return static_cast<int>(asked_for_help ? perdure::ExitCode::kOk : perdure::ExitCode::kUsage);
-  } catch (const perdure::StartupError& error) {
-    std::cerr << "perdure: " << error.what() << std::endl;
-    return static_cast<int>(error.code());
-  } catch (const std::exception& error) {
-    std::cerr << "perdure: " << error.what() << std::endl;
-    return static_cast<int>(perdure::ExitCode::kFailure);
+int flushed() {
+  if (std::fflush(stdout) == 0) return static_cast<int>(ExitCode::kOk);
+  return refuse(
+      ExitCode::kInputOutput,
+      std::string("perdure: standard output could not be written: ") + std::strerror(errno));
+}
+
+int printVersion() {
+  std::puts(PERDURE_VERSION);
+  return flushed();
+}
+
+int printHelp(const std::string& program) {
+  std::printf(
+      "Perdure: a persistent, metric map of objects from a camera and an IMU\n"
+      "Usage: %s [OPTIONS] SUBCOMMAND\n\n"
+      "Options:\n"
+      "  -h,--help                   Print this help message and exit\n"
+      "  --version                   Display program version information and exit\n\n"
+      "Subcommands:\n",
+      program.c_str());
+  for (const auto& [name, summary] : perdure::tools::commands()) {
+    std::printf("  %-28s%s\n", name, summary);
   }
-  return static_cast<int>(perdure::ExitCode::kOk);
+  std::printf("  %-28sThe same as SUBCOMMAND --help\n", "help SUBCOMMAND");
+  return flushed();
+}
+
+int refuseUnknown(const std::string& word) {
+  std::vector<std::string> names;
+  for (const auto& command : perdure::tools::commands()) names.emplace_back(command.name);
+  const std::string nearest = perdure::nearestWord(word, names);
+  return refuse(ExitCode::kUsage, "'" + word + "' is not a subcommand of perdure" +
+                                      (nearest.empty() ? "" : "; did you mean " + nearest + "?") +
+                                      "\nRun with --help for more information.");
+}
+
+/// Returns only if the executable cannot be started.
+int start(const std::string& program, const std::string& name, const Words& arguments) {
+  // `ps` shows the command line as the user typed it.
+  std::string called = program + " " + name;
+  std::vector<char*> words{called.data()};
+  for (const std::string& word : arguments) words.push_back(const_cast<char*>(word.c_str()));
+  words.push_back(nullptr);
+  const auto folder = std::filesystem::read_symlink("/proc/self/exe").parent_path().parent_path() /
+                      "libexec/perdure";
+  const std::string path = folder / name;
+  execv(path.c_str(), words.data());
+  return refuse(ExitCode::kUnavailable,
+                "perdure: " + path + " cannot be started: " + std::strerror(errno) +
+                    "; build it: cmake --build --preset release --target perdure-command-" + name +
+                    ", or install the package perdure-tools");
+}
+
+int run(const std::string& program, Words words) {
+  if (words.empty()) {
+    return refuse(ExitCode::kUsage,
+                  "A subcommand is required\nRun with --help for more information.");
+  }
+  if (words[0] == "help" && words.size() > 1) words = {words[1], "--help"};
+  const std::string word = words[0];
+  words.erase(words.begin());
+  if (word == "-h" || word == "--help" || word == "help") return printHelp(program);
+  if (word == "--version") return printVersion();
+  for (const auto& command : perdure::tools::commands()) {
+    if (word == command.name) return start(program, word, words);
+  }
+  return refuseUnknown(word);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Perdure: a persistent, metric map of objects from a camera and an IMU");
-  app.set_version_flag("--version", PERDURE_VERSION);
-  app.require_subcommand(1);
-  perdure::tools::addPipelineCommand(app);
-  perdure::tools::addEvaluateCommand(app);
-  perdure::tools::addDetectCommand(app);
-  perdure::tools::addModelCommand(app);
-  perdure::tools::addInferenceCommand(app);
-  perdure::tools::addSimulateCommand(app);
-  perdure::tools::addCalibrateCommand(app);
-  perdure::tools::addMapCommand(app);
-  perdure::tools::addDemoCommand(app);
-  perdure::tools::addRecordCommand(app);
-  perdure::tools::addPlayCommand(app);
-  perdure::tools::addSecurityCommand(app);
-  perdure::tools::addBusCommands(app);
-  return checkedOutput(run(app, argc, argv));
+  return run(argc > 0 ? argv[0] : "perdure", Words(argv + std::min(argc, 1), argv + argc));
 }

@@ -1,5 +1,3 @@
-#include "tools/pipeline/command.h"
-
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -11,6 +9,7 @@
 #include "common/base/errors.h"
 #include "tools/data_check/data_check.h"
 #include "tools/outputs/results_folder.h"
+#include "tools/perdure/commands.h"
 #include "tools/pipeline/pipeline.h"
 #include "tools/pipeline/report.h"
 
@@ -146,12 +145,10 @@ void run(const PipelineOptions& given) {
 
 }  // namespace
 
-void addPipelineCommand(CLI::App& app) {
+void setUpPipeline(CLI::App& pipeline) {
   auto options = std::make_shared<PipelineOptions>();
-  CLI::App* pipeline = app.add_subcommand(
-      "pipeline", "Run the services' nodes in one process over a dataset, repeatably");
-  addOptions(*pipeline, *options);
-  pipeline->callback([options] { run(*options); });
+  addOptions(pipeline, *options);
+  pipeline.callback([options] { run(*options); });
 }
 
 }  // namespace perdure::tools

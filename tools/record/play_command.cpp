@@ -6,7 +6,7 @@
 
 #include "common/service/signals.h"
 #include "tools/bus_tools/common.h"
-#include "tools/record/command.h"
+#include "tools/perdure/commands.h"
 #include "tools/record/files.h"
 #include "tools/record/gateway_replay.h"
 #include "tools/record/player.h"
@@ -68,40 +68,39 @@ void runPlay(const Options& options) {
 
 }  // namespace
 
-void addPlayCommand(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("play", "play a recording onto the bus");
+void setUpPlay(CLI::App& command) {
   auto options = std::make_shared<Options>();
   PlayOptions& play = options->play;
-  command->add_option("path", options->path, "a .mcap file, or a folder of them")->required();
-  command->add_option("--topics", play.topics, "only these, as odometry or frame/cam0");
+  command.add_option("path", options->path, "a .mcap file, or a folder of them")->required();
+  command.add_option("--topics", play.topics, "only these, as odometry or frame/cam0");
   command
-      ->add_option("--for", play.for_service,
-                   "what one service listens to: vio, inference, semantic_filter or map_store")
+      .add_option("--for", play.for_service,
+                  "what one service listens to: vio, inference, semantic_filter or map_store")
       ->excludes("--topics");
-  command->add_option("--rate", play.rate, "seconds of the recording in one second")
+  command.add_option("--rate", play.rate, "seconds of the recording in one second")
       ->capture_default_str()
       ->check(CLI::Range(0.01, 100.0));
-  command->add_option("--start", play.start_s, "seconds from its beginning")
+  command.add_option("--start", play.start_s, "seconds from its beginning")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("--seconds", play.seconds, "how much of it")->check(CLI::NonNegativeNumber);
-  command->add_option("--wait", play.wait_s, "seconds to wait for readers of each topic, at most")
+  command.add_option("--seconds", play.seconds, "how much of it")->check(CLI::NonNegativeNumber);
+  command.add_option("--wait", play.wait_s, "seconds to wait for readers of each topic, at most")
       ->capture_default_str()
       ->check(CLI::NonNegativeNumber);
-  command->add_flag("--loop", play.loop, "again and again, with the same stamps");
-  command->add_flag("--force", play.force, "also onto topics that others write now");
-  addBusOptions(*command, options->bus);
+  command.add_flag("--loop", play.loop, "again and again, with the same stamps");
+  command.add_flag("--force", play.force, "also onto topics that others write now");
+  addBusOptions(command, options->bus);
   CLI::Option* gateway =
-      command->add_flag("--gateway", options->gateway,
-                        "to a browser or Foxglove instead of the bus; they play, pause and seek");
+      command.add_flag("--gateway", options->gateway,
+                       "to a browser or Foxglove instead of the bus; they play, pause and seek");
   for (const char* of_the_bus : {"--topics", "--for", "--seconds", "--wait", "--loop", "--force"}) {
-    gateway->excludes(command->get_option(of_the_bus));
+    gateway->excludes(command.get_option(of_the_bus));
   }
-  command->add_flag("--paused", options->paused, "with --gateway: begin with a pause")
+  command.add_flag("--paused", options->paused, "with --gateway: begin with a pause")
       ->needs("--gateway");
-  command->add_option("--port", options->port, "with --gateway; 0: any that is free")
+  command.add_option("--port", options->port, "with --gateway; 0: any that is free")
       ->capture_default_str()
       ->check(CLI::Range(0, 65535));
-  command->callback([options] { options->gateway ? runGateway(*options) : runPlay(*options); });
+  command.callback([options] { options->gateway ? runGateway(*options) : runPlay(*options); });
 }
 
 }  // namespace perdure::tools

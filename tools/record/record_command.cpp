@@ -9,7 +9,7 @@
 #include "common/base/errors.h"
 #include "common/service/signals.h"
 #include "tools/bus_tools/common.h"
-#include "tools/record/command.h"
+#include "tools/perdure/commands.h"
 #include "tools/record/files.h"
 #include "tools/record/recorder.h"
 
@@ -142,13 +142,12 @@ void addOptions(CLI::App& command, RecordOptions& options) {
 
 }  // namespace
 
-void addRecordCommand(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("record", "record topics into MCAP files");
+void setUpRecord(CLI::App& command) {
   auto options = std::make_shared<RecordOptions>();
-  addOptions(*command, *options);
-  addFileCommands(*command);
-  command->callback([command, options] {
-    if (command->get_subcommands().empty()) runRecord(*options);
+  addOptions(command, *options);
+  addFileCommands(command);
+  command.callback([&command, options] {
+    if (command.get_subcommands().empty()) runRecord(*options);
   });
 }
 

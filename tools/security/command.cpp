@@ -1,5 +1,3 @@
-#include "tools/security/command.h"
-
 #include <fmt/format.h>
 #include <pwd.h>
 #include <unistd.h>
@@ -9,6 +7,7 @@
 
 #include "common/base/errors.h"
 #include "common/bus/security/identity.h"
+#include "tools/perdure/commands.h"
 #include "tools/security/authority.h"
 
 namespace perdure::tools {
@@ -110,19 +109,17 @@ void addOwner(CLI::App& command, Request& request, const char* meaning) {
 
 }  // namespace
 
-void addSecurityCommand(CLI::App& app) {
-  CLI::App* security = app.add_subcommand(
-      "security", "identities for a bus that is closed to strangers (DDS-Security)");
-  security->require_subcommand(1);
+void setUpSecurity(CLI::App& security) {
+  security.require_subcommand(1);
   auto request = std::make_shared<Request>();
-  CLI::App* made = subcommand(*security, "init",
+  CLI::App* made = subcommand(security, "init",
                               "make an authority, and identities for services, recorder, operator",
                               request, &init);
   made->add_option("--vehicle", request->vehicle, "the vehicle whose topics they may use")
       ->capture_default_str();
   addDays(*made, *request);
   addOwner(*made, *request, "user of all files; else the services' are perdure's, made by root");
-  CLI::App* added = subcommand(*security, "add", "one more identity", request, &add);
+  CLI::App* added = subcommand(security, "add", "one more identity", request, &add);
   added
       ->add_option("role", request->wanted.role,
                    "subscriber, player, ros2_driver, or as `init` makes them")
@@ -134,14 +131,14 @@ void addSecurityCommand(CLI::App& app) {
                     "ros2_driver what it writes");
   addDays(*added, *request);
   addOwner(*added, *request, "user of the files");
-  CLI::App* renewed = subcommand(*security, "renew", "new keys and certificates, of all or of some",
+  CLI::App* renewed = subcommand(security, "renew", "new keys and certificates, of all or of some",
                                  request, &renew);
   renewed->add_option("names", request->names, "which identities; none: all");
   addDays(*renewed, *request);
   CLI::App* revoked =
-      subcommand(*security, "revoke", "shut out all that a name was ever given", request, &revoke);
+      subcommand(security, "revoke", "shut out all that a name was ever given", request, &revoke);
   revoked->add_option("names", request->names, "which identities")->required();
-  subcommand(*security, "list", "the identities of the folder and when they end", request, &list);
+  subcommand(security, "list", "the identities of the folder and when they end", request, &list);
 }
 
 }  // namespace perdure::tools

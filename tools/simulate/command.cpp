@@ -1,5 +1,3 @@
-#include "tools/simulate/command.h"
-
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -12,6 +10,7 @@
 #include <thread>
 
 #include "common/base/errors.h"
+#include "tools/perdure/commands.h"
 #include "tools/simulate/simulate.h"
 
 namespace perdure::tools {
@@ -133,12 +132,10 @@ void addOptions(CLI::App& app, CommandLine& line) {
 
 }  // namespace
 
-void addSimulateCommand(CLI::App& app) {
+void setUpSimulate(CLI::App& simulate) {
   auto line = std::make_shared<CommandLine>();
-  CLI::App* simulate = app.add_subcommand(
-      "simulate", "Render a camera and IMU sequence with exact truth, in EuRoC's folder layout");
-  addOptions(*simulate, *line);
-  simulate->callback([line] { run(*line); });
+  addOptions(simulate, *line);
+  simulate.callback([line] { run(*line); });
 }
 
 }  // namespace perdure::tools

@@ -21,7 +21,7 @@ Npm::Npm() {
   Child npm({"env", "npm", "install", "--prefix", place_.file(""), "--no-audit", "--no-fund",
              "--ignore-scripts", "--prefer-offline", "--fetch-retries=0", "--fetch-timeout=10000"},
             place_.file("npm.log"));
-  if (npm.wait(60s) != 0) why_not_ = "npm or its registry is absent: " + npm.log();
+  if (npm.wait(60s) != 0) why_not_ = "npm or its registry is absent (deploy/install --page): " + npm.log();
 }
 
 const Npm& Npm::one() {

@@ -7,11 +7,13 @@
 namespace perdure::inference {
 namespace {
 
-using ::testing::HasSubstr;
 using Rig = testing::ServiceRig;
 
+/// With a lease of half a minute: on a crowded machine results are late, and Health would say that
+/// instead of what is tried here.
 std::vector<std::string> committedModel() {
-  return {"--set", "model.path=" + (test::sources() / "models/perdure_320x240.onnx").string()};
+  return {"--set", "model.path=" + (test::sources() / "models/perdure_320x240.onnx").string(),
+          "--set", "ownership.period_s=10"};
 }
 
 std::vector<std::string> operator+(std::vector<std::string> a, const std::vector<std::string>& b) {
@@ -27,9 +29,13 @@ TEST(InferenceService, ABudgetThatCannotBeKeptMakesTheInputSmallerAndHealthSaysS
   }
   EXPECT_DOUBLE_EQ(rig.answers.front().input_scale, 1.0);
   EXPECT_LT(rig.answers.back().input_scale, 0.65);
-  EXPECT_TRUE(rig.until([&] { return rig.health.reasons.contains("input_smaller"); }));
-  EXPECT_THAT(rig.health.message, HasSubstr("% of its width, for the budget of 0 ms"));
-  EXPECT_THAT(rig.health.message, HasSubstr("ms old"));
+  const auto says = [&](const char* words) {
+    return rig.health.message.find(words) != std::string::npos;
+  };
+  EXPECT_TRUE(rig.until([&] {
+    return rig.health.reasons.contains("input_smaller") &&
+           says("% of its width, for the budget of 0 ms") && says("ms old");
+  })) << rig.health.message;
 }
 
 TEST(InferenceService, ABudgetThatIsKeptLeavesTheInputAlone) {

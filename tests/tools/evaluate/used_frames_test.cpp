@@ -6,7 +6,7 @@
 #include <CLI/CLI.hpp>
 
 #include "tests/common/replay/tiny_datasets.h"
-#include "tools/evaluate/command.h"
+#include "tools/perdure/commands.h"
 
 namespace perdure::tools {
 namespace {
@@ -66,9 +66,9 @@ nlohmann::json judged(const fs::path& run, const fs::path& drive) {
   }
   writeText(run / "trajectory.tum", tum);
   CLI::App app;
-  addEvaluateCommand(app);
+  setUpEvaluate(app);
   ::testing::internal::CaptureStdout();
-  app.parse("evaluate trajectory " + (run / "trajectory.tum").string() + " --truth " +
+  app.parse("trajectory " + (run / "trajectory.tum").string() + " --truth " +
             drive.string() + " --json");
   std::fflush(stdout);
   return nlohmann::json::parse(::testing::internal::GetCapturedStdout());
@@ -78,13 +78,13 @@ TEST(EvaluateCommand, NamesItsOwnOptionWhereATrajectoryIsMissing) {
   const auto run = replay::freshFolder("no_trajectory");
   const auto error = [&](const std::string& line) {
     CLI::App app;
-    addEvaluateCommand(app);
+    setUpEvaluate(app);
     return startupErrorOf([&] { app.parse(line); });
   };
   const std::string tum = (run / "trajectory.tum").string();
-  EXPECT_THAT(error("evaluate trajectory " + tum + " --truth " + tum), HasSubstr("--truth takes"));
+  EXPECT_THAT(error("trajectory " + tum + " --truth " + tum), HasSubstr("--truth takes"));
   writeText(run / "truth.tum", "0 0 0 0 0 0 0 1\n");
-  EXPECT_THAT(error("evaluate trajectory " + tum + " --truth " + (run / "truth.tum").string()),
+  EXPECT_THAT(error("trajectory " + tum + " --truth " + (run / "truth.tum").string()),
               HasSubstr("`perdure pipeline` writes"));
 }
 

@@ -16,8 +16,8 @@
 #include "common/replay/files/text_file.h"
 #include "common/replay/recordings/recorded_messages.h"
 #include "tests/common/replay/tiny_datasets.h"
-#include "tools/evaluate/command.h"
 #include "tools/evaluate/object_rows.h"
+#include "tools/perdure/commands.h"
 #include "tools/pipeline/report.h"
 
 namespace perdure::tools {
@@ -245,8 +245,8 @@ void labelStreet(const fs::path& street) {
 
 void evaluateObjects(const PipelineOptions& options) {
   CLI::App app;
-  addEvaluateCommand(app);
-  app.parse("evaluate objects " + options.out + "/objects_final.csv --sequence 0000 --truth " +
+  setUpEvaluate(app);
+  app.parse("objects " + options.out + "/objects_final.csv --sequence 0000 --truth " +
             options.data + " --image-size 1242 375 --json");
 }
 

@@ -66,7 +66,7 @@ class NpmReader : public testing::Test {
     test::Child npm({"env", "npm", "install", "--prefix", place.file(""), "--no-audit", "--no-fund",
                      "--ignore-scripts", "--fetch-retries=0", "--fetch-timeout=10000"},
                     place.file("npm.log"));
-    return npm.wait(60s) == 0 ? "" : "npm or its registry is absent: " + npm.log();
+    return npm.wait(60s) == 0 ? "" : "npm or its registry is absent (deploy/install --page): " + npm.log();
   }
 
   static void SetUpTestSuite() {

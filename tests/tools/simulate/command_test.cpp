@@ -1,6 +1,4 @@
 // Tests the command line of `perdure simulate`.
-#include "tools/simulate/command.h"
-
 #include <gtest/gtest.h>
 
 #include <CLI/CLI.hpp>
@@ -9,15 +7,16 @@
 
 #include "common/base/errors.h"
 #include "common/sim/scene.h"
+#include "tools/perdure/commands.h"
 
 namespace perdure::tools {
 namespace {
 
 ExitCode exitOf(const std::string& arguments) {
   CLI::App app("perdure");
-  addSimulateCommand(app);
+  setUpSimulate(app);
   try {
-    app.parse("simulate " + arguments);
+    app.parse(arguments);
   } catch (const StartupError& error) {
     return error.code();
   } catch (const CLI::ParseError& error) {

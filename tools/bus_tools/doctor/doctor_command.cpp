@@ -8,9 +8,9 @@
 #include <optional>
 
 #include "common/base/errors.h"
-#include "tools/bus_tools/command.h"
 #include "tools/bus_tools/common.h"
 #include "tools/bus_tools/doctor/doctor.h"
+#include "tools/perdure/commands.h"
 
 namespace perdure::tools {
 namespace {
@@ -123,65 +123,63 @@ std::string toText(const Findings& findings) {
   return text;
 }
 
-void addDoctorCommand(CLI::App& app) {
-  CLI::App* command = app.add_subcommand(
-      "doctor", "check host, bus and services: a line each with OK, WARN or FAIL and the mend");
+void setUpDoctor(CLI::App& command) {
   auto options = std::make_shared<DoctorOptions>();
   // An unset shell variable must not select the default check.
   const CLI::Validator not_empty(
       [](const std::string& text) { return std::string(text.empty() ? "is empty" : ""); }, "");
-  command->add_option("--seconds", options->seconds, "how long to listen to the bus")
+  command.add_option("--seconds", options->seconds, "how long to listen to the bus")
       ->capture_default_str();
-  command->add_option("--data-dir", options->folders, "a folder that the services write to");
+  command.add_option("--data-dir", options->folders, "a folder that the services write to");
   command
-      ->add_option("--config-dir", options->configuration,
-                   "folder of the services' configuration: /etc/perdure, else config")
+      .add_option("--config-dir", options->configuration,
+                  "folder of the services' configuration: /etc/perdure, else config")
       ->capture_default_str();
-  command->add_option("--shared-memory-mb", options->bus.shared_memory_mb,
-                      "check RouDi as if bus.shared_memory_mb were this");
+  command.add_option("--shared-memory-mb", options->bus.shared_memory_mb,
+                     "check RouDi as if bus.shared_memory_mb were this");
   command
-      ->add_option("--report", options->report,
-                   "pack what a maintainer asks for: versions, host, configuration, status, "
-                   "five seconds of Health, journal")
+      .add_option("--report", options->report,
+                  "pack what a maintainer asks for: versions, host, configuration, status, "
+                  "five seconds of Health, journal")
       ->type_name("FILE.tar.gz");
   command
-      ->add_option("--data", options->drive.data,
-                   "judge a rig by this recording instead (dataset folder or .mcap with images): "
-                   "vio runs over it, and its innovations tell")
+      .add_option("--data", options->drive.data,
+                  "judge a rig by this recording instead (dataset folder or .mcap with images): "
+                  "vio runs over it, and its innovations tell")
       ->check(not_empty)
       ->type_name("DRIVE");
   command
-      ->add_option("--sequence", options->drive.sequence,
-                   "of a KITTI tracking folder, for example 0000, or a 7-Scenes one, for example "
-                   "seq-01")
+      .add_option("--sequence", options->drive.sequence,
+                  "of a KITTI tracking folder, for example 0000, or a 7-Scenes one, for example "
+                  "seq-01")
       ->type_name("NAME");
-  command->add_option("--rig", options->drive.rig,
-                      "the rig file to judge; the recording's own calibration where not given");
+  command.add_option("--rig", options->drive.rig,
+                     "the rig file to judge; the recording's own calibration where not given");
   command
-      ->add_option("--poses", options->drive.poses,
-                   "with --data: a file of another program's poses, as --odometry of perdure "
-                   "pipeline takes it, compared with images and inertial samples")
+      .add_option("--poses", options->drive.poses,
+                  "with --data: a file of another program's poses, as --odometry of perdure "
+                  "pipeline takes it, compared with images and inertial samples")
       ->check(not_empty)
       ->type_name("FILE");
   command
-      ->add_option("--fix", options->copy,
-                   "with --data: a new folder for a copy with what is sure mended (units, columns "
-                   "exchanged, T_BS the wrong way round, order and stamps, the rig of --rig)")
+      .add_option("--fix", options->copy,
+                  "with --data: a new folder for a copy with what is sure mended (units, columns "
+                  "exchanged, T_BS the wrong way round, order and stamps, the rig of --rig)")
       ->check(not_empty)
       ->type_name("FOLDER");
   command
-      ->add_option("--model", options->network,
-                   "with --data: the network whose input is compared with the camera's shape; "
-                   "model.path of inference.yaml where not given")
+      .add_option("--model", options->network,
+                  "with --data: the network whose input is compared with the camera's shape; "
+                  "model.path of inference.yaml where not given")
       ->type_name("FILE");
   command
-      ->add_option("--rig-seconds", options->rig_seconds,
-                   "of the recording by which the rig is judged; until it is surely good, and 60 "
-                   "at most, where not given")
+      .add_option("--rig-seconds", options->rig_seconds,
+                  "of the recording by which the rig is judged; until it is surely good, and 60 "
+                  "at most, where not given")
       ->check(CLI::Range(5.0, 3600.0));
-  command->add_flag("--images", options->images, "with an image of each camera in the report");
-  addBusOptions(*command, options->bus);
-  command->callback([options] { runDoctor(*options); });
+  command.add_flag("--images", options->images, "with an image of each camera in the report");
+  addBusOptions(command, options->bus);
+  command.callback([options] { runDoctor(*options); });
 }
 
 }  // namespace perdure::tools

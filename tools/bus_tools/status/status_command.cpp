@@ -5,9 +5,9 @@
 #include <iostream>
 #include <memory>
 
-#include "tools/bus_tools/command.h"
 #include "tools/bus_tools/common.h"
 #include "tools/bus_tools/status/status_watch.h"
+#include "tools/perdure/commands.h"
 
 namespace perdure::tools {
 namespace {
@@ -64,21 +64,18 @@ void runStatus(StatusOptions options) {
 
 }  // namespace
 
-void addStatusCommand(CLI::App& app) {
-  CLI::App* command = app.add_subcommand(
-      "status", "services, sensors, topics and the host as one tree; the worst state dominates");
+void setUpStatus(CLI::App& command) {
   auto options = std::make_shared<StatusOptions>();
-  command->footer(kStatusHelp);
-  command->add_option("--seconds", options->seconds, "how long to listen before it is judged")
+  command.footer(kStatusHelp);
+  command.add_option("--seconds", options->seconds, "how long to listen before it is judged")
       ->check(CLI::Range(1.0, 3600.0))
       ->capture_default_str();
-  command->add_flag("--watch", options->watch, "twice a second, until Ctrl-C");
-  command->add_flag("--json", options->json, "for programs; with --watch one line each time");
-  command->add_option(
-      "--data-dir", options->folders,
-      "folder whose disk must have room; default: /var/lib/perdure where it exists");
-  addBusOptions(*command, options->bus);
-  command->callback([options] { runStatus(*options); });
+  command.add_flag("--watch", options->watch, "twice a second, until Ctrl-C");
+  command.add_flag("--json", options->json, "for programs; with --watch one line each time");
+  command.add_option("--data-dir", options->folders,
+                     "folder whose disk must have room; default: /var/lib/perdure where it exists");
+  addBusOptions(command, options->bus);
+  command.callback([options] { runStatus(*options); });
 }
 
 }  // namespace perdure::tools

@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/algorithms/stable_sort.h"
 #include "common/math/gaussian.h"
 #include "common/math/small_cholesky.h"
+#include "services/semantic_filter/core/belief/classes/upper_part.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
-#include "services/semantic_filter/core/belief/classes/upper_part.h"
 
 namespace perdure::semantic_filter {
 
@@ -88,7 +89,7 @@ void toBelief(const Track& track, const ClassPriors& priors, double min_speed,
     toClassBelief(track, priors.of(*names[i]), *names[i], belief.classes[i]);
   const auto likelier = [](const auto& a, const auto& b) { return a.probability > b.probability; };
   if (!std::is_sorted(belief.classes.begin(), belief.classes.end(), likelier)) {
-    std::stable_sort(belief.classes.begin(), belief.classes.end(), likelier);
+    stableSortBy(belief.classes, [](const ClassBelief& c) { return -c.probability; });
   }
   belief.visibility = track.visibility.state;
   belief.visible_fraction = track.visibility.fraction;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/algorithms/stable_sort.h"
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/association/box_explanation.h"
@@ -145,8 +146,7 @@ ScratchVector<Candidate> candidates(const BoxDetection& detection, const FrameCo
     prior.name = name;
     all.push_back({prior, std::log(prior.frequency) + logRatio(detection, *frame.model, name)});
   }
-  std::stable_sort(all.begin(), all.end(),
-                   [](const auto& a, const auto& b) { return a.log_weight > b.log_weight; });
+  stableSortBy(all, [](const Candidate& c) { return -c.log_weight; });
   const auto& initiation = frame.parameters->initiation;
   const auto limit = static_cast<std::size_t>(initiation.max_classes);
   if (all.size() > limit) all.resize(limit);
@@ -298,7 +298,7 @@ void initiateTracks(Belief& belief, const ScratchVector<TrackVisibility>& visibi
   std::move(initiated.begin(), initiated.end(), std::back_inserter(belief.tracks));
   const auto older = [](const auto& a, const auto& b) { return a.id < b.id; };
   if (!std::is_sorted(belief.tracks.begin(), belief.tracks.end(), older)) {
-    std::stable_sort(belief.tracks.begin(), belief.tracks.end(), older);
+    stableSortBy(belief.tracks, [](const Track& o) { return o.id; });
   }
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/base/algorithms/stable_sort.h"
 #include "common/math/gaussian.h"
 #include "common/math/small_cholesky.h"
 #include "common/math/so3.h"
@@ -55,11 +56,9 @@ std::vector<Track> confirmAndDelete(std::vector<Track>& tracks, const FrameConte
   });
   const auto limit = static_cast<std::size_t>(parameters.max_objects);
   if (tracks.size() <= limit) return deleted;
-  std::stable_sort(tracks.begin(), tracks.end(),
-                   [](const auto& a, const auto& b) { return a.existence > b.existence; });
+  stableSortBy(tracks, [](const Track& o) { return -o.existence; });
   tracks.resize(limit);
-  std::stable_sort(tracks.begin(), tracks.end(),
-                   [](const auto& a, const auto& b) { return a.id < b.id; });
+  stableSortBy(tracks, [](const Track& o) { return o.id; });
   return deleted;
 }
 

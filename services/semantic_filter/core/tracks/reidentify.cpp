@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "common/base/algorithms/stable_sort.h"
 #include "common/base/scratch.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
 #include "services/semantic_filter/core/smoothing/keyframes.h"
@@ -165,8 +166,7 @@ std::vector<MergeRecord> reidentify(std::vector<Track>& tracks,
   const auto given_up = [](const Track& o) { return o.hypotheses.empty(); };
   std::erase_if(tracks, given_up);
   std::erase_if(recently_deleted, given_up);
-  std::stable_sort(tracks.begin(), tracks.end(),
-                   [](const Track& a, const Track& b) { return a.id < b.id; });
+  stableSortBy(tracks, [](const Track& o) { return o.id; });
   return merges;
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "common/base/algorithms/stable_sort.h"
 #include "common/math/so3.h"
 #include "services/vio/core/start/epipolar_bias.h"
 #include "services/vio/core/start/initialiser.h"
@@ -109,9 +110,7 @@ std::vector<WindowPoint> windowPoints(const std::vector<const TrackedFrame*>& tr
   for (auto& [id, point] : tracks) {
     if (point.views.size() >= kFewestViews) points.push_back(std::move(point));
   }
-  std::stable_sort(points.begin(), points.end(), [](const WindowPoint& a, const WindowPoint& b) {
-    return a.views.size() > b.views.size();
-  });
+  stableSortBy(points, [](const WindowPoint& p) { return -static_cast<double>(p.views.size()); });
   if (points.size() > kMostPoints) points.resize(kMostPoints);
   return points;
 }

@@ -6,6 +6,8 @@
 #include <array>
 #include <utility>
 
+#include "common/base/algorithms/stable_sort.h"
+
 namespace perdure::vio {
 namespace {
 
@@ -50,15 +52,13 @@ Result<Minima> refineAll(std::vector<MotionWindow> beginnings, const ImuBuffer& 
     }
   }
   if (minima.empty()) return failed;
-  std::stable_sort(minima.begin(), minima.end(),
-                   [](const auto& a, const auto& b) { return a.cost < b.cost; });
+  stableSortBy(minima, [](const RefinedWindow& m) { return m.cost; });
   return minima;
 }
 
 /// Keeps the lowest cost of each group of equal minima.
 void keepApart(Minima& minima) {
-  std::stable_sort(minima.begin(), minima.end(),
-                   [](const auto& a, const auto& b) { return a.cost < b.cost; });
+  stableSortBy(minima, [](const RefinedWindow& m) { return m.cost; });
   for (auto i = minima.begin(); i != minima.end(); ++i) {
     const auto same = [&](const RefinedWindow& m) { return !apart(*i, m, kSame); };
     minima.erase(std::remove_if(i + 1, minima.end(), same), minima.end());

@@ -1,6 +1,4 @@
 // Tests the command `perdure evaluate memory` on a hand-made folder of five frames.
-#include "tools/evaluate/command.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,6 +7,7 @@
 
 #include "common/base/errors.h"
 #include "tests/common/replay/tiny_datasets.h"
+#include "tools/perdure/commands.h"
 
 namespace perdure::tools {
 namespace {
@@ -57,8 +56,8 @@ fs::path tinyRun(const fs::path& root, const std::string& name) {
 
 void call(std::vector<std::string> arguments) {
   CLI::App app;
-  addEvaluateCommand(app);
-  arguments.insert(arguments.begin(), {"evaluate", "memory"});
+  setUpEvaluate(app);
+  arguments.insert(arguments.begin(), "memory");
   std::reverse(arguments.begin(), arguments.end());
   app.parse(arguments);
 }

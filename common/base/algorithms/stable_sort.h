@@ -1,0 +1,41 @@
+// Stable sorting of large elements by a key. Only keys are compared, and each element moves once.
+// std::stable_sort of such elements takes long to compile and moves each element several times.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "common/base/scratch.h"
+
+namespace perdure {
+
+/// Indices in order of increasing key. Equal keys keep their order.
+ScratchVector<std::size_t> stableOrder(const ScratchVector<double>& keys);
+ScratchVector<std::size_t> stableOrder(const ScratchVector<std::uint64_t>& keys);
+
+/// `keyOf` returns a double or a std::uint64_t for an element.
+template <class T, class Allocator, class KeyOf>
+void stableSortBy(std::vector<T, Allocator>& elements, const KeyOf& keyOf) {
+  ScratchVector<decltype(keyOf(std::as_const(elements).front()))> keys;
+  keys.reserve(elements.size());
+  for (const T& element : elements) keys.push_back(keyOf(element));
+  ScratchVector<std::size_t> from = stableOrder(keys);
+  // Moves the elements of each cycle of the permutation. The first element waits until its place is
+  // free.
+  for (std::size_t first = 0; first < from.size(); ++first) {
+    if (from[first] == first) continue;
+    T waiting = std::move(elements[first]);
+    std::size_t to = first;
+    for (std::size_t next = from[to]; next != first; next = from[to]) {
+      elements[to] = std::move(elements[next]);
+      from[to] = to;
+      to = next;
+    }
+    elements[to] = std::move(waiting);
+    from[to] = to;
+  }
+}
+
+}  // namespace perdure

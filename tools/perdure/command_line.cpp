@@ -1,0 +1,57 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <exception>
+#include <iostream>
+#include <string>
+
+#include "common/base/check.h"
+#include "common/base/errors.h"
+#include "tools/perdure/commands.h"
+
+namespace perdure::tools {
+namespace {
+
+/// Checks that all output was written. A full disk or a closed file is an error.
+int checkedOutput(int status) {
+  errno = 0;
+  std::cout.flush();
+  const bool written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good();
+  if (written || status != static_cast<int>(ExitCode::kOk)) return status;
+  std::cerr << "perdure: standard output could not be written whole"
+            << (errno != 0 ? std::string(" (") + std::strerror(errno) + ")" : std::string())
+            << "; free space, or send it elsewhere" << std::endl;
+  return static_cast<int>(ExitCode::kInputOutput);
+}
+
+int run(CLI::App& app, int argc, char** argv) {
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::RuntimeError& error) {
+    return error.get_exit_code();
+  } catch (const CLI::ParseError& error) {
+    const bool asked_for_help = app.exit(error) == 0;
+    return static_cast<int>(asked_for_help ? ExitCode::kOk : ExitCode::kUsage);
+  } catch (const StartupError& error) {
+    std::cerr << "perdure: " << error.what() << std::endl;
+    return static_cast<int>(error.code());
+  } catch (const std::exception& error) {
+    std::cerr << "perdure: " << error.what() << std::endl;
+    return static_cast<int>(ExitCode::kFailure);
+  }
+  return static_cast<int>(ExitCode::kOk);
+}
+
+}  // namespace
+
+int runCommand(const char* name, void (*set_up)(CLI::App&), int argc, char** argv) {
+  const auto entry = std::ranges::find(commands(), std::string(name), &CommandEntry::name);
+  check(entry != commands().end(), "a subcommand has a line in tools/perdure/commands.cpp");
+  CLI::App app(entry->summary, std::string("perdure ") + name);
+  set_up(app);
+  return checkedOutput(run(app, argc, argv));
+}
+
+}  // namespace perdure::tools

@@ -1,0 +1,48 @@
+// The subcommands of `perdure`. Each has its own executable in libexec/perdure, which the
+// CMakeLists.txt of its folder declares with perdure_command.
+#pragma once
+
+#include <filesystem>
+#include <span>
+
+namespace CLI {
+class App;
+}
+
+namespace perdure::tools {
+
+struct CommandEntry {
+  const char* name;
+  const char* summary;
+};
+
+/// In the order of `perdure --help`.
+std::span<const CommandEntry> commands();
+
+/// Each adds the options of its subcommand, and nested subcommands.
+void setUpCalibrate(CLI::App& command);
+void setUpDemo(CLI::App& command);
+void setUpDetect(CLI::App& command);
+void setUpDoctor(CLI::App& command);
+void setUpEcho(CLI::App& command);
+void setUpEnv(CLI::App& command);
+void setUpEvaluate(CLI::App& command);
+void setUpHz(CLI::App& command);
+void setUpInference(CLI::App& command);
+void setUpMap(CLI::App& command);
+void setUpModel(CLI::App& command);
+void setUpPipeline(CLI::App& command);
+void setUpPlay(CLI::App& command);
+void setUpRecord(CLI::App& command);
+void setUpSecurity(CLI::App& command);
+void setUpSimulate(CLI::App& command);
+void setUpStatus(CLI::App& command);
+void setUpTopics(CLI::App& command);
+
+/// The main function of a subcommand's executable. Returns the exit status.
+int runCommand(const char* name, void (*set_up)(CLI::App&), int argc, char** argv);
+
+/// The folder of `perdure` and the services, for a subcommand's executable.
+std::filesystem::path programFolder();
+
+}  // namespace perdure::tools
