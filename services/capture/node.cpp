@@ -5,7 +5,7 @@
 namespace perdure::capture {
 namespace {
 
-TimePoint timeOf(const replay::Message& message) {
+TimePoint stampOf(const replay::Message& message) {
   if (const auto* frame = std::get_if<Frame>(&message)) return frame->stamp.time;
   if (const auto* imu = std::get_if<ImuSample>(&message)) return imu->time;
   return std::get<SpeedSample>(message).time;
@@ -69,7 +69,7 @@ Duration Node::waitFor(TimePoint time, bool image, std::uint64_t sequence, std::
 
 Duration Node::tick(std::int64_t now_ns) {
   if (!pending_) return Duration::max();
-  const TimePoint time = timeOf(*pending_);
+  const TimePoint time = stampOf(*pending_);
   const auto* frame = std::get_if<Frame>(&*pending_);
   const std::uint64_t sequence = frame ? frame->stamp.sequence : 0;
   if (!begun_) {
@@ -90,7 +90,7 @@ Duration Node::tick(std::int64_t now_ns) {
 void Node::give(std::int64_t now_ns) {
   replay::Message message = *std::move(pending_);
   pending_.reset();
-  state_.last_ns = std::max(state_.last_ns, toNanoseconds(timeOf(message)));
+  state_.last_ns = std::max(state_.last_ns, toNanoseconds(stampOf(message)));
   if (auto* frame = std::get_if<Frame>(&message)) {
     giveFrame(std::move(*frame), now_ns);
   } else if (const auto* imu = std::get_if<ImuSample>(&message)) {

@@ -106,7 +106,7 @@ NOTES = {
     "MapLoopPair": "Two objects that a loop found to be one: of the map, and seen then.",
     "MapNear": "All that the map knows of the surroundings of the body, for the filter.",
     "Member": "A track that belongs to an object with another id.",
-    "EndedTrack": "A confirmed track that ended: it was merged into another one, or is gone.",
+    "EndedTrack": "A track that ended: it was merged into another one, or its object is gone.",
     "Ledger": "The evidence for an object: its sums are what is believed.",
     "Health": "How a process is, once a second.",
     "Health.rate_hz": "Hz, of frames_out",
