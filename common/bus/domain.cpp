@@ -18,7 +18,7 @@ namespace {
 
 /// Highest index of a participant without multicast. It limits the number of processes on one host.
 constexpr int kMaxParticipantIndex = 60;
-constexpr double kMostSharedMemory = 256;  // MB; wire/description/bounds.h allows no larger images
+constexpr double kMostSharedMemory = 256;  // MB; common/types/description.h allows no larger images
 
 std::string loopbackXml() {
   // Unicast only. Fragments and buffers are large, because no data can be lost between hosts.

@@ -65,7 +65,7 @@ QosPtr writerQos(const Qos& qos, const WriterOptions& options, const SharedMemor
 
 const TopicInfo& infoOf(const std::string& topic) {
   const TopicInfo* info = findTopic(topic);
-  check(info != nullptr, "a topic stands in the table of common/bus/topics.cpp");
+  check(info != nullptr, "a topic stands in the list of common/wire/topics.h");
   return *info;
 }
 

@@ -119,7 +119,7 @@ Context::Context(const std::string& process, const bus::Domain& domain,
       domain_(domain),
       participant_(domain_, process),
       health_(process, instance_),
-      health_writer_(participant_, bus::topics::kHealth),
+      health_writer_(participant_, bus::kTopic<Health>),
       loop_(participant_) {
   countReasons([this](ReasonCounts& counts) {
     health_writer_.report(counts);

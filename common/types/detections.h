@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/base/ids.h"
+#include "common/types/description.h"
 
 namespace perdure {
 
@@ -100,3 +101,70 @@ struct SwapNotice {
 };
 
 }  // namespace perdure
+
+namespace perdure::wire {
+
+template <class A, class D, class W>
+void describeBox(A& a, D& d, W& w) {
+  a.number("x1", d.x1, w[0], kPixel);
+  a.number("y1", d.y1, w[1], kPixel);
+  a.number("x2", d.x2, w[2], kPixel);
+  a.number("y2", d.y2, w[3], kPixel);
+  a.ensure("box", "out_of_range", [&] { return d.x1 < d.x2 && d.y1 < d.y2; });
+}
+
+template <class A, Is<Detection> D, class W>
+void describe(A& a, D& d, W& w) {
+  describeBox(a, d.box, w.corners);
+  a.numbers("activations", d.activations, w.activations, kLogit, kClasses + 1);
+  a.optionalNumber("azimuth", d.azimuth, w.has_azimuth, w.azimuth, kAngle);
+  a.number("azimuth_sigma", d.azimuth_sigma, w.azimuth_sigma, kNotNegative);
+  a.ensure("azimuth_sigma", "out_of_range", [&] { return !d.azimuth || d.azimuth_sigma > 0; });
+  a.value("primed", d.primed, w.primed);
+  a.number("sigma_x1", d.side_sigma[0], w.side_sigma[0], kNotNegative);
+  a.number("sigma_y1", d.side_sigma[1], w.side_sigma[1], kNotNegative);
+  a.number("sigma_x2", d.side_sigma[2], w.side_sigma[2], kNotNegative);
+  a.number("sigma_y2", d.side_sigma[3], w.side_sigma[3], kNotNegative);
+  a.value("primed_for", d.primed_for, w.primed_for);
+}
+
+template <class A, Is<Detections> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.object("stamp", d.stamp, w.stamp);
+  a.name("camera", d.camera, w.camera);
+  a.value("instance", d.instance, w.source);
+  a.value("model_hash", d.model_hash, w.model_hash);
+  a.list("detections", d.detections, w.items, kDetections);
+  a.number("input_scale", d.input_scale, w.input_scale, kInputScale);
+  a.number("forward_s", d.forward_s, w.forward_s, kNotNegative);
+}
+
+template <class A, Is<ModelInfo> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("hash", d.hash, w.model_hash);
+  a.value("instance", d.instance, w.source);
+  a.text("name", d.name, w.name, kTextLength);
+  a.names("classes", d.classes, w.classes, kClasses);
+  a.value("input_width", d.input_width, w.input_width);
+  a.value("input_height", d.input_height, w.input_height);
+  a.ensure("input_width", "out_of_range", [&] { return d.input_width <= kImageSide; });
+  a.ensure("input_height", "out_of_range", [&] { return d.input_height <= kImageSide; });
+  a.number("box_sigma", d.box_sigma, w.box_sigma, kNotNegative);
+  a.numbers("side_insets", d.side_insets, w.side_insets, kInset, 4 * kClasses);
+  a.ensure("side_insets", "size_mismatch",
+           [&] { return d.side_insets.empty() || d.side_insets.size() == 4 * d.classes.size(); });
+  a.choice("boxes", d.boxes, w.boxes, BoxExtent::kOutline);
+}
+
+template <class A, Is<SwapNotice> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("instance", d.instance, w.source);
+  a.value("about", d.about, w.about);
+  a.choice("step", d.step, w.step, SwapStep::kRetired);
+  a.number("probation_s", d.probation_s, w.probation_s, kNotNegative);
+  a.text("model", d.model, w.model, kTextLength);
+  a.text("reason", d.reason, w.reason, kNameLength);
+  a.text("detail", d.detail, w.detail, kTextLength);
+}
+
+}  // namespace perdure::wire

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "common/base/ids.h"
+#include "common/types/description.h"
 
 namespace perdure {
 
@@ -25,3 +26,23 @@ struct Health {
 };
 
 }  // namespace perdure
+
+namespace perdure::wire {
+
+template <class A, Is<Health> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.name("process", d.process, w.process);
+  a.value("instance", d.instance, w.source);
+  a.value("pid", d.pid, w.pid);
+  a.choice("state", d.state, w.state, HealthState::kFailed);
+  a.text("message", d.message, w.message, kTextLength);
+  a.value("frames_in", d.frames_in, w.frames_in);
+  a.value("frames_out", d.frames_out, w.frames_out);
+  a.value("dropped", d.dropped, w.dropped);
+  a.number("rate_hz", d.rate_hz, w.rate_hz, kNotNegative);
+  a.number("cpu_s", d.cpu_s, w.cpu_s, kNotNegative);
+  a.value("rss_bytes", d.rss_bytes, w.rss_bytes);
+  a.counts("reasons", d.reasons, w.reasons, kReasons);
+}
+
+}  // namespace perdure::wire

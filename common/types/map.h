@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/math/rigid_transform.h"
+#include "common/types/description.h"
 #include "common/types/objects.h"
 
 namespace perdure {
@@ -182,3 +183,147 @@ struct MapNear {
 };
 
 }  // namespace perdure
+
+namespace perdure::wire {
+
+template <class A, Is<MapObject> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("id", d.id, w.object_id);
+  a.ensure("id", "out_of_range", [&] { return d.id != 0; });
+  a.object("world", d.world, w.reference);
+  a.name("class_name", d.class_name, w.class_name);
+  a.probability("existence", d.existence, w.existence);
+  a.probability("class_probability", d.class_probability, w.class_probability);
+  a.matrix("mean", d.mean, w.mean, kCoordinate);
+  a.covariance("covariance", d.covariance, w.covariance);
+  a.time("first_seen_ns", d.first_seen, w.first_seen_ns);
+  a.time("last_seen_ns", d.last_seen, w.last_seen_ns);
+  a.value("hits", d.hits, w.hits);
+  a.choice("visibility", d.visibility, w.visibility, Visibility::kBehind);
+  a.choice("memory", d.memory, w.memory, Memory::kLongTerm);
+  a.value("provisional", d.provisional, w.provisional);
+}
+
+template <class A, Is<MapTile> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("x", d.x, w.x);
+  a.value("y", d.y, w.y);
+  a.value("part", d.part, w.part);
+  a.ensure("part", "out_of_range", [&] { return d.part >= 0; });
+  a.value("instance", d.instance, w.source);
+  a.value("revision", d.revision, w.revision);
+  a.list("objects", d.objects, w.items, kMapTileCapacity);
+}
+
+template <class A, Is<MapHeader> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("instance", d.instance, w.source);
+  a.value("revision", d.revision, w.revision);
+  a.number("tile_size_m", d.tile_size_m, w.tile_size_m, kPositive);
+  a.value("tiles", d.tiles, w.tile_count);
+  a.value("objects", d.objects, w.object_count);
+}
+
+template <class A, Is<MapFrame> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.object("stamp", d.stamp, w.stamp);
+  a.value("instance", d.instance, w.source);
+  a.object("world", d.world, w.reference);
+  a.object("map", d.map, w.map_reference);
+  a.pose("T_MW", d.T_MW, w.T_MW);
+  a.symmetric("covariance", d.covariance, w.covariance);
+  a.value("revision", d.revision, w.revision);
+  a.value("sessions", d.sessions, w.session_count);
+  a.value("loops", d.loops, w.loop_count);
+  a.value("anchors", d.anchors, w.anchor_count);
+}
+
+template <class A, Is<Member> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("track", d.track, w.track);
+  a.value("object", d.object, w.object);
+  a.ensure("object", "out_of_range", [&] { return d.track != 0 && d.object != 0; });
+}
+
+template <class A, Is<MapNear> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.object("stamp", d.stamp, w.stamp);
+  a.value("instance", d.instance, w.source);
+  a.value("client", d.client, w.client);
+  a.object("world", d.world, w.reference);
+  a.value("revision", d.revision, w.revision);
+  a.time("kept_ns", d.kept, w.kept_ns);
+  a.value("next_id", d.next_id, w.next_object_id);
+  a.value("corrects_drift", d.corrects_drift, w.corrects_drift);
+  a.value("more", d.more, w.more);
+  a.list("members", d.members, w.members, kObjects);
+  a.list("placed", d.placed, w.placed, kObjects);
+  a.list("as_published", d.as_published, w.as_published, kObjects);
+}
+
+template <class A, Is<MapQuery> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("client", d.client, w.client);
+  a.value("request", d.request, w.request);
+  a.choice("kind", d.kind, w.kind, MapQueryKind::kGraph);
+  a.value("object_id", d.object_id, w.object_id);
+  a.text("class_name", d.class_name, w.class_name, kNameLength);
+  a.matrix("low", d.low, w.low, kCoordinate);
+  a.matrix("high", d.high, w.high, kCoordinate);
+  a.number("radius", d.radius, w.radius, kNotNegative);
+  a.object("world", d.world, w.reference);
+  a.value("limit", d.limit, w.limit);
+}
+
+template <class A, Is<MapAnchor> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("id", d.id, w.anchor_id);
+  a.ensure("id", "out_of_range", [&] { return d.id != 0; });
+  a.value("previous", d.previous, w.previous);
+  a.object("session", d.session, w.session);
+  a.object("map", d.map, w.reference);
+  a.matrix("p", d.p, w.position, kCoordinate);
+  a.number("yaw", d.yaw, w.yaw, kAngle);
+  a.matrix("sigma", d.sigma, w.sigma, kNotNegative);
+  a.value("objects", d.objects, w.object_count);
+}
+
+template <class A, Is<MapLoopPair> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("known", d.known, w.known);
+  a.value("seen", d.seen, w.seen);
+}
+
+template <class A, Is<MapLoop> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("id", d.id, w.loop_id);
+  a.value("a", d.a, w.a);
+  a.value("b", d.b, w.b);
+  a.ensure("id", "out_of_range", [&] { return d.id != 0 && d.a != 0 && d.b != 0; });
+  a.choice("kind", d.kind, w.kind, MapLoopKind::kTie);
+  a.choice("state", d.state, w.state, MapLoopState::kWithdrawn);
+  a.matrix("residual", d.residual, w.residual, kCoordinate);
+  a.matrix("sigma", d.sigma, w.sigma, kNotNegative);
+  a.number("chi2", d.chi2, w.chi2, kNotNegative);
+  a.probability("weight", d.weight, w.weight);
+  a.list("pairs", d.pairs, w.pairs, kObjects);
+  a.value("landmarks", d.landmarks, w.landmark_count);
+}
+
+template <class A, Is<MapReply> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("client", d.client, w.client);
+  a.value("request", d.request, w.request);
+  a.value("instance", d.instance, w.source);
+  a.value("ok", d.ok, w.ok);
+  a.text("error", d.error, w.error, kTextLength);
+  a.value("truncated", d.truncated, w.truncated);
+  a.list("objects", d.objects, w.items, kReplyObjects);
+  a.list("beliefs", d.beliefs, w.beliefs, kObjects);
+  a.list("anchors", d.anchors, w.anchors, kReplyAnchors);
+  a.list("loops", d.loops, w.loops, kReplyAnchors);
+  a.value("anchor_count", d.anchor_count, w.anchor_count);
+  a.value("loop_count", d.loop_count, w.loop_count);
+}
+
+}  // namespace perdure::wire

@@ -10,6 +10,7 @@
 
 #include "common/base/ids.h"
 #include "common/math/rigid_transform.h"
+#include "common/types/description.h"
 
 namespace perdure {
 
@@ -60,3 +61,44 @@ struct Landmarks {
 };
 
 }  // namespace perdure
+
+namespace perdure::wire {
+
+template <class A, Is<Odometry> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.object("stamp", d.stamp, w.stamp);
+  a.value("instance", d.instance, w.source);
+  a.object("world", d.world, w.reference);
+  a.choice("state", d.state, w.state, OdometryState::kDegraded);
+  a.pose("T_WB", d.T_WB, w.T_WB);
+  a.matrix("v_WB", d.v_WB, w.v_WB, kSpeed);
+  a.symmetric("covariance", d.covariance, w.covariance);
+  a.unit("up_W", d.up_W, w.up_W);
+  a.matrix("gyro_bias", d.gyro_bias, w.gyro_bias, kAngularRate);
+  a.matrix("accel_bias", d.accel_bias, w.accel_bias, kAcceleration);
+  a.value("has_increment", d.has_increment, w.has_increment);
+  a.value("increment_from", d.increment_from, w.increment_from);
+  a.matrix("transition", d.transition, w.transition, kMatrixEntry);
+  a.symmetric("increment_covariance", d.increment_covariance, w.increment_covariance);
+}
+
+template <class A, Is<Landmark> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("id", d.id, w.landmark_id);
+  a.matrix("p_W", d.p_W, w.p_W, kCoordinate);
+  a.symmetric("covariance", d.covariance, w.covariance);
+  a.matrix("cross_pose", d.cross_pose, w.cross_pose, kMatrixEntry);
+  a.matrix("pixel", d.pixel, w.pixel, kPixel);
+  a.bytes("descriptor", d.descriptor, w.descriptor);
+}
+
+template <class A, Is<Landmarks> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.object("stamp", d.stamp, w.stamp);
+  a.value("instance", d.instance, w.source);
+  a.object("world", d.world, w.reference);
+  a.name("camera", d.camera, w.camera);
+  a.list("landmarks", d.landmarks, w.items, kLandmarks);
+}
+
+}  // namespace perdure::wire

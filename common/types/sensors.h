@@ -11,6 +11,7 @@
 #include "common/base/shared_bytes.h"
 #include "common/base/time.h"
 #include "common/math/rigid_transform.h"
+#include "common/types/description.h"
 
 namespace perdure {
 
@@ -105,3 +106,88 @@ struct Calibration {
 };
 
 }  // namespace perdure
+
+namespace perdure::wire {
+
+template <class A, Is<Frame> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.object("stamp", d.stamp, w.stamp);
+  a.name("camera", d.camera, w.camera);
+  a.value("width", d.width, w.width);
+  a.value("height", d.height, w.height);
+  a.choice("encoding", d.encoding, w.encoding, ImageEncoding::kJpegBgr8);
+  a.ensure("width", "out_of_range", [&] { return d.width >= 1 && d.width <= kImageSide; });
+  a.ensure("height", "out_of_range", [&] { return d.height >= 1 && d.height <= kImageSide; });
+  a.pixels("pixels", d, w);
+}
+
+template <class A, Is<ImuSample> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("source", d.source, w.source);
+  a.value("sequence", d.sequence, w.seq);
+  a.time("time_ns", d.time, w.time_ns);
+  a.matrix("gyro", d.gyro, w.gyro, kAngularRate);
+  a.matrix("accel", d.accel, w.accel, kAcceleration);
+}
+
+template <class A, Is<SpeedSample> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("source", d.source, w.source);
+  a.value("sequence", d.sequence, w.seq);
+  a.time("time_ns", d.time, w.time_ns);
+  a.number("speed", d.speed, w.speed, kSpeed);
+  a.number("sigma", d.sigma, w.sigma, kPositive);
+}
+
+template <class A, Is<CameraCalibration> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.name("name", d.name, w.name);
+  a.value("width", d.width, w.width);
+  a.value("height", d.height, w.height);
+  a.ensure("width", "out_of_range", [&] { return d.width >= 1 && d.width <= kImageSide; });
+  a.ensure("height", "out_of_range", [&] { return d.height >= 1 && d.height <= kImageSide; });
+  a.number("fx", d.fx, w.fx, kPositive);
+  a.number("fy", d.fy, w.fy, kPositive);
+  a.number("cx", d.cx, w.cx, kPixel);
+  a.number("cy", d.cy, w.cy, kPixel);
+  a.choice("distortion", d.distortion, w.distortion, DistortionModel::kRational);
+  a.numbers("distortion_coefficients", d.distortion_coefficients, w.coefficients, kMatrixEntry,
+            kCoefficients);
+  a.ensure("distortion_coefficients", "size_mismatch", [&] {
+    const std::size_t needed = coefficientsOf(d.distortion);
+    return d.distortion_coefficients.size() == needed || d.distortion_coefficients.empty();
+  });
+  a.pose("T_BC", d.T_BC, w.T_BC);
+  a.number("time_offset_s", d.time_offset_s, w.time_offset_s, kOffset);
+  a.number("readout_s", d.readout_s, w.readout_s, kOffset);
+  a.number("rate_hz", d.rate_hz, w.rate_hz, kNotNegative);
+}
+
+template <class A, Is<ImuCalibration> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.number("gyro_noise", d.gyro_noise, w.gyro_noise, kNotNegative);
+  a.number("gyro_bias_walk", d.gyro_bias_walk, w.gyro_bias_walk, kNotNegative);
+  a.number("accel_noise", d.accel_noise, w.accel_noise, kNotNegative);
+  a.number("accel_bias_walk", d.accel_bias_walk, w.accel_bias_walk, kNotNegative);
+  a.number("rate_hz", d.rate_hz, w.rate_hz, kNotNegative);
+}
+
+template <class A, Is<GeoAnchor> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.time("time_ns", d.time, w.time_ns);
+  a.number("latitude_deg", d.latitude_deg, w.latitude_deg, kLatitudeDeg);
+  a.number("longitude_deg", d.longitude_deg, w.longitude_deg, kLongitudeDeg);
+  a.number("height_m", d.height_m, w.height_m, kCoordinate);
+  a.number("yaw", d.yaw, w.yaw, kAngle);
+}
+
+template <class A, Is<Calibration> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("source", d.source, w.source);
+  a.list("cameras", d.cameras, w.cameras, kCameras);
+  a.optional("imu", d.imu, w.has_imu, w.imu);
+  a.value("has_speed", d.has_speed, w.has_speed);
+  a.optional("anchor", d.anchor, w.has_anchor, w.anchor);
+}
+
+}  // namespace perdure::wire

@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 #include <string_view>
 
+#include "common/types/description.h"
 #include "common/types/sensors.h"
-#include "common/wire/description/bounds.h"
 
 namespace perdure::wire {
 

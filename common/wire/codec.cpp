@@ -52,32 +52,15 @@ T decodeKey(const typename Type<T>::Wire& wire) {
   return value;
 }
 
-template <class T>
-struct Instances {
-  static constexpr auto kEncode = &encode<T>;
-  static constexpr auto kEncodeKey = &encodeKey<T>;
-  static constexpr auto kDecode = &decode<T>;
-  static constexpr auto kDecodeKey = &decodeKey<T>;
+template <class Rows>
+struct Instances;
+template <class... Rows>
+struct Instances<std::tuple<Rows...>> {
+  static constexpr std::tuple kEncode{&encode<typename Rows::Message>...};
+  static constexpr std::tuple kEncodeKey{&encodeKey<typename Rows::Message>...};
+  static constexpr std::tuple kDecode{&decode<typename Rows::Message>...};
+  static constexpr std::tuple kDecodeKey{&decodeKey<typename Rows::Message>...};
 };
-template struct Instances<Frame>;
-template struct Instances<ImuSample>;
-template struct Instances<SpeedSample>;
-template struct Instances<Calibration>;
-template struct Instances<Odometry>;
-template struct Instances<Landmarks>;
-template struct Instances<Detections>;
-template struct Instances<ModelInfo>;
-template struct Instances<SwapNotice>;
-template struct Instances<Objects>;
-template struct Instances<ObjectState>;
-template struct Instances<MapNear>;
-template struct Instances<Event>;
-template struct Instances<Predictions>;
-template struct Instances<MapTile>;
-template struct Instances<MapHeader>;
-template struct Instances<MapFrame>;
-template struct Instances<MapQuery>;
-template struct Instances<MapReply>;
-template struct Instances<Health>;
+template struct Instances<Topics>;
 
 }  // namespace perdure::wire

@@ -9,7 +9,7 @@
 
 #include "common/base/result.h"
 #include "common/wire/arena.h"
-#include "common/wire/description/types.h"
+#include "common/wire/topics.h"
 
 namespace perdure::wire {
 

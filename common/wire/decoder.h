@@ -4,7 +4,6 @@
 #include <cstring>
 
 #include "common/wire/checked.h"
-#include "common/wire/description/describe.h"
 
 namespace perdure::wire {
 

@@ -5,7 +5,6 @@
 
 #include "common/wire/arena.h"
 #include "common/wire/checked.h"
-#include "common/wire/description/describe.h"
 
 namespace perdure::wire {
 

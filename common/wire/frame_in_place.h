@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "common/wire/description/types.h"
+#include "idl/sensors.h"
 
 namespace perdure::wire {
 

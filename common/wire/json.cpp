@@ -2,8 +2,6 @@
 
 #include <cmath>
 
-#include "common/wire/description/describe.h"
-
 namespace perdure::wire {
 namespace {
 
@@ -145,25 +143,12 @@ Json toJson(const T& value) {
   return writer.take();
 }
 
-template Json toJson(const Frame&);
-template Json toJson(const ImuSample&);
-template Json toJson(const SpeedSample&);
-template Json toJson(const Calibration&);
-template Json toJson(const Odometry&);
-template Json toJson(const Landmarks&);
-template Json toJson(const Detections&);
-template Json toJson(const ModelInfo&);
-template Json toJson(const SwapNotice&);
-template Json toJson(const Objects&);
-template Json toJson(const ObjectState&);
-template Json toJson(const MapNear&);
-template Json toJson(const Event&);
-template Json toJson(const Predictions&);
-template Json toJson(const MapTile&);
-template Json toJson(const MapHeader&);
-template Json toJson(const MapFrame&);
-template Json toJson(const MapQuery&);
-template Json toJson(const MapReply&);
-template Json toJson(const Health&);
+template <class Rows>
+struct JsonInstances;
+template <class... Rows>
+struct JsonInstances<std::tuple<Rows...>> {
+  static constexpr std::tuple kToJson{&toJson<typename Rows::Message>...};
+};
+template struct JsonInstances<Topics>;
 
 }  // namespace perdure::wire

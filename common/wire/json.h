@@ -1,10 +1,10 @@
-// Messages as JSON for users and tools. Field names are those of describe.h in this folder. Times
-// are in nanoseconds, matrices are lists of rows, and pixels are only counted.
+// Messages as JSON for users and tools. Field names are those of the descriptions in common/types.
+// Times are in nanoseconds, matrices are lists of rows, and pixels are only counted.
 #pragma once
 
 #include <nlohmann/json.hpp>
 
-#include "common/wire/description/types.h"
+#include "common/wire/topics.h"
 
 namespace perdure::wire {
 

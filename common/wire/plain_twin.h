@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "common/wire/description/types.h"
+#include "dds/dds.h"
 
 namespace perdure::wire {
 

@@ -61,9 +61,9 @@ CameraSettings cameraSettings(const Config& config, const CameraCalibration& cam
 
 Live::Live(service::Context& context, const Config& config, const CameraOpeners& openers)
     : context_(context),
-      calibrations_(context.writer(bus::topics::kCalibration)),
-      imu_(context.sink(bus::topics::kImu)),
-      speed_(context.sink(bus::topics::kSpeed)),
+      calibrations_(context.writer(bus::kTopic<Calibration>)),
+      imu_(context.sink(bus::kTopic<ImuSample>)),
+      speed_(context.sink(bus::kTopic<SpeedSample>)),
       rig_(rigOf(config, context.instance(), unused_)),
       vehicle_(config.speed, config.gnss,
                {[this](const SpeedReading& reading) { offerOfVehicle(reading); },
@@ -80,7 +80,7 @@ void Live::openCameras(const Config& config, const CameraOpeners& openers) {
   constexpr std::chrono::milliseconds kLookForDue{2};
   std::vector<CameraSettings> settings;
   for (const CameraCalibration& camera : rig_.cameras) {
-    frames_[camera.name] = &context_.writer(bus::topics::frame(camera.name));
+    frames_[camera.name] = &context_.writer(bus::frameTopic(camera.name));
     settings.push_back(cameraSettings(config, camera));
   }
   cameras_ = std::make_unique<LiveCameras>(

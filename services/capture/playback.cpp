@@ -43,12 +43,12 @@ Playback::Playback(service::Context& context, const Config& config)
     calibration.cameras.resize(1);
   }
   for (const CameraCalibration& camera : calibration.cameras) {
-    frames_[camera.name] = &context_.writer(bus::topics::frame(camera.name));
+    frames_[camera.name] = &context_.writer(bus::frameTopic(camera.name));
   }
   outputs_ = outputs();
-  (void)context_.writer(bus::topics::kCalibration).write(calibration);
-  context_.on(bus::topics::kOdometry, [this](const Odometry& m) { credit("odometry", m.stamp); });
-  context_.on(bus::topics::kDetections,
+  (void)context_.writer(bus::kTopic<Calibration>).write(calibration);
+  context_.on(bus::kTopic<Odometry>, [this](const Odometry& m) { credit("odometry", m.stamp); });
+  context_.on(bus::kTopic<Detections>,
               [this](const Detections& m) { credit("detections", m.stamp); });
   context_.countReasons([this](ReasonCounts& counts) { report(counts); });
   context_.onHealth([this] { updateHealth(); });
@@ -57,7 +57,7 @@ Playback::Playback(service::Context& context, const Config& config)
 }
 
 Outputs Playback::outputs() {
-  return {context_.sink(bus::topics::kImu), context_.sink(bus::topics::kSpeed),
+  return {context_.sink(bus::kTopic<ImuSample>), context_.sink(bus::kTopic<SpeedSample>),
           [this](const Frame& frame) {
             const auto it = frames_.find(frame.camera);
             if (it != frames_.end() && it->second->write(frame) && frame.camera == "cam0") {

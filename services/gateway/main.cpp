@@ -22,7 +22,6 @@ using gateway::BytesOnDemand;
 using gateway::NewestOfBefore;
 using gateway::OnDemand;
 using gateway::ReaderOnDemand;
-namespace topics = bus::topics;
 namespace web = gateway::web;
 
 std::int64_t monotonicNs() {
@@ -59,12 +58,12 @@ std::vector<gateway::Figure> figuresOf(const web::Stats& stats,
 }
 
 void listenAlways(service::Context& context, gateway::Node& node) {
-  context.on(topics::kCalibration, [&](const Calibration& m) { node.onCalibration(m); });
-  context.on(topics::kModel, [&](const ModelInfo& m) { node.onModel(m); });
-  context.on(topics::kEvents, [&](const Event& m) { node.onEvent(m); });
-  context.on(topics::kHealth, [&](const Health& m) { node.onHealth(m, monotonicNs()); });
-  context.on(topics::kMapFrame, [&](const MapFrame& m) { node.onMapFrame(m); });
-  context.on(topics::kMapReply, [&](const MapReply& m) { node.onMapReply(m); });
+  context.on(bus::kTopic<Calibration>, [&](const Calibration& m) { node.onCalibration(m); });
+  context.on(bus::kTopic<ModelInfo>, [&](const ModelInfo& m) { node.onModel(m); });
+  context.on(bus::kTopic<Event>, [&](const Event& m) { node.onEvent(m); });
+  context.on(bus::kTopic<Health>, [&](const Health& m) { node.onHealth(m, monotonicNs()); });
+  context.on(bus::kTopic<MapFrame>, [&](const MapFrame& m) { node.onMapFrame(m); });
+  context.on(bus::kTopic<MapReply>, [&](const MapReply& m) { node.onMapReply(m); });
 }
 
 /// For the first viewer, waits briefly for the newest stored messages, and then sends the current
@@ -112,15 +111,15 @@ void listenToObjects(service::Context& context, gateway::Node& node, Beginning& 
                      std::vector<std::unique_ptr<OnDemand>>& readers) {
   gateway::Channels all;
   for (const auto& channel : gateway::channelTable(config.cameras)) all.insert(channel.id);
-  readers.push_back(std::make_unique<NewestOfBefore<Objects>>(context, topics::kObjects, all,
+  readers.push_back(std::make_unique<NewestOfBefore<Objects>>(context, bus::kTopic<Objects>, all,
                                                               [&](const Objects& m) {
                                                                 node.onObjectsOfBefore(m);
                                                                 beginning.heard();
                                                               }));
   readers.push_back(std::make_unique<ReaderOnDemand<Odometry>>(
-      context, topics::kOdometry, all,
+      context, bus::kTopic<Odometry>, all,
       [&](const Odometry& m) { node.onOdometry(m, monotonicNs()); }));
-  readers.push_back(std::make_unique<ReaderOnDemand<Objects>>(context, topics::kObjects, all,
+  readers.push_back(std::make_unique<ReaderOnDemand<Objects>>(context, bus::kTopic<Objects>, all,
                                                               [&](const Objects& m) {
                                                                 context.health().frameIn();
                                                                 node.onObjects(m, monotonicNs());
@@ -139,22 +138,22 @@ std::vector<std::unique_ptr<OnDemand>> listenOnDemand(service::Context& context,
     for_detections.insert(cameraChannel(i, kAnnotations));
     for_detections.insert(cameraChannel(i, kLikelihood));
     readers.push_back(std::make_unique<ReaderOnDemand<Frame>>(
-        context, topics::frame(config.cameras[i]), Channels{cameraChannel(i, kImage)},
+        context, bus::frameTopic(config.cameras[i]), Channels{cameraChannel(i, kImage)},
         [&node, i](const Frame& m) { node.onFrame(i, m); }));
     readers.push_back(std::make_unique<NewestOfBefore<Frame>>(
-        context, topics::frame(config.cameras[i]), Channels{cameraChannel(i, kImage)},
+        context, bus::frameTopic(config.cameras[i]), Channels{cameraChannel(i, kImage)},
         [&node, &beginning, i](const Frame& m) {
           beginning.afterwards([&node, i, m] { node.onFrameOfBefore(i, m); });
         }));
   }
   readers.push_back(std::make_unique<ReaderOnDemand<Detections>>(
-      context, topics::kDetections, for_detections,
+      context, bus::kTopic<Detections>, for_detections,
       [&](const Detections& m) { node.onDetections(m); }));
   readers.push_back(std::make_unique<ReaderOnDemand<Landmarks>>(
-      context, topics::kLandmarks, Channels{kLandmarks},
+      context, bus::kTopic<Landmarks>, Channels{kLandmarks},
       [&](const Landmarks& m) { node.onLandmarks(m); }));
   readers.push_back(std::make_unique<ReaderOnDemand<MapTile>>(
-      context, topics::kMap, Channels{kMap, kMapScene},
+      context, bus::kTopic<MapTile>, Channels{kMap, kMapScene},
       [&](const MapTile& m) { node.onMapTile(m); },
       [&](const MapTile& key) { node.onMapTileGone(key); }));
   return readers;
@@ -230,7 +229,7 @@ void serve(service::Context& context, const gateway::Config& config, const std::
                             mail.calls.push_back(std::move(call));
                             context.loop().wake();
                           }});
-  auto& questions = context.writer(topics::kMapQuery);
+  auto& questions = context.writer(bus::kTopic<MapQuery>);
   gateway::Node node(config, vehicle, context.instance(),
                      {.message = [&](const gateway::Encoded& message) { server.publish(message); },
                       .time = [&](const TimePoint& time) { server.tellTime(time); },

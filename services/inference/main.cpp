@@ -15,13 +15,13 @@ void run(service::Context& context, const inference::Config& config) {
                      node.model().classes.size(), toHex(node.model().hash), node.backend());
   const auto& ownership = config.ownership;
   const double lease_s = inference::leaseSeconds(ownership);
-  auto& detections = context.writer(bus::topics::kDetections,
+  auto& detections = context.writer(bus::kTopic<Detections>,
                                     {inference::Worker::firstStrength(ownership), lease_s});
-  auto& notices = context.writer(bus::topics::kSwap);
-  (void)context.writer(bus::topics::kModel).write(node.model());
+  auto& notices = context.writer(bus::kTopic<SwapNotice>);
+  (void)context.writer(bus::kTopic<ModelInfo>).write(node.model());
   inference::Worker* worker = nullptr;  // set before handlers use it in context.run()
   const auto& rivals =
-      context.on(bus::topics::kDetections, [&](const Detections& heard) { worker->heard(heard); });
+      context.on(bus::kTopic<Detections>, [&](const Detections& heard) { worker->heard(heard); });
   inference::Worker the_worker(node, ownership, config.model.budget_ms,
                                {detections, rivals, notices}, context.health(),
                                [&] { context.stop(); });
@@ -29,10 +29,10 @@ void run(service::Context& context, const inference::Config& config) {
 
   ReasonCounts lost;
   bus::Gaps gaps;
-  context.on(bus::topics::kModel, [&](const ModelInfo& model) { worker->learn(model); });
-  context.on(bus::topics::kSwap, [&](const SwapNotice& notice) { worker->told(notice); });
+  context.on(bus::kTopic<ModelInfo>, [&](const ModelInfo& model) { worker->learn(model); });
+  context.on(bus::kTopic<SwapNotice>, [&](const SwapNotice& notice) { worker->told(notice); });
   auto& frames = context.needs("frames", "mend the camera, or start capture");
-  context.on(bus::topics::frame(config.detection.camera), [&](const Frame& frame) {
+  context.on(bus::frameTopic(config.detection.camera), [&](const Frame& frame) {
     frames.heard();
     const auto missed = gaps.before(frame.stamp.source, frame.stamp.sequence);
     if (missed > 0) lost.add("frames_missed", missed);
@@ -43,7 +43,7 @@ void run(service::Context& context, const inference::Config& config) {
     }
   });
   context.countReasons([&]() -> const ReasonCounts& { return lost; });
-  context.on(bus::topics::kPredictions, [&](const Predictions& m) { worker->expect(m); });
+  context.on(bus::kTopic<Predictions>, [&](const Predictions& m) { worker->expect(m); });
   context.every(durationFromSeconds(lease_s / 5), [&] { worker->assertAlive(); });
   constexpr std::chrono::seconds kHangs{10};  // longer than any network needs for a frame
   context.watch([&] { return worker->goesOn(kHangs); });

@@ -12,7 +12,6 @@
 namespace {
 
 using namespace perdure;
-namespace topics = bus::topics;
 
 /// The fleet's server: it receives each commit, and the log and Health report the progress. Does
 /// nothing if `store.url` is empty.
@@ -59,26 +58,26 @@ class FleetServer {
 };
 
 void serve(service::Context& context, const map_store::Config& config) {
-  auto& tiles = context.writer(topics::kMap);
+  auto& tiles = context.writer(bus::kTopic<MapTile>);
   map_store::Node node(config, context.instance(),
                        {.tile = [&](const MapTile& tile) { (void)tiles.write(tile); },
                         .emptied = [&](const MapTile& key) { (void)tiles.dispose(key); },
-                        .header = context.sink(topics::kMapHeader),
-                        .reply = context.sink(topics::kMapReply),
-                        .near = context.sink(topics::kMapNear),
-                        .frame = context.sink(topics::kMapFrame),
-                        .event = context.sink(topics::kEvents)});
-  context.on(topics::kCalibration, [&](const Calibration& m) { node.onCalibration(m); });
-  context.on(topics::kOdometry, [&](const Odometry& odometry) { node.onOdometry(odometry); });
-  context.on(topics::kLandmarks, [&](const Landmarks& seen) { node.onLandmarks(seen); });
+                        .header = context.sink(bus::kTopic<MapHeader>),
+                        .reply = context.sink(bus::kTopic<MapReply>),
+                        .near = context.sink(bus::kTopic<MapNear>),
+                        .frame = context.sink(bus::kTopic<MapFrame>),
+                        .event = context.sink(bus::kTopic<Event>)});
+  context.on(bus::kTopic<Calibration>, [&](const Calibration& m) { node.onCalibration(m); });
+  context.on(bus::kTopic<Odometry>, [&](const Odometry& odometry) { node.onOdometry(odometry); });
+  context.on(bus::kTopic<Landmarks>, [&](const Landmarks& seen) { node.onLandmarks(seen); });
   auto& heard =
       context.needs("objects", "semantic_filter's Health says why, or start semantic_filter");
-  context.on(topics::kObjects, [&](const Objects& objects) {
+  context.on(bus::kTopic<Objects>, [&](const Objects& objects) {
     heard.heard();
     context.health().frameIn();
     node.onObjects(objects);
   });
-  context.on(topics::kMapQuery, [&](const MapQuery& query) { node.onQuery(query); });
+  context.on(bus::kTopic<MapQuery>, [&](const MapQuery& query) { node.onQuery(query); });
   FleetServer server(config);
   context.every(std::chrono::milliseconds(50), [&, commits = std::uint64_t{0}]() mutable {
     node.tick(std::chrono::steady_clock::now().time_since_epoch());

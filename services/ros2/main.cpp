@@ -17,7 +17,6 @@
 namespace {
 
 using namespace perdure;
-namespace topics = bus::topics;
 
 std::int64_t monotonicNs() {
   return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
@@ -93,11 +92,12 @@ class Outwards {
 
   /// Reads topics that are latched or needed by others; their messages are small and infrequent.
   void listenAlways() {
-    context_.on(topics::kCalibration, [this](const Calibration& m) { mirror_.onCalibration(m); });
-    context_.on(topics::kModel, [this](const ModelInfo& m) { mirror_.onModel(m); });
-    context_.on(topics::kMapFrame, [this](const MapFrame& m) { mirror_.onMapFrame(m); });
-    context_.on(topics::kHealth, [this](const Health& m) { mirror_.onHealth(m); });
-    context_.on(topics::kOdometry, [this](const Odometry& m) { mirror_.onOdometry(m); });
+    context_.on(bus::kTopic<Calibration>,
+                [this](const Calibration& m) { mirror_.onCalibration(m); });
+    context_.on(bus::kTopic<ModelInfo>, [this](const ModelInfo& m) { mirror_.onModel(m); });
+    context_.on(bus::kTopic<MapFrame>, [this](const MapFrame& m) { mirror_.onMapFrame(m); });
+    context_.on(bus::kTopic<Health>, [this](const Health& m) { mirror_.onHealth(m); });
+    context_.on(bus::kTopic<Odometry>, [this](const Odometry& m) { mirror_.onOdometry(m); });
   }
 
   template <class T>
@@ -113,22 +113,22 @@ class Outwards {
 
   void followWhatIsWanted() {
     // The angular rate is part of the odometry's twist.
-    add<ImuSample>(topics::kImu, {topic("imu"), topic("odometry")},
+    add<ImuSample>(bus::kTopic<ImuSample>, {topic("imu"), topic("odometry")},
                    [this](const ImuSample& m) { mirror_.onImu(m); });
-    add<Landmarks>(topics::kLandmarks, {topic("landmarks")},
+    add<Landmarks>(bus::kTopic<Landmarks>, {topic("landmarks")},
                    [this](const Landmarks& m) { mirror_.onLandmarks(m); });
-    add<Detections>(topics::kDetections, {topic("detections")},
+    add<Detections>(bus::kTopic<Detections>, {topic("detections")},
                     [this](const Detections& m) { mirror_.onDetections(m); });
     std::vector<std::string> of_objects{topic("objects"), topic("markers")};
     if (!config_.tracked_objects.empty()) of_objects.push_back(config_.tracked_objects);
-    add<Objects>(topics::kObjects, std::move(of_objects), [this](const Objects& m) {
+    add<Objects>(bus::kTopic<Objects>, std::move(of_objects), [this](const Objects& m) {
       mirror_.onObjects(m);
       // If the bridge reads images, its rate in Health is theirs, for `perdure status`.
       if (!config_.cam0.given()) context_.health().frameOut();
     });
     for (const std::string& camera : config_.shown_cameras) {
       const std::string image = mirror_.imageTopic(camera);
-      add<Frame>(topics::frame(camera),
+      add<Frame>(bus::frameTopic(camera),
                  {image, image + "/compressed", topic((camera + "/camera_info").c_str())},
                  [this](const Frame& m) { onFrame(m); });
     }
@@ -193,21 +193,21 @@ class Inwards {
   ros2::Outputs outputs() {
     ros2::Outputs to;
     for (const ros2::CameraInput& camera : config_.cameras())
-      frames_[camera.name] = context_.sink(topics::frame(camera.name));
+      frames_[camera.name] = context_.sink(bus::frameTopic(camera.name));
     to.frame = [this](const Frame& m) {
       frames_.at(m.camera)(m);
       if (m.camera == config_.cam0.name) context_.health().frameOut();
     };
-    if (config_.cam0.given()) to.calibration = context_.sink(topics::kCalibration);
-    if (config_.imu.given()) to.imu = context_.sink(topics::kImu);
-    if (config_.odometry.given()) to.odometry = context_.sink(topics::kOdometry);
+    if (config_.cam0.given()) to.calibration = context_.sink(bus::kTopic<Calibration>);
+    if (config_.imu.given()) to.imu = context_.sink(bus::kTopic<ImuSample>);
+    if (config_.odometry.given()) to.odometry = context_.sink(bus::kTopic<Odometry>);
     if (config_.detections.given()) {
       constexpr double kLease = 1.0;  // s; the rate of ROS detectors is not known
       auto& detections = context_.writer(
-          topics::kDetections,
+          bus::kTopic<Detections>,
           {.strength = static_cast<std::int32_t>(config_.detections.strength), .lease_s = kLease});
       to.detections = [&detections](const Detections& m) { (void)detections.write(m); };
-      to.model = context_.sink(topics::kModel);
+      to.model = context_.sink(bus::kTopic<ModelInfo>);
     }
     return to;
   }
@@ -282,7 +282,7 @@ class Inwards {
   /// Reads the frames of Perdure's capture, for the poses and boxes that belong to them.
   void listenToOwnFrames() {
     if (config_.cam0.given() || !(config_.odometry.given() || config_.detections.given())) return;
-    context_.on(topics::frame(config_.detections.camera), [this](const Frame& m) {
+    context_.on(bus::frameTopic(config_.detections.camera), [this](const Frame& m) {
       if (!once_.first(m.stamp.source, m.stamp.sequence)) return;
       node_.onOwnFrame(m, monotonicNs());
     });

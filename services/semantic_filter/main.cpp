@@ -14,7 +14,6 @@
 namespace {
 
 using namespace perdure;
-namespace topics = bus::topics;
 
 /// Delays messages, in order, until the map store has answered with the working set of an earlier
 /// run. Otherwise new tracks would get ids that are already in use.
@@ -52,10 +51,10 @@ void askForRestore(service::Context& context, bus::Writer<MapQuery>& queries,
 }
 
 void serve(service::Context& context, const semantic_filter::Config& config) {
-  auto& states = context.writer(topics::kObjectState);
-  auto& queries = context.writer(topics::kMapQuery);
+  auto& states = context.writer(bus::kTopic<ObjectState>);
+  auto& queries = context.writer(bus::kTopic<MapQuery>);
   semantic_filter::ObjectStates changed;
-  const auto publish = [&, objects = context.sink(topics::kObjects)](const Objects& m) {
+  const auto publish = [&, objects = context.sink(bus::kTopic<Objects>)](const Objects& m) {
     objects(m);
     context.health().frameOut();
     const auto changes = changed.update(m);
@@ -64,23 +63,23 @@ void serve(service::Context& context, const semantic_filter::Config& config) {
   };
   semantic_filter::Node node(config, semantic_filter::loadPriors(config), context.instance(),
                              {.objects = publish,
-                              .events = context.sink(topics::kEvents),
-                              .predictions = context.sink(topics::kPredictions)});
+                              .events = context.sink(bus::kTopic<Event>),
+                              .predictions = context.sink(bus::kTopic<Predictions>)});
   Gate gate;
   ReasonCounts lost;
   bus::Gaps odometry_gaps;
   bus::Once odometry_once;  // the node counts repeated detections
   context.countReasons([&]() -> const ReasonCounts& { return node.reasons(); });
   context.countReasons([&]() -> const ReasonCounts& { return lost; });
-  context.on(topics::kCalibration, [&](const Calibration& m) { node.onCalibration(m); });
-  context.on(topics::kModel, [&](const ModelInfo& m) { node.onModel(m); });
-  context.on(topics::kSwap, [&](const SwapNotice& m) { node.onSwap(m); });
-  context.on(topics::kMapNear, [&](const MapNear& m) {
+  context.on(bus::kTopic<Calibration>, [&](const Calibration& m) { node.onCalibration(m); });
+  context.on(bus::kTopic<ModelInfo>, [&](const ModelInfo& m) { node.onModel(m); });
+  context.on(bus::kTopic<SwapNotice>, [&](const SwapNotice& m) { node.onSwap(m); });
+  context.on(bus::kTopic<MapNear>, [&](const MapNear& m) {
     node.onNear(m);
     if (m.client == context.instance()) gate.open();
   });
   auto& odometry = context.needs("odometry", "vio's Health says why, or start vio");
-  context.on(topics::kOdometry, [&](const Odometry& m) {
+  context.on(bus::kTopic<Odometry>, [&](const Odometry& m) {
     odometry.heard();
     if (!odometry_once.first(m.stamp.source, m.stamp.sequence)) {
       return lost.add("odometry_repeated");
@@ -90,9 +89,9 @@ void serve(service::Context& context, const semantic_filter::Config& config) {
     context.health().frameIn();
     gate.pass([&, m] { node.onOdometry(m); });
   });
-  context.on(topics::kLandmarks,
+  context.on(bus::kTopic<Landmarks>,
              [&](const Landmarks& m) { gate.pass([&, m] { node.onLandmarks(m); }); });
-  context.on(topics::kDetections,
+  context.on(bus::kTopic<Detections>,
              [&](const Detections& m) { gate.pass([&, m] { node.onDetections(m); }); });
   askForRestore(context, queries, config, gate);
   context.onHealth([&] {

@@ -14,7 +14,6 @@
 namespace {
 
 using namespace perdure;
-namespace topics = bus::topics;
 
 /// Delivers each frame of the configured cameras once, decoded.
 class FrameInput {
@@ -27,7 +26,7 @@ class FrameInput {
         gaps_(config.cameras.size()) {
     auto& frames = context.needs("frames", "mend the camera, or start capture");
     for (std::size_t i = 0; i < config.cameras.size(); ++i) {
-      context.on(topics::frame(config.cameras[i]), [this, &context, &frames, i](const Frame& m) {
+      context.on(bus::frameTopic(config.cameras[i]), [this, &context, &frames, i](const Frame& m) {
         if (!once_[i].first(m.stamp.source, m.stamp.sequence)) {
           return reasons_.add("frames_repeated");
         }
@@ -60,23 +59,23 @@ void connect(service::Context& context, const vio::Config& config, Node& node,
              const ReasonCounts& own) {
   context.countReasons([&]() -> const ReasonCounts& { return node.reasons(); });
   context.countReasons([&]() -> const ReasonCounts& { return own; });
-  context.on(topics::kCalibration, [&](const Calibration& m) { node.onCalibration(m); });
+  context.on(bus::kTopic<Calibration>, [&](const Calibration& m) { node.onCalibration(m); });
   if (config.moving_mask.enabled) {
-    context.on(topics::kObjects, [&](const Objects& m) { node.onObjects(m); });
+    context.on(bus::kTopic<Objects>, [&](const Objects& m) { node.onObjects(m); });
   }
   context.onHealth([&] { context.health().state(node.health(), node.status()); });
 }
 
 void estimate(service::Context& context, const vio::Config& config) {
   const vio::StateFile file(config.state_directory);
-  const auto odometry = context.sink(topics::kOdometry);
+  const auto odometry = context.sink(bus::kTopic<Odometry>);
   vio::Node node(config, context.instance(),
                  {.odometry =
                       [&](const Odometry& m) {
                         odometry(m);
                         context.health().frameOut();
                       },
-                  .landmarks = context.sink(topics::kLandmarks)});
+                  .landmarks = context.sink(bus::kTopic<Landmarks>)});
   ReasonCounts own;
   if (const auto text = file.read()) {
     if (const auto restored = node.restoreState(*text); !restored) {
@@ -86,11 +85,11 @@ void estimate(service::Context& context, const vio::Config& config) {
   }
   connect(context, config, node, own);
   auto& samples = context.needs("inertial samples", "mend the IMU, or start capture");
-  context.on(topics::kImu, [&](const ImuSample& m) {
+  context.on(bus::kTopic<ImuSample>, [&](const ImuSample& m) {
     samples.heard();
     node.onImu(m);
   });
-  context.on(topics::kSpeed, [&](const SpeedSample& m) { node.onSpeed(m); });
+  context.on(bus::kTopic<SpeedSample>, [&](const SpeedSample& m) { node.onSpeed(m); });
   const FrameInput frames(context, config, own, [&](const Frame& m) { node.onFrame(m); });
   context.every(std::chrono::seconds(1), [&] {
     if (const auto kept = file.write(node.saveState()); !kept) own.add(kept.error());
@@ -99,7 +98,7 @@ void estimate(service::Context& context, const vio::Config& config) {
 }
 
 void followGivenPoses(service::Context& context, const vio::Config& config) {
-  const auto landmarks = context.sink(topics::kLandmarks);
+  const auto landmarks = context.sink(bus::kTopic<Landmarks>);
   vio::KnownPoseNode node(config, context.instance(), [&](const Landmarks& m) {
     landmarks(m);
     context.health().frameOut();
@@ -107,7 +106,7 @@ void followGivenPoses(service::Context& context, const vio::Config& config) {
   ReasonCounts own;
   connect(context, config, node, own);
   auto& poses = context.needs("odometry", "start the program that gives the poses");
-  context.on(topics::kOdometry, [&](const Odometry& m) {
+  context.on(bus::kTopic<Odometry>, [&](const Odometry& m) {
     poses.heard();
     node.onOdometry(m);
   });

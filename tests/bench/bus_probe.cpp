@@ -49,8 +49,8 @@ Frame noise() {
 }
 
 void send(const Participant& participant, double seconds) {
-  Writer<ImuSample> imu(participant, topics::kImu);
-  Writer<Frame> frames(participant, topics::frame("cam0"));
+  Writer<ImuSample> imu(participant, kTopic<ImuSample>);
+  Writer<Frame> frames(participant, frameTopic("cam0"));
   WaitLoop loop(participant);
   Frame frame = noise();
   ImuSample sample;
@@ -89,8 +89,8 @@ struct Ages {
 };
 
 void receive(const Participant& participant, double seconds) {
-  Reader<ImuSample> imu(participant, topics::kImu);
-  Reader<Frame> frames(participant, topics::frame("cam0"));
+  Reader<ImuSample> imu(participant, kTopic<ImuSample>);
+  Reader<Frame> frames(participant, frameTopic("cam0"));
   WaitLoop loop(participant);
   Ages samples, images;
   const auto settled = Clock::now() + std::chrono::seconds(2);

@@ -54,16 +54,15 @@ Bytes exampleOf(unsigned seed) {
   return wire::encodeCdr(message).value();
 }
 
-template <class... T>
-std::vector<WireType> wireTypes() {
-  return {{wire::Type<T>::descriptor().m_typename, takeMessage<T>, exampleOf<T>}...};
-}
-
 const std::vector<WireType>& allTypes() {
-  static const auto types =
-      wireTypes<Frame, ImuSample, SpeedSample, Calibration, Odometry, Landmarks, Detections,
-                ModelInfo, SwapNotice, Objects, ObjectState, Event, Predictions, MapTile, MapHeader,
-                MapFrame, MapNear, MapQuery, MapReply, Health>();
+  static const auto types = [] {
+    std::vector<WireType> all;
+    wire::forEachTopic([&]<class Row>(const Row& row) {
+      using T = typename Row::Message;
+      all.push_back({row.descriptor().m_typename, takeMessage<T>, exampleOf<T>});
+    });
+    return all;
+  }();
   return types;
 }
 

@@ -52,12 +52,12 @@ TEST(Interop, FastDdsFeedsDetectionsAndReadsObjects) {
   test::Folder folder;
   const bus::Domain domain(test::ownNetwork());
   const bus::Participant participant(domain, "test");
-  bus::Writer<Odometry> odometry(participant, bus::topics::kOdometry);
-  bus::Writer<Calibration> calibrations(participant, bus::topics::kCalibration);
-  bus::Reader<Objects> objects(participant, bus::topics::kObjects);
-  bus::Reader<Detections> detections(participant, bus::topics::kDetections);
-  bus::Reader<Health> health(participant, bus::topics::kHealth);
-  bus::Reader<ModelInfo> models(participant, bus::topics::kModel);
+  bus::Writer<Odometry> odometry(participant, bus::kTopic<Odometry>);
+  bus::Writer<Calibration> calibrations(participant, bus::kTopic<Calibration>);
+  bus::Reader<Objects> objects(participant, bus::kTopic<Objects>);
+  bus::Reader<Detections> detections(participant, bus::kTopic<Detections>);
+  bus::Reader<Health> health(participant, bus::kTopic<Health>);
+  bus::Reader<ModelInfo> models(participant, bus::kTopic<ModelInfo>);
   bus::WaitLoop loop(participant);
   std::string counts, model;
   loop.on(health, [&](const Health& m) {

@@ -54,9 +54,9 @@ class Listener {
  private:
   bus::Domain domain_{ownNetwork()};
   bus::Participant participant_{domain_, "test"};
-  bus::Reader<Health> health_reader_{participant_, bus::topics::kHealth};
-  bus::Reader<Objects> objects_reader_{participant_, bus::topics::kObjects};
-  bus::Reader<Odometry> odometry_reader_{participant_, bus::topics::kOdometry};
+  bus::Reader<Health> health_reader_{participant_, bus::kTopic<Health>};
+  bus::Reader<Objects> objects_reader_{participant_, bus::kTopic<Objects>};
+  bus::Reader<Odometry> odometry_reader_{participant_, bus::kTopic<Odometry>};
   bus::WaitLoop loop_{participant_};
   std::map<std::string, Health> health_;
   Objects objects_, first_of_filter_;

@@ -135,7 +135,7 @@ class Vehicle {
   int starts_ = 0;
   bus::Domain domain_{ownNetwork()};
   bus::Participant participant_{domain_, "test"};
-  bus::Reader<Event> events_{participant_, bus::topics::kEvents};
+  bus::Reader<Event> events_{participant_, bus::kTopic<Event>};
   std::unique_ptr<Child> store_, filter_;
 };
 

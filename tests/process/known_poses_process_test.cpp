@@ -59,11 +59,11 @@ class KnownPosesProcess : public ::testing::Test {
 
   bus::Domain domain_{ownNetwork()};
   bus::Participant participant_{domain_, "test"};
-  bus::Writer<Calibration> calibrations_{participant_, bus::topics::kCalibration};
-  bus::Writer<Frame> frames_{participant_, bus::topics::frame("cam0")};
-  bus::Writer<Odometry> odometry_{participant_, bus::topics::kOdometry};
-  bus::Reader<Landmarks> landmarks_{participant_, bus::topics::kLandmarks};
-  bus::Reader<Health> health_reader_{participant_, bus::topics::kHealth};
+  bus::Writer<Calibration> calibrations_{participant_, bus::kTopic<Calibration>};
+  bus::Writer<Frame> frames_{participant_, bus::frameTopic("cam0")};
+  bus::Writer<Odometry> odometry_{participant_, bus::kTopic<Odometry>};
+  bus::Reader<Landmarks> landmarks_{participant_, bus::kTopic<Landmarks>};
+  bus::Reader<Health> health_reader_{participant_, bus::kTopic<Health>};
   std::optional<Health> health_;
   Folder folder_;
   vio::test::SimulatedDrive drive_{manyPoints()};

@@ -51,7 +51,7 @@ class MapStoreProcess : public ::testing::Test {
 
   bus::Domain domain_{ownNetwork()};
   bus::Participant participant_{domain_, "test"};
-  bus::Writer<Objects> objects_{participant_, bus::topics::kObjects};
+  bus::Writer<Objects> objects_{participant_, bus::kTopic<Objects>};
   Folder folder_;
   int starts_ = 0;
 };
@@ -69,8 +69,8 @@ TEST_F(MapStoreProcess, HasEveryObjectAgainAfterItIsKilledASecondAfterItsConfirm
 
 TEST_F(MapStoreProcess, GivesTheWorkingSetBackToAFilterThatAsks) {
   const auto child = start();
-  bus::Reader<MapNear> near(participant_, bus::topics::kMapNear);
-  bus::Writer<MapQuery> queries(participant_, bus::topics::kMapQuery);
+  bus::Reader<MapNear> near(participant_, bus::kTopic<MapNear>);
+  bus::Writer<MapQuery> queries(participant_, bus::kTopic<MapQuery>);
   ASSERT_TRUE(eventually(5s, [&] { return near.matched() > 0 && queries.matched() > 0; }));
   ASSERT_TRUE(objects_.write(frame(1, 3)).has_value());
   ASSERT_TRUE(eventually(5s, [&] { return objectsOnTheMap() == 3; }));
@@ -96,7 +96,7 @@ TEST_F(MapStoreProcess, GivesTheWorkingSetBackToAFilterThatAsks) {
 
 TEST_F(MapStoreProcess, GivesBackWhatLeftTheWorkingSetAndSaysThatItHasIt) {
   const auto child = start();
-  bus::Reader<MapNear> near(participant_, bus::topics::kMapNear);
+  bus::Reader<MapNear> near(participant_, bus::kTopic<MapNear>);
   ASSERT_TRUE(eventually(5s, [&] { return near.matched() > 0; }));
   const Objects whole = frame(1, 3);
   Objects left = frame(2, 1);
@@ -124,7 +124,7 @@ TEST_F(MapStoreProcess, GivesBackWhatLeftTheWorkingSetAndSaysThatItHasIt) {
 
 TEST_F(MapStoreProcess, AnswersWithItsGraph) {
   const auto child = start();
-  bus::Writer<Odometry> odometry(participant_, bus::topics::kOdometry);
+  bus::Writer<Odometry> odometry(participant_, bus::kTopic<Odometry>);
   ASSERT_TRUE(eventually(5s, [&] { return odometry.matched() > 0; }));
   const Objects first = frame(1, 3);
   for (std::uint64_t i = 1; i <= 40; ++i) {
@@ -178,8 +178,8 @@ TEST_F(MapStoreProcess, ShowsItsTilesToALateJoiner) {
   const auto child = start();
   ASSERT_TRUE(objects_.write(frame(1, 40)).has_value());
   ASSERT_TRUE(eventually(5s, [&] { return objectsOnTheMap() == 40; }));
-  bus::Reader<MapTile> tiles(participant_, bus::topics::kMap);
-  bus::Reader<MapHeader> headers(participant_, bus::topics::kMapHeader);
+  bus::Reader<MapTile> tiles(participant_, bus::kTopic<MapTile>);
+  bus::Reader<MapHeader> headers(participant_, bus::kTopic<MapHeader>);
   std::map<std::pair<int, int>, std::size_t> counts;
   MapHeader header;
   EXPECT_TRUE(eventually(5s, [&] {

@@ -105,9 +105,9 @@ class Watcher {
   bus::Domain domain_;
   bus::Participant participant_{domain_, "perdure test"};
   bus::Discovery discovery_{participant_};
-  bus::Reader<Health> health_reader_{participant_, bus::topics::kHealth};
-  bus::Reader<Objects> objects_reader_{participant_, bus::topics::kObjects};
-  bus::Reader<Detections> detections_reader_{participant_, bus::topics::kDetections};
+  bus::Reader<Health> health_reader_{participant_, bus::kTopic<Health>};
+  bus::Reader<Objects> objects_reader_{participant_, bus::kTopic<Objects>};
+  bus::Reader<Detections> detections_reader_{participant_, bus::kTopic<Detections>};
   bus::WaitLoop loop_{participant_};
   std::map<std::string, Health> health_;
   int objects_ = 0, detections_ = 0;

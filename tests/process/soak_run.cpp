@@ -52,12 +52,12 @@ SoakRun::SoakRun(fs::path folder, int shared_memory_mb)
       shared_memory_mb_(shared_memory_mb),
       domain_(ownNetwork()),
       participant_(domain_, kName),
-      calibration_reader_(participant_, bus::topics::kCalibration),
-      odometry_reader_(participant_, bus::topics::kOdometry),
-      detections_reader_(participant_, bus::topics::kDetections),
-      objects_reader_(participant_, bus::topics::kObjects),
-      header_reader_(participant_, bus::topics::kMapHeader),
-      health_reader_(participant_, bus::topics::kHealth),
+      calibration_reader_(participant_, bus::kTopic<Calibration>),
+      odometry_reader_(participant_, bus::kTopic<Odometry>),
+      detections_reader_(participant_, bus::kTopic<Detections>),
+      objects_reader_(participant_, bus::kTopic<Objects>),
+      header_reader_(participant_, bus::kTopic<MapHeader>),
+      health_reader_(participant_, bus::kTopic<Health>),
       loop_(participant_) {
   fs::create_directories(folder_);
   frames_a_lap_ = renderLap(folder_ / "lap");

@@ -47,14 +47,14 @@ Reporter::Reporter(const bus::Participant& participant, bus::WaitLoop& loop, Out
                    std::map<std::string, ShapePoints> shapes)
     : outputs_(outputs),
       shapes_(std::move(shapes)),
-      calibration_reader_(participant, bus::topics::kCalibration),
-      odometry_reader_(participant, bus::topics::kOdometry),
-      landmarks_reader_(participant, bus::topics::kLandmarks),
-      model_reader_(participant, bus::topics::kModel),
-      detections_reader_(participant, bus::topics::kDetections),
-      objects_reader_(participant, bus::topics::kObjects),
-      events_reader_(participant, bus::topics::kEvents),
-      health_reader_(participant, bus::topics::kHealth) {
+      calibration_reader_(participant, bus::kTopic<Calibration>),
+      odometry_reader_(participant, bus::kTopic<Odometry>),
+      landmarks_reader_(participant, bus::kTopic<Landmarks>),
+      model_reader_(participant, bus::kTopic<ModelInfo>),
+      detections_reader_(participant, bus::kTopic<Detections>),
+      objects_reader_(participant, bus::kTopic<Objects>),
+      events_reader_(participant, bus::kTopic<Event>),
+      health_reader_(participant, bus::kTopic<Health>) {
   loop.on(calibration_reader_, [this](const Calibration& c) { outputs_.onCalibration(c); });
   loop.on(odometry_reader_, [this](const Odometry& o) { onOdometry(o); });
   loop.on(landmarks_reader_, [this](const Landmarks& l) { outputs_.onLandmarks(l); });

@@ -168,8 +168,8 @@ void runSwap(SwapRequest request) {
   const service::BlockedSignals blocked;
   const bus::Domain domain(request.bus);
   const bus::Participant participant(domain, "perdure inference swap");
-  bus::Reader<SwapNotice> notices(participant, bus::topics::kSwap);
-  bus::Reader<Health> health(participant, bus::topics::kHealth);
+  bus::Reader<SwapNotice> notices(participant, bus::kTopic<SwapNotice>);
+  bus::Reader<Health> health(participant, bus::kTopic<Health>);
   bus::WaitLoop loop(participant);
   Newcomer newcomer(commandOf(request), request.log);
   std::printf("%-12spid %d, log %s\n", "started", newcomer.pid(), request.log.c_str());

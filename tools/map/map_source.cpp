@@ -51,8 +51,8 @@ Result<map_store::Found> findInM(const map_store::MapReader& reader, const MapQu
 Result<MapReply> askMapStore(const bus::Participant& participant, MapQuery query,
                              double patience_s) {
   constexpr auto kResend = 500ms;
-  bus::Writer<MapQuery> questions(participant, bus::topics::kMapQuery);
-  bus::Reader<MapReply> answers(participant, bus::topics::kMapReply);
+  bus::Writer<MapQuery> questions(participant, bus::kTopic<MapQuery>);
+  bus::Reader<MapReply> answers(participant, bus::kTopic<MapReply>);
   query.client = makeInstanceId();
   query.request = 1;
 

@@ -46,12 +46,12 @@ class InferenceService {
       : options_(options),
         context_(options.process, openDomain(serviceOptionsOf(settings, options.process)),
                  makeLog(options.process)),
-        detections_(context_.writer(bus::topics::kDetections,
+        detections_(context_.writer(bus::kTopic<Detections>,
                                     {.strength = options.strength, .lease_s = options.lease_s})),
         frames_(context_.needs("frames", "mend the camera, or start capture")) {
     model_ = model;
     model_.instance = context_.instance();
-    const auto told = context_.writer(bus::topics::kModel).write(model_);
+    const auto told = context_.writer(bus::kTopic<ModelInfo>).write(model_);
     if (!told) throw StartupError(ExitCode::kConfiguration, sentenceOf("the model", told.error()));
     wire();
     thread_ = std::thread([this] { run(); });
@@ -121,9 +121,9 @@ class InferenceService {
  private:
   void wire() {
     say(HealthState::kStarting, "waits for frames");
-    context_.on(bus::topics::frame(options_.camera), [this](const Frame& frame) { offer(frame); });
+    context_.on(bus::frameTopic(options_.camera), [this](const Frame& frame) { offer(frame); });
     if (options_.expects) {
-      context_.on(bus::topics::kPredictions, [this](const Predictions& predictions) {
+      context_.on(bus::kTopic<Predictions>, [this](const Predictions& predictions) {
         const std::lock_guard lock(mutex_);
         expected_ = predictions;
       });

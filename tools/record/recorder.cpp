@@ -57,7 +57,7 @@ Recorder::Recorder(service::Context& context, const RecorderOptions& options, St
   }
   if (options.images && options.topics.empty()) lookForCameras();
   for (const std::string& topic : topics) listen(topic);
-  health_ = &context.on(bus::topics::kHealth, [this](const Health& health) {
+  health_ = &context.on(bus::kTopic<Health>, [this](const Health& health) {
     if (health.instance == context_.instance()) return;  // own faults trigger no dump
     onFault(watch_.onHealth(health, FaultWatch::Time::clock::now()));
   });

@@ -1,42 +1,16 @@
-// The roles of identities under DDS-Security, and the topics that each role may write and read.
+// The names of the roles of identities under DDS-Security.
 #pragma once
 
-#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
 
+#include "common/wire/roles.h"
+
 namespace perdure::bus {
 
-/// The services, the tools that record and play, and the roles of users.
-enum class Role : std::uint32_t {
-  kCapture = 1u << 0,
-  kVio = 1u << 1,
-  kInference = 1u << 2,
-  kSemanticFilter = 1u << 3,
-  kMapStore = 1u << 4,
-  kRecord = 1u << 5,       ///< `perdure record`: reads everything
-  kOperator = 1u << 6,     ///< the other commands: read everything, write queries
-  kPlayer = 1u << 7,       ///< `perdure play`: writes everything; made on demand only
-  kSubscriber = 1u << 8,   ///< third-party programs: read results, query the map
-  kGateway = 1u << 9,      ///< displays the bus: reads everything, writes queries
-  kRos2 = 1u << 10,        ///< the outward bridge to ROS 2: reads everything
-  kRos2Driver = 1u << 11,  ///< the bridge with inputs: also writes their topics; on demand only
-};
-
-/// A set of roles.
-class Roles {
- public:
-  constexpr Roles() = default;
-  constexpr Roles(Role role) : bits_(static_cast<std::uint32_t>(role)) {}
-  constexpr Roles operator|(Roles more) const { return Roles(bits_ | more.bits_); }
-  constexpr bool has(Role role) const { return (bits_ & static_cast<std::uint32_t>(role)) != 0; }
-
- private:
-  constexpr explicit Roles(std::uint32_t bits) : bits_(bits) {}
-  std::uint32_t bits_ = 0;
-};
-constexpr Roles operator|(Role a, Role b) { return Roles(a) | b; }
+using wire::Role;
+using wire::Roles;
 
 struct RoleName {
   Role role;

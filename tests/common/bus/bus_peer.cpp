@@ -14,7 +14,7 @@ void pause(double seconds) { std::this_thread::sleep_for(std::chrono::duration<d
 /// strength.
 void publishDetections(const Participant& participant, std::int32_t strength) {
   constexpr double kRate = 20.0;
-  Writer<Detections> writer(participant, topics::kDetections,
+  Writer<Detections> writer(participant, kTopic<Detections>,
                             {.strength = strength, .lease_s = leaseFor(kRate)});
   Detections message;
   message.camera = "cam0";
@@ -26,7 +26,7 @@ void publishDetections(const Participant& participant, std::int32_t strength) {
 }
 
 void publishImu(const Participant& participant, int count) {
-  Writer<ImuSample> writer(participant, topics::kImu);
+  Writer<ImuSample> writer(participant, kTopic<ImuSample>);
   for (int i = 0; i < count; ++i) {
     ImuSample sample;
     sample.sequence = static_cast<std::uint64_t>(i);
@@ -37,7 +37,7 @@ void publishImu(const Participant& participant, int count) {
 }
 
 void publishTiles(const Participant& participant, int count) {
-  Writer<MapTile> writer(participant, topics::kMap);
+  Writer<MapTile> writer(participant, kTopic<MapTile>);
   for (int i = 0; i < count; ++i) {
     MapTile tile;
     tile.x = i;

@@ -40,10 +40,10 @@ class Bus : public testing::Test {
 };
 
 TEST_F(Bus, CarriesAMessageFromWriterToReader) {
-  Reader<ImuSample> reader(here, topics::kImu);
+  Reader<ImuSample> reader(here, kTopic<ImuSample>);
   std::vector<std::uint64_t> got;
   loop.on(reader, [&](const ImuSample& m) { got.push_back(m.sequence); });
-  Writer<ImuSample> writer(there, topics::kImu);
+  Writer<ImuSample> writer(there, kTopic<ImuSample>);
   ImuSample sample;
   sample.sequence = 7;
   EXPECT_TRUE(writer.write(sample));
@@ -54,7 +54,7 @@ TEST_F(Bus, CarriesAMessageFromWriterToReader) {
 }
 
 TEST_F(Bus, RefusesToSendWhatIsNotSoundAndCountsIt) {
-  Writer<ImuSample> writer(there, topics::kImu);
+  Writer<ImuSample> writer(there, kTopic<ImuSample>);
   ImuSample sample;
   sample.gyro.x() = NAN;
   const Result<void> written = writer.write(sample);
@@ -102,7 +102,7 @@ class RawDetections {
 };
 
 TEST_F(Bus, TooManyBoxesAreCountedAndWhatFollowsIsHeard) {
-  Reader<Detections> reader(here, topics::kDetections);
+  Reader<Detections> reader(here, kTopic<Detections>);
   int sound = 0;
   loop.on(reader, [&](const Detections&) { ++sound; });
   RawDetections stranger(there);
@@ -115,7 +115,7 @@ TEST_F(Bus, TooManyBoxesAreCountedAndWhatFollowsIsHeard) {
 }
 
 TEST_F(Bus, CountsMalformedDetectionsOfAStrangerAndHearsItsSoundOnes) {
-  Reader<Detections> reader(here, topics::kDetections);
+  Reader<Detections> reader(here, kTopic<Detections>);
   int sound = 0;
   loop.on(reader, [&](const Detections&) { ++sound; });
   RawDetections stranger(there);
@@ -131,7 +131,7 @@ TEST_F(Bus, CountsMalformedDetectionsOfAStrangerAndHearsItsSoundOnes) {
 }
 
 TEST_F(Bus, CountsAWriterWhoseQualityOfServiceDoesNotFit) {
-  Reader<Detections> reader(here, topics::kDetections);
+  Reader<Detections> reader(here, kTopic<Detections>);
   const Entity topic(dds_create_topic(there.handle(), &perdure_msg_Detections_desc,
                                       there.wireName("detections").c_str(), nullptr, nullptr));
   const Entity shared(dds_create_writer(there.handle(), topic.handle(), nullptr, nullptr));
@@ -141,12 +141,12 @@ TEST_F(Bus, CountsAWriterWhoseQualityOfServiceDoesNotFit) {
 }
 
 TEST_F(Bus, TellsTheKeyOfADisposedObjectAfterItsLastState) {
-  Reader<MapTile> reader(here, topics::kMap);
+  Reader<MapTile> reader(here, kTopic<MapTile>);
   std::vector<std::string> story;
   loop.on(
       reader, [&](const MapTile& m) { story.push_back("tile " + std::to_string(m.x)); },
       [&](const MapTile& m) { story.push_back("gone " + std::to_string(m.x)); });
-  Writer<MapTile> writer(there, topics::kMap);
+  Writer<MapTile> writer(there, kTopic<MapTile>);
   MapTile tile;
   tile.x = 3;
   EXPECT_TRUE(writer.write(tile));
@@ -156,12 +156,12 @@ TEST_F(Bus, TellsTheKeyOfADisposedObjectAfterItsLastState) {
 }
 
 TEST_F(Bus, ADeadWriterDoesNotDisposeWhatItWrote) {
-  Reader<MapTile> reader(here, topics::kMap);
+  Reader<MapTile> reader(here, kTopic<MapTile>);
   int tiles = 0, gone = 0, silent = 0;
   loop.on(
       reader, [&](const MapTile&) { ++tiles; }, [&](const MapTile&) { ++gone; });
   {
-    Writer<MapTile> writer(there, topics::kMap);
+    Writer<MapTile> writer(there, kTopic<MapTile>);
     EXPECT_TRUE(writer.write(MapTile{}));
     EXPECT_TRUE(runUntil(loop, [&] { return tiles == 1; }));
   }
@@ -170,11 +170,11 @@ TEST_F(Bus, ADeadWriterDoesNotDisposeWhatItWrote) {
 }
 
 TEST_F(Bus, StrengthDecidesWhoIsHeardAndMayChange) {
-  Reader<Detections> reader(here, topics::kDetections);
+  Reader<Detections> reader(here, kTopic<Detections>);
   std::vector<InstanceId> heard;
   loop.on(reader, [&](const Detections& m) { heard.push_back(m.instance); });
-  Writer<Detections> weak(there, topics::kDetections, {.strength = 1, .lease_s = 20});
-  Writer<Detections> strong(there, topics::kDetections, {.strength = 2, .lease_s = 20});
+  Writer<Detections> weak(there, kTopic<Detections>, {.strength = 1, .lease_s = 20});
+  Writer<Detections> strong(there, kTopic<Detections>, {.strength = 2, .lease_s = 20});
   const auto bothWrite = [&] {
     Detections m;
     m.camera = "cam0";
@@ -196,12 +196,12 @@ TEST_F(Bus, StrengthDecidesWhoIsHeardAndMayChange) {
 }
 
 TEST_F(Bus, AnOwnerThatLetsTheTopicGoIsFollowedAtOnceByTheNextStrongest) {
-  Reader<Detections> reader(here, topics::kDetections);
+  Reader<Detections> reader(here, kTopic<Detections>);
   std::vector<InstanceId> heard;
   loop.on(reader, [&](const Detections& m) { heard.push_back(m.instance); });
   constexpr double kLongLease = 60.0;  // too long to decide these tests
-  Writer<Detections> owner(here, topics::kDetections, {.strength = 10, .lease_s = kLongLease});
-  Writer<Detections> spare(there, topics::kDetections, {.strength = 9, .lease_s = kLongLease});
+  Writer<Detections> owner(here, kTopic<Detections>, {.strength = 10, .lease_s = kLongLease});
+  Writer<Detections> spare(there, kTopic<Detections>, {.strength = 9, .lease_s = kLongLease});
   const auto say = [&](Writer<Detections>& writer, InstanceId who) {
     Detections m;
     m.camera = "cam0";
@@ -224,8 +224,8 @@ TEST_F(Bus, AnOwnerThatLetsTheTopicGoIsFollowedAtOnceByTheNextStrongest) {
 }
 
 TEST_F(Bus, AnOwnerThatMissesItsLeaseIsTold) {
-  Reader<Detections> reader(here, topics::kDetections);
-  Writer<Detections> writer(there, topics::kDetections, {.lease_s = 0.1});
+  Reader<Detections> reader(here, kTopic<Detections>);
+  Writer<Detections> writer(there, kTopic<Detections>, {.lease_s = 0.1});
   Detections m;
   m.camera = "cam0";
   EXPECT_TRUE(writer.write(m));
@@ -236,13 +236,13 @@ TEST_F(Bus, AnOwnerThatMissesItsLeaseIsTold) {
 }
 
 TEST_F(Bus, WhoComesLateGetsTheNewestThatIsKeptWhereHeAsks) {
-  Writer<Objects> writer(there, topics::kObjects);
+  Writer<Objects> writer(there, kTopic<Objects>);
   for (std::uint64_t sequence : {1, 2, 3}) {
     Objects objects;
     objects.stamp.sequence = sequence;
     ASSERT_TRUE(writer.write(objects));
   }
-  Reader<Objects> now(here, topics::kObjects), kept(here, topics::kObjects, ReadFrom::kKept);
+  Reader<Objects> now(here, kTopic<Objects>), kept(here, kTopic<Objects>, ReadFrom::kKept);
   std::vector<std::uint64_t> got, got_now;
   loop.on(kept, [&](const Objects& m) { got.push_back(m.stamp.sequence); });
   loop.on(now, [&](const Objects& m) { got_now.push_back(m.stamp.sequence); });
@@ -269,7 +269,7 @@ TEST_F(Bus, ATickRestsWhileItIsNotWanted) {
 
 TEST_F(Bus, DiscoveryNamesProcessesAndTheirEndpoints) {
   Discovery discovery(here);
-  Writer<ImuSample> writer(there, topics::kImu);
+  Writer<ImuSample> writer(there, kTopic<ImuSample>);
   EXPECT_TRUE(runUntil(loop, [&] {
     const auto endpoints = discovery.endpoints();
     return std::any_of(endpoints.begin(), endpoints.end(), [](const RemoteEndpoint& e) {
@@ -281,8 +281,8 @@ TEST_F(Bus, DiscoveryNamesProcessesAndTheirEndpoints) {
 }
 
 TEST_F(Bus, AStopEndsTheLoopAfterTheMessageAtWorkAlsoInTheMiddleOfABatch) {
-  Reader<ImuSample> reader(here, topics::kImu);
-  Writer<ImuSample> writer(there, topics::kImu);
+  Reader<ImuSample> reader(here, kTopic<ImuSample>);
+  Writer<ImuSample> writer(there, kTopic<ImuSample>);
   for (int i = 0; i < 50; ++i) EXPECT_TRUE(writer.write(ImuSample{}));
   int handled = 0;
   loop.on(reader, [&](const ImuSample&) {

@@ -51,7 +51,7 @@ class Evolution : public testing::Test {
 };
 
 TEST_F(Evolution, ABeliefOfTheFirstVersionHasAnEmptyLedgerAndItsOwnTrack) {
-  Reader<Objects> reader(here, topics::kObjects);
+  Reader<Objects> reader(here, kTopic<Objects>);
   std::vector<Objects> got;
   loop.on(reader, [&](const Objects& m) { got.push_back(m); });
   const dds_entity_t writer =
@@ -108,7 +108,7 @@ TEST_F(Evolution, AProgramOfTheFirstVersionReadsABeliefWithALedgerAndATrack) {
   const dds_entity_t reader =
       dds_create_reader(there.handle(), firstTopic(), reliable().get(), nullptr);
   ASSERT_GT(reader, 0);
-  Writer<Objects> writer(here, topics::kObjects);
+  Writer<Objects> writer(here, kTopic<Objects>);
   ASSERT_TRUE(eventually(loop, [&] { return writer.matched() == 1; }));
   wire::Examples examples(3);
   Objects message;
@@ -138,7 +138,7 @@ TEST_F(Evolution, AProgramOfTheFirstVersionReadsABeliefWithALedgerAndATrack) {
 }
 
 TEST_F(Evolution, AnAnswerOfAMapStoreThatTellsNoGraphHasNone) {
-  Reader<MapReply> reader(here, topics::kMapReply);
+  Reader<MapReply> reader(here, kTopic<MapReply>);
   std::vector<MapReply> got;
   loop.on(reader, [&](const MapReply& m) { got.push_back(m); });
   const dds_entity_t writer =
@@ -171,7 +171,7 @@ TEST_F(Evolution, AnAnswerWithAGraphIsReadByProgramsThatKnowNone) {
       dds_create_reader(there.handle(), topicAs<MapReply>(perdure_first_MapReply_desc, "map/reply"),
                         reliable().get(), nullptr);
   ASSERT_GT(reader, 0);
-  Writer<MapReply> writer(here, topics::kMapReply);
+  Writer<MapReply> writer(here, kTopic<MapReply>);
   ASSERT_TRUE(eventually(loop, [&] { return writer.matched() == 1; }));
   wire::Examples examples(5);
   MapReply message;

@@ -100,7 +100,7 @@ bool isShared(const void* address) {
 }
 
 int write(const Participant& participant, int count, std::uint32_t side) {
-  Writer<Frame> writer(participant, topics::frame("cam0"));
+  Writer<Frame> writer(participant, frameTopic("cam0"));
   const auto patience = std::chrono::steady_clock::now() + kSilence;
   while (writer.matched() == 0 && std::chrono::steady_clock::now() < patience) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -149,7 +149,7 @@ struct Seen {
 };
 
 int look(const Participant& participant, int count, std::size_t hold) {
-  Reader<Frame> reader(participant, topics::frame("cam0"));
+  Reader<Frame> reader(participant, frameTopic("cam0"));
   WaitLoop loop(participant);
   Seen seen;
   std::deque<Frame> held;

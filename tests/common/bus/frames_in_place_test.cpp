@@ -25,8 +25,8 @@ class FramesInPlace : public testing::Test {
 };
 
 TEST_F(FramesInPlace, ComeAsTheyWereWritten) {
-  Reader<Frame> reader(here, topics::frame("cam0"));
-  Writer<Frame> writer(there, topics::frame("cam0"));
+  Reader<Frame> reader(here, frameTopic("cam0"));
+  Writer<Frame> writer(there, frameTopic("cam0"));
   WaitLoop loop(here);
   std::vector<Frame> got;
   loop.on(reader, [&](const Frame& frame) { got.push_back(frame); });
@@ -50,8 +50,8 @@ TEST_F(FramesInPlace, StayWhenTheirReaderAndItsParticipantAreGone) {
   Frame kept;
   {
     const Participant other(domain, "other");
-    Reader<Frame> reader(other, topics::frame("cam0"));
-    Writer<Frame> writer(there, topics::frame("cam0"));
+    Reader<Frame> reader(other, frameTopic("cam0"));
+    Writer<Frame> writer(there, frameTopic("cam0"));
     ASSERT_TRUE(writer.write(example(5)));
     for (int wait = 0; wait < 500 && !kept.data; ++wait) {
       reader.drain([&](const Frame& frame) { kept = frame; });

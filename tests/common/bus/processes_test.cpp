@@ -47,7 +47,7 @@ class Processes : public testing::Test {
 TEST_F(Processes, ALateJoinerGetsTheLatchedTilesButNotTheDisposedOne) {
   const Subprocess writer(peer("tiles", "50"));
   ASSERT_TRUE(saysALine(log_));
-  Reader<MapTile> reader(participant, topics::kMap);
+  Reader<MapTile> reader(participant, kTopic<MapTile>);
   std::set<int> tiles;
   int gone = 0;
   loop.on(
@@ -60,7 +60,7 @@ TEST_F(Processes, ALateJoinerGetsTheLatchedTilesButNotTheDisposedOne) {
 TEST_F(Processes, ALateJoinerGetsTheNewest512InertialSamplesInOrder) {
   const Subprocess writer(peer("imu", "2000"));
   ASSERT_TRUE(saysALine(log_));
-  Reader<ImuSample> reader(participant, topics::kImu);
+  Reader<ImuSample> reader(participant, kTopic<ImuSample>);
   std::vector<std::uint64_t> got;
   loop.on(reader, [&](const ImuSample& m) { got.push_back(m.sequence); });
   EXPECT_TRUE(runUntil(loop, [&] { return got.size() == 512; }));
@@ -71,7 +71,7 @@ TEST_F(Processes, ALateJoinerGetsTheNewest512InertialSamplesInOrder) {
 }
 
 TEST_F(Processes, TheStandbyIsHeardAfterTheOwnerIsKilled) {
-  Reader<Detections> reader(participant, topics::kDetections);
+  Reader<Detections> reader(participant, kTopic<Detections>);
   InstanceId last = 0;
   loop.on(reader, [&](const Detections& m) { last = m.instance; });
   const Subprocess standby(peer("detections", "1"));

@@ -20,10 +20,10 @@ int main(int argc, char** argv) {
     ReasonCounts reasons;
     bool worker_goes_on = true;
     context.watch([&] { return worker_goes_on; });
-    const Sink<SpeedSample> speed = context.sink(bus::topics::kSpeed);
+    const Sink<SpeedSample> speed = context.sink(bus::kTopic<SpeedSample>);
     context.countReasons([&]() -> const ReasonCounts& { return reasons; });
     service::Input& input = context.needs("samples", "send some");
-    context.on(bus::topics::kImu, [&](const ImuSample& m) {
+    context.on(bus::kTopic<ImuSample>, [&](const ImuSample& m) {
       if (m.sequence > 0) input.heard();
       context.health().frameIn();
       reasons.add("seen");

@@ -87,9 +87,9 @@ TEST_F(Service, WorksTellsItsHealthAndEndsInOrderAtSigterm) {
   const bus::Domain domain{bus::Options{}};
   const bus::Participant participant(domain, "test");
   bus::WaitLoop loop(participant);
-  bus::Reader<Health> health(participant, bus::topics::kHealth);
-  bus::Reader<SpeedSample> speed(participant, bus::topics::kSpeed);
-  bus::Writer<ImuSample> imu(participant, bus::topics::kImu);
+  bus::Reader<Health> health(participant, bus::kTopic<Health>);
+  bus::Reader<SpeedSample> speed(participant, bus::kTopic<SpeedSample>);
+  bus::Writer<ImuSample> imu(participant, bus::kTopic<ImuSample>);
   Health last;
   int samples = 0;
   loop.on(health, [&](const Health& m) { last = m; });
@@ -118,8 +118,8 @@ TEST_F(Service, IsDegradedWhileItsInputIsSilentAndWellWhenItComesBack) {
   const bus::Domain domain{bus::Options{}};
   const bus::Participant participant(domain, "test");
   bus::WaitLoop loop(participant);
-  bus::Reader<Health> health(participant, bus::topics::kHealth);
-  bus::Writer<ImuSample> imu(participant, bus::topics::kImu);
+  bus::Reader<Health> health(participant, bus::kTopic<Health>);
+  bus::Writer<ImuSample> imu(participant, bus::kTopic<ImuSample>);
   Health last;
   loop.on(health, [&](const Health& m) { last = m; });
   Subprocess running(quietProbe());
@@ -205,7 +205,7 @@ TEST_P(Hangs, AndTheWatchdogIsNotFed) {
   Subprocess running(quietProbe({{"WATCHDOG_USEC", "400000"}}));
   const bus::Domain domain{bus::Options{}};
   const bus::Participant participant(domain, "test");
-  bus::Writer<ImuSample> imu(participant, bus::topics::kImu);
+  bus::Writer<ImuSample> imu(participant, bus::kTopic<ImuSample>);
   EXPECT_EQ(systemd.next(), "READY=1");
   EXPECT_EQ(systemd.next(), "WATCHDOG=1");
   ImuSample sample;

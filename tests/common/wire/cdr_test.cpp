@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "common/wire/json.h"
+#include "tests/common/wire/all_messages.h"
 #include "tests/common/wire/examples.h"
 
 namespace perdure::wire {
@@ -23,11 +24,7 @@ Result<T> decoded(std::vector<std::uint8_t> message) {
 template <class T>
 class Cdr : public testing::Test {};
 
-using Messages =
-    testing::Types<Frame, ImuSample, SpeedSample, Calibration, Odometry, Landmarks, Detections,
-                   ModelInfo, SwapNotice, Objects, ObjectState, Event, Predictions, MapTile,
-                   MapHeader, MapFrame, MapNear, MapQuery, MapReply, Health>;
-TYPED_TEST_SUITE(Cdr, Messages);
+TYPED_TEST_SUITE(Cdr, AllMessages);
 
 TYPED_TEST(Cdr, BringsEveryFieldThroughBytesAndBack) {
   for (unsigned seed = 0; seed < 50; ++seed) {

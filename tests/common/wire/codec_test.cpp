@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "common/wire/json.h"
+#include "tests/common/wire/all_messages.h"
 #include "tests/common/wire/examples.h"
 
 namespace perdure::wire {
@@ -11,11 +12,7 @@ namespace {
 template <class T>
 class Codec : public testing::Test {};
 
-using Messages =
-    testing::Types<Frame, ImuSample, SpeedSample, Calibration, Odometry, Landmarks, Detections,
-                   ModelInfo, SwapNotice, Objects, ObjectState, Event, Predictions, MapTile,
-                   MapHeader, MapFrame, MapNear, MapQuery, MapReply, Health>;
-TYPED_TEST_SUITE(Codec, Messages);
+TYPED_TEST_SUITE(Codec, AllMessages);
 
 TYPED_TEST(Codec, BringsEveryFieldThereAndBackToTheBit) {
   Arena arena;

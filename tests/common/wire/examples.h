@@ -4,7 +4,7 @@
 #include <Eigen/Cholesky>
 #include <random>
 
-#include "common/wire/description/types.h"
+#include "common/wire/topics.h"
 
 namespace perdure::wire {
 

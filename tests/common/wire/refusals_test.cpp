@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include "common/types/description.h"
 #include "common/wire/codec.h"
-#include "common/wire/description/bounds.h"
 #include "tests/common/wire/examples.h"
 
 namespace perdure::wire {

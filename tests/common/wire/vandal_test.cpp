@@ -7,7 +7,8 @@
 #include <limits>
 
 #include "common/wire/codec.h"
-#include "common/wire/description/describe.h"
+#include "common/wire/topics.h"
+#include "tests/common/wire/all_messages.h"
 #include "tests/common/wire/examples.h"
 
 namespace perdure::wire {
@@ -127,11 +128,7 @@ class Vandal {
 
 template <class T>
 class Damaged : public testing::Test {};
-using Messages =
-    testing::Types<Frame, ImuSample, SpeedSample, Calibration, Odometry, Landmarks, Detections,
-                   ModelInfo, SwapNotice, Objects, ObjectState, Event, Predictions, MapTile,
-                   MapHeader, MapFrame, MapNear, MapQuery, MapReply, Health>;
-TYPED_TEST_SUITE(Damaged, Messages);
+TYPED_TEST_SUITE(Damaged, AllMessages);
 
 TYPED_TEST(Damaged, MessagesGiveASoundValueOrAReason) {
   int refused = 0, accepted = 0;

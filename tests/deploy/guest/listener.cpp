@@ -101,10 +101,10 @@ void listen(const char* path, const char* touched) {
   const bus::Domain domain{bus::Options{}};
   const bus::Participant participant(domain, "guest_listener");
   bus::WaitLoop loop(participant);
-  bus::Reader<Frame> frames(participant, bus::topics::frame("cam0"));
-  bus::Reader<ImuSample> imu(participant, bus::topics::kImu);
-  bus::Reader<Odometry> odometry(participant, bus::topics::kOdometry);
-  bus::Reader<Health> health(participant, bus::topics::kHealth);
+  bus::Reader<Frame> frames(participant, bus::frameTopic("cam0"));
+  bus::Reader<ImuSample> imu(participant, bus::kTopic<ImuSample>);
+  bus::Reader<Odometry> odometry(participant, bus::kTopic<Odometry>);
+  bus::Reader<Health> health(participant, bus::kTopic<Health>);
   Notes notes(path, touched);
   hear(loop, frames, notes);
   hear(loop, imu, notes);

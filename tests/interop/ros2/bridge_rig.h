@@ -42,7 +42,7 @@ class BridgeRig {
  private:
   std::string domainId() const;
 
-  bus::Reader<Health> health_{participant, bus::topics::kHealth};
+  bus::Reader<Health> health_{participant, bus::kTopic<Health>};
   std::map<std::string, std::uint64_t> reasons_;
   std::string sentence_;
   std::unique_ptr<Child> bridge_, listener_;

@@ -163,8 +163,8 @@ TEST(Ros2Drive, CameraImuAndDetectorOfRosMakeAMapWithObjects) {
                       "restore.timeout_s=0.2"},
                      rig.folder.file("filter"));
   rig.listen({"/perdure/objects", "/perdure/odometry"});
-  bus::Reader<Objects> objects(rig.participant, bus::topics::kObjects);
-  bus::Reader<Odometry> odometry(rig.participant, bus::topics::kOdometry);
+  bus::Reader<Objects> objects(rig.participant, bus::kTopic<Objects>);
+  bus::Reader<Odometry> odometry(rig.participant, bus::kTopic<Odometry>);
   std::size_t frames = 0, most = 0, poses = 0;
   double way = 0;
   rig.loop.on(objects, [&](const Objects& m) {

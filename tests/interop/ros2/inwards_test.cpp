@@ -73,12 +73,12 @@ const Settings kAll{"in.cam0.image=/camera/image_raw", "in.imu.topic=/imu/data",
 /// Messages received on Perdure's bus.
 struct Bus {
   explicit Bus(BridgeRig& rig)
-      : frame(rig.participant, bus::topics::frame("cam0")),
-        imu(rig.participant, bus::topics::kImu),
-        calibration(rig.participant, bus::topics::kCalibration),
-        odometry(rig.participant, bus::topics::kOdometry),
-        detections(rig.participant, bus::topics::kDetections),
-        model(rig.participant, bus::topics::kModel) {
+      : frame(rig.participant, bus::frameTopic("cam0")),
+        imu(rig.participant, bus::kTopic<ImuSample>),
+        calibration(rig.participant, bus::kTopic<Calibration>),
+        odometry(rig.participant, bus::kTopic<Odometry>),
+        detections(rig.participant, bus::kTopic<Detections>),
+        model(rig.participant, bus::kTopic<ModelInfo>) {
     rig.loop.on(frame, [this](const Frame& m) {
       frames.push_back(m);
       frames.back().data =

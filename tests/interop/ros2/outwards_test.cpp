@@ -94,15 +94,15 @@ class Vehicle {
  private:
   const bus::Participant& participant_;
   std::uint64_t next_ = 1;
-  bus::Writer<Calibration> calibration_{participant_, bus::topics::kCalibration};
-  bus::Writer<ModelInfo> model_{participant_, bus::topics::kModel};
-  bus::Writer<MapFrame> map_{participant_, bus::topics::kMapFrame};
-  bus::Writer<Frame> frame_{participant_, bus::topics::frame("cam0")};
-  bus::Writer<ImuSample> imu_{participant_, bus::topics::kImu};
-  bus::Writer<Odometry> odometry_{participant_, bus::topics::kOdometry};
-  bus::Writer<Landmarks> landmarks_{participant_, bus::topics::kLandmarks};
-  bus::Writer<Detections> detections_{participant_, bus::topics::kDetections};
-  bus::Writer<Objects> objects_{participant_, bus::topics::kObjects};
+  bus::Writer<Calibration> calibration_{participant_, bus::kTopic<Calibration>};
+  bus::Writer<ModelInfo> model_{participant_, bus::kTopic<ModelInfo>};
+  bus::Writer<MapFrame> map_{participant_, bus::kTopic<MapFrame>};
+  bus::Writer<Frame> frame_{participant_, bus::frameTopic("cam0")};
+  bus::Writer<ImuSample> imu_{participant_, bus::kTopic<ImuSample>};
+  bus::Writer<Odometry> odometry_{participant_, bus::kTopic<Odometry>};
+  bus::Writer<Landmarks> landmarks_{participant_, bus::kTopic<Landmarks>};
+  bus::Writer<Detections> detections_{participant_, bus::kTopic<Detections>};
+  bus::Writer<Objects> objects_{participant_, bus::kTopic<Objects>};
 };
 
 /// Publishes frames until every topic has been received; returns the newest message of each.

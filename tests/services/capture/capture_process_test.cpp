@@ -58,11 +58,11 @@ class CaptureProcess : public ::testing::Test {
   test::Folder folder_;
   bus::Domain domain_{test::ownNetwork()};
   bus::Participant participant_{domain_, "vio"};
-  bus::Reader<Frame> frames_{participant_, bus::topics::frame("cam0")};
-  bus::Reader<ImuSample> imu_{participant_, bus::topics::kImu};
-  bus::Reader<Calibration> calibrations_{participant_, bus::topics::kCalibration};
-  bus::Reader<Health> health_{participant_, bus::topics::kHealth};
-  bus::Writer<Odometry> odometry_{participant_, bus::topics::kOdometry};
+  bus::Reader<Frame> frames_{participant_, bus::frameTopic("cam0")};
+  bus::Reader<ImuSample> imu_{participant_, bus::kTopic<ImuSample>};
+  bus::Reader<Calibration> calibrations_{participant_, bus::kTopic<Calibration>};
+  bus::Reader<Health> health_{participant_, bus::kTopic<Health>};
+  bus::Writer<Odometry> odometry_{participant_, bus::kTopic<Odometry>};
   bus::WaitLoop loop_{participant_};
   bool answers_ = false;
   int starts_ = 0;
@@ -96,7 +96,7 @@ TEST_F(CaptureProcess, StaysForLateReadersAndEndsWithinASecondWhenTold) {
   ASSERT_TRUE(runUntil(loop_, [&] { return ended(); })) << capture->log();
   EXPECT_EQ(last_health_.state, HealthState::kOk);
   bus::Participant late(domain_, "late");
-  bus::Reader<Calibration> calibrations(late, bus::topics::kCalibration);
+  bus::Reader<Calibration> calibrations(late, bus::kTopic<Calibration>);
   bus::WaitLoop loop(late);
   bool got = false;
   loop.on(calibrations, [&](const Calibration&) { got = true; });

@@ -96,8 +96,8 @@ class Gateway : public ::testing::Test {
 
   bus::Domain domain_{ownNetwork()};
   bus::Participant participant_{domain_, "test"};
-  bus::Writer<Objects> objects_{participant_, bus::topics::kObjects};
-  bus::Writer<Event> events_{participant_, bus::topics::kEvents};
+  bus::Writer<Objects> objects_{participant_, bus::kTopic<Objects>};
+  bus::Writer<Event> events_{participant_, bus::kTopic<Event>};
   Folder folder_;
   std::unique_ptr<Child> child_;
   std::uint16_t port_ = 0;
@@ -132,7 +132,7 @@ TEST_F(Gateway, ServesPageHealthAndMetrics) {
 TEST_F(Gateway, SaysInHealthWhereItIsAndForHowMany) {
   start();
   const auto client = lookingAt("/health");
-  bus::Reader<Health> healths(participant_, bus::topics::kHealth);
+  bus::Reader<Health> healths(participant_, bus::kTopic<Health>);
   std::string message;
   const std::string expected = "at http://127.0.0.1:" + std::to_string(port_) + "/ for 1 clients";
   EXPECT_TRUE(eventually(10s, [&] {
@@ -188,7 +188,7 @@ TEST_F(Gateway, WantsTheTokenThatIsSet) {
 
 TEST_F(Gateway, HasTheImagesSentToItOnlyWhileSomebodyLooks) {
   start();
-  bus::Writer<Frame> frames(participant_, bus::topics::frame("cam0"));
+  bus::Writer<Frame> frames(participant_, bus::frameTopic("cam0"));
   const auto client = greeted();
   EXPECT_EQ(frames.matched(), 0u);
   client->sendFrame(subscribe(4, channels_["/camera/cam0/image"]));
@@ -203,7 +203,7 @@ TEST_F(Gateway, HasTheImagesSentToItOnlyWhileSomebodyLooks) {
 
 TEST_F(Gateway, HasNothingThatIsFrequentSentToItWhileNobodyLooks) {
   start();
-  bus::Writer<Odometry> odometry(participant_, bus::topics::kOdometry);
+  bus::Writer<Odometry> odometry(participant_, bus::kTopic<Odometry>);
   auto client = greeted();
   publish(++sequence_);
   EXPECT_EQ(objects_.matched() + odometry.matched(), 0u);
@@ -217,7 +217,7 @@ TEST_F(Gateway, HasNothingThatIsFrequentSentToItWhileNobodyLooks) {
 /// last frame.
 TEST_F(Gateway, TellsTheEndOfADriveToWhoComesAfterIt) {
   start();
-  bus::Writer<Frame> frames(participant_, bus::topics::frame("cam0"));
+  bus::Writer<Frame> frames(participant_, bus::frameTopic("cam0"));
   for (int i = 0; i < 3; ++i) {
     publish(++sequence_);
     ASSERT_TRUE(frames.write(greyFrame(sequence_)).has_value());
@@ -236,7 +236,7 @@ TEST_F(Gateway, TellsTheEndOfADriveToWhoComesAfterIt) {
 /// No other message arrives that could make the gateway notice the new subscriber.
 TEST_F(Gateway, TellsTheLastImageWhereThereAreNoObjects) {
   start();
-  bus::Writer<Frame> frames(participant_, bus::topics::frame("cam0"));
+  bus::Writer<Frame> frames(participant_, bus::frameTopic("cam0"));
   ASSERT_TRUE(frames.write(greyFrame(1)).has_value());
   const auto client = lookingAt("/camera/cam0/image");
   EXPECT_THAT(client->readMessage(1), HasSubstr("\xff\xd8\xff"));

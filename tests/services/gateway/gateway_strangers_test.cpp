@@ -24,20 +24,20 @@ using ::testing::IsEmpty;
 class Drive {
  public:
   explicit Drive(const bus::Participant& participant)
-      : calibration_(participant, bus::topics::kCalibration),
-        odometry_(participant, bus::topics::kOdometry),
-        landmarks_(participant, bus::topics::kLandmarks),
-        detections_(participant, bus::topics::kDetections),
-        model_(participant, bus::topics::kModel),
-        objects_(participant, bus::topics::kObjects),
-        events_(participant, bus::topics::kEvents),
-        tiles_(participant, bus::topics::kMap),
-        map_frame_(participant, bus::topics::kMapFrame),
-        replies_(participant, bus::topics::kMapReply),
-        queries_(participant, bus::topics::kMapQuery),
-        imu_(participant, bus::topics::kImu),
-        speed_(participant, bus::topics::kSpeed),
-        frames_(participant, bus::topics::frame("cam0")) {
+      : calibration_(participant, bus::kTopic<Calibration>),
+        odometry_(participant, bus::kTopic<Odometry>),
+        landmarks_(participant, bus::kTopic<Landmarks>),
+        detections_(participant, bus::kTopic<Detections>),
+        model_(participant, bus::kTopic<ModelInfo>),
+        objects_(participant, bus::kTopic<Objects>),
+        events_(participant, bus::kTopic<Event>),
+        tiles_(participant, bus::kTopic<MapTile>),
+        map_frame_(participant, bus::kTopic<MapFrame>),
+        replies_(participant, bus::kTopic<MapReply>),
+        queries_(participant, bus::kTopic<MapQuery>),
+        imu_(participant, bus::kTopic<ImuSample>),
+        speed_(participant, bus::kTopic<SpeedSample>),
+        frames_(participant, bus::frameTopic("cam0")) {
     Calibration calibration = forwardCamera();
     calibration.source = 42;
     (void)calibration_.write(calibration);

@@ -52,9 +52,9 @@ class ServiceRig {
  private:
   bus::Domain domain_;
   bus::Participant participant_;
-  bus::Writer<Frame> frames_{participant_, bus::topics::frame("cam0")};
-  bus::Reader<Detections> detections_{participant_, bus::topics::kDetections};
-  bus::Reader<Health> health_{participant_, bus::topics::kHealth};
+  bus::Writer<Frame> frames_{participant_, bus::frameTopic("cam0")};
+  bus::Reader<Detections> detections_{participant_, bus::kTopic<Detections>};
+  bus::Reader<Health> health_{participant_, bus::kTopic<Health>};
   bus::WaitLoop loop_{participant_};
 };
 

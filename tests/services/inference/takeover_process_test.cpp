@@ -82,9 +82,9 @@ class Takeover : public ::testing::Test {
   test::Folder folder_;
   bus::Domain domain_{test::ownNetwork()};
   bus::Participant participant_{domain_, "test"};
-  bus::Writer<Frame> frames_{participant_, bus::topics::frame("cam0")};
-  bus::Reader<Detections> detections_{participant_, bus::topics::kDetections};
-  bus::Reader<ModelInfo> models_{participant_, bus::topics::kModel};
+  bus::Writer<Frame> frames_{participant_, bus::frameTopic("cam0")};
+  bus::Reader<Detections> detections_{participant_, bus::kTopic<Detections>};
+  bus::Reader<ModelInfo> models_{participant_, bus::kTopic<ModelInfo>};
   bus::WaitLoop loop_{participant_};
   std::string model_;
   std::uint64_t next_ = 0;

@@ -43,8 +43,8 @@ class BusTools : public testing::Test {
     std::thread publisher([&] {
       const bus::Domain domain{bus::Options{}};
       const bus::Participant participant(domain, "semantic_filter");
-      bus::Writer<Objects> objects(participant, bus::topics::kObjects);
-      bus::Writer<Odometry> odometry(participant, bus::topics::kOdometry);
+      bus::Writer<Objects> objects(participant, bus::kTopic<Objects>);
+      bus::Writer<Odometry> odometry(participant, bus::kTopic<Odometry>);
       bus::WaitLoop loop(participant);
       loop.every(std::chrono::milliseconds(20), [&] {
         (void)objects.write(oneCar());

@@ -26,12 +26,12 @@ class FullRate {
   FullRate()
       : domain_(test::ownNetwork()),
         participant_(domain_, "vehicle"),
-        imu_(participant_, bus::topics::kImu),
-        speed_(participant_, bus::topics::kSpeed),
-        odometry_(participant_, bus::topics::kOdometry),
-        landmarks_(participant_, bus::topics::kLandmarks),
-        detections_(participant_, bus::topics::kDetections),
-        objects_(participant_, bus::topics::kObjects),
+        imu_(participant_, bus::kTopic<ImuSample>),
+        speed_(participant_, bus::kTopic<SpeedSample>),
+        odometry_(participant_, bus::kTopic<Odometry>),
+        landmarks_(participant_, bus::kTopic<Landmarks>),
+        detections_(participant_, bus::kTopic<Detections>),
+        objects_(participant_, bus::kTopic<Objects>),
         loop_(participant_) {
     fill();
     loop_.every(5ms, [this] { publish(); });

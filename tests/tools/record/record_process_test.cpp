@@ -39,10 +39,10 @@ class Vehicle {
   Vehicle()
       : domain_(test::ownNetwork()),
         participant_(domain_, "vehicle"),
-        imu_(participant_, bus::topics::kImu),
-        odometry_(participant_, bus::topics::kOdometry),
-        calibration_(participant_, bus::topics::kCalibration),
-        health_(participant_, bus::topics::kHealth),
+        imu_(participant_, bus::kTopic<ImuSample>),
+        odometry_(participant_, bus::kTopic<Odometry>),
+        calibration_(participant_, bus::kTopic<Calibration>),
+        health_(participant_, bus::kTopic<Health>),
         loop_(participant_) {
     Calibration calibration = scene::calibrationOf(scene::makeCamera());
     calibration.source = 77;

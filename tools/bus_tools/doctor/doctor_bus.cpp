@@ -105,7 +105,7 @@ Findings checkBus(const bus::Options& options, double seconds) {
     const bus::Domain domain(options);
     const bus::Participant participant(domain, "perdure doctor");
     bus::Discovery discovery(participant);
-    bus::Reader<Health> reader(participant, bus::topics::kHealth);
+    bus::Reader<Health> reader(participant, bus::kTopic<Health>);
     bus::WaitLoop loop(participant);
     std::map<std::string, Health> processes;
     loop.on(reader, [&](const Health& m) { processes[m.process] = m; });

@@ -101,7 +101,7 @@ void writeImages(const bus::Options& options, const StatusSeen& seen, const fs::
     const bus::Domain domain(options);
     const bus::Participant participant(domain, "perdure doctor");
     bus::WaitLoop loop(participant);
-    bus::Reader<Frame> reader(participant, bus::topics::frame(camera.name));
+    bus::Reader<Frame> reader(participant, bus::frameTopic(camera.name));
     loop.on(reader, [&](const Frame& compressed) {
       const auto pixels = vision::decompressed(compressed);
       if (!pixels) return;

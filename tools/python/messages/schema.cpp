@@ -2,7 +2,7 @@
 
 #include <pybind11/stl.h>
 
-#include "common/wire/description/describe.h"
+#include "common/wire/topics.h"
 #include "tools/python/messages/choices.h"
 #include "tools/python/messages/message_class.h"
 

@@ -5,7 +5,7 @@
 
 #include <map>
 
-#include "common/wire/description/describe.h"
+#include "common/wire/topics.h"
 #include "tools/python/messages/choices.h"
 #include "tools/python/messages/message_class.h"
 

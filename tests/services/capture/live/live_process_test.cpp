@@ -66,9 +66,9 @@ class LiveProcess : public ::testing::Test {
   test::Folder folder_;
   bus::Domain domain_{test::ownNetwork()};
   bus::Participant participant_{domain_, "vio"};
-  bus::Reader<ImuSample> imu_{participant_, bus::topics::kImu};
-  bus::Reader<Calibration> calibrations_{participant_, bus::topics::kCalibration};
-  bus::Reader<Health> health_{participant_, bus::topics::kHealth};
+  bus::Reader<ImuSample> imu_{participant_, bus::kTopic<ImuSample>};
+  bus::Reader<Calibration> calibrations_{participant_, bus::kTopic<Calibration>};
+  bus::Reader<Health> health_{participant_, bus::kTopic<Health>};
   bus::WaitLoop loop_{participant_};
   Calibration calibration_;
   std::vector<ImuSample> samples_;
@@ -177,7 +177,7 @@ std::string sentencesOf(int second) {
 TEST_F(LiveProcess, GivesTheSpeedAndTheVehiclesPlaceOnEarth) {
   const Vehicle vehicle(address_);
   std::vector<SpeedSample> speeds;
-  bus::Reader<SpeedSample> speed(participant_, bus::topics::kSpeed);
+  bus::Reader<SpeedSample> speed(participant_, bus::kTopic<SpeedSample>);
   loop_.on(speed, [&](const SpeedSample& s) { speeds.push_back(s); });
   const Child capture(
       command({"imu.uri=ip:" + address_, "speed.source=udp", "speed.address=" + address_ + ":5600",

@@ -102,10 +102,10 @@ class StereoLive : public ::testing::Test {
   std::chrono::steady_clock::time_point next_;
   bus::Domain domain_{test::ownNetwork()};
   bus::Participant participant_{domain_, "vio"};
-  bus::Reader<Calibration> calibrations_{participant_, bus::topics::kCalibration};
-  bus::Reader<Frame> left_images_{participant_, bus::topics::frame("cam0")};
-  bus::Reader<Frame> right_images_{participant_, bus::topics::frame("cam1")};
-  bus::Reader<Health> health_{participant_, bus::topics::kHealth};
+  bus::Reader<Calibration> calibrations_{participant_, bus::kTopic<Calibration>};
+  bus::Reader<Frame> left_images_{participant_, bus::frameTopic("cam0")};
+  bus::Reader<Frame> right_images_{participant_, bus::frameTopic("cam1")};
+  bus::Reader<Health> health_{participant_, bus::kTopic<Health>};
   bus::WaitLoop loop_{participant_};
   Calibration calibration_;
   Health last_health_;

@@ -1,9 +1,14 @@
-// Limits of message contents. The IDL has no bounds; they are checked here, where refusals can be
-// counted.
+// How messages are described: each header of this folder has, below a struct, its fields by name
+// and kind with their limits. Encoding, decoding, JSON and Python use this description. In
+// describe(a, d, w), `a` is the archive, `d` the domain value, `w` the value on the wire (idl/).
+// The IDL has no bounds; they are checked here, where refusals can be counted.
 #pragma once
 
+#include <concepts>
 #include <cstddef>
+#include <type_traits>
 
+#include "common/base/ids.h"
 #include "common/base/time_bounds.h"
 
 namespace perdure::wire {
@@ -47,5 +52,23 @@ inline constexpr std::size_t kReasons = 1024;
 inline constexpr std::size_t kEvidenceKinds = 64;
 /// Tolerance of the norm of a quaternion or a unit vector, and of the sum of a PMF.
 inline constexpr double kUnitTolerance = 1e-3;
+
+template <class D, class T>
+concept Is = std::same_as<std::remove_cv_t<D>, T>;
+
+template <class A, Is<FrameStamp> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("source", d.source, w.source);
+  a.value("sequence", d.sequence, w.seq);
+  a.time("time_ns", d.time, w.time_ns);
+  a.value("captured_ns", d.captured_ns, w.captured_ns);
+  a.ensure("captured_ns", "out_of_range", [&] { return isTime(d.captured_ns); });
+}
+
+template <class A, Is<WorldId> D, class W>
+void describe(A& a, D& d, W& w) {
+  a.value("world", d.world, w.world);
+  a.value("epoch", d.epoch, w.epoch);
+}
 
 }  // namespace perdure::wire
