@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "dds/dds.h"
+#include "common/wire/topics.h"
 
 namespace perdure::wire {
 
