@@ -54,7 +54,8 @@ FrameContext SemanticFilter::contextOf(const Belief& belief, const FrameInput& i
           noise_scale,
           std::make_shared<const GroundSurface>(belief.tracks, belief.path,
                                                 belief.learned.roughness_scale, input.view.up_W,
-                                                priors_, parameters_.ground)};
+                                                priors_, parameters_.ground),
+          &belief.learned.movers};
 }
 
 ScratchVector<TrackVisibility> SemanticFilter::updateVisibility(Belief& belief,
@@ -147,10 +148,10 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief,
 void SemanticFilter::manage(Track& track, ScoredTrack& scored, const FrameInput& input,
                             const FrameContext& frame) const {
   const auto pmf = classShares(track);
-  reduceMixture(track, priors_, parameters_);
+  reduceMixture(track, frame);
   if (track.hypotheses.empty() && scored.before) {
     track = updateAsMissed(*scored.before, scored.score, frame);
-    if (sound(track)) reduceMixture(track, priors_, parameters_);
+    if (sound(track)) reduceMixture(track, frame);
   }
   if (!track.hypotheses.empty()) return;
   if (scored.assigned) {
@@ -158,7 +159,7 @@ void SemanticFilter::manage(Track& track, ScoredTrack& scored, const FrameInput&
     const auto range = rangeFromLandmarks(box, input.points, parameters_.initiation);
     if (reinitialise(track, pmf, box, range, frame)) {
       considerKeyframe(track, box, hiddenSides(scored.score, *scored.assigned, box), frame);
-      reduceMixture(track, priors_, parameters_);
+      reduceMixture(track, frame);
     }
   }
   if (track.hypotheses.empty()) {
@@ -251,6 +252,9 @@ StepReport SemanticFilter::step(Belief& belief, const FrameInput& heard, IdBook&
   dropBroken(belief, report);
   // Track management uses the detections of this frame and includes new tracks.
   recordDetections(belief, now);
+  for (const Track& t : belief.tracks) {
+    if (t.life.last_seen == now) belief.learned.movers.learn(t, parameters_.motion.min_speed);
+  }
   resolveIdentities(belief, frame, now, report);
   return report;
 }

@@ -9,6 +9,7 @@
 
 #include "common/types/objects.h"
 #include "services/semantic_filter/core/belief/ground_surface.h"
+#include "services/semantic_filter/core/belief/mover_shares.h"
 #include "services/semantic_filter/core/belief/noise_scale.h"
 #include "services/semantic_filter/core/belief/track.h"
 
@@ -19,6 +20,7 @@ struct Learned {
   NoiseScales sides{4000.0};    ///< scales of the variances of box sides
   NoiseScales azimuths{200.0};  ///< scales of the variances of azimuths
   GroundRoughness roughness_scale = {};
+  MoverShares movers = {};
 };
 
 struct Belief {

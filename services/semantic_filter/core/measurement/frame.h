@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "services/semantic_filter/core/belief/ground_surface.h"
+#include "services/semantic_filter/core/belief/mover_shares.h"
 #include "services/semantic_filter/core/belief/view_change.h"
 #include "services/semantic_filter/core/measurement/detection.h"
 #include "services/semantic_filter/core/measurement/view.h"
@@ -106,9 +107,14 @@ struct FrameContext {
   std::shared_ptr<const FrameView> frame_view = {};  ///< of this frame, for its keyframes
   NoiseScale noise_scale = {};
   std::shared_ptr<const GroundSurface> ground = {};  ///< before this frame; null: nothing is known
+  const MoverShares* movers = nullptr;               ///< null: the shares of the class priors
 
   /// Returns the projector that belongs to `view`.
   Projector projector() const;
+  /// Returns the prior probability that an instance of the class moves.
+  double moverShare(const ClassPrior& prior) const {
+    return movers ? movers->of(prior) : prior.moving;
+  }
   /// Returns how the network draws boxes around objects of a class, for projectObserved.
   const BoxStyle& styleOf(const std::string& class_name) const {
     static const BoxStyle plain;

@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "common/math/so3.h"
+#include "services/semantic_filter/core/belief/classes/upper_part.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
-#include "services/semantic_filter/core/belief/classes/upper_part.h"
 #include "services/semantic_filter/core/parameters.h"
 #include "services/semantic_filter/core/update/ground_contact.h"
 
@@ -98,6 +98,7 @@ void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Fit
   const MapFit &static_fit = at_rest.map_fit, &moving_fit = in_motion.map_fit;
   constexpr double kMaxLogOdds = 15.0;  // nats
   const ClassPrior& prior = frame.priors->of(name);
+  const double share = frame.moverShare(prior);
   const auto& motion = frame.parameters->motion;
   const PerKeyframe inflations = static_fit.inflations().cwiseMin(moving_fit.inflations());
   const double speed_prior_ratio =
@@ -105,7 +106,7 @@ void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Fit
                                                              motion.slow_share * prior.speed_sigma);
   const double log_odds = std::clamp(
       static_fit.logEvidence(inflations) - moving_fit.logEvidence(inflations) + at_rest.beside -
-          in_motion.beside + std::log((1.0 - prior.moving) / prior.moving / speed_prior_ratio),
+          in_motion.beside + std::log((1.0 - share) / share / speed_prior_ratio),
       -kMaxLogOdds, kMaxLogOdds);
   const double p_rest = 1.0 / (1.0 + std::exp(-log_odds));
   double weight[2] = {0.0, 0.0};

@@ -34,11 +34,11 @@ ScratchVector<YawStart> yawStarts(const ClassPrior& prior, const FrameContext& f
   return starts;
 }
 
-void addMovingCopy(Track& track, const Hypothesis& at_rest, const ClassPrior& prior) {
-  if (prior.moving <= 0.0 || prior.speed_sigma <= 0.0) return;
+void addMovingCopy(Track& track, const Hypothesis& at_rest, const ClassPrior& prior, double share) {
+  if (share <= 0.0 || prior.speed_sigma <= 0.0) return;
   Hypothesis copy = at_rest;
-  track.hypotheses.back().weight *= 1.0 - prior.moving;
-  copy.weight *= prior.moving;
+  track.hypotheses.back().weight *= 1.0 - share;
+  copy.weight *= share;
   copy.moving = true;
   const Eigen::Vector2d along(std::cos(copy.x[kYaw]), std::sin(copy.x[kYaw]));
   const double s2 = prior.speed_sigma * prior.speed_sigma;
@@ -118,7 +118,7 @@ void addClass(Track& track, const ClassPrior& prior, double ratio, const BoxDete
   for (const auto& h : fits) {
     if (h.weight < 1e-15) continue;
     track.hypotheses.push_back(h);
-    addMovingCopy(track, h, prior);
+    addMovingCopy(track, h, prior, frame.moverShare(prior));
   }
 }
 
@@ -290,7 +290,7 @@ void initiateTracks(Belief& belief, const ScratchVector<TrackVisibility>& visibi
       track->existence.become(track->existence * (1.0 - share), ExistenceEvidence::kShared,
                               input.stamp.time);
     }
-    reduceMixture(*track, *frame.priors, *frame.parameters);
+    reduceMixture(*track, frame);
     if (track->hypotheses.empty()) continue;
     initiated.push_back(std::move(*track));
     accepted.push_back(z);

@@ -92,13 +92,14 @@ void pruneLightHypotheses(Track& track, const TrackParameters& parameters) {
   });
 }
 
-void addMovingAndMisplaced(Track& track, const ClassPriors& priors,
-                           const MotionParameters& motion) {
+/// The moving hypothesis becomes rarer with the share of movers. A wrong depth does not.
+void addMovingAndMisplaced(Track& track, const FrameContext& frame) {
+  const MotionParameters& motion = frame.parameters->motion;
   if (track.history.running_nis < motion.start_nis || hasMoving(track)) return;
-  const ClassPrior& prior = priors.of(track.best().class_name);
+  const ClassPrior& prior = frame.priors->of(track.best().class_name);
   if (prior.moving <= 0.0 || track.life.hits < 3) return;
   Hypothesis copy = asMoving(track.best());
-  copy.weight *= motion.start_probability;
+  copy.weight *= motion.start_probability * frame.moverShare(prior) / prior.moving;
   copy.P.topLeftCorner<2, 2>().diagonal().array() += 0.25;
   // The alternative to motion: the object stands, but nearer or farther along the ray.
   Hypothesis misplaced = track.best();
@@ -117,7 +118,9 @@ void addMovingAndMisplaced(Track& track, const ClassPriors& priors,
 
 }  // namespace
 
-void reduceMixture(Track& track, const ClassPriors& priors, const Parameters& parameters) {
+void reduceMixture(Track& track, const FrameContext& frame) {
+  const ClassPriors& priors = *frame.priors;
+  const Parameters& parameters = *frame.parameters;
   applySpeedPrior(track, priors, parameters.motion);
   settleSlowHypotheses(track, parameters.motion.min_speed);
   mergeNearHypotheses(track, parameters.tracks.hypothesis_merge);
@@ -127,7 +130,7 @@ void reduceMixture(Track& track, const ClassPriors& priors, const Parameters& pa
   normalise(track, ClassEvidence::kGeometry);
   pruneLightHypotheses(track, parameters.tracks);
   book(track, ClassEvidence::kPruning);
-  addMovingAndMisplaced(track, priors, parameters.motion);
+  addMovingAndMisplaced(track, frame);
   normalise(track, ClassEvidence::kMotion);
 }
 

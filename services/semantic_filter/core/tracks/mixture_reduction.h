@@ -2,9 +2,8 @@
 // 1.4.16). Derivation: tools/docs/maths/state_and_mixture.md.
 #pragma once
 
-#include "services/semantic_filter/core/belief/classes/class_prior.h"
 #include "services/semantic_filter/core/belief/track.h"
-#include "services/semantic_filter/core/parameters.h"
+#include "services/semantic_filter/core/measurement/frame.h"
 
 namespace perdure::semantic_filter {
 
@@ -13,6 +12,6 @@ namespace perdure::semantic_filter {
 /// - Stops moving hypotheses that are slow.
 /// - Gives a static track that its boxes contradict a moving copy, and one misplaced along the ray.
 /// Possibly no hypothesis is left.
-void reduceMixture(Track& track, const ClassPriors& priors, const Parameters& parameters);
+void reduceMixture(Track& track, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

@@ -23,7 +23,7 @@ TEST_F(MixtureReduction, ASlowHypothesisStopsAndItsPlaceIsCorrected) {
   h.x[kVelocity] = 0.2;
   h.P.bottomRightCorner<3, 3>().diagonal() << 0.04, 0.01, 0.01;
   h.P(0, kVelocity) = h.P(kVelocity, 0) = 0.03;
-  reduceMixture(o, priors, parameters);
+  reduceMixture(o, frame);
   ASSERT_FALSE(o.best().moving);
   EXPECT_NEAR(o.best().x[0], 20.0 - 0.03 / 0.04 * 0.2, 1e-9);
   EXPECT_NEAR(o.best().P(0, 0), 0.04 - 0.03 * 0.03 / 0.04, 1e-9);
@@ -37,7 +37,7 @@ TEST_F(MixtureReduction, AHypothesisOfImplausibleSizeIsPruned) {
   o.hypotheses[0].weight = 0.4;
   half.weight = 0.6;
   o.hypotheses.push_back(half);
-  reduceMixture(o, priors, parameters);
+  reduceMixture(o, frame);
   ASSERT_EQ(o.hypotheses.size(), 1u);
   EXPECT_NEAR(o.best().x[0], 10.0, 1e-9);
   EXPECT_NEAR(o.existence, 0.9 * 0.4, 1e-9);
@@ -50,7 +50,7 @@ TEST_F(MixtureReduction, ADominantClassPrunesTheOthers) {
   van.weight = 0.003;
   o.hypotheses.push_back(van);
   normalise(o, ClassEvidence::kPrior);
-  reduceMixture(o, priors, parameters);
+  reduceMixture(o, frame);
   EXPECT_EQ(o.hypotheses.size(), 1u);
   EXPECT_EQ(classProbability(o, "car"), 1.0);
 }

@@ -32,7 +32,7 @@ TEST_F(Reinitialise, ATrackWithoutPlausibleSizeStartsAgainFromItsAssignedBoxWith
   o.life.hits = 40;
   const double existence = o.existence;
   const auto pmf = classShares(o);
-  reduceMixture(o, priors, parameters);
+  reduceMixture(o, frame);
   ASSERT_TRUE(o.hypotheses.empty());
   ASSERT_TRUE(reinitialise(o, pmf, e, std::nullopt, frame));
   EXPECT_EQ(o.id, 7u);

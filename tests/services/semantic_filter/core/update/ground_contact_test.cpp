@@ -123,7 +123,7 @@ TEST_F(UpdateWithGround, AnotherHypothesisOfTheTrackDoesNotInheritIt) {
   o.history.running_nis = 2.0 * usual_.parameters.motion.start_nis;
   o.hypotheses[0].ground_contact = {0.1, 0.01};
   for (ClassPrior& c : usual_.priors.classes) c.moving = 0.3;
-  reduceMixture(o, usual_.priors, usual_.parameters);
+  reduceMixture(o, usual_.frame);
   ASSERT_EQ(o.hypotheses.size(), 3u) << "one that drives off, and one that is misplaced";
   for (const Hypothesis& h : o.hypotheses.read()) {
     const bool itself = !h.moving && h.P(0, 0) < 0.05;
