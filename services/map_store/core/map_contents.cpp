@@ -35,18 +35,6 @@ CREATE TABLE changes(
   by_world INTEGER NOT NULL, by_epoch INTEGER NOT NULL);
 )sql";
 
-template <class Take>
-Result<void> forRows(const Connection& connection, std::string_view sql, Take take) {
-  auto rows = connection.prepare(sql);
-  if (!rows) return tl::unexpected<Reason>(rows.error());
-  for (;;) {
-    const auto row = rows->step();
-    if (!row) return tl::unexpected<Reason>(row.error());
-    if (!*row) return {};
-    take(*rows);
-  }
-}
-
 WorldId worldAt(const Statement& row, int column) {
   return {row.id(column), static_cast<std::uint32_t>(row.integer(column + 1))};
 }
@@ -70,47 +58,47 @@ void takeObject(const Statement& row, WholeMap& map) {
 }
 
 Result<void> readObjects(const Connection& connection, WholeMap& map) {
-  return forRows(connection,
-                 "SELECT world, epoch, gone, belief, gone_ns, "
-                 "coalesce(merged_into, 0) FROM objects ORDER BY id",
-                 [&](const Statement& row) { takeObject(row, map); });
+  return connection.forRows(
+      "SELECT world, epoch, gone, belief, gone_ns, "
+      "coalesce(merged_into, 0) FROM objects ORDER BY id",
+      [&](const Statement& row) { takeObject(row, map); });
 }
 
 Result<void> readProvenance(const Connection& connection, MapContents& map) {
   if (!connection.has("provenance").value_or(false)) return {};
-  return forRows(connection,
-                 "SELECT map_first, map_second, old_id, id, first_seen_ns, last_seen_ns FROM "
-                 "provenance ORDER BY rowid",
-                 [&](const Statement& row) {
-                   map.origins.push_back({{row.id(0), row.id(1)},
-                                          row.id(2),
-                                          row.id(3),
-                                          fromNanoseconds(row.integer(4)),
-                                          fromNanoseconds(row.integer(5))});
-                 });
+  return connection.forRows(
+      "SELECT map_first, map_second, old_id, id, first_seen_ns, last_seen_ns FROM "
+      "provenance ORDER BY rowid",
+      [&](const Statement& row) {
+        map.origins.push_back({{row.id(0), row.id(1)},
+                               row.id(2),
+                               row.id(3),
+                               fromNanoseconds(row.integer(4)),
+                               fromNanoseconds(row.integer(5))});
+      });
 }
 
 Result<void> readChanges(const Connection& connection, MapContents& map) {
   if (!connection.has("changes").value_or(false)) return {};
-  return forRows(connection,
-                 "SELECT map_world, map_epoch, by_world, by_epoch, id, kind, class, x, y, z, "
-                 "last_seen_ns, since_ns FROM changes ORDER BY rowid",
-                 [&](const Statement& row) {
-                   Change change;
-                   change.map = worldAt(row, 0);
-                   change.by = worldAt(row, 2);
-                   change.id = row.id(4);
-                   change.kind = row.integer(5) == 1 ? Change::Kind::kMoved : Change::Kind::kGone;
-                   change.class_name = row.text(6);
-                   change.p_M = {row.real(7), row.real(8), row.real(9)};
-                   change.last_seen = fromNanoseconds(row.integer(10));
-                   change.since = fromNanoseconds(row.integer(11));
-                   map.changes.push_back(std::move(change));
-                 });
+  return connection.forRows(
+      "SELECT map_world, map_epoch, by_world, by_epoch, id, kind, class, x, y, z, "
+      "last_seen_ns, since_ns FROM changes ORDER BY rowid",
+      [&](const Statement& row) {
+        Change change;
+        change.map = worldAt(row, 0);
+        change.by = worldAt(row, 2);
+        change.id = row.id(4);
+        change.kind = row.integer(5) == 1 ? Change::Kind::kMoved : Change::Kind::kGone;
+        change.class_name = row.text(6);
+        change.p_M = {row.real(7), row.real(8), row.real(9)};
+        change.last_seen = fromNanoseconds(row.integer(10));
+        change.since = fromNanoseconds(row.integer(11));
+        map.changes.push_back(std::move(change));
+      });
 }
 
 Result<void> readMeta(const Connection& connection, WholeMap& map) {
-  return forRows(connection, "SELECT key, value FROM meta", [&](const Statement& row) {
+  return connection.forRows("SELECT key, value FROM meta", [&](const Statement& row) {
     if (row.text(0) == "revision") map.revision = row.id(1);
     if (row.text(0) == "tile_size_m" && row.real(1) > 0.0) map.tile_size_m = row.real(1);
     if (row.text(0) == "earth_anchor") map.earth_anchor = row.text(1);
@@ -176,9 +164,10 @@ Result<void> writeProvenance(const Connection& connection, const MapContents& ma
   auto insert = connection.prepare("INSERT INTO provenance VALUES(?1, ?2, ?3, ?4, ?5, ?6)");
   if (!insert) return tl::unexpected<Reason>(insert.error());
   for (const Origin& origin : map.origins) {
-    insert->bindId(1, origin.map.first).bindId(2, origin.map.second).bindId(3, origin.id);
-    insert->bindId(4, origin.now).bind(5, toNanoseconds(origin.first_seen));
-    const auto done = insert->bind(6, toNanoseconds(origin.last_seen)).run();
+    const auto done = insert
+                          ->bindAll(origin.map.first, origin.map.second, origin.id, origin.now,
+                                    origin.first_seen, origin.last_seen)
+                          .run();
     if (!done) return done;
   }
   return {};
@@ -189,13 +178,10 @@ Result<void> writeChanges(const Connection& connection, const MapContents& map) 
       "INSERT INTO changes VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)");
   if (!insert) return tl::unexpected<Reason>(insert.error());
   for (const Change& change : map.changes) {
-    insert->bindId(1, change.id).bind(2, static_cast<std::int64_t>(change.kind));
-    insert->bind(3, std::string_view(change.class_name)).bindId(4, change.map.world);
-    insert->bind(5, std::int64_t{change.map.epoch}).bind(6, change.p_M.x());
-    insert->bind(7, change.p_M.y()).bind(8, change.p_M.z());
-    insert->bind(9, toNanoseconds(change.last_seen)).bind(10, toNanoseconds(change.since));
-    insert->bindId(11, change.by.world);
-    const auto done = insert->bind(12, std::int64_t{change.by.epoch}).run();
+    insert->bindAll(change.id, change.kind, change.class_name, change.map.world, change.map.epoch,
+                    change.p_M.x(), change.p_M.y(), change.p_M.z(), change.last_seen, change.since,
+                    change.by.world, change.by.epoch);
+    const auto done = insert->run();
     if (!done) return done;
   }
   return {};

@@ -28,18 +28,6 @@ std::uint64_t digestOf(std::span<const std::uint8_t> bytes, const WorldId& world
 
 Result<void> failed(const Reason& reason) { return tl::unexpected<Reason>(reason); }
 
-Result<void> run(Statement& statement, const auto&... parameters) {
-  int index = 0;
-  (statement.bind(++index, parameters), ...);
-  return statement.run();
-}
-
-Result<void> runOnce(const Connection& connection, std::string_view sql,
-                     const auto&... parameters) {
-  auto statement = connection.prepare(sql);
-  return statement ? run(*statement, parameters...) : failed(statement.error());
-}
-
 /// A statement for many rows of one commit. It is prepared with the first row, because preparing
 /// takes longer than writing a row.
 Result<void> runAgain(const Connection& connection, std::optional<Statement>& statement,
@@ -49,10 +37,8 @@ Result<void> runAgain(const Connection& connection, std::optional<Statement>& st
     if (!prepared) return failed(prepared.error());
     statement.emplace(std::move(*prepared));
   }
-  return run(*statement, parameters...);
+  return statement->bindAll(parameters...).run();
 }
-
-std::int64_t asStored(std::uint64_t id) { return static_cast<std::int64_t>(id); }
 
 }  // namespace
 
@@ -93,19 +79,15 @@ MapDatabase::MapDatabase(OpenedStore opened, const StoreOptions& options)
 /// Updates the columns tile_x and tile_y to the configured tile size.
 Result<void> MapDatabase::keepTileSize() {
   const std::string size = std::to_string(tile_size_m_);
-  auto stored = connection_.prepare("SELECT 1 FROM meta WHERE key = 'tile_size_m' AND value = ?1");
-  if (!stored) return failed(stored.error());
-  stored->bind(1, std::string_view(size));
-  const auto same = stored->step();
+  const auto same = connection_.first(
+      "SELECT value FROM meta WHERE key = 'tile_size_m' AND value = ?1",
+      [](const Statement& row) { return row.text(0); }, size);
   if (!same) return failed(same.error());
   if (*same) return {};
-  stored->reset();
   auto transaction = Transaction::begin(connection_);
   if (!transaction) return failed(transaction.error());
   auto done = retile();
-  if (done)
-    done =
-        runOnce(connection_, "REPLACE INTO meta VALUES('tile_size_m', ?1)", std::string_view(size));
+  if (done) done = connection_.run("REPLACE INTO meta VALUES('tile_size_m', ?1)", size);
   return done ? transaction->commit() : done;
 }
 
@@ -120,8 +102,7 @@ Result<void> MapDatabase::retile() {
     if (!*row) return {};
     const auto square = squareOf({rows->real(1), rows->real(2), 0.0}, tile_size_m_);
     if (!square) continue;
-    update->bind(1, rows->integer(0)).bind(2, std::int64_t{square->x});
-    const auto done = update->bind(3, std::int64_t{square->y}).run();
+    const auto done = update->bindAll(rows->integer(0), square->x, square->y).run();
     if (!done) return done;
   }
 }
@@ -140,19 +121,18 @@ Result<void> MapDatabase::rememberWorking() {
 }
 
 Result<MapDatabase::Row> MapDatabase::rowOf(ObjectId id) const {
-  auto statement = connection_.prepare(
-      "SELECT gone, gone_ns, memory, world, epoch, belief FROM objects WHERE id = ?1");
-  if (!statement) return tl::unexpected<Reason>(statement.error());
-  const auto there = statement->bindId(1, id).step();
-  if (!there) return tl::unexpected<Reason>(there.error());
   Row row;
-  if (!*there) return row;
-  row.stored = true;
-  if (statement->integer(0) != 0) row.gone = fromNanoseconds(statement->integer(1));
-  const WorldId world{statement->id(3), static_cast<std::uint32_t>(statement->integer(4))};
-  // A track that had left the working set is written again even if its belief is the same.
-  if (statement->integer(2) == 0) row.digest = digestOf(statement->blob(5), world);
-  return row;
+  const auto take = [&](const Statement& stored) {
+    row.stored = true;
+    if (stored.integer(0) != 0) row.gone = fromNanoseconds(stored.integer(1));
+    const WorldId world{stored.id(3), static_cast<std::uint32_t>(stored.integer(4))};
+    // A track that had left the working set is written again even if its belief is the same.
+    if (stored.integer(2) == 0) row.digest = digestOf(stored.blob(5), world);
+  };
+  return connection_
+      .forRows("SELECT gone, gone_ns, memory, world, epoch, belief FROM objects WHERE id = ?1",
+               take, id)
+      .map([&] { return row; });
 }
 
 Result<MapDatabase::Row> MapDatabase::rowOfTrack(TrackId id, const Batch& batch) const {
@@ -172,17 +152,15 @@ Result<void> MapDatabase::insert(const PlacedBelief& placed, const Square& squar
                                  const Bytes& bytes, Change& change) {
   const MapObject o = mapObjectOf(placed.belief, placed.world);
   const Vector7d& m = o.mean;
-  const auto done = runAgain(
-      connection_, change.put_object, kPutObject, asStored(o.id), asStored(o.world.world),
-      std::int64_t{o.world.epoch}, std::string_view(o.class_name), o.class_probability, o.existence,
-      m[0], m[1], m[2], m[3], std::exp(m[4]), std::exp(m[5]), std::exp(m[6]),
-      toNanoseconds(o.first_seen), toNanoseconds(o.last_seen), std::int64_t{o.hits},
-      static_cast<std::int64_t>(o.visibility), static_cast<std::int64_t>(o.memory),
-      std::int64_t{square.x}, std::int64_t{square.y}, std::span<const std::uint8_t>(bytes));
+  const auto done =
+      runAgain(connection_, change.put_object, kPutObject, o.id, o.world.world, o.world.epoch,
+               o.class_name, o.class_probability, o.existence, m[0], m[1], m[2], m[3],
+               std::exp(m[4]), std::exp(m[5]), std::exp(m[6]), o.first_seen, o.last_seen, o.hits,
+               o.visibility, o.memory, square.x, square.y, bytes);
   if (!done) return done;
   return runAgain(connection_, change.put_place,
-                  "REPLACE INTO positions VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7)", asStored(o.id), m[0],
-                  m[0], m[1], m[1], m[2], m[2]);
+                  "REPLACE INTO positions VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7)", o.id, m[0], m[0],
+                  m[1], m[1], m[2], m[2]);
 }
 
 Result<void> MapDatabase::put(const PlacedBelief& placed, const Batch& batch, Change& change) {
@@ -251,9 +229,8 @@ Result<void> MapDatabase::hide(const StoredTrack* track, TrackId id, ObjectId ob
   const auto row = rowOf(id);
   if (!row) return failed(row.error());
   if (row->gone) {
-    return runOnce(connection_,
-                   "UPDATE objects SET merged_into = ?2 WHERE id = ?1 AND merged_into <> ?2",
-                   asStored(id), asStored(object));
+    return connection_.run(
+        "UPDATE objects SET merged_into = ?2 WHERE id = ?1 AND merged_into <> ?2", id, object);
   }
   if (row->stored && track != nullptr) {
     const PlacedBelief& placed = track->placed;
@@ -308,14 +285,8 @@ Result<void> MapDatabase::end(TrackId id, const Removal& removal, const Batch& b
 
 /// Adds the tracks of the last working set that are on the map but were not confirmed any more.
 Result<void> MapDatabase::addDoubtful(std::set<ObjectId>& ids) const {
-  auto rows = connection_.prepare("SELECT id FROM working WHERE belief IS NOT NULL");
-  if (!rows) return failed(rows.error());
-  for (;;) {
-    const auto row = rows->step();
-    if (!row) return failed(row.error());
-    if (!*row) return {};
-    ids.insert(rows->id(0));
-  }
+  return connection_.forRows("SELECT id FROM working WHERE belief IS NOT NULL",
+                             [&](const Statement& row) { ids.insert(row.id(0)); });
 }
 
 Result<void> MapDatabase::markLeft(ObjectId id, Change& change) {
@@ -323,9 +294,8 @@ Result<void> MapDatabase::markLeft(ObjectId id, Change& change) {
   if (!row) return failed(row.error());
   if (!row->stored || row->gone) return {};
   change.objects.insert(id);
-  return runOnce(connection_, "UPDATE objects SET visibility = ?2, memory = ?3 WHERE id = ?1",
-                 asStored(id), static_cast<std::int64_t>(Visibility::kOutOfView),
-                 static_cast<std::int64_t>(Memory::kLongTerm));
+  return connection_.run("UPDATE objects SET visibility = ?2, memory = ?3 WHERE id = ?1", id,
+                         Visibility::kOutOfView, Memory::kLongTerm);
 }
 
 Result<void> MapDatabase::remove(ObjectId id, const Removal& removal, Change& change) {
@@ -334,24 +304,20 @@ Result<void> MapDatabase::remove(ObjectId id, const Removal& removal, Change& ch
   if (!row->stored || row->gone) return {};  // never confirmed, or gone before
   change.objects.insert(id);
   change.rows.erase(id);
-  const auto done = runOnce(
-      connection_,
-      "UPDATE objects SET gone = ?2, gone_ns = ?3, merged_into = nullif(?4, 0) WHERE id = ?1",
-      asStored(id), 1 + static_cast<std::int64_t>(removal.kind), toNanoseconds(removal.time),
-      asStored(removal.merged_into));
+  const auto done = connection_.run(
+      "UPDATE objects SET gone = ?2, gone_ns = ?3, merged_into = nullif(?4, 0) WHERE id = ?1", id,
+      1 + static_cast<std::int64_t>(removal.kind), removal.time, removal.merged_into);
   if (!done) return done;
   for (const char* sql :
        {"DELETE FROM positions WHERE id = ?1", "DELETE FROM sightings WHERE id = ?1"}) {
-    const auto deleted = runOnce(connection_, sql, asStored(id));
+    const auto deleted = connection_.run(sql, id);
     if (!deleted) return deleted;
   }
   return {};
 }
 
 Result<void> MapDatabase::putWorking(const Objects& working, const Change& change) {
-  const Bytes header = encodeHeader(working);
-  auto done = runOnce(connection_, "REPLACE INTO meta VALUES('working', ?1)",
-                      std::span<const std::uint8_t>(header));
+  auto done = connection_.run("REPLACE INTO meta VALUES('working', ?1)", encodeHeader(working));
   if (done) done = connection_.execute("DELETE FROM working");
   if (!done) return done;
   auto insert = connection_.prepare("INSERT INTO working VALUES(?1, ?2, ?3)");
@@ -359,12 +325,8 @@ Result<void> MapDatabase::putWorking(const Objects& working, const Change& chang
   std::int64_t position = 0;
   for (const auto& belief : working.objects) {
     if (change.shut_out.contains(belief.id)) continue;
-    insert->bind(1, position++).bindId(2, belief.id);
-    if (change.rows.contains(belief.id)) {
-      insert->bindNull(3);
-    } else {
-      insert->bind(3, std::span<const std::uint8_t>(encodeBelief(belief)));
-    }
+    insert->bindAll(position++, belief.id);  // no belief: it is in the row of the track
+    if (!change.rows.contains(belief.id)) insert->bind(3, encodeBelief(belief));
     done = insert->run();
     if (!done) return done;
   }
@@ -432,8 +394,7 @@ Result<Written> MapDatabase::putAll(const Batch& batch, Change& change) {
   if (done && batch.facts != nullptr) done = writeFacts(connection_, *batch.facts);
   if (done) done = putWorking(*batch.working, change);
   if (done && !batch.earth_anchor.empty()) {
-    done = runOnce(connection_, "REPLACE INTO meta VALUES('earth_anchor', ?1)",
-                   std::string_view(batch.earth_anchor));
+    done = connection_.run("REPLACE INTO meta VALUES('earth_anchor', ?1)", batch.earth_anchor);
   }
   if (!done) return tl::unexpected<Reason>(done.error());
   return nextRevision(change);
@@ -445,8 +406,7 @@ Result<Written> MapDatabase::nextRevision(const Change& change) {
     --written.revision;
     return written;
   }
-  const auto done =
-      runOnce(connection_, "REPLACE INTO meta VALUES('revision', ?1)", asStored(written.revision));
+  const auto done = connection_.run("REPLACE INTO meta VALUES('revision', ?1)", written.revision);
   if (!done) return tl::unexpected<Reason>(done.error());
   return written;
 }

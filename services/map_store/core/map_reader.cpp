@@ -58,7 +58,7 @@ void bindBox(Statement& statement, const Eigen::Vector3d& low, const Eigen::Vect
   for (int axis = 0; axis < 3; ++axis) {
     statement.bind(1 + 2 * axis, low[axis]).bind(2 + 2 * axis, high[axis]);
   }
-  statement.bindId(7, world.world).bind(8, static_cast<std::int64_t>(world.epoch));
+  statement.bind(7, world.world).bind(8, world.epoch);
 }
 
 Result<Statement> byBox(const Connection& connection, const MapQuery& query, const WorldId& world) {
@@ -90,12 +90,12 @@ Result<Statement> statementFor(const Connection& connection, const MapQuery& que
   switch (query.kind) {
     case MapQueryKind::kById: {
       auto statement = connection.prepare(from + "AND o.id = ?1");
-      if (statement) statement->bindId(1, query.object_id);
+      if (statement) statement->bind(1, query.object_id);
       return statement;
     }
     case MapQueryKind::kByClass: {
       auto statement = connection.prepare(from + "AND o.class = ?1 ORDER BY o.id");
-      if (statement) statement->bind(1, std::string_view(query.class_name));
+      if (statement) statement->bind(1, query.class_name);
       return statement;
     }
     case MapQueryKind::kByRadius:
@@ -115,21 +115,17 @@ Result<Statement> statementFor(const Connection& connection, const MapQuery& que
 Result<std::vector<ObjectBelief>> workingBeliefs(const Connection& connection) {
   const auto has_tracks = connection.has("tracks");  // older maps have no such table
   if (!has_tracks) return tl::unexpected<Reason>(has_tracks.error());
-  auto rows = connection.prepare(
+  std::vector<ObjectBelief> beliefs;
+  const auto read = connection.forRows(
       *has_tracks ? "SELECT coalesce(w.belief, t.belief, o.belief) FROM working w "
                     "LEFT JOIN tracks t ON t.id = w.id LEFT JOIN objects o ON o.id = w.id "
                     "ORDER BY w.position"
                   : "SELECT coalesce(w.belief, o.belief) FROM working w "
-                    "LEFT JOIN objects o ON o.id = w.id ORDER BY w.position");
-  if (!rows) return tl::unexpected<Reason>(rows.error());
-  std::vector<ObjectBelief> beliefs;
-  for (;;) {
-    const auto row = rows->step();
-    if (!row) return tl::unexpected<Reason>(row.error());
-    if (!*row) return beliefs;
-    auto belief = decodeBelief(rows->blob(0));
-    if (belief) beliefs.push_back(std::move(*belief));
-  }
+                    "LEFT JOIN objects o ON o.id = w.id ORDER BY w.position",
+      [&](const Statement& row) {
+        if (auto belief = decodeBelief(row.blob(0))) beliefs.push_back(std::move(*belief));
+      });
+  return read.map([&] { return std::move(beliefs); });
 }
 
 }  // namespace
@@ -169,16 +165,14 @@ Result<Found> MapReader::find(const MapQuery& query, const WorldId& newest,
 }
 
 Result<std::vector<PlacedBelief>> MapReader::beliefs() const {
-  auto rows =
-      connection_->prepare(std::string(kColumns) + "FROM objects o WHERE o.gone = 0 ORDER BY o.id");
-  if (!rows) return tl::unexpected<Reason>(rows.error());
   std::vector<PlacedBelief> beliefs;
-  for (;;) {
-    const auto row = rows->step();
-    if (!row) return tl::unexpected<Reason>(row.error());
-    if (!*row) return beliefs;
-    if (auto placed = beliefFrom(*rows)) beliefs.push_back(std::move(*placed));
-  }
+  const auto read =
+      connection_->forRows(std::string(kColumns) + "FROM objects o WHERE o.gone = 0 ORDER BY o.id",
+                           [&](const Statement& row) {
+                             if (auto placed = beliefFrom(row))
+                               beliefs.push_back(std::move(*placed));
+                           });
+  return read.map([&] { return std::move(beliefs); });
 }
 
 Result<Found> MapReader::inFullNear(const Eigen::Vector3d& centre, double radius,
@@ -192,17 +186,14 @@ Result<Found> MapReader::inFullNear(const Eigen::Vector3d& centre, double radius
 }
 
 Result<std::optional<PlacedBelief>> MapReader::beliefOf(TrackId track) const {
-  auto row = connection_->prepare(
+  const auto placed = connection_->first(
       "SELECT world, epoch, 0, 0, belief FROM tracks WHERE id = ?1 AND gone = 0 UNION ALL "
       "SELECT world, epoch, visibility, memory, belief FROM objects WHERE id = ?1 AND gone = 0 "
-      "AND NOT EXISTS (SELECT 1 FROM tracks WHERE id = ?1) LIMIT 1");
-  if (!row) return tl::unexpected<Reason>(row.error());
-  const auto there = row->bindId(1, track).step();
-  if (!there) return tl::unexpected<Reason>(there.error());
-  if (!*there) return std::optional<PlacedBelief>();
-  auto placed = beliefFrom(*row);
+      "AND NOT EXISTS (SELECT 1 FROM tracks WHERE id = ?1) LIMIT 1",
+      beliefFrom, track);
   if (!placed) return tl::unexpected<Reason>(placed.error());
-  return std::optional(*std::move(placed));
+  if (!*placed) return std::optional<PlacedBelief>();
+  return (*placed)->map([](const PlacedBelief& belief) { return std::optional(belief); });
 }
 
 Result<Found> MapReader::byIds(const std::vector<ObjectId>& ids, std::size_t limit) const {
@@ -211,7 +202,7 @@ Result<Found> MapReader::byIds(const std::vector<ObjectId>& ids, std::size_t lim
   if (!statement) return tl::unexpected<Reason>(statement.error());
   Found found;
   for (const ObjectId id : ids) {
-    statement->bindId(1, id);
+    statement->bind(1, id);
     auto one = collect(*statement, 1);
     if (!one) return one;
     found.truncated = found.objects.size() == limit && !one->objects.empty();
@@ -224,46 +215,32 @@ Result<Found> MapReader::byIds(const std::vector<ObjectId>& ids, std::size_t lim
 }
 
 Result<std::vector<StoredPlace>> MapReader::places() const {
-  auto rows = connection_->prepare(std::string(kPlace) + "ORDER BY id");
-  if (!rows) return tl::unexpected<Reason>(rows.error());
   std::vector<StoredPlace> places;
-  for (;;) {
-    const auto row = rows->step();
-    if (!row) return tl::unexpected<Reason>(row.error());
-    if (!*row) return places;
-    places.push_back(placeFrom(*rows));
-  }
+  return connection_
+      ->forRows(std::string(kPlace) + "ORDER BY id",
+                [&](const Statement& row) { places.push_back(placeFrom(row)); })
+      .map([&] { return std::move(places); });
 }
 
 Result<std::optional<StoredPlace>> MapReader::placeOf(ObjectId id) const {
-  auto rows = connection_->prepare(std::string(kPlace) + "AND id = ?1");
-  if (!rows) return tl::unexpected<Reason>(rows.error());
-  rows->bindId(1, id);
-  const auto row = rows->step();
-  if (!row) return tl::unexpected<Reason>(row.error());
-  return *row ? std::optional(placeFrom(*rows)) : std::nullopt;
+  return connection_->first(std::string(kPlace) + "AND id = ?1", placeFrom, id);
 }
 
 Result<std::vector<ObjectId>> MapReader::mergedInto(ObjectId id) const {
-  auto rows = connection_->prepare("SELECT id FROM objects WHERE merged_into = ?1 ORDER BY id");
-  if (!rows) return tl::unexpected<Reason>(rows.error());
-  rows->bindId(1, id);
   std::vector<ObjectId> ids;
-  for (;;) {
-    const auto row = rows->step();
-    if (!row) return tl::unexpected<Reason>(row.error());
-    if (!*row) return ids;
-    ids.push_back(rows->id(0));
-  }
+  return connection_
+      ->forRows(
+          "SELECT id FROM objects WHERE merged_into = ?1 ORDER BY id",
+          [&](const Statement& row) { ids.push_back(row.id(0)); }, id)
+      .map([&] { return std::move(ids); });
 }
 
 Result<std::optional<Objects>> MapReader::working() const {
-  auto header = connection_->prepare("SELECT value FROM meta WHERE key = 'working'");
+  auto header = connection_->first("SELECT value FROM meta WHERE key = 'working'",
+                                   [](const Statement& row) { return decodeHeader(row.blob(0)); });
   if (!header) return tl::unexpected<Reason>(header.error());
-  const auto row = header->step();
-  if (!row) return tl::unexpected<Reason>(row.error());
-  if (!*row) return std::optional<Objects>();
-  auto working = decodeHeader(header->blob(0));
+  if (!*header) return std::optional<Objects>();
+  Result<Objects>& working = **header;
   if (!working) return tl::unexpected<Reason>(working.error());
   auto beliefs = workingBeliefs(*connection_);
   if (!beliefs) return tl::unexpected<Reason>(beliefs.error());
@@ -274,16 +251,11 @@ Result<std::optional<Objects>> MapReader::working() const {
 Result<std::set<std::uint64_t>> MapReader::worlds() const {
   const auto has_graph = connection_->has("anchors");
   if (!has_graph) return tl::unexpected<Reason>(has_graph.error());
-  auto rows = connection_->prepare(std::string("SELECT DISTINCT world FROM objects") +
-                                   (*has_graph ? " UNION SELECT world FROM anchors" : ""));
-  if (!rows) return tl::unexpected<Reason>(rows.error());
   std::set<std::uint64_t> worlds;
-  for (;;) {
-    const auto row = rows->step();
-    if (!row) return tl::unexpected<Reason>(row.error());
-    if (!*row) break;
-    worlds.insert(rows->id(0));
-  }
+  const auto read = connection_->forRows(std::string("SELECT DISTINCT world FROM objects") +
+                                             (*has_graph ? " UNION SELECT world FROM anchors" : ""),
+                                         [&](const Statement& row) { worlds.insert(row.id(0)); });
+  if (!read) return tl::unexpected<Reason>(read.error());
   const auto last = working();
   if (!last) return tl::unexpected<Reason>(last.error());
   if (*last) worlds.insert((*last)->world.world);
@@ -291,24 +263,19 @@ Result<std::set<std::uint64_t>> MapReader::worlds() const {
 }
 
 Result<std::string> MapReader::earthAnchor() const {
-  auto row = connection_->prepare("SELECT value FROM meta WHERE key = 'earth_anchor'");
-  if (!row) return tl::unexpected<Reason>(row.error());
-  const auto there = row->step();
-  if (!there) return tl::unexpected<Reason>(there.error());
-  return *there ? row->text(0) : std::string();
+  return connection_
+      ->first("SELECT value FROM meta WHERE key = 'earth_anchor'",
+              [](const Statement& row) { return row.text(0); })
+      .map([](auto anchor) { return std::move(anchor).value_or(""); });
 }
 
 Result<std::uint64_t> MapReader::revision() const {
-  const auto value =
-      connection_->integer("SELECT coalesce((SELECT value FROM meta WHERE key = 'revision'), 0)");
-  if (!value) return tl::unexpected<Reason>(value.error());
-  return static_cast<std::uint64_t>(*value);
+  return connection_->integer(
+      "SELECT coalesce((SELECT value FROM meta WHERE key = 'revision'), 0)");
 }
 
 Result<ObjectId> MapReader::largestId() const {
-  const auto value = connection_->integer("SELECT coalesce(max(id), 0) FROM objects");
-  if (!value) return tl::unexpected<Reason>(value.error());
-  return static_cast<ObjectId>(*value);
+  return connection_->integer("SELECT coalesce(max(id), 0) FROM objects");
 }
 
 }  // namespace perdure::map_store

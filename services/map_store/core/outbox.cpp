@@ -67,11 +67,9 @@ std::string removal() {
 }
 
 Result<std::string> text(const Connection& connection, std::string_view sql) {
-  auto statement = connection.prepare(sql);
-  if (!statement) return tl::unexpected<Reason>(statement.error());
-  const auto row = statement->step();
-  if (!row) return tl::unexpected<Reason>(row.error());
-  return *row ? statement->text(0) : std::string();
+  return connection.first(sql, [](const Statement& row) { return row.text(0); }).map([](auto text) {
+    return std::move(text).value_or("");
+  });
 }
 
 }  // namespace
@@ -100,9 +98,7 @@ Result<void> acknowledge(const Connection& connection, std::int64_t number) {
   for (const char* sql :
        {"DELETE FROM outbox WHERE number <= ?1",
         "UPDATE meta SET value = ?1 WHERE key = 'outbox_acknowledged' AND value < ?1"}) {
-    auto statement = connection.prepare(sql);
-    if (!statement) return tl::unexpected<Reason>(statement.error());
-    const auto done = statement->bind(1, number).run();
+    const auto done = connection.run(sql, number);
     if (!done) return done;
   }
   return {};

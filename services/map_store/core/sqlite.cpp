@@ -54,7 +54,7 @@ Reason reasonOf(int code, std::string_view detail) {
 
 void Statement::Finalize::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
 
-Statement& Statement::bind(int index, std::int64_t value) {
+Statement& Statement::bindInteger(int index, std::int64_t value) {
   mustBind(sqlite3_bind_int64(statement_.get(), index, value));
   return *this;
 }
@@ -81,10 +81,6 @@ Statement& Statement::bindNull(int index) {
   return *this;
 }
 
-Statement& Statement::bindId(int index, std::uint64_t value) {
-  return bind(index, static_cast<std::int64_t>(value));
-}
-
 Result<bool> Statement::step() {
   const int code = sqlite3_step(statement_.get());
   if (code == SQLITE_ROW) return true;
@@ -96,14 +92,6 @@ Result<bool> Statement::step() {
   auto error = failure(code, connection);
   reset();
   return error;
-}
-
-Result<void> Statement::run() {
-  for (;;) {
-    const auto row = step();
-    if (!row) return tl::unexpected<Reason>(row.error());
-    if (!*row) return {};
-  }
 }
 
 void Statement::reset() {
@@ -165,18 +153,16 @@ Result<void> Connection::execute(const std::string& sql) const {
 }
 
 Result<std::int64_t> Connection::integer(std::string_view sql) const {
-  auto statement = prepare(sql);
-  if (!statement) return tl::unexpected<Reason>(statement.error());
-  const auto row = statement->step();
-  if (!row) return tl::unexpected<Reason>(row.error());
-  if (!*row) return fail("database_error", "a query that must have one row has none");
-  return statement->integer(0);
+  return first(sql, [](const Statement& row) { return row.integer(0); })
+      .and_then([](std::optional<std::int64_t> value) -> Result<std::int64_t> {
+        if (!value) return fail("database_error", "a query that must have one row has none");
+        return *value;
+      });
 }
 
 Result<bool> Connection::has(const std::string& name) const {
-  const auto count = integer("SELECT count(*) FROM sqlite_master WHERE name = '" + name + "'");
-  if (!count) return tl::unexpected<Reason>(count.error());
-  return *count > 0;
+  return integer("SELECT count(*) FROM sqlite_master WHERE name = '" + name + "'")
+      .map([](std::int64_t count) { return count > 0; });
 }
 
 Result<void> Connection::copyInto(const Connection& target) const {
@@ -191,9 +177,7 @@ Result<void> Connection::copyInto(const Connection& target) const {
 }
 
 Result<Transaction> Transaction::begin(const Connection& connection) {
-  const auto begun = connection.execute("BEGIN IMMEDIATE");
-  if (!begun) return tl::unexpected<Reason>(begun.error());
-  return Transaction(&connection);
+  return connection.execute("BEGIN IMMEDIATE").map([&] { return Transaction(&connection); });
 }
 
 Transaction::~Transaction() {

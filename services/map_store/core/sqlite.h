@@ -4,11 +4,15 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
+#include <utility>
 
 #include "common/base/result.h"
+#include "common/base/time.h"
 
 struct sqlite3;
 struct sqlite3_stmt;
@@ -26,17 +30,38 @@ class Statement {
  public:
   Statement() = default;
 
-  Statement& bind(int index, std::int64_t value);
+  /// Integers, flags and enumerations. An unsigned value is stored as the same 64 bits.
+  template <class T>
+  requires(std::is_integral_v<T> || std::is_enum_v<T>) Statement& bind(int index, T value) {
+    return bindInteger(index, static_cast<std::int64_t>(value));
+  }
+  Statement& bind(int index, TimePoint value) { return bind(index, toNanoseconds(value)); }
   Statement& bind(int index, double value);
   Statement& bind(int index, std::string_view value);
   Statement& bind(int index, std::span<const std::uint8_t> value);
   Statement& bindNull(int index);
-  Statement& bindId(int index, std::uint64_t value);  ///< stored as the same 64 bits
+  /// Binds the values to the parameters from 1.
+  Statement& bindAll(const auto&... values) {
+    int index = 0;
+    (bind(++index, values), ...);
+    return *this;
+  }
 
   /// True: a row was read; false: done, and reset for the next use.
   Result<bool> step();
   /// Runs the statement to its end, resets it and clears its bindings.
-  Result<void> run();
+  Result<void> run() {
+    return forEach([](const Statement&) {});
+  }
+  /// Calls `take` for each row.
+  Result<void> forEach(auto take) {
+    for (;;) {
+      const auto row = step();
+      if (!row) return tl::unexpected<Reason>(row.error());
+      if (!*row) return {};
+      take(std::as_const(*this));
+    }
+  }
   void reset();
 
   std::int64_t integer(int column) const;
@@ -54,6 +79,7 @@ class Statement {
     void operator()(sqlite3_stmt* statement) const;
   };
   explicit Statement(sqlite3_stmt* statement) : statement_(statement) {}
+  Statement& bindInteger(int index, std::int64_t value);
   std::unique_ptr<sqlite3_stmt, Finalize> statement_;
 };
 
@@ -63,6 +89,25 @@ class Connection {
   static Result<Connection> open(const std::string& path, Mode mode);
 
   Result<Statement> prepare(std::string_view sql) const;
+  /// Runs one statement with the values of its parameters.
+  Result<void> run(std::string_view sql, const auto&... values) const {
+    return prepare(sql).and_then(
+        [&](Statement statement) { return statement.bindAll(values...).run(); });
+  }
+  /// Calls `take` for each row of a query with the values of its parameters.
+  Result<void> forRows(std::string_view sql, auto take, const auto&... values) const {
+    return prepare(sql).and_then(
+        [&](Statement rows) { return rows.bindAll(values...).forEach(take); });
+  }
+  /// Returns what `read` makes of the first row, or nothing if there is no row.
+  template <class Read, class T = std::invoke_result_t<Read, const Statement&>>
+  Result<std::optional<T>> first(std::string_view sql, Read read, const auto&... values) const {
+    return prepare(sql).and_then([&](Statement row) -> Result<std::optional<T>> {
+      return row.bindAll(values...).step().map([&](bool there) {
+        return there ? std::optional<T>(read(std::as_const(row))) : std::nullopt;
+      });
+    });
+  }
   /// Runs statements without results, separated by semicolons.
   Result<void> execute(const std::string& sql) const;
   /// The first column of the first row. The query must have one.

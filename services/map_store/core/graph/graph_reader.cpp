@@ -19,14 +19,7 @@ using mapping::SavedMap;
 template <class Take>
 Result<void> takeRows(const Connection& connection, std::string_view sql, std::uint64_t& malformed,
                       Take take) {
-  auto rows = connection.prepare(sql);
-  if (!rows) return tl::unexpected<Reason>(rows.error());
-  for (;;) {
-    const auto row = rows->step();
-    if (!row) return tl::unexpected<Reason>(row.error());
-    if (!*row) return {};
-    if (!take(*rows)) ++malformed;
-  }
+  return connection.forRows(sql, [&](const Statement& row) { malformed += take(row) ? 0 : 1; });
 }
 
 /// Reads class names by their numbers, from 0. Names after a gap cannot be assigned and are left

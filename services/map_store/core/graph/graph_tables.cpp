@@ -89,49 +89,38 @@ using SightingRow = std::pair<const ObjectId, mapping::ObjectRecord>;
 
 void bindAnchor(Statement& to, const AnchorRow& row) {
   const mapping::Anchor& anchor = row.second.anchor;
-  to.bindId(1, row.first).bindId(2, anchor.previous);
-  to.bindId(3, anchor.session.world).bind(4, std::int64_t{anchor.session.epoch});
-  to.bindId(5, anchor.stamp.source).bindId(6, anchor.stamp.sequence);
-  to.bind(7, toNanoseconds(anchor.stamp.time)).bind(8, anchor.way_m);
-  to.bind(9, std::span<const std::uint8_t>(encodeAnchor(anchor)));
+  to.bindAll(row.first, anchor.previous, anchor.session.world, anchor.session.epoch,
+             anchor.stamp.source, anchor.stamp.sequence, anchor.stamp.time, anchor.way_m,
+             encodeAnchor(anchor));
 }
 
 void bindPose(Statement& to, const AnchorRow& row) {
   const mapping::LevelPose& T_MA = row.second.T_MA;
-  to.bindId(1, row.first).bind(2, T_MA.p.x()).bind(3, T_MA.p.y()).bind(4, T_MA.p.z());
-  to.bind(5, T_MA.yaw).bind(6, std::int64_t{row.second.held_fast});
+  to.bindAll(row.first, T_MA.p.x(), T_MA.p.y(), T_MA.p.z(), T_MA.yaw, row.second.held_fast);
 }
 
 void bindEdge(Statement& to, const EdgeRow& row) {
   const mapping::Edge& edge = row.second.edge;
-  to.bindId(1, row.first).bindId(2, edge.a).bindId(3, edge.b);
-  to.bind(4, static_cast<std::int64_t>(edge.kind)).bind(5, row.second.weight);
-  to.bind(6, std::span<const std::uint8_t>(encodeEdge(edge)));
+  to.bindAll(row.first, edge.a, edge.b, edge.kind, row.second.weight, encodeEdge(edge));
 }
 
 void bindSighting(Statement& to, const SightingRow& row) {
   const mapping::ObjectRecord& record = row.second;
   const mapping::PlacedObject& object = record.sighting.in_anchor;
-  to.bindId(1, row.first).bindId(2, record.sighting.anchor);
-  to.bindId(3, record.session.world).bind(4, std::int64_t{record.session.epoch});
-  to.bind(5, toNanoseconds(record.last_seen)).bind(6, object.p.x()).bind(7, object.p.y());
-  to.bind(8, object.p.z()).bind(9, object.yaw);
-  to.bind(10, std::span<const std::uint8_t>(encodeRecord(record)));
+  to.bindAll(row.first, record.sighting.anchor, record.session.world, record.session.epoch,
+             record.last_seen, object.p.x(), object.p.y(), object.p.z(), object.yaw,
+             encodeRecord(record));
 }
 
 void bindTrack(Statement& to, const SightingRow& row) {
-  to.bindId(1, row.first).bind(2, std::int64_t{row.second.confirmed});
-  to.bind(3, std::int64_t{row.second.gone});
-  to.bind(4, std::span<const std::uint8_t>(encodeRecord(row.second)));
+  to.bindAll(row.first, row.second.confirmed, row.second.gone, encodeRecord(row.second));
 }
 
 void bindFact(Statement& to, const mapping::SameObject& fact) {
-  to.bindId(1, fact.loop).bindId(2, fact.a).bindId(3, fact.b);
+  to.bindAll(fact.loop, fact.a, fact.b);
 }
 
-void bindView(Statement& to, const ViewRow& row) {
-  to.bindId(1, row.first).bind(2, std::span<const std::uint8_t>(encodeView(row.second)));
-}
+void bindView(Statement& to, const ViewRow& row) { to.bindAll(row.first, encodeView(row.second)); }
 
 /// Returns the elements of `all` that may be written, and adds the number of the others to
 /// `refused`.
@@ -151,15 +140,14 @@ std::vector<std::reference_wrapper<const typename All::value_type>> soundOnes(
 
 Result<void> putClasses(const Connection& connection, const std::vector<std::string>& classes) {
   std::int64_t number = 0;
-  return runForEach(connection, kPutClass, classes, [&](Statement& to, const std::string& name) {
-    to.bind(1, number++).bind(2, std::string_view(name));
-  });
+  return runForEach(connection, kPutClass, classes,
+                    [&](Statement& to, const std::string& name) { to.bindAll(number++, name); });
 }
 
 Result<void> deleteFrom(const Connection& connection, const std::string& table,
                         const std::set<std::uint64_t>& ids, const std::string& key = "id") {
   return runForEach(connection, "DELETE FROM " + table + " WHERE " + key + " = ?1", ids,
-                    [](Statement& to, std::uint64_t id) { to.bindId(1, id); });
+                    [](Statement& to, std::uint64_t id) { to.bind(1, id); });
 }
 
 /// Returns the ids of a table's rows that are not in `known`.
@@ -167,17 +155,10 @@ template <class Known>
 Result<void> deleteOthers(const Connection& connection, const std::string& table,
                           const Known& known, const std::string& key = "id") {
   std::set<std::uint64_t> others;
-  {
-    auto rows = connection.prepare("SELECT " + key + " FROM " + table);
-    if (!rows) return tl::unexpected<Reason>(rows.error());
-    for (;;) {
-      const auto row = rows->step();
-      if (!row) return tl::unexpected<Reason>(row.error());
-      if (!*row) break;
-      if (!known.contains(rows->id(0))) others.insert(rows->id(0));
-    }
-  }
-  return deleteFrom(connection, table, others, key);
+  const auto read = connection.forRows("SELECT " + key + " FROM " + table, [&](const auto& row) {
+    if (!known.contains(row.id(0))) others.insert(row.id(0));
+  });
+  return read ? deleteFrom(connection, table, others, key) : read;
 }
 
 }  // namespace
