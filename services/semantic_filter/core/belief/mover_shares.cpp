@@ -5,7 +5,8 @@
 namespace perdure::semantic_filter {
 
 void MoverShares::learn(const Track& track, double min_speed) {
-  constexpr std::uint32_t kJudgedAt = 10;  // detections
+  constexpr std::uint32_t kJudgedAt =
+      20;  // detections; after 10, one in eight parked cars of KITTI 00 seems to move
   if (track.life.hits != kJudgedAt || !track.life.once_confirmed) return;
   auto counts = counts_ ? *counts_ : std::map<std::string, Counts>();
   Counts& of_class = counts[track.best().class_name];

@@ -19,7 +19,7 @@ ClassPrior carPrior(double moving) {
 Track judged(double speed) {
   Track t = testing::makeObject(1, "car", testing::makeState(20, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
   t.life.once_confirmed = true;
-  t.life.hits = 10;
+  t.life.hits = 20;
   t.hypotheses[0].moving = speed > 0.0;
   t.hypotheses[0].x[kVelocity] = speed;
   t.hypotheses[0].P.bottomRightCorner<3, 3>() = 0.01 * Eigen::Matrix3d::Identity();
@@ -41,11 +41,11 @@ TEST(MoverShares, FallWithEachObjectAtRestAndRiseWithEachMover) {
 TEST(MoverShares, CountAConfirmedObjectOnce) {
   MoverShares shares;
   Track t = judged(0.0);
-  t.life.hits = 9;
+  t.life.hits = 19;
   shares.learn(t, kMinSpeed);
-  t.life.hits = 11;
+  t.life.hits = 21;
   shares.learn(t, kMinSpeed);
-  t.life.hits = 10;
+  t.life.hits = 20;
   t.life.once_confirmed = false;
   shares.learn(t, kMinSpeed);
   EXPECT_EQ(shares.of(carPrior(0.2)), 0.2);
