@@ -128,7 +128,7 @@ double takeDouble(View& from) {
 
 void insertRow(std::vector<Statement>& statements, Table table, std::uint64_t id, View content) {
   Statement& row = statements[static_cast<std::size_t>(table)];
-  row.bindId(1, id);
+  row.bind(1, id);
   const int numbers = table == Table::kPose   ? 4
                       : table == Table::kFact ? 2
                       : table == Table::kEdge ? 1

@@ -11,6 +11,7 @@ namespace perdure::semantic_filter {
 namespace {
 
 using testing::makeObject;
+using testing::makePriors;
 using testing::makeState;
 
 /// *Other* starts from one yaw, and its boxes reduce the variance of the yaw too early.
