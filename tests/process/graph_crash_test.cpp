@@ -161,7 +161,8 @@ void expectWhole(const Outcome& outcome) {
     EXPECT_TRUE(fact.loop == 0 || graph.edges.contains(fact.loop))
         << fact.a << " and " << fact.b << " are one by loop " << fact.loop;
   }
-  for (const auto& [id, tracks] : mapping::Identity(outcome.facts).shared()) {
+  const mapping::Identity identity(outcome.facts);
+  for (const auto& [id, tracks] : identity.shared()) {
     for (const TrackId track : tracks) {
       const auto object = contents.objects.find(track);
       if (track == id || object == contents.objects.end()) continue;
