@@ -19,7 +19,7 @@ struct TopicInfo {
   Qos qos;
   double rate_hz = 0.0;  ///< nominal, for a 10 Hz camera and a 100 Hz IMU; 0: on change
   bool recorded = true;
-  Roles writers = {}, readers = {};  ///< granted by DDS-Security, if enabled; all roles
+  Roles writers = {}, readers = {};  ///< with the roles that read or write every topic
 
   std::string typeName() const;
 };
@@ -37,7 +37,7 @@ struct Topic {
   std::string name;
 };
 
-/// The topic of a message; of frames without the camera.
+/// The topic of a message type. For Frame it is only the prefix: see frameTopic().
 template <class T>
 inline const Topic<T> kTopic{std::string(wire::nameOfTopic<T>())};
 

@@ -28,7 +28,8 @@ int flushed() {
   if (std::fflush(stdout) == 0) return static_cast<int>(ExitCode::kOk);
   return refuse(
       ExitCode::kInputOutput,
-      std::string("perdure: standard output could not be written: ") + std::strerror(errno));
+      std::string("perdure: standard output could not be written: ") + std::strerror(errno) +
+          "; free space on its disk, or send it to another place");
 }
 
 int printVersion() {
@@ -55,8 +56,10 @@ int printHelp(const std::string& program) {
 int refuseUnknown(const std::string& word) {
   std::vector<std::string> names;
   for (const auto& command : perdure::tools::commands()) names.emplace_back(command.name);
-  const std::string nearest = perdure::nearestWord(word, names);
-  return refuse(ExitCode::kUsage, "'" + word + "' is not a subcommand of perdure" +
+  const bool option = word.starts_with('-');
+  const std::string nearest = option ? "" : perdure::nearestWord(word, names);
+  return refuse(ExitCode::kUsage, "'" + word + "' is not " + (option ? "an option" : "a subcommand") +
+                                      " of perdure" +
                                       (nearest.empty() ? "" : "; did you mean " + nearest + "?") +
                                       "\nRun with --help for more information.");
 }
