@@ -123,8 +123,9 @@ Bars commonBars(const Outcome& run) {
 Bars everywhereBars(const Outcome& run) {
   const Falls falls = fallsOnHits(run);
   const Merges merges = mergesOf(run);
-  return {atMost(0, "looks that showed a claimed thing and made it less sure", falls.count),
-          atMost(0, "things that were merged twice", merges.again),
+  return {atMost(0, "observations that showed a reported object and lowered its existence",
+                 falls.count),
+          atMost(0, "objects that were merged twice", merges.again),
           atMost(0, "merges that kept the younger id", merges.younger),
           atMost(0, "merges that lost hits", merges.lost_hits),
           atMost(0, "merges that lost existence", merges.lost_existence)};

@@ -144,7 +144,7 @@ Bars occlusionBars(const Outcome& run) {
           atMost(0, "of them those that changed a bit of existence, PMF, mean, covariance",
                  hidden.changes),
           atLeast(2, "`occluded` events of it that name the monitor", named.right),
-          atMost(0, "that name something else", named.all - named.right),
+          atMost(0, "that name another object", named.all - named.right),
           atLeast(4, "predictions of its return", returns.foreseen),
           atMost(1, "frames by which the last one before a return is wrong", returns.last_error),
           atLeast(0.9, "share of the predictions whose interval holds the return",
@@ -199,7 +199,7 @@ Bars roomBars(const Outcome& run) {
     }
   }
   return {
-      atLeast(1, "chairs within a metre of a table's middle, both once claimed", pairs),
+      atLeast(1, "chairs within a metre of a table's middle, both once reported", pairs),
       atLeast(1.0, "share of them that are two objects at the end", two / std::max(pairs, 1.0))};
 }
 

@@ -206,7 +206,7 @@ Bars rollBars(const Outcome& run) {
   std::vector<double> yaws, sizes;
   for (const Change& c : changes) yaws.push_back(c.yaw / kDegree), sizes.push_back(c.size);
   return {
-      atLeast(5, "settled things in sight from a level camera until it leans by 50 deg and more",
+      atLeast(5, "settled objects in view of a level camera until it leans by 50 deg and more",
               number(changes.size())),
       atMost(5.0, "change of yaw meanwhile, deg, median", quantile(yaws, 0.5)),
       atMost(5.0, "change of yaw meanwhile, deg, nine in ten", quantile(yaws, 0.9)),
@@ -255,13 +255,14 @@ Bars trafficBars(const Outcome& run) {
     kept_vehicles += vehicle ? 1.0 : 0.0;
   }
   const sim::TruthObject* off = whatDrivesOff(run);
-  return {atMost(0, "vehicles that drove, in long-term memory where nothing stands", kept_vehicles),
-          atMost(0, "things in long-term memory where nothing stands", kept),
-          onAverage(atLeast(0.95, "share of the parked ones left behind that it has",
-                            rememberedShare(run))),
-          atLeast(1, "`moved` events of the parked car that drives off",
-                  off == nullptr ? 0.0 : movedEvents(run, *off)),
-          atMost(0, "standing things on the map where nothing is", number(ghosts(run).size()))};
+  return {
+      atMost(0, "vehicles that drove, stored in the map where there is no object", kept_vehicles),
+      atMost(0, "objects stored in the map where there is none", kept),
+      onAverage(
+          atLeast(0.95, "share of the parked ones left behind that it has", rememberedShare(run))),
+      atLeast(1, "`moved` events of the parked car that drives off",
+              off == nullptr ? 0.0 : movedEvents(run, *off)),
+      atMost(0, "static objects on the map where there is none", number(ghosts(run).size()))};
 }
 
 Bars streetBars(const Outcome& run) {
@@ -269,9 +270,8 @@ Bars streetBars(const Outcome& run) {
       onAverage(atLeast(0.98, "second lap: share that keeps the id of the first", keptIds(run))),
       onAverage(atMost(1.02, "objects of the map for each one found", run.final.idsPerFound())),
       atMost(0, "switches of id, FINAL", number(run.final.id_switches)),
-      atMost(0, "flicker: claims in full sight that ceased and came back", flicker(run)),
-      atMost(0, "claims at rest that jump by more than 3 m from one frame to the next",
-             jumps(run))};
+      atMost(0, "flicker: reports of a fully visible object that stop and resume", flicker(run)),
+      atMost(0, "static positions that jump by more than 3 m in one frame", jumps(run))};
 }
 
 }  // namespace perdure::test

@@ -144,19 +144,19 @@ Bars toyBars(const Outcome& run, const Outcome& no_size_prior) {
     far += 1.0;
     far_accepted += at_end >= 0.95 ? 1.0 : 0.0;
   }
-  return {
-      atLeast(0.95, "P(car, exists) of the real cars, 40 frames after first sight", car_decided),
-      atLeast(0.95, "P(car, exists) of the real cars at the end", car_end),
-      atMost(0.05, "P(car, exists) of the toy, 40 frames after first sight",
-             decidedProbability(run, toy)),
-      atMost(0.05, "P(car, exists) of the toy at the end", probabilityOfCar(run, toy, end)),
-      atLeast(0.3, "baseline travelled, of the toy's distance", baseline(run, toy)),
-      atLeast(2, "cars that are smaller in the image than the toy", far),
-      atLeast(1.0, "share of the far ones that is accepted at the end",
-              far_accepted / std::max(far, 1.0)),
-      atLeast(0.95, "P(car, exists) of the toy at the end without the size prior",
-              probabilityOfCar(no_size_prior, no_size_prior.standing("toy").at(0),
-                               lastFrame(no_size_prior)))};
+  return {atLeast(0.95, "P(car, exists) of the real cars, 40 frames after first detection",
+                  car_decided),
+          atLeast(0.95, "P(car, exists) of the real cars at the end", car_end),
+          atMost(0.05, "P(car, exists) of the toy, 40 frames after first detection",
+                 decidedProbability(run, toy)),
+          atMost(0.05, "P(car, exists) of the toy at the end", probabilityOfCar(run, toy, end)),
+          atLeast(0.3, "baseline travelled, of the toy's distance", baseline(run, toy)),
+          atLeast(2, "cars that are smaller in the image than the toy", far),
+          atLeast(1.0, "share of the far ones that is accepted at the end",
+                  far_accepted / std::max(far, 1.0)),
+          atLeast(0.95, "P(car, exists) of the toy at the end without the size prior",
+                  probabilityOfCar(no_size_prior, no_size_prior.standing("toy").at(0),
+                                   lastFrame(no_size_prior)))};
 }
 
 Bars stillBars(const Outcome& run) {
@@ -175,9 +175,9 @@ Bars stillBars(const Outcome& run) {
   }
   return {
       atLeast(0.05, "P(car, exists), the least of the cars and the toy: nobody is rejected", least),
-      atMost(0, "things that were given up", number(run.countEvents("gone"))),
+      atMost(0, "objects that were deleted", number(run.countEvents("gone"))),
       atLeast(0.05, "relative deviation of the distance that is said, the least", sigma),
-      atMost(3.0, "deviations between true distance and belief, the most (the toy's as other)",
+      atMost(3.0, "deviations between true distance and belief, the most (the toy as other)",
              deviations)};
 }
 

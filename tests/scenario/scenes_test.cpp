@@ -57,7 +57,7 @@ TEST(LongScene, Town) {
   for (const auto& object : run.objects) {
     kept += object.working && (object.centre - here).norm() > 150.0 ? 1.0 : 0.0;
   }
-  hold(commonBars(run) + Bars{atMost(0, "things in the working set more than 150 m away", kept)});
+  hold(commonBars(run) + Bars{atMost(0, "objects in the working set more than 150 m away", kept)});
 }
 
 TEST(LongScene, Straight) {
