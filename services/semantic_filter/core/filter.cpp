@@ -5,9 +5,8 @@
 #include <limits>
 
 #include "common/base/check.h"
+#include "services/semantic_filter/core/association/box_explanation.h"
 #include "services/semantic_filter/core/association/joint_association.h"
-#include "services/semantic_filter/core/association/occlusion_revision.h"
-#include "services/semantic_filter/core/association/top_down.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
 #include "services/semantic_filter/core/smoothing/refit.h"
@@ -16,7 +15,6 @@
 #include "services/semantic_filter/core/tracks/mixture_reduction.h"
 #include "services/semantic_filter/core/tracks/new_classes.h"
 #include "services/semantic_filter/core/tracks/reidentify.h"
-#include "services/semantic_filter/core/tracks/reinitialise.h"
 #include "services/semantic_filter/core/update/predict.h"
 #include "services/semantic_filter/core/update/track_update.h"
 

@@ -40,4 +40,16 @@ class BoxExplanations {
   ScratchVector<Entry> at_;
 };
 
+/// Adds the partial views of tracks with v = 0 to the clutter of each box
+/// (BoxDetection::log_partial_views). Such a box is less likely a new object or that of another
+/// track. The track with v = 0 does not change.
+void explainPartialViews(const Belief& belief, const ScratchVector<TrackVisibility>& visibilities,
+                         FrameInput& input, const Parameters& parameters,
+                         const ClassPriors& priors);
+
+/// A box that an occluded track explains far better than any visible one shows that the occluder
+/// was misjudged. The occluded track gets v = visibility.minimum in this frame.
+void reviseOcclusion(Belief& belief, ScratchVector<TrackVisibility>& visibilities,
+                     const FrameInput& input, const Parameters& parameters);
+
 }  // namespace perdure::semantic_filter

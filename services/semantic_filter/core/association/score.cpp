@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/semantic_filter/core/association/tempering.h"
 #include "services/semantic_filter/core/visibility/detectability.h"
 
 namespace perdure::semantic_filter {
@@ -12,6 +11,17 @@ namespace {
 
 constexpr double kMaxLogLikelihood = 40.0;  // nats, keeps products finite
 constexpr double kMaxDetection = 0.98;      // of v without an unmapped occluder
+
+/// Returns the number of earlier observations whose errors are shared by one of `position` from
+/// this view.
+double correlatedObservations(const Eigen::Vector3d& position, const Viewpoint& last,
+                              const View& view, const TemperingParameters& parameters) {
+  if (last.observations <= 0.0) return 0.0;
+  const double correlation =
+      viewCorrelation(position, last.T_WC, view.T_WC(),
+                      {parameters.angle, parameters.log_distance, parameters.image_angle});
+  return last.observations * correlation;
+}
 
 /// Returns the log clutter density of the sides that were compared. With fewer sides it has other
 /// units.
@@ -172,6 +182,29 @@ double associationWeight(const Track& track, const TrackScore& score, std::size_
   }
   const double r = track.existence;
   return r * reported / std::max(1.0 - r + r * unreported, 1e-12);
+}
+
+double temperingExponent(double observations, double correlation) {
+  const auto information = [&](double n) { return n / (correlation * n + 1.0 - correlation); };
+  return information(observations + 1.0) - information(observations);
+}
+
+void applyTopDown(TrackScore& score, const Track& track, const std::vector<double>& log_ratio,
+                  const FrameContext& frame) {
+  const auto k = frame.model->index.find(track.best().class_name);
+  if (k == frame.model->index.end() || k->second >= log_ratio.size()) return;
+  // Observations from one viewpoint share the mistakes of the network, so an answer in favour of
+  // the track is tempered. An answer against it is limited by the unmapped occluder, as a miss is.
+  double nats = log_ratio[k->second];
+  if (nats > 0.0) {
+    nats *= temperingExponent(score.hypotheses.front().correlated_observations,
+                              frame.parameters->tempering.correlation);
+  }
+  for (HypothesisScore& h : score.hypotheses) {
+    h.no_box =
+        std::max(1.0 - h.detection_probability + h.undetected * (std::exp(nats) - 1.0), 1e-6);
+  }
+  score.top_down = true;
 }
 
 }  // namespace perdure::semantic_filter

@@ -64,7 +64,7 @@ struct HypothesisScore {
 /// Lives within one step.
 struct TrackScore {
   TrackVisibility visibility;
-  bool top_down = false;             ///< a top-down answer is applied (association/top_down.h)
+  bool top_down = false;             ///< a top-down answer is applied (applyTopDown)
   ScratchVector<std::size_t> boxes;  ///< indices of the frame's boxes that are near a hypothesis
   ScratchVector<HypothesisScore> hypotheses;
 };
@@ -80,5 +80,31 @@ std::array<bool, 4> hiddenSides(const TrackScore& score, std::size_t box,
 /// Returns ψ: "the track made this box" against "it made none, or does not exist". `box`: index
 /// into TrackScore::boxes.
 double associationWeight(const Track& track, const TrackScore& score, std::size_t box);
+
+/// Returns the tempering exponent τ: how much one more observation counts if its errors are
+/// correlated with earlier ones, because observations from one viewpoint share the errors of the
+/// network. It is the information of one more observation after n correlated ones, in units of the
+/// first: I(n) = n / (ρ n + 1 - ρ), τ = I(n+1) - I(n). Derivation:
+/// tools/docs/maths/class_and_existence_update.md.
+double temperingExponent(double observations, double correlation);
+
+/// Applies a top-down likelihood: what the network says at a predicted measurement where it
+/// reported no box (paper, eq. 7; services/inference/README.md, "Top-down"). Derivation:
+/// tools/docs/maths/joint_association.md, "Top-down likelihood".
+///
+/// The best activation at a visible object that was not reported has another distribution than
+/// where nothing is; ρ is the ratio of the two. Without a box
+///   A = (1 - v) + v (1 - P_D) ρ
+/// in place of 1 - v P_D. Where nothing is, log ρ is negative on average, although the best
+/// activation is selected. So a false track is deleted sooner than by its misses alone.
+///
+/// An answer is evidence of existence only. Its box was chosen near the prediction and says little
+/// of the place. It initiates no track, is no hit, and does not raise existence above what the last
+/// hit left.
+///
+/// `log_ratio`: by class of the model; that of the track's best class counts. If the model does not
+/// know that class, nothing changes.
+void applyTopDown(TrackScore& score, const Track& track, const std::vector<double>& log_ratio,
+                  const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

@@ -37,11 +37,17 @@ struct Belief {
 /// detection does not rename tracks, and no id is used twice.
 class IdBook {
  public:
-  ObjectId idFor(std::uint64_t frame_sequence, std::size_t box);
+  ObjectId idFor(std::uint64_t frame_sequence, std::size_t box) {
+    const auto [it, fresh] = given_.try_emplace({frame_sequence, box}, next_);
+    if (fresh) ++next_;
+    return it->second;
+  }
   ObjectId next() const { return next_; }
   void atLeast(ObjectId next) { next_ = std::max(next_, next); }
   /// Forgets the frames before this one. They cannot be stepped again.
-  void forgetBefore(std::uint64_t frame_sequence);
+  void forgetBefore(std::uint64_t frame_sequence) {
+    given_.erase(given_.begin(), given_.lower_bound({frame_sequence, 0}));
+  }
 
  private:
   ObjectId next_ = 1;

@@ -29,6 +29,12 @@ struct PoseError {
   bool reported = false;
 };
 
+/// Brings `error` from the frame before to the frame of `odometry`. `last_T_WB`: pose of the frame
+/// before; without one a walk adds nothing.
+void advancePoseError(PoseError& error, const Odometry& odometry,
+                      const std::optional<RigidTransform>& last_T_WB,
+                      const PoseParameters& parameters);
+
 /// A landmark in the image. It lies before or behind an object.
 struct LandmarkDepth {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 
 #include "common/camera/camera_model.h"
+#include "common/math/so3.h"
 
 namespace perdure::semantic_filter {
 
@@ -19,7 +20,12 @@ struct View {
 /// A view with the matrices that all projections from it share. It converts from a View, for a
 /// single projection.
 struct Projector {
-  Projector(const View& view);  // NOLINT(google-explicit-constructor)
+  Projector(const View& view)  // NOLINT(google-explicit-constructor)
+      : camera(view.camera),
+        T_WC(view.T_WC()),
+        R_CW(T_WC.q.conjugate().toRotationMatrix()),
+        R_BC(view.camera->T_BC().R()),
+        R_WL(levelling(view.up_W).conjugate().toRotationMatrix()) {}
 
   const CameraModel* camera;
   RigidTransform T_WC;
@@ -28,6 +34,8 @@ struct Projector {
 };
 
 /// Returns R_WO of an upright cuboid.
-Eigen::Matrix3d uprightRotation(double yaw, const Eigen::Vector3d& up_W);
+inline Eigen::Matrix3d uprightRotation(double yaw, const Eigen::Vector3d& up_W) {
+  return levelling(up_W).conjugate().toRotationMatrix() * rotationAboutZ(yaw);
+}
 
 }  // namespace perdure::semantic_filter
