@@ -214,7 +214,7 @@ bool leavesView(BoxExplanations& expected, const Belief& belief,
   for (std::size_t j = 0; j < visibilities.size(); ++j) {
     if (visibilities[j].state != Visibility::kOutOfView || !belief.tracks[j].life.confirmed)
       continue;
-    if (expected.matches(j, visibilities[j].hidden_sides, box)) return true;
+    if (expected.fit(j, visibilities[j].hidden_sides, box)) return true;
   }
   return false;
 }
