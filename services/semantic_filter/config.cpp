@@ -1,6 +1,5 @@
 #include "services/semantic_filter/config.h"
 
-#include <string>
 #include <utility>
 #include <vector>
 

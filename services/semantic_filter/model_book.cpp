@@ -1,7 +1,5 @@
 #include "services/semantic_filter/model_book.h"
 
-#include <utility>
-
 namespace perdure::semantic_filter {
 namespace {
 

@@ -5,10 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/check.h"
 #include "common/camera/same_camera.h"
 #include "common/math/gaussian.h"
-#include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
 #include "services/semantic_filter/core/belief/track_message.h"
 #include "services/semantic_filter/core/visibility/predicted_box.h"

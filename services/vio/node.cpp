@@ -1,7 +1,6 @@
 #include "services/vio/node.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "common/vision/image.h"
 #include "services/vio/landmarks_message.h"

@@ -1,7 +1,6 @@
 #include "services/semantic_filter/core/arrivals.h"
 
 #include <algorithm>
-#include <set>
 #include <utility>
 
 #include "services/semantic_filter/core/belief/pose_correlation.h"

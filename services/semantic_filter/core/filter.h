@@ -3,11 +3,8 @@
 // steps from the belief before it (core/history.h).
 #pragma once
 
-#include <map>
-#include <optional>
 #include <vector>
 
-#include "services/semantic_filter/core/association/score.h"
 #include "services/semantic_filter/core/belief/belief.h"
 #include "services/semantic_filter/core/measurement/frame.h"
 #include "services/semantic_filter/core/tracks/merge.h"

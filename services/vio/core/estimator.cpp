@@ -6,11 +6,9 @@
 
 #include "common/base/check.h"
 #include "common/math/gaussian.h"
-#include "common/math/so3.h"
 #include "services/vio/core/propagation/imu_propagator.h"
 #include "services/vio/core/update/triangulation.h"
 #include "services/vio/core/update/updater_msckf.h"
-#include "services/vio/core/update/updater_slam.h"
 #include "services/vio/core/update/updates.h"
 #include "services/vio/core/update/visual.h"
 

@@ -1,7 +1,6 @@
 #include "services/semantic_filter/core/association/score.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "services/semantic_filter/core/visibility/detectability.h"
 

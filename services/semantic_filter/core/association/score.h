@@ -3,7 +3,6 @@
 // tools/docs/maths/measurement_likelihood.md.
 #pragma once
 
-#include <cmath>
 #include <optional>
 #include <vector>
 

@@ -1,7 +1,6 @@
 #include "services/semantic_filter/core/belief/detection_rate.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace perdure::semantic_filter {
 namespace {

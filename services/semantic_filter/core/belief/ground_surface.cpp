@@ -6,7 +6,6 @@
 #include "common/math/gaussian.h"
 #include "common/math/small_cholesky.h"
 #include "common/math/so3.h"
-#include "services/semantic_filter/core/parameters.h"
 
 namespace perdure::semantic_filter {
 

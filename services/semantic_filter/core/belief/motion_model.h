@@ -2,8 +2,6 @@
 // (Bar-Shalom, Li 2001, ch. 6). Derivation: tools/docs/maths/state_and_mixture.md.
 #pragma once
 
-#include <optional>
-
 #include "services/semantic_filter/core/belief/track.h"
 #include "services/semantic_filter/core/parameters.h"
 

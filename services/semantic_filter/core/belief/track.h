@@ -10,7 +10,6 @@
 #include <optional>
 #include <set>
 #include <string>
-#include <vector>
 
 #include "common/base/shared_vector.h"
 #include "common/types/detections.h"

@@ -6,7 +6,6 @@
 #include "common/math/chi2.h"
 #include "common/math/small_cholesky.h"
 #include "common/math/small_products.h"
-#include "services/semantic_filter/core/parameters.h"
 
 namespace perdure::semantic_filter {
 namespace {

@@ -2,7 +2,6 @@
 // and the keyframes taken from it. Derivation: tools/docs/maths/pose_error.md.
 #pragma once
 
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>

@@ -5,12 +5,6 @@
 // the whole, stays wrong. A fit to all keyframes does not.
 #pragma once
 
-#include <memory>
-#include <optional>
-#include <vector>
-
-#include "common/camera/camera_model.h"
-#include "common/math/gaussian.h"
 #include "services/semantic_filter/core/belief/track.h"
 #include "services/semantic_filter/core/measurement/frame.h"
 

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "common/math/gaussian.h"
-#include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/belief/pose_correlation.h"
 #include "services/semantic_filter/core/parameters.h"

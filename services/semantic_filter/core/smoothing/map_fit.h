@@ -13,7 +13,6 @@
 
 #include <memory>
 #include <optional>
-#include <vector>
 
 #include "services/semantic_filter/core/belief/noise_scale.h"
 #include "services/semantic_filter/core/smoothing/batch_problem.h"

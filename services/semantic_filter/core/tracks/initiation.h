@@ -9,7 +9,6 @@
 #pragma once
 
 #include <optional>
-#include <vector>
 
 #include "services/semantic_filter/core/belief/belief.h"
 #include "services/semantic_filter/core/tracks/cuboid_fit.h"

@@ -1,13 +1,9 @@
 #include "services/semantic_filter/core/tracks/lifecycle.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 
 #include "common/base/algorithms/stable_sort.h"
 #include "common/math/gaussian.h"
-#include "common/math/small_cholesky.h"
-#include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/pose_correlation.h"
 
 namespace perdure::semantic_filter {

@@ -6,7 +6,6 @@
 #include "common/base/algorithms/stable_sort.h"
 #include "common/base/scratch.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
-#include "services/semantic_filter/core/smoothing/keyframes.h"
 #include "services/semantic_filter/core/tracks/lifecycle.h"
 
 namespace perdure::semantic_filter {

@@ -5,7 +5,6 @@
 // occluder that excuses a miss. Attribution changes no belief; track_update.h does.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "common/base/scratch.h"

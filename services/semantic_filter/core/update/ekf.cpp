@@ -1,7 +1,6 @@
 #include "services/semantic_filter/core/update/ekf.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "common/math/small_cholesky.h"
 #include "common/math/small_products.h"

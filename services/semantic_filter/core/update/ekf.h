@@ -2,7 +2,6 @@
 // Bar-Shalom, Li 2001, ch. 10; Schmidt 1966). Derivation: tools/docs/maths/ekf.md.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "services/semantic_filter/core/measurement/cuboid_projection.h"

@@ -6,7 +6,6 @@
 #include "common/math/gaussian.h"
 #include "common/math/small_cholesky.h"
 #include "common/math/small_products.h"
-#include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
 #include "services/semantic_filter/core/belief/pose_correlation.h"

@@ -5,8 +5,6 @@
 // A track is predicted when it is next visible. Until then its belief stays as it is.
 #pragma once
 
-#include <optional>
-
 #include "services/semantic_filter/core/belief/track.h"
 #include "services/semantic_filter/core/measurement/frame.h"
 

@@ -5,9 +5,6 @@
 #include <string_view>
 
 #include "common/math/gaussian.h"
-#include "common/math/small_cholesky.h"
-#include "common/math/small_products.h"
-#include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/update/azimuth_update.h"
 #include "services/semantic_filter/core/update/ekf.h"

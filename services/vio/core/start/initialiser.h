@@ -3,7 +3,6 @@
 // alone: motion_initialiser.h.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "common/base/result.h"

@@ -3,9 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
-#include "common/math/so3.h"
 #include "services/vio/core/start/motion_terms.h"
 
 namespace perdure::vio {

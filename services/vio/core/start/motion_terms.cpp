@@ -3,7 +3,6 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "common/math/so3.h"

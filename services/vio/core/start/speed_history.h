@@ -1,7 +1,6 @@
 // Recent samples of the speed sensor, and the speed at a given time.
 #pragma once
 
-#include <cstddef>
 #include <deque>
 #include <optional>
 #include <vector>

@@ -1,10 +1,8 @@
 #include "services/vio/core/state/state.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "common/base/check.h"
-#include "common/math/gaussian.h"
 #include "common/math/so3.h"
 
 namespace perdure::vio {

@@ -1,7 +1,6 @@
 #include "services/vio/core/tracks/ransac.h"
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <cstdint>
 
 namespace perdure::vio {

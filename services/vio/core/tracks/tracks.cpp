@@ -1,6 +1,5 @@
 #include "services/vio/core/tracks/tracks.h"
 
-#include <algorithm>
 #include <cmath>
 
 namespace perdure::vio {

@@ -2,7 +2,6 @@
 // leaves the window (Mourikis & Roumeliotis, ICRA 2007).
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "common/base/result.h"

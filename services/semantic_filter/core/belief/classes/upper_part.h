@@ -5,7 +5,6 @@
 #pragma once
 
 #include "services/semantic_filter/core/belief/classes/class_prior.h"
-#include "services/semantic_filter/core/parameters.h"
 #include "services/semantic_filter/core/belief/state.h"
 
 namespace perdure::semantic_filter {
