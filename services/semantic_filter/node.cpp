@@ -12,12 +12,9 @@
 #include "services/semantic_filter/core/visibility/predicted_box.h"
 
 namespace perdure::semantic_filter {
-namespace {
 
 constexpr std::size_t kMaxEarly = 16;
 constexpr std::chrono::seconds kFuture{10};  // detections further ahead of odometry are not stored
-
-}  // namespace
 
 Node::Node(const Config& config, const ClassPriors& priors, InstanceId instance, Outputs outputs)
     : config_(config),

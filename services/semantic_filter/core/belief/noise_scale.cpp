@@ -4,11 +4,8 @@
 #include <cmath>
 
 namespace perdure::semantic_filter {
-namespace {
 
 constexpr double kLeastRatio = 0.04, kMostRatio = 9.0;
-
-}  // namespace
 
 double NoiseScales::ratio(std::uint64_t model, double assumed) const {
   if (assumed <= 0.0) return 1.0;

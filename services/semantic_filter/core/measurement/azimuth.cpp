@@ -6,12 +6,8 @@
 
 namespace perdure::semantic_filter {
 
-namespace {
-
 constexpr double kOutlier = 0.2;  // share of azimuths that carry no information
 constexpr double kFlip = 0.1;     // share of azimuths that are turned by 180°
-
-}  // namespace
 
 AzimuthMatch matchAzimuth(double azimuth, const State& x, const View& view, double variance) {
   const double full = wrapAngle(yawFromAzimuth(azimuth, x.head<3>(), view) - x[kYaw]);

@@ -41,96 +41,6 @@ double gateThreshold(double gate, int dof) {
   return quantile[dof];
 }
 
-}  // namespace
-
-int BoxMeasurement::count() const {
-  return static_cast<int>(std::count(measured.begin(), measured.end(), true));
-}
-
-SideError sideError(const BoxParameters& parameters, const BoxNoise& noise) {
-  return {std::max(parameters.sigma_px, parameters.sigma_network_px * noise.pixel),
-          noise.relative > 0.0 ? noise.relative : parameters.sigma_relative};
-}
-
-SideError lastingError(const BoxParameters& parameters, const BoxNoise& noise) {
-  return sideError(parameters, noise) * std::sqrt(parameters.bias_share);
-}
-
-BoxMeasurement measure(const Box& box, double width, double height, const BoxParameters& parameters,
-                       const BoxNoise& noise) {
-  BoxMeasurement z;
-  z.sides << std::clamp(box.x1, 0.0, width), std::clamp(box.y1, 0.0, height),
-      std::clamp(box.x2, 0.0, width), std::clamp(box.y2, 0.0, height);
-  const SideError lasting = lastingError(parameters, noise);
-  SideError error = sideError(parameters, noise);
-  error.relative += parameters.sigma_weak * noise.clutter_probability;
-  const double sx = error.at(z.width()), sy = error.at(z.height());
-  for (int i = 0; i < 4; ++i) {
-    const bool is_x = i % 2 == 0;
-    const double whole = noise.sides[i] > 0.0 ? noise.sides[i] : is_x ? sx : sy;
-    const double stays = lasting.at(is_x ? z.width() : z.height());
-    z.lasting[i] = std::min(stays * stays, parameters.bias_share * whole * whole);
-    z.variance[i] = whole * whole - z.lasting[i];
-  }
-  const double mx = std::max(parameters.border_px, sx), my = std::max(parameters.border_px, sy);
-  z.measured = {z.sides[0] > mx, z.sides[1] > my, z.sides[2] < width - mx,
-                z.sides[3] < height - my};
-  return z;
-}
-
-Eigen::Vector4d biasSigma(const SideError& lasting, double width_px, double height_px) {
-  const double x = lasting.at(width_px) / width_px, y = lasting.at(height_px) / height_px;
-  return {x, y, x, y};
-}
-
-double logClutter(const BoxMeasurement& z, double width, double height,
-                  const ClutterParameters& parameters, const std::array<bool, 4>& ignored) {
-  const double size[2] = {std::max(z.width(), 1.0), std::max(z.height(), 1.0)};
-  const double extent[2] = {width, height};
-  double log_measure = std::log(parameters.per_frame);
-  for (int axis = 0; axis < 2; ++axis) {
-    const int censored = !z.measured[axis] + !z.measured[axis + 2];
-    const double log_uniform = std::log(std::log(extent[axis] / parameters.min_size_px));
-    const int told = 2 - censored - ignored[axis] - ignored[axis + 2];
-    if (told > 0) log_measure -= std::log(extent[axis]);
-    if (told == 2) log_measure -= std::log(size[axis]) + log_uniform;
-    log_measure += censored * std::log(parameters.censored_probability);
-  }
-  return log_measure;
-}
-
-Eigen::Matrix4d predictedCovariance(const Hypothesis& h, const ProjectedBox& box,
-                                    const Eigen::Matrix<double, 6, 6>& P_pose) {
-  // No side depends on the velocity.
-  const Eigen::Matrix<double, 4, kVelocity> H = box.H.leftCols<kVelocity>();
-  const auto HP = timesTop<kVelocity>(H, h.P);
-  const Eigen::Matrix<double, 4, 6> pose =
-      timesTop<6>(H, h.C) + 0.5 * timesTop<6>(box.H_pose, P_pose);
-  const Eigen::Matrix4d half = 0.5 * timesTransposed(HP, H) + timesTransposed(pose, box.H_pose);
-  return half + half.transpose();
-}
-
-bool mayOverlap(const BoxMeasurement& z, const ProjectedBox& p, const Eigen::Matrix4d& covariance) {
-  constexpr double kReach = 5.0;  // deviations
-  for (int axis = 0; axis < 2; ++axis) {
-    const double gap =
-        std::max(z.sides[axis] - p.sides[axis + 2], p.sides[axis] - z.sides[axis + 2]);
-    if (gap <= 0.0) continue;
-    const double variance = std::max(covariance(axis, axis), covariance(axis + 2, axis + 2));
-    if (gap * gap > kReach * kReach * (variance + z.variance[axis])) return false;
-  }
-  return true;
-}
-
-std::array<bool, 4> comparableSides(const BoxMeasurement& z, const ProjectedBox& predicted,
-                                    const std::array<bool, 4>& hidden) {
-  std::array<bool, 4> use;
-  for (int i = 0; i < 4; ++i) use[i] = z.measured[i] && !hidden[i] && predicted.exact[i];
-  return use;
-}
-
-namespace {
-
 /// How far the predicted side lies inside the observed one, px. The true side lies at or beyond a
 /// censored side: left and top at smaller coordinates, right and bottom at larger ones.
 double within(const BoxMeasurement& z, const ProjectedBox& predicted, int side) {
@@ -218,6 +128,92 @@ void keepLikelier(std::optional<BoxScore>& best, const std::optional<BoxScore>& 
 }
 
 }  // namespace
+
+int BoxMeasurement::count() const {
+  return static_cast<int>(std::count(measured.begin(), measured.end(), true));
+}
+
+SideError sideError(const BoxParameters& parameters, const BoxNoise& noise) {
+  return {std::max(parameters.sigma_px, parameters.sigma_network_px * noise.pixel),
+          noise.relative > 0.0 ? noise.relative : parameters.sigma_relative};
+}
+
+SideError lastingError(const BoxParameters& parameters, const BoxNoise& noise) {
+  return sideError(parameters, noise) * std::sqrt(parameters.bias_share);
+}
+
+BoxMeasurement measure(const Box& box, double width, double height, const BoxParameters& parameters,
+                       const BoxNoise& noise) {
+  BoxMeasurement z;
+  z.sides << std::clamp(box.x1, 0.0, width), std::clamp(box.y1, 0.0, height),
+      std::clamp(box.x2, 0.0, width), std::clamp(box.y2, 0.0, height);
+  const SideError lasting = lastingError(parameters, noise);
+  SideError error = sideError(parameters, noise);
+  error.relative += parameters.sigma_weak * noise.clutter_probability;
+  const double sx = error.at(z.width()), sy = error.at(z.height());
+  for (int i = 0; i < 4; ++i) {
+    const bool is_x = i % 2 == 0;
+    const double whole = noise.sides[i] > 0.0 ? noise.sides[i] : is_x ? sx : sy;
+    const double stays = lasting.at(is_x ? z.width() : z.height());
+    z.lasting[i] = std::min(stays * stays, parameters.bias_share * whole * whole);
+    z.variance[i] = whole * whole - z.lasting[i];
+  }
+  const double mx = std::max(parameters.border_px, sx), my = std::max(parameters.border_px, sy);
+  z.measured = {z.sides[0] > mx, z.sides[1] > my, z.sides[2] < width - mx,
+                z.sides[3] < height - my};
+  return z;
+}
+
+Eigen::Vector4d biasSigma(const SideError& lasting, double width_px, double height_px) {
+  const double x = lasting.at(width_px) / width_px, y = lasting.at(height_px) / height_px;
+  return {x, y, x, y};
+}
+
+double logClutter(const BoxMeasurement& z, double width, double height,
+                  const ClutterParameters& parameters, const std::array<bool, 4>& ignored) {
+  const double size[2] = {std::max(z.width(), 1.0), std::max(z.height(), 1.0)};
+  const double extent[2] = {width, height};
+  double log_measure = std::log(parameters.per_frame);
+  for (int axis = 0; axis < 2; ++axis) {
+    const int censored = !z.measured[axis] + !z.measured[axis + 2];
+    const double log_uniform = std::log(std::log(extent[axis] / parameters.min_size_px));
+    const int told = 2 - censored - ignored[axis] - ignored[axis + 2];
+    if (told > 0) log_measure -= std::log(extent[axis]);
+    if (told == 2) log_measure -= std::log(size[axis]) + log_uniform;
+    log_measure += censored * std::log(parameters.censored_probability);
+  }
+  return log_measure;
+}
+
+Eigen::Matrix4d predictedCovariance(const Hypothesis& h, const ProjectedBox& box,
+                                    const Eigen::Matrix<double, 6, 6>& P_pose) {
+  // No side depends on the velocity.
+  const Eigen::Matrix<double, 4, kVelocity> H = box.H.leftCols<kVelocity>();
+  const auto HP = timesTop<kVelocity>(H, h.P);
+  const Eigen::Matrix<double, 4, 6> pose =
+      timesTop<6>(H, h.C) + 0.5 * timesTop<6>(box.H_pose, P_pose);
+  const Eigen::Matrix4d half = 0.5 * timesTransposed(HP, H) + timesTransposed(pose, box.H_pose);
+  return half + half.transpose();
+}
+
+bool mayOverlap(const BoxMeasurement& z, const ProjectedBox& p, const Eigen::Matrix4d& covariance) {
+  constexpr double kReach = 5.0;  // deviations
+  for (int axis = 0; axis < 2; ++axis) {
+    const double gap =
+        std::max(z.sides[axis] - p.sides[axis + 2], p.sides[axis] - z.sides[axis + 2]);
+    if (gap <= 0.0) continue;
+    const double variance = std::max(covariance(axis, axis), covariance(axis + 2, axis + 2));
+    if (gap * gap > kReach * kReach * (variance + z.variance[axis])) return false;
+  }
+  return true;
+}
+
+std::array<bool, 4> comparableSides(const BoxMeasurement& z, const ProjectedBox& predicted,
+                                    const std::array<bool, 4>& hidden) {
+  std::array<bool, 4> use;
+  for (int i = 0; i < 4; ++i) use[i] = z.measured[i] && !hidden[i] && predicted.exact[i];
+  return use;
+}
 
 std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& predicted,
                                  const Eigen::Matrix4d& covariance,

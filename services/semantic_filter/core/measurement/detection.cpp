@@ -26,82 +26,11 @@ BoxStyles stylesOf(const ModelInfo& info, const ClassPriors& priors) {
   return styles;
 }
 
-}  // namespace
-
-Model makeModel(const ModelInfo& info, const ClassPriors& priors) {
-  Model model;
-  model.hash = info.hash;
-  model.classes = info.classes;
-  model.names = std::make_shared<const ClassNames>(info.classes.begin(), info.classes.end());
-  for (std::size_t k = 0; k < info.classes.size(); ++k) model.index.emplace(info.classes[k], k);
-  model.input_width = info.input_width;
-  model.box_sigma = info.box_sigma;
-  model.styles = std::make_shared<const BoxStyles>(stylesOf(info, priors));
-  return model;
-}
-
-BoxNoise boxNoise(const Model& model, double image_width) {
-  return {model.box_sigma, model.input_width > 0.0 ? image_width / model.input_width : 0.0};
-}
-
-const char* flawOf(const Detection& detection, const Model& model) {
-  const Box& b = detection.box;
-  if (!std::isfinite(b.x1 + b.y1 + b.x2 + b.y2)) return "detections_not_finite";
-  if (b.x1 >= b.x2 || b.y1 >= b.y2) return "detections_box_inside_out";
-  if (detection.activations.size() != model.classes.size() + 1) {
-    return "detections_classes_mismatch";
-  }
-  for (const float a : detection.activations) {
-    if (std::isnan(a - detection.activations[0])) return "detections_not_finite";
-  }
-  for (const double sigma : detection.side_sigma) {
-    if (!std::isfinite(sigma)) return "detections_not_finite";
-  }
-  if (!detection.azimuth) return nullptr;
-  if (!std::isfinite(*detection.azimuth + detection.azimuth_sigma)) return "detections_not_finite";
-  return detection.azimuth_sigma > 0.0 ? nullptr : "detections_azimuth_without_sigma";
-}
-
-namespace {
-
 /// To the network, an object of no known class resembles clutter or one of its classes.
 double logRatioOfOther(const BoxDetection& e, double lookalike_nats) {
   const double share = lookalikeProbability(e.lookalike, lookalike_nats);
   return std::log(1.0 - share + share * std::exp(e.log_ratio_best));
 }
-
-}  // namespace
-
-std::optional<BoxDetection> makeBoxDetection(const Detection& detection, const Model& model,
-                                             double width, double height, const BoxParameters& box,
-                                             const ClutterParameters& clutter) {
-  const Box& b = detection.box;
-  if (flawOf(detection, model)) return std::nullopt;
-  BoxDetection e;
-  const double zero = detection.activations[0];
-  double best = -clutter.max_log_ratio, odds = 0.0;
-  std::vector<double>& log_ratio = e.log_ratio.write(model.classes.size());
-  for (std::size_t k = 0; k < model.classes.size(); ++k) {
-    const double ratio = detection.activations[k + 1] - zero;
-    log_ratio.push_back(std::clamp(ratio, -clutter.max_log_ratio, clutter.max_log_ratio));
-    best = std::max(best, log_ratio.back());
-    odds += std::exp(log_ratio.back());
-  }
-  BoxNoise noise = boxNoise(model, width);
-  noise.sides = detection.side_sigma;
-  noise.clutter_probability = 1.0 / (1.0 + odds);
-  e.z = measure(b, width, height, box, noise);
-  if (e.z.width() < 1.0 || e.z.height() < 1.0) return std::nullopt;
-  e.log_clutter = logClutter(e.z, width, height, clutter);
-  e.log_ratio_best = best;
-  e.lookalike = clutter.other_lookalike;
-  e.log_ratio_other = logRatioOfOther(e, 0.0);
-  e.azimuth = detection.azimuth;
-  e.azimuth_sigma = detection.azimuth_sigma;
-  return e;
-}
-
-namespace {
 
 /// Length that two intervals share.
 double shared(double a1, double a2, double b1, double b2) {
@@ -139,6 +68,69 @@ void markBeside(BoxDetection& far, const BoxDetection& near) {
 }
 
 }  // namespace
+
+Model makeModel(const ModelInfo& info, const ClassPriors& priors) {
+  Model model;
+  model.hash = info.hash;
+  model.classes = info.classes;
+  model.names = std::make_shared<const ClassNames>(info.classes.begin(), info.classes.end());
+  for (std::size_t k = 0; k < info.classes.size(); ++k) model.index.emplace(info.classes[k], k);
+  model.input_width = info.input_width;
+  model.box_sigma = info.box_sigma;
+  model.styles = std::make_shared<const BoxStyles>(stylesOf(info, priors));
+  return model;
+}
+
+BoxNoise boxNoise(const Model& model, double image_width) {
+  return {model.box_sigma, model.input_width > 0.0 ? image_width / model.input_width : 0.0};
+}
+
+const char* flawOf(const Detection& detection, const Model& model) {
+  const Box& b = detection.box;
+  if (!std::isfinite(b.x1 + b.y1 + b.x2 + b.y2)) return "detections_not_finite";
+  if (b.x1 >= b.x2 || b.y1 >= b.y2) return "detections_box_inside_out";
+  if (detection.activations.size() != model.classes.size() + 1) {
+    return "detections_classes_mismatch";
+  }
+  for (const float a : detection.activations) {
+    if (std::isnan(a - detection.activations[0])) return "detections_not_finite";
+  }
+  for (const double sigma : detection.side_sigma) {
+    if (!std::isfinite(sigma)) return "detections_not_finite";
+  }
+  if (!detection.azimuth) return nullptr;
+  if (!std::isfinite(*detection.azimuth + detection.azimuth_sigma)) return "detections_not_finite";
+  return detection.azimuth_sigma > 0.0 ? nullptr : "detections_azimuth_without_sigma";
+}
+
+std::optional<BoxDetection> makeBoxDetection(const Detection& detection, const Model& model,
+                                             double width, double height, const BoxParameters& box,
+                                             const ClutterParameters& clutter) {
+  const Box& b = detection.box;
+  if (flawOf(detection, model)) return std::nullopt;
+  BoxDetection e;
+  const double zero = detection.activations[0];
+  double best = -clutter.max_log_ratio, odds = 0.0;
+  std::vector<double>& log_ratio = e.log_ratio.write(model.classes.size());
+  for (std::size_t k = 0; k < model.classes.size(); ++k) {
+    const double ratio = detection.activations[k + 1] - zero;
+    log_ratio.push_back(std::clamp(ratio, -clutter.max_log_ratio, clutter.max_log_ratio));
+    best = std::max(best, log_ratio.back());
+    odds += std::exp(log_ratio.back());
+  }
+  BoxNoise noise = boxNoise(model, width);
+  noise.sides = detection.side_sigma;
+  noise.clutter_probability = 1.0 / (1.0 + odds);
+  e.z = measure(b, width, height, box, noise);
+  if (e.z.width() < 1.0 || e.z.height() < 1.0) return std::nullopt;
+  e.log_clutter = logClutter(e.z, width, height, clutter);
+  e.log_ratio_best = best;
+  e.lookalike = clutter.other_lookalike;
+  e.log_ratio_other = logRatioOfOther(e, 0.0);
+  e.azimuth = detection.azimuth;
+  e.azimuth_sigma = detection.azimuth_sigma;
+  return e;
+}
 
 void markSidesBesideNearer(std::vector<BoxDetection>& boxes, const View& view) {
   const Eigen::Vector3d up = view.T_WC().R().transpose() * view.up_W;

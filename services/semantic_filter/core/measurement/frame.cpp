@@ -4,11 +4,7 @@
 
 namespace perdure::semantic_filter {
 
-namespace {
-
 constexpr double kNever = 1e9;  // a scale that makes a view change count nothing
-
-}  // namespace
 
 Projector FrameContext::projector() const { return frame_view ? frame_view->projector : view; }
 

@@ -9,12 +9,9 @@
 #include "services/semantic_filter/core/parameters.h"
 
 namespace perdure::semantic_filter {
-namespace {
 
 constexpr int kRounds = 12;
 constexpr double kEnough = 0.02;  // least gain of a further step, squared deviations
-
-}  // namespace
 
 struct MapFit::Fit {
   State x;

@@ -243,24 +243,6 @@ TrackVisibility classify(const Tally& tally, double in_image, double by_points,
   return visibility;
 }
 
-}  // namespace
-
-Outline outlineOf(const Track& track, const State& x, const Projector& from, const Shape& shape) {
-  const Hypothesis& h = track.best();
-  const Eigen::Vector3d ray = x.head<3>() - from.T_WC.p;
-  Outline o;
-  o.id = track.id;
-  o.solidity = track.existence * track.history.recent_share;
-  o.distance_m = ray.norm();
-  const Eigen::Vector3d along = ray / std::max(o.distance_m, 1e-6);
-  o.depth_sigma_m = std::sqrt(std::max(along.dot(h.P.topLeftCorner<3, 3>() * along), 0.0));
-  o.extent_m = 0.5 * x.segment<3>(kSize).array().exp().maxCoeff();
-  o.box = projectOutline(x, from, shape);
-  return o;
-}
-
-namespace {
-
 /// The part of an outline that lies in the image, and its share of the whole.
 struct InImage {
   Polygon inside;
@@ -303,6 +285,20 @@ DepthBuffer& begin(double width, double height, const VisibilityParameters& para
 }
 
 }  // namespace
+
+Outline outlineOf(const Track& track, const State& x, const Projector& from, const Shape& shape) {
+  const Hypothesis& h = track.best();
+  const Eigen::Vector3d ray = x.head<3>() - from.T_WC.p;
+  Outline o;
+  o.id = track.id;
+  o.solidity = track.existence * track.history.recent_share;
+  o.distance_m = ray.norm();
+  const Eigen::Vector3d along = ray / std::max(o.distance_m, 1e-6);
+  o.depth_sigma_m = std::sqrt(std::max(along.dot(h.P.topLeftCorner<3, 3>() * along), 0.0));
+  o.extent_m = 0.5 * x.segment<3>(kSize).array().exp().maxCoeff();
+  o.box = projectOutline(x, from, shape);
+  return o;
+}
 
 double shareOfFirst(const ScratchVector<Outline>& outlines, double width, double height,
                     const VisibilityParameters& parameters) {

@@ -116,6 +116,30 @@ void step(ImuIncrement& x, const ImuReading& a, const ImuReading& b, const Vecto
   x.mean_force += dt * fm;
 }
 
+/// Transition of the navigation error, and its derivative by the scale's error if that is
+/// estimated.
+struct Moves {
+  const Matrix15d& Phi;
+  Matrix93d by_scale;
+  std::optional<int> scale_at;
+};
+
+/// Covariance of the navigation error after the step.
+Matrix15d movedNav(const State& state, const Moves& m, const Matrix15d& Q) {
+  const auto P = state.P();
+  Matrix15d result = m.Phi * P.topLeftCorner<kNavSize, kNavSize>() * m.Phi.transpose() + Q;
+  if (!m.scale_at) return result;
+  const Eigen::Matrix<double, kNavSize, 3> cross =
+      m.Phi * P.block<kNavSize, kScaleSize>(0, *m.scale_at);
+  const Eigen::Matrix<double, kNavSize, 9> added = cross * m.by_scale.transpose();
+  result.leftCols<9>() += added;
+  result.topRows<9>() += added.transpose();
+  result.topLeftCorner<9, 9>() += m.by_scale *
+                                  P.block<kScaleSize, kScaleSize>(*m.scale_at, *m.scale_at) *
+                                  m.by_scale.transpose();
+  return result;
+}
+
 }  // namespace
 
 ImuIncrement integrate(const std::vector<ImuReading>& readings, const Vector3d& gyro_bias,
@@ -185,34 +209,6 @@ Matrix15d transition(const Nav& from, const Nav& to, const ImuIncrement& x, cons
       R_W_B0 * x.F.block<3, 3>(kVelocity, kAccelBias);
   return Phi;
 }
-
-namespace {
-
-/// Transition of the navigation error, and its derivative by the scale's error if that is
-/// estimated.
-struct Moves {
-  const Matrix15d& Phi;
-  Matrix93d by_scale;
-  std::optional<int> scale_at;
-};
-
-/// Covariance of the navigation error after the step.
-Matrix15d movedNav(const State& state, const Moves& m, const Matrix15d& Q) {
-  const auto P = state.P();
-  Matrix15d result = m.Phi * P.topLeftCorner<kNavSize, kNavSize>() * m.Phi.transpose() + Q;
-  if (!m.scale_at) return result;
-  const Eigen::Matrix<double, kNavSize, 3> cross =
-      m.Phi * P.block<kNavSize, kScaleSize>(0, *m.scale_at);
-  const Eigen::Matrix<double, kNavSize, 9> added = cross * m.by_scale.transpose();
-  result.leftCols<9>() += added;
-  result.topRows<9>() += added.transpose();
-  result.topLeftCorner<9, 9>() += m.by_scale *
-                                  P.block<kScaleSize, kScaleSize>(*m.scale_at, *m.scale_at) *
-                                  m.by_scale.transpose();
-  return result;
-}
-
-}  // namespace
 
 void propagate(State& state, const ImuIncrement& x, TimePoint to, double gravity,
                bool first_estimates) {

@@ -79,18 +79,6 @@ BearingPair pairOf(const Bearings& from, const Bearings& to, const ImuIncrement&
   return pair;
 }
 
-}  // namespace
-
-void MotionInitialiser::add(const FrameInput& input, TimePoint imu_time) {
-  // The clock restarted: its frames and the earlier ones have no common window.
-  if (!frames_.empty() && imu_time <= frames_.back().time) clear();
-  frames_.push_back({imu_time, input.tracked});
-  const Duration window = durationFromSeconds(options_.start.motion_window_s * 1.05);
-  while (frames_.front().time < imu_time - window) frames_.pop_front();
-}
-
-namespace {
-
 /// Tracks of at least three views, the longest first.
 std::vector<WindowPoint> windowPoints(const std::vector<const TrackedFrame*>& tracked,
                                       const std::vector<CameraModel>& cameras) {
@@ -158,6 +146,14 @@ Start startOf(const RefinedWindow& refined, const Options& options) {
 }
 
 }  // namespace
+
+void MotionInitialiser::add(const FrameInput& input, TimePoint imu_time) {
+  // The clock restarted: its frames and the earlier ones have no common window.
+  if (!frames_.empty() && imu_time <= frames_.back().time) clear();
+  frames_.push_back({imu_time, input.tracked});
+  const Duration window = durationFromSeconds(options_.start.motion_window_s * 1.05);
+  while (frames_.front().time < imu_time - window) frames_.pop_front();
+}
 
 Result<Start> MotionInitialiser::start(const ImuBuffer& imu,
                                        const std::vector<CameraModel>& cameras) {

@@ -4,12 +4,9 @@
 #include <cmath>
 
 namespace perdure::vio {
-namespace {
 
 constexpr std::size_t kSamples = 512;
 constexpr double kSpeedChange = 2.0;  // m/s², assumed unknown acceleration
-
-}  // namespace
 
 Result<void> SpeedHistory::add(const TimedSpeed& sample) {
   if (!std::isfinite(sample.speed) || !(sample.sigma > 0) || !std::isfinite(sample.sigma)) {
