@@ -312,9 +312,9 @@ Result<FrameEstimate> Estimator::process(const FrameInput& input, const ImuBuffe
   return out;
 }
 
-LandmarkEstimate Estimator::ofState(const PointState& point, const ImagePoint& seen) const {
+Landmark Estimator::ofState(const PointState& point, const ImagePoint& seen) const {
   const auto P = state_->P();
-  LandmarkEstimate l;
+  Landmark l;
   l.id = point.id;
   l.p_W = point.p_W;
   l.pixel = seen.pixel;
@@ -328,11 +328,10 @@ LandmarkEstimate Estimator::ofState(const PointState& point, const ImagePoint& s
   return l;
 }
 
-std::optional<LandmarkEstimate> Estimator::ofTrack(const Track& track,
-                                                   const ImagePoint& seen) const {
+std::optional<Landmark> Estimator::ofTrack(const Track& track, const ImagePoint& seen) const {
   const auto point = triangulate(raysOf(track, *state_, options_.vision.sigma_px), options_.vision);
   if (!point || point->rms > 2.0) return std::nullopt;
-  LandmarkEstimate l;
+  Landmark l;
   l.id = track.id;
   l.p_W = point->p_W;
   l.pixel = seen.pixel;
@@ -342,8 +341,8 @@ std::optional<LandmarkEstimate> Estimator::ofTrack(const Track& track,
   return l;
 }
 
-std::vector<LandmarkEstimate> Estimator::landmarks() const {
-  std::vector<LandmarkEstimate> result;
+std::vector<Landmark> Estimator::landmarks() const {
+  std::vector<Landmark> result;
   if (!state_ || state_->clones.empty()) return result;
   std::map<std::uint64_t, const PointState*> points;
   for (const PointState& p : state_->points) points[p.id] = &p;

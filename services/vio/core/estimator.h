@@ -14,7 +14,6 @@
 #include "services/vio/core/state/saved_state.h"
 #include "services/vio/core/state/state.h"
 #include "services/vio/core/tracks/tracks.h"
-#include "services/vio/core/update/landmark.h"
 #include "services/vio/core/update/standstill.h"
 #include "services/vio/core/update/updater_slam.h"
 
@@ -93,8 +92,8 @@ class Estimator {
   /// at an IMU time. Before a start it uses the raw rate. Zero for a global shutter.
   Eigen::Vector3d turnOfReadout(const ImuBuffer& imu, TimePoint time);
 
-  /// Points of the newest image whose position is known.
-  std::vector<LandmarkEstimate> landmarks() const;
+  /// Points of the newest image whose position is known, without descriptors.
+  std::vector<Landmark> landmarks() const;
 
   const State& state() const { return *state_; }
   State& state() { return *state_; }
@@ -116,8 +115,8 @@ class Estimator {
   void marginalise(bool at_rest);
   void measureRows(const ImuBuffer& imu);
   Result<void> sane() const;
-  LandmarkEstimate ofState(const PointState& point, const ImagePoint& seen) const;
-  std::optional<LandmarkEstimate> ofTrack(const Track& track, const ImagePoint& seen) const;
+  Landmark ofState(const PointState& point, const ImagePoint& seen) const;
+  std::optional<Landmark> ofTrack(const Track& track, const ImagePoint& seen) const;
 
   Options options_;
   std::vector<RigidTransform> T_BC_;

@@ -143,7 +143,7 @@ void PointMapper::add(const KnownPose& pose, const TrackedFrame& tracked) {
   landmarks_.clear();
   for (const Candidate& c : candidates) {
     if (!isSure(c.point)) continue;
-    LandmarkEstimate l;
+    Landmark l;
     l.id = c.seen->id;
     l.p_W = c.point.p_W;
     l.covariance = scale_ * scale_ * c.point.covariance;

@@ -12,7 +12,6 @@
 #include "services/vio/core/state/options.h"
 #include "services/vio/core/state/row_motion.h"
 #include "services/vio/core/tracks/tracks.h"
-#include "services/vio/core/update/landmark.h"
 #include "services/vio/core/update/triangulation.h"
 
 namespace perdure::vio {
@@ -34,9 +33,10 @@ class PointMapper {
 
   /// Adds the next image's pose and tracked points.
   void add(const KnownPose& pose, const TrackedFrame& tracked);
-  /// Points of the newest image whose position is known, by rising id. Points that fit the poses
-  /// much worse than the others are left out, because they move or were tracked wrongly.
-  const std::vector<LandmarkEstimate>& landmarks() const { return landmarks_; }
+  /// Points of the newest image whose position is known, by rising id, without descriptors. Points
+  /// that fit the poses much worse than the others are left out, because they move or were tracked
+  /// wrongly.
+  const std::vector<Landmark>& landmarks() const { return landmarks_; }
   /// Counts for the newest image.
   const Mapped& mapped() const { return mapped_; }
   /// Ratio of the tracks' residuals to VisionOptions::sigma_px, at least 1.
@@ -74,7 +74,7 @@ class PointMapper {
   FeatureDatabase database_;
   std::uint64_t frame_ = 0;
   double scale_ = 1.0;  ///< ratio of the residuals to sigma_px
-  std::vector<LandmarkEstimate> landmarks_;
+  std::vector<Landmark> landmarks_;
   Mapped mapped_;
 };
 
