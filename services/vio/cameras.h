@@ -35,4 +35,7 @@ std::vector<double> readouts(const std::vector<CameraModel>& all);
 /// Whether both calibrations have exactly the same cameras in the same order.
 bool sameCameras(const Calibration& a, const Calibration& b);
 
+/// A sentence with both sizes if the frame's size differs from its calibration; otherwise empty.
+std::string otherSize(const Frame& frame, const CameraModel& model);
+
 }  // namespace perdure::vio

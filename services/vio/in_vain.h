@@ -3,9 +3,6 @@
 
 #include <string>
 
-#include "common/camera/camera_model.h"
-#include "common/types/sensors.h"
-
 namespace perdure::vio {
 
 class InVain {
@@ -31,8 +28,5 @@ class InVain {
 inline constexpr int kInVain = 10;
 inline constexpr int kOtherSizes = 2;
 inline constexpr char kNoImage[] = "images cannot be read; mend the camera";
-
-/// A sentence with both sizes if the frame's size differs from its calibration; otherwise empty.
-std::string otherSize(const Frame& frame, const CameraModel& model);
 
 }  // namespace perdure::vio

@@ -16,7 +16,6 @@ Result<UpdateCounts> updateMsckf(State& state, const std::vector<const Track*>& 
   for (const Track* const track : tracks) {
     const auto point = triangulate(raysOf(*track, state, options.sigma_px), options);
     if (!point) {
-      ++counts.not_triangulated;
       if (point.error().code == "triangulation_depth") ++counts.behind;
       reasons.add(point.error());
       continue;

@@ -12,9 +12,8 @@
 namespace perdure::vio {
 
 struct UpdateCounts {
-  int used = 0, not_triangulated = 0, gated = 0;
-  int behind = 0;       ///< not triangulated because the rays do not meet in front of the cameras
-  bool jumped = false;  ///< the pose covariance was enlarged
+  int used = 0, gated = 0;
+  int behind = 0;  ///< not triangulated because the rays do not meet in front of the cameras
 };
 
 /// Triangulates and gates each track, and updates the state once with all tracks that pass.

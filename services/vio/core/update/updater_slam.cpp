@@ -131,7 +131,6 @@ Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
   counts.gated = static_cast<int>(leaving.size());
   if (may_jump && haveJumped(seen)) {
     reasons.add("images_jumped");
-    counts.jumped = true;
     state.widenPose(options.jump_rotation, options.jump_position_m);
     for (Seen& s : seen) s.judge(state, options.gate_probability);
   }
