@@ -8,8 +8,7 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kResolved = 0.9;      // probability of a class
-constexpr double kMissingBelow = 0.5;  // existence below which a confirmed object is reported as
-                                       // missing
+constexpr double kMissingBelow = 0.5;  // existence of a confirmed object
 
 bool isHidden(Visibility v) { return v != Visibility::kVisible && v != Visibility::kPartial; }
 

@@ -32,8 +32,7 @@ struct Outputs {
   Sink<std::vector<Innovation>> innovations = {};
 };
 
-inline constexpr int kDegradedFrames = 20;  ///< number of degraded frames after a gap or a
-                                            ///< resumption
+inline constexpr int kDegradedFrames = 20;  ///< degraded frames after a gap or a resumption
 
 class Node {
  public:

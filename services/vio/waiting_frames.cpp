@@ -6,8 +6,7 @@
 namespace perdure::vio {
 
 constexpr std::size_t kUnpaired = 4;
-constexpr std::size_t kAlone = 10;  // frames in a row after which the second camera counts as
-                                    // absent
+constexpr std::size_t kAlone = 10;  // frames in a row after which the second camera is absent
 constexpr std::chrono::milliseconds kReordered{300};  // largest reordering by transports
 
 Result<void> WaitingFrames::addFirst(const Frame& frame) {

@@ -9,8 +9,7 @@ namespace perdure::vio {
 
 /// Counts of the tracks of one image, by the result of their triangulation.
 struct Mapped {
-  std::size_t contradicted = 0;  ///< rays that do not meet in front of the cameras, or that fail
-                                 ///< the gate
+  std::size_t contradicted = 0;  ///< rays that do not meet before the cameras, or fail the gate
   std::size_t far = 0;           ///< points beyond VisionOptions::max_depth_m
   std::size_t sure = 0;          ///< landmarks, and tracks that an update has used
 };

@@ -37,8 +37,7 @@ struct FrameInput {
   TrackedFrame tracked;
   std::optional<double> motion_px;  ///< median image motion over the last frames
   std::optional<SpeedReading> speed;
-  std::optional<double> most_motion_px = {};  ///< image motion that four fifths of the points do
-                                              ///< not exceed
+  std::optional<double> most_motion_px = {};  ///< 0.8 quantile of the points' image motion
   double still_share = 0.0;  ///< share of the points that have stayed in place for a second
 };
 
@@ -49,11 +48,9 @@ struct FrameEstimate {
   std::uint64_t increment_from = 0;
   Matrix6d transition = Matrix6d::Identity(), increment_covariance = Matrix6d::Zero();
   bool at_rest = false;
-  std::optional<bool> speed_refused;    ///< whether the gate refused the speed; empty without a
-                                        ///< speed
+  std::optional<bool> speed_refused;    ///< by the gate; empty without a speed
   int points_used = 0;                  ///< points of this image used by all updates
-  int points_refused = 0;               ///< points that failed the gate, or whose rays do not meet
-                                        ///< in front of the cameras
+  int points_refused = 0;               ///< points that the gate or the triangulation refused
   std::vector<Innovation> innovations;  ///< filled after keepInnovations()
 };
 
@@ -127,8 +124,7 @@ class Estimator {
   Standstill standstill_;
   FeatureDatabase database_;
   TrackedFrame newest_;
-  std::vector<ImuReading> readings_;  ///< readings of one interval; a member so that its memory is
-                                      ///< reused
+  std::vector<ImuReading> readings_;  ///< of one interval; a member so that its memory is reused
   std::vector<ImuReading> rows_;      ///< readings around one image; a member for the same reason
   ReasonCounts reasons_;
   bool agreed_ = false;  ///< most points of the last image agreed with their predictions

@@ -61,8 +61,8 @@ Archive::Leaving Archive::leaving(const std::vector<Track>& tracks, const Eigen:
 }
 
 double Archive::nearRadius() const {
-  constexpr double kShare = 1.0 / 3.0;  // share of the margin; objects that come near before the
-                                        // next message
+  constexpr double kShare =
+      1.0 / 3.0;  // of the margin, for objects that come near before the next message
   return parameters_.archive ? parameters_.recall_m + kShare * parameters_.margin_m : 0.0;
 }
 

@@ -15,8 +15,7 @@ constexpr double kForget = 0.05;     // weight of a new image in the scale
 constexpr double kMany = 10.0;       // points needed for this weight; with fewer points it is lower
 constexpr double kMoved = 0.05;      // m; a smaller displacement is rest
 constexpr double kTurned = 0.05;     // rad
-constexpr double kGate = 3.0;        // limit of a point's residuals, relative to those of the
-                                     // others
+constexpr double kGate = 3.0;        // a point's residuals relative to those of the others
 
 double lackOfFit(const Triangulated& point, std::size_t rays) {
   // rms² averages 2n residuals, and the point uses three of their degrees of freedom.

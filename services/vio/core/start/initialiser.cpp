@@ -15,8 +15,7 @@ using Eigen::Vector3d;
 constexpr double kGauge = 1e-4;        // rad and m: yaw and position at the start define W
 constexpr double kMaxTurn = 0.3;       // rad/s, largest plausible bias
 constexpr double kSpeedWindow = 0.5;   // s, duration of the average of the force
-constexpr double kForceTolerance = 3;  // m/s², difference between the mean force's length and
-                                       // gravity
+constexpr double kForceTolerance = 3;  // m/s², of the mean force's length from gravity
 
 /// Mean dv/dt of the speeds in [from, to]; 0 for fewer than two speeds.
 double acceleration(const std::vector<TimedSpeed>& speeds, TimePoint from, TimePoint to) {

@@ -1,13 +1,14 @@
 #include "services/vio/core/start/motion_initialiser.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <map>
 
 #include "common/base/algorithms/stable_sort.h"
+#include "common/math/gaussian.h"
 #include "common/math/so3.h"
-#include "services/vio/core/start/epipolar_bias.h"
 #include "services/vio/core/start/initialiser.h"
 #include "services/vio/core/start/linear_start.h"
 #include "services/vio/core/start/motion_search.h"
@@ -22,8 +23,7 @@ constexpr std::size_t kKeyframes = 8, kFewestTracks = 15, kFewestViews = 3, kMos
 constexpr double kShortestWindow = 0.2;  // s
 constexpr double kGrowth = 0.1;          // relative growth of the window between searches
 constexpr double kMostNoise = 1.25;      // ratio of the residuals to their expected size
-constexpr double kFewestInFront = 0.8;   // share of points in front of the cameras, in the linear
-                                         // solution
+constexpr double kFewestInFront = 0.8;   // share of points, in the linear solution
 constexpr double kMostLinearPx = 3.0;    // residual of the linear solution
 constexpr double kFewestParallaxPx = 2.0;
 constexpr double kMostAcceleration = 5.0;  // m/s², mean over a window
@@ -59,6 +59,65 @@ std::vector<Vector3d> ratesAt(const std::vector<TimePoint>& times, const ImuBuff
     rates[i] = rowMotion(nav, imu, times[i], half, 0.0, readings).rate;
   }
   return rates;
+}
+
+/// Matches between two times, as bearings of one camera, and the rotation between them.
+struct BearingPair {
+  std::vector<std::pair<Vector3d, Vector3d>> bearings;  ///< unit vectors in C
+  Matrix3d R_B0_B1;                                     ///< rotation with zero bias
+  Matrix3d J_bias;  ///< derivative of R_B0_B1 (right tangent) by the gyro bias
+};
+
+/// Smallest eigenvalue of Σ n nᵀ over the epipolar normals n. It is zero for the true R.
+double coplanarity(const BearingPair& pair, const Matrix3d& R_C0_C1) {
+  Matrix3d M = Matrix3d::Zero();
+  for (const auto& [f0, f1] : pair.bearings) {
+    const Vector3d n = f0.cross(R_C0_C1 * f1);
+    M += n * n.transpose();
+  }
+  M /= static_cast<double>(pair.bearings.size());
+  return Eigen::SelfAdjointEigenSolver<Matrix3d>(M, Eigen::EigenvaluesOnly).eigenvalues()[0];
+}
+
+/// Gyro bias for which the epipolar normals of each pair are closest to coplanar (Kneip & Lynen,
+/// ICCV 2013; He et al., CVPR 2023).
+Vector3d gyroBiasFromPairs(const std::vector<BearingPair>& pairs, const Matrix3d& R_BC) {
+  const auto residuals = [&](const Vector3d& bias) {
+    Eigen::VectorXd r(static_cast<Eigen::Index>(pairs.size()));
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const Matrix3d R_B = pairs[i].R_B0_B1 * expSo3(pairs[i].J_bias * bias);
+      r[static_cast<Eigen::Index>(i)] =
+          std::sqrt(std::max(coplanarity(pairs[i], R_BC.transpose() * R_B * R_BC), 0.0));
+    }
+    return r;
+  };
+  Vector3d bias = Vector3d::Zero();
+  double lambda = 1e-3;
+  Eigen::VectorXd r = residuals(bias);
+  for (int iteration = 0; iteration < 30; ++iteration) {
+    Eigen::MatrixXd J(r.size(), 3);
+    constexpr double kStep = 1e-4;
+    for (int i = 0; i < 3; ++i) {
+      J.col(i) = (residuals(bias + kStep * Vector3d::Unit(i)) -
+                  residuals(bias - kStep * Vector3d::Unit(i))) /
+                 (2.0 * kStep);
+    }
+    Matrix3d A = J.transpose() * J;
+    A.diagonal() *= 1.0 + lambda;
+    A.diagonal().array() += 1e-12;
+    const Vector3d step = -solveSymmetric(A, J.transpose() * r);
+    const Eigen::VectorXd next = residuals(bias + step);
+    if (next.squaredNorm() < r.squaredNorm()) {
+      bias += step;
+      r = next;
+      lambda = std::max(0.2 * lambda, 1e-6);
+      if (step.norm() < 1e-6) break;
+    } else {
+      lambda *= 5.0;
+      if (lambda > 1e6) break;
+    }
+  }
+  return bias;
 }
 
 /// Matches of points seen in both frames. Their displacements in pixels are appended to `moved`.

@@ -20,8 +20,7 @@ struct WindowView {
   Eigen::Vector3d p_BC;
   Eigen::Vector2d normalised;
   Eigen::Matrix2d to_pixels;  ///< ∂pixel / ∂normalised
-  double row_s = 0.0;         ///< delay of the point's row after the pose, in s, for a rolling
-                              ///< shutter
+  double row_s = 0.0;         ///< s from the pose to the point's row of a rolling shutter
 };
 
 struct WindowPoint {
@@ -42,8 +41,7 @@ struct MotionWindow {
   std::vector<WindowPoint> points;
   Eigen::Vector3d gravity_B0 = Eigen::Vector3d::Zero();  ///< fixed length
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = Eigen::Vector3d::Zero();
-  double time_offset_s = 0.0;  ///< s, of the images, in addition to the offset already applied to
-                               ///< `poses`
+  double time_offset_s = 0.0;  ///< of the images, in addition to the one applied to `poses`
 };
 
 /// Error of the newest pose and of the window's parameters: [θ, v (B0), gravity (2), b_g, b_a].
@@ -56,8 +54,7 @@ Eigen::Matrix<double, 3, 2> acrossGravity(const Eigen::Vector3d& gravity_B0);
 struct RefinedWindow {
   MotionWindow window;
   WindowCovariance covariance;  ///< enlarged if the residuals are larger than expected
-  double cost = 0.0;            ///< twice the negative logarithm of the posterior, with robust
-                                ///< terms
+  double cost = 0.0;            ///< twice the negative log posterior, with robust terms
   double image_noise = 1.0;     ///< RMS of the views' residuals, in deviations; 1 if as expected
   double noise_ratio = 1.0;     ///< root of the cost per degree of freedom; 1 if all terms fit
 };

@@ -30,8 +30,7 @@ struct WindowOptions {
   std::int64_t clones = 11;           ///< poses in the sliding window
   std::int64_t slam_features = 36;    ///< points in the state
   std::int64_t msckf_features = 24;   ///< points used once, per frame
-  std::int64_t min_observations = 4;  ///< smallest number of image points of a track that is used
-                                      ///< once
+  std::int64_t min_observations = 4;  ///< least image points of a track that is used once
   bool first_estimates = true;        ///< Jacobians at first estimates, which updates do not change
 };
 
@@ -54,8 +53,7 @@ struct CalibrationOptions {
   bool estimate_readout = true;       ///< for a rolling shutter
   double extrinsic_rotation = 0.005;  ///< rad
   double extrinsic_position_m = 0.01;
-  double second_camera_factor = 0.1;  ///< factor on both, because the stereo pair's relative pose
-                                      ///< is calibrated more precisely
+  double second_camera_factor = 0.1;  ///< on both: the pose within the pair is more precise
   double time_offset_s = 0.005;
   double readout_s = 0.005;  ///< deviation of the read-out time of a rolling shutter
   double gyro_scale = 0.0;   ///< deviation of each axis from 1; 0: exact, not estimated
@@ -64,8 +62,7 @@ struct CalibrationOptions {
 struct StartOptions {
   double rest_window_s = 0.5;      ///< duration of rest before a start at rest
   double rest_disparity_px = 0.7;  ///< largest median image motion over that window
-  double still_window_s = 2.0;     ///< duration of rest if traffic moves in front of a background
-                                   ///< at rest
+  double still_window_s = 2.0;     ///< duration of rest if traffic moves in the image
   double rest_accel_m_s2 = 1.0;    ///< largest difference between the mean force and gravity
   double motion_window_s = 2.0;    ///< longest window of a start in motion
   double tilt_sigma = 0.03;        ///< rad, at a start with a speed sensor

@@ -25,8 +25,7 @@ struct RowMotion {
 
 struct RowCamera {
   RigidTransform T_BC;        ///< B at the middle row, C at this row
-  Eigen::Matrix3d R_BR;       ///< R: body frame at this row. Rotates an error of the mounted p_BC
-                              ///< into B.
+  Eigen::Matrix3d R_BR;       ///< R: body frame at this row; rotates errors of p_BC into B
   Eigen::Vector3d theta_dot;  ///< derivative of T_BC's rotation (right tangent) by s, rad/s
   Eigen::Vector3d p_dot;      ///< derivative of T_BC's position by s, m/s in B
 };

@@ -20,8 +20,7 @@ struct ImagePoint {
   Eigen::Vector2d normalised = Eigen::Vector2d::Zero();  ///< x/z, y/z, undistorted
   double scale = 1.0;  ///< mean number of pixels per unit of the normalised image at this point
   Eigen::Matrix2d to_pixels = Eigen::Matrix2d::Identity();  ///< ∂pixel / ∂normalised at this point
-  double row = 0.0;  ///< −½ … ½, first to last row: time since the middle row as a share of the
-                     ///< read-out
+  double row = 0.0;  ///< −½ … ½: time since the middle row, as a share of the read-out
 };
 
 /// Undistorts a pixel. Empty if the lens model has no inverse there.

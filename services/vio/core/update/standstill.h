@@ -49,11 +49,9 @@ class Standstill {
   bool holds(const ImuBuffer& imu, TimePoint now, const ImuNoise& noise);
 
  private:
-  std::optional<TimePoint> confirmed_;    ///< last time at which the images confirmed the
-                                          ///< standstill
+  std::optional<TimePoint> confirmed_;    ///< when the images last confirmed the standstill
   std::optional<TimePoint> interrupted_;  ///< time since which the IMU contradicts it
-  TimePoint begun_;                       ///< first time at which the images confirmed this
-                                          ///< standstill
+  TimePoint begun_;                       ///< when the images first confirmed it
   /// Expectation with its time. The filter attributes a slow acceleration to a bias, so the
   /// expectation must be older than the acceleration.
   struct Reference {

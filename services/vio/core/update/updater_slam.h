@@ -9,8 +9,7 @@ namespace perdure::vio {
 /// Innovation of a point of the state in the newest image.
 struct Innovation {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();     ///< as seen by the first camera
-  Eigen::Vector2d residual = Eigen::Vector2d::Zero();  ///< observed minus predicted pixel of the
-                                                       ///< first camera, px
+  Eigen::Vector2d residual = Eigen::Vector2d::Zero();  ///< observed minus predicted, px
   double nis = 0.0;                                    ///< rᵀ S⁻¹ r over all its views
   int rows = 0;                                        ///< degrees of freedom of nis
   bool used = false;                                   ///< passed the gate
