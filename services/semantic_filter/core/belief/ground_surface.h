@@ -1,14 +1,7 @@
 // Height of the ground, from the objects that stand on it and from the path of the body: a Gaussian
 // process. Derivation: tools/docs/maths/ground_contact.md.
-//
-// Objects that parallax has placed show where their undersides are; what stands near them stands
-// about as high. So a far object whose distance only its size shows stands where the street is. An
-// object that seems to stand below the street is nearer, or moves. If the height of the body above
-// the ground is known, its path shows the ground from the first frame on.
-//
-// Model: a level plane of unknown height, with slope N(0, ground.slope²) and Brownian unevenness of
-// variance ground.roughness² per metre. Where nothing stands, nothing is known. Heights are along
-// the view's up direction, in the frame of the beliefs.
+// Where nothing stands, nothing is known. Heights are along the view's up direction, in the frame
+// of the beliefs.
 #pragma once
 
 #include <Eigen/Core>

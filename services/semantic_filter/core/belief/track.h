@@ -102,9 +102,6 @@ struct BatchState {
   std::uint32_t seen = 0;             ///< keyframes since there were enough for a fit
   std::uint32_t mode_search_due = 0;  ///< modes are searched when `seen` reaches it
   std::uint32_t patience = 1;         ///< fits are this much rarer while they change little
-
-  /// Forgets all: the state begins anew.
-  void restart();
 };
 
 /// As the latest frame saw it.

@@ -1,14 +1,8 @@
 // MAP fit: the state of a hypothesis that maximises the posterior given all keyframes at once, by
 // Levenberg-Marquardt (Dellaert, Kaess 2017; Nielsen 1999). It replaces what the filter made of
 // them one after the other. Derivation: tools/docs/maths/map_fit.md.
-//
-// The model is that of the filter:
-// - sides with noise and with b, an Ornstein-Uhlenbeck process along the view change;
-// - a pose error for each keyframe, correlated between keyframes and with the present pose error;
-// - t-distributed boxes, and the size prior of the class;
-// - for a moving hypothesis, a speed prior and white acceleration.
-// b, pose errors and accelerations are marginalised. So the sides of all keyframes have one full
-// covariance matrix.
+// The model is that of the filter; b, pose errors and accelerations are marginalised. So the sides
+// of all keyframes have one full covariance matrix.
 #pragma once
 
 #include <memory>

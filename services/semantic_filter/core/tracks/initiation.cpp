@@ -283,7 +283,7 @@ bool reinitialise(Track& track, const ClassNumbers& pmf, const BoxDetection& det
   } else {
     track.hypotheses = std::move(initiated->hypotheses);
   }
-  track.batch.restart();
+  track.batch = {};
   track.history.running_nis = 1.0;
   normalise(track, ClassEvidence::kGeometry);
   return true;

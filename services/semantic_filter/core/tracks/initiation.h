@@ -1,11 +1,5 @@
 // Initiation of a track from a box that no track explains (paper, "Initialization", line 284).
 // Derivation: tools/docs/maths/initiation.md.
-//
-// Position, yaw and size minimise the reprojection error of the box under the size prior of the
-// class (Ceres' TinySolver). The covariance is the inverse of the Gauss-Newton Hessian. So a depth
-// that only the size prior determines has the variance it deserves. Enough landmarks inside the box
-// add their weighted centroid. Later updates do not apply the size prior again. The pose error
-// enters position and yaw once, with its cross-covariance.
 #pragma once
 
 #include <optional>

@@ -1,8 +1,5 @@
 // Attribution: the division of one update of existence and PMF among its causes, for the ledger
 // (the paper has no such account). Derivation: tools/docs/maths/ledger.md.
-//
-// The causes are the activations of the network, the geometry of the boxes, and an unmapped
-// occluder that excuses a miss. Attribution changes no belief; track_update.h does.
 #pragma once
 
 #include <vector>
