@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/camera/same_camera.h"
+#include "common/vision/image.h"
 
 namespace perdure::vio {
 namespace {
@@ -66,6 +67,25 @@ std::string otherSize(const Frame& frame, const CameraModel& model) {
   return "frames of " + frame.camera + " are " + sizeText(frame.width, frame.height) +
          ", their calibration is for " + sizeText(width, height) +
          "; set the camera to that size, or calibrate it at its own";
+}
+
+std::optional<std::size_t> cameraOf(const Frame& frame, const std::vector<CameraModel>& models,
+                                    const Calibration& calibration, ReasonCounts& reasons) {
+  for (std::size_t i = models.size(); i-- > 0;) {
+    if (frame.camera == models[i].calibration().name) return i;
+  }
+  if (!calibration.camera(frame.camera)) reasons.add("frame_of_unknown_camera");
+  return std::nullopt;
+}
+
+cv::Mat secondImage(const FramePair& frames, bool stereo, ReasonCounts& reasons) {
+  if (!frames.second) {
+    if (stereo) reasons.add("stereo_unpaired");
+    return {};
+  }
+  const auto image = vision::monoOf(*frames.second);
+  if (!image) reasons.add(image.error());
+  return image ? *image : cv::Mat();
 }
 
 }  // namespace perdure::vio

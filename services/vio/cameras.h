@@ -1,6 +1,8 @@
 // Objects that exist once the cameras are known.
 #pragma once
 
+#include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "common/camera/camera_model.h"
@@ -8,6 +10,7 @@
 #include "services/vio/config.h"
 #include "services/vio/core/estimator.h"
 #include "services/vio/core/tracks/tracker.h"
+#include "services/vio/waiting_frames.h"
 
 namespace perdure::vio {
 
@@ -37,5 +40,13 @@ bool sameCameras(const Calibration& a, const Calibration& b);
 
 /// A sentence with both sizes if the frame's size differs from its calibration; otherwise empty.
 std::string otherSize(const Frame& frame, const CameraModel& model);
+
+/// Index in `models` of the camera that took the frame. Empty for other cameras; one that the
+/// calibration lacks is counted.
+std::optional<std::size_t> cameraOf(const Frame& frame, const std::vector<CameraModel>& models,
+                                    const Calibration& calibration, ReasonCounts& reasons);
+/// The second image (CV_8UC1) of a pair; empty without a usable one, which is counted for a stereo
+/// rig.
+cv::Mat secondImage(const FramePair& frames, bool stereo, ReasonCounts& reasons);
 
 }  // namespace perdure::vio

@@ -21,8 +21,6 @@ constexpr char kImagesContradict[] =
     "axes, signs and units (radians per second), the focal length and time_offset_s; or what moves "
     "fills the picture";
 
-double seconds(Duration d) { return toSeconds(d); }
-
 }  // namespace
 
 Node::Node(const Config& config, InstanceId instance, Outputs outputs)
@@ -143,21 +141,17 @@ void Node::onImu(const ImuSample& sample) {
 }
 
 void Node::onSpeed(const SpeedSample& sample) {
-  const auto added = speeds_.add({sample.time, sample.speed, sample.sigma});
+  const auto added = speeds_.add(sample);
   if (!added) return reasons_.add(added.error());
   drain(false);
 }
 
 void Node::onFrame(const Frame& frame) {
   if (!cameras_) return reasons_.add("frame_before_calibration");
-  const bool second =
-      cameras_->models.size() == 2 && frame.camera == cameras_->models[1].calibration().name;
-  if (!second && frame.camera != cameras_->models[0].calibration().name) {
-    if (!calibration_->camera(frame.camera)) reasons_.add("frame_of_unknown_camera");
-    return;
-  }
-  const CameraModel& model = cameras_->models[second ? 1 : 0];
-  if (auto why = otherSize(frame, model); !why.empty()) {
+  const auto camera = cameraOf(frame, cameras_->models, *calibration_, reasons_);
+  if (!camera) return;
+  const bool second = *camera == 1;
+  if (auto why = otherSize(frame, cameras_->models[*camera]); !why.empty()) {
     second ? waiting_.refuseSecond(std::move(why)) : in_vain_.add(std::move(why), kOtherSizes);
     return reasons_.add("frame_size_differs");
   }
@@ -222,14 +216,14 @@ void Node::noteGaps(TimePoint now) {
   const TimePoint from =
       started() ? cameras_->estimator.state().time : last_imu_time_.value_or(now);
   if (from >= now || imu_.empty()) return;
-  const double gap = seconds(imu_.longestGap(from, now));
+  const double gap = toSeconds(imu_.longestGap(from, now));
   if (gap <= config_.core.imu.gap_from_s) return;
   reasons_.add("imu_gap");
   degraded_frames_ = kDegradedFrames;
   if (!started()) return;
   if (gap > config_.longest_gap_s) return lose({"imu_gap_too_long", ""});
   // Neither images nor samples arrived: the clock jumped, or the body moved unobserved.
-  if (std::min(gap, seconds(now - from)) > config_.longest_blackout_s) {
+  if (std::min(gap, toSeconds(now - from)) > config_.longest_blackout_s) {
     lose({"clock_jumped_or_blackout", ""});
   }
 }
@@ -238,7 +232,7 @@ TrackedFrame Node::trackImages(const cv::Mat& first, const cv::Mat& second, Time
   std::optional<Eigen::Matrix3d> R;
   const double gap_from = config_.core.imu.gap_from_s;
   if (started() && !imu_.empty() && imu_.last() > cameras_->estimator.state().time &&
-      seconds(imu_.longestGap(cameras_->estimator.state().time, now)) <= gap_from) {
+      toSeconds(imu_.longestGap(cameras_->estimator.state().time, now)) <= gap_from) {
     R = cameras_->estimator.predictRotation(imu_, now);
   }
   const Eigen::Vector3d turn = cameras_->estimator.turnOfReadout(imu_, now);
@@ -255,7 +249,7 @@ TrackedFrame Node::trackImages(const cv::Mat& first, const cv::Mat& second, Time
   }
   const State& state = cameras_->estimator.state();
   RigidTransform T_WB = state.nav.T_WB();
-  T_WB.p += seconds(now - state.time) * state.nav.v_WB;
+  T_WB.p += toSeconds(now - state.time) * state.nav.v_WB;
   if (R) T_WB.q = T_WB.q * Eigen::Quaterniond(R->transpose());
   const auto masked = moving_.boxes(cameras_->models[0], world_, T_WB, *last_image_);
   return cameras_->tracker.track(first, second, R, masked, turn);
@@ -271,16 +265,7 @@ void Node::process(const FramePair& frames) {
     return publishWaiting(stamp);
   }
   in_vain_.clear();
-  cv::Mat second;
-  if (frames.second) {
-    if (const auto image = vision::monoOf(*frames.second)) {
-      second = *image;
-    } else {
-      reasons_.add(image.error());
-    }
-  } else if (cameras_->models.size() == 2) {
-    reasons_.add("stereo_unpaired");
-  }
+  const cv::Mat second = secondImage(frames, cameras_->models.size() == 2, reasons_);
   const TimePoint now = imuTime(stamp.time);
   noteGaps(now);
   FrameInput input{++frame_, stamp.time, trackImages(*first, second, now), {}, {}};
