@@ -6,8 +6,7 @@ namespace {
 constexpr std::size_t kMaxModels = 64;
 constexpr std::size_t kMaxNamed = 8;  // largest number of classes in a sentence
 
-/// Text for the classes that `model` has and `other` lacks, for example "; new classes: a, b and 3
-/// more".
+/// Text for the classes of `model` that `other` lacks, as in "; new classes: a, b and 3 more".
 std::string beyond(const Model& model, const Model& other, const std::string& title) {
   std::string text;
   std::size_t n = 0;

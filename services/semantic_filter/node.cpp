@@ -179,8 +179,7 @@ void Node::onDetections(const Detections& detections) {
   keepEarly(detections);
 }
 
-/// If there are too many, the one furthest ahead is dropped: false stamps must not displace the
-/// next detections.
+/// Of too many, the one furthest ahead is dropped: false stamps must not displace the next ones.
 void Node::keepEarly(const Detections& detections) {
   for (const auto& d : early_) {
     if (d.stamp.sameFrame(detections.stamp)) return reasons_.add("detections_repeated");

@@ -87,8 +87,7 @@ void Node::take(const MapNear& near, ExistenceEvidence evidence) {
   history_.arrive(arrivals);
 }
 
-/// The survivor of a merge of two confirmed tracks belongs to the older object, as the map will
-/// find.
+/// The survivor of a merge of confirmed tracks belongs to the older object, as in the map.
 void Node::noteMerge(TrackId survivor, TrackId absorbed) {
   const auto memberOf = [&](TrackId track) {
     const auto at = members_.find(track);

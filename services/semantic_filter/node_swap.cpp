@@ -56,8 +56,7 @@ bool Node::isInDoubt(const Frame& frame, const Detections& detections) {
   return false;
 }
 
-/// Applies the delayed detections late if they are accepted; otherwise these frames have no
-/// detections.
+/// Applies accepted delayed detections late; otherwise these frames have none.
 void Node::settleProbation(bool believed) {
   const auto kept = probation_.take();
   if (!believed && !kept.empty()) reasons_.add("detections_rolled_back", kept.size());

@@ -14,8 +14,7 @@ namespace perdure::semantic_filter {
 
 class Probation {
  public:
-  /// The largest number of delayed frames. The old process decides within fewer, and the history
-  /// can repeat more (history.frames).
+  /// Most delayed frames. The old process decides within fewer; the history can repeat more.
   static constexpr std::size_t kLongest = 24;
 
   void begin(InstanceId newcomer) { newcomer_ = newcomer; }
@@ -31,8 +30,7 @@ class Probation {
   std::vector<Detections> kept_;
 };
 
-/// Whether at least one object is likely to be detected, and no detection overlaps any of the
-/// likely ones.
+/// Whether an object is likely to be detected, and no detection overlaps a likely one.
 bool missesAll(const std::vector<Prediction>& expected, const Detections& detections);
 
 }  // namespace perdure::semantic_filter

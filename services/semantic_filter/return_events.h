@@ -15,8 +15,7 @@ namespace perdure::semantic_filter {
 
 class ReappearanceMonitor {
  public:
-  /// Returns events of kind kPredictedReturn for one published frame. `blank`: an event with stamp
-  /// and writer.
+  /// Returns events kPredictedReturn of one frame. `blank`: an event with stamp and writer.
   std::vector<Event> update(const std::vector<Track>& objects, const FrameInput& now,
                             const std::optional<ComingFrame>& coming, const Parameters& parameters,
                             const Event& blank);

@@ -27,8 +27,7 @@ struct Cameras {
 /// second is used only if stereo is enabled. If the calibration has none of them, its first camera
 /// is used.
 std::vector<CameraModel> usedCameras(const Config& config, const Calibration& calibration);
-/// A sentence if the configuration names a camera that does not exist. Otherwise empty; also empty
-/// if only the default cameras are named.
+/// A sentence if a camera other than the defaults is configured and does not exist; else empty.
 std::string unknownCamera(const Config& config, const Calibration& calibration);
 
 /// Camera parameters of the estimators: the mounting on the body, and the read-out time in s.
@@ -41,12 +40,10 @@ bool sameCameras(const Calibration& a, const Calibration& b);
 /// A sentence with both sizes if the frame's size differs from its calibration; otherwise empty.
 std::string otherSize(const Frame& frame, const CameraModel& model);
 
-/// Index in `models` of the camera that took the frame. Empty for other cameras; one that the
-/// calibration lacks is counted.
+/// Index in `models` of the frame's camera; empty for others. An unknown camera is counted.
 std::optional<std::size_t> cameraOf(const Frame& frame, const std::vector<CameraModel>& models,
                                     const Calibration& calibration, ReasonCounts& reasons);
-/// The second image (CV_8UC1) of a pair; empty without a usable one, which is counted for a stereo
-/// rig.
+/// The second image (CV_8UC1) of a pair, or empty; a missing one of a stereo rig is counted.
 cv::Mat secondImage(const FramePair& frames, bool stereo, ReasonCounts& reasons);
 
 }  // namespace perdure::vio

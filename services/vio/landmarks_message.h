@@ -8,8 +8,7 @@
 
 namespace perdure::vio {
 
-/// Landmarks of one image (CV_8UC1) of `camera`, with descriptors. Landmarks that are not finite are
-/// left out.
+/// Landmarks of an image (CV_8UC1) of `camera`, with descriptors, without non-finite ones.
 Landmarks landmarksMessage(const FrameStamp& stamp, InstanceId instance, const WorldId& world,
                            const std::string& camera, std::vector<Landmark> landmarks,
                            const cv::Mat& image);

@@ -41,7 +41,6 @@ class Arrival {
     belief_.tracks.insert(later, std::move(track));
   }
 
-  /// Fuses the tracks of each object.
   std::vector<MergeRecord> unite() {
     std::map<ObjectId, std::vector<TrackId>> objects;
     for (const auto& [track, object] : arrivals_.members) objects[object].push_back(track);

@@ -206,7 +206,6 @@ void Step::manageAll(ScratchVector<ScoredTrack>& scored) {
   keepDeleted(belief.recently_deleted, std::move(lost), now, parameters.tracks);
 }
 
-/// Merges, confirms, deletes and re-identifies tracks.
 void Step::resolveIdentities(StepReport& report) {
   report.merges = mergeObjects(belief.tracks, frame);
   keepDeleted(belief.recently_deleted, confirmAndDelete(belief.tracks, frame), now,

@@ -47,8 +47,7 @@ Eigen::Vector3d Estimator::turnOfReadout(const ImuBuffer& imu, TimePoint time) {
   return readout_s * rowMotion(nav, imu, time, half, options_.gravity, readings_, scale).rate;
 }
 
-/// Computes the row motion of the newest clone. Repeated after an update, with the new velocity and
-/// biases.
+/// Computes the row motion of the newest clone, again after an update.
 void Estimator::measureRows(const ImuBuffer& imu) {
   const double readout_s = state_->longestReadout();
   if (readout_s == 0.0) return;
@@ -79,8 +78,7 @@ Result<void> Estimator::propagateTo(const FrameInput& input, const ImuBuffer& im
   return {};
 }
 
-/// True if half of the points are at rest and the IMU does not measure a turn. A lorry that fills
-/// the image may also cause this.
+/// True if half of the points rest and the IMU measures no turn; a lorry may also cause this.
 bool Estimator::medianRests(const FrameInput& input) const {
   const RestOptions& o = options_.rest;
   if (!input.motion_px || *input.motion_px > o.disparity_px) return false;
@@ -231,8 +229,7 @@ Result<void> Estimator::visionUpdate(const FrameInput& input, FrameEstimate& out
 
 void Estimator::report(const FrameInput& input, FrameEstimate& out) {
   const auto P = state_->P();
-  // The pose at the image is that of the newest clone. Unlike nav, it includes the error of the
-  // time offset.
+  // The pose at the image is that of the newest clone, with the error of the time offset.
   const Clone& newest = state_->clones.back();
   out.nav = state_->nav;
   out.covariance << P.block<6, 6>(newest.at, newest.at), P.block<6, 3>(newest.at, kVelocity),
@@ -258,8 +255,7 @@ void Estimator::report(const FrameInput& input, FrameEstimate& out) {
 void Estimator::marginalise(bool at_rest) {
   const std::size_t n = state_->clones.size();
   if (at_rest && n >= 2) {
-    // The newest pose repeats the previous one. Removing the previous one preserves the newest pose
-    // and the window's baseline.
+    // The newest pose repeats the previous one, whose removal preserves the window's baseline.
     const std::uint64_t frame = state_->clones[n - 2].frame;
     database_.removeFrame(frame);
     state_->removeClone(frame);

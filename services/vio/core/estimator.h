@@ -56,8 +56,7 @@ struct FrameEstimate {
 
 class Estimator {
  public:
-  /// Takes one or two cameras. readout_s: read-out time of each camera, 0 for a global shutter. If
-  /// empty, all cameras have a global shutter.
+  /// One or two cameras. readout_s: of each camera, 0 for a global shutter; empty: all global.
   Estimator(const Options& options, const std::vector<RigidTransform>& T_BC, double time_offset_s,
             const std::vector<double>& readout_s = {});
 
@@ -69,8 +68,7 @@ class Estimator {
   /// estimated quantities. Fails with state_other_cameras, state_other_shutter,
   /// state_other_gyro_scale or state_other_readout.
   Result<void> fits(const SavedState& saved) const;
-  /// Returns the state that restore() takes. The caller fills world and next_track. Needs
-  /// started().
+  /// Returns the state for restore(), without world and next_track. Needs started().
   SavedState save() const;
   bool started() const { return state_.has_value(); }
   void stop() { state_.reset(); }

@@ -29,9 +29,8 @@ class BoxExplanations {
   ScratchVector<std::optional<std::optional<PredictedBox>>> at_;  ///< outer: computed
 };
 
-/// Adds the partial views of tracks with v = 0 to the clutter of each box
-/// (BoxDetection::log_partial_views). Such a box is less likely a new object or that of another
-/// track. The track with v = 0 does not change.
+/// Adds the partial views of tracks with v = 0 to the clutter of each box (log_partial_views), so
+/// that it is less likely a new object or that of another track. The tracks do not change.
 void explainPartialViews(const Belief& belief, const ScratchVector<TrackVisibility>& visibilities,
                          FrameInput& input, const Parameters& parameters,
                          const ClassPriors& priors);

@@ -11,8 +11,7 @@ namespace {
 constexpr double kMaxLogLikelihood = 40.0;  // nats, keeps products finite
 constexpr double kMaxDetection = 0.98;      // of v without an unmapped occluder
 
-/// Returns the number of earlier observations whose errors are shared by one of `position` from
-/// this view.
+/// Returns the number of earlier observations that share the errors of this view of `position`.
 double correlatedObservations(const Eigen::Vector3d& position, const Viewpoint& last,
                               const View& view, const TemperingParameters& parameters) {
   if (last.observations <= 0.0) return 0.0;
@@ -22,8 +21,7 @@ double correlatedObservations(const Eigen::Vector3d& position, const Viewpoint& 
   return last.observations * correlation;
 }
 
-/// Returns the log clutter density of the sides that were compared. With fewer sides it has other
-/// units.
+/// Returns the log clutter density of the compared sides. With fewer sides it has other units.
 double logClutterOf(const BoxDetection& e, const BoxScore& score, const View& view,
                     const ClutterParameters& parameters) {
   const auto& ignored = score.ignored;
@@ -68,8 +66,7 @@ HypothesisScore scoreHypothesis(const Hypothesis& hypothesis, const Track& track
   return h;
 }
 
-/// Bounds of the boxes that mayOverlap can accept for one of the hypotheses. To reject boxes that
-/// lie elsewhere is most of the work.
+/// Bounds of the boxes that mayOverlap can accept. To reject boxes elsewhere is most of the work.
 struct Reach {
   double least[2], most[2];
 

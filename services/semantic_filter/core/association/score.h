@@ -30,7 +30,6 @@ struct Judge {
   const View* view;
   const Parameters* parameters;
 };
-/// A box, explained by a prediction.
 struct Explanation {
   double log_ratio = 0.0;  ///< of the likelihoods of the box, sides and class, to clutter, nats
   BoxScore sides;
@@ -41,14 +40,12 @@ std::optional<Explanation> explain(const BoxDetection& detection, const Predicte
                                    const std::array<bool, 4>& hidden, const std::string& class_name,
                                    double lookalike_nats, const Judge& judge);
 
-/// How a hypothesis explains one box.
 struct BoxMatch {
   double likelihood = 0.0;  ///< L(z), 0 outside the gate
   double nis = 0.0;         ///< normalised innovation per degree of freedom, if likelihood > 0
   int part = -1;            ///< BoxScore::part
 };
 
-/// One hypothesis in one frame.
 struct HypothesisScore {
   std::optional<PredictedBox> predicted;
   double detection_probability = 0.0;  ///< v P_D: probability that the network reports the object
@@ -71,8 +68,7 @@ struct TrackScore {
 TrackScore scoreTrack(const Track& track, const TrackVisibility& visibility,
                       const std::vector<BoxDetection>& boxes, const FrameContext& frame);
 
-/// Returns the hidden sides of a box, given the hypothesis that explains it best. `box`: index
-/// among the boxes of the frame.
+/// Returns the hidden sides, given the hypothesis that explains `box` (index in the frame) best.
 std::array<bool, 4> hiddenSides(const TrackScore& score, std::size_t box,
                                 const BoxDetection& detection);
 

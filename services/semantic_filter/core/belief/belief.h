@@ -26,15 +26,13 @@ struct Learned {
 struct Belief {
   std::vector<Track> tracks;            ///< ordered by id
   std::vector<Track> recently_deleted;  ///< kept for re-identification (core/tracks/reidentify.h)
-  /// Tracks that the map gave and that were fused with a track of the same object, by that track:
-  /// they are not fused a second time.
+  /// Tracks of the map that were fused with a track of the same object: not fused a second time.
   std::map<TrackId, TrackId> fused = {};
   Learned learned = {};
   BodyPath path = {};  ///< recent positions of the body
 };
 
-/// The same box of the same frame always gets the same id. So a step that is repeated after a late
-/// detection does not rename tracks, and no id is used twice.
+/// One box of one frame always gets the same id, so repeated steps rename no tracks.
 class IdBook {
  public:
   ObjectId idFor(std::uint64_t frame_sequence, std::size_t box) {

@@ -21,14 +21,12 @@ struct GroundHeight {
   double uneven = 0.0;                ///< the part of the variance that slope and roughness cause
 };
 
-/// How uneven the ground is relative to ground.slope and ground.roughness. It is learned from the
-/// objects that stand on the ground and is part of the belief.
+/// How uneven the ground is relative to ground.slope and ground.roughness, learned from objects.
 class GroundRoughness {
  public:
   /// Returns true over assumed variance. The assumption weighs as much as `assumed` objects.
   double ratio(double assumed) const;
-  /// Learns from an object that stands `above` (m) higher than the others say. `share`: the share
-  /// of its keyframes that are new.
+  /// Learns from an object that stands `above` (m) over the others. `share`: of new keyframes.
   void learn(double above, const GroundHeight& others, double own_variance, double ratio,
              double share);
 
@@ -77,8 +75,7 @@ class GroundSurface {
     const Stand* stand;
   };
 
-  /// Returns the `most` nearest of `stands` within reach of a place, nearest first, without
-  /// `except`.
+  /// Returns the `most` nearest of `stands` in reach of a place, nearest first, without `except`.
   ScratchVector<Near> around(const std::vector<Stand>& stands, const Eigen::Vector2d& here,
                              ObjectId except, std::size_t most) const;
   Eigen::Vector2d horizontal(const Eigen::Vector3d& p) const { return axes_ * p; }

@@ -10,7 +10,6 @@
 
 namespace perdure::semantic_filter {
 
-/// The residuals of one fit.
 struct ResidualRatio {
   double ratio = 1.0;  ///< squared residuals over their variance, per degree of freedom
   double count = 0.0;  ///< number of new residuals; keyframes of an earlier fit do not count again

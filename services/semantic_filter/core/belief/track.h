@@ -45,10 +45,8 @@ struct AssignedBox {
   Box box;
 };
 
-/// How the detector did at this track.
 struct DetectionHistory {
-  /// One bit for each of the last 64 frames with detections: the track was visible, was detected.
-  /// The bits of all tracks of one belief are of the same frames.
+  /// One bit for each of the last 64 frames with detections, the same frames for all tracks.
   std::uint64_t visible = 0, detected = 0;
   double recent_share = 1.0;             ///< share of the latest observations that were detections
   double existence_when_detected = 0.0;  ///< existence after the latest detection
@@ -92,11 +90,9 @@ struct Lookalike {
 /// One observation that is kept for the batch; smoothing knows what it holds.
 struct Keyframe;
 
-/// State of the batch estimate (smoothing).
 struct BatchState {
   SharedVector<std::shared_ptr<const Keyframe>> keyframes;  ///< in order of time
-  /// False for a track that came back: what it knew before is in its state alone, and a batch of
-  /// later keyframes would lose it.
+  /// False for a track that came back: a batch of later keyframes would lose what it knew before.
   bool complete = true;
   std::uint32_t fresh = 0;            ///< keyframes since the latest fit
   std::uint32_t seen = 0;             ///< keyframes since there were enough for a fit
@@ -104,7 +100,6 @@ struct BatchState {
   std::uint32_t patience = 1;         ///< fits are this much rarer while they change little
 };
 
-/// As the latest frame saw it.
 struct PublishedVisibility {
   Visibility state = Visibility::kVisible;
   double fraction = 1.0;

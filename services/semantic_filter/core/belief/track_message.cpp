@@ -15,9 +15,8 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// Makes P positive definite. Rounding may leave a pivot just below zero if its parts differ by
-/// many orders of magnitude, and readers refuse such a message. The eigenvalues of its correlations
-/// get the least value that is definite.
+/// Makes P positive definite, because readers refuse other messages. Rounding may leave a pivot
+/// just below zero. The eigenvalues of the correlations get the least definite value.
 Matrix7d definite(const Matrix7d& P) {
   constexpr double kLeastEigenvalue = 1e-9;  // of the correlations; also m² or rad², of a variance
   constexpr double kRounding = 1e-12;
@@ -39,8 +38,7 @@ Matrix7d definite(const Matrix7d& P) {
   return result;
 }
 
-/// The Gaussian of the heaviest hypothesis of a class. Its covariance holds the second moments of
-/// the others of the class about its mean.
+/// The Gaussian of the heaviest hypothesis of a class, with the second moments of the others.
 void toClassBelief(const Track& track, const ClassPrior& prior, const std::string& name,
                    ClassBelief& belief) {
   belief.name = name;

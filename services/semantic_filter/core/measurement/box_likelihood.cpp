@@ -15,8 +15,7 @@ double logBelowZero(double mean, double variance) {
   return std::log(std::max(0.5 * std::erfc(mean / std::sqrt(2.0 * variance)), 1e-12));
 }
 
-/// log of the multivariate t density in n dimensions, from the squared Mahalanobis distance and the
-/// log-determinant of the scale matrix.
+/// log of the multivariate t density in n dimensions, from the squared Mahalanobis distance.
 double logStudent(double nis, double log_det, int n, double tail) {
   thread_local double cached_tail = -1.0;
   thread_local std::array<double, 5> constant{};  // for 1 to 4 dimensions
@@ -57,8 +56,7 @@ bool outsideOf(double gate, const BoxMeasurement& z, const ProjectedBox& predict
   return nu * nu > gate * (covariance(side, side) + z.variance[side]);
 }
 
-/// Scores the sides in use. Each other side counts with the probability that the true side lies
-/// beyond it.
+/// Scores the sides in use. The others count with the probability that the true side lies beyond.
 std::optional<BoxScore> scoreSides(const BoxMeasurement& z, const ProjectedBox& predicted,
                                    const Eigen::Matrix4d& covariance, const Sides& use,
                                    const BoxParameters& parameters) {
@@ -101,8 +99,7 @@ double logAnywhere(const ProjectedBox& predicted, int side) {
   return -std::log(std::max(predicted.sides[axis + 2] - predicted.sides[axis], 1.0));
 }
 
-/// Returns the sides in use that may be hidden: without such a side, no other side is outside the
-/// gate alone.
+/// Returns the sides in use that may be hidden: without one, no other side alone is outside.
 Sides mayBeHidden(const BoxMeasurement& z, const ProjectedBox& predicted,
                   const Eigen::Matrix4d& covariance, const Sides& use,
                   const BoxParameters& parameters) {

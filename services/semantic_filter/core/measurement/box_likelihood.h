@@ -36,7 +36,6 @@ struct BoxNoise {
   double clutter_probability = 0.0;  ///< a network places doubtful boxes worse
 };
 
-/// Standard deviation of a side of a box.
 struct SideError {
   double pixels = 0.0;    ///< image pixels
   double relative = 0.0;  ///< in box widths (x sides) or heights (y sides)

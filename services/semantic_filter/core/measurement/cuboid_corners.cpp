@@ -13,7 +13,6 @@ struct Frame {
   double heading;
 };
 
-/// Range of N coordinates.
 template <int N>
 struct Range {
   std::array<double, N> least, most;

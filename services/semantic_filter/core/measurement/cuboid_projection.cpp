@@ -25,8 +25,7 @@ std::optional<Segment> beforeNearPlane(int a, int b, const Corners& corners) {
   return segment;
 }
 
-/// Returns the share of the way at which a line crosses a border of the image. The first step is
-/// exact without distortion.
+/// Returns the share of the way at which a line crosses a border (first step exact undistorted).
 std::optional<double> crossing(const Segment& segment, const Corners& corners,
                                const CameraModel& camera, int axis, double border) {
   const Eigen::Vector3d a = corners.p_C(segment.a), way = corners.p_C(segment.b) - a;

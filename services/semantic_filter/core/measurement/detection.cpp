@@ -32,7 +32,6 @@ double logRatioOfOther(const BoxDetection& e, double lookalike_nats) {
   return std::log(1.0 - share + share * std::exp(e.log_ratio_best));
 }
 
-/// Length that two intervals share.
 double shared(double a1, double a2, double b1, double b2) {
   return std::min(a2, b2) - std::max(a1, b1);
 }

@@ -8,7 +8,6 @@
 
 namespace perdure::semantic_filter {
 
-/// Everything that a projection needs.
 struct View {
   const CameraModel* camera = nullptr;
   RigidTransform T_WB;
@@ -17,8 +16,7 @@ struct View {
   RigidTransform T_WC() const { return T_WB * camera->T_BC(); }
 };
 
-/// A view with the matrices that all projections from it share. It converts from a View, for a
-/// single projection.
+/// A view with the matrices that all its projections share. Converts from a View.
 struct Projector {
   Projector(const View& view)  // NOLINT(google-explicit-constructor)
       : camera(view.camera),

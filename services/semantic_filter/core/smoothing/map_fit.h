@@ -15,8 +15,7 @@ namespace perdure::semantic_filter {
 
 using KeyframeCounts = Eigen::Array<int, Eigen::Dynamic, 1, 0, kMostKeyframes, 1>;
 
-/// One hypothesis, fitted to all keyframes. The batch and the frame outlive it; it lives within one
-/// step.
+/// One hypothesis, fitted to all keyframes. Batch and frame outlive it; it lives within one step.
 class MapFit {
  public:
   struct Fit;
@@ -34,8 +33,7 @@ class MapFit {
   const PerKeyframe& inflations() const;
   /// Returns the share of keyframes that contradict the fit.
   double contradicted() const { return contradictions().cast<double>().mean(); }
-  /// Returns the residuals of the sides, relative to the first assumption. Their count is the
-  /// degrees of freedom.
+  /// Returns the residuals of the sides, by the first assumption; their count: degrees of freedom.
   ResidualRatio residualRatio() const;
   /// Returns the same for the azimuths.
   ResidualRatio azimuthResidualRatio() const;

@@ -11,7 +11,6 @@
 
 namespace perdure::semantic_filter {
 
-/// The fit of one hypothesis of a track.
 struct Fitted {
   std::size_t index;
   MapFit map_fit;
@@ -37,7 +36,6 @@ void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Fit
 /// Divides the weight of the fitted hypotheses among them, by all keyframes and the ground. A mode
 /// that was reached twice counts once. A mode below `least` of the best gets the weight 0.
 void weighModes(std::vector<Hypothesis>& hs, const Fits& fits, double least);
-/// Returns the fit whose hypothesis has the largest weight.
 std::optional<Fitted> heaviest(const std::vector<Hypothesis>& hs, Fits&& fits);
 /// Fits from other starts of yaw and size, and adds the new modes to the track and to `fits`.
 void searchModes(Track& track, const KeyframeBatch& batch, const FrameContext& frame, Fits& fits);

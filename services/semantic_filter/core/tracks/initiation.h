@@ -13,8 +13,7 @@ namespace perdure::semantic_filter {
 /// Returns the log ratio of "new object" to clutter for this box, all classes together.
 double logInitiationRatio(const BoxDetection& detection, const FrameContext& frame);
 
-/// Returns a track without an id; nothing if the box does not determine one (too few measured
-/// sides).
+/// Returns a track without an id; nothing if too few sides are measured.
 std::optional<Track> initiate(const BoxDetection& detection, const std::optional<RangeHint>& range,
                               TimePoint now, const FrameContext& frame);
 

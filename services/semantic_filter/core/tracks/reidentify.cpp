@@ -59,7 +59,6 @@ bool takesOver(const Track& new_track, const Track& missing) {
              kSameBox;
 }
 
-/// How a new track is a missing one.
 struct Match {
   double metres;  ///< between the place of the missing track and where the new one was then
   bool returned;  ///< it stands where it stood
@@ -90,8 +89,7 @@ std::optional<Match> matchOf(const Missing& missing, const Track& new_track,
   return Match{metres, false};
 }
 
-/// The new track keeps its belief and takes over the id, the first times and the counts of the old
-/// one.
+/// The new track keeps its belief and takes over id, first times and counts of the old one.
 void takeOverIdentity(Track& past, Track&& now) {
   now.id = past.id;
   now.life.first_seen = past.life.first_seen;

@@ -35,8 +35,7 @@ UpdateReasons reasonsOf(const Track& track, const AllShares& shares, double dete
 
 /// Sets existence to `r` and enters its reasons in the ledger.
 void bookExistence(Track& track, double r, const UpdateReasons& reasons);
-/// Normalises the weights and enters the reasons of the PMF in the ledger. The track is sound
-/// (belief/mixture_ops.h).
+/// Normalises the weights of a sound track and enters the reasons of the PMF in the ledger.
 void bookClasses(Track& track, const UpdateReasons& reasons);
 
 }  // namespace perdure::semantic_filter

@@ -15,8 +15,7 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// Returns the stationary deviation of b in this view, for the mean extent of the cuboid over all
-/// directions.
+/// Returns the stationary deviation of b in this view, for the mean extent over all directions.
 Eigen::Vector4d stationaryBias(const State& x, const RigidTransform& T_WC, const ViewWalk& walk) {
   const double scale = walk.focal / std::max((x.head<3>() - T_WC.p).norm(), 1.0);
   const Eigen::Vector3d size = x.segment<3>(kSize).array().exp();
@@ -41,8 +40,7 @@ void predictBias(Hypothesis& h, const std::optional<RigidTransform>& last, const
   h.P.diagonal().segment<4>(kBias) += (1.0 - correlation * correlation) * sigma.cwiseAbs2();
 }
 
-/// Removes moving hypotheses whose position is lost: they would explain any box. Existence is
-/// multiplied by the share of the others.
+/// Removes moving hypotheses whose position is lost, because they would explain any box.
 void dropLostHypotheses(Track& track, TimePoint now, double lost_sigma_m) {
   double kept = 0.0;
   for (const auto& h : track.hypotheses.read()) {

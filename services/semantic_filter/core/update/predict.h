@@ -10,7 +10,6 @@
 
 namespace perdure::semantic_filter {
 
-/// Predicts the track to `now` and to the view of `walk`.
 void predict(Track& track, TimePoint now, const PoseError& pose_error,
              const MotionParameters& parameters, const ViewWalk& walk);
 

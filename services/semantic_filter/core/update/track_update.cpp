@@ -61,8 +61,7 @@ double probabilityDetected(const Track& track, const AllShares& shares) {
   return total > 0.0 ? detected / total : 0.0;
 }
 
-/// Returns the assigned box, as an index into TrackScore::boxes: its posterior share is at least
-/// kAssigned.
+/// Returns the assigned box, an index into TrackScore::boxes with a share of kAssigned.
 std::optional<std::size_t> assignedBox(const Track& track, const AllShares& shares) {
   constexpr double kAssigned = 0.8;
   double total = 0.0;
@@ -118,8 +117,7 @@ double noiseRepetition(const Track& track, const FrameContext& frame) {
   return (1.0 + correlation) / std::max(1.0 - correlation, 1e-6);
 }
 
-/// Tempering of an observation. The view change depends on the distance of the object, so it is
-/// taken for the hypothesis with the largest posterior.
+/// Tempering of an observation, for the hypothesis with the largest posterior.
 struct Tempering {
   double exponent = 1.0;
   double observations = 0.0;  ///< earlier ones with correlated errors

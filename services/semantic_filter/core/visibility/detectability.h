@@ -12,20 +12,17 @@ namespace perdure::semantic_filter {
 /// hard to detect, the share `hard_detection_share` of P_D is left.
 double detectableShare(const Track& track, double hard_detection_share);
 
-/// Returns P_D of a class for a fully visible object. `size_px`: square root of the area of its
-/// box, px.
+/// Returns P_D of a class for a fully visible object. `size_px`: root of its box's area.
 double detectionProbability(const ClassPrior& prior, double size_px, const FrameContext& frame);
 
 /// Returns P_D of a hypothesis. *Other* is detected as often as the class that it resembles, as far
 /// as it resembles it.
 double detectionProbabilityOf(const Hypothesis& hypothesis, const Track& track, double size_px,
                               const FrameContext& frame);
-/// Returns the factor on P_D by the detection rate of earlier visits at this viewpoint; 1 for a
-/// moving track.
+/// Returns the factor on P_D by earlier visits at this viewpoint; 1 for a moving track.
 double detectionRateFactor(const Track& track, const FrameContext& frame);
 
-/// Moves the detectability towards its stationary value as the view changes: from another
-/// viewpoint, something else may hide the object.
+/// Moves detectability towards its stationary value as the view changes.
 void predictDetectability(Track& track, const ViewWalk& walk);
 
 /// Updates the reasons of misses by an observation. `mean_A`: mean of A over the hypotheses.

@@ -133,8 +133,7 @@ class Blockers {
  public:
   explicit Blockers(const Outline& outline) : o_(outline) {}
 
-  /// Searches from the newest: few occluders hide one object, and adjacent cells usually have the
-  /// same.
+  /// Searches from the newest: adjacent cells usually have the same occluder.
   Blocked& of(const Cell& cell) {
     for (auto b = all_.rbegin(); b != all_.rend(); ++b) {
       if (b->by == cell.blocker) return *b;

@@ -53,8 +53,7 @@ void PointMapper::forgetEnded() {
   std::erase_if(views_, [&](const View& view) { return view.frame < oldest; });
 }
 
-/// Removes the pose that adds the least baseline, among those between the oldest and the newest
-/// ones. The newest poses stay, because most tracks are short.
+/// Removes the pose that adds the least baseline. The newest ones stay: most tracks are short.
 void PointMapper::forgetOne() {
   std::size_t least = 1;
   double shortest = std::numeric_limits<double>::infinity();
@@ -91,13 +90,11 @@ std::vector<Ray> PointMapper::raysOf(const Track& track) const {
   return rays;
 }
 
-/// Triangulation and the estimate of the scale do not use this test. Otherwise a scale raised by
-/// some bad poses would reject too many points, and could not decrease again.
+/// Not used by triangulation and scale, because a scale raised by bad poses could not fall again.
 bool PointMapper::isSure(const Triangulated& point) const {
   return point.rms <= kGate * scale_ && point.relative_sigma * scale_ < options_.max_relative_sigma;
 }
 
-/// Counts why a track has no position.
 void PointMapper::note(const Reason& why) {
   if (why.code == "triangulation_depth") ++mapped_.contradicted;
   if (why.code == "triangulation_far") ++mapped_.far;

@@ -26,27 +26,22 @@ struct KnownPose {
 
 class PointMapper {
  public:
-  /// readout_s: read-out time of each camera, 0 for a global shutter. If empty, all cameras have a
-  /// global shutter.
+  /// readout_s: read-out time of each camera, 0 for a global shutter; empty: all global.
   PointMapper(const VisionOptions& options, const WindowOptions& window,
               std::vector<RigidTransform> T_BC, std::vector<double> readout_s = {});
 
-  /// Adds the next image's pose and tracked points.
   void add(const KnownPose& pose, const TrackedFrame& tracked);
   /// Points of the newest image whose position is known, by rising id, without descriptors. Points
   /// that fit the poses much worse than the others are left out, because they move or were tracked
   /// wrongly.
   const std::vector<Landmark>& landmarks() const { return landmarks_; }
-  /// Counts for the newest image.
   const Mapped& mapped() const { return mapped_; }
   /// Ratio of the tracks' residuals to VisionOptions::sigma_px, at least 1.
   double scale() const { return scale_; }
   /// Whether the body moved between the oldest and the newest stored pose.
   bool moved() const;
-  /// Standard deviation of a tracked point from its projection, in pixels. It is at least
-  /// VisionOptions::sigma_px and grows with the errors of the poses.
+  /// Standard deviation of a tracked point from its projection, px; grows with the poses' errors.
   double noisePx() const { return scale_ * options_.sigma_px; }
-  /// Clears poses and views, because another frame of reference begins.
   void clear();
 
  private:

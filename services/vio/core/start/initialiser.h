@@ -25,8 +25,7 @@ Result<Start> startWithSpeed(const ImuBuffer& imu, TimePoint now, const SpeedRea
 /// Attitude with yaw 0 that aligns `up_B` (not zero) with z of W.
 Eigen::Quaterniond levelAttitude(const Eigen::Vector3d& up_B);
 
-/// Covariance of a start. Yaw and position define W and are nearly exact. The other deviations are
-/// arguments.
+/// Covariance of a start. Yaw and position define W; the other deviations are arguments.
 Eigen::Matrix<double, 15, 15> startCovariance(const Nav& nav, double tilt, double gyro_bias,
                                               double accel_bias, const Eigen::Vector3d& velocity_B);
 

@@ -292,8 +292,7 @@ Result<Start> MotionInitialiser::attempt(const ImuBuffer& imu,
   s.x.setZero();
   for (int i = 0; i < 4; ++i) s = solveOnce(views, estimates, s.x, options_.gravity);
   if (!s.x.allFinite() || s.in_front < kFewestInFront || s.rms_px > kMostLinearPx) {
-    // The solution is far from the truth. The search begins at rest, with gravity opposite to the
-    // mean force.
+    // Far from the truth: the search begins at rest, with gravity opposite to the mean force.
     s.x.setZero();
     s.x.tail<3>() = -options_.gravity * keyframes.back().dv.normalized();
   }

@@ -27,8 +27,7 @@ double huber(double deviations) {
   return deviations <= kHuber ? deviations * deviations : kHuber * (2.0 * deviations - kHuber);
 }
 
-/// Information on an inverse depth, from the least depth of a point. Without it, images also fit if
-/// all motion and all depths vanish.
+/// Information on an inverse depth. Without it, vanishing motion and depths also fit.
 double nearness(const Options& o) { return o.vision.min_depth_m * o.vision.min_depth_m; }
 
 double priorCost(const MotionWindow& w, const Options& o) {
@@ -61,8 +60,7 @@ double costOf(const Estimate& e, const Inertial& inertial, const Options& o) {
   return cost;
 }
 
-/// Normal equations with the points eliminated, and the values that recover the points' part of a
-/// step.
+/// Normal equations with the points eliminated, and what recovers the points' part of a step.
 struct Normal {
   MatrixXd H;  ///< only the lower half is valid
   VectorXd b;
@@ -225,8 +223,7 @@ Result<Minimum> minimise(Estimate e, const ImuBuffer& imu, const Options& option
   return Minimum{std::move(e), std::move(*inertial), cost};
 }
 
-/// Root mean square of the views' residuals, in deviations, per degree of freedom left by the poses
-/// and points.
+/// RMS of the views' residuals, in deviations, per remaining degree of freedom.
 double imageNoise(const Minimum& m, double sigma_px) {
   double sum = 0.0, freedom = -6.0 * static_cast<double>(m.estimate.window.poses.size());
   for (std::size_t j = 0; j < m.estimate.rays.size(); ++j) {
@@ -240,7 +237,6 @@ double imageNoise(const Minimum& m, double sigma_px) {
   return std::sqrt(sum / std::max(1.0, freedom));
 }
 
-/// Result with the covariance at the minimum.
 Result<RefinedWindow> refinedBy(Minimum m, const Options& options) {
   const Estimate& e = m.estimate;
   std::size_t rows = 9 * m.inertial.increments.size() + 7;

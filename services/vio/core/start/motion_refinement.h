@@ -13,7 +13,6 @@
 
 namespace perdure::vio {
 
-/// One view of a point.
 struct WindowView {
   std::size_t keyframe = 0;
   Eigen::Matrix3d R_BC;

@@ -18,9 +18,8 @@ class SpeedHistory {
 
   /// Refuses "speed_not_finite" and "speed_out_of_order".
   Result<void> add(const SpeedSample& sample);
-  /// Interpolates between two samples that are at most two ages apart. Otherwise it returns the
-  /// nearest sample, with a sigma enlarged for possible acceleration. Empty if the nearest sample
-  /// is too old.
+  /// Interpolates between samples at most two ages apart, or returns the nearest with a larger
+  /// sigma. Empty if that is too old.
   std::optional<SpeedReading> at(TimePoint time) const;
   bool reaches(TimePoint time) const { return !samples_.empty() && samples_.back().time >= time; }
   std::vector<SpeedSample> samples() const { return {samples_.begin(), samples_.end()}; }

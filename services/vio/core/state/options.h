@@ -11,8 +11,7 @@ struct ImuNoise {
   double gyro_walk = 2.0e-5;   ///< rad/s²/√Hz
   double accel = 2.0e-3;       ///< m/s²/√Hz
   double accel_walk = 3.0e-3;  ///< m/s³/√Hz
-  /// Factor on all four densities in propagation, for errors that a unit at rest does not show. The
-  /// rest tests do not apply it.
+  /// Factor on all four densities in propagation, for errors beyond rest; not in the rest tests.
   double inflation = 1.0;
   /// Samples with a longer interval are treated as momentary values, not averages. The error of
   /// linear interpolation between them is added to the noise.
@@ -39,8 +38,7 @@ struct VisionOptions {
   double gate_probability = 0.95;
   double min_depth_m = 0.1, max_depth_m = 75.0;
   double max_condition = 10000.0;  ///< largest condition number of a triangulation's normal matrix
-  /// Largest standard deviation along the ray, relative to the depth, for a point to enter the
-  /// state.
+  /// Largest standard deviation along the ray, relative to the depth, of a point of the state.
   double max_relative_sigma = 0.4;
   /// Possible jump of the pose, assumed if nearly all points of a frame contradict the prediction.
   double jump_position_m = 0.3;
@@ -78,8 +76,7 @@ struct RestOptions {
   double speed_sigma = 0.02;  ///< m/s
   double position_sigma_m = 0.005;
   double rotation_sigma = 0.001;  ///< rad
-  /// Smallest share of points that stay in place for a second while the others move. They are the
-  /// background of a body that stands in traffic.
+  /// Least share of points that stay for a second while others move: the background of traffic.
   double still_share = 0.15;
   double max_rate = 0.15;  ///< rad/s, mean over a frame, bias removed
   double max_speed = 0.5;  ///< m/s, largest estimated speed at which rest is accepted

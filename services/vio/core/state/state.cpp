@@ -39,8 +39,7 @@ State::State(const std::vector<RigidTransform>& cameras, double offset, int max_
   size_ = calibrationEnd();
   const int capacity = size_ + 6 * (max_clones + 2) + 3 * max_points;
   P_ = Eigen::MatrixXd::Zero(capacity, capacity);
-  // The largest updates: one with all points, and one with compressed rows of calibration and
-  // clones.
+  // The largest updates: all points, or compressed rows of calibration and clones.
   const int count = static_cast<int>(cameras.size());
   workspace_.begin(roomOfUpdate(
       capacity, std::max(2 * count * max_points, 6 * (count + max_clones + 2) + readoutCount())));
@@ -79,8 +78,7 @@ int State::append(int size) {
 }
 
 void State::remove(int at, int size) {
-  // Moves column by column without a temporary copy. Values that move up or left never overwrite
-  // values that are still to be moved.
+  // Column by column, without a copy: values that move never overwrite values still to be moved.
   const int tail = size_ - at - size;
   for (int column = 0; column < size_; ++column) {
     if (column >= at && column < at + size) continue;

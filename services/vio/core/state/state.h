@@ -32,8 +32,7 @@ struct Nav {
   RigidTransform T_WB() const { return RigidTransform(q_WB, p_WB); }
 };
 
-/// Pose of the body at an image. `linear`: linearisation point of the Jacobians, taken from
-/// nav_linear.
+/// Pose of the body at an image. `linear`: linearisation point, taken from nav_linear.
 struct Clone {
   std::uint64_t frame = 0;
   TimePoint image_time;
@@ -101,8 +100,7 @@ class State {
         int max_points, const std::vector<double>& readout_s = {}, bool estimate_readout = false,
         bool estimate_scale = false);
 
-  /// nav_linear: linearisation point of the Jacobians. It holds the predicted q, and a p and v that
-  /// updates do not change.
+  /// nav_linear: linearisation point with the predicted q, and p and v that updates do not change.
   Nav nav, nav_linear;
   TimePoint time;                    ///< IMU clock
   std::vector<RigidTransform> T_BC;  ///< one for each camera
@@ -144,8 +142,7 @@ class State {
   const Clone* clone(std::uint64_t frame) const;
   const PointState* point(std::uint64_t id) const;
 
-  /// Adds a clone of the current pose. rate_B: angular rate, which correlates it with the time
-  /// offset.
+  /// Adds a clone of the current pose. rate_B correlates it with the time offset.
   void addClone(std::uint64_t frame, TimePoint image_time, const Eigen::Vector3d& rate_B,
                 bool first_estimates);
   /// Enlarges the covariance of the current pose and of the newest clone, which is the same pose.
@@ -164,8 +161,7 @@ class State {
   /// not change the state.
   Result<void> update(const Eigen::MatrixXd& H, const std::vector<Block>& blocks,
                       const Eigen::VectorXd& r);
-  /// The same update with measurements that each depend on few blocks. Zero columns are not
-  /// computed.
+  /// The same with measurements that each depend on few blocks, without their zero columns.
   Result<void> update(std::span<const Measurement> measurements);
   /// Returns H P Hᵀ for an H with the columns of `blocks`.
   Eigen::MatrixXd project(const MatrixView& H, std::span<const Block> blocks) const;

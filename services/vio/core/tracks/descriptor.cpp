@@ -21,8 +21,7 @@ struct Pair {
   std::uint16_t first, second;
 };
 
-/// Pairs with an approximately normal distribution in the patch: sums of uniform draws of a fixed
-/// generator.
+/// Approximately normal pairs in the patch: sums of uniform draws of a fixed generator.
 std::array<Pair, 256> makePattern() {
   std::uint64_t seed = 20111129;
   const auto draw = [&seed] {

@@ -20,8 +20,7 @@ class Patch {
     float similarity = 0;  ///< −1 … 1: normalised cross-correlation with the first observation
   };
 
-  /// Cuts a patch around `pixel` of a CV_8UC1 image. Empty if the patch exceeds the image or has
-  /// too little texture.
+  /// Cuts a patch of a CV_8UC1 image. Empty beyond the image or with too little texture.
   static std::optional<Patch> cut(const cv::Mat& image, const cv::Point2f& pixel);
 
   /// Finds the patch, starting from `seed`. Each of `levels` has half the size of the previous one.

@@ -12,8 +12,7 @@ struct Match {
   double scale = 1.0;           ///< pixels per normalised unit
 };
 
-/// Marks the matches that agree with R_now_before and the best translation, within threshold_px of
-/// their epipolar lines. The result is deterministic.
+/// Marks matches within threshold_px of their epipolar lines by the best translation, repeatably.
 std::vector<bool> twoPointRansac(const std::vector<Match>& matches,
                                  const Eigen::Matrix3d& R_now_before, double threshold_px);
 

@@ -50,8 +50,7 @@ class Tracker {
                      const std::optional<Eigen::Matrix3d>& R_now_before,
                      const std::vector<cv::Rect2f>& masked = {},
                      const Eigen::Vector3d& turn_of_readout = Eigen::Vector3d::Zero());
-  /// Quantile of the points' image motion in pixels over the last `frames` frames. Empty if too few
-  /// points are known.
+  /// Quantile of the points' image motion, px, over the last `frames`. Empty for too few points.
   std::optional<double> motionSince(std::size_t frames, double quantile = 0.5) const;
   /// Share of the points that have stayed within half a pixel for the last `frames` images. 0 if
   /// these points are few or close together, because they are then no background.

@@ -14,7 +14,6 @@ namespace perdure::vio {
 
 inline constexpr std::size_t kMaxCameras = 2;
 
-/// One point in one image of one camera.
 struct ImagePoint {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();       ///< as seen, distorted
   Eigen::Vector2d normalised = Eigen::Vector2d::Zero();  ///< x/z, y/z, undistorted

@@ -31,8 +31,7 @@ RestExpectation restExpectation(const State& state, double gravity);
 bool imuRests(const ImuBuffer& imu, TimePoint now, Duration window, const RestExpectation& expected,
               Duration age, const ImuNoise& noise);
 
-/// Whether rate and force were constant over `window` before `now`, as at rest and at constant
-/// velocity. False if the samples do not cover the window.
+/// Whether rate and force were constant over `window` before `now`; false without its samples.
 bool imuIsEven(const ImuBuffer& imu, TimePoint now, Duration window, const ImuNoise& noise);
 
 /// Stores when the body last stood still, and the IMU values expected at rest.

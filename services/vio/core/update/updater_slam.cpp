@@ -15,8 +15,7 @@ constexpr int kFailuresToLeave = 3;
 constexpr int kFewestJumped = 8;
 constexpr double kFarOff = 25.0;  ///< mean square of the rows, in variances of a pixel
 
-/// Rows of one point in the newest clone's views; columns are [extrinsics, read-outs, clone,
-/// point].
+/// Rows of one point in the newest clone; columns [extrinsics, read-outs, clone, point].
 struct PointRows {
   static constexpr int kRows = 2 * kMaxCameras, kColumns = 7 * kMaxCameras + 9;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kRows, kColumns> H;

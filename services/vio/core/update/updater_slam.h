@@ -27,8 +27,7 @@ Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
                                 const VisionOptions& options, bool may_jump, ReasonCounts& reasons,
                                 std::vector<Innovation>* innovations = nullptr);
 
-/// Adds the track's point to the state, and uses all its views. Fails with the reason of
-/// triangulation, "slam_gated", or that of the update.
+/// Adds the track's point by all views. Fails as triangulation, the update, or "slam_gated".
 Result<void> initialisePoint(State& state, const Track& track, const VisionOptions& options);
 
 }  // namespace perdure::vio

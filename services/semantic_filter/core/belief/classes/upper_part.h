@@ -15,9 +15,8 @@ struct SizePrior {
   Eigen::Matrix3d covariance;
 };
 
-/// Returns the prior of the cuboid of an object, or of its upper part. That has any share of the
-/// length (the back of a chair, the cabin of a car), any share of the height up to a half, and the
-/// width of the object.
+/// Returns the prior of the cuboid of an object, or of its upper part: any share of the length and
+/// of the height up to a half, and the width of the object.
 SizePrior sizePriorOf(const ClassPrior& prior, bool upper_part);
 
 /// Whether it has less than half of the usual height. Only such a cuboid is of an upper part: what
