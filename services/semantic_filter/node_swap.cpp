@@ -1,7 +1,28 @@
 // Effects of a swap of inference on the filter.
+#include <algorithm>
+
 #include "services/semantic_filter/node.h"
 
 namespace perdure::semantic_filter {
+namespace {
+
+/// Whether an object is likely to be detected, and no detection overlaps a likely one.
+bool missesAll(const std::vector<Prediction>& expected, const Detections& detections) {
+  constexpr double kLikely = 0.5, kAtAll = 0.1;  // r·π·v; intersection over union
+  bool any = false;
+  for (const Prediction& prediction : expected) {
+    if (prediction.probability < kLikely) continue;
+    any = true;
+    const auto lies_there = [&](const Detection& d) {
+      return !d.primed && intersectionOverUnion(d.box, prediction.box) >= kAtAll;
+    };
+    const auto& list = detections.detections;
+    if (std::any_of(list.begin(), list.end(), lies_there)) return false;
+  }
+  return any;
+}
+
+}  // namespace
 
 /// Inference decides which process answers. The detections of a new process are delayed in case of
 /// doubt until it passes its probation. A failure is reported as an event.

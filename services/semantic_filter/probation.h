@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "common/types/detections.h"
-#include "common/types/objects.h"
 
 namespace perdure::semantic_filter {
 
@@ -29,8 +28,5 @@ class Probation {
   InstanceId newcomer_ = 0;
   std::vector<Detections> kept_;
 };
-
-/// Whether an object is likely to be detected, and no detection overlaps a likely one.
-bool missesAll(const std::vector<Prediction>& expected, const Detections& detections);
 
 }  // namespace perdure::semantic_filter

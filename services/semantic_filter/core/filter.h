@@ -28,9 +28,6 @@ class SemanticFilter {
   /// exclude each other. Both must exist.
   bool join(Belief& belief, TrackId id, TrackId absorbed, const FrameInput& input) const;
 
-  const Parameters& parameters() const { return parameters_; }
-  const ClassPriors& priors() const { return priors_; }
-
  private:
   Parameters parameters_;
   ClassPriors priors_;

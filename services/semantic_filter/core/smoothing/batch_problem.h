@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "common/math/gaussian.h"
-#include "services/semantic_filter/core/belief/noise_scale.h"
 #include "services/semantic_filter/core/belief/classes/upper_part.h"
-#include "services/semantic_filter/core/measurement/azimuth.h"
+#include "services/semantic_filter/core/belief/noise_scale.h"
 #include "services/semantic_filter/core/smoothing/keyframes.h"
+#include "services/semantic_filter/core/update/azimuth_update.h"
 
 namespace perdure::semantic_filter {
 

@@ -10,7 +10,6 @@
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/association/box_explanation.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
-#include "services/semantic_filter/core/measurement/azimuth.h"
 #include "services/semantic_filter/core/tracks/mixture_reduction.h"
 #include "services/semantic_filter/core/update/azimuth_update.h"
 #include "services/semantic_filter/core/update/ground_contact.h"

@@ -11,7 +11,7 @@
 #include "common/math/so3.h"
 #include "services/vio/core/start/initialiser.h"
 #include "services/vio/core/start/linear_start.h"
-#include "services/vio/core/start/motion_search.h"
+#include "services/vio/core/start/motion_refinement.h"
 
 namespace perdure::vio {
 namespace {

@@ -62,4 +62,18 @@ struct RefinedWindow {
 /// information is singular. The failures of inertialOf() (motion_terms.h) are passed on.
 Result<RefinedWindow> refine(MotionWindow window, const ImuBuffer& imu, const Options& options);
 
+// In motion_search.cpp: the best minimum of a window. The search begins from at least two initial
+// values and uses the noise estimated from the images.
+
+/// Largest error of a usable velocity, as a share of the largest velocity in the window. The same
+/// limit applies to the distance of other minima that fit about as well.
+inline constexpr double kVelocityShare = 0.16;
+
+/// Triangulates the points from the poses of the window.
+void placePoints(MotionWindow& window);
+
+/// Fails as refine() does, and with "start_unobservable" if another minimum fits about as well.
+Result<RefinedWindow> searchMinimum(MotionWindow window, const ImuBuffer& imu,
+                                    const Options& options);
+
 }  // namespace perdure::vio

@@ -1,4 +1,4 @@
-#include "services/vio/core/start/motion_search.h"
+#include "services/vio/core/start/motion_refinement.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
