@@ -1,8 +1,5 @@
-// The semantic filter as a node. Inputs: odometry, landmarks, detections and the map's objects near
-// the body. Outputs: objects, events and predictions. Single-threaded; time comes from messages
-// only.
-//
-// core/history does the estimation. The node checks messages, waits for detections, and publishes.
+// The semantic filter as a node: checks messages, waits for detections, and publishes objects,
+// events and predictions; core/history estimates. Single-threaded; time comes from messages only.
 #pragma once
 
 #include <deque>

@@ -55,9 +55,8 @@ void Node::reportModelChange(const FrameStamp& stamp, const std::string& detail)
   if (outputs_.events) outputs_.events(event);
 }
 
-/// Whether these detections of a new process must be delayed. The delayed ones are used once the
-/// process detects an expected object again, or after a time within which the old process would
-/// have decided.
+/// Whether detections of a new process are delayed: until it detects an expected object again, or
+/// the old process would have decided.
 bool Node::isInDoubt(const Frame& frame, const Detections& detections) {
   if (!probation_.isOf(detections.instance)) return false;
   const auto model = models_.find(detections.model_hash);

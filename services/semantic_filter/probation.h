@@ -1,6 +1,5 @@
-// Delayed detections of a new inference process. If it misses everything that should be visible,
-// either it does not work or the objects are gone. The process that it replaces will soon decide
-// (services/inference/README.md, roll-backs).
+// Delayed detections of a new inference process that misses everything that should be visible,
+// until the process that it replaces decides (services/inference/README.md, roll-backs).
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,5 @@
-// Publishes the reappearance times of occluded objects: at the beginning of an occlusion, and again
-// when the time has changed or half of it has passed. The prediction therefore improves as the time
-// approaches. Derivation: tools/docs/maths/reappearance_time.md.
+// Publishes the reappearance times of occluded objects, and again when they have changed or half of
+// the time has passed. Derivation: tools/docs/maths/reappearance_time.md.
 #pragma once
 
 #include <deque>

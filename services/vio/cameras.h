@@ -23,9 +23,8 @@ struct Cameras {
   std::vector<CameraModel> models;
 };
 
-/// Cameras whose frames are read, in the order of the configuration. The first one leads; the
-/// second is used only if stereo is enabled. If the calibration has none of them, its first camera
-/// is used.
+/// Cameras whose frames are read, by the configuration: the first leads, a second needs stereo.
+/// Without any of them, the calibration's first camera.
 std::vector<CameraModel> usedCameras(const Config& config, const Calibration& calibration);
 /// A sentence if a camera other than the defaults is configured and does not exist; else empty.
 std::string unknownCamera(const Config& config, const Calibration& calibration);

@@ -1,6 +1,5 @@
-// One step of the semantic filter: computes the belief after a frame from the belief before it and
-// the frame (eq. 4, 8, 9). The belief is a plain value. A late frame is applied by repeating the
-// steps from the belief before it (core/history.h).
+// One step of the semantic filter, from the belief before a frame to that after it (eq. 4, 8, 9).
+// Late frames repeat the steps from the belief before them (core/history.h).
 #pragma once
 
 #include <vector>

@@ -1,6 +1,5 @@
-// Checks whether poses, given or estimated by the filter, agree with the images. Over the last
-// images it counts the tracks with parallax that have a position, and those that the poses
-// contradict. Derivation: tools/docs/maths/vio-known-poses.md.
+// Checks whether poses agree with the images, by the tracks with parallax of the last images.
+// Derivation: tools/docs/maths/vio-known-poses.md.
 #pragma once
 
 #include <cstddef>

@@ -76,8 +76,7 @@ class Estimator {
   void keepInnovations() { keeps_innovations_ = true; }
 
   /// Propagates over `imu` to the frame and updates. Fails with "frame_not_after_state" or
-  /// "imu_missing". If the state has become invalid, it fails with "numbers_…" and the estimator
-  /// stops.
+  /// "imu_missing"; with "numbers_…" the estimator stops.
   Result<FrameEstimate> process(const FrameInput& input, const ImuBuffer& imu);
 
   /// Rotation R_B1_B0 of the body from the newest frame to an IMU time, from the gyroscope.

@@ -1,6 +1,5 @@
-// How often earlier visits detected a track, by viewpoint: the view-dependent detection
-// probability. P_D belongs to the class, but its objects differ: what a network misses from one
-// side, it usually misses from there again. Derivation: tools/docs/maths/detectability.md.
+// View-dependent detection probability: how often earlier visits detected a track, by viewpoint.
+// Derivation: tools/docs/maths/detectability.md.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,7 +1,5 @@
-// Height of the ground, from the objects that stand on it and from the path of the body: a Gaussian
-// process. Derivation: tools/docs/maths/ground_contact.md.
-// Where nothing stands, nothing is known. Heights are along the view's up direction, in the frame
-// of the beliefs.
+// Height of the ground, from objects that stand on it and the path of the body: a Gaussian process.
+// Heights are along the view's up direction. Derivation: tools/docs/maths/ground_contact.md.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,7 +1,5 @@
-// The share of the instances of a class that move, learned from the objects of this drive. The
-// prior of config/class_priors.yaml counts as a few objects. Each object counts once, with the
-// probability that it moves, after it has been detected often enough to judge.
-// Derivation: tools/docs/maths/state_and_mixture.md.
+// Share of the instances of a class that move, learned from the objects of this drive beside the
+// prior, each once and when it can be judged. Derivation: tools/docs/maths/state_and_mixture.md.
 #pragma once
 
 #include <map>

@@ -1,7 +1,5 @@
 // Noise scale: squared ratio of true to assumed errors of boxes and azimuths, learned for each
 // network. Derivation: tools/docs/maths/noise_scale.md.
-// The assumption is box.* of parameters.h with the class priors, or what the network says itself.
-// The scale is part of the belief, so that a late frame finds it as it was.
 #pragma once
 
 #include <cstdint>

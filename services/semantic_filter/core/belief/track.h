@@ -1,7 +1,6 @@
-// A track: what is believed of one object, as a plain value (eq. 9: existence x PMF x a bank of
-// Gaussians). Beyond the paper the bank is a mixture over (class, static or moving, mode): the PMF
-// and the probability of moving are sums of the weights of its hypotheses.
-// Derivation: tools/docs/maths/state_and_mixture.md.
+// A track: the belief about one object, as a plain value (eq. 9: existence x PMF x a bank of
+// Gaussians). The bank is a mixture over (class, static or moving, mode). Derivation:
+// tools/docs/maths/state_and_mixture.md.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,9 +1,7 @@
 // Measurement likelihood L_k(z): how much better a hypothesis explains a box than clutter does
-// (paper, eq. 6 and 7). Derivation: tools/docs/maths/measurement_likelihood.md.
-//
-// A side of a box is measured or censored. A measured side has a density (px⁻¹). A censored side is
-// cut by the image border or by a nearer object: only the probability that the true side lies
-// beyond is known. Clutter is measured for the same event, so the units agree.
+// (paper, eq. 6 and 7). A measured side has a density (px⁻¹); of a censored side, cut by the border
+// or a nearer object, only the probability that the true side lies beyond is known. Derivation:
+// tools/docs/maths/measurement_likelihood.md.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,6 +1,5 @@
 // One box of the network as the filter uses it: box, and log-likelihood ratios by class (paper, eq.
-// 6). Activations before the soft-max are marginal likelihoods. Only differences to the clutter
-// activation matter, so a constant added to all of them changes nothing. Derivation:
+// 6). Only differences to the clutter activation matter. Derivation:
 // tools/docs/maths/measurement_likelihood.md.
 #pragma once
 

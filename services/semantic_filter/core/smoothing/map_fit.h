@@ -1,8 +1,6 @@
 // MAP fit: the state of a hypothesis that maximises the posterior given all keyframes at once, by
-// Levenberg-Marquardt (Dellaert, Kaess 2017; Nielsen 1999). It replaces what the filter made of
-// them one after the other. Derivation: tools/docs/maths/map_fit.md.
-// The model is that of the filter; b, pose errors and accelerations are marginalised. So the sides
-// of all keyframes have one full covariance matrix.
+// Levenberg-Marquardt (Dellaert, Kaess 2017; Nielsen 1999), with the model of the filter. b, pose
+// errors and accelerations are marginalised. Derivation: tools/docs/maths/map_fit.md.
 #pragma once
 
 #include <memory>
@@ -20,10 +18,9 @@ class MapFit {
  public:
   struct Fit;
 
-  /// Returns nothing if `start` has no projection in a keyframe, if the keyframes do not determine
-  /// the place, or if the fit comes to one of the modes `found` of the same batch. `like`: another
-  /// mode of the same batch with the same motion; the fit begins with its inflations and
-  /// covariance.
+  /// Returns nothing if `start` has no projection in a keyframe, if the place stays undetermined,
+  /// or if the fit comes to one of the modes `found`. `like`: a mode of the same batch and motion,
+  /// whose inflations and covariance the fit begins with.
   static std::optional<MapFit> make(const Hypothesis& start, const KeyframeBatch& batch,
                                     const FrameContext& frame, const MapFit* like = nullptr,
                                     const ScratchVector<const Hypothesis*>& found = {});

@@ -22,9 +22,8 @@ using Fits = ScratchVector<Fitted>;
 std::optional<MapFit> fit(const Hypothesis& start, const KeyframeBatch& batch,
                           const FrameContext& frame, const MapFit* like = nullptr,
                           const ScratchVector<const Hypothesis*>& found = {});
-/// Returns what else speaks for a fit, nats: the log-likelihood ratio of its ground contact, by
-/// which `h` is updated, and the log of the share of objects whose lower part is hidden, if `h` is
-/// an upper part.
+/// Returns what else speaks for a fit, nats: its ground contact, by which `h` is updated, and the
+/// share of objects with a hidden lower part, if `h` is an upper part.
 double besideKeyframes(Hypothesis& h, ObjectId id, const FrameContext& frame);
 /// Adds `h` with its ground contact to the track and returns it with its fit.
 Fitted adopt(Track& track, Hypothesis h, MapFit&& map_fit, const FrameContext& frame);
@@ -43,9 +42,8 @@ void searchModes(Track& track, const KeyframeBatch& batch, const FrameContext& f
 /// object may move on the ground elsewhere. Returns nothing if there is no such fit.
 std::optional<Fitted> tryMoving(Track& track, const Fitted& at_rest, const KeyframeBatch& batch,
                                 const FrameContext& frame);
-/// Fits an *other* track as the class that it resembles, and adds what fits. Boxes of two objects
-/// make the shape of neither, and *other* fits any shape; all keyframes together may show the class
-/// after all. The odds of *other* against the class are those at initiation, counted once.
+/// Fits an *other* track as the class that it resembles, and adds what fits: the shape of an
+/// *other* may come from boxes of two objects. Its odds are those at initiation, counted once.
 void tryLookalikeClass(Track& track, const KeyframeBatch& batch, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

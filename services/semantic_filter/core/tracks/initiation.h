@@ -17,9 +17,8 @@ double logInitiationRatio(const BoxDetection& detection, const FrameContext& fra
 std::optional<Track> initiate(const BoxDetection& detection, const std::optional<RangeHint>& range,
                               TimePoint now, const FrameContext& frame);
 
-/// Finds state and shape of a track again, from a box assigned to it. Id, existence and known
-/// classes stay; geometry and motion are those of an initiation. `pmf`: of the track before it lost
-/// its shape. Returns false, and leaves the track as it is, if the box does not determine a track.
+/// Finds state and shape of a track again from a box assigned to it. `pmf`: of the track before it
+/// lost its shape. Returns false, and changes nothing, if the box does not determine a track.
 bool reinitialise(Track& track, const ClassNumbers& pmf, const BoxDetection& detection,
                   const std::optional<RangeHint>& range, const FrameContext& frame);
 

@@ -178,9 +178,8 @@ bool alternate(const Track& a, const Track& b) {
   return std::popcount((of_a.detected ^ of_b.detected) & of_a.visible & of_b.visible) >= kTurns;
 }
 
-/// Whether two tracks are one object by their space: they overlap in space and in the image; or
-/// they overlap less and alternate; or one is *other* and lies inside the other, because two solid
-/// objects cannot share their space.
+/// Whether two tracks are one object: they overlap in space and image; or overlap less and
+/// alternate; or one is *other* and lies inside the other.
 bool sameSpace(const Track& a, const Track& b, const FrameContext& frame) {
   const State &x = a.best().x, &y = b.best().x;
   const TrackParameters& parameters = frame.parameters->tracks;

@@ -26,9 +26,8 @@ struct UpdateReasons {
   ClassNumbers activation;
 };
 
-/// `detected`: probability that one of the boxes is the track's. `tempering`: exponent τ of the
-/// observation, for a hit. `exponent`: that of A between classes. `gated`: indices of the boxes
-/// near the track.
+/// `detected`: probability that a box is the track's. `tempering`: exponent τ of a hit. `exponent`:
+/// that of A between classes. `gated`: indices of the boxes near the track.
 UpdateReasons reasonsOf(const Track& track, const AllShares& shares, double detected,
                         double tempering, double exponent, const ScratchVector<std::size_t>& gated,
                         const std::vector<BoxDetection>& boxes, const FrameContext& frame);

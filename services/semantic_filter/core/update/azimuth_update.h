@@ -1,8 +1,6 @@
-// The network's azimuth as a measurement of yaw. It measures the direction of the length axis
-// (modulo 180°) and, separately, the heading; it changes yaw, heading and the weights of yaw modes,
-// and nothing else. (The paper uses azimuths at initiation only: "Initialization", line 284.) Some
-// azimuths carry no information, and some are turned by 180°. Derivation:
-// tools/docs/maths/azimuth_and_heading.md.
+// The network's azimuth as a measurement of the length axis (modulo 180°) and of the heading: it
+// changes yaw, heading and the weights of yaw modes. (The paper uses azimuths at initiation only:
+// "Initialization", line 284.) Derivation: tools/docs/maths/azimuth_and_heading.md.
 #pragma once
 
 #include <vector>

@@ -139,9 +139,8 @@ struct MeanA {
   double tempered = 0.0, full = 0.0;
 };
 
-/// π ∝ π A. Within a class, hypotheses differ by geometry only, whose lasting errors are in the
-/// state: there A counts in full. Between classes, and for existence, observations share the
-/// mistakes of the network: there A counts with the exponent τ. Returns the prior means of A.
+/// π ∝ π A. A counts in full within a class, whose hypotheses differ by geometry only, and with the
+/// exponent τ between classes and for existence. Returns the prior means of A.
 MeanA updateWeights(Track& track, const AllShares& shares, double tempering) {
   ScratchMap<std::string_view, std::pair<double, double>> classes;  // weight, Σ w A
   double mean_A = 0.0, tempered_A = 0.0;
@@ -164,10 +163,9 @@ MeanA updateWeights(Track& track, const AllShares& shares, double tempering) {
   return {tempered_A, mean_A};
 }
 
-/// Protects the yaw modes that a mode search (core/smoothing/mode_search.h) has weighed by all
-/// keyframes. Each is linearised at its own state, so the later observations alone would let the
-/// filter give up true modes before the next search. A mode that explains this observation about as
-/// well as the best one keeps at least `least` of its class. The weight of the class stays.
+/// Protects yaw modes that a mode search has weighed by all keyframes, because later observations
+/// alone could end true modes. One that explains this observation about as well as the best keeps
+/// at least `least` of its class, whose weight stays.
 void keepSearchedModes(std::vector<Hypothesis>& hs, const AllShares& shares, double least) {
   constexpr double kComparable = 0.05;  // least ratio to the largest A of the class
   struct Class {
@@ -207,10 +205,9 @@ double existenceAfter(Track& track, const MeanA& mean_A, double certain) {
   return 1.0 / (1.0 + std::exp(-std::min(real, still)));
 }
 
-/// Updates PMF, existence and detectability by one observation, all from the same A. `tempering`:
-/// exponent τ of the observation, 0 to 1. `detected`: one of the boxes is more probably the track's
-/// than not. Leaves the weights unnormalised. Returns the new existence, at most
-/// `existenceCeiling`; the track keeps the old one.
+/// Updates PMF, existence and detectability by one observation, from the same A. `tempering`: τ, 0
+/// to 1. `detected`: a box is probably the track's. Leaves the weights unnormalised. Returns the
+/// new existence, at most `existenceCeiling`.
 double updateClassAndExistence(Track& track, const AllShares& shares, double tempering,
                                bool detected, const Parameters& parameters) {
   const MeanA mean_A = updateWeights(track, shares, tempering);

@@ -1,5 +1,4 @@
-// Detectability: what makes the detection probability of one track differ from that of its class:
-// an unmapped occluder, and views from which it is seldom detected (Mahler 2007; not in the paper).
+// Detectability: why P_D of a track differs from that of its class (Mahler 2007; not in the paper).
 // Derivation: tools/docs/maths/detectability.md.
 #pragma once
 

@@ -25,9 +25,8 @@ struct Span {
   double x, y;
 };
 
-/// A grid of cells that is reused for every painting, also of other grids: to clear or to allocate
-/// all cells costs more than to use a few. A stamp for each cell tells whether it belongs to the
-/// present painting. Most cells stay blank.
+/// A grid of cells that is reused for every painting. A stamp tells whether a cell belongs to the
+/// present painting, because most cells stay blank.
 class DepthBuffer {
  public:
   void begin(double width, double height, double cell_px) {

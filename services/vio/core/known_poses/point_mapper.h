@@ -1,7 +1,6 @@
-// Maps points from tracks when another program gives the poses. Each point is triangulated from the
-// views that add a baseline. Only the agreement of the tracks with the poses is estimated, not the
-// poses. Derivation: tools/docs/maths/vio-known-poses.md. The class does not access images, threads
-// or clocks.
+// Maps points from tracks and poses that another program gives, and estimates how the tracks agree
+// with them. It does not access images, threads or clocks. Derivation:
+// tools/docs/maths/vio-known-poses.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -31,9 +30,8 @@ class PointMapper {
               std::vector<RigidTransform> T_BC, std::vector<double> readout_s = {});
 
   void add(const KnownPose& pose, const TrackedFrame& tracked);
-  /// Points of the newest image whose position is known, by rising id, without descriptors. Points
-  /// that fit the poses much worse than the others are left out, because they move or were tracked
-  /// wrongly.
+  /// Points of the newest image whose position is known, by rising id, without descriptors, and
+  /// without those that fit the poses much worse.
   const std::vector<Landmark>& landmarks() const { return landmarks_; }
   const Mapped& mapped() const { return mapped_; }
   /// Ratio of the tracks' residuals to VisionOptions::sigma_px, at least 1.

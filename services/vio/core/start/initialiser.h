@@ -1,6 +1,5 @@
-// Initial state of the filter. At rest, gravity follows from the mean force and the gyro bias from
-// the mean rate. With a speed sensor, the filter starts at once in motion. Starts from images
-// alone: motion_initialiser.h.
+// Initial state of the filter at rest, or in motion with a speed sensor. Starts from images alone:
+// motion_initialiser.h.
 #pragma once
 
 #include <vector>

@@ -28,9 +28,8 @@ constexpr double kMostLinearPx = 3.0;    // residual of the linear solution
 constexpr double kFewestParallaxPx = 2.0;
 constexpr double kMostAcceleration = 5.0;  // m/s², mean over a window
 
-/// Bearing of the point, rotated to the camera's attitude at the middle row. The translation
-/// between the rows lies in the epipolar plane. turn_C: rotation of the camera from the first to
-/// the last row.
+/// Bearing of the point at the camera's attitude at the middle row. turn_C: rotation of the camera
+/// from the first to the last row.
 Vector3d bearing(const ImagePoint& seen, const Vector3d& turn_C) {
   const Vector3d ray = seen.normalised.homogeneous().normalized();
   return turn_C.isZero(0.0) ? ray : Vector3d(expQuaternion(seen.row * turn_C) * ray);
@@ -163,8 +162,7 @@ std::vector<WindowPoint> windowPoints(const std::vector<const TrackedFrame*>& tr
 }
 
 /// State at the newest pose, from the error [θ, v, gravity, b_g, b_a] of a window. Its W is the
-/// level frame that is rotated least. A frame of yaw 0 is not used, because it is discontinuous if
-/// x points up.
+/// level frame that is rotated least, because yaw 0 is discontinuous if x points up.
 Nav navOf(const MotionWindow& w, const Eigen::Matrix<double, kWindowError, 1>& error,
           const Eigen::Quaterniond& level) {
   const WindowPose& last = w.poses.back();

@@ -146,9 +146,8 @@ double stretchOf(const MotionWindow& w, const VectorXd& dx) {
   return std::clamp(along / square, -kLargestStretch, kLargestStretch);
 }
 
-/// Adds a step. Images do not constrain the scale, and their cost is constant along it. The scale
-/// part of the step is therefore applied as a factor, which preserves the fit to the images. To
-/// first order the step is the same.
+/// Adds a step. Its scale part, along which the images' cost is constant, is applied as a factor,
+/// which preserves the fit to the images.
 void move(Estimate& e, const VectorXd& dx, const Normal& n) {
   const double stretch = stretchOf(e.window, dx), factor = std::exp(stretch);
   VectorXd rest = dx;

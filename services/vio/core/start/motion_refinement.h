@@ -1,7 +1,6 @@
 // Maximum a posteriori estimate of a window in motion, from images and inertial samples
-// (Levenberg-Marquardt with the points eliminated). It estimates poses, velocities, the direction
-// of gravity, both biases, the time offset and the points. Its covariance becomes the covariance of
-// the start. Derivation: tools/docs/maths/vio-starts.md.
+// (Levenberg-Marquardt with the points eliminated). Its covariance becomes that of the start.
+// Derivation: tools/docs/maths/vio-starts.md.
 #pragma once
 
 #include <Eigen/Core>

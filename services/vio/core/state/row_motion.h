@@ -1,8 +1,6 @@
 // Pose of a camera while one row of a rolling-shutter image is exposed, relative to the body at the
-// middle row. As in Li, Kim, Mourikis (ICRA 2013) and Li & Mourikis (IJRR 2014), the IMU gives the
-// motion within an image. Here this motion is expressed in the body's frame and treated as exact.
-// The camera of a row is then a camera with another mounting on the body, and the unobservable
-// directions are preserved. Derivation: tools/docs/maths/vio-rolling-shutter.md.
+// middle row (Li, Kim, Mourikis, ICRA 2013; Li & Mourikis, IJRR 2014). Here the IMU's motion within
+// an image is in the body's frame and exact. Derivation: tools/docs/maths/vio-rolling-shutter.md.
 #pragma once
 
 #include <Eigen/Core>

@@ -93,9 +93,8 @@ inline constexpr int kTheta = 0, kPosition = 3, kVelocity = 6, kGyroBias = 9, kA
 
 class State {
  public:
-  /// readout_s: read-out time of each camera, 0 for a global shutter. If empty, all cameras have a
-  /// global shutter. estimate_readout adds the non-zero read-outs to the error; estimate_scale adds
-  /// the gyroscope's scale.
+  /// readout_s: read-out time of each camera, 0 for a global shutter; empty: all global. The last
+  /// two add non-zero read-outs and the gyroscope's scale to the error.
   State(const std::vector<RigidTransform>& T_BC, double time_offset_s, int max_clones,
         int max_points, const std::vector<double>& readout_s = {}, bool estimate_readout = false,
         bool estimate_scale = false);
@@ -156,9 +155,8 @@ class State {
 
   /// x ← x ⊞ dx.
   void apply(const VectorView& dx);
-  /// EKF update with residual r = H·error + noise of unit covariance. The columns of H are those of
-  /// `blocks`, in that order. Fails with "update_not_positive" or "update_not_finite" and then does
-  /// not change the state.
+  /// EKF update with r = H·error + noise of unit covariance; H has the columns of `blocks`. Fails
+  /// with "update_not_positive" or "update_not_finite" and then does not change the state.
   Result<void> update(const Eigen::MatrixXd& H, const std::vector<Block>& blocks,
                       const Eigen::VectorXd& r);
   /// The same with measurements that each depend on few blocks, without their zero columns.

@@ -1,7 +1,6 @@
-// Tracks corners from image to image. Pyramidal Lucas-Kanade at half size starts from the
-// gyroscope's prediction; comparison with the first observation (patch.h) then refines the
-// position. Points of the second camera come from Lucas-Kanade alone. New corners (FAST) fill empty
-// cells of a grid.
+// Tracks corners: pyramidal Lucas-Kanade at half size from the gyroscope's prediction, then
+// comparison with the first observation (patch.h). The second camera has Lucas-Kanade alone. New
+// corners (FAST) fill empty cells of a grid.
 #pragma once
 
 #include <Eigen/Core>

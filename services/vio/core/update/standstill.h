@@ -1,8 +1,6 @@
-// Decides whether the body stands still while most of the image moves, because traffic in front of
-// a body at rest looks like motion. An IMU alone cannot distinguish rest from constant velocity. It
-// therefore only confirms that a body that stood still has not moved. Zero-velocity detectors:
-// Skog, Händel, Nilsson, Rantakokko, IEEE TBME 2010. Derivation:
-// tools/docs/maths/vio-rest-and-speed.md.
+// Decides whether the body stands still while most of the image moves, as traffic does. An IMU only
+// confirms that a body that stood still has not moved (Skog, Händel, Nilsson, Rantakokko, IEEE TBME
+// 2010). Derivation: tools/docs/maths/vio-rest-and-speed.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -25,9 +23,8 @@ struct RestExpectation {
 /// From the filter's attitude and biases, with their covariance.
 RestExpectation restExpectation(const State& state, double gravity);
 
-/// Whether the means over `window` before `now` agree with the expectation. `age`: time since the
-/// expectation was taken, during which the biases drift. False if the samples do not cover the
-/// window.
+/// Whether the means over `window` before `now` agree with the expectation, taken `age` ago. False
+/// if the samples do not cover the window.
 bool imuRests(const ImuBuffer& imu, TimePoint now, Duration window, const RestExpectation& expected,
               Duration age, const ImuNoise& noise);
 
@@ -43,8 +40,7 @@ class Standstill {
   /// The images show that the body stands still at `now`.
   void confirm(TimePoint now, const RestExpectation& expected);
   /// Whether the IMU shows that a body that stood still has not moved since. A disturbance of up to
-  /// a second without net velocity change, for example a person getting in, only interrupts the
-  /// standstill.
+  /// a second without net velocity change only interrupts the standstill.
   bool holds(const ImuBuffer& imu, TimePoint now, const ImuNoise& noise);
 
  private:

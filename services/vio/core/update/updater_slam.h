@@ -16,13 +16,9 @@ struct Innovation {
 };
 
 /// Updates the state's points with their observations in the newest clone. A point leaves the state
-/// if it fails the gate three times in a row or lies behind the camera. If `innovations` is given,
-/// it is filled.
-///
-/// If most points fail at once by a wide margin, the images contradict the prediction as a whole.
-/// The pose covariance is then enlarged by `VisionOptions::jump_*` before the gates are repeated,
-/// and "images_jumped" is counted. `may_jump`: whether such a contradiction may be treated as a
-/// jump.
+/// if it fails the gate three times in a row or lies behind the camera. `innovations`, if given, is
+/// filled. If most points fail at once by a wide margin and `may_jump`, the pose covariance is
+/// enlarged by `VisionOptions::jump_*`, the gates are repeated, and "images_jumped" is counted.
 Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
                                 const VisionOptions& options, bool may_jump, ReasonCounts& reasons,
                                 std::vector<Innovation>* innovations = nullptr);

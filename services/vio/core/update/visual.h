@@ -51,9 +51,8 @@ std::vector<Block> calibrationAndClones(const State& state);
 Eigen::Vector3d linearisationPoint(const State& state, const Track& track,
                                    const Eigen::Vector3d& p_W);
 
-/// Stacks all views of `track` whose clones are in the state. H_x has the columns of
-/// calibrationAndClones. The residual uses the estimates; the Jacobians use `linear`. r is empty if
-/// the point lies behind a camera.
+/// Stacks all views of `track` by clones of the state, with the columns of calibrationAndClones. r
+/// is empty if the point lies behind a camera.
 PointSystem stackViews(const Track& track, const State& state, const Eigen::Vector3d& p_W,
                        double sigma_px);
 

@@ -1,7 +1,6 @@
-// Upper part: of an object whose lower part something hides that is not on the map (a chair at a
-// table) only the upper part is seen, from every side. Such a hypothesis is of the object's class;
-// its cuboid is that of the part. So it predicts the boxes as they are, and pays for the hiding
-// thing once and not in every frame. Beyond the paper. Derivation: tools/docs/maths/upper_part.md.
+// Upper part: what is seen of an object whose lower part something off the map hides, as a table a
+// chair. Such a hypothesis has the object's class and the part's cuboid, so that it pays for the
+// hiding thing once. Beyond the paper. Derivation: tools/docs/maths/upper_part.md.
 #pragma once
 
 #include "services/semantic_filter/core/belief/classes/class_prior.h"
