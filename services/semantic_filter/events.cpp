@@ -35,12 +35,6 @@ EventTracker::Known EventTracker::comeBack(const ObjectBelief& o) {
   return known;
 }
 
-void EventTracker::clear() {
-  known_.clear();
-  recalled_.clear();
-  archived_.clear();
-}
-
 void EventTracker::compare(const ObjectBelief& o, Known& known, std::vector<Event>& events,
                            const Event& blank) {
   const auto add = [&](EventKind kind, double p) { events.push_back(make(blank, kind, o, p)); };
@@ -114,11 +108,8 @@ void EventTracker::merge(const MergeRecord& m, const Objects& objects, const Eve
 }
 
 EventTracker::Changes EventTracker::update(const Objects& objects,
-                                           const std::vector<MergeRecord>& merges) {
-  Event blank;
-  blank.stamp = objects.stamp;
-  blank.instance = objects.instance;
-  blank.world = objects.world;
+                                           const std::vector<MergeRecord>& merges,
+                                           const Event& blank) {
   Changes changes;
   std::vector<Event>& events = changes.events;
   for (const auto& m : merges) merge(m, objects, blank, changes);

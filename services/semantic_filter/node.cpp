@@ -247,12 +247,12 @@ void Node::publish(const Frame& frame) {
     std::sort(objects.objects.begin(), objects.objects.end(),
               [](const ObjectBelief& a, const ObjectBelief& b) { return a.id < b.id; });
   }
-  auto [events, ended] = events_.update(objects, merges);
+  Event blank;
+  blank.stamp = objects.stamp, blank.instance = objects.instance, blank.world = objects.world;
+  auto [events, ended] = events_.update(objects, merges, blank);
   keepEnded(ended);
   objects.ended.assign(ended_.begin(), ended_.end());
   const auto coming = history_.comingAfter(frame);
-  Event blank;
-  blank.stamp = objects.stamp, blank.instance = objects.instance, blank.world = objects.world;
   auto returns =
       returns_.update(history_.belief().tracks, frame.input, coming, config_.filter, blank);
   for (Event& event : returns) {

@@ -30,11 +30,6 @@ bool ReappearanceMonitor::waits(const Track& o, const Parameters& parameters) co
   return inSight(o) && known != waiting_.end() && o.life.hits == known->second.hits;
 }
 
-void ReappearanceMonitor::clear() {
-  waiting_.clear();
-  velocities_.clear();
-}
-
 void ReappearanceMonitor::addKeyframe(const FrameInput& now, const Way& way) {
   velocities_.push_back({now.stamp.time, now.view.T_WB.R() * (way.step.p / way.seconds)});
   while (toSeconds(now.stamp.time - velocities_.front().time) > kRemembered_s) {

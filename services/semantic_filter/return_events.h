@@ -18,7 +18,7 @@ class ReappearanceMonitor {
   std::vector<Event> update(const std::vector<Track>& objects, const FrameInput& now,
                             const std::optional<ComingFrame>& coming, const Parameters& parameters,
                             const Event& blank);
-  void clear();
+  void clear() { *this = {}; }
 
  private:
   struct Velocity {

@@ -6,8 +6,6 @@
 #include "common/camera/camera_model.h"
 #include "common/math/so3.h"
 #include "common/vision/image.h"
-#include "services/vio/cameras.h"
-#include "services/vio/core/tracks/tracker.h"
 #include "services/vio/landmarks_message.h"
 
 namespace perdure::vio {
@@ -27,25 +25,12 @@ constexpr char kFar[] =
 
 }  // namespace
 
-struct KnownPoseNode::Cameras {
-  Cameras(const Config& config, std::vector<CameraModel> all)
-      : models(std::move(all)),
-        tracker(config.tracker, models),
-        mapper(config.core.vision, config.core.window, extrinsics(models), readouts(models)) {}
-
-  std::vector<CameraModel> models;
-  Tracker tracker;
-  PointMapper mapper;
-};
-
 KnownPoseNode::KnownPoseNode(const Config& config, InstanceId instance, Sink<Landmarks> landmarks)
     : config_(config),
       instance_(instance),
       landmarks_(std::move(landmarks)),
       moving_(config.moving_mask),
       waiting_(config.pair_tolerance_s) {}
-
-KnownPoseNode::~KnownPoseNode() = default;
 
 const ReasonCounts& KnownPoseNode::reasons() const {
   all_reasons_ = reasons_;

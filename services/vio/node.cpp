@@ -33,10 +33,6 @@ Node::Node(const Config& config, InstanceId instance, Outputs outputs)
       moving_(config.moving_mask),
       motion_initialiser_(config.core) {}
 
-Node::~Node() = default;
-
-bool Node::started() const { return cameras_ && cameras_->estimator.started(); }
-
 const ReasonCounts& Node::reasons() const {
   all_reasons_ = reasons_;
   if (cameras_) {
@@ -175,14 +171,6 @@ TimePoint Node::imuTime(TimePoint image_time) const {
   return image_time + durationFromSeconds(offset);
 }
 
-double Node::longestReadout() const {
-  double longest = 0.0;
-  for (const CameraModel& m : cameras_->models) {
-    longest = std::max(longest, m.calibration().readout_s);
-  }
-  return longest;
-}
-
 bool Node::waitsForPair() const {
   if (cameras_->models.size() < 2 || !waiting_.frontMayBePaired()) return false;
   // After half a second of later samples, no partner is expected.
@@ -194,9 +182,7 @@ bool Node::ready() const {
   TimePoint now = imuTime(waiting_.front().first.stamp.time);
   if (imu_.empty()) return false;
   // Up to the last row, because an image arrives only after its read-out.
-  if (const double readout_s = longestReadout(); readout_s > 0.0) {
-    now += durationFromSeconds(0.5 * readout_s);
-  }
+  now += durationFromSeconds(0.5 * std::max(0.0, std::ranges::max(readouts(cameras_->models))));
   // The last sample may be extrapolated by a quarter of a period. A capture that waits for this
   // frame's answer sends no sample beyond the next frame.
   if (const auto period = imu_.period()) now -= *period / 4;
@@ -209,8 +195,6 @@ bool Node::ready() const {
 void Node::drain(bool all) {
   while (cameras_ && !waiting_.empty() && (all || ready())) process(waiting_.take());
 }
-
-void Node::flush() { drain(true); }
 
 void Node::noteGaps(TimePoint now) {
   const TimePoint from =

@@ -50,7 +50,6 @@ class History {
   void erase(const std::set<TrackId>& ids);
 
   std::deque<HistoryFrame>& frames() { return frames_; }
-  const std::deque<HistoryFrame>& frames() const { return frames_; }
   bool empty() const { return frames_.empty(); }
   HistoryFrame& newest() { return frames_.back(); }
   TimePoint oldestTime() const { return frames_.front().input.stamp.time; }
@@ -61,7 +60,6 @@ class History {
 
   const Belief& belief() const { return belief_; }
   IdBook& ids() { return ids_; }
-  const IdBook& ids() const { return ids_; }
   const PoseError& poseError() const { return pose_error_; }
   const std::optional<RigidTransform>& lastPose() const { return last_T_WB_; }
 

@@ -164,11 +164,8 @@ std::vector<const Track*> Estimator::onceUsed(std::uint64_t frame, bool window_f
 
 void Estimator::forgetUsed(const std::vector<const Track*>& used, std::uint64_t frame) {
   for (const Track* track : used) database_.erase(track->id);
-  std::vector<std::uint64_t> ended;
-  for (const auto& [id, track] : database_.tracks()) {
-    if (!track.seenAt(frame) && !state_->point(id)) ended.push_back(id);
-  }
-  for (const std::uint64_t id : ended) database_.erase(id);
+  database_.eraseIf(
+      [&](const Track& track) { return !track.seenAt(frame) && !state_->point(track.id); });
 }
 
 void Estimator::dropLostPoints(std::uint64_t frame) {

@@ -32,19 +32,6 @@ double logClutterOf(const BoxDetection& e, const BoxScore& score, const View& vi
          logClutter(e.z, view.camera->width(), view.camera->height(), parameters, ignored);
 }
 
-void scoreBoxes(HypothesisScore& h, const std::string& class_name, double lookalike_nats,
-                const TrackScore& score, const std::vector<BoxDetection>& boxes,
-                const FrameContext& frame) {
-  for (std::size_t i = 0; i < score.boxes.size(); ++i) {
-    const auto why =
-        explain(boxes[score.boxes[i]], *h.predicted, score.visibility.hidden_sides, class_name,
-                lookalike_nats, {frame.model, &frame.view, frame.parameters});
-    if (!why) continue;
-    h.matches[i] = {std::exp(std::min(why->log_ratio, kMaxLogLikelihood)),
-                    why->sides.nis / why->sides.dof, why->sides.part};
-  }
-}
-
 HypothesisScore scoreHypothesis(const Hypothesis& hypothesis, const Track& track, double rate,
                                 const TrackVisibility& visibility, const Projector& from,
                                 const FrameContext& frame) {
@@ -132,6 +119,7 @@ TrackScore scoreTrack(const Track& track, const TrackVisibility& visibility,
   result.visibility = visibility;
   result.hypotheses.reserve(track.hypotheses.size());
   const Projector from = frame.projector();
+  const Judge judge{frame.model, &frame.view, frame.parameters};
   const double rate = detectionRateFactor(track, frame);
   for (const auto& hypothesis : track.hypotheses) {
     result.hypotheses.push_back(scoreHypothesis(hypothesis, track, rate, visibility, from, frame));
@@ -148,8 +136,13 @@ TrackScore scoreTrack(const Track& track, const TrackVisibility& visibility,
   for (std::size_t i = 0; i < result.hypotheses.size(); ++i) {
     HypothesisScore& h = result.hypotheses[i];
     h.matches.assign(result.boxes.size(), {});
-    if (h.predicted)
-      scoreBoxes(h, track.hypotheses[i].class_name, track.lookalike.nats, result, boxes, frame);
+    for (std::size_t k = 0; h.predicted && k < result.boxes.size(); ++k) {
+      const auto why = explain(boxes[result.boxes[k]], *h.predicted, visibility.hidden_sides,
+                               track.hypotheses[i].class_name, track.lookalike.nats, judge);
+      if (!why) continue;
+      h.matches[k] = {std::exp(std::min(why->log_ratio, kMaxLogLikelihood)),
+                      why->sides.nis / why->sides.dof, why->sides.part};
+    }
   }
   return result;
 }

@@ -105,11 +105,6 @@ struct PublishedVisibility {
   ObjectId blocked_by = 0;
 };
 
-/// What the cross-covariances of the hypotheses refer to.
-struct PoseReference {
-  Matrix6d product = Matrix6d::Identity();  ///< PoseError::product at as_of
-};
-
 /// Frames that said nothing since the track was last predicted. They change no published value.
 struct UnusedFrames {
   LedgerEntry occluded, out_of_view;
@@ -135,7 +130,7 @@ struct Track {
   Detectability detectability;
   BatchState batch;
   PublishedVisibility visibility;
-  PoseReference pose;
+  Matrix6d pose_product = Matrix6d::Identity();  ///< PoseError::product at as_of
   UnusedFrames unused;
 
   const Hypothesis& best() const { return hypotheses.front(); }

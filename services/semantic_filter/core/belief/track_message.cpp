@@ -138,7 +138,7 @@ Track fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product, Exist
   track.life.first_seen = belief.first_seen;
   track.life.last_seen = belief.last_seen;
   track.as_of = belief.as_of;
-  track.pose.product = pose_product;
+  track.pose_product = pose_product;
   track.life.hits = belief.hits;
   track.life.visible_misses = belief.visible_misses;
   track.visibility.state = belief.visibility;

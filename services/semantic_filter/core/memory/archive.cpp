@@ -67,7 +67,7 @@ double Archive::nearRadius() const {
 }
 
 void Archive::rememberReference(const Track& track) {
-  references_[track.as_of] = track.pose.product;
+  references_[track.as_of] = track.pose_product;
   if (references_.size() > kMostReferences) references_.erase(references_.begin());
 }
 

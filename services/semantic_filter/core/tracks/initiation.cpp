@@ -248,7 +248,7 @@ std::optional<Track> initiate(const BoxDetection& detection, const std::optional
   addOther(track, other * std::exp(detection.log_ratio_other), seen, *ray, range, frame);
   if (track.hypotheses.empty()) return std::nullopt;
   track.life.first_seen = track.life.last_seen = track.as_of = now;
-  track.pose.product = frame.pose_error.product;
+  track.pose_product = frame.pose_error.product;
   track.history.first_box = track.history.last_box = AssignedBox{now, detection.z.box()};
   track.life.hits = 1;
   track.classes_considered = frame.model->names;

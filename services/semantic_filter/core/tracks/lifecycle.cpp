@@ -16,7 +16,7 @@ bool forgettable(const Track& o, const TrackParameters& parameters) {
   if (o.life.once_confirmed || o.life.hits > static_cast<std::uint32_t>(parameters.confirm_hits))
     return false;
   const TimePoint last = std::max(o.unused.occluded.last, o.unused.out_of_view.last);
-  const bool invisible = o.unused.occluded.count + o.unused.out_of_view.count > 0;
+  const bool invisible = o.unused.count() > 0;
   return invisible && toSeconds(last - o.life.last_seen) > parameters.tentative_s;
 }
 

@@ -76,7 +76,7 @@ void predict(Track& track, TimePoint now, const PoseError& pose_error,
   const double dt = toSeconds(now - track.as_of);
   // Without a usable transition C becomes 0.
   const Matrix6d transition =
-      transitionBetween(track.pose.product, pose_error.product).value_or(Matrix6d::Zero());
+      transitionBetween(track.pose_product, pose_error.product).value_or(Matrix6d::Zero());
   const bool may_disagree = pose_error.reported || track.life.recalled;
   std::optional<Matrix6d> L_pose;
   if (may_disagree) L_pose = pose_error.covariance;
@@ -87,8 +87,7 @@ void predict(Track& track, TimePoint now, const PoseError& pose_error,
     h.C = timesTransposed(h.C, transition);
     if (may_disagree) keepConsistent(h, pose_error.covariance, L_pose);
   }
-  const bool undetected = track.life.last_seen < track.as_of ||
-                          track.unused.occluded.count + track.unused.out_of_view.count > 0;
+  const bool undetected = track.life.last_seen < track.as_of || track.unused.count() > 0;
   if (undetected && dt > 0.0) decayUndetectedMoving(track, dt, parameters.mover_survival_s);
   dropLostHypotheses(track, now, parameters.lost_sigma_m);
   if (dt > 0.0) {
@@ -105,7 +104,7 @@ void predict(Track& track, TimePoint now, const PoseError& pose_error,
   track.as_of = now;
   predictDetectability(track, walk);
   track.views.predicted_from = walk.T_WC;
-  track.pose.product = pose_error.product;
+  track.pose_product = pose_error.product;
 }
 
 }  // namespace perdure::semantic_filter

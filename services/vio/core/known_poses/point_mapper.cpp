@@ -40,16 +40,11 @@ void PointMapper::clear() {
 
 /// Removes tracks that have ended, and poses older than the first view of every remaining track.
 void PointMapper::forgetEnded() {
-  std::vector<std::uint64_t> ended;
+  database_.eraseIf([&](const Track& track) { return !track.seenAt(frame_); });
   std::uint64_t oldest = frame_;
   for (const auto& [id, track] : database_.tracks()) {
-    if (track.seenAt(frame_)) {
-      oldest = std::min(oldest, track.observations.front().frame);
-    } else {
-      ended.push_back(id);
-    }
+    oldest = std::min(oldest, track.observations.front().frame);
   }
-  for (const std::uint64_t id : ended) database_.erase(id);
   std::erase_if(views_, [&](const View& view) { return view.frame < oldest; });
 }
 

@@ -114,10 +114,4 @@ void ImuBuffer::dropBefore(TimePoint time) {
   dropBefore(forces_, time);
 }
 
-void ImuBuffer::clear() {
-  raw_.clear();
-  rates_.clear();
-  forces_.clear();
-}
-
 }  // namespace perdure::vio

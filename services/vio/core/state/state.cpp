@@ -125,11 +125,10 @@ void State::widenPose(double rotation, double position_m) {
 }
 
 void State::removeClone(std::uint64_t frame) {
-  const auto it =
-      std::find_if(clones.begin(), clones.end(), [&](const Clone& c) { return c.frame == frame; });
-  if (it == clones.end()) return;
-  const int at = it->at;
-  clones.erase(it);
+  const Clone* const gone = clone(frame);
+  if (!gone) return;
+  const int at = gone->at;
+  clones.erase(clones.begin() + (gone - clones.data()));
   remove(at, 6);
 }
 
@@ -143,11 +142,10 @@ void State::addPoint(std::uint64_t id, const Eigen::Vector3d& p_W,
 }
 
 void State::removePoint(std::uint64_t id) {
-  const auto it =
-      std::find_if(points.begin(), points.end(), [&](const PointState& p) { return p.id == id; });
-  if (it == points.end()) return;
-  const int at = it->at;
-  points.erase(it);
+  const PointState* const gone = point(id);
+  if (!gone) return;
+  const int at = gone->at;
+  points.erase(points.begin() + (gone - points.data()));
   remove(at, 3);
 }
 

@@ -56,6 +56,12 @@ class FeatureDatabase {
   /// Removes the observations of a frame, and tracks that become empty.
   void removeFrame(std::uint64_t frame);
   void erase(std::uint64_t id);
+  template <class Predicate>
+  void eraseIf(Predicate goes) {
+    for (auto it = tracks_.begin(); it != tracks_.end();) {
+      it = goes(it->second) ? forget(it) : std::next(it);
+    }
+  }
   void clear() { tracks_.clear(); }
   const std::map<std::uint64_t, Track>& tracks() const { return tracks_; }
   const Track* find(std::uint64_t id) const;
