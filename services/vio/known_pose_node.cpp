@@ -6,7 +6,7 @@
 #include "common/camera/camera_model.h"
 #include "common/math/so3.h"
 #include "common/vision/image.h"
-#include "services/vio/landmarks_message.h"
+#include "services/vio/core/tracks/descriptor.h"
 
 namespace perdure::vio {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "common/vision/image.h"
-#include "services/vio/landmarks_message.h"
+#include "services/vio/core/tracks/descriptor.h"
 
 namespace perdure::vio {
 namespace {

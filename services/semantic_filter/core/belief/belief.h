@@ -9,8 +9,7 @@
 
 #include "common/types/objects.h"
 #include "services/semantic_filter/core/belief/ground_surface.h"
-#include "services/semantic_filter/core/belief/mover_shares.h"
-#include "services/semantic_filter/core/belief/noise_scale.h"
+#include "services/semantic_filter/core/belief/learned.h"
 #include "services/semantic_filter/core/belief/track.h"
 
 namespace perdure::semantic_filter {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "services/semantic_filter/core/belief/ground_surface.h"
-#include "services/semantic_filter/core/belief/mover_shares.h"
+#include "services/semantic_filter/core/belief/learned.h"
 #include "services/semantic_filter/core/belief/view_change.h"
 #include "services/semantic_filter/core/measurement/detection.h"
 #include "services/semantic_filter/core/measurement/view.h"

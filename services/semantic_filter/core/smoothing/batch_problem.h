@@ -9,7 +9,7 @@
 
 #include "common/math/gaussian.h"
 #include "services/semantic_filter/core/belief/classes/upper_part.h"
-#include "services/semantic_filter/core/belief/noise_scale.h"
+#include "services/semantic_filter/core/belief/learned.h"
 #include "services/semantic_filter/core/smoothing/keyframes.h"
 #include "services/semantic_filter/core/update/azimuth_update.h"
 

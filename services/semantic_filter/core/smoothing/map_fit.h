@@ -6,7 +6,7 @@
 #include <memory>
 #include <optional>
 
-#include "services/semantic_filter/core/belief/noise_scale.h"
+#include "services/semantic_filter/core/belief/learned.h"
 #include "services/semantic_filter/core/smoothing/batch_problem.h"
 
 namespace perdure::semantic_filter {

@@ -87,4 +87,16 @@ std::optional<Descriptor> descriptorAt(const cv::Mat& image, const Eigen::Vector
   return d;
 }
 
+Landmarks landmarksMessage(const FrameStamp& stamp, InstanceId instance, const WorldId& world,
+                           const std::string& camera, std::vector<Landmark> landmarks,
+                           const cv::Mat& image) {
+  std::erase_if(landmarks, [](const Landmark& l) {
+    return !l.p_W.allFinite() || !l.covariance.allFinite() || !l.cross_pose.allFinite();
+  });
+  for (Landmark& l : landmarks) {
+    l.descriptor = descriptorAt(image, l.pixel).value_or(Descriptor{});
+  }
+  return {stamp, instance, world, camera, std::move(landmarks)};
+}
+
 }  // namespace perdure::vio
