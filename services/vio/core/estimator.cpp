@@ -7,8 +7,8 @@
 #include "common/base/check.h"
 #include "common/math/gaussian.h"
 #include "services/vio/core/propagation/imu_propagator.h"
+#include "services/vio/core/update/point_updates.h"
 #include "services/vio/core/update/triangulation.h"
-#include "services/vio/core/update/updater_msckf.h"
 #include "services/vio/core/update/updates.h"
 #include "services/vio/core/update/visual.h"
 

@@ -14,8 +14,8 @@
 #include "services/vio/core/state/saved_state.h"
 #include "services/vio/core/state/state.h"
 #include "services/vio/core/tracks/tracks.h"
+#include "services/vio/core/update/point_updates.h"
 #include "services/vio/core/update/standstill.h"
-#include "services/vio/core/update/updater_slam.h"
 
 namespace perdure::vio {
 
