@@ -1,6 +1,5 @@
 #include "services/semantic_filter/config.h"
 
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -173,7 +172,7 @@ void describeFormer(Fields& fields) {
                              {"pose.drift_rotation", "pose.walk_rotation, of all odometry"}};
   for (const auto& [old, now] : renamed) fields.formerly(old, std::string("is now ") + now);
   fields.formerly("context", "is gone: context is no longer laid over the classes; leave it out");
-  // Former keys that are constants in the rooms' parameters.h now.
+  // Former keys that are constants in core/parameters.h now.
   static const Pairs fixed{{"box.tail", "5"},
                            {"box.iterations", "3"},
                            {"box.bias_log_distance", "0.3"},

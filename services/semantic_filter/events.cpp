@@ -8,8 +8,7 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kResolved = 0.9;      // probability of a class
-constexpr double kMissingBelow = 0.5;  // existence below which a confirmed object is reported as
-                                       // missing
+constexpr double kMissingBelow = 0.5;  // existence of a confirmed object
 
 bool isHidden(Visibility v) { return v != Visibility::kVisible && v != Visibility::kPartial; }
 
@@ -34,12 +33,6 @@ EventTracker::Known EventTracker::comeBack(const ObjectBelief& o) {
   known.moving = o.moving > 0.5;
   known.class_name = o.best().name;
   return known;
-}
-
-void EventTracker::clear() {
-  known_.clear();
-  recalled_.clear();
-  archived_.clear();
 }
 
 void EventTracker::compare(const ObjectBelief& o, Known& known, std::vector<Event>& events,
@@ -115,11 +108,8 @@ void EventTracker::merge(const MergeRecord& m, const Objects& objects, const Eve
 }
 
 EventTracker::Changes EventTracker::update(const Objects& objects,
-                                           const std::vector<MergeRecord>& merges) {
-  Event blank;
-  blank.stamp = objects.stamp;
-  blank.instance = objects.instance;
-  blank.world = objects.world;
+                                           const std::vector<MergeRecord>& merges,
+                                           const Event& blank) {
   Changes changes;
   std::vector<Event>& events = changes.events;
   for (const auto& m : merges) merge(m, objects, blank, changes);

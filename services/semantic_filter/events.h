@@ -4,7 +4,6 @@
 #include <map>
 #include <set>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "common/types/objects.h"
@@ -18,13 +17,14 @@ class EventTracker {
     std::vector<Event> events;      ///< ordered by track
     std::vector<EndedTrack> ended;  ///< merged, or confirmed and gone
   };
-  /// Returns the changes since the last call. `merges`: the merges since then.
-  Changes update(const Objects& objects, const std::vector<MergeRecord>& merges);
+  /// Returns the changes since the last call. `merges`: since then. `blank`: with stamp and writer.
+  Changes update(const Objects& objects, const std::vector<MergeRecord>& merges,
+                 const Event& blank);
   /// The track comes from the map. The next update that has the track creates the event.
   void recalled(TrackId id, bool restored) { recalled_[id] = restored; }
   /// The track is archived from now on. The next update creates its event.
   void archived(TrackId id) { archived_.insert(id); }
-  void clear();
+  void clear() { *this = {}; }
   /// Whether the track was published as confirmed.
   bool wasConfirmed(TrackId id) const;
 

@@ -1,15 +1,12 @@
 #include "services/semantic_filter/model_book.h"
 
-#include <utility>
-
 namespace perdure::semantic_filter {
 namespace {
 
 constexpr std::size_t kMaxModels = 64;
 constexpr std::size_t kMaxNamed = 8;  // largest number of classes in a sentence
 
-/// Text for the classes that `model` has and `other` lacks, for example "; new classes: a, b and 3
-/// more".
+/// Text for the classes of `model` that `other` lacks, as in "; new classes: a, b and 3 more".
 std::string beyond(const Model& model, const Model& other, const std::string& title) {
   std::string text;
   std::size_t n = 0;

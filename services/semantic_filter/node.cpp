@@ -5,21 +5,16 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/check.h"
 #include "common/camera/same_camera.h"
 #include "common/math/gaussian.h"
-#include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
 #include "services/semantic_filter/core/belief/track_message.h"
 #include "services/semantic_filter/core/visibility/predicted_box.h"
 
 namespace perdure::semantic_filter {
-namespace {
 
 constexpr std::size_t kMaxEarly = 16;
 constexpr std::chrono::seconds kFuture{10};  // detections further ahead of odometry are not stored
-
-}  // namespace
 
 Node::Node(const Config& config, const ClassPriors& priors, InstanceId instance, Outputs outputs)
     : config_(config),
@@ -184,8 +179,7 @@ void Node::onDetections(const Detections& detections) {
   keepEarly(detections);
 }
 
-/// If there are too many, the one furthest ahead is dropped: false stamps must not displace the
-/// next detections.
+/// Of too many, the one furthest ahead is dropped: false stamps must not displace the next ones.
 void Node::keepEarly(const Detections& detections) {
   for (const auto& d : early_) {
     if (d.stamp.sameFrame(detections.stamp)) return reasons_.add("detections_repeated");
@@ -253,12 +247,12 @@ void Node::publish(const Frame& frame) {
     std::sort(objects.objects.begin(), objects.objects.end(),
               [](const ObjectBelief& a, const ObjectBelief& b) { return a.id < b.id; });
   }
-  auto [events, ended] = events_.update(objects, merges);
+  Event blank;
+  blank.stamp = objects.stamp, blank.instance = objects.instance, blank.world = objects.world;
+  auto [events, ended] = events_.update(objects, merges, blank);
   keepEnded(ended);
   objects.ended.assign(ended_.begin(), ended_.end());
   const auto coming = history_.comingAfter(frame);
-  Event blank;
-  blank.stamp = objects.stamp, blank.instance = objects.instance, blank.world = objects.world;
   auto returns =
       returns_.update(history_.belief().tracks, frame.input, coming, config_.filter, blank);
   for (Event& event : returns) {

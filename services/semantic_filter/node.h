@@ -1,8 +1,5 @@
-// The semantic filter as a node. Inputs: odometry, landmarks, detections and the map's objects near
-// the body. Outputs: objects, events and predictions. Single-threaded; time comes from messages
-// only.
-//
-// core/history does the estimation. The node checks messages, waits for detections, and publishes.
+// The semantic filter as a node: checks messages, waits for detections, and publishes objects,
+// events and predictions; core/history estimates. Single-threaded; time comes from messages only.
 #pragma once
 
 #include <deque>
@@ -41,8 +38,7 @@ class Node {
   void onLandmarks(const Landmarks& landmarks);
   void onDetections(const Detections& detections);
   void onNear(const MapNear& near);
-  /// Publishes the newest frame although its detections have not arrived. For the end of the data,
-  /// and for the tick of a service whose detections have stopped.
+  /// Publishes the newest frame without its detections, at the end of the data or if they stop.
   void flush();
 
   const ReasonCounts& reasons() const { return reasons_; }
@@ -98,7 +94,7 @@ class Node {
   std::map<ObjectId, TrackId> track_of_;
   std::deque<EndedTrack> ended_;
   std::set<TrackId> ended_confirmed_;  ///< merged tracks of `ended_` that name their object
-  Objects published_;  ///< the newest message; the next one reuses its memory
+  Objects published_;                  ///< the newest message; the next one reuses its memory
   EventTracker events_;
   ReappearanceMonitor returns_;
   Archive archive_;

@@ -87,8 +87,7 @@ void Node::take(const MapNear& near, ExistenceEvidence evidence) {
   history_.arrive(arrivals);
 }
 
-/// The survivor of a merge of two confirmed tracks belongs to the older object, as the map will
-/// find.
+/// The survivor of a merge of confirmed tracks belongs to the older object, as in the map.
 void Node::noteMerge(TrackId survivor, TrackId absorbed) {
   const auto memberOf = [&](TrackId track) {
     const auto at = members_.find(track);
@@ -98,9 +97,8 @@ void Node::noteMerge(TrackId survivor, TrackId absorbed) {
   if (object != survivor) members_[survivor] = object;
 }
 
-/// Assigns object ids to tracks that have another id. If the working set has two tracks of one
-/// object that are not fused, one of them gets the id of the object: the track with that id, or
-/// else the first.
+/// Assigns object ids to tracks that have another id. Of two tracks of one object, the one with its
+/// id is named, or else the first.
 void Node::nameObjects() {
   object_of_.clear();
   track_of_.clear();

@@ -1,7 +1,28 @@
 // Effects of a swap of inference on the filter.
+#include <algorithm>
+
 #include "services/semantic_filter/node.h"
 
 namespace perdure::semantic_filter {
+namespace {
+
+/// Whether an object is likely to be detected, and no detection overlaps a likely one.
+bool missesAll(const std::vector<Prediction>& expected, const Detections& detections) {
+  constexpr double kLikely = 0.5, kAtAll = 0.1;  // r·π·v; intersection over union
+  bool any = false;
+  for (const Prediction& prediction : expected) {
+    if (prediction.probability < kLikely) continue;
+    any = true;
+    const auto lies_there = [&](const Detection& d) {
+      return !d.primed && intersectionOverUnion(d.box, prediction.box) >= kAtAll;
+    };
+    const auto& list = detections.detections;
+    if (std::any_of(list.begin(), list.end(), lies_there)) return false;
+  }
+  return any;
+}
+
+}  // namespace
 
 /// Inference decides which process answers. The detections of a new process are delayed in case of
 /// doubt until it passes its probation. A failure is reported as an event.
@@ -34,9 +55,8 @@ void Node::reportModelChange(const FrameStamp& stamp, const std::string& detail)
   if (outputs_.events) outputs_.events(event);
 }
 
-/// Whether these detections of a new process must be delayed. The delayed ones are used once the
-/// process detects an expected object again, or after a time within which the old process would
-/// have decided.
+/// Whether detections of a new process are delayed: until it detects an expected object again, or
+/// the old process would have decided.
 bool Node::isInDoubt(const Frame& frame, const Detections& detections) {
   if (!probation_.isOf(detections.instance)) return false;
   const auto model = models_.find(detections.model_hash);
@@ -56,8 +76,7 @@ bool Node::isInDoubt(const Frame& frame, const Detections& detections) {
   return false;
 }
 
-/// Applies the delayed detections late if they are accepted; otherwise these frames have no
-/// detections.
+/// Applies accepted delayed detections late; otherwise these frames have none.
 void Node::settleProbation(bool believed) {
   const auto kept = probation_.take();
   if (!believed && !kept.empty()) reasons_.add("detections_rolled_back", kept.size());

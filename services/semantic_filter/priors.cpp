@@ -1,5 +1,6 @@
 #include "services/semantic_filter/priors.h"
 
+#include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
 #include <Eigen/Cholesky>
@@ -32,8 +33,7 @@ class PriorsReader {
 
   void complain(const YAML::Node& node, const std::string& message) {
     const auto mark = node.Mark();
-    problems_ += file_ + ":" + std::to_string(mark.line + 1) + ":" +
-                 std::to_string(mark.column + 1) + ": " + message + "\n";
+    problems_ += fmt::format("{}:{}:{}: {}\n", file_, mark.line + 1, mark.column + 1, message);
   }
 
   double number(const YAML::Node& parent, const std::string& key, double standard, double low,
@@ -42,9 +42,7 @@ class PriorsReader {
     if (!node) return standard;
     double value = 0.0;
     if (!YAML::convert<double>::decode(node, value) || !(value >= low && value <= high)) {
-      std::ostringstream text;
-      text << key << ": is not a number from " << low << " to " << high;
-      complain(node, text.str());
+      complain(node, fmt::format("{}: is not a number from {:g} to {:g}", key, low, high));
       return standard;
     }
     return value;
@@ -60,9 +58,8 @@ class PriorsReader {
     for (std::size_t i = 0; i < 3; ++i) {
       double value = 0.0;
       if (!YAML::convert<double>::decode(node[i], value) || !(value >= low && value <= high)) {
-        std::ostringstream text;
-        text << key << ": each is a number from " << low << " to " << high;
-        return complain(node[i], text.str());
+        return complain(node[i],
+                        fmt::format("{}: each is a number from {:g} to {:g}", key, low, high));
       }
       target[static_cast<Eigen::Index>(i)] = value;
     }
@@ -137,15 +134,13 @@ class PriorsReader {
   }
 
   void checkKeys(const YAML::Node& node) {
-    static const std::vector<std::string> known = {
-        "size",          "spread", "common",    "frequency", "moving", "speed",
-        "azimuth_sigma", "yaw",    "detection", "shape",     "stands"};
+    static const std::vector<std::string> known = {"size",      "spread", "common", "frequency",
+                                                   "detection", "moving", "speed",  "azimuth_sigma",
+                                                   "yaw",       "shape",  "stands"};
     for (const auto& item : node) {
       const std::string key = name(item.first);
       if (!key.empty() && std::find(known.begin(), known.end(), key) == known.end()) {
-        complain(item.first, key +
-                                 ": unknown; keys are size, spread, common, frequency, "
-                                 "detection, moving, speed, azimuth_sigma, yaw, shape, stands");
+        complain(item.first, fmt::format("{}: unknown; keys are {}", key, fmt::join(known, ", ")));
       }
     }
   }
@@ -165,9 +160,8 @@ ClassPriors parseClassPriors(const std::string& yaml, const std::string& file) {
   try {
     root = YAML::Load(yaml);
   } catch (const YAML::ParserException& e) {
-    throw StartupError(ExitCode::kConfiguration, file + ":" + std::to_string(e.mark.line + 1) +
-                                                     ":" + std::to_string(e.mark.column + 1) +
-                                                     ": " + e.msg);
+    throw StartupError(ExitCode::kConfiguration, fmt::format("{}:{}:{}: {}", file, e.mark.line + 1,
+                                                             e.mark.column + 1, e.msg));
   }
   PriorsReader reader(file);
   ClassPriors priors;

@@ -1,6 +1,5 @@
-// Delayed detections of a new inference process. If it misses everything that should be visible,
-// either it does not work or the objects are gone. The process that it replaces will soon decide
-// (services/inference/README.md, roll-backs).
+// Delayed detections of a new inference process that misses everything that should be visible,
+// until the process that it replaces decides (services/inference/README.md, roll-backs).
 #pragma once
 
 #include <cstddef>
@@ -8,14 +7,12 @@
 #include <vector>
 
 #include "common/types/detections.h"
-#include "common/types/objects.h"
 
 namespace perdure::semantic_filter {
 
 class Probation {
  public:
-  /// The largest number of delayed frames. The old process decides within fewer, and the history
-  /// can repeat more (history.frames).
+  /// Most delayed frames. The old process decides within fewer; the history can repeat more.
   static constexpr std::size_t kLongest = 24;
 
   void begin(InstanceId newcomer) { newcomer_ = newcomer; }
@@ -30,9 +27,5 @@ class Probation {
   InstanceId newcomer_ = 0;
   std::vector<Detections> kept_;
 };
-
-/// Whether at least one object is likely to be detected, and no detection overlaps any of the
-/// likely ones.
-bool missesAll(const std::vector<Prediction>& expected, const Detections& detections);
 
 }  // namespace perdure::semantic_filter

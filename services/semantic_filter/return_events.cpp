@@ -10,16 +10,13 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kRemembered_s = 8.0;
-constexpr double kLongestPause_s = 0.5;  // longest interval until the time is computed again
-constexpr double kNewShare = 0.2;        // relative change of the remaining time above which it is
-                                         // published
+constexpr double kShortestPause_s = 0.2;  // for an object that should already be visible
+constexpr double kLongestPause_s = 0.5;   // longest interval until the time is computed again
+constexpr double kNewShare = 0.2;  // least relative change of the remaining time that is news
 
 TimePoint later(TimePoint time, double seconds) {
   return time + std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 * seconds));
 }
-
-constexpr double kShortestPause_s = 0.2;  // minimum interval for an object that should already be
-                                          // visible
 
 bool inSight(const Track& o) { return o.visibility.fraction > 0.0; }
 
@@ -31,11 +28,6 @@ bool ReappearanceMonitor::waits(const Track& o, const Parameters& parameters) co
   if (o.visibility.state == Visibility::kOccluded) return true;
   const auto known = waiting_.find(o.id);
   return inSight(o) && known != waiting_.end() && o.life.hits == known->second.hits;
-}
-
-void ReappearanceMonitor::clear() {
-  waiting_.clear();
-  velocities_.clear();
 }
 
 void ReappearanceMonitor::addKeyframe(const FrameInput& now, const Way& way) {

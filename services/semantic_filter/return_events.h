@@ -1,6 +1,5 @@
-// Publishes the reappearance times of occluded objects: at the beginning of an occlusion, and again
-// when the time has changed or half of it has passed. The prediction therefore improves as the time
-// approaches. Derivation: tools/docs/maths/reappearance_time.md.
+// Publishes the reappearance times of occluded objects, and again when they have changed or half of
+// the time has passed. Derivation: tools/docs/maths/reappearance_time.md.
 #pragma once
 
 #include <deque>
@@ -15,12 +14,11 @@ namespace perdure::semantic_filter {
 
 class ReappearanceMonitor {
  public:
-  /// Returns events of kind kPredictedReturn for one published frame. `blank`: an event with stamp
-  /// and writer.
+  /// Returns events kPredictedReturn of one frame. `blank`: an event with stamp and writer.
   std::vector<Event> update(const std::vector<Track>& objects, const FrameInput& now,
                             const std::optional<ComingFrame>& coming, const Parameters& parameters,
                             const Event& blank);
-  void clear();
+  void clear() { *this = {}; }
 
  private:
   struct Velocity {

@@ -3,8 +3,16 @@
 #include <algorithm>
 
 #include "common/camera/same_camera.h"
+#include "common/vision/image.h"
 
 namespace perdure::vio {
+namespace {
+
+std::string sizeText(std::uint32_t width, std::uint32_t height) {
+  return std::to_string(width) + "×" + std::to_string(height);
+}
+
+}  // namespace
 
 std::vector<CameraModel> usedCameras(const Config& config, const Calibration& calibration) {
   const std::size_t wanted = config.stereo ? 2 : 1;
@@ -50,6 +58,34 @@ Cameras::Cameras(const Config& config, const Options& options, const std::vector
 bool sameCameras(const Calibration& a, const Calibration& b) {
   return std::equal(a.cameras.begin(), a.cameras.end(), b.cameras.begin(), b.cameras.end(),
                     sameCamera);
+}
+
+std::string otherSize(const Frame& frame, const CameraModel& model) {
+  const auto width = static_cast<std::uint32_t>(model.width());
+  const auto height = static_cast<std::uint32_t>(model.height());
+  if (frame.width == width && frame.height == height) return {};
+  return "frames of " + frame.camera + " are " + sizeText(frame.width, frame.height) +
+         ", their calibration is for " + sizeText(width, height) +
+         "; set the camera to that size, or calibrate it at its own";
+}
+
+std::optional<std::size_t> cameraOf(const Frame& frame, const std::vector<CameraModel>& models,
+                                    const Calibration& calibration, ReasonCounts& reasons) {
+  for (std::size_t i = models.size(); i-- > 0;) {
+    if (frame.camera == models[i].calibration().name) return i;
+  }
+  if (!calibration.camera(frame.camera)) reasons.add("frame_of_unknown_camera");
+  return std::nullopt;
+}
+
+cv::Mat secondImage(const FramePair& frames, bool stereo, ReasonCounts& reasons) {
+  if (!frames.second) {
+    if (stereo) reasons.add("stereo_unpaired");
+    return {};
+  }
+  const auto image = vision::monoOf(*frames.second);
+  if (!image) reasons.add(image.error());
+  return image ? *image : cv::Mat();
 }
 
 }  // namespace perdure::vio

@@ -3,15 +3,11 @@
 
 #include <string>
 
-#include "common/camera/camera_model.h"
-#include "common/types/sensors.h"
-
 namespace perdure::vio {
 
 class InVain {
  public:
-  /// Adds a frame without a result. why: a sentence with the fix, reported from the `from`-th frame
-  /// on.
+  /// Adds a frame without a result. why: a sentence, reported from the `from`-th frame on.
   void add(std::string why, int from) {
     ++frames_;
     why_ = frames_ >= from ? std::move(why) : std::string();
@@ -26,13 +22,9 @@ class InVain {
   std::string why_;
 };
 
-/// Number of frames after which Health reports the reason. For frames of another size it is lower,
-/// but above one, because one such frame may remain from an earlier setting.
+/// Frames after which Health reports the reason; fewer for another size, of which one may remain.
 inline constexpr int kInVain = 10;
 inline constexpr int kOtherSizes = 2;
 inline constexpr char kNoImage[] = "images cannot be read; mend the camera";
-
-/// A sentence with both sizes if the frame's size differs from its calibration; otherwise empty.
-std::string otherSize(const Frame& frame, const CameraModel& model);
 
 }  // namespace perdure::vio

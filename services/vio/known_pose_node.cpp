@@ -6,9 +6,7 @@
 #include "common/camera/camera_model.h"
 #include "common/math/so3.h"
 #include "common/vision/image.h"
-#include "services/vio/cameras.h"
-#include "services/vio/core/tracks/tracker.h"
-#include "services/vio/landmarks_message.h"
+#include "services/vio/core/tracks/descriptor.h"
 
 namespace perdure::vio {
 namespace {
@@ -27,25 +25,12 @@ constexpr char kFar[] =
 
 }  // namespace
 
-struct KnownPoseNode::Cameras {
-  Cameras(const Config& config, std::vector<CameraModel> all)
-      : models(std::move(all)),
-        tracker(config.tracker, models),
-        mapper(config.core.vision, config.core.window, extrinsics(models), readouts(models)) {}
-
-  std::vector<CameraModel> models;
-  Tracker tracker;
-  PointMapper mapper;
-};
-
 KnownPoseNode::KnownPoseNode(const Config& config, InstanceId instance, Sink<Landmarks> landmarks)
     : config_(config),
       instance_(instance),
       landmarks_(std::move(landmarks)),
       moving_(config.moving_mask),
       waiting_(config.pair_tolerance_s) {}
-
-KnownPoseNode::~KnownPoseNode() = default;
 
 const ReasonCounts& KnownPoseNode::reasons() const {
   all_reasons_ = reasons_;
@@ -153,18 +138,15 @@ void KnownPoseNode::onOdometry(const Odometry& odometry) {
 void KnownPoseNode::onFrame(const Frame& frame) {
   if (!cameras_) return reasons_.add("frame_before_calibration");
   const auto& models = cameras_->models;
-  const bool second = models.size() == 2 && frame.camera == models[1].calibration().name;
-  if (!second && frame.camera != models[0].calibration().name) {
-    if (!calibration_->camera(frame.camera)) reasons_.add("frame_of_unknown_camera");
-    return;
-  }
-  const CameraModel& model = models[second ? 1 : 0];
-  if (auto why = otherSize(frame, model); !why.empty()) {
+  const auto camera = cameraOf(frame, models, *calibration_, reasons_);
+  if (!camera) return;
+  const bool second = *camera == 1;
+  if (auto why = otherSize(frame, models[*camera]); !why.empty()) {
     second ? waiting_.refuseSecond(std::move(why)) : other_size_.add(std::move(why), kOtherSizes);
     return reasons_.add("frame_size_differs");
   }
-  if (!second) other_size_.clear();
   if (!second) {
+    other_size_.clear();
     if (isBefore(frame.stamp.time, newest_frame_)) clockJumpedBack();
     newest_frame_ = std::max(newest_frame_.value_or(frame.stamp.time), frame.stamp.time);
   }
@@ -213,14 +195,7 @@ void KnownPoseNode::begin(const WorldId& world) {
 void KnownPoseNode::process(const FramePair& frames, const Odometry& odometry) {
   const auto first = vision::monoOf(frames.first);
   if (!first) return giveUp(first.error(), kNoImage);
-  cv::Mat second;
-  if (frames.second) {
-    const auto image = vision::monoOf(*frames.second);
-    if (image) second = *image;
-    if (!image) reasons_.add(image.error());
-  } else if (cameras_->models.size() == 2) {
-    reasons_.add("stereo_unpaired");
-  }
+  const cv::Mat second = secondImage(frames, cameras_->models.size() == 2, reasons_);
   begin(odometry.world);
   std::optional<Eigen::Matrix3d> R;
   KnownPose pose{odometry.T_WB, odometry.covariance.topLeftCorner<6, 6>(), odometry.v_WB, {}};

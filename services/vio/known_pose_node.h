@@ -12,6 +12,7 @@
 #include "common/types/health.h"
 #include "common/types/odometry.h"
 #include "common/types/sensors.h"
+#include "services/vio/cameras.h"
 #include "services/vio/config.h"
 #include "services/vio/core/agreement.h"
 #include "services/vio/core/known_poses/point_mapper.h"
@@ -25,7 +26,6 @@ class KnownPoseNode {
  public:
   /// landmarks: one message for each frame of the first camera that has a pose, in order.
   KnownPoseNode(const Config& config, InstanceId instance, Sink<Landmarks> landmarks);
-  ~KnownPoseNode();
 
   void onCalibration(const Calibration& calibration);
   /// Takes poses in order of their stamps. Only poses of the first camera's frames are used.
@@ -46,7 +46,16 @@ class KnownPoseNode {
   std::string statusOfPoses() const;
 
  private:
-  struct Cameras;
+  struct Cameras {
+    Cameras(const Config& config, std::vector<CameraModel> all)
+        : models(std::move(all)),
+          tracker(config.tracker, models),
+          mapper(config.core.vision, config.core.window, extrinsics(models), readouts(models)) {}
+
+    std::vector<CameraModel> models;
+    Tracker tracker;
+    PointMapper mapper;
+  };
   void judgePoses();
   void drain(bool all);
   bool isBefore(TimePoint time, const std::optional<TimePoint>& newest) const;

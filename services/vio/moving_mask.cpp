@@ -1,7 +1,6 @@
 #include "services/vio/moving_mask.h"
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 
 #include "common/math/so3.h"

@@ -24,9 +24,8 @@ class MovingMask {
 
   /// Stores those of the newest objects that move.
   void onObjects(const Objects& objects);
-  /// Bounding boxes, in pixels and clipped to the image, of the moving objects' cuboids at `now`.
-  /// Each object is propagated with its velocity. T_WB: pose of the body in `world` at `now`. Empty
-  /// if the objects belong to another world, are too old, or have a later time.
+  /// Boxes, px and clipped to the image, of the moving objects' cuboids, propagated to `now`. T_WB:
+  /// the body in `world`. Empty for objects of another world, too old, or of a later time.
   std::vector<cv::Rect2f> boxes(const CameraModel& camera, const WorldId& world,
                                 const RigidTransform& T_WB, TimePoint now) const;
 

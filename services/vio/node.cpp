@@ -1,10 +1,9 @@
 #include "services/vio/node.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "common/vision/image.h"
-#include "services/vio/landmarks_message.h"
+#include "services/vio/core/tracks/descriptor.h"
 
 namespace perdure::vio {
 namespace {
@@ -22,8 +21,6 @@ constexpr char kImagesContradict[] =
     "axes, signs and units (radians per second), the focal length and time_offset_s; or what moves "
     "fills the picture";
 
-double seconds(Duration d) { return toSeconds(d); }
-
 }  // namespace
 
 Node::Node(const Config& config, InstanceId instance, Outputs outputs)
@@ -35,10 +32,6 @@ Node::Node(const Config& config, InstanceId instance, Outputs outputs)
       waiting_(config.pair_tolerance_s),
       moving_(config.moving_mask),
       motion_initialiser_(config.core) {}
-
-Node::~Node() = default;
-
-bool Node::started() const { return cameras_ && cameras_->estimator.started(); }
 
 const ReasonCounts& Node::reasons() const {
   all_reasons_ = reasons_;
@@ -144,21 +137,17 @@ void Node::onImu(const ImuSample& sample) {
 }
 
 void Node::onSpeed(const SpeedSample& sample) {
-  const auto added = speeds_.add({sample.time, sample.speed, sample.sigma});
+  const auto added = speeds_.add(sample);
   if (!added) return reasons_.add(added.error());
   drain(false);
 }
 
 void Node::onFrame(const Frame& frame) {
   if (!cameras_) return reasons_.add("frame_before_calibration");
-  const bool second =
-      cameras_->models.size() == 2 && frame.camera == cameras_->models[1].calibration().name;
-  if (!second && frame.camera != cameras_->models[0].calibration().name) {
-    if (!calibration_->camera(frame.camera)) reasons_.add("frame_of_unknown_camera");
-    return;
-  }
-  const CameraModel& model = cameras_->models[second ? 1 : 0];
-  if (auto why = otherSize(frame, model); !why.empty()) {
+  const auto camera = cameraOf(frame, cameras_->models, *calibration_, reasons_);
+  if (!camera) return;
+  const bool second = *camera == 1;
+  if (auto why = otherSize(frame, cameras_->models[*camera]); !why.empty()) {
     second ? waiting_.refuseSecond(std::move(why)) : in_vain_.add(std::move(why), kOtherSizes);
     return reasons_.add("frame_size_differs");
   }
@@ -182,14 +171,6 @@ TimePoint Node::imuTime(TimePoint image_time) const {
   return image_time + durationFromSeconds(offset);
 }
 
-double Node::longestReadout() const {
-  double longest = 0.0;
-  for (const CameraModel& m : cameras_->models) {
-    longest = std::max(longest, m.calibration().readout_s);
-  }
-  return longest;
-}
-
 bool Node::waitsForPair() const {
   if (cameras_->models.size() < 2 || !waiting_.frontMayBePaired()) return false;
   // After half a second of later samples, no partner is expected.
@@ -201,9 +182,7 @@ bool Node::ready() const {
   TimePoint now = imuTime(waiting_.front().first.stamp.time);
   if (imu_.empty()) return false;
   // Up to the last row, because an image arrives only after its read-out.
-  if (const double readout_s = longestReadout(); readout_s > 0.0) {
-    now += durationFromSeconds(0.5 * readout_s);
-  }
+  now += durationFromSeconds(0.5 * std::max(0.0, std::ranges::max(readouts(cameras_->models))));
   // The last sample may be extrapolated by a quarter of a period. A capture that waits for this
   // frame's answer sends no sample beyond the next frame.
   if (const auto period = imu_.period()) now -= *period / 4;
@@ -217,20 +196,18 @@ void Node::drain(bool all) {
   while (cameras_ && !waiting_.empty() && (all || ready())) process(waiting_.take());
 }
 
-void Node::flush() { drain(true); }
-
 void Node::noteGaps(TimePoint now) {
   const TimePoint from =
       started() ? cameras_->estimator.state().time : last_imu_time_.value_or(now);
   if (from >= now || imu_.empty()) return;
-  const double gap = seconds(imu_.longestGap(from, now));
+  const double gap = toSeconds(imu_.longestGap(from, now));
   if (gap <= config_.core.imu.gap_from_s) return;
   reasons_.add("imu_gap");
   degraded_frames_ = kDegradedFrames;
   if (!started()) return;
   if (gap > config_.longest_gap_s) return lose({"imu_gap_too_long", ""});
   // Neither images nor samples arrived: the clock jumped, or the body moved unobserved.
-  if (std::min(gap, seconds(now - from)) > config_.longest_blackout_s) {
+  if (std::min(gap, toSeconds(now - from)) > config_.longest_blackout_s) {
     lose({"clock_jumped_or_blackout", ""});
   }
 }
@@ -239,13 +216,12 @@ TrackedFrame Node::trackImages(const cv::Mat& first, const cv::Mat& second, Time
   std::optional<Eigen::Matrix3d> R;
   const double gap_from = config_.core.imu.gap_from_s;
   if (started() && !imu_.empty() && imu_.last() > cameras_->estimator.state().time &&
-      seconds(imu_.longestGap(cameras_->estimator.state().time, now)) <= gap_from) {
+      toSeconds(imu_.longestGap(cameras_->estimator.state().time, now)) <= gap_from) {
     R = cameras_->estimator.predictRotation(imu_, now);
   }
   const Eigen::Vector3d turn = cameras_->estimator.turnOfReadout(imu_, now);
   if (!started()) {
-    // Traffic in front of a body at rest. With a known rotation, traffic cannot outvote the points
-    // at rest.
+    // Traffic before a body at rest cannot outvote points at rest with a known rotation.
     const auto motion = cameras_->tracker.motionSince(1, 0.8);
     constexpr std::chrono::milliseconds kEven{500};
     if (motion && *motion > config_.core.rest.disparity_px &&
@@ -256,7 +232,7 @@ TrackedFrame Node::trackImages(const cv::Mat& first, const cv::Mat& second, Time
   }
   const State& state = cameras_->estimator.state();
   RigidTransform T_WB = state.nav.T_WB();
-  T_WB.p += seconds(now - state.time) * state.nav.v_WB;
+  T_WB.p += toSeconds(now - state.time) * state.nav.v_WB;
   if (R) T_WB.q = T_WB.q * Eigen::Quaterniond(R->transpose());
   const auto masked = moving_.boxes(cameras_->models[0], world_, T_WB, *last_image_);
   return cameras_->tracker.track(first, second, R, masked, turn);
@@ -272,16 +248,7 @@ void Node::process(const FramePair& frames) {
     return publishWaiting(stamp);
   }
   in_vain_.clear();
-  cv::Mat second;
-  if (frames.second) {
-    if (const auto image = vision::monoOf(*frames.second)) {
-      second = *image;
-    } else {
-      reasons_.add(image.error());
-    }
-  } else if (cameras_->models.size() == 2) {
-    reasons_.add("stereo_unpaired");
-  }
+  const cv::Mat second = secondImage(frames, cameras_->models.size() == 2, reasons_);
   const TimePoint now = imuTime(stamp.time);
   noteGaps(now);
   FrameInput input{++frame_, stamp.time, trackImages(*first, second, now), {}, {}};

@@ -32,13 +32,11 @@ struct Outputs {
   Sink<std::vector<Innovation>> innovations = {};
 };
 
-inline constexpr int kDegradedFrames = 20;  ///< number of degraded frames after a gap or a
-                                            ///< resumption
+inline constexpr int kDegradedFrames = 20;  ///< degraded frames after a gap or a resumption
 
 class Node {
  public:
   Node(const Config& config, InstanceId instance, Outputs outputs);
-  ~Node();
 
   void onCalibration(const Calibration& calibration);
   void onImu(const ImuSample& sample);
@@ -47,7 +45,7 @@ class Node {
   /// Objects of the object filter; used only with input.moving_mask.
   void onObjects(const Objects& objects) { moving_.onObjects(objects); }
   /// End of data: processes the waiting frames and repeats the last inertial sample.
-  void flush();
+  void flush() { drain(true); }
 
   /// Sets the frame of reference; call before the first output.
   void setWorld(WorldId world) { world_ = world; }
@@ -58,7 +56,7 @@ class Node {
   Result<void> restoreState(const std::string& text);
 
   const ReasonCounts& reasons() const;
-  bool started() const;
+  bool started() const { return cameras_ && cameras_->estimator.started(); }
   HealthState health() const;
   /// One sentence: what the node waits for, or what is wrong. Empty if there is no problem.
   std::string status() const;
@@ -82,7 +80,6 @@ class Node {
   void publishWaiting(const FrameStamp& stamp);
   void publishLandmarks(const FrameStamp& stamp, const cv::Mat& image);
   TimePoint imuTime(TimePoint image_time) const;
-  double longestReadout() const;
 
   Config config_;
   InstanceId instance_;

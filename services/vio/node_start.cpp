@@ -70,8 +70,7 @@ void Node::begin(TimePoint now, const FrameInput& input) {
   const bool moves = moved && *moved >= options.start.rest_disparity_px;
   const bool slow = !input.speed || std::abs(input.speed->speed) < 0.1;
   Result<Start> start = fail("start_waits");
-  // With older samples the start would have an old pose, and the next frame would end the filter
-  // again.
+  // Older samples would give an old pose, and the next frame would end the filter again.
   constexpr std::chrono::milliseconds kFresh{300};
   const bool fresh =
       !imu_.empty() && toSeconds(imu_.longestGap(now - kFresh, now)) <= config_.core.imu.gap_from_s;

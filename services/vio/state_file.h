@@ -10,8 +10,7 @@ namespace perdure::vio {
 
 class StateFile {
  public:
-  /// Creates the directory, and throws StartupError if it cannot. If `directory` is empty, nothing
-  /// is saved.
+  /// Creates the directory or throws StartupError. With an empty `directory` nothing is saved.
   explicit StateFile(const std::string& directory);
   /// Empty if there is no file.
   std::optional<std::string> read() const;

@@ -4,14 +4,10 @@
 #include <chrono>
 
 namespace perdure::vio {
-namespace {
 
 constexpr std::size_t kUnpaired = 4;
-constexpr std::size_t kAlone = 10;  // frames in a row after which the second camera counts as
-                                    // absent
+constexpr std::size_t kAlone = 10;  // frames in a row after which the second camera is absent
 constexpr std::chrono::milliseconds kReordered{300};  // largest reordering by transports
-
-}  // namespace
 
 Result<void> WaitingFrames::addFirst(const Frame& frame) {
   const bool earlier_run = std::erase_if(pairs_, [&](const FramePair& waiting) {

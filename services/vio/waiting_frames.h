@@ -49,8 +49,7 @@ class WaitingFrames {
   std::deque<Frame> seconds_;       ///< not paired yet
   std::optional<TimePoint> taken_;  ///< stamp of the last frame taken
   int alone_ = 0;                   ///< frames taken in a row without a partner
-  std::deque<TimePoint> missed_;    ///< stamps of these frames, since an image of the second camera
-                                    ///< arrived for one of them
+  std::deque<TimePoint> missed_;    ///< their stamps, since the second camera served one of them
   std::string trouble_;             ///< problem of the second camera's last image; empty: none
 };
 

@@ -52,7 +52,7 @@ TEST(IncludeRules, ForbidWhatCrossesLayers) {
   EXPECT_THAT(including("services/semantic_filter/core/belief/track.h",
                         "services/semantic_filter/core/measurement/frame.h"),
               ElementsAre(HasSubstr("a layer of a folder")));
-  EXPECT_THAT(including("services/semantic_filter/core/belief/parameters.h",
+  EXPECT_THAT(including("services/semantic_filter/core/parameters.h",
                         "services/semantic_filter/core/belief/track.h"),
               ElementsAre(HasSubstr("plain numbers")));
   EXPECT_THAT(including("services/vio/main.cpp", "dds/dds.h"),
@@ -74,7 +74,7 @@ TEST(IncludeRules, AllowWhatStaysInsideThem) {
   EXPECT_THAT(including("services/vio/main.cpp", "common/service/service.h"), IsEmpty());
   EXPECT_THAT(including("services/vio/main.cpp", "services/vio/node.h"), IsEmpty());
   EXPECT_THAT(including("services/semantic_filter/core/belief/track.h",
-                        "services/semantic_filter/core/tracks/parameters.h"),
+                        "services/semantic_filter/core/parameters.h"),
               IsEmpty());
   EXPECT_THAT(including("services/vio/core/start/a.h", "services/vio/core/estimator.h"), IsEmpty());
   EXPECT_THAT(including("common/bus/dds.h", "dds/dds.h"), IsEmpty());

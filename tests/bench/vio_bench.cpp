@@ -10,8 +10,7 @@
 #include "services/vio/core/start/motion_initialiser.h"
 #include "services/vio/core/tracks/descriptor.h"
 #include "services/vio/core/tracks/tracker.h"
-#include "services/vio/core/update/updater_msckf.h"
-#include "services/vio/core/update/updater_slam.h"
+#include "services/vio/core/update/point_updates.h"
 #include "tests/bench/allocations.h"
 #include "tests/bench/vio_stages.h"
 

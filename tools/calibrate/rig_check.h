@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "services/vio/config.h"
-#include "services/vio/core/update/updater_slam.h"
+#include "services/vio/core/update/point_updates.h"
 #include "services/vio/node.h"
 #include "tools/calibrate/verdict.h"
 

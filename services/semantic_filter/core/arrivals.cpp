@@ -1,7 +1,6 @@
 #include "services/semantic_filter/core/arrivals.h"
 
 #include <algorithm>
-#include <set>
 #include <utility>
 
 #include "services/semantic_filter/core/belief/pose_correlation.h"
@@ -42,7 +41,6 @@ class Arrival {
     belief_.tracks.insert(later, std::move(track));
   }
 
-  /// Fuses the tracks of each object.
   std::vector<MergeRecord> unite() {
     std::map<ObjectId, std::vector<TrackId>> objects;
     for (const auto& [track, object] : arrivals_.members) objects[object].push_back(track);

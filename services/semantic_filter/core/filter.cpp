@@ -2,12 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "common/base/check.h"
+#include "services/semantic_filter/core/association/box_explanation.h"
 #include "services/semantic_filter/core/association/joint_association.h"
-#include "services/semantic_filter/core/association/occlusion_revision.h"
-#include "services/semantic_filter/core/association/top_down.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
 #include "services/semantic_filter/core/smoothing/refit.h"
@@ -16,13 +14,67 @@
 #include "services/semantic_filter/core/tracks/mixture_reduction.h"
 #include "services/semantic_filter/core/tracks/new_classes.h"
 #include "services/semantic_filter/core/tracks/reidentify.h"
-#include "services/semantic_filter/core/tracks/reinitialise.h"
 #include "services/semantic_filter/core/update/predict.h"
 #include "services/semantic_filter/core/update/track_update.h"
 
 namespace perdure::semantic_filter {
 
 namespace {
+
+NoiseScale noiseScaleOf(const Belief& belief, const FrameInput& input, const BoxParameters& box) {
+  const std::uint64_t model = input.model->hash;
+  return {model, belief.learned.sides.ratio(model, box.prior_sides),
+          belief.learned.azimuths.ratio(model, box.prior_azimuths)};
+}
+
+/// Returns the input with the learned noise of the network in its boxes.
+FrameInput withLearnedNoise(const Belief& belief, FrameInput input, const BoxParameters& box) {
+  const NoiseScale scale = noiseScaleOf(belief, input, box);
+  for (BoxDetection& detection : *input.boxes) {
+    detection.z.variance *= scale.noise;
+    detection.z.lasting *= scale.lasting();
+  }
+  return input;
+}
+
+FrameContext contextOf(const Belief& belief, const FrameInput& input, const Parameters& parameters,
+                       const ClassPriors& priors) {
+  const NoiseScale noise_scale = noiseScaleOf(belief, input, parameters.box);
+  return {input.view,
+          input.pose_error,
+          input.model.get(),
+          &priors,
+          &parameters,
+          std::make_shared<const FrameView>(input.view, input.pose_error, input.stamp.time,
+                                            input.model->styles, noise_scale),
+          noise_scale,
+          std::make_shared<const GroundSurface>(belief.tracks, belief.path,
+                                                belief.learned.roughness_scale, input.view.up_W,
+                                                priors, parameters.ground),
+          &belief.learned.movers};
+}
+
+/// Sets the visibility of all tracks and returns it in the order of the tracks.
+ScratchVector<TrackVisibility> updateVisibility(Belief& belief, const FrameInput& input,
+                                                const VisibilityParameters& parameters) {
+  const Projector from(input.view);
+  ScratchVector<Outline> outlines;
+  outlines.reserve(belief.tracks.size());
+  for (const auto& o : belief.tracks) {
+    outlines.push_back(
+        outlineOf(o, stateAt(o.best(), toSeconds(input.stamp.time - o.as_of)), from));
+  }
+  const auto& camera = *input.view.camera;
+  auto visibilities =
+      computeVisibility(outlines, input.points, camera.width(), camera.height(), parameters);
+  for (std::size_t j = 0; j < visibilities.size(); ++j) {
+    Track& o = belief.tracks[j];
+    o.visibility.state = visibilities[j].state;
+    o.visibility.fraction = visibilities[j].fraction;
+    o.visibility.blocked_by = visibilities[j].blocked_by;
+  }
+  return visibilities;
+}
 
 /// Notes a frame in which the track is not visible in its ledger.
 void noteNotVisible(Track& track, Visibility why, TimePoint now, double min_speed) {
@@ -33,84 +85,60 @@ void noteNotVisible(Track& track, Visibility why, TimePoint now, double min_spee
   entry.last = now;
 }
 
-}  // namespace
+struct ScoredTrack {
+  std::size_t track;  ///< index in Belief::tracks
+  TrackScore score;
+  std::optional<std::size_t> assigned = {};  ///< the box of the frame that is assigned to the track
+  /// The track before its update, if it was confirmed, is static, and a box is near. One bad box
+  /// must not deform the track.
+  std::optional<Track> before = {};
+  bool sound = true;  ///< state of its numbers after the update
+};
 
-NoiseScale SemanticFilter::noiseScaleOf(const Belief& belief, const FrameInput& input) const {
-  const std::uint64_t model = input.model->hash;
-  const BoxParameters& assumed = parameters_.box;
-  return {model, belief.learned.sides.ratio(model, assumed.prior_sides),
-          belief.learned.azimuths.ratio(model, assumed.prior_azimuths)};
-}
+/// The parts of a step that use the detections.
+struct Step {
+  Belief& belief;
+  const FrameInput& input;
+  const FrameContext& frame;
+  const std::vector<BoxDetection>& boxes = *input.boxes;
+  const Parameters& parameters = *frame.parameters;
+  const TimePoint now = input.stamp.time;
 
-FrameContext SemanticFilter::contextOf(const Belief& belief, const FrameInput& input) const {
-  const NoiseScale noise_scale = noiseScaleOf(belief, input);
-  return {input.view,
-          input.pose_error,
-          input.model.get(),
-          &priors_,
-          &parameters_,
-          std::make_shared<const FrameView>(input.view, input.pose_error, input.stamp.time,
-                                            input.model->styles, noise_scale),
-          noise_scale,
-          std::make_shared<const GroundSurface>(belief.tracks, belief.path,
-                                                belief.learned.roughness_scale, input.view.up_W,
-                                                priors_, parameters_.ground),
-          &belief.learned.movers};
-}
+  ScratchVector<ScoredTrack> scoreAll(const ScratchVector<TrackVisibility>& visibilities);
+  Eigen::VectorXd associateAndUpdate(ScratchVector<ScoredTrack>& scored);
+  void manage(Track& track, ScoredTrack& scored);
+  void manageAll(ScratchVector<ScoredTrack>& scored);
+  void resolveIdentities(StepReport& report);
+};
 
-ScratchVector<TrackVisibility> SemanticFilter::updateVisibility(Belief& belief,
-                                                                const FrameInput& input) const {
-  const Projector from(input.view);
-  ScratchVector<Outline> outlines;
-  outlines.reserve(belief.tracks.size());
-  for (const auto& o : belief.tracks) {
-    outlines.push_back(
-        outlineOf(o, stateAt(o.best(), toSeconds(input.stamp.time - o.as_of)), from));
-  }
-  const auto& camera = *input.view.camera;
-  auto visibilities = computeVisibility(outlines, input.points, camera.width(), camera.height(),
-                                        parameters_.visibility);
-  for (std::size_t j = 0; j < visibilities.size(); ++j) {
-    Track& o = belief.tracks[j];
-    o.visibility.state = visibilities[j].state;
-    o.visibility.fraction = visibilities[j].fraction;
-    o.visibility.blocked_by = visibilities[j].blocked_by;
-  }
-  return visibilities;
-}
-
-ScratchVector<SemanticFilter::ScoredTrack> SemanticFilter::scoreAll(
-    Belief& belief, const ScratchVector<TrackVisibility>& visibilities, const FrameInput& input,
-    const FrameContext& frame) const {
+/// Predicts and scores the visible tracks.
+ScratchVector<ScoredTrack> Step::scoreAll(const ScratchVector<TrackVisibility>& visibilities) {
   ScratchVector<ScoredTrack> scored;
   scored.reserve(static_cast<std::size_t>(
       std::count_if(visibilities.begin(), visibilities.end(),
                     [](const TrackVisibility& s) { return s.fraction > 0.0; })));
   const ViewWalk walk = viewWalkOf(frame);
   for (std::size_t j = 0; j < visibilities.size(); ++j) {
+    Track& track = belief.tracks[j];
     if (visibilities[j].fraction <= 0.0) {
-      noteNotVisible(belief.tracks[j], visibilities[j].state, input.stamp.time,
-                     parameters_.motion.min_speed);
+      noteNotVisible(track, visibilities[j].state, now, parameters.motion.min_speed);
       continue;
     }
-    predict(belief.tracks[j], input.stamp.time, input.pose_error, parameters_.motion, walk);
-    scored.push_back({j, scoreTrack(belief.tracks[j], visibilities[j], *input.boxes, frame)});
-    if (admitNewClasses(belief.tracks[j], scored.back().score, *input.boxes, frame)) {
-      scored.back().score = scoreTrack(belief.tracks[j], visibilities[j], *input.boxes, frame);
+    predict(track, now, input.pose_error, parameters.motion, walk);
+    scored.push_back({j, scoreTrack(track, visibilities[j], boxes, frame)});
+    if (admitNewClasses(track, scored.back().score, boxes, frame)) {
+      scored.back().score = scoreTrack(track, visibilities[j], boxes, frame);
     }
-    const auto primed = input.top_down.find(belief.tracks[j].id);
+    const auto primed = input.top_down.find(track.id);
     if (primed != input.top_down.end()) {
-      applyTopDown(scored.back().score, belief.tracks[j], primed->second, frame);
+      applyTopDown(scored.back().score, track, primed->second, frame);
     }
   }
   return scored;
 }
 
-Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief,
-                                                   ScratchVector<ScoredTrack>& scored,
-                                                   const FrameInput& input,
-                                                   const FrameContext& frame) const {
-  const auto& boxes = *input.boxes;
+/// Updates the scored tracks; returns Association::explained.
+Eigen::VectorXd Step::associateAndUpdate(ScratchVector<ScoredTrack>& scored) {
   const auto n = static_cast<Eigen::Index>(scored.size());
   const auto m = static_cast<Eigen::Index>(boxes.size());
   Eigen::MatrixXd psi = Eigen::MatrixXd::Zero(n, m);
@@ -145,8 +173,9 @@ Eigen::VectorXd SemanticFilter::associateAndUpdate(Belief& belief,
   return association.explained;
 }
 
-void SemanticFilter::manage(Track& track, ScoredTrack& scored, const FrameInput& input,
-                            const FrameContext& frame) const {
+/// Reduces the mixture of one track after its update. If no hypothesis remains, the box counts as a
+/// miss, or the box re-initialises the state; otherwise existence becomes 0.
+void Step::manage(Track& track, ScoredTrack& scored) {
   const auto pmf = classShares(track);
   reduceMixture(track, frame);
   if (track.hypotheses.empty() && scored.before) {
@@ -155,8 +184,8 @@ void SemanticFilter::manage(Track& track, ScoredTrack& scored, const FrameInput&
   }
   if (!track.hypotheses.empty()) return;
   if (scored.assigned) {
-    const BoxDetection& box = (*input.boxes)[*scored.assigned];
-    const auto range = rangeFromLandmarks(box, input.points, parameters_.initiation);
+    const BoxDetection& box = boxes[*scored.assigned];
+    const auto range = rangeFromLandmarks(box, input.points, parameters.initiation);
     if (reinitialise(track, pmf, box, range, frame)) {
       considerKeyframe(track, box, hiddenSides(scored.score, *scored.assigned, box), frame);
       reduceMixture(track, frame);
@@ -166,6 +195,26 @@ void SemanticFilter::manage(Track& track, ScoredTrack& scored, const FrameInput&
     track.existence.become(0.0, ExistenceEvidence::kMisshapen, track.as_of);
   }
 }
+
+void Step::manageAll(ScratchVector<ScoredTrack>& scored) {
+  std::vector<Track> lost;
+  for (auto& s : scored) {
+    Track& track = belief.tracks[s.track];
+    if (s.sound) manage(track, s);
+    if (track.hypotheses.empty() && s.before) lost.push_back(*std::move(s.before));
+  }
+  keepDeleted(belief.recently_deleted, std::move(lost), now, parameters.tracks);
+}
+
+void Step::resolveIdentities(StepReport& report) {
+  report.merges = mergeObjects(belief.tracks, frame);
+  keepDeleted(belief.recently_deleted, confirmAndDelete(belief.tracks, frame), now,
+              parameters.tracks);
+  const auto found = reidentify(belief.tracks, belief.recently_deleted, frame);
+  report.merges.insert(report.merges.end(), found.begin(), found.end());
+}
+
+}  // namespace
 
 bool SemanticFilter::join(Belief& belief, TrackId id, TrackId absorbed,
                           const FrameInput& input) const {
@@ -178,84 +227,43 @@ bool SemanticFilter::join(Belief& belief, TrackId id, TrackId absorbed,
         "two tracks of the working set are joined");
   if (!sameKind(*kept, *other)) return false;
   if (other->id < kept->id) std::swap(*kept, *other);
-  mergeTwo(*kept, *other, contextOf(belief, input));
+  mergeTwo(*kept, *other, contextOf(belief, input, parameters_, priors_));
   kept->id = id;
   belief.tracks.erase(other);
   return true;
 }
 
-FrameInput SemanticFilter::withLearnedNoise(const Belief& belief, FrameInput input) const {
-  const NoiseScale scale = noiseScaleOf(belief, input);
-  for (BoxDetection& box : *input.boxes) {
-    box.z.variance *= scale.noise;
-    box.z.lasting *= scale.lasting();
-  }
-  return input;
-}
-
-void SemanticFilter::manageAll(Belief& belief, ScratchVector<ScoredTrack>& scored,
-                               const FrameInput& input, const FrameContext& frame) const {
-  std::vector<Track> lost;
-  for (auto& s : scored) {
-    Track& track = belief.tracks[s.track];
-    if (s.sound) manage(track, s, input, frame);
-    if (track.hypotheses.empty() && s.before) lost.push_back(*std::move(s.before));
-  }
-  keepDeleted(belief.recently_deleted, std::move(lost), input.stamp.time, parameters_.tracks);
-}
-
-void SemanticFilter::dropBroken(Belief& belief, StepReport& report) {
+StepReport SemanticFilter::step(Belief& belief, const FrameInput& heard, IdBook& ids) const {
+  const ScratchScope scope;
+  StepReport report;
+  belief.path.advance(heard.view.T_WB.p);
+  // Visibility is published with every frame, with or without detections.
+  auto visibilities = updateVisibility(belief, heard, parameters_.visibility);
+  if (!heard.boxes) return report;
+  FrameInput input = withLearnedNoise(belief, heard, parameters_.box);
+  markSidesBesideNearer(*input.boxes, input.view);
+  // Both change the meaning of a box or a miss, so they precede all scores.
+  explainPartialViews(belief, visibilities, input, parameters_, priors_);
+  const FrameContext frame = contextOf(belief, input, parameters_, priors_);
+  reviseOcclusion(belief, visibilities, input, parameters_);
+  Step step{belief, input, frame};
+  // All tracks are scored before the first update, because association compares their scores.
+  auto scored = step.scoreAll(visibilities);
+  const auto explained = step.associateAndUpdate(scored);
+  // A track that lost its shape may take its box again before this box initiates another track.
+  step.manageAll(scored);
+  initiateTracks(belief, visibilities, explained, input, frame, ids);
   std::erase_if(belief.tracks, [](const Track& t) { return t.hypotheses.empty(); });
   report.broken = std::erase_if(belief.tracks, [](const Track& t) {
     return t.visibility.fraction > 0.0 && !sound(t);  // the other tracks did not change
   });
-}
-
-void SemanticFilter::recordDetections(Belief& belief, TimePoint now) {
-  for (Track& t : belief.tracks) {
-    const bool visible = t.visibility.fraction > 0.0;
-    t.history.add(visible, visible && t.life.last_seen == now);
-  }
-}
-
-void SemanticFilter::resolveIdentities(Belief& belief, const FrameContext& frame, TimePoint now,
-                                       StepReport& report) const {
-  const auto add = [&](const std::vector<MergeRecord>& merges) {
-    report.merges.insert(report.merges.end(), merges.begin(), merges.end());
-  };
-  add(mergeObjects(belief.tracks, frame));
-  keepDeleted(belief.recently_deleted, confirmAndDelete(belief.tracks, frame), now,
-              parameters_.tracks);
-  add(reidentify(belief.tracks, belief.recently_deleted, frame));
-}
-
-StepReport SemanticFilter::step(Belief& belief, const FrameInput& heard, IdBook& ids) const {
-  const ScratchScope scope;
-  StepReport report;
-  const TimePoint now = heard.stamp.time;
-  belief.path.advance(heard.view.T_WB.p);
-  // Visibility is published with every frame, with or without detections.
-  auto visibilities = updateVisibility(belief, heard);
-  if (!heard.boxes) return report;
-  FrameInput input = withLearnedNoise(belief, heard);
-  markSidesBesideNearer(*input.boxes, input.view);
-  // Both change the meaning of a box or a miss, so they precede all scores.
-  explainPartialViews(belief, visibilities, input, parameters_, priors_);
-  const FrameContext frame = contextOf(belief, input);
-  reviseOcclusion(belief, visibilities, input, parameters_);
-  // All tracks are scored before the first update, because association compares their scores.
-  auto scored = scoreAll(belief, visibilities, input, frame);
-  const auto explained = associateAndUpdate(belief, scored, input, frame);
-  // A track that lost its shape may take its box again before this box initiates another track.
-  manageAll(belief, scored, input, frame);
-  initiateTracks(belief, visibilities, explained, input, frame, ids);
-  dropBroken(belief, report);
   // Track management uses the detections of this frame and includes new tracks.
-  recordDetections(belief, now);
-  for (const Track& t : belief.tracks) {
-    if (t.life.last_seen == now) belief.learned.movers.learn(t, parameters_.motion.min_speed);
+  for (Track& t : belief.tracks) {
+    const bool visible = t.visibility.fraction > 0.0, detected = t.life.last_seen == step.now;
+    t.history.add(visible, visible && detected);
+    if (detected) belief.learned.movers.learn(t, parameters_.motion.min_speed);
   }
-  resolveIdentities(belief, frame, now, report);
+  step.resolveIdentities(report);
   return report;
 }
 

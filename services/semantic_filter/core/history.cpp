@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "common/math/gaussian.h"
-#include "services/semantic_filter/core/measurement/pose_error.h"
 
 namespace perdure::semantic_filter {
 namespace {

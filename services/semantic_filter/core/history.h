@@ -46,12 +46,10 @@ class History {
   /// Steps frame `index` and all stepped ones after it again.
   void stepAgainFrom(std::size_t index);
 
-  /// Removes tracks and their arrivals from the newest belief and from those that late detections
-  /// may return to.
+  /// Removes tracks and their arrivals from all beliefs.
   void erase(const std::set<TrackId>& ids);
 
   std::deque<HistoryFrame>& frames() { return frames_; }
-  const std::deque<HistoryFrame>& frames() const { return frames_; }
   bool empty() const { return frames_.empty(); }
   HistoryFrame& newest() { return frames_.back(); }
   TimePoint oldestTime() const { return frames_.front().input.stamp.time; }
@@ -62,9 +60,7 @@ class History {
 
   const Belief& belief() const { return belief_; }
   IdBook& ids() { return ids_; }
-  const IdBook& ids() const { return ids_; }
   const PoseError& poseError() const { return pose_error_; }
-  /// Pose of the newest frame in W.
   const std::optional<RigidTransform>& lastPose() const { return last_T_WB_; }
 
  private:

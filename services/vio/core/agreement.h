@@ -1,6 +1,5 @@
-// Checks whether poses, given or estimated by the filter, agree with the images. Over the last
-// images it counts the tracks with parallax that have a position, and those that the poses
-// contradict. Derivation: tools/docs/maths/vio-known-poses.md.
+// Checks whether poses agree with the images, by the tracks with parallax of the last images.
+// Derivation: tools/docs/maths/vio-known-poses.md.
 #pragma once
 
 #include <cstddef>
@@ -9,8 +8,7 @@ namespace perdure::vio {
 
 /// Counts of the tracks of one image, by the result of their triangulation.
 struct Mapped {
-  std::size_t contradicted = 0;  ///< rays that do not meet in front of the cameras, or that fail
-                                 ///< the gate
+  std::size_t contradicted = 0;  ///< rays that do not meet before the cameras, or fail the gate
   std::size_t far = 0;           ///< points beyond VisionOptions::max_depth_m
   std::size_t sure = 0;          ///< landmarks, and tracks that an update has used
 };

@@ -6,11 +6,9 @@
 
 #include "common/base/check.h"
 #include "common/math/gaussian.h"
-#include "common/math/so3.h"
 #include "services/vio/core/propagation/imu_propagator.h"
+#include "services/vio/core/update/point_updates.h"
 #include "services/vio/core/update/triangulation.h"
-#include "services/vio/core/update/updater_msckf.h"
-#include "services/vio/core/update/updater_slam.h"
 #include "services/vio/core/update/updates.h"
 #include "services/vio/core/update/visual.h"
 
@@ -49,8 +47,7 @@ Eigen::Vector3d Estimator::turnOfReadout(const ImuBuffer& imu, TimePoint time) {
   return readout_s * rowMotion(nav, imu, time, half, options_.gravity, readings_, scale).rate;
 }
 
-/// Computes the row motion of the newest clone. Repeated after an update, with the new velocity and
-/// biases.
+/// Computes the row motion of the newest clone, again after an update.
 void Estimator::measureRows(const ImuBuffer& imu) {
   const double readout_s = state_->longestReadout();
   if (readout_s == 0.0) return;
@@ -81,8 +78,7 @@ Result<void> Estimator::propagateTo(const FrameInput& input, const ImuBuffer& im
   return {};
 }
 
-/// True if half of the points are at rest and the IMU does not measure a turn. A lorry that fills
-/// the image may also cause this.
+/// True if half of the points rest and the IMU measures no turn; a lorry may also cause this.
 bool Estimator::medianRests(const FrameInput& input) const {
   const RestOptions& o = options_.rest;
   if (!input.motion_px || *input.motion_px > o.disparity_px) return false;
@@ -168,11 +164,8 @@ std::vector<const Track*> Estimator::onceUsed(std::uint64_t frame, bool window_f
 
 void Estimator::forgetUsed(const std::vector<const Track*>& used, std::uint64_t frame) {
   for (const Track* track : used) database_.erase(track->id);
-  std::vector<std::uint64_t> ended;
-  for (const auto& [id, track] : database_.tracks()) {
-    if (!track.seenAt(frame) && !state_->point(id)) ended.push_back(id);
-  }
-  for (const std::uint64_t id : ended) database_.erase(id);
+  database_.eraseIf(
+      [&](const Track& track) { return !track.seenAt(frame) && !state_->point(track.id); });
 }
 
 void Estimator::dropLostPoints(std::uint64_t frame) {
@@ -233,8 +226,7 @@ Result<void> Estimator::visionUpdate(const FrameInput& input, FrameEstimate& out
 
 void Estimator::report(const FrameInput& input, FrameEstimate& out) {
   const auto P = state_->P();
-  // The pose at the image is that of the newest clone. Unlike nav, it includes the error of the
-  // time offset.
+  // The pose at the image is that of the newest clone, with the error of the time offset.
   const Clone& newest = state_->clones.back();
   out.nav = state_->nav;
   out.covariance << P.block<6, 6>(newest.at, newest.at), P.block<6, 3>(newest.at, kVelocity),
@@ -260,8 +252,7 @@ void Estimator::report(const FrameInput& input, FrameEstimate& out) {
 void Estimator::marginalise(bool at_rest) {
   const std::size_t n = state_->clones.size();
   if (at_rest && n >= 2) {
-    // The newest pose repeats the previous one. Removing the previous one preserves the newest pose
-    // and the window's baseline.
+    // The newest pose repeats the previous one, whose removal preserves the window's baseline.
     const std::uint64_t frame = state_->clones[n - 2].frame;
     database_.removeFrame(frame);
     state_->removeClone(frame);
@@ -314,9 +305,9 @@ Result<FrameEstimate> Estimator::process(const FrameInput& input, const ImuBuffe
   return out;
 }
 
-LandmarkEstimate Estimator::ofState(const PointState& point, const ImagePoint& seen) const {
+Landmark Estimator::ofState(const PointState& point, const ImagePoint& seen) const {
   const auto P = state_->P();
-  LandmarkEstimate l;
+  Landmark l;
   l.id = point.id;
   l.p_W = point.p_W;
   l.pixel = seen.pixel;
@@ -330,11 +321,10 @@ LandmarkEstimate Estimator::ofState(const PointState& point, const ImagePoint& s
   return l;
 }
 
-std::optional<LandmarkEstimate> Estimator::ofTrack(const Track& track,
-                                                   const ImagePoint& seen) const {
+std::optional<Landmark> Estimator::ofTrack(const Track& track, const ImagePoint& seen) const {
   const auto point = triangulate(raysOf(track, *state_, options_.vision.sigma_px), options_.vision);
   if (!point || point->rms > 2.0) return std::nullopt;
-  LandmarkEstimate l;
+  Landmark l;
   l.id = track.id;
   l.p_W = point->p_W;
   l.pixel = seen.pixel;
@@ -344,8 +334,8 @@ std::optional<LandmarkEstimate> Estimator::ofTrack(const Track& track,
   return l;
 }
 
-std::vector<LandmarkEstimate> Estimator::landmarks() const {
-  std::vector<LandmarkEstimate> result;
+std::vector<Landmark> Estimator::landmarks() const {
+  std::vector<Landmark> result;
   if (!state_ || state_->clones.empty()) return result;
   std::map<std::uint64_t, const PointState*> points;
   for (const PointState& p : state_->points) points[p.id] = &p;

@@ -14,9 +14,8 @@
 #include "services/vio/core/state/saved_state.h"
 #include "services/vio/core/state/state.h"
 #include "services/vio/core/tracks/tracks.h"
-#include "services/vio/core/update/landmark.h"
+#include "services/vio/core/update/point_updates.h"
 #include "services/vio/core/update/standstill.h"
-#include "services/vio/core/update/updater_slam.h"
 
 namespace perdure::vio {
 
@@ -38,8 +37,7 @@ struct FrameInput {
   TrackedFrame tracked;
   std::optional<double> motion_px;  ///< median image motion over the last frames
   std::optional<SpeedReading> speed;
-  std::optional<double> most_motion_px = {};  ///< image motion that four fifths of the points do
-                                              ///< not exceed
+  std::optional<double> most_motion_px = {};  ///< 0.8 quantile of the points' image motion
   double still_share = 0.0;  ///< share of the points that have stayed in place for a second
 };
 
@@ -50,18 +48,15 @@ struct FrameEstimate {
   std::uint64_t increment_from = 0;
   Matrix6d transition = Matrix6d::Identity(), increment_covariance = Matrix6d::Zero();
   bool at_rest = false;
-  std::optional<bool> speed_refused;    ///< whether the gate refused the speed; empty without a
-                                        ///< speed
+  std::optional<bool> speed_refused;    ///< by the gate; empty without a speed
   int points_used = 0;                  ///< points of this image used by all updates
-  int points_refused = 0;               ///< points that failed the gate, or whose rays do not meet
-                                        ///< in front of the cameras
+  int points_refused = 0;               ///< points that the gate or the triangulation refused
   std::vector<Innovation> innovations;  ///< filled after keepInnovations()
 };
 
 class Estimator {
  public:
-  /// Takes one or two cameras. readout_s: read-out time of each camera, 0 for a global shutter. If
-  /// empty, all cameras have a global shutter.
+  /// One or two cameras. readout_s: of each camera, 0 for a global shutter; empty: all global.
   Estimator(const Options& options, const std::vector<RigidTransform>& T_BC, double time_offset_s,
             const std::vector<double>& readout_s = {});
 
@@ -73,8 +68,7 @@ class Estimator {
   /// estimated quantities. Fails with state_other_cameras, state_other_shutter,
   /// state_other_gyro_scale or state_other_readout.
   Result<void> fits(const SavedState& saved) const;
-  /// Returns the state that restore() takes. The caller fills world and next_track. Needs
-  /// started().
+  /// Returns the state for restore(), without world and next_track. Needs started().
   SavedState save() const;
   bool started() const { return state_.has_value(); }
   void stop() { state_.reset(); }
@@ -82,8 +76,7 @@ class Estimator {
   void keepInnovations() { keeps_innovations_ = true; }
 
   /// Propagates over `imu` to the frame and updates. Fails with "frame_not_after_state" or
-  /// "imu_missing". If the state has become invalid, it fails with "numbers_…" and the estimator
-  /// stops.
+  /// "imu_missing"; with "numbers_…" the estimator stops.
   Result<FrameEstimate> process(const FrameInput& input, const ImuBuffer& imu);
 
   /// Rotation R_B1_B0 of the body from the newest frame to an IMU time, from the gyroscope.
@@ -93,8 +86,8 @@ class Estimator {
   /// at an IMU time. Before a start it uses the raw rate. Zero for a global shutter.
   Eigen::Vector3d turnOfReadout(const ImuBuffer& imu, TimePoint time);
 
-  /// Points of the newest image whose position is known.
-  std::vector<LandmarkEstimate> landmarks() const;
+  /// Points of the newest image whose position is known, without descriptors.
+  std::vector<Landmark> landmarks() const;
 
   const State& state() const { return *state_; }
   State& state() { return *state_; }
@@ -116,8 +109,8 @@ class Estimator {
   void marginalise(bool at_rest);
   void measureRows(const ImuBuffer& imu);
   Result<void> sane() const;
-  LandmarkEstimate ofState(const PointState& point, const ImagePoint& seen) const;
-  std::optional<LandmarkEstimate> ofTrack(const Track& track, const ImagePoint& seen) const;
+  Landmark ofState(const PointState& point, const ImagePoint& seen) const;
+  std::optional<Landmark> ofTrack(const Track& track, const ImagePoint& seen) const;
 
   Options options_;
   std::vector<RigidTransform> T_BC_;
@@ -128,8 +121,7 @@ class Estimator {
   Standstill standstill_;
   FeatureDatabase database_;
   TrackedFrame newest_;
-  std::vector<ImuReading> readings_;  ///< readings of one interval; a member so that its memory is
-                                      ///< reused
+  std::vector<ImuReading> readings_;  ///< of one interval; a member so that its memory is reused
   std::vector<ImuReading> rows_;      ///< readings around one image; a member for the same reason
   ReasonCounts reasons_;
   bool agreed_ = false;  ///< most points of the last image agreed with their predictions

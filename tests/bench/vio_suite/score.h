@@ -7,7 +7,7 @@
 
 #include "common/replay/files/pose_file.h"
 #include "common/types/odometry.h"
-#include "services/vio/core/update/updater_slam.h"
+#include "services/vio/core/update/point_updates.h"
 
 namespace perdure::bench {
 

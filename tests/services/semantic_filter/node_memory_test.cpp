@@ -81,7 +81,7 @@ void expectRecallBitForBit(bool graph) {
     EXPECT_NEAR(b.why.logOdds(), logOdds(b.existence), 1e-9);
   }
   // The cross-covariance with the pose error refers to the same error as before.
-  EXPECT_NE(pair.filter.belief().tracks[0].pose.product, Matrix6d::Identity());
+  EXPECT_NE(pair.filter.belief().tracks[0].pose_product, Matrix6d::Identity());
 }
 
 TEST(NodeMemory, ABeliefIsRecalledBitForBitAndItsLedgerSaysSo) { expectRecallBitForBit(true); }

@@ -16,28 +16,28 @@ class BoxExplanations {
  public:
   BoxExplanations(const Belief& belief, const FrameInput& input, const Parameters& parameters);
 
-  /// Whether the box is inside the gate of track j (index). `hidden`: sides that a nearer object
-  /// hides.
-  bool matches(std::size_t j, const std::array<bool, 4>& hidden, const BoxDetection& box);
-
   /// Returns the log-likelihood ratio of the box, sides and class, to clutter, nats; nothing
-  /// outside the gate.
+  /// outside the gate of track j (index). `hidden`: sides that a nearer object hides.
   std::optional<double> fit(std::size_t j, const std::array<bool, 4>& hidden,
                             const BoxDetection& box);
 
  private:
-  struct Entry {
-    bool known = false;
-    std::optional<PredictedBox> predicted;
-  };
-
-  const Entry& entryOf(std::size_t j);
-
   const Belief& belief_;
   const FrameInput& input_;
   Projector from_;
   Judge judge_;
-  ScratchVector<Entry> at_;
+  ScratchVector<std::optional<std::optional<PredictedBox>>> at_;  ///< outer: computed
 };
+
+/// Adds the partial views of tracks with v = 0 to the clutter of each box (log_partial_views), so
+/// that it is less likely a new object or that of another track. The tracks do not change.
+void explainPartialViews(const Belief& belief, const ScratchVector<TrackVisibility>& visibilities,
+                         FrameInput& input, const Parameters& parameters,
+                         const ClassPriors& priors);
+
+/// A box that an occluded track explains far better than any visible one shows that the occluder
+/// was misjudged. The occluded track gets v = visibility.minimum in this frame.
+void reviseOcclusion(Belief& belief, ScratchVector<TrackVisibility>& visibilities,
+                     const FrameInput& input, const Parameters& parameters);
 
 }  // namespace perdure::semantic_filter

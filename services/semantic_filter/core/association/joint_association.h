@@ -9,8 +9,7 @@
 namespace perdure::semantic_filter {
 
 struct Association {
-  /// eta(j, z): message from all other tracks to track j, in (0, 1]. It says how free box z is for
-  /// track j.
+  /// eta(j, z): message from all other tracks to track j, in (0, 1]: how free box z is for it.
   Eigen::MatrixXd eta;
   /// explained(z): probability that some track made box z.
   Eigen::VectorXd explained;

@@ -1,9 +1,7 @@
 #include "services/semantic_filter/core/association/score.h"
 
 #include <algorithm>
-#include <cmath>
 
-#include "services/semantic_filter/core/association/tempering.h"
 #include "services/semantic_filter/core/visibility/detectability.h"
 
 namespace perdure::semantic_filter {
@@ -13,8 +11,17 @@ namespace {
 constexpr double kMaxLogLikelihood = 40.0;  // nats, keeps products finite
 constexpr double kMaxDetection = 0.98;      // of v without an unmapped occluder
 
-/// Returns the log clutter density of the sides that were compared. With fewer sides it has other
-/// units.
+/// Returns the number of earlier observations that share the errors of this view of `position`.
+double correlatedObservations(const Eigen::Vector3d& position, const Viewpoint& last,
+                              const View& view, const TemperingParameters& parameters) {
+  if (last.observations <= 0.0) return 0.0;
+  const double correlation =
+      viewCorrelation(position, last.T_WC, view.T_WC(),
+                      {parameters.angle, parameters.log_distance, parameters.image_angle});
+  return last.observations * correlation;
+}
+
+/// Returns the log clutter density of the compared sides. With fewer sides it has other units.
 double logClutterOf(const BoxDetection& e, const BoxScore& score, const View& view,
                     const ClutterParameters& parameters) {
   const auto& ignored = score.ignored;
@@ -23,19 +30,6 @@ double logClutterOf(const BoxDetection& e, const BoxScore& score, const View& vi
   }
   return e.log_partial_views +
          logClutter(e.z, view.camera->width(), view.camera->height(), parameters, ignored);
-}
-
-void scoreBoxes(HypothesisScore& h, const std::string& class_name, double lookalike_nats,
-                const TrackScore& score, const std::vector<BoxDetection>& boxes,
-                const FrameContext& frame) {
-  for (std::size_t i = 0; i < score.boxes.size(); ++i) {
-    const auto why =
-        explain(boxes[score.boxes[i]], *h.predicted, score.visibility.hidden_sides, class_name,
-                lookalike_nats, {frame.model, &frame.view, frame.parameters});
-    if (!why) continue;
-    h.matches[i] = {std::exp(std::min(why->log_ratio, kMaxLogLikelihood)),
-                    why->sides.nis / why->sides.dof, why->sides.part};
-  }
 }
 
 HypothesisScore scoreHypothesis(const Hypothesis& hypothesis, const Track& track, double rate,
@@ -59,8 +53,7 @@ HypothesisScore scoreHypothesis(const Hypothesis& hypothesis, const Track& track
   return h;
 }
 
-/// Bounds of the boxes that mayOverlap can accept for one of the hypotheses. To reject boxes that
-/// lie elsewhere is most of the work.
+/// Bounds of the boxes that mayOverlap can accept. To reject boxes elsewhere is most of the work.
 struct Reach {
   double least[2], most[2];
 
@@ -126,6 +119,7 @@ TrackScore scoreTrack(const Track& track, const TrackVisibility& visibility,
   result.visibility = visibility;
   result.hypotheses.reserve(track.hypotheses.size());
   const Projector from = frame.projector();
+  const Judge judge{frame.model, &frame.view, frame.parameters};
   const double rate = detectionRateFactor(track, frame);
   for (const auto& hypothesis : track.hypotheses) {
     result.hypotheses.push_back(scoreHypothesis(hypothesis, track, rate, visibility, from, frame));
@@ -142,8 +136,13 @@ TrackScore scoreTrack(const Track& track, const TrackVisibility& visibility,
   for (std::size_t i = 0; i < result.hypotheses.size(); ++i) {
     HypothesisScore& h = result.hypotheses[i];
     h.matches.assign(result.boxes.size(), {});
-    if (h.predicted)
-      scoreBoxes(h, track.hypotheses[i].class_name, track.lookalike.nats, result, boxes, frame);
+    for (std::size_t k = 0; h.predicted && k < result.boxes.size(); ++k) {
+      const auto why = explain(boxes[result.boxes[k]], *h.predicted, visibility.hidden_sides,
+                               track.hypotheses[i].class_name, track.lookalike.nats, judge);
+      if (!why) continue;
+      h.matches[k] = {std::exp(std::min(why->log_ratio, kMaxLogLikelihood)),
+                      why->sides.nis / why->sides.dof, why->sides.part};
+    }
   }
   return result;
 }
@@ -172,6 +171,29 @@ double associationWeight(const Track& track, const TrackScore& score, std::size_
   }
   const double r = track.existence;
   return r * reported / std::max(1.0 - r + r * unreported, 1e-12);
+}
+
+double temperingExponent(double observations, double correlation) {
+  const auto information = [&](double n) { return n / (correlation * n + 1.0 - correlation); };
+  return information(observations + 1.0) - information(observations);
+}
+
+void applyTopDown(TrackScore& score, const Track& track, const std::vector<double>& log_ratio,
+                  const FrameContext& frame) {
+  const auto k = frame.model->index.find(track.best().class_name);
+  if (k == frame.model->index.end() || k->second >= log_ratio.size()) return;
+  // Observations from one viewpoint share the mistakes of the network, so an answer in favour of
+  // the track is tempered. An answer against it is limited by the unmapped occluder, as a miss is.
+  double nats = log_ratio[k->second];
+  if (nats > 0.0) {
+    nats *= temperingExponent(score.hypotheses.front().correlated_observations,
+                              frame.parameters->tempering.correlation);
+  }
+  for (HypothesisScore& h : score.hypotheses) {
+    h.no_box =
+        std::max(1.0 - h.detection_probability + h.undetected * (std::exp(nats) - 1.0), 1e-6);
+  }
+  score.top_down = true;
 }
 
 }  // namespace perdure::semantic_filter

@@ -3,7 +3,6 @@
 // tools/docs/maths/measurement_likelihood.md.
 #pragma once
 
-#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -31,7 +30,6 @@ struct Judge {
   const View* view;
   const Parameters* parameters;
 };
-/// A box, explained by a prediction.
 struct Explanation {
   double log_ratio = 0.0;  ///< of the likelihoods of the box, sides and class, to clutter, nats
   BoxScore sides;
@@ -42,14 +40,12 @@ std::optional<Explanation> explain(const BoxDetection& detection, const Predicte
                                    const std::array<bool, 4>& hidden, const std::string& class_name,
                                    double lookalike_nats, const Judge& judge);
 
-/// How a hypothesis explains one box.
 struct BoxMatch {
   double likelihood = 0.0;  ///< L(z), 0 outside the gate
   double nis = 0.0;         ///< normalised innovation per degree of freedom, if likelihood > 0
   int part = -1;            ///< BoxScore::part
 };
 
-/// One hypothesis in one frame.
 struct HypothesisScore {
   std::optional<PredictedBox> predicted;
   double detection_probability = 0.0;  ///< v P_D: probability that the network reports the object
@@ -64,7 +60,7 @@ struct HypothesisScore {
 /// Lives within one step.
 struct TrackScore {
   TrackVisibility visibility;
-  bool top_down = false;             ///< a top-down answer is applied (association/top_down.h)
+  bool top_down = false;             ///< a top-down answer is applied (applyTopDown)
   ScratchVector<std::size_t> boxes;  ///< indices of the frame's boxes that are near a hypothesis
   ScratchVector<HypothesisScore> hypotheses;
 };
@@ -72,13 +68,31 @@ struct TrackScore {
 TrackScore scoreTrack(const Track& track, const TrackVisibility& visibility,
                       const std::vector<BoxDetection>& boxes, const FrameContext& frame);
 
-/// Returns the hidden sides of a box, given the hypothesis that explains it best. `box`: index
-/// among the boxes of the frame.
+/// Returns the hidden sides, given the hypothesis that explains `box` (index in the frame) best.
 std::array<bool, 4> hiddenSides(const TrackScore& score, std::size_t box,
                                 const BoxDetection& detection);
 
 /// Returns ψ: "the track made this box" against "it made none, or does not exist". `box`: index
 /// into TrackScore::boxes.
 double associationWeight(const Track& track, const TrackScore& score, std::size_t box);
+
+/// Returns the tempering exponent τ: how much one more observation counts if its errors are
+/// correlated with earlier ones, because observations from one viewpoint share the errors of the
+/// network. It is the information of one more observation after n correlated ones, in units of the
+/// first: I(n) = n / (ρ n + 1 - ρ), τ = I(n+1) - I(n). Derivation:
+/// tools/docs/maths/class_and_existence_update.md.
+double temperingExponent(double observations, double correlation);
+
+/// Applies a top-down likelihood: what the network says at a predicted measurement where it
+/// reported no box (paper, eq. 7; services/inference/README.md, "Top-down"). Derivation:
+/// tools/docs/maths/joint_association.md, "Top-down likelihood".
+///
+/// An answer is evidence of existence only: its box was chosen near the prediction and says little
+/// of the place.
+///
+/// `log_ratio`: by class of the model; that of the track's best class counts. If the model does not
+/// know that class, nothing changes.
+void applyTopDown(TrackScore& score, const Track& track, const std::vector<double>& log_ratio,
+                  const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

@@ -9,8 +9,7 @@
 
 #include "common/types/objects.h"
 #include "services/semantic_filter/core/belief/ground_surface.h"
-#include "services/semantic_filter/core/belief/mover_shares.h"
-#include "services/semantic_filter/core/belief/noise_scale.h"
+#include "services/semantic_filter/core/belief/learned.h"
 #include "services/semantic_filter/core/belief/track.h"
 
 namespace perdure::semantic_filter {
@@ -26,22 +25,26 @@ struct Learned {
 struct Belief {
   std::vector<Track> tracks;            ///< ordered by id
   std::vector<Track> recently_deleted;  ///< kept for re-identification (core/tracks/reidentify.h)
-  /// Tracks that the map gave and that were fused with a track of the same object, by that track:
-  /// they are not fused a second time.
+  /// Tracks of the map that were fused with a track of the same object: not fused a second time.
   std::map<TrackId, TrackId> fused = {};
   Learned learned = {};
   BodyPath path = {};  ///< recent positions of the body
 };
 
-/// The same box of the same frame always gets the same id. So a step that is repeated after a late
-/// detection does not rename tracks, and no id is used twice.
+/// One box of one frame always gets the same id, so repeated steps rename no tracks.
 class IdBook {
  public:
-  ObjectId idFor(std::uint64_t frame_sequence, std::size_t box);
+  ObjectId idFor(std::uint64_t frame_sequence, std::size_t box) {
+    const auto [it, fresh] = given_.try_emplace({frame_sequence, box}, next_);
+    if (fresh) ++next_;
+    return it->second;
+  }
   ObjectId next() const { return next_; }
   void atLeast(ObjectId next) { next_ = std::max(next_, next); }
   /// Forgets the frames before this one. They cannot be stepped again.
-  void forgetBefore(std::uint64_t frame_sequence);
+  void forgetBefore(std::uint64_t frame_sequence) {
+    given_.erase(given_.begin(), given_.lower_bound({frame_sequence, 0}));
+  }
 
  private:
   ObjectId next_ = 1;

@@ -1,15 +1,11 @@
 #include "services/semantic_filter/core/belief/detection_rate.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace perdure::semantic_filter {
-namespace {
 
 constexpr double kSameView = 0.5;  // view change below which observations share one count
 constexpr std::size_t kRoom = 32;  // counts that most visits have room for
-
-}  // namespace
 
 void DetectionRate::addTo(Counts& counts, const Count& count, const ViewScales& scales) {
   const auto same = std::find_if(counts.begin(), counts.end(), [&](const Count& c) {

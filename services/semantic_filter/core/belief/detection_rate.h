@@ -1,6 +1,5 @@
-// How often earlier visits detected a track, by viewpoint: the view-dependent detection
-// probability. P_D belongs to the class, but its objects differ: what a network misses from one
-// side, it usually misses from there again. Derivation: tools/docs/maths/detectability.md.
+// View-dependent detection probability: how often earlier visits detected a track, by viewpoint.
+// Derivation: tools/docs/maths/detectability.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,15 +11,13 @@
 
 namespace perdure::semantic_filter {
 
-/// Every belief that is kept for late detections holds a copy. The copies share the counts of
-/// earlier visits.
+/// Copies, as beliefs are kept for late detections, share the counts of earlier visits.
 class DetectionRate {
  public:
   /// at most, of one visit and of all earlier visits
   static constexpr std::size_t kMostViews = 96;
 
-  /// Adds an observation in which P_D and visibility expect a detection with probability
-  /// `expected`.
+  /// Adds an observation in which a detection had the probability `expected`.
   void add(const ViewRay& from, double expected, bool found, const ViewScales& scales);
   /// Begins a visit: the counts so far apply from now on. Within one visit, misses do not excuse
   /// each other, because the object may have gone.

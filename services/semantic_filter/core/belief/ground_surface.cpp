@@ -6,11 +6,8 @@
 #include "common/math/gaussian.h"
 #include "common/math/small_cholesky.h"
 #include "common/math/so3.h"
-#include "services/semantic_filter/core/parameters.h"
 
 namespace perdure::semantic_filter {
-
-namespace {
 
 constexpr std::size_t kNearest = 12, kLeast = 3;
 constexpr int kMostHeights = static_cast<int>(kNearest + BodyPath::kPlaces);
@@ -21,8 +18,6 @@ using HeightMatrix =
 constexpr double kLevelSigma = 10.0;
 constexpr double kBounce = 0.03;       // m, variation of the body's height as it moves
 constexpr double kSurelyStands = 0.9;  // of a class whose objects contribute
-
-}  // namespace
 
 double GroundRoughness::ratio(double assumed) const {
   constexpr double kLeastRatio = 0.01, kMostRatio = 9.0;

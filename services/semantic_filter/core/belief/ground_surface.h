@@ -1,14 +1,5 @@
-// Height of the ground, from the objects that stand on it and from the path of the body: a Gaussian
-// process. Derivation: tools/docs/maths/ground_contact.md.
-//
-// Objects that parallax has placed show where their undersides are; what stands near them stands
-// about as high. So a far object whose distance only its size shows stands where the street is. An
-// object that seems to stand below the street is nearer, or moves. If the height of the body above
-// the ground is known, its path shows the ground from the first frame on.
-//
-// Model: a level plane of unknown height, with slope N(0, ground.slope²) and Brownian unevenness of
-// variance ground.roughness² per metre. Where nothing stands, nothing is known. Heights are along
-// the view's up direction, in the frame of the beliefs.
+// Height of the ground, from objects that stand on it and the path of the body: a Gaussian process.
+// Heights are along the view's up direction. Derivation: tools/docs/maths/ground_contact.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -28,14 +19,12 @@ struct GroundHeight {
   double uneven = 0.0;                ///< the part of the variance that slope and roughness cause
 };
 
-/// How uneven the ground is relative to ground.slope and ground.roughness. It is learned from the
-/// objects that stand on the ground and is part of the belief.
+/// How uneven the ground is relative to ground.slope and ground.roughness, learned from objects.
 class GroundRoughness {
  public:
   /// Returns true over assumed variance. The assumption weighs as much as `assumed` objects.
   double ratio(double assumed) const;
-  /// Learns from an object that stands `above` (m) higher than the others say. `share`: the share
-  /// of its keyframes that are new.
+  /// Learns from an object that stands `above` (m) over the others. `share`: of new keyframes.
   void learn(double above, const GroundHeight& others, double own_variance, double ratio,
              double share);
 
@@ -84,8 +73,7 @@ class GroundSurface {
     const Stand* stand;
   };
 
-  /// Returns the `most` nearest of `stands` within reach of a place, nearest first, without
-  /// `except`.
+  /// Returns the `most` nearest of `stands` in reach of a place, nearest first, without `except`.
   ScratchVector<Near> around(const std::vector<Stand>& stands, const Eigen::Vector2d& here,
                              ObjectId except, std::size_t most) const;
   Eigen::Vector2d horizontal(const Eigen::Vector3d& p) const { return axes_ * p; }

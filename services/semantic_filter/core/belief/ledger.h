@@ -1,10 +1,7 @@
 // The ledger of a track: every change of existence and PMF is booked under its cause, in nats. The
-// entries of existence sum to log r / (1 - r), those of a class to log π. Derivation:
+// entries of existence sum to log r / (1 - r), those of a class to log π. Only become() changes
+// existence, and every change of weights ends in normalise() (mixture_ops.h). Derivation:
 // tools/docs/maths/ledger.md.
-//
-// Only become() changes existence, and every change of weights ends in normalise() (mixture_ops.h).
-// Both ask for the cause, so nothing changes without one. Each booking is the new belief minus the
-// sum so far. So rounding does not add up.
 #pragma once
 
 #include <array>

@@ -20,8 +20,7 @@ State difference(const State& a, const State& b) {
   return d;
 }
 
-/// Returns x, turned by 180° if its yaw is then nearer to that of `reference`. The cuboid is the
-/// same.
+/// Returns x, turned by 180° (the same cuboid) if its yaw is then nearer to that of `reference`.
 State nearestTurn(const State& x, const State& reference) {
   State y = x;
   if (std::abs(wrapAngle(x[kYaw] - reference[kYaw])) > M_PI / 2)

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include "services/semantic_filter/core/belief/classes/class_prior.h"
 #include "services/semantic_filter/core/belief/track.h"
@@ -18,11 +17,9 @@ bool sound(const Track& track);
 ClassNumbers classShares(const Track& track);
 /// Enters the present PMF in the ledger, whatever the sum of the weights.
 void book(Track& track, ClassEvidence why);
-/// Divides the weights by their sum, sorts them (heaviest first, stable), and enters the PMF in the
-/// ledger.
+/// Divides the weights by their sum, sorts them (heaviest first) and enters the PMF in the ledger.
 void normalise(Track& track, ClassEvidence why);
-/// Returns a - b of the cuboids. Yaw is taken modulo 180°, because a cuboid is the same when turned
-/// by 180°.
+/// Returns a - b of the cuboids, with yaw modulo 180°, because a turned cuboid is the same.
 Vector7d geometryDifference(const Hypothesis& a, const Hypothesis& b);
 /// Merges b into a: adds the weights and keeps two moments of the pair, yaw modulo 180°.
 void mergeInto(Hypothesis& a, const Hypothesis& b);

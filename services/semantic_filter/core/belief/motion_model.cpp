@@ -10,11 +10,7 @@
 
 namespace perdure::semantic_filter {
 
-namespace {
-
 constexpr double kNoWeight = 1e-12;
-
-}  // namespace
 
 double fasterThan(const Hypothesis& h, double limit) {
   const Eigen::Vector2d v = h.x.segment<2>(kVelocity);

@@ -2,8 +2,6 @@
 // (Bar-Shalom, Li 2001, ch. 6). Derivation: tools/docs/maths/state_and_mixture.md.
 #pragma once
 
-#include <optional>
-
 #include "services/semantic_filter/core/belief/track.h"
 #include "services/semantic_filter/core/parameters.h"
 
@@ -11,15 +9,13 @@ namespace perdure::semantic_filter {
 
 /// Returns the probability that a moving hypothesis is faster than `speed`, m/s.
 double fasterThan(const Hypothesis& h, double speed);
-/// Returns the probability that the track moves faster than `min_speed` (m/s), given that it
-/// exists.
+/// Returns the probability that an existing track moves faster than `min_speed`, m/s.
 double movingProbability(const Track& track, double min_speed);
 
 /// Applies motion and process noise of `dt` seconds.
 void predictHypothesis(Hypothesis& h, double dt, const MotionParameters& m);
 
-/// Conditions the hypothesis on v = 0. This also corrects the error of position that looked like
-/// motion.
+/// Conditions the hypothesis on v = 0, with the error of position that looked like motion.
 void stop(Hypothesis& h);
 /// Is called when the track leaves the view. Splits each moving hypothesis that is probably slower
 /// than `min_speed` (m/s) by its speed: the slow share stops and stays where it was, the fast share

@@ -12,8 +12,7 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// Whether P - C P_pose⁻¹ Cᵀ / share is positive definite. This is the usual case and cheap to
-/// test. L_pose: Cholesky factor of P_pose.
+/// Whether P - C P_pose⁻¹ Cᵀ / share is positive definite. L_pose: Cholesky factor of P_pose.
 bool isExplained(const Hypothesis& h, const Matrix6d& L_pose, double share) {
   CrossPose B = h.C;
   whitenRows(L_pose, B);

@@ -42,7 +42,6 @@ struct Hypothesis {
   bool modes_searched = false;  ///< a mode search of yaw has weighed it by all keyframes
   GroundContact ground_contact = {};
 
-  /// Returns the expected heading, as Shape::corner takes it.
   double heading() const { return headingOf(heading_log_odds); }
 };
 

@@ -28,8 +28,6 @@ void Viewpoints::merge(const Viewpoints& other) {
   observed_from.observations += other.observed_from.observations;
 }
 
-void BatchState::restart() { *this = {}; }
-
 double existenceCeiling(const Track& track, const TrackParameters& parameters) {
   return track.life.detected_on_revisit ? parameters.certain_again : parameters.certain;
 }

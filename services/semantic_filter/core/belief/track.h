@@ -1,7 +1,6 @@
-// A track: what is believed of one object, as a plain value (eq. 9: existence x PMF x a bank of
-// Gaussians). Beyond the paper the bank is a mixture over (class, static or moving, mode): the PMF
-// and the probability of moving are sums of the weights of its hypotheses.
-// Derivation: tools/docs/maths/state_and_mixture.md.
+// A track: the belief about one object, as a plain value (eq. 9: existence x PMF x a bank of
+// Gaussians). The bank is a mixture over (class, static or moving, mode). Derivation:
+// tools/docs/maths/state_and_mixture.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,7 +9,6 @@
 #include <optional>
 #include <set>
 #include <string>
-#include <vector>
 
 #include "common/base/shared_vector.h"
 #include "common/types/detections.h"
@@ -46,10 +44,8 @@ struct AssignedBox {
   Box box;
 };
 
-/// How the detector did at this track.
 struct DetectionHistory {
-  /// One bit for each of the last 64 frames with detections: the track was visible, was detected.
-  /// The bits of all tracks of one belief are of the same frames.
+  /// One bit for each of the last 64 frames with detections, the same frames for all tracks.
   std::uint64_t visible = 0, detected = 0;
   double recent_share = 1.0;             ///< share of the latest observations that were detections
   double existence_when_detected = 0.0;  ///< existence after the latest detection
@@ -93,31 +89,20 @@ struct Lookalike {
 /// One observation that is kept for the batch; smoothing knows what it holds.
 struct Keyframe;
 
-/// State of the batch estimate (smoothing).
 struct BatchState {
   SharedVector<std::shared_ptr<const Keyframe>> keyframes;  ///< in order of time
-  /// False for a track that came back: what it knew before is in its state alone, and a batch of
-  /// later keyframes would lose it.
+  /// False for a track that came back: a batch of later keyframes would lose what it knew before.
   bool complete = true;
   std::uint32_t fresh = 0;            ///< keyframes since the latest fit
   std::uint32_t seen = 0;             ///< keyframes since there were enough for a fit
   std::uint32_t mode_search_due = 0;  ///< modes are searched when `seen` reaches it
   std::uint32_t patience = 1;         ///< fits are this much rarer while they change little
-
-  /// Forgets all: the state begins anew.
-  void restart();
 };
 
-/// As the latest frame saw it.
 struct PublishedVisibility {
   Visibility state = Visibility::kVisible;
   double fraction = 1.0;
   ObjectId blocked_by = 0;
-};
-
-/// What the cross-covariances of the hypotheses refer to.
-struct PoseReference {
-  Matrix6d product = Matrix6d::Identity();  ///< PoseError::product at as_of
 };
 
 /// Frames that said nothing since the track was last predicted. They change no published value.
@@ -145,7 +130,7 @@ struct Track {
   Detectability detectability;
   BatchState batch;
   PublishedVisibility visibility;
-  PoseReference pose;
+  Matrix6d pose_product = Matrix6d::Identity();  ///< PoseError::product at as_of
   UnusedFrames unused;
 
   const Hypothesis& best() const { return hypotheses.front(); }

@@ -15,9 +15,8 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// Makes P positive definite. Rounding may leave a pivot just below zero if its parts differ by
-/// many orders of magnitude, and readers refuse such a message. The eigenvalues of its correlations
-/// get the least value that is definite.
+/// Makes P positive definite, because readers refuse other messages. Rounding may leave a pivot
+/// just below zero. The eigenvalues of the correlations get the least definite value.
 Matrix7d definite(const Matrix7d& P) {
   constexpr double kLeastEigenvalue = 1e-9;  // of the correlations; also m² or rad², of a variance
   constexpr double kRounding = 1e-12;
@@ -39,8 +38,7 @@ Matrix7d definite(const Matrix7d& P) {
   return result;
 }
 
-/// The Gaussian of the heaviest hypothesis of a class. Its covariance holds the second moments of
-/// the others of the class about its mean.
+/// The Gaussian of the heaviest hypothesis of a class, with the second moments of the others.
 void toClassBelief(const Track& track, const ClassPrior& prior, const std::string& name,
                    ClassBelief& belief) {
   belief.name = name;
@@ -140,7 +138,7 @@ Track fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product, Exist
   track.life.first_seen = belief.first_seen;
   track.life.last_seen = belief.last_seen;
   track.as_of = belief.as_of;
-  track.pose.product = pose_product;
+  track.pose_product = pose_product;
   track.life.hits = belief.hits;
   track.life.visible_misses = belief.visible_misses;
   track.visibility.state = belief.visibility;

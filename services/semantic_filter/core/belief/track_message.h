@@ -15,8 +15,7 @@ ObjectBelief toBelief(const Track& track, const ClassPriors& priors, double min_
 void toBelief(const Track& track, const ClassPriors& priors, double min_speed,
               ObjectBelief& belief);
 
-/// Makes a track from a published belief, with one hypothesis for each class. `back`: kRestore or
-/// kRecall.
+/// Makes a track with one hypothesis for each class. `back`: kRestore or kRecall.
 Track fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product, ExistenceEvidence back);
 
 }  // namespace perdure::semantic_filter

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
 
 #include "common/math/rigid_transform.h"
 
@@ -18,11 +20,27 @@ struct ViewRay {
   Eigen::Vector3d ray_W, ray_C;  ///< unit vectors from the camera to the point
   double log_distance;
 };
-ViewRay viewRayOf(const Eigen::Vector3d& position, const RigidTransform& T_WC);
-double viewChange(const ViewRay& a, const ViewRay& b, const ViewScales& scales);
+inline ViewRay viewRayOf(const Eigen::Vector3d& position, const RigidTransform& T_WC) {
+  const Eigen::Vector3d ray = position - T_WC.p;
+  const double distance = std::max(ray.norm(), 1e-3);
+  const Eigen::Vector3d ray_W = ray / distance;
+  return {ray_W, T_WC.q.conjugate() * ray_W, std::log(distance)};
+}
+
+inline double viewChange(const ViewRay& a, const ViewRay& b, const ViewScales& scales) {
+  return (a.ray_W - b.ray_W).norm() / scales.angle +
+         (a.ray_C - b.ray_C).norm() / scales.image_angle +
+         std::abs(a.log_distance - b.log_distance) / scales.log_distance;
+}
+
 /// Returns the correlation of two observations from these views, 0 to 1.
-double viewCorrelation(const ViewRay& a, const ViewRay& b, const ViewScales& scales);
-double viewCorrelation(const Eigen::Vector3d& position, const RigidTransform& T_WC_a,
-                       const RigidTransform& T_WC_b, const ViewScales& scales);
+inline double viewCorrelation(const ViewRay& a, const ViewRay& b, const ViewScales& scales) {
+  return std::exp(-viewChange(a, b, scales));
+}
+
+inline double viewCorrelation(const Eigen::Vector3d& position, const RigidTransform& a,
+                              const RigidTransform& b, const ViewScales& scales) {
+  return viewCorrelation(viewRayOf(position, a), viewRayOf(position, b), scales);
+}
 
 }  // namespace perdure::semantic_filter

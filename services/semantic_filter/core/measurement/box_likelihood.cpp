@@ -6,7 +6,6 @@
 #include "common/math/chi2.h"
 #include "common/math/small_cholesky.h"
 #include "common/math/small_products.h"
-#include "services/semantic_filter/core/parameters.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -16,8 +15,7 @@ double logBelowZero(double mean, double variance) {
   return std::log(std::max(0.5 * std::erfc(mean / std::sqrt(2.0 * variance)), 1e-12));
 }
 
-/// log of the multivariate t density in n dimensions, from the squared Mahalanobis distance and the
-/// log-determinant of the scale matrix.
+/// log of the multivariate t density in n dimensions, from the squared Mahalanobis distance.
 double logStudent(double nis, double log_det, int n, double tail) {
   thread_local double cached_tail = -1.0;
   thread_local std::array<double, 5> constant{};  // for 1 to 4 dimensions
@@ -40,6 +38,90 @@ double gateThreshold(double gate, int dof) {
     cached_gate = gate;
   }
   return quantile[dof];
+}
+
+/// How far the predicted side lies inside the observed one, px. The true side lies at or beyond a
+/// censored side: left and top at smaller coordinates, right and bottom at larger ones.
+double within(const BoxMeasurement& z, const ProjectedBox& predicted, int side) {
+  const double d = predicted.sides[side] - z.sides[side];
+  return side < 2 ? d : -d;
+}
+
+using Sides = std::array<bool, 4>;
+
+/// Whether one side alone is outside the gate.
+bool outsideOf(double gate, const BoxMeasurement& z, const ProjectedBox& predicted,
+               const Eigen::Matrix4d& covariance, int side) {
+  const double nu = z.sides[side] - predicted.sides[side];
+  return nu * nu > gate * (covariance(side, side) + z.variance[side]);
+}
+
+/// Scores the sides in use. The others count with the probability that the true side lies beyond.
+std::optional<BoxScore> scoreSides(const BoxMeasurement& z, const ProjectedBox& predicted,
+                                   const Eigen::Matrix4d& covariance, const Sides& use,
+                                   const BoxParameters& parameters) {
+  BoxScore score;
+  score.dof = static_cast<int>(std::count(use.begin(), use.end(), true));
+  if (score.dof == 0) return std::nullopt;
+  const double gate = gateThreshold(parameters.gate, score.dof);
+  Eigen::Vector4d nu = Eigen::Vector4d::Zero();
+  Eigen::Matrix4d S = covariance;
+  S.diagonal() += z.variance;
+  for (int i = 0; i < 4; ++i) {
+    if (!use[i]) continue;
+    if (outsideOf(gate, z, predicted, covariance, i)) return std::nullopt;
+    nu[i] = z.sides[i] - predicted.sides[i];
+  }
+  // Sides that are not compared keep their rows, with a residual of 0 and a variance of 1.
+  for (int i = 0; i < 4; ++i) {
+    if (use[i]) continue;
+    S.row(i).setZero();
+    S.col(i).setZero();
+    S(i, i) = 1.0;
+  }
+  if (!choleskyInPlace(S)) return std::nullopt;
+  whiten(S, nu);
+  score.nis = nu.squaredNorm();
+  if (score.nis > gate) return std::nullopt;
+  for (int i = 0; i < 4; ++i) {
+    if (use[i] || !predicted.exact[i]) continue;
+    const double variance = std::max(covariance(i, i), 0.0) + z.variance[i];
+    score.log_density += logBelowZero(within(z, predicted, i), variance);
+  }
+  score.log_density +=
+      logStudent(score.nis, 2.0 * std::log(S.diagonal().prod()), score.dof, parameters.tail);
+  return score;
+}
+
+/// Log density of a hidden side: it ends anywhere within the object.
+double logAnywhere(const ProjectedBox& predicted, int side) {
+  const int axis = side % 2;
+  return -std::log(std::max(predicted.sides[axis + 2] - predicted.sides[axis], 1.0));
+}
+
+/// Returns the sides in use that may be hidden: without one, no other side alone is outside.
+Sides mayBeHidden(const BoxMeasurement& z, const ProjectedBox& predicted,
+                  const Eigen::Matrix4d& covariance, const Sides& use,
+                  const BoxParameters& parameters) {
+  Sides result{}, outside{};
+  const auto compared = static_cast<int>(std::count(use.begin(), use.end(), true));
+  if (compared < 3) return result;
+  const double gate = gateThreshold(parameters.gate, compared - 1);
+  for (int i = 0; i < 4; ++i) {
+    outside[i] = use[i] && outsideOf(gate, z, predicted, covariance, i);
+  }
+  const auto all_outside = std::count(outside.begin(), outside.end(), true);
+  for (int i = 0; i < 4; ++i) {
+    result[i] = use[i] && all_outside == (outside[i] ? 1 : 0) && within(z, predicted, i) < 0.0;
+  }
+  return result;
+}
+
+void keepLikelier(std::optional<BoxScore>& best, const std::optional<BoxScore>& next,
+                  double log_share) {
+  if (!next || (best && best->log_density >= next->log_density + log_share)) return;
+  best = next;
+  best->log_density += log_share;
 }
 
 }  // namespace
@@ -129,96 +211,6 @@ std::array<bool, 4> comparableSides(const BoxMeasurement& z, const ProjectedBox&
   for (int i = 0; i < 4; ++i) use[i] = z.measured[i] && !hidden[i] && predicted.exact[i];
   return use;
 }
-
-namespace {
-
-/// How far the predicted side lies inside the observed one, px. The true side lies at or beyond a
-/// censored side: left and top at smaller coordinates, right and bottom at larger ones.
-double within(const BoxMeasurement& z, const ProjectedBox& predicted, int side) {
-  const double d = predicted.sides[side] - z.sides[side];
-  return side < 2 ? d : -d;
-}
-
-using Sides = std::array<bool, 4>;
-
-/// Whether one side alone is outside the gate.
-bool outsideOf(double gate, const BoxMeasurement& z, const ProjectedBox& predicted,
-               const Eigen::Matrix4d& covariance, int side) {
-  const double nu = z.sides[side] - predicted.sides[side];
-  return nu * nu > gate * (covariance(side, side) + z.variance[side]);
-}
-
-/// Scores the sides in use. Each other side counts with the probability that the true side lies
-/// beyond it.
-std::optional<BoxScore> scoreSides(const BoxMeasurement& z, const ProjectedBox& predicted,
-                                   const Eigen::Matrix4d& covariance, const Sides& use,
-                                   const BoxParameters& parameters) {
-  BoxScore score;
-  score.dof = static_cast<int>(std::count(use.begin(), use.end(), true));
-  if (score.dof == 0) return std::nullopt;
-  const double gate = gateThreshold(parameters.gate, score.dof);
-  Eigen::Vector4d nu = Eigen::Vector4d::Zero();
-  Eigen::Matrix4d S = covariance;
-  S.diagonal() += z.variance;
-  for (int i = 0; i < 4; ++i) {
-    if (!use[i]) continue;
-    if (outsideOf(gate, z, predicted, covariance, i)) return std::nullopt;
-    nu[i] = z.sides[i] - predicted.sides[i];
-  }
-  // Sides that are not compared keep their rows, with a residual of 0 and a variance of 1.
-  for (int i = 0; i < 4; ++i) {
-    if (use[i]) continue;
-    S.row(i).setZero();
-    S.col(i).setZero();
-    S(i, i) = 1.0;
-  }
-  if (!choleskyInPlace(S)) return std::nullopt;
-  whiten(S, nu);
-  score.nis = nu.squaredNorm();
-  if (score.nis > gate) return std::nullopt;
-  for (int i = 0; i < 4; ++i) {
-    if (use[i] || !predicted.exact[i]) continue;
-    const double variance = std::max(covariance(i, i), 0.0) + z.variance[i];
-    score.log_density += logBelowZero(within(z, predicted, i), variance);
-  }
-  score.log_density +=
-      logStudent(score.nis, 2.0 * std::log(S.diagonal().prod()), score.dof, parameters.tail);
-  return score;
-}
-
-/// Log density of a hidden side: it ends anywhere within the object.
-double logAnywhere(const ProjectedBox& predicted, int side) {
-  const int axis = side % 2;
-  return -std::log(std::max(predicted.sides[axis + 2] - predicted.sides[axis], 1.0));
-}
-
-/// Returns the sides in use that may be hidden: without such a side, no other side is outside the
-/// gate alone.
-Sides mayBeHidden(const BoxMeasurement& z, const ProjectedBox& predicted,
-                  const Eigen::Matrix4d& covariance, const Sides& use,
-                  const BoxParameters& parameters) {
-  Sides result{}, outside{};
-  const auto compared = static_cast<int>(std::count(use.begin(), use.end(), true));
-  if (compared < 3) return result;
-  const double gate = gateThreshold(parameters.gate, compared - 1);
-  for (int i = 0; i < 4; ++i) {
-    outside[i] = use[i] && outsideOf(gate, z, predicted, covariance, i);
-  }
-  const auto all_outside = std::count(outside.begin(), outside.end(), true);
-  for (int i = 0; i < 4; ++i) {
-    result[i] = use[i] && all_outside == (outside[i] ? 1 : 0) && within(z, predicted, i) < 0.0;
-  }
-  return result;
-}
-
-void keepLikelier(std::optional<BoxScore>& best, const std::optional<BoxScore>& next,
-                  double log_share) {
-  if (!next || (best && best->log_density >= next->log_density + log_share)) return;
-  best = next;
-  best->log_density += log_share;
-}
-
-}  // namespace
 
 std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& predicted,
                                  const Eigen::Matrix4d& covariance,

@@ -1,9 +1,7 @@
 // Measurement likelihood L_k(z): how much better a hypothesis explains a box than clutter does
-// (paper, eq. 6 and 7). Derivation: tools/docs/maths/measurement_likelihood.md.
-//
-// A side of a box is measured or censored. A measured side has a density (px⁻¹). A censored side is
-// cut by the image border or by a nearer object: only the probability that the true side lies
-// beyond is known. Clutter is measured for the same event, so the units agree.
+// (paper, eq. 6 and 7). A measured side has a density (px⁻¹); of a censored side, cut by the border
+// or a nearer object, only the probability that the true side lies beyond is known. Derivation:
+// tools/docs/maths/measurement_likelihood.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -36,7 +34,6 @@ struct BoxNoise {
   double clutter_probability = 0.0;  ///< a network places doubtful boxes worse
 };
 
-/// Standard deviation of a side of a box.
 struct SideError {
   double pixels = 0.0;    ///< image pixels
   double relative = 0.0;  ///< in box widths (x sides) or heights (y sides)

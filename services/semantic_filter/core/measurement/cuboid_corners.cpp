@@ -13,7 +13,6 @@ struct Frame {
   double heading;
 };
 
-/// Range of N coordinates.
 template <int N>
 struct Range {
   std::array<double, N> least, most;
@@ -67,6 +66,19 @@ PERDURE_ALSO_AVX2 void projectPoints(const CameraModel& camera, const PerCorner&
   }
 }
 
+/// Adds the cuts of the cuboid's edges at corner i by the near plane.
+void addCuts(ImagePoints& points, int i, const Corners& corners, const CameraModel& camera) {
+  const Eigen::Vector3d a = corners.p_C(i);
+  for (int axis = 1; axis < 8; axis <<= 1) {
+    const int j = i | axis;
+    if (j == i) continue;
+    const Eigen::Vector3d b = corners.p_C(j);
+    if ((a.z() >= kNear) == (b.z() >= kNear)) continue;
+    const double s = (kNear - a.z()) / (b.z() - a.z());
+    points.add(pixelOf(camera, a + s * (b - a)), kCut);
+  }
+}
+
 }  // namespace
 
 bool cornersBeforeCamera(const State& x, const Projector& from, const Shape& shape, double heading,
@@ -95,23 +107,6 @@ Eigen::Vector2d pixelOf(const CameraModel& camera, const Eigen::Vector3d& p_C) {
   return {camera.cx() + camera.fx() * direction.x() * 4.0,
           camera.cy() + camera.fy() * direction.y() * 4.0};
 }
-
-namespace {
-
-/// Adds the cuts of the cuboid's edges at corner i by the near plane.
-void addCuts(ImagePoints& points, int i, const Corners& corners, const CameraModel& camera) {
-  const Eigen::Vector3d a = corners.p_C(i);
-  for (int axis = 1; axis < 8; axis <<= 1) {
-    const int j = i | axis;
-    if (j == i) continue;
-    const Eigen::Vector3d b = corners.p_C(j);
-    if ((a.z() >= kNear) == (b.z() >= kNear)) continue;
-    const double s = (kNear - a.z()) / (b.z() - a.z());
-    points.add(pixelOf(camera, a + s * (b - a)), kCut);
-  }
-}
-
-}  // namespace
 
 void projectCorners(const Corners& corners, const CameraModel& camera, ImagePoints& points) {
   const int n = corners.shape->corners();

@@ -1,5 +1,5 @@
-// The corners of an object's shape before the camera, and their images: what cuboid_projection and
-// image_border are made of. Derivation: tools/docs/maths/cuboid_projection.md.
+// The corners of an object's shape before the camera, and their images, for cuboid_projection.
+// Derivation: tools/docs/maths/cuboid_projection.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,7 +15,6 @@ namespace perdure::semantic_filter {
 
 inline constexpr double kNear = 0.2;  ///< depth of the near plane, m
 
-/// One number for each corner.
 using PerCorner = std::array<double, Shape::kMostCorners>;
 
 /// The corners of a shape, relative to the camera.
@@ -75,12 +74,10 @@ bool cornersBeforeCamera(const State& x, const Projector& from, const Shape& sha
 /// Computes the pixels of all corners, and of the cuts of the edges by the near plane.
 void projectCorners(const Corners& corners, const CameraModel& camera, ImagePoints& points);
 
-/// Returns the pixel of a point in front of the camera. Where the distortion is not defined, it
-/// lies far outside the image.
+/// Returns the pixel of a point in front; far outside the image where distortion is not defined.
 Eigen::Vector2d pixelOf(const CameraModel& camera, const Eigen::Vector3d& p_C);
 
-/// Derivative of one image coordinate of a point in front of the camera. Returns false where there
-/// is none.
+/// Derivative of one image coordinate of a point in front; false where there is none.
 bool coordinateByPoint(const CameraModel& camera, const Eigen::Vector3d& p_C, int axis,
                        Eigen::RowVector3d& by_C);
 

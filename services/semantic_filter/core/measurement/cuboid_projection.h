@@ -7,7 +7,6 @@
 #include <array>
 #include <optional>
 
-#include "common/camera/camera_model.h"
 #include "services/semantic_filter/core/belief/state.h"
 #include "services/semantic_filter/core/measurement/polygon.h"
 #include "services/semantic_filter/core/measurement/view.h"

@@ -26,6 +26,46 @@ BoxStyles stylesOf(const ModelInfo& info, const ClassPriors& priors) {
   return styles;
 }
 
+/// To the network, an object of no known class resembles clutter or one of its classes.
+double logRatioOfOther(const BoxDetection& e, double lookalike_nats) {
+  const double share = lookalikeProbability(e.lookalike, lookalike_nats);
+  return std::log(1.0 - share + share * std::exp(e.log_ratio_best));
+}
+
+double shared(double a1, double a2, double b1, double b2) {
+  return std::min(a2, b2) - std::max(a1, b1);
+}
+
+/// Variance of a side with b.
+double variance(const BoxMeasurement& z, int side) { return z.variance[side] + z.lasting[side]; }
+
+/// Whether two sides may be the same edge in the image.
+bool sameEdge(const BoxMeasurement& a, int side_a, const BoxMeasurement& b, int side_b) {
+  const double d = a.sides[side_a] - b.sides[side_b];
+  return a.measured[side_a] &&
+         d * d < gates::kSameEdge * (variance(a, side_a) + variance(b, side_b));
+}
+
+/// Whether `a` stands lower in the image than `b`. `slope` (dy/dx): of a level line. What of the
+/// lower side stands on the ground is not known where the camera leans.
+bool reachesLower(const BoxMeasurement& a, const BoxMeasurement& b, double slope) {
+  const double apart = 0.5 * (a.sides[0] + a.sides[2] - b.sides[0] - b.sides[2]);
+  const double lower =
+      a.sides[3] - b.sides[3] - slope * apart - 0.5 * std::abs(slope) * (a.width() + b.width());
+  return lower > 0.0 && lower * lower > gates::kLower * (variance(a, 3) + variance(b, 3));
+}
+
+/// Marks the sides of `far` at which `near` begins.
+void markBeside(BoxDetection& far, const BoxDetection& near) {
+  constexpr double kFaces = 0.5;  // share of the side that the nearer box covers
+  const BoxMeasurement &a = far.z, &b = near.z;
+  const bool rows = shared(a.sides[1], a.sides[3], b.sides[1], b.sides[3]) > kFaces * a.height();
+  const bool columns = shared(a.sides[0], a.sides[2], b.sides[0], b.sides[2]) > kFaces * a.width();
+  far.beside_nearer[0] |= rows && sameEdge(a, 0, b, 2);
+  far.beside_nearer[2] |= rows && sameEdge(a, 2, b, 0);
+  far.beside_nearer[3] |= columns && sameEdge(a, 3, b, 1);
+}
+
 }  // namespace
 
 Model makeModel(const ModelInfo& info, const ClassPriors& priors) {
@@ -62,16 +102,6 @@ const char* flawOf(const Detection& detection, const Model& model) {
   return detection.azimuth_sigma > 0.0 ? nullptr : "detections_azimuth_without_sigma";
 }
 
-namespace {
-
-/// To the network, an object of no known class resembles clutter or one of its classes.
-double logRatioOfOther(const BoxDetection& e, double lookalike_nats) {
-  const double share = lookalikeProbability(e.lookalike, lookalike_nats);
-  return std::log(1.0 - share + share * std::exp(e.log_ratio_best));
-}
-
-}  // namespace
-
 std::optional<BoxDetection> makeBoxDetection(const Detection& detection, const Model& model,
                                              double width, double height, const BoxParameters& box,
                                              const ClutterParameters& clutter) {
@@ -100,45 +130,6 @@ std::optional<BoxDetection> makeBoxDetection(const Detection& detection, const M
   e.azimuth_sigma = detection.azimuth_sigma;
   return e;
 }
-
-namespace {
-
-/// Length that two intervals share.
-double shared(double a1, double a2, double b1, double b2) {
-  return std::min(a2, b2) - std::max(a1, b1);
-}
-
-/// Variance of a side with b.
-double variance(const BoxMeasurement& z, int side) { return z.variance[side] + z.lasting[side]; }
-
-/// Whether two sides may be the same edge in the image.
-bool sameEdge(const BoxMeasurement& a, int side_a, const BoxMeasurement& b, int side_b) {
-  const double d = a.sides[side_a] - b.sides[side_b];
-  return a.measured[side_a] &&
-         d * d < gates::kSameEdge * (variance(a, side_a) + variance(b, side_b));
-}
-
-/// Whether `a` stands lower in the image than `b`. `slope` (dy/dx): of a level line. What of the
-/// lower side stands on the ground is not known where the camera leans.
-bool reachesLower(const BoxMeasurement& a, const BoxMeasurement& b, double slope) {
-  const double apart = 0.5 * (a.sides[0] + a.sides[2] - b.sides[0] - b.sides[2]);
-  const double lower =
-      a.sides[3] - b.sides[3] - slope * apart - 0.5 * std::abs(slope) * (a.width() + b.width());
-  return lower > 0.0 && lower * lower > gates::kLower * (variance(a, 3) + variance(b, 3));
-}
-
-/// Marks the sides of `far` at which `near` begins.
-void markBeside(BoxDetection& far, const BoxDetection& near) {
-  constexpr double kFaces = 0.5;  // share of the side that the nearer box covers
-  const BoxMeasurement &a = far.z, &b = near.z;
-  const bool rows = shared(a.sides[1], a.sides[3], b.sides[1], b.sides[3]) > kFaces * a.height();
-  const bool columns = shared(a.sides[0], a.sides[2], b.sides[0], b.sides[2]) > kFaces * a.width();
-  far.beside_nearer[0] |= rows && sameEdge(a, 0, b, 2);
-  far.beside_nearer[2] |= rows && sameEdge(a, 2, b, 0);
-  far.beside_nearer[3] |= columns && sameEdge(a, 3, b, 1);
-}
-
-}  // namespace
 
 void markSidesBesideNearer(std::vector<BoxDetection>& boxes, const View& view) {
   const Eigen::Vector3d up = view.T_WC().R().transpose() * view.up_W;

@@ -1,6 +1,5 @@
 // One box of the network as the filter uses it: box, and log-likelihood ratios by class (paper, eq.
-// 6). Activations before the soft-max are marginal likelihoods. Only differences to the clutter
-// activation matter, so a constant added to all of them changes nothing. Derivation:
+// 6). Only differences to the clutter activation matter. Derivation:
 // tools/docs/maths/measurement_likelihood.md.
 #pragma once
 
@@ -19,7 +18,6 @@
 
 namespace perdure::semantic_filter {
 
-/// How a model draws its boxes, by class.
 struct BoxStyles {
   std::map<std::string, BoxStyle> by_class;
   BoxStyle rest;  ///< of a class that neither model nor priors name: mean of the offsets
@@ -59,8 +57,7 @@ struct BoxDetection {
   double lookalike = 0.0;          ///< share of *other* objects that resemble a known class
   std::optional<double> azimuth;
   double azimuth_sigma = 0.35;
-  /// Sides (x1, y1, x2, y2) at which a nearer box of the same image begins: the object may reach on
-  /// behind it.
+  /// Sides (x1, y1, x2, y2) at which a nearer box begins: the object may reach on behind it.
   std::array<bool, 4> beside_nearer{};
 };
 
@@ -76,14 +73,12 @@ std::array<bool, 4> withSidesBesideNearer(std::array<bool, 4> hidden, const BoxD
 /// because what is missing in it would count as a miss.
 const char* flawOf(const Detection& detection, const Model& model);
 
-/// Returns nothing for a flawed detection, or for one that leaves no pixel in the image. `width`,
-/// `height`: of the image, px.
+/// Returns nothing for a flawed detection or one without a pixel in the image (width, height: px).
 std::optional<BoxDetection> makeBoxDetection(const Detection& detection, const Model& model,
                                              double width, double height, const BoxParameters& box,
                                              const ClutterParameters& clutter);
 
-/// Top-down answers of the network: log-likelihood ratios by class of the model, for each track
-/// that was asked for.
+/// Top-down answers of the network: log-likelihood ratios by class, for each track asked for.
 using TopDownAnswers = std::map<ObjectId, std::vector<double>>;
 /// Returns the ratios of one answer, clamped; nothing if it is not usable.
 std::optional<std::vector<double>> topDownRatios(const Detection& detection, const Model& model,

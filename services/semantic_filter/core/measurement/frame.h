@@ -2,14 +2,13 @@
 // and the keyframes taken from it. Derivation: tools/docs/maths/pose_error.md.
 #pragma once
 
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "services/semantic_filter/core/belief/ground_surface.h"
-#include "services/semantic_filter/core/belief/mover_shares.h"
+#include "services/semantic_filter/core/belief/learned.h"
 #include "services/semantic_filter/core/belief/view_change.h"
 #include "services/semantic_filter/core/measurement/detection.h"
 #include "services/semantic_filter/core/measurement/view.h"
@@ -20,14 +19,19 @@ namespace perdure::semantic_filter {
 /// Error of the body's pose at one frame, [θ, p] (rad, m).
 struct PoseError {
   Matrix6d covariance = Matrix6d::Zero();
-  /// Product of the transitions of all frames so far. A track updated at product A has the
-  /// cross-covariance C (B A⁻¹)ᵀ at product B.
+  /// Product of the transitions of all frames. A track of product A has C (B A⁻¹)ᵀ at product B.
   Matrix6d product = Matrix6d::Identity();
   /// The covariance is what odometry reports. Its corrections shrink it, so that it and a
   /// cross-covariance are no longer of one covariance (belief/pose_correlation.h). A walk only
   /// grows.
   bool reported = false;
 };
+
+/// Brings `error` from the frame before to the frame of `odometry`. `last_T_WB`: pose of the frame
+/// before; without one a walk adds nothing.
+void advancePoseError(PoseError& error, const Odometry& odometry,
+                      const std::optional<RigidTransform>& last_T_WB,
+                      const PoseParameters& parameters);
 
 /// A landmark in the image. It lies before or behind an object.
 struct LandmarkDepth {
@@ -36,8 +40,7 @@ struct LandmarkDepth {
   double sigma_m = 0.0;
 };
 
-/// The input of one frame. Without `boxes` it carries no information; an empty list is a miss of
-/// every visible track.
+/// The input of one frame. Without `boxes` it says nothing; an empty list misses visible tracks.
 struct FrameInput {
   FrameStamp stamp;
   View view;
@@ -109,7 +112,6 @@ struct FrameContext {
   std::shared_ptr<const GroundSurface> ground = {};  ///< before this frame; null: nothing is known
   const MoverShares* movers = nullptr;               ///< null: the shares of the class priors
 
-  /// Returns the projector that belongs to `view`.
   Projector projector() const;
   /// Returns the prior probability that an instance of the class moves.
   double moverShare(const ClassPrior& prior) const {
@@ -137,7 +139,6 @@ struct ViewWalk {
 ViewScales biasScales(const BoxParameters& box);
 /// Returns the view changes after which detectability no longer correlates.
 ViewScales detectabilityScales(const VisibilityParameters& visibility);
-/// Returns what the view of this frame alters at a track.
 ViewWalk viewWalkOf(const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

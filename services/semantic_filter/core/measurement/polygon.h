@@ -8,8 +8,7 @@
 
 namespace perdure::semantic_filter {
 
-/// Most points of an outline: corners of a shape, or corners of a cuboid and cuts of its edges by
-/// the near plane.
+/// Most points of an outline: corners of a shape, or of a cuboid with cuts by the near plane.
 inline constexpr std::size_t kMostOutline = 24;
 /// Has room for the points that clipping at the four image borders adds.
 using Polygon = InplaceVector<Eigen::Vector2d, kMostOutline + 8>;

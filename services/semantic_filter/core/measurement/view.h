@@ -4,10 +4,10 @@
 #include <Eigen/Core>
 
 #include "common/camera/camera_model.h"
+#include "common/math/so3.h"
 
 namespace perdure::semantic_filter {
 
-/// Everything that a projection needs.
 struct View {
   const CameraModel* camera = nullptr;
   RigidTransform T_WB;
@@ -16,10 +16,14 @@ struct View {
   RigidTransform T_WC() const { return T_WB * camera->T_BC(); }
 };
 
-/// A view with the matrices that all projections from it share. It converts from a View, for a
-/// single projection.
+/// A view with the matrices that all its projections share. Converts from a View.
 struct Projector {
-  Projector(const View& view);  // NOLINT(google-explicit-constructor)
+  Projector(const View& view)  // NOLINT(google-explicit-constructor)
+      : camera(view.camera),
+        T_WC(view.T_WC()),
+        R_CW(T_WC.q.conjugate().toRotationMatrix()),
+        R_BC(view.camera->T_BC().R()),
+        R_WL(levelling(view.up_W).conjugate().toRotationMatrix()) {}
 
   const CameraModel* camera;
   RigidTransform T_WC;
@@ -28,6 +32,8 @@ struct Projector {
 };
 
 /// Returns R_WO of an upright cuboid.
-Eigen::Matrix3d uprightRotation(double yaw, const Eigen::Vector3d& up_W);
+inline Eigen::Matrix3d uprightRotation(double yaw, const Eigen::Vector3d& up_W) {
+  return levelling(up_W).conjugate().toRotationMatrix() * rotationAboutZ(yaw);
+}
 
 }  // namespace perdure::semantic_filter

@@ -61,13 +61,13 @@ Archive::Leaving Archive::leaving(const std::vector<Track>& tracks, const Eigen:
 }
 
 double Archive::nearRadius() const {
-  constexpr double kShare = 1.0 / 3.0;  // share of the margin; objects that come near before the
-                                        // next message
+  constexpr double kShare =
+      1.0 / 3.0;  // of the margin, for objects that come near before the next message
   return parameters_.archive ? parameters_.recall_m + kShare * parameters_.margin_m : 0.0;
 }
 
 void Archive::rememberReference(const Track& track) {
-  references_[track.as_of] = track.pose.product;
+  references_[track.as_of] = track.pose_product;
   if (references_.size() > kMostReferences) references_.erase(references_.begin());
 }
 

@@ -35,13 +35,11 @@ class Archive {
   /// greater distance, so that they do not come and go.
   double nearRadius() const;
 
-  /// Stores the product of pose error transitions that the cross-covariance of an archived track
-  /// refers to. The map does not have it.
+  /// Stores the product that the cross-covariance of an archived track refers to. The map lacks it.
   void rememberReference(const Track& track);
   /// Returns nothing if the belief is of another run, or if too many tracks were archived since.
   std::optional<Matrix6d> referenceAt(TimePoint as_of) const;
 
-  /// Deletes everything, because another frame of reference begins.
   void clear();
 
  private:
@@ -50,8 +48,7 @@ class Archive {
 
   MemoryParameters parameters_;
   double min_speed_;  ///< m/s; a slower track is at rest
-  /// The time since when each track could leave. It leaves once the map has a frame of this time or
-  /// later.
+  /// Since when each track could leave. It leaves once the map has a frame of this time or later.
   std::map<TrackId, TimePoint> waiting_;
   TimePoint kept_;
   std::map<TimePoint, Matrix6d> references_;

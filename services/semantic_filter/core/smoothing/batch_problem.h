@@ -5,33 +5,28 @@
 
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "common/math/gaussian.h"
-#include "services/semantic_filter/core/belief/noise_scale.h"
 #include "services/semantic_filter/core/belief/classes/upper_part.h"
-#include "services/semantic_filter/core/measurement/azimuth.h"
+#include "services/semantic_filter/core/belief/learned.h"
 #include "services/semantic_filter/core/smoothing/keyframes.h"
+#include "services/semantic_filter/core/update/azimuth_update.h"
 
 namespace perdure::semantic_filter {
 
 using Keyframes = std::vector<std::shared_ptr<const Keyframe>>;
 
-/// The matrices of a batch have bounded sizes, so that they stay off the
-/// heap.
+/// The matrices of a batch have bounded sizes, so that they stay off the heap.
 inline constexpr int kMostSides = 4 * kMostKeyframes;
-/// One number for each keyframe.
 using PerKeyframe = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostKeyframes, 1>;
 /// One number for each side, four sides a keyframe.
 using PerSide = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostSides, 1>;
-/// Covariance of all sides.
 using SideMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostSides, kMostSides>;
 
 using PoseJacobian = Eigen::Matrix<double, 4, 6>;
 
-/// The keyframes of one track, with the covariances of their pose errors: of all pairs, and with
-/// the present pose error.
+/// The keyframes of one track, with the covariances of their pose errors and the present one.
 class KeyframeBatch {
  public:
   /// `keyframes`: in order of time; they outlive this object.
@@ -39,7 +34,6 @@ class KeyframeBatch {
 
   const Keyframes& keyframes() const { return *keyframes_; }
   std::size_t size() const { return keyframes_->size(); }
-  /// True where all poses are exact.
   bool exactPoses() const { return exact_; }
   /// Computes the covariance that the pose errors cause in all sides, px²; only its lower triangle.
   /// `J`: derivatives of the sides by the pose error, for each keyframe.
@@ -111,8 +105,7 @@ struct Quadratic {
   FreeVector g;  ///< its gradient: the maximum is at x + G⁻¹ g
 };
 
-/// Every x has b = 0. `inflations`: one for each keyframe, >= 1; it widens all sides of the
-/// keyframe.
+/// Every x has b = 0. `inflations`: one for each keyframe, >= 1; widens all its sides.
 class BatchProblem {
  public:
   /// The problem of hypotheses like `kind`: of its class, at rest or moving, whole or an upper
@@ -137,8 +130,7 @@ class BatchProblem {
   double logAzimuths(const State& x) const;
   /// Returns the log-odds, by the azimuths, that the yaw of x is not turned by 180°.
   double logHeading(const State& x) const;
-  /// Returns the residuals of the azimuths that carry information, relative to the first
-  /// assumption. `yaw_variance`: of the fit, rad².
+  /// Returns the residuals of informative azimuths, by the first assumption. `yaw_variance`: rad².
   ResidualRatio azimuthResidualRatio(const State& x, double yaw_variance) const;
   /// Returns log |Λ / 2π| of the velocity prior; 0 at rest.
   double logSpeedPrior() const;
@@ -147,8 +139,7 @@ class BatchProblem {
   /// Returns the part of log |R| that belongs to no density: a cut side has a probability (that it
   /// lies beyond the cut), and whether it counts depends on the state.
   double logVolumeOfCuts(const Stack& s, const PerKeyframe& inflations) const;
-  /// Returns the covariance of all rows with the present b. `sigma`: present deviations of b, in
-  /// widths and heights.
+  /// Returns the covariance of all rows with the present b of deviations `sigma` (widths, heights).
   SideColumns<4> biasNow(const State& x, const Stack& s, const Eigen::Vector4d& sigma,
                          const PerKeyframe& inflations) const;
   /// Returns the covariance of all rows with the present pose error.

@@ -33,8 +33,7 @@ double changeBetween(const KeyframeView& a, const KeyframeView& b, const ViewSca
                       std::abs(a.log_height - b.log_height) / scales.log_distance);
 }
 
-/// Returns the keyframe that is most similar to another. It is never the newest, because a moving
-/// object is estimated at the time of the newest.
+/// Returns the keyframe most similar to another; never the newest, when a mover is estimated.
 std::size_t mostSimilar(const Eigen::Vector3d& place, const Keyframes& all,
                         const ViewScales& scales) {
   ScratchVector<KeyframeView> views;

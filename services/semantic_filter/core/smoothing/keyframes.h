@@ -1,24 +1,14 @@
 // Keyframes of a track: observations that are kept for the batch estimate (Dellaert, Kaess 2017).
 // Derivation: tools/docs/maths/map_fit.md.
-//
-// A filter that linearised at a wrong first depth, or that took the visible part of an object for
-// the whole, stays wrong. A fit to all keyframes does not.
 #pragma once
 
-#include <memory>
-#include <optional>
-#include <vector>
-
-#include "common/camera/camera_model.h"
-#include "common/math/gaussian.h"
 #include "services/semantic_filter/core/belief/track.h"
 #include "services/semantic_filter/core/measurement/frame.h"
 
 namespace perdure::semantic_filter {
 
-/// Adds the keyframe if its view differs from those of all others. When there are more than
-/// `parameters.keyframes`, the one that is most similar to another goes, but never the newest.
-/// Returns whether the keyframe was added.
+/// Adds the keyframe if its view is new, and returns whether. Of more than `parameters.keyframes`,
+/// the one most similar to another goes, but never the newest.
 bool addKeyframe(Track& track, Keyframe keyframe, const ViewScales& scales,
                  const SmoothingParameters& parameters);
 

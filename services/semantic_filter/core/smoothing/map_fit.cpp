@@ -2,21 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "common/math/gaussian.h"
-#include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/belief/pose_correlation.h"
 #include "services/semantic_filter/core/parameters.h"
 
 namespace perdure::semantic_filter {
-namespace {
 
 constexpr int kRounds = 12;
 constexpr double kEnough = 0.02;  // least gain of a further step, squared deviations
-
-}  // namespace
 
 struct MapFit::Fit {
   State x;
@@ -55,8 +50,7 @@ bool inflateKeyframes(Fit& fit, double tail) {
   return matters;
 }
 
-/// Whether the object has moved so far that the covariance must be computed again. It changes
-/// little with x.
+/// Whether the object has moved so far that the covariance must be computed again.
 bool movedInView(const Fit& fit, const Eigen::Vector3d& from) {
   constexpr double kLittle = 0.02;  // of the distance
   const double distance = (fit.x.head<3>() - from).norm();
@@ -137,8 +131,7 @@ bool isOneOf(const ScratchVector<const Hypothesis*>& found, const State& x) {
   });
 }
 
-/// `like`: fit of another mode of the same batch. This fit begins with its covariance and
-/// inflations.
+/// `like`: fit of another mode of the batch, whose covariance and inflations this fit begins with.
 std::optional<Fit> fitKeyframes(const BatchProblem& model, const State& start,
                                 const KeyframeBatch& batch, double tail, const Fit* like,
                                 const ScratchVector<const Hypothesis*>& found) {
@@ -246,8 +239,7 @@ std::optional<MapFit> MapFit::make(const Hypothesis& start, const KeyframeBatch&
   if (!fit) return std::nullopt;
   auto h = stateOf(model, *fit, start, frame);
   if (!h) return std::nullopt;
-  // With the covariance of another state, a motion of object and pose together resembles
-  // information.
+  // At another state, a common motion of object and pose resembles information.
   if (fit->covariance_at != fit->x && !isJointCovariance(*h, frame.pose_error.covariance)) {
     h = factorise(model, *fit, true) ? stateOf(model, *fit, start, frame) : std::nullopt;
     if (!h) return std::nullopt;

@@ -1,37 +1,26 @@
 // MAP fit: the state of a hypothesis that maximises the posterior given all keyframes at once, by
-// Levenberg-Marquardt (Dellaert, Kaess 2017; Nielsen 1999). It replaces what the filter made of
-// them one after the other. Derivation: tools/docs/maths/map_fit.md.
-//
-// The model is that of the filter:
-// - sides with noise and with b, an Ornstein-Uhlenbeck process along the view change;
-// - a pose error for each keyframe, correlated between keyframes and with the present pose error;
-// - t-distributed boxes, and the size prior of the class;
-// - for a moving hypothesis, a speed prior and white acceleration.
-// b, pose errors and accelerations are marginalised. So the sides of all keyframes have one full
-// covariance matrix.
+// Levenberg-Marquardt (Dellaert, Kaess 2017; Nielsen 1999), with the model of the filter. b, pose
+// errors and accelerations are marginalised. Derivation: tools/docs/maths/map_fit.md.
 #pragma once
 
 #include <memory>
 #include <optional>
-#include <vector>
 
-#include "services/semantic_filter/core/belief/noise_scale.h"
+#include "services/semantic_filter/core/belief/learned.h"
 #include "services/semantic_filter/core/smoothing/batch_problem.h"
 
 namespace perdure::semantic_filter {
 
 using KeyframeCounts = Eigen::Array<int, Eigen::Dynamic, 1, 0, kMostKeyframes, 1>;
 
-/// One hypothesis, fitted to all keyframes. The batch and the frame outlive it; it lives within one
-/// step.
+/// One hypothesis, fitted to all keyframes. Batch and frame outlive it; it lives within one step.
 class MapFit {
  public:
   struct Fit;
 
-  /// Returns nothing if `start` has no projection in a keyframe, if the keyframes do not determine
-  /// the place, or if the fit comes to one of the modes `found` of the same batch. `like`: another
-  /// mode of the same batch with the same motion; the fit begins with its inflations and
-  /// covariance.
+  /// Returns nothing if `start` has no projection in a keyframe, if the place stays undetermined,
+  /// or if the fit comes to one of the modes `found`. `like`: a mode of the same batch and motion,
+  /// whose inflations and covariance the fit begins with.
   static std::optional<MapFit> make(const Hypothesis& start, const KeyframeBatch& batch,
                                     const FrameContext& frame, const MapFit* like = nullptr,
                                     const ScratchVector<const Hypothesis*>& found = {});
@@ -41,8 +30,7 @@ class MapFit {
   const PerKeyframe& inflations() const;
   /// Returns the share of keyframes that contradict the fit.
   double contradicted() const { return contradictions().cast<double>().mean(); }
-  /// Returns the residuals of the sides, relative to the first assumption. Their count is the
-  /// degrees of freedom.
+  /// Returns the residuals of the sides, by the first assumption; their count: degrees of freedom.
   ResidualRatio residualRatio() const;
   /// Returns the same for the azimuths.
   ResidualRatio azimuthResidualRatio() const;

@@ -11,7 +11,6 @@
 
 namespace perdure::semantic_filter {
 
-/// The fit of one hypothesis of a track.
 struct Fitted {
   std::size_t index;
   MapFit map_fit;
@@ -23,9 +22,8 @@ using Fits = ScratchVector<Fitted>;
 std::optional<MapFit> fit(const Hypothesis& start, const KeyframeBatch& batch,
                           const FrameContext& frame, const MapFit* like = nullptr,
                           const ScratchVector<const Hypothesis*>& found = {});
-/// Returns what else speaks for a fit, nats: the log-likelihood ratio of its ground contact, by
-/// which `h` is updated, and the log of the share of objects whose lower part is hidden, if `h` is
-/// an upper part.
+/// Returns what else speaks for a fit, nats: its ground contact, by which `h` is updated, and the
+/// share of objects with a hidden lower part, if `h` is an upper part.
 double besideKeyframes(Hypothesis& h, ObjectId id, const FrameContext& frame);
 /// Adds `h` with its ground contact to the track and returns it with its fit.
 Fitted adopt(Track& track, Hypothesis h, MapFit&& map_fit, const FrameContext& frame);
@@ -37,7 +35,6 @@ void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Fit
 /// Divides the weight of the fitted hypotheses among them, by all keyframes and the ground. A mode
 /// that was reached twice counts once. A mode below `least` of the best gets the weight 0.
 void weighModes(std::vector<Hypothesis>& hs, const Fits& fits, double least);
-/// Returns the fit whose hypothesis has the largest weight.
 std::optional<Fitted> heaviest(const std::vector<Hypothesis>& hs, Fits&& fits);
 /// Fits from other starts of yaw and size, and adds the new modes to the track and to `fits`.
 void searchModes(Track& track, const KeyframeBatch& batch, const FrameContext& frame, Fits& fits);
@@ -45,9 +42,8 @@ void searchModes(Track& track, const KeyframeBatch& batch, const FrameContext& f
 /// object may move on the ground elsewhere. Returns nothing if there is no such fit.
 std::optional<Fitted> tryMoving(Track& track, const Fitted& at_rest, const KeyframeBatch& batch,
                                 const FrameContext& frame);
-/// Fits an *other* track as the class that it resembles, and adds what fits. Boxes of two objects
-/// make the shape of neither, and *other* fits any shape; all keyframes together may show the class
-/// after all. The odds of *other* against the class are those at initiation, counted once.
+/// Fits an *other* track as the class that it resembles, and adds what fits: the shape of an
+/// *other* may come from boxes of two objects. Its odds are those at initiation, counted once.
 void tryLookalikeClass(Track& track, const KeyframeBatch& batch, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

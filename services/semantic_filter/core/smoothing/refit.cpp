@@ -1,14 +1,11 @@
 #include "services/semantic_filter/core/smoothing/refit.h"
 
 #include <algorithm>
-#include <cmath>
 
-#include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
 #include "services/semantic_filter/core/parameters.h"
 #include "services/semantic_filter/core/smoothing/mode_search.h"
-#include "services/semantic_filter/core/update/ground_contact.h"
 
 namespace perdure::semantic_filter {
 

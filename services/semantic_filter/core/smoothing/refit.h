@@ -7,14 +7,12 @@
 
 namespace perdure::semantic_filter {
 
-/// Keeps this assigned box as a keyframe if its view is new. Returns whether the track should then
-/// be fitted.
+/// Keeps the assigned box as a keyframe if its view is new. Returns whether to fit the track.
 bool considerKeyframe(Track& track, const BoxDetection& box, const std::array<bool, 4>& hidden,
                       const FrameContext& frame);
 /// Returns the number of new keyframes over the number that is awaited; from 1 on the track should
 /// be fitted. `fresh`: the share of new keyframes that is awaited.
 double refitNeed(const Track& track, double fresh);
-/// The residuals of a fit.
 struct ResidualRatios {
   ResidualRatio sides, azimuths;
 };

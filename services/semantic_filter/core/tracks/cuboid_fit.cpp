@@ -12,12 +12,10 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// Residuals of a state without a projection. The solver reads the residuals of a step even if its
-/// cost could not be computed, and must not take such a step.
+/// Residuals of a state without a projection: the solver reads them and must not take the step.
 constexpr double kNoStep = 1e100;
 
-/// Residuals, whitened: four of sides, three of position (weak), one of yaw, three of size, one of
-/// range, four of bias.
+/// Whitened residuals: 4 sides, 3 position (weak), 1 yaw, 3 size, 1 range, 4 bias.
 class CuboidCost {
  public:
   using Scalar = double;
@@ -92,8 +90,7 @@ class CuboidCost {
   Eigen::Matrix3d size_whitening_;
 };
 
-/// Returns the depth, m, at which an object of the prior's size has the height of the box, or else
-/// its width.
+/// Returns the depth, m, at which an object of usual size has the height (or width) of the box.
 std::optional<double> depthFromSize(const BoxMeasurement& z, const ClassPrior& prior,
                                     const CameraModel& camera) {
   if (z.measured[1] && z.measured[3]) return camera.fy() * std::exp(prior.log_size[2]) / z.height();

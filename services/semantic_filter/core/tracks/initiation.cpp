@@ -10,7 +10,6 @@
 #include "common/math/so3.h"
 #include "services/semantic_filter/core/association/box_explanation.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
-#include "services/semantic_filter/core/measurement/azimuth.h"
 #include "services/semantic_filter/core/tracks/mixture_reduction.h"
 #include "services/semantic_filter/core/update/azimuth_update.h"
 #include "services/semantic_filter/core/update/ground_contact.h"
@@ -214,7 +213,7 @@ bool leavesView(BoxExplanations& expected, const Belief& belief,
   for (std::size_t j = 0; j < visibilities.size(); ++j) {
     if (visibilities[j].state != Visibility::kOutOfView || !belief.tracks[j].life.confirmed)
       continue;
-    if (expected.matches(j, visibilities[j].hidden_sides, box)) return true;
+    if (expected.fit(j, visibilities[j].hidden_sides, box)) return true;
   }
   return false;
 }
@@ -249,7 +248,7 @@ std::optional<Track> initiate(const BoxDetection& detection, const std::optional
   addOther(track, other * std::exp(detection.log_ratio_other), seen, *ray, range, frame);
   if (track.hypotheses.empty()) return std::nullopt;
   track.life.first_seen = track.life.last_seen = track.as_of = now;
-  track.pose.product = frame.pose_error.product;
+  track.pose_product = frame.pose_error.product;
   track.history.first_box = track.history.last_box = AssignedBox{now, detection.z.box()};
   track.life.hits = 1;
   track.classes_considered = frame.model->names;
@@ -258,6 +257,35 @@ std::optional<Track> initiate(const BoxDetection& detection, const std::optional
   track.views.detected_from = track.views.observed_from = {frame.view.T_WC(), 1.0};
   track.views.predicted_from = frame.view.T_WC();
   return track;
+}
+
+bool reinitialise(Track& track, const ClassNumbers& pmf, const BoxDetection& detection,
+                  const std::optional<RangeHint>& range, const FrameContext& frame) {
+  auto initiated = initiate(detection, range, track.as_of, frame);
+  if (!initiated) return false;
+  const auto shares = classShares(*initiated);
+  std::vector<Hypothesis> known;
+  double of_known = 0.0;
+  for (const auto& c : pmf) {
+    const auto now = std::find_if(shares.begin(), shares.end(),
+                                  [&](const ClassNumber& s) { return s.name == c.name; });
+    if (c.name == kOtherClass || now == shares.end()) continue;
+    of_known += c.value;
+    for (const auto& h : initiated->hypotheses) {
+      if (h.class_name != c.name) continue;
+      known.push_back(h);
+      known.back().weight *= c.value / now->value;
+    }
+  }
+  if (of_known > 0.5) {
+    track.hypotheses = std::move(known);
+  } else {
+    track.hypotheses = std::move(initiated->hypotheses);
+  }
+  track.batch = {};
+  track.history.running_nis = 1.0;
+  normalise(track, ClassEvidence::kGeometry);
+  return true;
 }
 
 void initiateTracks(Belief& belief, const ScratchVector<TrackVisibility>& visibilities,

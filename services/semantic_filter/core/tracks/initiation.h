@@ -1,15 +1,8 @@
 // Initiation of a track from a box that no track explains (paper, "Initialization", line 284).
 // Derivation: tools/docs/maths/initiation.md.
-//
-// Position, yaw and size minimise the reprojection error of the box under the size prior of the
-// class (Ceres' TinySolver). The covariance is the inverse of the Gauss-Newton Hessian. So a depth
-// that only the size prior determines has the variance it deserves. Enough landmarks inside the box
-// add their weighted centroid. Later updates do not apply the size prior again. The pose error
-// enters position and yaw once, with its cross-covariance.
 #pragma once
 
 #include <optional>
-#include <vector>
 
 #include "services/semantic_filter/core/belief/belief.h"
 #include "services/semantic_filter/core/tracks/cuboid_fit.h"
@@ -20,10 +13,14 @@ namespace perdure::semantic_filter {
 /// Returns the log ratio of "new object" to clutter for this box, all classes together.
 double logInitiationRatio(const BoxDetection& detection, const FrameContext& frame);
 
-/// Returns a track without an id; nothing if the box does not determine one (too few measured
-/// sides).
+/// Returns a track without an id; nothing if too few sides are measured.
 std::optional<Track> initiate(const BoxDetection& detection, const std::optional<RangeHint>& range,
                               TimePoint now, const FrameContext& frame);
+
+/// Finds state and shape of a track again from a box assigned to it. `pmf`: of the track before it
+/// lost its shape. Returns false, and changes nothing, if the box does not determine a track.
+bool reinitialise(Track& track, const ClassNumbers& pmf, const BoxDetection& detection,
+                  const std::optional<RangeHint>& range, const FrameContext& frame);
 
 /// Adds tracks from the boxes that no track explains. `explained`: Association::explained.
 void initiateTracks(Belief& belief, const ScratchVector<TrackVisibility>& visibilities,

@@ -1,13 +1,9 @@
 #include "services/semantic_filter/core/tracks/lifecycle.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 
 #include "common/base/algorithms/stable_sort.h"
 #include "common/math/gaussian.h"
-#include "common/math/small_cholesky.h"
-#include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/pose_correlation.h"
 
 namespace perdure::semantic_filter {
@@ -20,7 +16,7 @@ bool forgettable(const Track& o, const TrackParameters& parameters) {
   if (o.life.once_confirmed || o.life.hits > static_cast<std::uint32_t>(parameters.confirm_hits))
     return false;
   const TimePoint last = std::max(o.unused.occluded.last, o.unused.out_of_view.last);
-  const bool invisible = o.unused.occluded.count + o.unused.out_of_view.count > 0;
+  const bool invisible = o.unused.count() > 0;
   return invisible && toSeconds(last - o.life.last_seen) > parameters.tentative_s;
 }
 

@@ -23,7 +23,6 @@ constexpr double kSameInImage = 0.6;  // intersection over union of two images o
 
 bool isOther(const Track& o) { return o.best().class_name == kOtherClass; }
 
-/// Multiplies the PMF of a by that of b.
 void multiplyPmf(Track& a, const Track& b) {
   for (auto& h : a.hypotheses) {
     h.weight *= std::max(classProbability(b, h.class_name), 1e-3);
@@ -63,8 +62,7 @@ void keepBoth(Track& a, const Track& b) {
   normalise(a, ClassEvidence::kMerge);
 }
 
-/// If one track was seldom detected of late, removes those of its keyframes that the other does not
-/// explain: they showed something else.
+/// Removes keyframes of a seldom detected track that the other does not explain.
 void forgetForeignKeyframes(Track& a, Track& b, const BoxParameters& parameters) {
   constexpr double kSeldomDetected = 0.2;  // share of late observations
   Track& seldom_detected = a.history.recent_share < b.history.recent_share ? a : b;
@@ -117,15 +115,13 @@ bool bothVisible(const Track& a, const Track& b) {
   return a.visibility.fraction > 0.0 && b.visibility.fraction > 0.0;
 }
 
-/// Whether a is visible and occludes b. Two solid objects cannot share their space, so a copy
-/// behind its original is no object of its own.
+/// Whether a is visible and occludes b: a copy behind its original is no object of its own.
 bool occludes(const Track& a, const Track& b) {
   return a.visibility.fraction > 0.0 && b.visibility.state == Visibility::kOccluded &&
          b.visibility.blocked_by == a.id;
 }
 
-/// Predicts invisible tracks to the time of the later one. A track that is not visible has the time
-/// of its last observation.
+/// Predicts invisible tracks, which have the time of their last observation, to the later time.
 void predictToSameTime(Track& a, Track& b, const FrameContext& frame) {
   const TimePoint now = std::max(a.as_of, b.as_of);
   for (Track* o : {&a, &b}) {
@@ -174,8 +170,7 @@ bool detectedTogether(const Track& a, const Track& b) {
   return (a.history.detected & b.history.detected) != 0;
 }
 
-/// Whether, in frames with both visible, the box was assigned now to the one and now to the other.
-/// Two tracks share the boxes of one object in this way.
+/// Whether the box was assigned now to the one and now to the other of two visible tracks.
 bool alternate(const Track& a, const Track& b) {
   constexpr int kTurns = 4;  // frames
   const DetectionHistory &of_a = a.history, &of_b = b.history;
@@ -183,9 +178,8 @@ bool alternate(const Track& a, const Track& b) {
   return std::popcount((of_a.detected ^ of_b.detected) & of_a.visible & of_b.visible) >= kTurns;
 }
 
-/// Whether two tracks are one object by their space: they overlap in space and in the image; or
-/// they overlap less and alternate; or one is *other* and lies inside the other, because two solid
-/// objects cannot share their space.
+/// Whether two tracks are one object: they overlap in space and image; or overlap less and
+/// alternate; or one is *other* and lies inside the other.
 bool sameSpace(const Track& a, const Track& b, const FrameContext& frame) {
   const State &x = a.best().x, &y = b.best().x;
   const TrackParameters& parameters = frame.parameters->tracks;
@@ -199,8 +193,7 @@ bool sameSpace(const Track& a, const Track& b, const FrameContext& frame) {
   return shared.of_joint >= parameters.merge_overlap && sameInImage(x, y, frame.projector());
 }
 
-/// The sphere around the cuboid of a track's best hypothesis. Few of all pairs touch, and to test
-/// that is most of the work. So the spheres are stored apart from the beliefs.
+/// Sphere around a track's cuboid, stored apart: few pairs touch, and the test is most of the work.
 struct Ball {
   Eigen::Vector3d centre;
   double radius;

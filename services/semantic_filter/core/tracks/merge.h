@@ -19,9 +19,8 @@ struct MergeRecord {
 /// Returns the shared volume over the joint volume of two upright cuboids. `up_W`: against gravity.
 double overlap(const State& a, const State& b, const Eigen::Vector3d& up_W);
 
-/// Merges tracks of the same kind that occupy the same space. The confirmed one survives, or else
-/// the older one. Both must be visible, or one occludes the other. Otherwise they wait: a frame in
-/// which they are not visible does not change them.
+/// Merges tracks of one kind in the same space. The confirmed one survives, or else the older one.
+/// Pairs wait unless both are visible or one occludes the other.
 std::vector<MergeRecord> mergeObjects(std::vector<Track>& tracks, const FrameContext& frame);
 
 /// Whether class and motion allow that both are one object.

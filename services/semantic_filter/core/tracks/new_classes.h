@@ -7,9 +7,8 @@
 
 namespace perdure::semantic_filter {
 
-/// Adds hypotheses of classes that the model of this frame knows and that the track was never
-/// considered for. They are those that an initiation from the track's box would keep. Returns
-/// whether hypotheses changed; the track must then be scored again.
+/// Adds hypotheses of new classes of this frame's model that an initiation from the track's box
+/// would keep. Returns whether hypotheses changed; the track must then be scored again.
 bool admitNewClasses(Track& track, const TrackScore& score, const std::vector<BoxDetection>& boxes,
                      const FrameContext& frame);
 

@@ -6,7 +6,6 @@
 #include "common/base/algorithms/stable_sort.h"
 #include "common/base/scratch.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
-#include "services/semantic_filter/core/smoothing/keyframes.h"
 #include "services/semantic_filter/core/tracks/lifecycle.h"
 
 namespace perdure::semantic_filter {
@@ -27,9 +26,8 @@ struct Missing {
 
 bool isMissing(const Track& o) { return o.life.once_confirmed && o.existence < kMissing; }
 
-/// Whether most keyframes of the missing track had the place of the new one in the image, when
-/// nothing was there. What is new only because the camera never saw its place was not carried
-/// there.
+/// Whether most keyframes of the missing track had the new one's place in the image, empty: then
+/// the new track was carried there.
 bool wasInView(const Eigen::Vector3d& place, const Track& missing) {
   const auto& keyframes = missing.batch.keyframes;
   const auto count = std::count_if(keyframes.begin(), keyframes.end(), [&](const auto& k) {
@@ -44,9 +42,8 @@ bool confirmedOrEstablished(const Track& o, const FrameContext& frame) {
   return o.life.confirmed || established(o, frame);
 }
 
-/// Whether the first box of a moving track is almost the last box of the missing one, and follows
-/// it at once. Then both are one object, even if the missing one was misplaced, or deformed until
-/// it was of no known class.
+/// Whether the first box of a moving track is almost the last one of the missing track, and follows
+/// at once. Then both are one object, however misplaced or deformed.
 bool takesOver(const Track& new_track, const Track& missing) {
   constexpr double kAtOnce_s = 0.5, kSameBox = 0.5;  // kSameBox: intersection over union
   if (!new_track.best().moving || !new_track.history.first_box || !missing.history.last_box)
@@ -60,7 +57,6 @@ bool takesOver(const Track& new_track, const Track& missing) {
              kSameBox;
 }
 
-/// How a new track is a missing one.
 struct Match {
   double metres;  ///< between the place of the missing track and where the new one was then
   bool returned;  ///< it stands where it stood
@@ -91,8 +87,7 @@ std::optional<Match> matchOf(const Missing& missing, const Track& new_track,
   return Match{metres, false};
 }
 
-/// The new track keeps its belief and takes over the id, the first times and the counts of the old
-/// one.
+/// The new track keeps its belief and takes over id, first times and counts of the old one.
 void takeOverIdentity(Track& past, Track&& now) {
   now.id = past.id;
   now.life.first_seen = past.life.first_seen;

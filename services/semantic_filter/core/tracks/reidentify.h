@@ -13,17 +13,9 @@ namespace perdure::semantic_filter {
 void keepDeleted(std::vector<Track>& recently_deleted, std::vector<Track> deleted, TimePoint now,
                  const TrackParameters& parameters);
 
-/// Gives new tracks the ids and the past of missing ones; their own ids are absorbed. Missing is
-/// what was confirmed once and is of little existence or deleted by now. A new track is established
-/// and of a known class, and was first detected when the missing one no longer was. Pairs are taken
-/// from the nearest to the farthest. One of these must hold:
-/// - It moves and begins, at once, in the last box of the missing one, wherever that was believed.
-/// - It moves and was at the place of the missing one when that was last detected; same class.
-/// - It stands in the place of a deleted one; same class.
-/// - It stands near, is of a class that is carried, and its place was in view and empty before;
-/// same
-///   class.
-/// Where it stands in the old place, both beliefs are merged; else the new one holds.
+/// Gives new tracks the ids and the past of missing ones, nearest pairs first; their own ids are
+/// absorbed. The derivation lists the cases. Where the new track stands in the old place, both
+/// beliefs are merged; else the new one holds.
 std::vector<MergeRecord> reidentify(std::vector<Track>& tracks,
                                     std::vector<Track>& recently_deleted,
                                     const FrameContext& frame);

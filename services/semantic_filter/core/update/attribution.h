@@ -1,11 +1,7 @@
 // Attribution: the division of one update of existence and PMF among its causes, for the ledger
 // (the paper has no such account). Derivation: tools/docs/maths/ledger.md.
-//
-// The causes are the activations of the network, the geometry of the boxes, and an unmapped
-// occluder that excuses a miss. Attribution changes no belief; track_update.h does.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "common/base/scratch.h"
@@ -30,17 +26,15 @@ struct UpdateReasons {
   ClassNumbers activation;
 };
 
-/// `detected`: probability that one of the boxes is the track's. `tempering`: exponent τ of the
-/// observation, for a hit. `exponent`: that of A between classes. `gated`: indices of the boxes
-/// near the track.
+/// `detected`: probability that a box is the track's. `tempering`: exponent τ of a hit. `exponent`:
+/// that of A between classes. `gated`: indices of the boxes near the track.
 UpdateReasons reasonsOf(const Track& track, const AllShares& shares, double detected,
                         double tempering, double exponent, const ScratchVector<std::size_t>& gated,
                         const std::vector<BoxDetection>& boxes, const FrameContext& frame);
 
 /// Sets existence to `r` and enters its reasons in the ledger.
 void bookExistence(Track& track, double r, const UpdateReasons& reasons);
-/// Normalises the weights and enters the reasons of the PMF in the ledger. The track is sound
-/// (belief/mixture_ops.h).
+/// Normalises the weights of a sound track and enters the reasons of the PMF in the ledger.
 void bookClasses(Track& track, const UpdateReasons& reasons);
 
 }  // namespace perdure::semantic_filter

@@ -6,13 +6,14 @@
 
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
-#include "services/semantic_filter/core/measurement/azimuth.h"
 
 namespace perdure::semantic_filter {
 
 namespace {
 
 constexpr double kMaxHeading = 6.0;  // nats
+constexpr double kOutlier = 0.2;     // share of azimuths that carry no information
+constexpr double kFlip = 0.1;        // share of azimuths that are turned by 180°
 
 /// Multiplies the weights of yaw modes by the likelihood of the azimuths. Each group of one class
 /// and one motion keeps its total weight, so that existence, class and motion learn nothing.
@@ -74,6 +75,27 @@ double updateWithAzimuth(Hypothesis& h, double azimuth, double sigma, double wei
   h.x[kYaw] = wrapAngle(h.x[kYaw]);
   makeSymmetric(h.P);
   return match.likelihood;
+}
+
+AzimuthMatch matchAzimuth(double azimuth, const State& x, const View& view, double variance) {
+  const double full = wrapAngle(yawFromAzimuth(azimuth, x.head<3>(), view) - x[kYaw]);
+  AzimuthMatch match;
+  match.same_head = std::abs(full) <= M_PI / 2;
+  match.residual = match.same_head ? full : wrapAngle(full + M_PI);
+  const double density = std::exp(-0.5 * match.residual * match.residual / variance) /
+                         std::sqrt(2.0 * M_PI * variance);
+  match.likelihood = (1.0 - kOutlier) * density + kOutlier / M_PI;
+  match.inlier = (1.0 - kOutlier) * density / match.likelihood;
+  return match;
+}
+
+double headingOdds(const AzimuthMatch& match) {
+  const double nats = std::log((1.0 - kFlip) / kFlip) * match.inlier;
+  return match.same_head ? nats : -nats;
+}
+
+double azimuthSigma(double told, const ClassPrior& prior) {
+  return std::max(told, prior.azimuth_sigma);
 }
 
 }  // namespace perdure::semantic_filter

@@ -1,6 +1,6 @@
-// Update by the network's azimuth: it changes yaw, heading and the weights of yaw modes, and
-// nothing else. (The paper uses azimuths at initiation only: "Initialization", line 284.)
-// Derivation: tools/docs/maths/azimuth_and_heading.md.
+// The network's azimuth as a measurement of the length axis (modulo 180°) and of the heading: it
+// changes yaw, heading and the weights of yaw modes. (The paper uses azimuths at initiation only:
+// "Initialization", line 284.) Derivation: tools/docs/maths/azimuth_and_heading.md.
 #pragma once
 
 #include <vector>
@@ -8,6 +8,23 @@
 #include "services/semantic_filter/core/update/attribution.h"
 
 namespace perdure::semantic_filter {
+
+struct AzimuthMatch {
+  double residual = 0.0;  ///< rad, to the nearer of the two turns (0 or 180°)
+  bool same_head = true;
+  double likelihood = 0.0;  ///< of the azimuth, over a half turn, 1/rad
+  double inlier = 0.0;      ///< probability that the azimuth carries information
+};
+
+/// `azimuth`: rad. `variance`: of the azimuth and of the yaw together, rad².
+AzimuthMatch matchAzimuth(double azimuth, const State& x, const View& view, double variance);
+
+/// Returns what one such azimuth adds to the log-odds of the heading, nats.
+double headingOdds(const AzimuthMatch& match);
+
+/// Returns the deviation of an azimuth, rad, as assumed before learning. `told`: what the network
+/// says, rad.
+double azimuthSigma(double told, const ClassPrior& prior);
 
 /// Updates the yaw (modulo 180°) by an EKF and the heading by its log-odds. `azimuth`, `sigma`:
 /// rad. `weight`: in (0, 1]. Returns the likelihood of the azimuth, 1/rad. It is for the weights of

@@ -1,7 +1,6 @@
 #include "services/semantic_filter/core/update/ekf.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "common/math/small_cholesky.h"
 #include "common/math/small_products.h"
@@ -23,8 +22,7 @@ struct Innovation {
   int count = 0;
 };
 
-/// Uses the comparable sides, and cut or hidden sides whose prediction ends inside the box: that
-/// must be wrong.
+/// Uses comparable sides, and cut or hidden sides whose prediction ends inside the box.
 Innovation innovation(const BoxMeasurement& z, const ProjectedBox& p,
                       const std::array<bool, 4>& hidden) {
   Innovation y;
@@ -57,8 +55,7 @@ std::optional<Gain> gainOf(const Gains& PHt, const Eigen::Matrix4d& S,
   return gain;
 }
 
-/// Returns the factor that widens the noise of an outlier: the inverse weight of a t distribution
-/// with `tail` degrees of freedom.
+/// Returns the factor on the noise of an outlier: the inverse weight of a t distribution.
 double inflationOf(const Innovation& y, const Eigen::Matrix4d& L, double tail) {
   Eigen::Vector4d whitened = y.residual;
   whiten(L, whitened);

@@ -2,7 +2,6 @@
 // Bar-Shalom, Li 2001, ch. 10; Schmidt 1966). Derivation: tools/docs/maths/ekf.md.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "services/semantic_filter/core/measurement/cuboid_projection.h"
@@ -18,9 +17,8 @@ Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
                          const std::array<bool, 4>& hidden, double repetition,
                          const FrameContext& frame, const ProjectedBox* at_prior = nullptr);
 
-/// Mixes the prior `none` ("none of the boxes") and one posterior for each box to one Gaussian with
-/// the same two moments (probabilistic data association). The weights of `parts` are the posterior
-/// shares of their boxes. The result replaces `none`.
+/// Mixes the prior `none` ("none of the boxes") and the posteriors `parts`, weighted by their
+/// shares, to one Gaussian with the same two moments (probabilistic data association), in `none`.
 void mix(Hypothesis& none, double share_none, std::vector<Hypothesis>& parts);
 inline constexpr double kNegligible = 0.01;  ///< posterior share below which a box is left out
 

@@ -23,8 +23,7 @@ Row undersideByState(const State& x, const Eigen::Vector3d& up) {
   return a;
 }
 
-/// Returns the derivative of a believed height at `place` by the pose error, as addPoseError
-/// (core/tracks/cuboid_fit.cpp) has it.
+/// Returns the derivative of a believed height by the pose error, as in addPoseError.
 Eigen::Matrix<double, 1, 6> heightByPose(const Eigen::Vector3d& place, const View& view) {
   Eigen::Matrix<double, 1, 6> a;
   const Eigen::Vector3d p_B = view.T_WB.inverse() * place;

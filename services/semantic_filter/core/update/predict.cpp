@@ -6,7 +6,6 @@
 #include "common/math/gaussian.h"
 #include "common/math/small_cholesky.h"
 #include "common/math/small_products.h"
-#include "common/math/so3.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
 #include "services/semantic_filter/core/belief/pose_correlation.h"
@@ -16,8 +15,7 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// Returns the stationary deviation of b in this view, for the mean extent of the cuboid over all
-/// directions.
+/// Returns the stationary deviation of b in this view, for the mean extent over all directions.
 Eigen::Vector4d stationaryBias(const State& x, const RigidTransform& T_WC, const ViewWalk& walk) {
   const double scale = walk.focal / std::max((x.head<3>() - T_WC.p).norm(), 1.0);
   const Eigen::Vector3d size = x.segment<3>(kSize).array().exp();
@@ -42,8 +40,7 @@ void predictBias(Hypothesis& h, const std::optional<RigidTransform>& last, const
   h.P.diagonal().segment<4>(kBias) += (1.0 - correlation * correlation) * sigma.cwiseAbs2();
 }
 
-/// Removes moving hypotheses whose position is lost: they would explain any box. Existence is
-/// multiplied by the share of the others.
+/// Removes moving hypotheses whose position is lost, because they would explain any box.
 void dropLostHypotheses(Track& track, TimePoint now, double lost_sigma_m) {
   double kept = 0.0;
   for (const auto& h : track.hypotheses.read()) {
@@ -79,7 +76,7 @@ void predict(Track& track, TimePoint now, const PoseError& pose_error,
   const double dt = toSeconds(now - track.as_of);
   // Without a usable transition C becomes 0.
   const Matrix6d transition =
-      transitionBetween(track.pose.product, pose_error.product).value_or(Matrix6d::Zero());
+      transitionBetween(track.pose_product, pose_error.product).value_or(Matrix6d::Zero());
   const bool may_disagree = pose_error.reported || track.life.recalled;
   std::optional<Matrix6d> L_pose;
   if (may_disagree) L_pose = pose_error.covariance;
@@ -90,8 +87,7 @@ void predict(Track& track, TimePoint now, const PoseError& pose_error,
     h.C = timesTransposed(h.C, transition);
     if (may_disagree) keepConsistent(h, pose_error.covariance, L_pose);
   }
-  const bool undetected = track.life.last_seen < track.as_of ||
-                          track.unused.occluded.count + track.unused.out_of_view.count > 0;
+  const bool undetected = track.life.last_seen < track.as_of || track.unused.count() > 0;
   if (undetected && dt > 0.0) decayUndetectedMoving(track, dt, parameters.mover_survival_s);
   dropLostHypotheses(track, now, parameters.lost_sigma_m);
   if (dt > 0.0) {
@@ -108,7 +104,7 @@ void predict(Track& track, TimePoint now, const PoseError& pose_error,
   track.as_of = now;
   predictDetectability(track, walk);
   track.views.predicted_from = walk.T_WC;
-  track.pose.product = pose_error.product;
+  track.pose_product = pose_error.product;
 }
 
 }  // namespace perdure::semantic_filter

@@ -2,16 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "common/math/gaussian.h"
-#include "common/math/small_cholesky.h"
-#include "common/math/small_products.h"
-#include "common/math/so3.h"
-#include "services/semantic_filter/core/association/tempering.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/update/azimuth_update.h"
-#include "services/semantic_filter/core/update/class_existence.h"
 #include "services/semantic_filter/core/update/ekf.h"
+#include "services/semantic_filter/core/visibility/detectability.h"
 
 namespace perdure::semantic_filter {
 
@@ -64,8 +61,7 @@ double probabilityDetected(const Track& track, const AllShares& shares) {
   return total > 0.0 ? detected / total : 0.0;
 }
 
-/// Returns the assigned box, as an index into TrackScore::boxes: its posterior share is at least
-/// kAssigned.
+/// Returns the assigned box, an index into TrackScore::boxes with a share of kAssigned.
 std::optional<std::size_t> assignedBox(const Track& track, const AllShares& shares) {
   constexpr double kAssigned = 0.8;
   double total = 0.0;
@@ -121,8 +117,7 @@ double noiseRepetition(const Track& track, const FrameContext& frame) {
   return (1.0 + correlation) / std::max(1.0 - correlation, 1e-6);
 }
 
-/// Tempering of an observation. The view change depends on the distance of the object, so it is
-/// taken for the hypothesis with the largest posterior.
+/// Tempering of an observation, for the hypothesis with the largest posterior.
 struct Tempering {
   double exponent = 1.0;
   double observations = 0.0;  ///< earlier ones with correlated errors
@@ -137,6 +132,89 @@ Tempering temperingOf(const Track& track, const TrackScore& score, const AllShar
   }
   const double observations = score.hypotheses[best].correlated_observations;
   return {temperingExponent(observations, correlation), observations};
+}
+
+/// Mean of A over the hypotheses, with tempering between classes and without.
+struct MeanA {
+  double tempered = 0.0, full = 0.0;
+};
+
+/// π ∝ π A. A counts in full within a class, whose hypotheses differ by geometry only, and with the
+/// exponent τ between classes and for existence. Returns the prior means of A.
+MeanA updateWeights(Track& track, const AllShares& shares, double tempering) {
+  ScratchMap<std::string_view, std::pair<double, double>> classes;  // weight, Σ w A
+  double mean_A = 0.0, tempered_A = 0.0;
+  for (std::size_t i = 0; i < shares.size(); ++i) {
+    auto& [weight, sum] = classes[track.hypotheses[i].class_name];
+    weight += track.hypotheses[i].weight;
+    sum += track.hypotheses[i].weight * shares[i].A;
+  }
+  for (const auto& [name, c] : classes) {
+    if (c.first <= 0.0) continue;
+    mean_A += c.second;
+    tempered_A += c.first * std::pow(c.second / c.first, tempering);
+  }
+  for (std::size_t i = 0; i < shares.size(); ++i) {
+    const auto& [weight, sum] = classes[track.hypotheses[i].class_name];
+    if (weight > 0.0) {
+      track.hypotheses[i].weight *= shares[i].A * std::pow(sum / weight, tempering - 1.0);
+    }
+  }
+  return {tempered_A, mean_A};
+}
+
+/// Protects yaw modes that a mode search has weighed by all keyframes, because later observations
+/// alone could end true modes. One that explains this observation about as well as the best keeps
+/// at least `least` of its class, whose weight stays.
+void keepSearchedModes(std::vector<Hypothesis>& hs, const AllShares& shares, double least) {
+  constexpr double kComparable = 0.05;  // least ratio to the largest A of the class
+  struct Class {
+    double before = 0.0, after = 0.0, best_A = 0.0;
+  };
+  ScratchMap<std::string_view, Class> classes;
+  for (std::size_t i = 0; i < hs.size(); ++i) {
+    Class& c = classes[hs[i].class_name];
+    c.before += hs[i].weight;
+    c.best_A = std::max(c.best_A, shares[i].A);
+  }
+  for (std::size_t i = 0; i < hs.size(); ++i) {
+    Hypothesis& h = hs[i];
+    Class& c = classes[h.class_name];
+    const bool kept = h.modes_searched && !h.moving && shares[i].A > kComparable * c.best_A;
+    if (kept) h.weight = std::max(h.weight, least * c.before);
+    c.after += h.weight;
+  }
+  for (auto& h : hs) {
+    const Class& c = classes[h.class_name];
+    if (c.after > c.before) h.weight *= c.before / c.after;
+  }
+}
+
+/// Existence has two accounts; the smaller one is believed. "It is a real object": observations
+/// from one viewpoint share the mistakes of the network, hits as well as misses, so A counts with
+/// the exponent τ. "It is still there": a patch of wall that resembles a chair does not go away, so
+/// A counts in full, and one hit shows that the misses before it were mistakes of the network.
+double existenceAfter(Track& track, const MeanA& mean_A, double certain) {
+  const auto logOdds = [](double p) { return std::log(p / (1.0 - p)); };
+  const double most = logOdds(certain), now = logOdds(std::min<double>(track.existence, certain));
+  const double real =
+      std::min(now + std::max(track.existence_lead, 0.0) + std::log(mean_A.tempered), most);
+  const double still =
+      std::min(now - std::min(track.existence_lead, 0.0) + std::log(mean_A.full), most);
+  track.existence_lead = real - still;
+  return 1.0 / (1.0 + std::exp(-std::min(real, still)));
+}
+
+/// Updates PMF, existence and detectability by one observation, from the same A. `tempering`: τ, 0
+/// to 1. `detected`: a box is probably the track's. Leaves the weights unnormalised. Returns the
+/// new existence, at most `existenceCeiling`.
+double updateClassAndExistence(Track& track, const AllShares& shares, double tempering,
+                               bool detected, const Parameters& parameters) {
+  const MeanA mean_A = updateWeights(track, shares, tempering);
+  if (detected)
+    keepSearchedModes(track.hypotheses.write(), shares, parameters.smoothing.least_weight);
+  updateDetectability(track, mean_A.full, parameters.visibility.hard_detection_share);
+  return existenceAfter(track, mean_A, existenceCeiling(track, parameters.tracks));
 }
 
 }  // namespace

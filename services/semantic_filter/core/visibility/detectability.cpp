@@ -10,8 +10,7 @@ namespace perdure::semantic_filter {
 namespace {
 
 /// Returns the stationary probability, at this view, that an unmapped static object hides the
-/// track. Keyframes of earlier visits lower it near their views: an object that is not detected
-/// where it was detected before has probably gone.
+/// track. Keyframes of earlier visits lower it near their views.
 double stationaryOccluder(const Track& track, const Eigen::Vector3d& place, const ViewWalk& walk) {
   double unmapped_occluder = walk.unmapped_occluder;
   for (const auto& k : track.batch.keyframes.read()) {

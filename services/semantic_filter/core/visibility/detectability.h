@@ -1,5 +1,4 @@
-// Detectability: what makes the detection probability of one track differ from that of its class:
-// an unmapped occluder, and views from which it is seldom detected (Mahler 2007; not in the paper).
+// Detectability: why P_D of a track differs from that of its class (Mahler 2007; not in the paper).
 // Derivation: tools/docs/maths/detectability.md.
 #pragma once
 
@@ -12,20 +11,17 @@ namespace perdure::semantic_filter {
 /// hard to detect, the share `hard_detection_share` of P_D is left.
 double detectableShare(const Track& track, double hard_detection_share);
 
-/// Returns P_D of a class for a fully visible object. `size_px`: square root of the area of its
-/// box, px.
+/// Returns P_D of a class for a fully visible object. `size_px`: root of its box's area.
 double detectionProbability(const ClassPrior& prior, double size_px, const FrameContext& frame);
 
 /// Returns P_D of a hypothesis. *Other* is detected as often as the class that it resembles, as far
 /// as it resembles it.
 double detectionProbabilityOf(const Hypothesis& hypothesis, const Track& track, double size_px,
                               const FrameContext& frame);
-/// Returns the factor on P_D by the detection rate of earlier visits at this viewpoint; 1 for a
-/// moving track.
+/// Returns the factor on P_D by earlier visits at this viewpoint; 1 for a moving track.
 double detectionRateFactor(const Track& track, const FrameContext& frame);
 
-/// Moves the detectability towards its stationary value as the view changes: from another
-/// viewpoint, something else may hide the object.
+/// Moves detectability towards its stationary value as the view changes.
 void predictDetectability(Track& track, const ViewWalk& walk);
 
 /// Updates the reasons of misses by an observation. `mean_A`: mean of A over the hypotheses.

@@ -25,9 +25,8 @@ struct Span {
   double x, y;
 };
 
-/// A grid of cells that is reused for every painting, also of other grids: to clear or to allocate
-/// all cells costs more than to use a few. A stamp for each cell tells whether it belongs to the
-/// present painting. Most cells stay blank.
+/// A grid of cells that is reused for every painting. A stamp tells whether a cell belongs to the
+/// present painting, because most cells stay blank.
 class DepthBuffer {
  public:
   void begin(double width, double height, double cell_px) {
@@ -133,8 +132,7 @@ class Blockers {
  public:
   explicit Blockers(const Outline& outline) : o_(outline) {}
 
-  /// Searches from the newest: few occluders hide one object, and adjacent cells usually have the
-  /// same.
+  /// Searches from the newest: adjacent cells usually have the same occluder.
   Blocked& of(const Cell& cell) {
     for (auto b = all_.rbegin(); b != all_.rend(); ++b) {
       if (b->by == cell.blocker) return *b;
@@ -243,24 +241,6 @@ TrackVisibility classify(const Tally& tally, double in_image, double by_points,
   return visibility;
 }
 
-}  // namespace
-
-Outline outlineOf(const Track& track, const State& x, const Projector& from, const Shape& shape) {
-  const Hypothesis& h = track.best();
-  const Eigen::Vector3d ray = x.head<3>() - from.T_WC.p;
-  Outline o;
-  o.id = track.id;
-  o.solidity = track.existence * track.history.recent_share;
-  o.distance_m = ray.norm();
-  const Eigen::Vector3d along = ray / std::max(o.distance_m, 1e-6);
-  o.depth_sigma_m = std::sqrt(std::max(along.dot(h.P.topLeftCorner<3, 3>() * along), 0.0));
-  o.extent_m = 0.5 * x.segment<3>(kSize).array().exp().maxCoeff();
-  o.box = projectOutline(x, from, shape);
-  return o;
-}
-
-namespace {
-
 /// The part of an outline that lies in the image, and its share of the whole.
 struct InImage {
   Polygon inside;
@@ -303,6 +283,20 @@ DepthBuffer& begin(double width, double height, const VisibilityParameters& para
 }
 
 }  // namespace
+
+Outline outlineOf(const Track& track, const State& x, const Projector& from, const Shape& shape) {
+  const Hypothesis& h = track.best();
+  const Eigen::Vector3d ray = x.head<3>() - from.T_WC.p;
+  Outline o;
+  o.id = track.id;
+  o.solidity = track.existence * track.history.recent_share;
+  o.distance_m = ray.norm();
+  const Eigen::Vector3d along = ray / std::max(o.distance_m, 1e-6);
+  o.depth_sigma_m = std::sqrt(std::max(along.dot(h.P.topLeftCorner<3, 3>() * along), 0.0));
+  o.extent_m = 0.5 * x.segment<3>(kSize).array().exp().maxCoeff();
+  o.box = projectOutline(x, from, shape);
+  return o;
+}
 
 double shareOfFirst(const ScratchVector<Outline>& outlines, double width, double height,
                     const VisibilityParameters& parameters) {

@@ -13,7 +13,6 @@
 
 namespace perdure::semantic_filter {
 
-/// One track, as the depth buffer takes it.
 struct Outline {
   ObjectId id = 0;
   double solidity = 0.0;       ///< probability that the object is there and hides what is behind it
@@ -32,7 +31,6 @@ struct TrackVisibility {
   std::array<bool, 4> hidden_sides{};  ///< sides (x1, y1, x2, y2) that a nearer object hides
 };
 
-/// Returns the outline of the track's cuboid `x` in the view `from`.
 Outline outlineOf(const Track& track, const State& x, const Projector& from,
                   const Shape& shape = cuboidShape());
 

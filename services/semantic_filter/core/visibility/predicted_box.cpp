@@ -7,14 +7,11 @@
 #include "services/semantic_filter/core/belief/motion_model.h"
 
 namespace perdure::semantic_filter {
-namespace {
 
 constexpr double kPredictionFloor = 0.05;  // r·π·v below which inference is not asked
 constexpr double kFastest = 1e5;           // px/s; a faster side passes close to the lens
 constexpr double kLeastSigma = 1;          // px
 constexpr double kFarthest = 1e5;  // px; a side further away is of an object beside the camera
-
-}  // namespace
 
 std::optional<Prediction> predictionOf(const Track& track, const FrameInput& now,
                                        const std::optional<ComingFrame>& coming) {

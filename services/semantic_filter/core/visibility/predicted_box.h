@@ -10,15 +10,13 @@
 
 namespace perdure::semantic_filter {
 
-/// The view that is expected next.
 struct ComingFrame {
   View view;
   double seconds = 0.0;  ///< after the present one
 };
 
-/// Returns the box that the network should report of the track in this frame, with the velocity of
-/// its sides (px/s) towards `coming`. Returns nothing if r·π·v is below 0.05, or if nothing of the
-/// object is before the camera.
+/// Returns the box that the network should report, with the velocity of its sides (px/s) towards
+/// `coming`; nothing if r·π·v is below 0.05 or nothing is before the camera.
 std::optional<Prediction> predictionOf(const Track& track, const FrameInput& now,
                                        const std::optional<ComingFrame>& coming);
 

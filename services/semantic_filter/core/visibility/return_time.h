@@ -11,7 +11,6 @@
 
 namespace perdure::semantic_filter {
 
-/// How the body moves on.
 struct Way {
   RigidTransform step;      ///< T_BB': motion from one frame to the next
   double seconds = 0.0;     ///< duration of a step, > 0

@@ -15,8 +15,7 @@ constexpr double kForget = 0.05;     // weight of a new image in the scale
 constexpr double kMany = 10.0;       // points needed for this weight; with fewer points it is lower
 constexpr double kMoved = 0.05;      // m; a smaller displacement is rest
 constexpr double kTurned = 0.05;     // rad
-constexpr double kGate = 3.0;        // limit of a point's residuals, relative to those of the
-                                     // others
+constexpr double kGate = 3.0;        // a point's residuals relative to those of the others
 
 double lackOfFit(const Triangulated& point, std::size_t rays) {
   // rms² averages 2n residuals, and the point uses three of their degrees of freedom.
@@ -41,21 +40,15 @@ void PointMapper::clear() {
 
 /// Removes tracks that have ended, and poses older than the first view of every remaining track.
 void PointMapper::forgetEnded() {
-  std::vector<std::uint64_t> ended;
+  database_.eraseIf([&](const Track& track) { return !track.seenAt(frame_); });
   std::uint64_t oldest = frame_;
   for (const auto& [id, track] : database_.tracks()) {
-    if (track.seenAt(frame_)) {
-      oldest = std::min(oldest, track.observations.front().frame);
-    } else {
-      ended.push_back(id);
-    }
+    oldest = std::min(oldest, track.observations.front().frame);
   }
-  for (const std::uint64_t id : ended) database_.erase(id);
   std::erase_if(views_, [&](const View& view) { return view.frame < oldest; });
 }
 
-/// Removes the pose that adds the least baseline, among those between the oldest and the newest
-/// ones. The newest poses stay, because most tracks are short.
+/// Removes the pose that adds the least baseline. The newest ones stay: most tracks are short.
 void PointMapper::forgetOne() {
   std::size_t least = 1;
   double shortest = std::numeric_limits<double>::infinity();
@@ -92,13 +85,11 @@ std::vector<Ray> PointMapper::raysOf(const Track& track) const {
   return rays;
 }
 
-/// Triangulation and the estimate of the scale do not use this test. Otherwise a scale raised by
-/// some bad poses would reject too many points, and could not decrease again.
+/// Not used by triangulation and scale, because a scale raised by bad poses could not fall again.
 bool PointMapper::isSure(const Triangulated& point) const {
   return point.rms <= kGate * scale_ && point.relative_sigma * scale_ < options_.max_relative_sigma;
 }
 
-/// Counts why a track has no position.
 void PointMapper::note(const Reason& why) {
   if (why.code == "triangulation_depth") ++mapped_.contradicted;
   if (why.code == "triangulation_far") ++mapped_.far;
@@ -143,7 +134,7 @@ void PointMapper::add(const KnownPose& pose, const TrackedFrame& tracked) {
   landmarks_.clear();
   for (const Candidate& c : candidates) {
     if (!isSure(c.point)) continue;
-    LandmarkEstimate l;
+    Landmark l;
     l.id = c.seen->id;
     l.p_W = c.point.p_W;
     l.covariance = scale_ * scale_ * c.point.covariance;

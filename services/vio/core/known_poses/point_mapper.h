@@ -1,7 +1,6 @@
-// Maps points from tracks when another program gives the poses. Each point is triangulated from the
-// views that add a baseline. Only the agreement of the tracks with the poses is estimated, not the
-// poses. Derivation: tools/docs/maths/vio-known-poses.md. The class does not access images, threads
-// or clocks.
+// Maps points from tracks and poses that another program gives, and estimates how the tracks agree
+// with them. It does not access images, threads or clocks. Derivation:
+// tools/docs/maths/vio-known-poses.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,7 +11,6 @@
 #include "services/vio/core/state/options.h"
 #include "services/vio/core/state/row_motion.h"
 #include "services/vio/core/tracks/tracks.h"
-#include "services/vio/core/update/landmark.h"
 #include "services/vio/core/update/triangulation.h"
 
 namespace perdure::vio {
@@ -27,26 +25,21 @@ struct KnownPose {
 
 class PointMapper {
  public:
-  /// readout_s: read-out time of each camera, 0 for a global shutter. If empty, all cameras have a
-  /// global shutter.
+  /// readout_s: read-out time of each camera, 0 for a global shutter; empty: all global.
   PointMapper(const VisionOptions& options, const WindowOptions& window,
               std::vector<RigidTransform> T_BC, std::vector<double> readout_s = {});
 
-  /// Adds the next image's pose and tracked points.
   void add(const KnownPose& pose, const TrackedFrame& tracked);
-  /// Points of the newest image whose position is known, by rising id. Points that fit the poses
-  /// much worse than the others are left out, because they move or were tracked wrongly.
-  const std::vector<LandmarkEstimate>& landmarks() const { return landmarks_; }
-  /// Counts for the newest image.
+  /// Points of the newest image whose position is known, by rising id, without descriptors, and
+  /// without those that fit the poses much worse.
+  const std::vector<Landmark>& landmarks() const { return landmarks_; }
   const Mapped& mapped() const { return mapped_; }
   /// Ratio of the tracks' residuals to VisionOptions::sigma_px, at least 1.
   double scale() const { return scale_; }
   /// Whether the body moved between the oldest and the newest stored pose.
   bool moved() const;
-  /// Standard deviation of a tracked point from its projection, in pixels. It is at least
-  /// VisionOptions::sigma_px and grows with the errors of the poses.
+  /// Standard deviation of a tracked point from its projection, px; grows with the poses' errors.
   double noisePx() const { return scale_ * options_.sigma_px; }
-  /// Clears poses and views, because another frame of reference begins.
   void clear();
 
  private:
@@ -74,7 +67,7 @@ class PointMapper {
   FeatureDatabase database_;
   std::uint64_t frame_ = 0;
   double scale_ = 1.0;  ///< ratio of the residuals to sigma_px
-  std::vector<LandmarkEstimate> landmarks_;
+  std::vector<Landmark> landmarks_;
   Mapped mapped_;
 };
 

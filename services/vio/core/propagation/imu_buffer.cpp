@@ -7,8 +7,7 @@
 namespace perdure::vio {
 namespace {
 
-// Larger than gravity or a slow turn. Above these values, two samples equal to the last bit are at
-// the sensor's limit.
+// Above these values, two equal samples are at the sensor's limit.
 constexpr double kLargeRate = 3.0, kLargeForce = 12.0;  // rad/s, m/s²
 
 const auto kEarlier = [](const auto& item, TimePoint t) { return item.time < t; };
@@ -82,8 +81,7 @@ void ImuBuffer::between(TimePoint from, TimePoint to, std::vector<ImuReading>& r
 Duration ImuBuffer::longestGap(TimePoint from, TimePoint to) const {
   TimePoint previous = from;
   Duration longest{0};
-  // The samples around the interval also limit the gap, so the search begins at the sample before
-  // it.
+  // Samples around the interval also limit the gap.
   auto it = std::lower_bound(raw_.begin(), raw_.end(), from, kEarlier);
   if (it != raw_.begin() && it != raw_.end()) previous = (it - 1)->time;
   for (; it != raw_.end(); ++it) {
@@ -114,12 +112,6 @@ void ImuBuffer::dropBefore(TimePoint time) {
   while (raw_.size() > 2 && raw_[1].time < time) raw_.pop_front();
   dropBefore(rates_, time);
   dropBefore(forces_, time);
-}
-
-void ImuBuffer::clear() {
-  raw_.clear();
-  rates_.clear();
-  forces_.clear();
 }
 
 }  // namespace perdure::vio

@@ -40,7 +40,7 @@ class ImuBuffer {
   /// Median interval of the newest samples; empty for fewer than three samples.
   std::optional<Duration> period() const;
   void dropBefore(TimePoint time);
-  void clear();
+  void clear() { *this = {}; }
 
  private:
   struct Value {

@@ -38,8 +38,7 @@ struct Densities {
   double gyro2, accel2;
 };
 
-/// Square density added if values are interpolated over `span` and change by `change` over `dt` of
-/// it.
+/// Square density added if values interpolated over `span` change by `change` over `dt` of it.
 double interpolationDensity(double span, double dt, double change2, double floor, double gap,
                             const ImuNoise& noise) {
   if (span <= noise.interpolation_from_s) return 0.0;
@@ -70,8 +69,7 @@ void step(ImuIncrement& x, const ImuReading& a, const ImuReading& b, const Vecto
   const Turn half = turn(w0, wm, 0.5 * dt, scale), whole = turn(w0, w1, dt, scale);
   const Matrix3d R0 = x.dq.toRotationMatrix(), Rm = R0 * half.R, R1 = R0 * whole.R;
 
-  // d (R f) by the rotation error at the start, by gyro bias and by scale; at start, middle and
-  // end.
+  // d (R f) by rotation at the start, gyro bias and scale; at start, middle and end.
   const Matrix3d A0 = -R0 * skew(f0), Am = -Rm * skew(fm), A1 = -R1 * skew(f1);
   const Matrix3d Am_t = Am * half.R.transpose(), A1_t = A1 * whole.R.transpose();
   const Matrix3d Am_b = Am * half.J_bias, A1_b = A1 * whole.J_bias;
@@ -114,6 +112,29 @@ void step(ImuIncrement& x, const ImuReading& a, const ImuReading& b, const Vecto
   x.end_rate = w1;
   x.mean_rate += dt * wm;
   x.mean_force += dt * fm;
+}
+
+/// Transition of the navigation error, and its derivative by an estimated scale's error.
+struct Moves {
+  const Matrix15d& Phi;
+  Matrix93d by_scale;
+  std::optional<int> scale_at;
+};
+
+/// Covariance of the navigation error after the step.
+Matrix15d movedNav(const State& state, const Moves& m, const Matrix15d& Q) {
+  const auto P = state.P();
+  Matrix15d result = m.Phi * P.topLeftCorner<kNavSize, kNavSize>() * m.Phi.transpose() + Q;
+  if (!m.scale_at) return result;
+  const Eigen::Matrix<double, kNavSize, 3> cross =
+      m.Phi * P.block<kNavSize, kScaleSize>(0, *m.scale_at);
+  const Eigen::Matrix<double, kNavSize, 9> added = cross * m.by_scale.transpose();
+  result.leftCols<9>() += added;
+  result.topRows<9>() += added.transpose();
+  result.topLeftCorner<9, 9>() += m.by_scale *
+                                  P.block<kScaleSize, kScaleSize>(*m.scale_at, *m.scale_at) *
+                                  m.by_scale.transpose();
+  return result;
 }
 
 }  // namespace
@@ -185,34 +206,6 @@ Matrix15d transition(const Nav& from, const Nav& to, const ImuIncrement& x, cons
       R_W_B0 * x.F.block<3, 3>(kVelocity, kAccelBias);
   return Phi;
 }
-
-namespace {
-
-/// Transition of the navigation error, and its derivative by the scale's error if that is
-/// estimated.
-struct Moves {
-  const Matrix15d& Phi;
-  Matrix93d by_scale;
-  std::optional<int> scale_at;
-};
-
-/// Covariance of the navigation error after the step.
-Matrix15d movedNav(const State& state, const Moves& m, const Matrix15d& Q) {
-  const auto P = state.P();
-  Matrix15d result = m.Phi * P.topLeftCorner<kNavSize, kNavSize>() * m.Phi.transpose() + Q;
-  if (!m.scale_at) return result;
-  const Eigen::Matrix<double, kNavSize, 3> cross =
-      m.Phi * P.block<kNavSize, kScaleSize>(0, *m.scale_at);
-  const Eigen::Matrix<double, kNavSize, 9> added = cross * m.by_scale.transpose();
-  result.leftCols<9>() += added;
-  result.topRows<9>() += added.transpose();
-  result.topLeftCorner<9, 9>() += m.by_scale *
-                                  P.block<kScaleSize, kScaleSize>(*m.scale_at, *m.scale_at) *
-                                  m.by_scale.transpose();
-  return result;
-}
-
-}  // namespace
 
 void propagate(State& state, const ImuIncrement& x, TimePoint to, double gravity,
                bool first_estimates) {

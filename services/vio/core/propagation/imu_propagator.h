@@ -29,8 +29,7 @@ struct ImuIncrement {
   Eigen::Vector3d mean_force = Eigen::Vector3d::Zero();  ///< bias removed, in B
 };
 
-/// readings: at least two, in time order, as returned by ImuBuffer::between. The rate is (reading −
-/// bias) / scale.
+/// readings: at least two, of ImuBuffer::between. The rate is (reading − bias) / scale.
 ImuIncrement integrate(const std::vector<ImuReading>& readings, const Eigen::Vector3d& gyro_bias,
                        const Eigen::Vector3d& accel_bias, const ImuNoise& noise,
                        const Eigen::Vector3d& gyro_scale = Eigen::Vector3d::Ones());

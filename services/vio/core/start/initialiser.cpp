@@ -15,13 +15,12 @@ using Eigen::Vector3d;
 constexpr double kGauge = 1e-4;        // rad and m: yaw and position at the start define W
 constexpr double kMaxTurn = 0.3;       // rad/s, largest plausible bias
 constexpr double kSpeedWindow = 0.5;   // s, duration of the average of the force
-constexpr double kForceTolerance = 3;  // m/s², difference between the mean force's length and
-                                       // gravity
+constexpr double kForceTolerance = 3;  // m/s², of the mean force's length from gravity
 
 /// Mean dv/dt of the speeds in [from, to]; 0 for fewer than two speeds.
-double acceleration(const std::vector<TimedSpeed>& speeds, TimePoint from, TimePoint to) {
-  const TimedSpeed *first = nullptr, *last = nullptr;
-  for (const TimedSpeed& s : speeds) {
+double acceleration(const std::vector<SpeedSample>& speeds, TimePoint from, TimePoint to) {
+  const SpeedSample *first = nullptr, *last = nullptr;
+  for (const SpeedSample& s : speeds) {
     if (s.time < from - std::chrono::milliseconds(50) ||
         s.time > to + std::chrono::milliseconds(50)) {
       continue;
@@ -79,7 +78,7 @@ Result<Start> startAtRest(const ImuBuffer& imu, TimePoint now, const Options& op
 }
 
 Result<Start> startWithSpeed(const ImuBuffer& imu, TimePoint now, const SpeedReading& speed,
-                             const std::vector<TimedSpeed>& speeds, const Options& options) {
+                             const std::vector<SpeedSample>& speeds, const Options& options) {
   if (imu.empty() || imu.first() >= now || imu.last() < now) return fail("start_window_short");
   const TimePoint from = std::max(imu.first(), now - durationFromSeconds(kSpeedWindow));
   const auto readings = imu.between(from, now);

@@ -1,16 +1,17 @@
 #include "services/vio/core/start/motion_initialiser.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <map>
 
 #include "common/base/algorithms/stable_sort.h"
+#include "common/math/gaussian.h"
 #include "common/math/so3.h"
-#include "services/vio/core/start/epipolar_bias.h"
 #include "services/vio/core/start/initialiser.h"
 #include "services/vio/core/start/linear_start.h"
-#include "services/vio/core/start/motion_search.h"
+#include "services/vio/core/start/motion_refinement.h"
 
 namespace perdure::vio {
 namespace {
@@ -22,15 +23,13 @@ constexpr std::size_t kKeyframes = 8, kFewestTracks = 15, kFewestViews = 3, kMos
 constexpr double kShortestWindow = 0.2;  // s
 constexpr double kGrowth = 0.1;          // relative growth of the window between searches
 constexpr double kMostNoise = 1.25;      // ratio of the residuals to their expected size
-constexpr double kFewestInFront = 0.8;   // share of points in front of the cameras, in the linear
-                                         // solution
+constexpr double kFewestInFront = 0.8;   // share of points, in the linear solution
 constexpr double kMostLinearPx = 3.0;    // residual of the linear solution
 constexpr double kFewestParallaxPx = 2.0;
 constexpr double kMostAcceleration = 5.0;  // m/s², mean over a window
 
-/// Bearing of the point, rotated to the camera's attitude at the middle row. The translation
-/// between the rows lies in the epipolar plane. turn_C: rotation of the camera from the first to
-/// the last row.
+/// Bearing of the point at the camera's attitude at the middle row. turn_C: rotation of the camera
+/// from the first to the last row.
 Vector3d bearing(const ImagePoint& seen, const Vector3d& turn_C) {
   const Vector3d ray = seen.normalised.homogeneous().normalized();
   return turn_C.isZero(0.0) ? ray : Vector3d(expQuaternion(seen.row * turn_C) * ray);
@@ -61,6 +60,65 @@ std::vector<Vector3d> ratesAt(const std::vector<TimePoint>& times, const ImuBuff
   return rates;
 }
 
+/// Matches between two times, as bearings of one camera, and the rotation between them.
+struct BearingPair {
+  std::vector<std::pair<Vector3d, Vector3d>> bearings;  ///< unit vectors in C
+  Matrix3d R_B0_B1;                                     ///< rotation with zero bias
+  Matrix3d J_bias;  ///< derivative of R_B0_B1 (right tangent) by the gyro bias
+};
+
+/// Smallest eigenvalue of Σ n nᵀ over the epipolar normals n. It is zero for the true R.
+double coplanarity(const BearingPair& pair, const Matrix3d& R_C0_C1) {
+  Matrix3d M = Matrix3d::Zero();
+  for (const auto& [f0, f1] : pair.bearings) {
+    const Vector3d n = f0.cross(R_C0_C1 * f1);
+    M += n * n.transpose();
+  }
+  M /= static_cast<double>(pair.bearings.size());
+  return Eigen::SelfAdjointEigenSolver<Matrix3d>(M, Eigen::EigenvaluesOnly).eigenvalues()[0];
+}
+
+/// Gyro bias for which the epipolar normals of each pair are closest to coplanar (Kneip & Lynen,
+/// ICCV 2013; He et al., CVPR 2023).
+Vector3d gyroBiasFromPairs(const std::vector<BearingPair>& pairs, const Matrix3d& R_BC) {
+  const auto residuals = [&](const Vector3d& bias) {
+    Eigen::VectorXd r(static_cast<Eigen::Index>(pairs.size()));
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const Matrix3d R_B = pairs[i].R_B0_B1 * expSo3(pairs[i].J_bias * bias);
+      r[static_cast<Eigen::Index>(i)] =
+          std::sqrt(std::max(coplanarity(pairs[i], R_BC.transpose() * R_B * R_BC), 0.0));
+    }
+    return r;
+  };
+  Vector3d bias = Vector3d::Zero();
+  double lambda = 1e-3;
+  Eigen::VectorXd r = residuals(bias);
+  for (int iteration = 0; iteration < 30; ++iteration) {
+    Eigen::MatrixXd J(r.size(), 3);
+    constexpr double kStep = 1e-4;
+    for (int i = 0; i < 3; ++i) {
+      J.col(i) = (residuals(bias + kStep * Vector3d::Unit(i)) -
+                  residuals(bias - kStep * Vector3d::Unit(i))) /
+                 (2.0 * kStep);
+    }
+    Matrix3d A = J.transpose() * J;
+    A.diagonal() *= 1.0 + lambda;
+    A.diagonal().array() += 1e-12;
+    const Vector3d step = -solveSymmetric(A, J.transpose() * r);
+    const Eigen::VectorXd next = residuals(bias + step);
+    if (next.squaredNorm() < r.squaredNorm()) {
+      bias += step;
+      r = next;
+      lambda = std::max(0.2 * lambda, 1e-6);
+      if (step.norm() < 1e-6) break;
+    } else {
+      lambda *= 5.0;
+      if (lambda > 1e6) break;
+    }
+  }
+  return bias;
+}
+
 /// Matches of points seen in both frames. Their displacements in pixels are appended to `moved`.
 BearingPair pairOf(const Bearings& from, const Bearings& to, const ImuIncrement& x,
                    std::vector<double>& moved) {
@@ -78,18 +136,6 @@ BearingPair pairOf(const Bearings& from, const Bearings& to, const ImuIncrement&
   }
   return pair;
 }
-
-}  // namespace
-
-void MotionInitialiser::add(const FrameInput& input, TimePoint imu_time) {
-  // The clock restarted: its frames and the earlier ones have no common window.
-  if (!frames_.empty() && imu_time <= frames_.back().time) clear();
-  frames_.push_back({imu_time, input.tracked});
-  const Duration window = durationFromSeconds(options_.start.motion_window_s * 1.05);
-  while (frames_.front().time < imu_time - window) frames_.pop_front();
-}
-
-namespace {
 
 /// Tracks of at least three views, the longest first.
 std::vector<WindowPoint> windowPoints(const std::vector<const TrackedFrame*>& tracked,
@@ -116,8 +162,7 @@ std::vector<WindowPoint> windowPoints(const std::vector<const TrackedFrame*>& tr
 }
 
 /// State at the newest pose, from the error [θ, v, gravity, b_g, b_a] of a window. Its W is the
-/// level frame that is rotated least. A frame of yaw 0 is not used, because it is discontinuous if
-/// x points up.
+/// level frame that is rotated least, because yaw 0 is discontinuous if x points up.
 Nav navOf(const MotionWindow& w, const Eigen::Matrix<double, kWindowError, 1>& error,
           const Eigen::Quaterniond& level) {
   const WindowPose& last = w.poses.back();
@@ -158,6 +203,14 @@ Start startOf(const RefinedWindow& refined, const Options& options) {
 }
 
 }  // namespace
+
+void MotionInitialiser::add(const FrameInput& input, TimePoint imu_time) {
+  // The clock restarted: its frames and the earlier ones have no common window.
+  if (!frames_.empty() && imu_time <= frames_.back().time) clear();
+  frames_.push_back({imu_time, input.tracked});
+  const Duration window = durationFromSeconds(options_.start.motion_window_s * 1.05);
+  while (frames_.front().time < imu_time - window) frames_.pop_front();
+}
 
 Result<Start> MotionInitialiser::start(const ImuBuffer& imu,
                                        const std::vector<CameraModel>& cameras) {
@@ -237,8 +290,7 @@ Result<Start> MotionInitialiser::attempt(const ImuBuffer& imu,
   s.x.setZero();
   for (int i = 0; i < 4; ++i) s = solveOnce(views, estimates, s.x, options_.gravity);
   if (!s.x.allFinite() || s.in_front < kFewestInFront || s.rms_px > kMostLinearPx) {
-    // The solution is far from the truth. The search begins at rest, with gravity opposite to the
-    // mean force.
+    // Far from the truth: the search begins at rest, with gravity opposite to the mean force.
     s.x.setZero();
     s.x.tail<3>() = -options_.gravity * keyframes.back().dv.normalized();
   }

@@ -1,5 +1,5 @@
 // Start in motion from images and inertial samples alone, with one or two cameras. It estimates the
-// gyro bias (epipolar_bias.h), then velocity and gravity (linear_start.h), then all quantities
+// gyro bias from epipolar normals, then velocity and gravity (linear_start.h), then all quantities
 // jointly (motion_refinement.h).
 #pragma once
 

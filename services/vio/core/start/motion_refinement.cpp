@@ -3,9 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
-#include "common/math/so3.h"
 #include "services/vio/core/start/motion_terms.h"
 
 namespace perdure::vio {
@@ -29,8 +27,7 @@ double huber(double deviations) {
   return deviations <= kHuber ? deviations * deviations : kHuber * (2.0 * deviations - kHuber);
 }
 
-/// Information on an inverse depth, from the least depth of a point. Without it, images also fit if
-/// all motion and all depths vanish.
+/// Information on an inverse depth. Without it, vanishing motion and depths also fit.
 double nearness(const Options& o) { return o.vision.min_depth_m * o.vision.min_depth_m; }
 
 double priorCost(const MotionWindow& w, const Options& o) {
@@ -63,8 +60,7 @@ double costOf(const Estimate& e, const Inertial& inertial, const Options& o) {
   return cost;
 }
 
-/// Normal equations with the points eliminated, and the values that recover the points' part of a
-/// step.
+/// Normal equations with the points eliminated, and what recovers the points' part of a step.
 struct Normal {
   MatrixXd H;  ///< only the lower half is valid
   VectorXd b;
@@ -150,9 +146,8 @@ double stretchOf(const MotionWindow& w, const VectorXd& dx) {
   return std::clamp(along / square, -kLargestStretch, kLargestStretch);
 }
 
-/// Adds a step. Images do not constrain the scale, and their cost is constant along it. The scale
-/// part of the step is therefore applied as a factor, which preserves the fit to the images. To
-/// first order the step is the same.
+/// Adds a step. Its scale part, along which the images' cost is constant, is applied as a factor,
+/// which preserves the fit to the images.
 void move(Estimate& e, const VectorXd& dx, const Normal& n) {
   const double stretch = stretchOf(e.window, dx), factor = std::exp(stretch);
   VectorXd rest = dx;
@@ -227,8 +222,7 @@ Result<Minimum> minimise(Estimate e, const ImuBuffer& imu, const Options& option
   return Minimum{std::move(e), std::move(*inertial), cost};
 }
 
-/// Root mean square of the views' residuals, in deviations, per degree of freedom left by the poses
-/// and points.
+/// RMS of the views' residuals, in deviations, per remaining degree of freedom.
 double imageNoise(const Minimum& m, double sigma_px) {
   double sum = 0.0, freedom = -6.0 * static_cast<double>(m.estimate.window.poses.size());
   for (std::size_t j = 0; j < m.estimate.rays.size(); ++j) {
@@ -242,7 +236,6 @@ double imageNoise(const Minimum& m, double sigma_px) {
   return std::sqrt(sum / std::max(1.0, freedom));
 }
 
-/// Result with the covariance at the minimum.
 Result<RefinedWindow> refinedBy(Minimum m, const Options& options) {
   const Estimate& e = m.estimate;
   std::size_t rows = 9 * m.inertial.increments.size() + 7;

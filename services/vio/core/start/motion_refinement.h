@@ -1,7 +1,6 @@
 // Maximum a posteriori estimate of a window in motion, from images and inertial samples
-// (Levenberg-Marquardt with the points eliminated). It estimates poses, velocities, the direction
-// of gravity, both biases, the time offset and the points. Its covariance becomes the covariance of
-// the start. Derivation: tools/docs/maths/vio-starts.md.
+// (Levenberg-Marquardt with the points eliminated). Its covariance becomes that of the start.
+// Derivation: tools/docs/maths/vio-starts.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,15 +12,13 @@
 
 namespace perdure::vio {
 
-/// One view of a point.
 struct WindowView {
   std::size_t keyframe = 0;
   Eigen::Matrix3d R_BC;
   Eigen::Vector3d p_BC;
   Eigen::Vector2d normalised;
   Eigen::Matrix2d to_pixels;  ///< ∂pixel / ∂normalised
-  double row_s = 0.0;         ///< delay of the point's row after the pose, in s, for a rolling
-                              ///< shutter
+  double row_s = 0.0;         ///< s from the pose to the point's row of a rolling shutter
 };
 
 struct WindowPoint {
@@ -42,8 +39,7 @@ struct MotionWindow {
   std::vector<WindowPoint> points;
   Eigen::Vector3d gravity_B0 = Eigen::Vector3d::Zero();  ///< fixed length
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = Eigen::Vector3d::Zero();
-  double time_offset_s = 0.0;  ///< s, of the images, in addition to the offset already applied to
-                               ///< `poses`
+  double time_offset_s = 0.0;  ///< of the images, in addition to the one applied to `poses`
 };
 
 /// Error of the newest pose and of the window's parameters: [θ, v (B0), gravity (2), b_g, b_a].
@@ -56,8 +52,7 @@ Eigen::Matrix<double, 3, 2> acrossGravity(const Eigen::Vector3d& gravity_B0);
 struct RefinedWindow {
   MotionWindow window;
   WindowCovariance covariance;  ///< enlarged if the residuals are larger than expected
-  double cost = 0.0;            ///< twice the negative logarithm of the posterior, with robust
-                                ///< terms
+  double cost = 0.0;            ///< twice the negative log posterior, with robust terms
   double image_noise = 1.0;     ///< RMS of the views' residuals, in deviations; 1 if as expected
   double noise_ratio = 1.0;     ///< root of the cost per degree of freedom; 1 if all terms fit
 };
@@ -65,5 +60,19 @@ struct RefinedWindow {
 /// Fails with "start_inconsistent" if it finds no minimum, and with "start_unobservable" if the
 /// information is singular. The failures of inertialOf() (motion_terms.h) are passed on.
 Result<RefinedWindow> refine(MotionWindow window, const ImuBuffer& imu, const Options& options);
+
+// In motion_search.cpp: the best minimum of a window. The search begins from at least two initial
+// values and uses the noise estimated from the images.
+
+/// Largest error of a usable velocity, as a share of the largest velocity in the window. The same
+/// limit applies to the distance of other minima that fit about as well.
+inline constexpr double kVelocityShare = 0.16;
+
+/// Triangulates the points from the poses of the window.
+void placePoints(MotionWindow& window);
+
+/// Fails as refine() does, and with "start_unobservable" if another minimum fits about as well.
+Result<RefinedWindow> searchMinimum(MotionWindow window, const ImuBuffer& imu,
+                                    const Options& options);
 
 }  // namespace perdure::vio

@@ -1,9 +1,8 @@
-#include "services/vio/core/start/motion_search.h"
+#include "services/vio/core/start/motion_refinement.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <utility>
 
 #include "common/base/algorithms/stable_sort.h"
@@ -100,8 +99,7 @@ void placePoints(MotionWindow& window) {
 
 Result<RefinedWindow> searchMinimum(MotionWindow window, const ImuBuffer& imu,
                                     const Options& options) {
-  // The linear solution may be degenerate, without motion and depth. A second search begins with
-  // all points at the usual depth.
+  // The linear solution may be degenerate, so a second search begins at the usual depth.
   MotionWindow usual = window;
   placeAt(usual, kUsualDepth);
   MotionWindow resting = window;

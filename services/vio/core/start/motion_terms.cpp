@@ -3,13 +3,11 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "common/math/so3.h"
 
 namespace perdure::vio::motion {
-namespace {
 
 using Eigen::Index;
 using Eigen::Matrix3d;
@@ -17,8 +15,6 @@ using Eigen::Vector3d;
 
 constexpr double kLeastDepth = 0.1;     // m, initial depth of a point
 constexpr double kGreatestDepth = 1e4;  // m, depth given to a point at infinity
-
-}  // namespace
 
 void add(MotionWindow& w, const Eigen::VectorXd& dx) {
   const double length = w.gravity_B0.norm();

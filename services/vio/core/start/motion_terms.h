@@ -43,21 +43,18 @@ struct Estimate {
   std::vector<Ray> rays;
 };
 
-/// Returns one ray for each point of the window.
 std::vector<Ray> raysOf(const MotionWindow& window);
 /// Returns the window with its points at the positions given by the rays.
 MotionWindow windowOf(Estimate estimate);
 
-/// Quantities that depend on the biases: the increments between neighbours, and the rate at each
-/// pose.
+/// Quantities that depend on the biases: increments between neighbours, and rates at the poses.
 struct Inertial {
   std::vector<ImuIncrement> increments;
   std::vector<Matrix9> information;
   std::vector<Eigen::Vector3d> rates;  // angular rates of the body in B, rad/s
 };
 
-/// Fails with "start_window_short" if samples are missing. Fails with "start_imu_noise_singular" if
-/// the noise covariance of the samples is singular.
+/// Fails with "start_window_short" without samples, and with "start_imu_noise_singular".
 Result<Inertial> inertialOf(const MotionWindow& window, const ImuBuffer& imu,
                             const ImuNoise& noise);
 

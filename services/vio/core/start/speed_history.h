@@ -1,7 +1,6 @@
 // Recent samples of the speed sensor, and the speed at a given time.
 #pragma once
 
-#include <cstddef>
 #include <deque>
 #include <optional>
 #include <vector>
@@ -18,18 +17,17 @@ class SpeedHistory {
   explicit SpeedHistory(double max_age_s) : max_age_s_(max_age_s) {}
 
   /// Refuses "speed_not_finite" and "speed_out_of_order".
-  Result<void> add(const TimedSpeed& sample);
-  /// Interpolates between two samples that are at most two ages apart. Otherwise it returns the
-  /// nearest sample, with a sigma enlarged for possible acceleration. Empty if the nearest sample
-  /// is too old.
+  Result<void> add(const SpeedSample& sample);
+  /// Interpolates between samples at most two ages apart, or returns the nearest with a larger
+  /// sigma. Empty if that is too old.
   std::optional<SpeedReading> at(TimePoint time) const;
   bool reaches(TimePoint time) const { return !samples_.empty() && samples_.back().time >= time; }
-  std::vector<TimedSpeed> samples() const { return {samples_.begin(), samples_.end()}; }
+  std::vector<SpeedSample> samples() const { return {samples_.begin(), samples_.end()}; }
   void clear() { samples_.clear(); }
 
  private:
   double max_age_s_;
-  std::deque<TimedSpeed> samples_;
+  std::deque<SpeedSample> samples_;
 };
 
 }  // namespace perdure::vio

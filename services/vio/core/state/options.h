@@ -11,8 +11,7 @@ struct ImuNoise {
   double gyro_walk = 2.0e-5;   ///< rad/s²/√Hz
   double accel = 2.0e-3;       ///< m/s²/√Hz
   double accel_walk = 3.0e-3;  ///< m/s³/√Hz
-  /// Factor on all four densities in propagation, for errors that a unit at rest does not show. The
-  /// rest tests do not apply it.
+  /// Factor on all four densities in propagation, for errors beyond rest; not in the rest tests.
   double inflation = 1.0;
   /// Samples with a longer interval are treated as momentary values, not averages. The error of
   /// linear interpolation between them is added to the noise.
@@ -30,8 +29,7 @@ struct WindowOptions {
   std::int64_t clones = 11;           ///< poses in the sliding window
   std::int64_t slam_features = 36;    ///< points in the state
   std::int64_t msckf_features = 24;   ///< points used once, per frame
-  std::int64_t min_observations = 4;  ///< smallest number of image points of a track that is used
-                                      ///< once
+  std::int64_t min_observations = 4;  ///< least image points of a track that is used once
   bool first_estimates = true;        ///< Jacobians at first estimates, which updates do not change
 };
 
@@ -40,8 +38,7 @@ struct VisionOptions {
   double gate_probability = 0.95;
   double min_depth_m = 0.1, max_depth_m = 75.0;
   double max_condition = 10000.0;  ///< largest condition number of a triangulation's normal matrix
-  /// Largest standard deviation along the ray, relative to the depth, for a point to enter the
-  /// state.
+  /// Largest standard deviation along the ray, relative to the depth, of a point of the state.
   double max_relative_sigma = 0.4;
   /// Possible jump of the pose, assumed if nearly all points of a frame contradict the prediction.
   double jump_position_m = 0.3;
@@ -54,8 +51,7 @@ struct CalibrationOptions {
   bool estimate_readout = true;       ///< for a rolling shutter
   double extrinsic_rotation = 0.005;  ///< rad
   double extrinsic_position_m = 0.01;
-  double second_camera_factor = 0.1;  ///< factor on both, because the stereo pair's relative pose
-                                      ///< is calibrated more precisely
+  double second_camera_factor = 0.1;  ///< on both: the pose within the pair is more precise
   double time_offset_s = 0.005;
   double readout_s = 0.005;  ///< deviation of the read-out time of a rolling shutter
   double gyro_scale = 0.0;   ///< deviation of each axis from 1; 0: exact, not estimated
@@ -64,8 +60,7 @@ struct CalibrationOptions {
 struct StartOptions {
   double rest_window_s = 0.5;      ///< duration of rest before a start at rest
   double rest_disparity_px = 0.7;  ///< largest median image motion over that window
-  double still_window_s = 2.0;     ///< duration of rest if traffic moves in front of a background
-                                   ///< at rest
+  double still_window_s = 2.0;     ///< duration of rest if traffic moves in the image
   double rest_accel_m_s2 = 1.0;    ///< largest difference between the mean force and gravity
   double motion_window_s = 2.0;    ///< longest window of a start in motion
   double tilt_sigma = 0.03;        ///< rad, at a start with a speed sensor
@@ -81,8 +76,7 @@ struct RestOptions {
   double speed_sigma = 0.02;  ///< m/s
   double position_sigma_m = 0.005;
   double rotation_sigma = 0.001;  ///< rad
-  /// Smallest share of points that stay in place for a second while the others move. They are the
-  /// background of a body that stands in traffic.
+  /// Least share of points that stay for a second while others move: the background of traffic.
   double still_share = 0.15;
   double max_rate = 0.15;  ///< rad/s, mean over a frame, bias removed
   double max_speed = 0.5;  ///< m/s, largest estimated speed at which rest is accepted

@@ -1,13 +1,12 @@
 // Pose of a camera while one row of a rolling-shutter image is exposed, relative to the body at the
-// middle row. As in Li, Kim, Mourikis (ICRA 2013) and Li & Mourikis (IJRR 2014), the IMU gives the
-// motion within an image. Here this motion is expressed in the body's frame and treated as exact.
-// The camera of a row is then a camera with another mounting on the body, and the unobservable
-// directions are preserved. Derivation: tools/docs/maths/vio-rolling-shutter.md.
+// middle row (Li, Kim, Mourikis, ICRA 2013; Li & Mourikis, IJRR 2014). Here the IMU's motion within
+// an image is in the body's frame and exact. Derivation: tools/docs/maths/vio-rolling-shutter.md.
 #pragma once
 
 #include <Eigen/Core>
 
 #include "common/math/rigid_transform.h"
+#include "common/math/so3.h"
 
 namespace perdure::vio {
 
@@ -24,13 +23,22 @@ struct RowMotion {
 
 struct RowCamera {
   RigidTransform T_BC;        ///< B at the middle row, C at this row
-  Eigen::Matrix3d R_BR;       ///< R: body frame at this row. Rotates an error of the mounted p_BC
-                              ///< into B.
+  Eigen::Matrix3d R_BR;       ///< R: body frame at this row; rotates errors of p_BC into B
   Eigen::Vector3d theta_dot;  ///< derivative of T_BC's rotation (right tangent) by s, rad/s
   Eigen::Vector3d p_dot;      ///< derivative of T_BC's position by s, m/s in B
 };
 
 /// Camera mounted at T_BC, `s` seconds after the middle row. |s| is a few hundredths of a second.
-RowCamera rowCamera(const RowMotion& motion, const RigidTransform& T_BC, double s);
+inline RowCamera rowCamera(const RowMotion& m, const RigidTransform& T_BC, double s) {
+  const Eigen::Vector3d turned = m.turn(s);
+  const Eigen::Vector3d rate = rightJacobianSo3(turned) * (m.rate + s * m.rate_change);
+  const RigidTransform T_BR(expSo3(turned), s * m.velocity + 0.5 * s * s * m.acceleration);
+  RowCamera row;
+  row.T_BC = T_BR * T_BC;
+  row.R_BR = T_BR.R();
+  row.theta_dot = T_BC.q.conjugate() * rate;
+  row.p_dot = m.velocity + s * m.acceleration + row.R_BR * rate.cross(T_BC.p);
+  return row;
+}
 
 }  // namespace perdure::vio

@@ -13,60 +13,23 @@ constexpr double kTurnRate = 0.3, kAcceleration = 1.5;
 // Factor for the lost correlations with the window.
 constexpr double kInflation = 1.5;
 
-void put(std::string& out, double value) {
-  char buffer[40];
-  const auto end = std::to_chars(buffer, buffer + sizeof buffer, value).ptr;
-  out.append(buffer, end);
-  out += ' ';
-}
-
-template <class Derived>
-void put(std::string& out, const Eigen::MatrixBase<Derived>& m) {
-  for (Eigen::Index c = 0; c < m.cols(); ++c) {
-    for (Eigen::Index r = 0; r < m.rows(); ++r) put(out, m(r, c));
-  }
-}
-
-class Reader {
- public:
-  explicit Reader(const std::string& text) : in_(text) {}
-  template <class T>
-  T integer() {
-    T value{};
-    if (!(in_ >> value)) good_ = false;
-    return value;
-  }
-  double number() {
-    std::string word;
-    double value = 0.0;
-    if (!(in_ >> word)) {
-      good_ = false;
-      return 0.0;
+/// Calls `each` for every number of the state in the order of the text. T_BC, readout_s and
+/// covariance have their sizes.
+template <class State, class Each>
+void forNumbers(State& s, Each each) {
+  const auto all = [&](auto&& m) {
+    for (Eigen::Index c = 0; c < m.cols(); ++c) {
+      for (Eigen::Index r = 0; r < m.rows(); ++r) each(m(r, c));
     }
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(value)) {
-      good_ = false;
-    }
-    return value;
-  }
-  Eigen::Vector3d vector() {
-    Eigen::Vector3d v;
-    for (int i = 0; i < 3; ++i) v[i] = number();
-    return v;
-  }
-  Eigen::Quaterniond rotation() {
-    Eigen::Vector4d v;
-    for (int i = 0; i < 4; ++i) v[i] = number();
-    if (!(std::abs(v.norm() - 1.0) < 1e-6)) good_ = false;
-    return Eigen::Quaterniond(v[3], v[0], v[1], v[2]);
-  }
-  bool good() const { return good_; }
-  void bad() { good_ = false; }
-
- private:
-  std::istringstream in_;
-  bool good_ = true;
-};
+  };
+  all(s.nav.q_WB.coeffs());
+  for (auto* v : {&s.nav.p_WB, &s.nav.v_WB, &s.nav.gyro_bias, &s.nav.accel_bias}) all(*v);
+  for (auto& T : s.T_BC) all(T.q.coeffs()), all(T.p);
+  each(s.time_offset_s);
+  for (auto& readout : s.readout_s) each(readout);
+  all(s.gyro_scale);
+  all(s.covariance);
+}
 
 }  // namespace
 
@@ -75,18 +38,10 @@ std::string toText(const SavedState& s) {
                      std::to_string(toNanoseconds(s.time)) + ' ' + std::to_string(s.next_track) +
                      ' ' + std::to_string(s.T_BC.size()) + ' ' +
                      std::to_string(s.covariance.rows()) + '\n';
-  put(body, s.nav.q_WB.coeffs());
-  for (const auto* v : {&s.nav.p_WB, &s.nav.v_WB, &s.nav.gyro_bias, &s.nav.accel_bias}) {
-    put(body, *v);
-  }
-  for (const RigidTransform& T : s.T_BC) {
-    put(body, T.q.coeffs());
-    put(body, T.p);
-  }
-  put(body, s.time_offset_s);
-  for (const double readout : s.readout_s) put(body, readout);
-  put(body, s.gyro_scale);
-  put(body, s.covariance);
+  forNumbers(s, [&](double value) {
+    char buffer[40];
+    body.append(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr) += ' ';
+  });
   return std::string(kMagic) + ' ' + toHex(digest(body)) + '\n' + body;
 }
 
@@ -98,35 +53,33 @@ Result<SavedState> fromText(const std::string& text) {
   if (text.substr(0, line) != std::string(kMagic) + ' ' + toHex(digest(body))) {
     return malformed("its check sum or version does not fit");
   }
-  Reader in(body);
+  std::istringstream in(body);
   SavedState s;
-  s.world.world = in.integer<std::uint64_t>();
-  s.world.epoch = in.integer<std::uint32_t>();
-  s.time = fromNanoseconds(in.integer<std::int64_t>());
-  s.next_track = in.integer<std::uint64_t>();
-  const auto cameras = in.integer<std::size_t>();
-  const auto n = in.integer<Eigen::Index>();
-  if (!in.good() || cameras < 1 || cameras > 2) return malformed("its head");
+  std::int64_t time = 0;
+  std::size_t cameras = 0;
+  Eigen::Index n = 0;
+  in >> s.world.world >> s.world.epoch >> time >> s.next_track >> cameras >> n;
+  if (!in || cameras < 1 || cameras > 2) return malformed("its head");
   const Eigen::Index least = kNavSize + 6 * static_cast<Eigen::Index>(cameras) + 1;
   if (n < least || n > least + static_cast<Eigen::Index>(cameras) + kScaleSize) {
     return malformed("its head");
   }
-  s.nav.q_WB = in.rotation();
-  for (auto* v : {&s.nav.p_WB, &s.nav.v_WB, &s.nav.gyro_bias, &s.nav.accel_bias}) {
-    *v = in.vector();
-  }
-  for (std::size_t i = 0; i < cameras; ++i) {
-    const Eigen::Quaterniond q = in.rotation();
-    s.T_BC.emplace_back(q, in.vector());
-  }
-  s.time_offset_s = in.number();
-  for (std::size_t i = 0; i < cameras; ++i) s.readout_s.push_back(in.number());
-  s.gyro_scale = in.vector();
+  s.time = fromNanoseconds(time);
+  s.T_BC.resize(cameras);
+  s.readout_s.resize(cameras);
   s.covariance.resize(n, n);
-  for (Eigen::Index c = 0; c < n; ++c) {
-    for (Eigen::Index r = 0; r < n; ++r) s.covariance(r, c) = in.number();
-  }
-  if (!in.good()) return malformed("a number");
+  bool good = true;
+  forNumbers(s, [&](double& value) {
+    std::string word;
+    in >> word;
+    const char* const end = word.data() + word.size();
+    const auto [stop, error] = std::from_chars(word.data(), end, value);
+    good = good && error == std::errc() && stop == end && std::isfinite(value);
+  });
+  const auto isUnit = [](const Eigen::Quaterniond& q) { return std::abs(q.norm() - 1.0) < 1e-6; };
+  good = good && isUnit(s.nav.q_WB);
+  for (RigidTransform& T : s.T_BC) good = good && isUnit(T.q), T.q.normalize();
+  if (!good) return malformed("a number");
   return s;
 }
 

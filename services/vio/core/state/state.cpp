@@ -1,10 +1,8 @@
 #include "services/vio/core/state/state.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "common/base/check.h"
-#include "common/math/gaussian.h"
 #include "common/math/so3.h"
 
 namespace perdure::vio {
@@ -41,8 +39,7 @@ State::State(const std::vector<RigidTransform>& cameras, double offset, int max_
   size_ = calibrationEnd();
   const int capacity = size_ + 6 * (max_clones + 2) + 3 * max_points;
   P_ = Eigen::MatrixXd::Zero(capacity, capacity);
-  // The largest updates: one with all points, and one with compressed rows of calibration and
-  // clones.
+  // The largest updates: all points, or compressed rows of calibration and clones.
   const int count = static_cast<int>(cameras.size());
   workspace_.begin(roomOfUpdate(
       capacity, std::max(2 * count * max_points, 6 * (count + max_clones + 2) + readoutCount())));
@@ -81,8 +78,7 @@ int State::append(int size) {
 }
 
 void State::remove(int at, int size) {
-  // Moves column by column without a temporary copy. Values that move up or left never overwrite
-  // values that are still to be moved.
+  // Column by column, without a copy: values that move never overwrite values still to be moved.
   const int tail = size_ - at - size;
   for (int column = 0; column < size_; ++column) {
     if (column >= at && column < at + size) continue;
@@ -129,11 +125,10 @@ void State::widenPose(double rotation, double position_m) {
 }
 
 void State::removeClone(std::uint64_t frame) {
-  const auto it =
-      std::find_if(clones.begin(), clones.end(), [&](const Clone& c) { return c.frame == frame; });
-  if (it == clones.end()) return;
-  const int at = it->at;
-  clones.erase(it);
+  const Clone* const gone = clone(frame);
+  if (!gone) return;
+  const int at = gone->at;
+  clones.erase(clones.begin() + (gone - clones.data()));
   remove(at, 6);
 }
 
@@ -147,11 +142,10 @@ void State::addPoint(std::uint64_t id, const Eigen::Vector3d& p_W,
 }
 
 void State::removePoint(std::uint64_t id) {
-  const auto it =
-      std::find_if(points.begin(), points.end(), [&](const PointState& p) { return p.id == id; });
-  if (it == points.end()) return;
-  const int at = it->at;
-  points.erase(it);
+  const PointState* const gone = point(id);
+  if (!gone) return;
+  const int at = gone->at;
+  points.erase(points.begin() + (gone - points.data()));
   remove(at, 3);
 }
 

@@ -32,8 +32,7 @@ struct Nav {
   RigidTransform T_WB() const { return RigidTransform(q_WB, p_WB); }
 };
 
-/// Pose of the body at an image. `linear`: linearisation point of the Jacobians, taken from
-/// nav_linear.
+/// Pose of the body at an image. `linear`: linearisation point, taken from nav_linear.
 struct Clone {
   std::uint64_t frame = 0;
   TimePoint image_time;
@@ -94,15 +93,13 @@ inline constexpr int kTheta = 0, kPosition = 3, kVelocity = 6, kGyroBias = 9, kA
 
 class State {
  public:
-  /// readout_s: read-out time of each camera, 0 for a global shutter. If empty, all cameras have a
-  /// global shutter. estimate_readout adds the non-zero read-outs to the error; estimate_scale adds
-  /// the gyroscope's scale.
+  /// readout_s: read-out time of each camera, 0 for a global shutter; empty: all global. The last
+  /// two add non-zero read-outs and the gyroscope's scale to the error.
   State(const std::vector<RigidTransform>& T_BC, double time_offset_s, int max_clones,
         int max_points, const std::vector<double>& readout_s = {}, bool estimate_readout = false,
         bool estimate_scale = false);
 
-  /// nav_linear: linearisation point of the Jacobians. It holds the predicted q, and a p and v that
-  /// updates do not change.
+  /// nav_linear: linearisation point with the predicted q, and p and v that updates do not change.
   Nav nav, nav_linear;
   TimePoint time;                    ///< IMU clock
   std::vector<RigidTransform> T_BC;  ///< one for each camera
@@ -144,8 +141,7 @@ class State {
   const Clone* clone(std::uint64_t frame) const;
   const PointState* point(std::uint64_t id) const;
 
-  /// Adds a clone of the current pose. rate_B: angular rate, which correlates it with the time
-  /// offset.
+  /// Adds a clone of the current pose. rate_B correlates it with the time offset.
   void addClone(std::uint64_t frame, TimePoint image_time, const Eigen::Vector3d& rate_B,
                 bool first_estimates);
   /// Enlarges the covariance of the current pose and of the newest clone, which is the same pose.
@@ -159,13 +155,11 @@ class State {
 
   /// x ← x ⊞ dx.
   void apply(const VectorView& dx);
-  /// EKF update with residual r = H·error + noise of unit covariance. The columns of H are those of
-  /// `blocks`, in that order. Fails with "update_not_positive" or "update_not_finite" and then does
-  /// not change the state.
+  /// EKF update with r = H·error + noise of unit covariance; H has the columns of `blocks`. Fails
+  /// with "update_not_positive" or "update_not_finite" and then does not change the state.
   Result<void> update(const Eigen::MatrixXd& H, const std::vector<Block>& blocks,
                       const Eigen::VectorXd& r);
-  /// The same update with measurements that each depend on few blocks. Zero columns are not
-  /// computed.
+  /// The same with measurements that each depend on few blocks, without their zero columns.
   Result<void> update(std::span<const Measurement> measurements);
   /// Returns H P Hᵀ for an H with the columns of `blocks`.
   Eigen::MatrixXd project(const MatrixView& H, std::span<const Block> blocks) const;

@@ -21,8 +21,7 @@ struct Pair {
   std::uint16_t first, second;
 };
 
-/// Pairs with an approximately normal distribution in the patch: sums of uniform draws of a fixed
-/// generator.
+/// Approximately normal pairs in the patch: sums of uniform draws of a fixed generator.
 std::array<Pair, 256> makePattern() {
   std::uint64_t seed = 20111129;
   const auto draw = [&seed] {
@@ -86,6 +85,18 @@ std::optional<Descriptor> descriptorAt(const cv::Mat& image, const Eigen::Vector
     byte = static_cast<std::uint8_t>(bits);
   }
   return d;
+}
+
+Landmarks landmarksMessage(const FrameStamp& stamp, InstanceId instance, const WorldId& world,
+                           const std::string& camera, std::vector<Landmark> landmarks,
+                           const cv::Mat& image) {
+  std::erase_if(landmarks, [](const Landmark& l) {
+    return !l.p_W.allFinite() || !l.covariance.allFinite() || !l.cross_pose.allFinite();
+  });
+  for (Landmark& l : landmarks) {
+    l.descriptor = descriptorAt(image, l.pixel).value_or(Descriptor{});
+  }
+  return {stamp, instance, world, camera, std::move(landmarks)};
 }
 
 }  // namespace perdure::vio

@@ -7,6 +7,10 @@
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <string>
+#include <vector>
+
+#include "common/types/odometry.h"
 
 namespace perdure::vio {
 
@@ -14,5 +18,10 @@ using Descriptor = std::array<std::uint8_t, 32>;
 
 /// Takes a CV_8UC1 image. Empty if the pixel is nearer than 16 pixels to the border.
 std::optional<Descriptor> descriptorAt(const cv::Mat& image, const Eigen::Vector2d& pixel);
+
+/// Landmarks of an image (CV_8UC1) of `camera`, with descriptors, without non-finite ones.
+Landmarks landmarksMessage(const FrameStamp& stamp, InstanceId instance, const WorldId& world,
+                           const std::string& camera, std::vector<Landmark> landmarks,
+                           const cv::Mat& image);
 
 }  // namespace perdure::vio

@@ -13,8 +13,7 @@ constexpr int kSteps = 10;
 constexpr float kSettled = 0.01F;        // px
 constexpr float kLeastDeviation = 2.0F;  // grey levels; below it, the texture is noise
 constexpr float kFarthest = 4.0F;        // px from the seed
-// Damping of the affine terms, in grey levels² per (pixel at the patch's rim)². A patch with little
-// texture then keeps its previous warp.
+// Damping of affine terms, grey levels² per (pixel at the rim)²; little texture keeps the warp.
 constexpr float kAffineDamping = 600.0F;
 
 using Values = Eigen::Matrix<float, Patch::kPixels, 1>;
@@ -29,8 +28,7 @@ bool sample(const cv::Mat& image, const Eigen::Matrix2f& warp, const Eigen::Vect
       !(centre.y() + reach.y() < static_cast<float>(image.rows - 1))) {
     return false;
   }
-  // All rows are processed together, one column at a time, so that the compiler has loops of fixed
-  // length. Rows beyond the patch repeat its last row.
+  // All rows together, a column at a time, for loops of fixed length. Rows beyond repeat the last.
   constexpr std::size_t kRows = 16;
   static_assert(kRows >= Patch::kSide);
   std::array<float, kRows> px, py, a, b;
@@ -114,8 +112,7 @@ float Patch::growth() const { return std::sqrt(std::abs(warp_.determinant())); }
 
 std::optional<Patch::Found> Patch::find(const std::vector<cv::Mat>& levels,
                                         const cv::Point2f& seed) {
-  // A patch that has grown is searched for in a smaller image, at the scale of its first
-  // observation.
+  // A grown patch is searched for in a smaller image, at its first scale.
   const int last = static_cast<int>(levels.size()) - 1;
   const int level =
       std::clamp(static_cast<int>(std::lround(std::log2(std::max(growth(), 1.0F)))), 0, last);

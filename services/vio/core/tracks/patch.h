@@ -1,7 +1,6 @@
-// Appearance of a corner at its first observation, and the change since then: an affine warp with
-// gain and offset of brightness. Inverse-compositional Gauss-Newton estimates the warp (Baker &
-// Matthews, "Lucas-Kanade 20 years on", IJCV 2004). Each image is compared with the first one, so
-// that errors do not accumulate along a track.
+// Appearance of a corner at its first observation, and the affine warp, gain and offset since then,
+// by inverse-compositional Gauss-Newton (Baker & Matthews, "Lucas-Kanade 20 years on", IJCV 2004).
+// Comparison with the first image does not accumulate errors.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,13 +19,11 @@ class Patch {
     float similarity = 0;  ///< −1 … 1: normalised cross-correlation with the first observation
   };
 
-  /// Cuts a patch around `pixel` of a CV_8UC1 image. Empty if the patch exceeds the image or has
-  /// too little texture.
+  /// Cuts a patch of a CV_8UC1 image. Empty beyond the image or with too little texture.
   static std::optional<Patch> cut(const cv::Mat& image, const cv::Point2f& pixel);
 
-  /// Finds the patch, starting from `seed`. Each of `levels` has half the size of the previous one.
-  /// Empty if the patch leaves the image or the search does not converge; the warp is then
-  /// unchanged.
+  /// Finds the patch, starting from `seed`, in images each of half the size of the previous. Empty,
+  /// with an unchanged warp, outside the image or without convergence.
   std::optional<Found> find(const std::vector<cv::Mat>& levels, const cv::Point2f& seed);
 
   /// Current size in pixels relative to the first observation.
@@ -38,8 +35,7 @@ class Patch {
   Eigen::Matrix<float, kPixels, 6> steepest_;  ///< derivatives by [x, y, a_xx, a_xy, a_yx, a_yy]
   Eigen::Matrix<float, 6, 6> inverse_hessian_;
   float norm_ = 0;
-  Eigen::Matrix2f warp_ = Eigen::Matrix2f::Identity();  ///< warp from the first observation to the
-                                                        ///< current image
+  Eigen::Matrix2f warp_ = Eigen::Matrix2f::Identity();  ///< from the first to the current image
 };
 
 }  // namespace perdure::vio

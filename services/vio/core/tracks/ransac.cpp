@@ -1,7 +1,6 @@
 #include "services/vio/core/tracks/ransac.h"
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <cstdint>
 
 namespace perdure::vio {
@@ -23,8 +22,8 @@ double epipolarDistance(const Match& match, const Eigen::Matrix3d& R_now_before,
 }
 
 std::vector<bool> twoPointRansac(const std::vector<Match>& matches,
-                                 const Eigen::Matrix3d& R_now_before, double threshold_px,
-                                 int iterations) {
+                                 const Eigen::Matrix3d& R_now_before, double threshold_px) {
+  constexpr int kIterations = 100;
   const std::size_t n = matches.size();
   std::vector<bool> best(n, true);
   if (n < 4) return best;
@@ -43,7 +42,7 @@ std::vector<bool> twoPointRansac(const std::vector<Match>& matches,
   };
   std::size_t best_count = 0;
   std::vector<bool> agrees(n);
-  for (int k = 0; k < iterations && best_count < n; ++k) {
+  for (int k = 0; k < kIterations && best_count < n; ++k) {
     const std::size_t i = next(), j = next();
     if (i == j) continue;
     const Eigen::Vector3d t = normals[i].cross(normals[j]);

@@ -12,11 +12,9 @@ struct Match {
   double scale = 1.0;           ///< pixels per normalised unit
 };
 
-/// Marks the matches that agree with R_now_before and the best translation, within threshold_px of
-/// their epipolar lines. The result is deterministic.
+/// Marks matches within threshold_px of their epipolar lines by the best translation, repeatably.
 std::vector<bool> twoPointRansac(const std::vector<Match>& matches,
-                                 const Eigen::Matrix3d& R_now_before, double threshold_px,
-                                 int iterations = 100);
+                                 const Eigen::Matrix3d& R_now_before, double threshold_px);
 
 /// Distance in pixels of `now` from the epipolar line of `before`. translation: direction in the
 /// frame of `now`. If no epipolar line exists, the result is the distance between the two points.

@@ -1,7 +1,6 @@
-// Tracks corners from image to image. Pyramidal Lucas-Kanade at half size starts from the
-// gyroscope's prediction; comparison with the first observation (patch.h) then refines the
-// position. Points of the second camera come from Lucas-Kanade alone. New corners (FAST) fill empty
-// cells of a grid.
+// Tracks corners: pyramidal Lucas-Kanade at half size from the gyroscope's prediction, then
+// comparison with the first observation (patch.h). The second camera has Lucas-Kanade alone. New
+// corners (FAST) fill empty cells of a grid.
 #pragma once
 
 #include <Eigen/Core>
@@ -50,8 +49,7 @@ class Tracker {
                      const std::optional<Eigen::Matrix3d>& R_now_before,
                      const std::vector<cv::Rect2f>& masked = {},
                      const Eigen::Vector3d& turn_of_readout = Eigen::Vector3d::Zero());
-  /// Quantile of the points' image motion in pixels over the last `frames` frames. Empty if too few
-  /// points are known.
+  /// Quantile of the points' image motion, px, over the last `frames`. Empty for too few points.
   std::optional<double> motionSince(std::size_t frames, double quantile = 0.5) const;
   /// Share of the points that have stayed within half a pixel for the last `frames` images. 0 if
   /// these points are few or close together, because they are then no background.
@@ -71,16 +69,13 @@ class Tracker {
     Eigen::Vector2d normalised;
     Eigen::Vector2d at_middle;  ///< normalised, rotated to the camera's attitude at the middle row
     std::unique_ptr<Patch> patch;
-    cv::Point2f place = pixel;  ///< position from which the point has moved by less than half a
-                                ///< pixel
+    cv::Point2f place = pixel;  ///< the point has moved by less than half a pixel from here
     std::size_t still = 0;
   };
   std::vector<cv::Mat> pyramid(const cv::Mat& image, std::int64_t levels) const;
   struct Images {
-    std::vector<cv::Mat> half;    ///< pyramid from half size on, as built by
-                                  ///< cv::buildOpticalFlowPyramid
-    std::vector<cv::Mat> levels;  ///< the image itself first, then each half the size of the
-                                  ///< previous
+    std::vector<cv::Mat> half;    ///< cv::buildOpticalFlowPyramid from half size on
+    std::vector<cv::Mat> levels;  ///< the image itself, then each of half the previous size
   };
   void follow(const Images& now, const std::optional<Eigen::Matrix3d>& R);
   Eigen::Vector2d atMiddle(const ImagePoint& seen) const;
@@ -99,11 +94,9 @@ class Tracker {
     double scale;
     cv::Point2f shift;
   };
-  std::optional<Placed> as_first_;  ///< scale and shift for pixels of the second camera; empty if
-                                    ///< the sizes are equal
+  std::optional<Placed> as_first_;  ///< for pixels of the second camera; empty at equal sizes
   std::vector<Point> points_;
-  Eigen::Vector3d turn_ = Eigen::Vector3d::Zero();  ///< rotation of the first camera during
-                                                    ///< read-out, in C
+  Eigen::Vector3d turn_ = Eigen::Vector3d::Zero();  ///< of camera 0 during read-out, in C
   std::vector<cv::Mat> previous_;
   std::deque<std::vector<std::pair<std::uint64_t, cv::Point2f>>> history_;  ///< newest last
   std::uint64_t next_id_ = 1;

@@ -1,6 +1,5 @@
 #include "services/vio/core/tracks/tracks.h"
 
-#include <algorithm>
 #include <cmath>
 
 namespace perdure::vio {
@@ -51,10 +50,10 @@ void FeatureDatabase::erase(std::uint64_t id) {
 }
 
 void FeatureDatabase::removeFrame(std::uint64_t frame) {
-  for (auto it = tracks_.begin(); it != tracks_.end();) {
-    std::erase_if(it->second.observations, [&](const Observation& o) { return o.frame == frame; });
-    it = it->second.observations.empty() ? forget(it) : std::next(it);
+  for (auto& [id, track] : tracks_) {
+    std::erase_if(track.observations, [&](const Observation& o) { return o.frame == frame; });
   }
+  eraseIf([](const Track& track) { return track.observations.empty(); });
 }
 
 const Track* FeatureDatabase::find(std::uint64_t id) const {

@@ -14,14 +14,12 @@ namespace perdure::vio {
 
 inline constexpr std::size_t kMaxCameras = 2;
 
-/// One point in one image of one camera.
 struct ImagePoint {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();       ///< as seen, distorted
   Eigen::Vector2d normalised = Eigen::Vector2d::Zero();  ///< x/z, y/z, undistorted
   double scale = 1.0;  ///< mean number of pixels per unit of the normalised image at this point
   Eigen::Matrix2d to_pixels = Eigen::Matrix2d::Identity();  ///< ∂pixel / ∂normalised at this point
-  double row = 0.0;  ///< −½ … ½, first to last row: time since the middle row as a share of the
-                     ///< read-out
+  double row = 0.0;  ///< −½ … ½: time since the middle row, as a share of the read-out
 };
 
 /// Undistorts a pixel. Empty if the lens model has no inverse there.
@@ -58,6 +56,12 @@ class FeatureDatabase {
   /// Removes the observations of a frame, and tracks that become empty.
   void removeFrame(std::uint64_t frame);
   void erase(std::uint64_t id);
+  template <class Predicate>
+  void eraseIf(Predicate goes) {
+    for (auto it = tracks_.begin(); it != tracks_.end();) {
+      it = goes(it->second) ? forget(it) : std::next(it);
+    }
+  }
   void clear() { tracks_.clear(); }
   const std::map<std::uint64_t, Track>& tracks() const { return tracks_; }
   const Track* find(std::uint64_t id) const;

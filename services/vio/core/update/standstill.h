@@ -1,8 +1,6 @@
-// Decides whether the body stands still while most of the image moves, because traffic in front of
-// a body at rest looks like motion. An IMU alone cannot distinguish rest from constant velocity. It
-// therefore only confirms that a body that stood still has not moved. Zero-velocity detectors:
-// Skog, Händel, Nilsson, Rantakokko, IEEE TBME 2010. Derivation:
-// tools/docs/maths/vio-rest-and-speed.md.
+// Decides whether the body stands still while most of the image moves, as traffic does. An IMU only
+// confirms that a body that stood still has not moved (Skog, Händel, Nilsson, Rantakokko, IEEE TBME
+// 2010). Derivation: tools/docs/maths/vio-rest-and-speed.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -25,14 +23,12 @@ struct RestExpectation {
 /// From the filter's attitude and biases, with their covariance.
 RestExpectation restExpectation(const State& state, double gravity);
 
-/// Whether the means over `window` before `now` agree with the expectation. `age`: time since the
-/// expectation was taken, during which the biases drift. False if the samples do not cover the
-/// window.
+/// Whether the means over `window` before `now` agree with the expectation, taken `age` ago. False
+/// if the samples do not cover the window.
 bool imuRests(const ImuBuffer& imu, TimePoint now, Duration window, const RestExpectation& expected,
               Duration age, const ImuNoise& noise);
 
-/// Whether rate and force were constant over `window` before `now`, as at rest and at constant
-/// velocity. False if the samples do not cover the window.
+/// Whether rate and force were constant over `window` before `now`; false without its samples.
 bool imuIsEven(const ImuBuffer& imu, TimePoint now, Duration window, const ImuNoise& noise);
 
 /// Stores when the body last stood still, and the IMU values expected at rest.
@@ -44,16 +40,13 @@ class Standstill {
   /// The images show that the body stands still at `now`.
   void confirm(TimePoint now, const RestExpectation& expected);
   /// Whether the IMU shows that a body that stood still has not moved since. A disturbance of up to
-  /// a second without net velocity change, for example a person getting in, only interrupts the
-  /// standstill.
+  /// a second without net velocity change only interrupts the standstill.
   bool holds(const ImuBuffer& imu, TimePoint now, const ImuNoise& noise);
 
  private:
-  std::optional<TimePoint> confirmed_;    ///< last time at which the images confirmed the
-                                          ///< standstill
+  std::optional<TimePoint> confirmed_;    ///< when the images last confirmed the standstill
   std::optional<TimePoint> interrupted_;  ///< time since which the IMU contradicts it
-  TimePoint begun_;                       ///< first time at which the images confirmed this
-                                          ///< standstill
+  TimePoint begun_;                       ///< when the images first confirmed it
   /// Expectation with its time. The filter attributes a slow acceleration to a bias, so the
   /// expectation must be older than the acceleration.
   struct Reference {

@@ -26,8 +26,7 @@ RestSample restSample(const std::vector<ImuReading>& readings, const ImuNoise& n
 Eigen::Matrix<double, 6, 1> restPrediction(const Nav& nav, double gravity,
                                            Eigen::Matrix<double, 6, 9>* J = nullptr);
 
-/// Constrains velocity and rotation rate to zero, and the force to gravity. Fails with
-/// "rest_gated".
+/// Sets velocity and rotation rate to zero, the force to gravity. Fails with "rest_gated".
 Result<void> updateRest(State& state, const RestSample& sample, const RestOptions& options,
                         double gravity, bool gated = true);
 

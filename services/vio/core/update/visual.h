@@ -32,8 +32,7 @@ struct View {
   Eigen::Vector2d readout = Eigen::Vector2d::Zero();  ///< derivative by the read-out time
 };
 
-/// The residual uses the clone's estimate and p_W; the Jacobians use its `linear` and p_linear.
-/// Empty if the point is behind the camera.
+/// The residual uses estimate and p_W, the Jacobians `linear` and p_linear. Empty if behind.
 std::optional<View> viewOf(const State& state, const Clone& clone, std::size_t camera,
                            const ImagePoint& seen, const Eigen::Vector3d& p_W,
                            const Eigen::Vector3d& p_linear, double sigma_px);
@@ -48,19 +47,16 @@ struct PointSystem {
 /// Blocks of all extrinsics, of the estimated read-outs, and of the clones.
 std::vector<Block> calibrationAndClones(const State& state);
 
-/// Position of an estimated point for linearisation. The point moves rigidly with the track's
-/// newest clone.
+/// Linearisation point of an estimated point, which moves with the track's newest clone.
 Eigen::Vector3d linearisationPoint(const State& state, const Track& track,
                                    const Eigen::Vector3d& p_W);
 
-/// Stacks all views of `track` whose clones are in the state. H_x has the columns of
-/// calibrationAndClones. The residual uses the estimates; the Jacobians use `linear`. r is empty if
-/// the point lies behind a camera.
+/// Stacks all views of `track` by clones of the state, with the columns of calibrationAndClones. r
+/// is empty if the point lies behind a camera.
 PointSystem stackViews(const Track& track, const State& state, const Eigen::Vector3d& p_W,
                        double sigma_px);
 
-/// Transforms the system so that H_f is upper triangular. Only the first three rows then depend on
-/// the point.
+/// Makes H_f upper triangular: only the first three rows then depend on the point.
 void separatePoint(PointSystem& system);
 
 /// Keeps the rows that depend on the state alone. Needs separatePoint before.
@@ -69,8 +65,7 @@ void dropPoint(PointSystem& system);
 /// True if rᵀ S⁻¹ r is below the χ² quantile; S = H P Hᵀ + I.
 bool passesGate(const VectorView& r, const MatrixView& S, double probability);
 
-/// The same test with S = P + I for an expensive P. P is evaluated only if rᵀ r, an upper bound of
-/// rᵀ S⁻¹ r, reaches the quantile.
+/// The same with S = P + I. P is evaluated only if rᵀ r, an upper bound, reaches the quantile.
 bool passesGateWith(const VectorView& r, const std::function<Eigen::MatrixXd()>& P,
                     double probability);
 

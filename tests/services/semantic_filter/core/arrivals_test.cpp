@@ -78,7 +78,7 @@ TEST_F(ArrivalsTest, APlacedTrackIsAsUncertainAsTheBodyAndSharesItsError) {
   ASSERT_EQ(ids(), Ids{7});
   const Track& track = belief_.tracks.front();
   EXPECT_TRUE(track.life.recalled);
-  EXPECT_EQ(track.pose.product, input_.pose_error.product);
+  EXPECT_EQ(track.pose_product, input_.pose_error.product);
   // Numeric derivative: the object moves with the body.
   constexpr double kStep = 1e-6;
   const RigidTransform& T_WB = input_.view.T_WB;
@@ -116,7 +116,7 @@ TEST_F(ArrivalsTest, APublishedTrackKeepsEachBitAndTheProductOfItsTime) {
   ASSERT_EQ(ids(), Ids{7});
   const Track& track = belief_.tracks.front();
   EXPECT_TRUE(track.life.recalled);
-  EXPECT_EQ(track.pose.product, product);
+  EXPECT_EQ(track.pose_product, product);
   ASSERT_EQ(track.hypotheses.size(), 1u);
   EXPECT_EQ(track.best().x.head<7>(), belief.best().mean);
   const Matrix7d P = track.best().P.topLeftCorner<7, 7>();

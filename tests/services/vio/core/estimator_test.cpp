@@ -186,7 +186,7 @@ TEST(Estimator, LandmarksLieWithinTheirCovariance) {
   const Matrix6d P = estimator.state().covarianceOf({{estimator.state().clones.back().at, 6}});
   double nees = 0.0;
   int count = 0;
-  for (const LandmarkEstimate& l : estimator.landmarks()) {
+  for (const Landmark& l : estimator.landmarks()) {
     std::size_t nearest = 0;
     double best = 1e9;
     for (std::size_t i = 0; i < drive.points().size(); ++i) {

@@ -20,7 +20,6 @@ struct ShapeLevel {
 /// The corners of a convex solid. The image of the object is the hull of their images.
 struct Shape {
   static constexpr int kMostLevels = 3, kMostCorners = 8 * kMostLevels;
-  /// One number for each corner.
   using PerCorner = Eigen::Array<double, Eigen::Dynamic, 1, 0, kMostCorners, 1>;
 
   PerCorner along, across, up;  ///< from the middle, in halves of length, width and height, -1 to 1

@@ -1,11 +1,9 @@
-// Upper part: of an object whose lower part something hides that is not on the map (a chair at a
-// table) only the upper part is seen, from every side. Such a hypothesis is of the object's class;
-// its cuboid is that of the part. So it predicts the boxes as they are, and pays for the hiding
-// thing once and not in every frame. Beyond the paper. Derivation: tools/docs/maths/upper_part.md.
+// Upper part: what is seen of an object whose lower part something off the map hides, as a table a
+// chair. Such a hypothesis has the object's class and the part's cuboid, so that it pays for the
+// hiding thing once. Beyond the paper. Derivation: tools/docs/maths/upper_part.md.
 #pragma once
 
 #include "services/semantic_filter/core/belief/classes/class_prior.h"
-#include "services/semantic_filter/core/belief/parameters.h"
 #include "services/semantic_filter/core/belief/state.h"
 
 namespace perdure::semantic_filter {
@@ -16,9 +14,8 @@ struct SizePrior {
   Eigen::Matrix3d covariance;
 };
 
-/// Returns the prior of the cuboid of an object, or of its upper part. That has any share of the
-/// length (the back of a chair, the cabin of a car), any share of the height up to a half, and the
-/// width of the object.
+/// Returns the prior of the cuboid of an object, or of its upper part: any share of the length and
+/// of the height up to a half, and the width of the object.
 SizePrior sizePriorOf(const ClassPrior& prior, bool upper_part);
 
 /// Whether it has less than half of the usual height. Only such a cuboid is of an upper part: what

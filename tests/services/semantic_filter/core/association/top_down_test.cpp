@@ -1,5 +1,5 @@
 // Top-down answers: the effects that they may have on a track, and those that they must not have.
-#include "services/semantic_filter/core/association/top_down.h"
+#include "services/semantic_filter/core/association/score.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,6 @@
-#include "services/semantic_filter/core/belief/mover_shares.h"
-
 #include <gtest/gtest.h>
 
+#include "services/semantic_filter/core/belief/learned.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {

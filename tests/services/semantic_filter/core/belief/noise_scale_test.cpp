@@ -1,8 +1,8 @@
-#include "services/semantic_filter/core/belief/noise_scale.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "services/semantic_filter/core/belief/learned.h"
 
 namespace perdure::semantic_filter {
 namespace {

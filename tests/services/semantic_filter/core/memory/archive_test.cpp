@@ -101,10 +101,10 @@ TEST(Archive, ObjectsComeNearerThanTheyLeave) {
 TEST(Archive, TheProductOfAnArchivedTrackIsKeptByTheTimeOfItsState) {
   Archive memory{kMemory, kStands};
   Track track = thingAt(1, 140, 10);
-  track.pose.product = 3.0 * Matrix6d::Identity();
+  track.pose_product = 3.0 * Matrix6d::Identity();
   memory.rememberReference(track);
   ASSERT_TRUE(memory.referenceAt(track.as_of));
-  EXPECT_EQ(*memory.referenceAt(track.as_of), track.pose.product);
+  EXPECT_EQ(*memory.referenceAt(track.as_of), track.pose_product);
   EXPECT_FALSE(memory.referenceAt(at(11)));
   memory.clear();
   EXPECT_FALSE(memory.referenceAt(track.as_of)) << "of another frame of reference";

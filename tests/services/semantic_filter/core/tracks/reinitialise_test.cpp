@@ -1,4 +1,4 @@
-#include "services/semantic_filter/core/tracks/reinitialise.h"
+#include "services/semantic_filter/core/tracks/initiation.h"
 
 #include <gtest/gtest.h>
 

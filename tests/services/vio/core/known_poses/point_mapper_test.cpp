@@ -55,7 +55,7 @@ class GivenDrive {
     for (double t = from; t < until; t += kStep) mapper.add(poseAt(t), drive_.see(t));
   }
   /// Returns the drive's point with the image at `t` nearest to the landmark's pixel.
-  Vector3d truthOf(const LandmarkEstimate& landmark, double t) const {
+  Vector3d truthOf(const Landmark& landmark, double t) const {
     std::size_t best = 0;
     double least = 1e9;
     for (std::size_t i = 0; i < drive_.points().size(); ++i) {
@@ -97,7 +97,7 @@ Honesty honestyOf(GivenDrive& given, PointMapper& mapper, double from, double un
   Honesty honesty;
   for (double t = from; t < until; t += kStep) {
     mapper.add(given.poseAt(t), given.drive().see(t));
-    for (const LandmarkEstimate& l : mapper.landmarks()) {
+    for (const Landmark& l : mapper.landmarks()) {
       const Vector3d error = l.p_W - given.truthOf(l, t);
       const double distance = (l.p_W - given.drive().truth(t).p_WB).norm();
       honesty.relative.push_back(error.norm() / distance);
@@ -191,7 +191,7 @@ TEST(PointMapper, WhatMovesIsLeftOut) {
     tracked.points.push_back(moving);
     mapper.add(given.poseAt(t), tracked);
     if (t < 1.0) continue;
-    for (const LandmarkEstimate& l : mapper.landmarks()) seen = seen || l.id == kMoving;
+    for (const Landmark& l : mapper.landmarks()) seen = seen || l.id == kMoving;
   }
   EXPECT_FALSE(seen);
   EXPECT_GT(mapper.landmarks().size(), 30u);
@@ -263,7 +263,7 @@ TEST(PointMapper, TheErrorOfThePoseIsThatOfThePoint) {
   pose.covariance = 1e-4 * Matrix6d::Identity();
   mapper.add(pose, given.drive().see(2.0));
   ASSERT_FALSE(mapper.landmarks().empty());
-  const LandmarkEstimate& l = mapper.landmarks().front();
+  const Landmark& l = mapper.landmarks().front();
   Eigen::Matrix<double, 6, 1> error;
   error << 0.002, -0.001, 0.003, 0.01, 0.02, -0.03;
   RigidTransform moved = pose.T_WB;

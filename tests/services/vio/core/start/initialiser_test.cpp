@@ -71,12 +71,12 @@ TEST(StartAtRest, RefusesAShortWindowAFallAndATurn) {
 TEST(StartWithSpeed, LevelsInSpiteOfAccelerationAndTurn) {
   // 8 m/s, with an acceleration of 2 m/s² and a yaw rate of 0.4 rad/s on a level street.
   std::vector<ImuReading> readings;
-  std::vector<TimedSpeed> speeds;
+  std::vector<SpeedSample> speeds;
   for (int i = 0; i <= 20; ++i) {
     const double t = 0.05 * i, v = 8.0 + 2.0 * t;
     const TimePoint time = fromNanoseconds(0) + durationFromSeconds(t);
     readings.push_back({time, Vector3d(0, 0, 0.4), Vector3d(2.0, 0.4 * v, 9.81)});
-    speeds.push_back({time, v, 0.1});
+    speeds.push_back({.time = time, .speed = v, .sigma = 0.1});
   }
   const auto start =
       startWithSpeed(bufferOf(readings), readings.back().time, {10.0, 0.1}, speeds, Options{});

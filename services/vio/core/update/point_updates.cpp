@@ -1,4 +1,4 @@
-#include "services/vio/core/update/updater_slam.h"
+#include "services/vio/core/update/point_updates.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -15,8 +15,7 @@ constexpr int kFailuresToLeave = 3;
 constexpr int kFewestJumped = 8;
 constexpr double kFarOff = 25.0;  ///< mean square of the rows, in variances of a pixel
 
-/// Rows of one point in the newest clone's views; columns are [extrinsics, read-outs, clone,
-/// point].
+/// Rows of one point in the newest clone; columns [extrinsics, read-outs, clone, point].
 struct PointRows {
   static constexpr int kRows = 2 * kMaxCameras, kColumns = 7 * kMaxCameras + 9;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kRows, kColumns> H;
@@ -121,6 +120,49 @@ Innovation innovationOf(const State& state, const PointRows& rows, const ImagePo
 
 }  // namespace
 
+Result<UpdateCounts> updateMsckf(State& state, const std::vector<const Track*>& tracks,
+                                 const VisionOptions& options, ReasonCounts& reasons) {
+  UpdateCounts counts;
+  const std::vector<Block> blocks = calibrationAndClones(state);
+  const Eigen::MatrixXd P = state.covarianceOf(blocks);
+  std::vector<PointSystem> systems;
+  Eigen::Index rows = 0;
+  systems.reserve(tracks.size());
+  for (const Track* const track : tracks) {
+    const auto point = triangulate(raysOf(*track, state, options.sigma_px), options);
+    if (!point) {
+      if (point.error().code == "triangulation_depth") ++counts.behind;
+      reasons.add(point.error());
+      continue;
+    }
+    PointSystem s = stackViews(*track, state, point->p_W, options.sigma_px);
+    if (s.r.size() < 4) continue;
+    separatePoint(s);
+    dropPoint(s);
+    const auto of_views = [&] { return s.H_x * P * s.H_x.transpose(); };
+    if (!passesGateWith(s.r, of_views, options.gate_probability)) {
+      ++counts.gated;
+      reasons.add("msckf_gated");
+      continue;
+    }
+    ++counts.used;
+    rows += s.r.size();
+    systems.push_back(std::move(s));
+  }
+  if (rows == 0) return counts;
+  Eigen::MatrixXd H(rows, P.cols());
+  Eigen::VectorXd r(rows);
+  Eigen::Index row = 0;
+  for (const PointSystem& s : systems) {
+    H.middleRows(row, s.r.size()) = s.H_x;
+    r.segment(row, s.r.size()) = s.r;
+    row += s.r.size();
+  }
+  compress(H, r);
+  if (const auto done = state.update(H, blocks, r); !done) return tl::unexpected(done.error());
+  return counts;
+}
+
 Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
                                 const VisionOptions& options, bool may_jump, ReasonCounts& reasons,
                                 std::vector<Innovation>* innovations) {
@@ -131,7 +173,6 @@ Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
   counts.gated = static_cast<int>(leaving.size());
   if (may_jump && haveJumped(seen)) {
     reasons.add("images_jumped");
-    counts.jumped = true;
     state.widenPose(options.jump_rotation, options.jump_position_m);
     for (Seen& s : seen) s.judge(state, options.gate_probability);
   }

@@ -1,24 +1,25 @@
-// Noise scale: squared ratio of true to assumed errors of boxes and azimuths, learned for each
-// network. Derivation: tools/docs/maths/noise_scale.md.
-//
-// The assumption is box.* of parameters.h with the class priors, or what the network says itself.
-// The scale is learned from the residuals of MAP fits of objects at rest. It is part of the belief,
-// so that a late frame finds it as it was.
+// What is learned while driving: noise scales of networks and shares of movers.
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "services/semantic_filter/core/belief/classes/class_prior.h"
+#include "services/semantic_filter/core/belief/track.h"
+
 namespace perdure::semantic_filter {
 
-/// The residuals of one fit.
 struct ResidualRatio {
   double ratio = 1.0;  ///< squared residuals over their variance, per degree of freedom
   double count = 0.0;  ///< number of new residuals; keyframes of an earlier fit do not count again
 };
 
-/// The noise scale of box sides, or of azimuths, for each network.
+/// Noise scale of box sides, or of azimuths: squared ratio of true to assumed errors, for each
+/// network. Derivation: tools/docs/maths/noise_scale.md.
 class NoiseScales {
  public:
   /// Remembers at most `remembered` residuals, because a network has other errors on another road.
@@ -36,6 +37,22 @@ class NoiseScales {
   };
   double remembered_;
   std::vector<std::pair<std::uint64_t, Sums>> sums_;  ///< a list, because networks are few
+};
+
+/// Share of the instances of a class that move, learned from the objects of this drive beside the
+/// prior, each once and when it can be judged. Derivation: tools/docs/maths/state_and_mixture.md.
+class MoverShares {
+ public:
+  /// Counts a track if this was the detection at which tracks are judged.
+  void learn(const Track& track, double min_speed);
+  /// Returns the prior probability that an instance of the class moves; 0 stays 0.
+  double of(const ClassPrior& prior) const;
+
+ private:
+  struct Counts {
+    double moving = 0.0, all = 0.0;
+  };
+  std::shared_ptr<const std::map<std::string, Counts>> counts_;  ///< shared by copies of the belief
 };
 
 }  // namespace perdure::semantic_filter

@@ -1,0 +1,46 @@
+// Updates with points that are used once, because their tracks have ended or their oldest view
+// leaves the window (Mourikis & Roumeliotis, ICRA 2007), and with points of the state: delayed
+// initialisation from a full track, and the newest image (Li & Mourikis, RSS 2012: hybrid MSCKF /
+// EKF-SLAM).
+#pragma once
+
+#include <vector>
+
+#include "common/base/result.h"
+#include "services/vio/core/state/options.h"
+#include "services/vio/core/state/state.h"
+#include "services/vio/core/tracks/tracks.h"
+
+namespace perdure::vio {
+
+struct UpdateCounts {
+  int used = 0, gated = 0;
+  int behind = 0;  ///< not triangulated because the rays do not meet in front of the cameras
+};
+
+/// Triangulates and gates each track, and updates the state once with all tracks that pass.
+/// Failures are counted under their reasons. Fails only if the update fails.
+Result<UpdateCounts> updateMsckf(State& state, const std::vector<const Track*>& tracks,
+                                 const VisionOptions& options, ReasonCounts& reasons);
+
+/// Innovation of a point of the state in the newest image.
+struct Innovation {
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();     ///< as seen by the first camera
+  Eigen::Vector2d residual = Eigen::Vector2d::Zero();  ///< observed minus predicted, px
+  double nis = 0.0;                                    ///< rᵀ S⁻¹ r over all its views
+  int rows = 0;                                        ///< degrees of freedom of nis
+  bool used = false;                                   ///< passed the gate
+};
+
+/// Updates the state's points with their observations in the newest clone. A point leaves the state
+/// if it fails the gate three times in a row or lies behind the camera. `innovations`, if given, is
+/// filled. If most points fail at once by a wide margin and `may_jump`, the pose covariance is
+/// enlarged by `VisionOptions::jump_*`, the gates are repeated, and "images_jumped" is counted.
+Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
+                                const VisionOptions& options, bool may_jump, ReasonCounts& reasons,
+                                std::vector<Innovation>* innovations = nullptr);
+
+/// Adds the track's point by all views. Fails as triangulation, the update, or "slam_gated".
+Result<void> initialisePoint(State& state, const Track& track, const VisionOptions& options);
+
+}  // namespace perdure::vio
