@@ -184,7 +184,7 @@ class Writer : public RawWriter {
   /// Disposes the instance with this value's key, also for late joiners. Only the key is read.
   Result<void> dispose(const T& key) {
     typename wire::Type<T>::Wire sample;
-    wire::encodeKey(key, sample, arena_);
+    (void)wire::encode(key, sample, arena_);  // other fields need not be valid
     return disposeWire(&sample);
   }
 
