@@ -15,8 +15,7 @@ struct Overloaded : F... {
 template <class... F>
 Overloaded(F...) -> Overloaded<F...>;
 
-template <class List, class ToText>
-std::string listText(const List& values, ToText toText) {
+std::string listText(const auto& values, auto toText) {
   std::string text = "[";
   for (const auto& value : values) text += (text.size() > 1 ? ", " : "") + toText(value);
   return text + "]";

@@ -84,13 +84,11 @@ class Coder {
     copyRows(d, w);
     checkMatrix(name, d, limits);
   }
-  template <class M, class W, std::size_t N>
-  void symmetric(const char* name, M& d, W (&w)[N]) {
+  void symmetric(const char* name, auto& d, auto& w) {
     copyTriangle(name, d, w);
     if (!failed() && !isSemiDefinite(d)) refuse(name, "bad_covariance");
   }
-  template <class M, class W, std::size_t N>
-  void covariance(const char* name, M& d, W (&w)[N]) {
+  void covariance(const char* name, auto& d, auto& w) {
     copyTriangle(name, d, w);
     if (!failed() && !isDefinite(d)) refuse(name, "bad_covariance");
   }
@@ -104,40 +102,34 @@ class Coder {
     checkUnit(name, d.q.norm());
     checkMatrix(name, d.p, kCoordinate);
   }
-  template <class D, class W>
-  void object(const char* name, D& d, W& w) {
+  void object(const char* name, auto& d, auto& w) {
     under(name, -1, [&] { describe(*this, d, w); });
   }
-  template <class D, class W>
-  void optional(const char* name, D& d, Wire<bool>& has, W& w) {
+  void optional(const char* name, auto& d, Wire<bool>& has, auto& w) {
     if (exists(name, d, has)) object(name, *d, w);
   }
   void optionalNumber(const char* name, Domain<std::optional<double>>& d, Wire<bool>& has,
                       Wire<double>& w, const Limits& limits) {
     if (exists(name, d, has)) number(name, *d, w, limits);
   }
-  template <class D, class S>
-  void list(const char* name, D& d, S& w, std::size_t most) {
+  void list(const char* name, auto& d, auto& w, std::size_t most) {
     if (!resize(name, d, w, most)) return;
     for (std::size_t i = 0; i < d.size() && !failed(); ++i) {
       under(name, static_cast<long>(i), [&] { describe(*this, d[i], w._buffer[i]); });
     }
   }
-  template <class D, class S>
-  void numbers(const char* name, D& d, S& w, const Limits& limits, std::size_t most) {
+  void numbers(const char* name, auto& d, auto& w, const Limits& limits, std::size_t most) {
     if (!resize(name, d, w, most)) return;
     for (std::size_t i = 0; i < d.size(); ++i) {
       copy(d[i], w._buffer[i]);
       if (!checkNumber(name, static_cast<double>(d[i]), limits)) return;
     }
   }
-  template <class D, class S>
-  void names(const char* field, D& d, S& w, std::size_t most) {
+  void names(const char* field, auto& d, auto& w, std::size_t most) {
     if (!resize(field, d, w, most)) return;
     for (std::size_t i = 0; i < d.size(); ++i) name(field, d[i], w._buffer[i]);
   }
-  template <class Counts, class S>
-  void counts(const char* field, Counts& d, S& w, std::size_t most) {
+  void counts(const char* field, auto& d, auto& w, std::size_t most) {
     if constexpr (kEncodes) {
       if (!resize(field, d, w, most)) return;
       std::size_t i = 0;
@@ -177,13 +169,11 @@ class Coder {
     }
   }
   /// `holds` is called only for values that were read.
-  template <class Predicate>
-  void ensure(const char* name, const char* code, Predicate holds) {
+  void ensure(const char* name, const char* code, auto holds) {
     if (!failed() && !holds()) refuse(name, code);
   }
   /// Checks a value of the wire that has no counterpart in the domain.
-  template <class Predicate>
-  void ensureWire(const char* name, const char* code, Predicate holds) {
+  void ensureWire(const char* name, const char* code, auto holds) {
     if constexpr (!kEncodes) ensure(name, code, holds);
   }
 
@@ -206,8 +196,7 @@ class Coder {
     if (!std::isfinite(norm)) return refuse(name, "not_finite");
     if (std::abs(norm - 1.0) > kUnitTolerance) refuse(name, "bad_rotation");
   }
-  template <class Matrix>
-  void checkMatrix(const char* name, const Matrix& m, const Limits& limits) {
+  void checkMatrix(const char* name, const auto& m, const Limits& limits) {
     for (Eigen::Index i = 0; i < m.size(); ++i) {
       if (!checkNumber(name, m(i % m.rows(), i / m.rows()), limits)) return;
     }
@@ -220,8 +209,7 @@ class Coder {
     if (count > most) refuse(name, "over_bound");
     return count <= most;
   }
-  template <class S>
-  bool checkBuffer(const char* name, const S& w, std::size_t most) {
+  bool checkBuffer(const char* name, const auto& w, std::size_t most) {
     if (!checkCount(name, w._length, most)) return false;
     if (w._length > 0 && w._buffer == nullptr) refuse(name, "size_mismatch");
     return w._length > 0 && w._buffer != nullptr;
@@ -233,8 +221,7 @@ class Coder {
     if (byte > 1) refuse(name, "out_of_range");
     return byte == 1;
   }
-  template <class D>
-  bool exists(const char* name, D& d, Wire<bool>& has) {
+  bool exists(const char* name, auto& d, Wire<bool>& has) {
     if constexpr (kEncodes) {
       has = d.has_value();
     } else if (isTrue(name, has)) {
@@ -243,8 +230,7 @@ class Coder {
     return d.has_value();
   }
   /// Gives the target the length of the source. Returns false if the elements must not be copied.
-  template <class D, class S>
-  bool resize(const char* name, D& d, S& w, std::size_t most) {
+  bool resize(const char* name, auto& d, auto& w, std::size_t most) {
     if constexpr (kEncodes) {
       if (!checkCount(name, d.size(), most)) return false;
       w._buffer = memory_.template allocate<std::remove_pointer_t<decltype(w._buffer)>>(d.size());
@@ -263,8 +249,7 @@ class Coder {
       d = w;
     }
   }
-  template <class M>
-  static void copyRows(M&& d, Wire<double>* w) {
+  static void copyRows(auto&& d, Wire<double>* w) {
     for (Eigen::Index r = 0; r < d.rows(); ++r) {
       for (Eigen::Index c = 0; c < d.cols(); ++c) copy(d(r, c), *w++);
     }
@@ -283,8 +268,7 @@ class Coder {
     checkMatrix(name, d, kMatrixEntry);
   }
   /// Visits one part of the message under its name.
-  template <class Visit>
-  void under(const char* name, long index, Visit visit) {
+  void under(const char* name, long index, auto visit) {
     path_.push_back({name, index});
     visit();
     path_.pop_back();
