@@ -180,7 +180,7 @@ void Endpoint::add(ReasonCounts& counts, const char* what, std::uint64_t n) cons
 
 void Endpoint::addRefusals(ReasonCounts& counts) const {
   const std::lock_guard lock(mutex_);
-  for (const auto& [reason, n] : refusals_.all()) counts.add(reason, n);
+  counts.add(refusals_);
 }
 
 RawReader::RawReader(const Participant& participant, const std::string& topic, ReadFrom from)

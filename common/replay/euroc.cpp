@@ -27,7 +27,7 @@ constexpr char kImuColumns[] =
 using Fields = std::vector<std::string_view>;
 
 void addNotes(const SensorTable& table, Recording& recording) {
-  for (const auto& [reason, n] : table.reasons().all()) recording.reasons.add(reason, n);
+  recording.reasons.add(table.reasons());
   const auto& notes = table.notes();
   recording.notes.insert(recording.notes.end(), notes.begin(), notes.end());
 }

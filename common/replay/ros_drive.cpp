@@ -172,8 +172,7 @@ class RosDriveReader {
     }
     messages_.rewind(wanted);
     while (const auto message = messages_.next()) take(*message);
-    const ReasonCounts reasons = messages_.reasons();
-    for (const auto& [reason, n] : reasons.all()) recording_.reasons.add(reason, n);
+    recording_.reasons.add(messages_.reasons());
     if (!messages_.lastProblem().empty()) recording_.notes.push_back(messages_.lastProblem());
     if (unstamped_ == 0) return;
     recording_.notes.push_back(file_ + ": " + std::to_string(unstamped_) +

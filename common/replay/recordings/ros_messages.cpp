@@ -107,9 +107,7 @@ std::vector<std::string> RosMessages::notes() const {
 
 ReasonCounts RosMessages::reasons() const {
   ReasonCounts all = reasons_;
-  for (const auto& source : sources_) {
-    for (const auto& [reason, n] : source->reasons().all()) all.add(reason, n);
-  }
+  for (const auto& source : sources_) all.add(source->reasons());
   return all;
 }
 
