@@ -5,6 +5,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace perdure {
 
@@ -28,7 +29,8 @@ class StartupError : public std::runtime_error {
   template <class First, class... More>
   StartupError(ExitCode code, fmt::format_string<First, More...> format, First&& first,
                More&&... more)
-      : StartupError(code, fmt::format(format, first, more...)) {}
+      : StartupError(
+            code, fmt::format(format, std::forward<First>(first), std::forward<More>(more)...)) {}
   ExitCode code() const { return code_; }
 
  private:

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
+#include <utility>
 
 namespace perdure {
 
@@ -29,7 +30,7 @@ inline tl::unexpected<Reason> fail(std::string_view code, std::string_view detai
 template <class First, class... More>
 tl::unexpected<Reason> fail(std::string_view code, fmt::format_string<First, More...> detail,
                             First&& first, More&&... more) {
-  return fail(code, fmt::format(detail, first, more...));
+  return fail(code, fmt::format(detail, std::forward<First>(first), std::forward<More>(more)...));
 }
 
 /// Counts of reasons since the start, published in Health. Ordered, so that the output is

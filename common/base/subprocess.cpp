@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "common/base/check.h"
+#include "common/base/descriptor.h"
 #include "common/base/errors.h"
 
 namespace perdure {
@@ -26,32 +27,12 @@ constexpr std::chrono::milliseconds kStep{10};
   throw StartupError(ExitCode::kUnavailable, program + " cannot be started: " + why);
 }
 
-class Descriptor {
- public:
-  explicit Descriptor(int fd = -1) : fd_(fd) {}
-  ~Descriptor() { close(); }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int get() const { return fd_; }
-  void reset(int fd) {
-    close();
-    fd_ = fd;
-  }
-  void close() {
-    if (fd_ >= 0) ::close(fd_);
-    fd_ = -1;
-  }
-
- private:
-  int fd_;
-};
-
 struct Pipe {
   Descriptor read_end, write_end;
   Pipe() {
     int ends[2];
     check(pipe2(ends, O_CLOEXEC) == 0, "a pipe can be made");
-    read_end.reset(ends[0]), write_end.reset(ends[1]);
+    read_end = Descriptor(ends[0]), write_end = Descriptor(ends[1]);
   }
 };
 
@@ -182,8 +163,8 @@ std::optional<std::filesystem::path> findProgram(const std::string& name) {
 Subprocess::Subprocess(const ProgramOptions& options) {
   Descriptor log;
   if (!options.log.empty()) {
-    log.reset(open(options.log.c_str(), O_CREAT | O_APPEND | O_WRONLY | O_CLOEXEC, 0644));
-    if (log.get() < 0) {
+    log = Descriptor(open(options.log.c_str(), O_CREAT | O_APPEND | O_WRONLY | O_CLOEXEC, 0644));
+    if (!log.open()) {
       refuse(options.command[0],
              options.log.string() + " cannot be written: " + std::strerror(errno));
     }

@@ -16,10 +16,10 @@ namespace {
 constexpr char kLibrary[] = "perdure";
 constexpr char kZstd[] = "zstd";
 
-Result<int> opened(const std::filesystem::path& path, int flags) {
-  const int file = open(path.c_str(), flags | O_CLOEXEC, 0644);
-  if (file >= 0) return file;
-  return fail("file", path.string() + ": " + std::strerror(errno));
+Result<Descriptor> opened(const std::filesystem::path& path, int flags) {
+  Descriptor file(open(path.c_str(), flags | O_CLOEXEC, 0644));
+  if (file.open()) return file;
+  return fail("file", "{}: {}", path.c_str(), std::strerror(errno));
 }
 
 std::vector<std::uint8_t> beginning(const std::string& profile = {}) {
@@ -138,9 +138,9 @@ Chunk pack(const Draft& draft) {
 }
 
 Result<Writer> Writer::create(const std::filesystem::path& path, const std::string& profile) {
-  const auto file = opened(path, O_WRONLY | O_CREAT | O_EXCL);
+  auto file = opened(path, O_WRONLY | O_CREAT | O_EXCL);
   if (!file) return tl::unexpected(file.error());
-  Writer writer(path, *file);
+  Writer writer(path, *std::move(file));
   if (auto written = writer.write(beginning(profile)); !written) {
     std::error_code ignored;
     std::filesystem::remove(path, ignored);
@@ -152,11 +152,11 @@ Result<Writer> Writer::create(const std::filesystem::path& path, const std::stri
 Result<Writer> Writer::resume(const std::filesystem::path& path, std::uint64_t end,
                               const Catalogue& catalogue, std::vector<ChunkIndex> chunks,
                               const Statistics& counted) {
-  const auto file = opened(path, O_WRONLY);
+  auto file = opened(path, O_WRONLY);
   if (!file) return tl::unexpected(file.error());
-  Writer writer(path, *file);
-  if (ftruncate(*file, static_cast<off_t>(end)) != 0) {
-    return fail("file", path.string() + ": " + std::strerror(errno));
+  Writer writer(path, *std::move(file));
+  if (ftruncate(writer.file_.get(), static_cast<off_t>(end)) != 0) {
+    return fail("file", "{}: {}", path.c_str(), std::strerror(errno));
   }
   writer.size_ = end;
   writer.catalogue_ = catalogue;
@@ -167,41 +167,19 @@ Result<Writer> Writer::resume(const std::filesystem::path& path, std::uint64_t e
   return writer;
 }
 
-Writer::Writer(Writer&& other) noexcept
-    : path_(std::move(other.path_)),
-      file_(std::exchange(other.file_, -1)),
-      size_(other.size_),
-      catalogue_(std::move(other.catalogue_)),
-      chunks_(std::move(other.chunks_)),
-      statistics_(std::move(other.statistics_)) {}
-
-Writer& Writer::operator=(Writer&& other) noexcept {
-  std::swap(path_, other.path_);
-  std::swap(file_, other.file_);
-  std::swap(size_, other.size_);
-  std::swap(catalogue_, other.catalogue_);
-  std::swap(chunks_, other.chunks_);
-  std::swap(statistics_, other.statistics_);
-  return *this;
-}
-
-Writer::~Writer() {
-  if (file_ >= 0) close(file_);
-}
-
 Result<void> Writer::write(const std::vector<std::uint8_t>& bytes) {
   std::size_t done = 0;
   while (done < bytes.size()) {
-    const ssize_t n =
-        pwrite(file_, bytes.data() + done, bytes.size() - done, static_cast<off_t>(size_ + done));
+    const ssize_t n = pwrite(file_.get(), bytes.data() + done, bytes.size() - done,
+                             static_cast<off_t>(size_ + done));
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0) {
       const int error = n < 0 ? errno : ENOSPC;
-      if (ftruncate(file_, static_cast<off_t>(size_)) != 0) {
-        return fail("file", path_.string() + ": " + std::strerror(errno));
+      if (ftruncate(file_.get(), static_cast<off_t>(size_)) != 0) {
+        return fail("file", "{}: {}", path_.c_str(), std::strerror(errno));
       }
       const bool full = error == ENOSPC || error == EDQUOT;
-      return fail(full ? "disk_full" : "file", path_.string() + ": " + std::strerror(error));
+      return fail(full ? "disk_full" : "file", "{}: {}", path_.c_str(), std::strerror(error));
     }
     done += static_cast<std::size_t>(n);
   }
@@ -270,6 +248,6 @@ std::vector<std::uint8_t> Writer::summary() const {
 
 Result<void> Writer::finish() { return write(summary()); }
 
-void Writer::sync() const { fdatasync(file_); }
+void Writer::sync() const { fdatasync(file_.get()); }
 
 }  // namespace perdure::replay::mcap
