@@ -30,7 +30,7 @@ template <class X>
 X numberIn(std::string_view bytes) {
   X x = 0;
   mcap::Take take({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
-  take.number(x);
+  take(x);
   return x;
 }
 
@@ -40,7 +40,7 @@ std::optional<HeadFields> fieldsOf(Bytes head) {
   mcap::Take take(head);
   while (!take.rest().empty()) {
     std::string field;
-    if (!take.text(field)) return std::nullopt;
+    if (!take(field)) return std::nullopt;
     const auto sign = field.find('=');
     if (sign == std::string::npos) return std::nullopt;
     fields[field.substr(0, sign)] = field.substr(sign + 1);
@@ -156,7 +156,7 @@ class Bag : public RosSource {
   std::optional<std::uint32_t> numberAt(std::uint64_t at) const {
     const auto bytes = file_.read(at, 4);
     std::uint32_t number = 0;
-    return mcap::Take(bytes).number(number) ? std::optional(number) : std::nullopt;
+    return mcap::Take(bytes)(number) ? std::optional(number) : std::nullopt;
   }
 
   void cutAt(std::uint64_t at) {
@@ -188,7 +188,7 @@ class Bag : public RosSource {
     const auto connection = numberIn<std::uint32_t>(valueOf(fields, "conn"));
     mcap::Take take(entries);
     std::uint32_t seconds = 0, rest = 0, offset = 0;
-    while (take.number(seconds) && take.number(rest) && take.number(offset)) {
+    while (take(seconds) && take(rest) && take(offset)) {
       note(chunks_.back(), connection, nanoseconds(seconds, rest));
     }
   }
@@ -249,8 +249,8 @@ class Bag : public RosSource {
     while (!take.rest().empty()) {
       std::uint32_t length = 0;
       Bytes head, data;
-      const bool whole = take.number(length) && take.bytes(head, length) && take.number(length) &&
-                         take.bytes(data, length);
+      const bool whole =
+          take(length) && take.bytes(head, length) && take(length) && take.bytes(data, length);
       const auto fields = whole ? fieldsOf(head) : std::nullopt;
       if (!fields) {
         return count({"chunk_damaged", name() + ": a chunk ends within a record"});

@@ -21,9 +21,8 @@ std::optional<ChunkHead> chunkHeadFrom(Bytes content) {
   Take take(content);
   ChunkHead head;
   ChunkIndex& place = head.place;
-  const bool whole = take.number(place.start_ns) && take.number(place.end_ns) &&
-                     take.number(place.unpacked) && take.number(head.crc) &&
-                     take.text(place.compression) && take.number(place.packed);
+  const bool whole = take(place.start_ns) && take(place.end_ns) && take(place.unpacked) &&
+                     take(head.crc) && take(place.compression) && take(place.packed);
   head.records_at = content.size() - take.rest().size();
   return whole ? std::optional(head) : std::nullopt;
 }
@@ -88,9 +87,10 @@ bool forEachMessage(Bytes records, const std::function<void(const Message&, std:
       if (!message) return false;
       visit(*message, offset);
     } else if (record->op == Op::kSchema) {
-      if (auto schema = schemaFrom(record->content)) other.schemas.emplace(schema->id, *schema);
+      if (auto schema = recordFrom<Schema>(record->content))
+        other.schemas.emplace(schema->id, *schema);
     } else if (record->op == Op::kChannel) {
-      if (auto channel = channelFrom(record->content))
+      if (auto channel = recordFrom<Channel>(record->content))
         other.channels.emplace(channel->id, *channel);
     }
   }
@@ -127,7 +127,7 @@ Reader::Summary Reader::readSummary() {
   Take take(footer->content);
   std::uint64_t summary_at = 0, offsets_at = 0;
   std::uint32_t checksum = 0;
-  const bool whole = take.number(summary_at) && take.number(offsets_at) && take.number(checksum);
+  const bool whole = take(summary_at) && take(offsets_at) && take(checksum);
   if (whole && summary_at == 0) return Summary::kTooLittle;
   if (!whole || summary_at < kMagic.size() || summary_at > footer_at) return Summary::kWrong;
   if (footer_at - summary_at > kMostContent) return Summary::kWrong;
@@ -144,19 +144,19 @@ Reader::Summary Reader::takeSummary(Bytes records) {
     const auto record = takeRecord(records);
     if (!record) return Summary::kWrong;
     if (record->op == Op::kSchema) {
-      const auto schema = schemaFrom(record->content);
+      const auto schema = recordFrom<Schema>(record->content);
       if (!schema) return Summary::kWrong;
       catalogue_.schemas.emplace(schema->id, *schema);
     } else if (record->op == Op::kChannel) {
-      const auto channel = channelFrom(record->content);
+      const auto channel = recordFrom<Channel>(record->content);
       if (!channel) return Summary::kWrong;
       catalogue_.channels.emplace(channel->id, *channel);
     } else if (record->op == Op::kChunkIndex) {
-      const auto chunk = chunkIndexFrom(record->content);
+      const auto chunk = recordFrom<ChunkIndex>(record->content);
       if (!chunk) return Summary::kWrong;
       chunks_.push_back(*chunk);
     } else if (record->op == Op::kStatistics) {
-      const auto statistics = statisticsFrom(record->content);
+      const auto statistics = recordFrom<Statistics>(record->content);
       if (!statistics) return Summary::kWrong;
       statistics_ = *statistics;
       counted = true;
@@ -194,7 +194,7 @@ bool Reader::scan() {
     Take take(head);
     std::uint8_t op = 0;
     std::uint64_t length = 0;
-    if (!take.number(op) || !take.number(length) || op == 0) return false;
+    if (!take(op) || !take(length) || op == 0) return false;
     if (length > size() - at - kRecordHead) return false;  // truncated
     const std::uint64_t end = at + kRecordHead + length;
     if (static_cast<Op>(op) == Op::kFooter) return endsAt(end);
@@ -224,12 +224,12 @@ bool Reader::scanRecord(Op op, std::uint64_t at, std::uint64_t length) {
   const auto content = file_.read(at + kRecordHead, length);
   if (content.size() != length) return false;
   if (op == Op::kSchema) {
-    const auto schema = schemaFrom(content);
+    const auto schema = recordFrom<Schema>(content);
     if (schema) catalogue_.schemas.emplace(schema->id, *schema);
     return schema.has_value();
   }
   if (op == Op::kChannel) {
-    const auto channel = channelFrom(content);
+    const auto channel = recordFrom<Channel>(content);
     if (channel) catalogue_.channels.emplace(channel->id, *channel);
     return channel.has_value();
   }
@@ -296,7 +296,7 @@ void Reader::check() {
 void Reader::scanMessageIndex(std::uint64_t at, std::uint64_t length, Bytes content) {
   Take take(content);
   std::uint16_t channel = 0;
-  if (chunks_.empty() || !take.number(channel) || !last_index_.contains(channel)) return;
+  if (chunks_.empty() || !take(channel) || !last_index_.contains(channel)) return;
   ChunkIndex& chunk = chunks_.back();
   chunk.index_offsets[channel] = at;
   chunk.index_length += kRecordHead + length;

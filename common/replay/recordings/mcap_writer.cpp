@@ -24,8 +24,8 @@ Result<Descriptor> opened(const std::filesystem::path& path, int flags) {
 
 std::vector<std::uint8_t> beginning(const std::string& profile = {}) {
   std::vector<std::uint8_t> bytes(kMagic.begin(), kMagic.end()), header;
-  Put(header).text(profile);
-  Put(header).text(kLibrary);
+  Put{header}(profile);
+  Put{header}(kLibrary);
   Put(bytes).record(Op::kHeader, header);
   return bytes;
 }
@@ -50,11 +50,11 @@ void putIndexes(std::vector<std::uint8_t>& to, std::uint64_t at, const Draft::In
     place.index_offsets[channel] = at + to.size();
     std::vector<std::uint8_t> content;
     Put put(content);
-    put.number(channel);
-    put.number(static_cast<std::uint32_t>(entries.size() * 2 * sizeof(std::uint64_t)));
+    put(channel);
+    put(static_cast<std::uint32_t>(entries.size() * 2 * sizeof(std::uint64_t)));
     for (const auto& [log_ns, offset] : entries) {
-      put.number(log_ns);
-      put.number(offset);
+      put(log_ns);
+      put(offset);
     }
     Put(to).record(Op::kMessageIndex, content);
   }
@@ -71,9 +71,9 @@ class Summary {
     put(bytes_);
     if (bytes_.size() == before) return;
     std::vector<std::uint8_t> content;
-    Put(content).number(static_cast<std::uint8_t>(op));
-    Put(content).number(at_ + before);
-    Put(content).number(static_cast<std::uint64_t>(bytes_.size() - before));
+    Put{content}(static_cast<std::uint8_t>(op));
+    Put{content}(at_ + before);
+    Put{content}(static_cast<std::uint64_t>(bytes_.size() - before));
     Put(offsets_).record(Op::kSummaryOffset, content);
   }
   /// Returns the summary with the footer and the magic. The footer's checksum covers all bytes from
@@ -82,11 +82,11 @@ class Summary {
     const std::uint64_t offsets_at = at_ + bytes_.size();
     Put put(bytes_);
     put.bytes(offsets_);
-    put.number(static_cast<std::uint8_t>(Op::kFooter));
-    put.number(static_cast<std::uint64_t>(kFooterContent));
-    put.number(at_);
-    put.number(offsets_at);
-    put.number(crc(bytes_));
+    put(static_cast<std::uint8_t>(Op::kFooter));
+    put(static_cast<std::uint64_t>(kFooterContent));
+    put(at_);
+    put(offsets_at);
+    put(crc(bytes_));
     put.bytes(kMagic);
     return std::move(bytes_);
   }
@@ -125,12 +125,12 @@ Chunk pack(const Draft& draft) {
   std::vector<std::uint8_t> content;
   content.reserve(packed.size() + 64);
   Put put(content);
-  put.number(draft.startNs());
-  put.number(draft.endNs());
-  put.number(static_cast<std::uint64_t>(draft.bytes()));
-  put.number(crc(draft.records()));
-  put.text(kZstd);
-  put.number(static_cast<std::uint64_t>(packed.size()));
+  put(draft.startNs());
+  put(draft.endNs());
+  put(static_cast<std::uint64_t>(draft.bytes()));
+  put(crc(draft.records()));
+  put(kZstd);
+  put(static_cast<std::uint64_t>(packed.size()));
   put.bytes(packed);
   Put(chunk.record).record(Op::kChunk, content);
   chunk.place.length = chunk.record.size();
@@ -195,8 +195,8 @@ Result<void> Writer::append(const Chunk& chunk, const Catalogue& catalogue) {
     const Channel& channel = catalogue.channels.at(id);
     const Schema& schema = catalogue.schemas.at(channel.schema);
     if (!catalogue_.schemas.contains(schema.id) && added.schemas.emplace(schema.id, schema).second)
-      putSchema(bytes, schema);
-    putChannel(bytes, channel);
+      putRecord(bytes, schema);
+    putRecord(bytes, channel);
     added.channels.emplace(id, channel);
   }
   ChunkIndex place = chunk.place;
@@ -226,21 +226,21 @@ Result<void> Writer::appendIndex(ChunkIndex& chunk, const Draft::Index& index) {
 
 std::vector<std::uint8_t> Writer::summary() const {
   std::vector<std::uint8_t> end{static_cast<std::uint8_t>(Op::kDataEnd), 4, 0, 0, 0, 0, 0, 0, 0};
-  Put(end).number(std::uint32_t{0});  // no checksum of the data section, because each chunk has one
+  Put{end}(std::uint32_t{0});  // no checksum of the data section, because each chunk has one
   Statistics statistics = statistics_;
-  statistics.schemas = static_cast<std::uint32_t>(catalogue_.schemas.size());
+  statistics.schemas = static_cast<std::uint16_t>(catalogue_.schemas.size());
   statistics.channels = static_cast<std::uint32_t>(catalogue_.channels.size());
   statistics.chunks = static_cast<std::uint32_t>(chunks_.size());
   Summary summary(size_ + end.size());
   summary.group(Op::kSchema, [&](auto& to) {
-    for (const auto& [id, schema] : catalogue_.schemas) putSchema(to, schema);
+    for (const auto& [id, schema] : catalogue_.schemas) putRecord(to, schema);
   });
   summary.group(Op::kChannel, [&](auto& to) {
-    for (const auto& [id, channel] : catalogue_.channels) putChannel(to, channel);
+    for (const auto& [id, channel] : catalogue_.channels) putRecord(to, channel);
   });
-  summary.group(Op::kStatistics, [&](auto& to) { putStatistics(to, statistics); });
+  summary.group(Op::kStatistics, [&](auto& to) { putRecord(to, statistics); });
   summary.group(Op::kChunkIndex, [&](auto& to) {
-    for (const ChunkIndex& chunk : chunks_) putChunkIndex(to, chunk);
+    for (const ChunkIndex& chunk : chunks_) putRecord(to, chunk);
   });
   Put(end).bytes(summary.finished());
   return end;
