@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <tuple>
 
+#include "common/base/folder.h"
 #include "common/replay/files/stamps.h"
 #include "common/vision/decode.h"
 
@@ -18,12 +19,7 @@ std::filesystem::path imagePath(const std::filesystem::path& folder, const std::
 
 std::optional<std::pair<std::uint32_t, std::uint32_t>> firstImageSize(
     const std::filesystem::path& folder) {
-  std::vector<std::filesystem::path> files;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    files.push_back(entry.path());
-  }
-  std::sort(files.begin(), files.end());
-  for (const auto& file : files) {
+  for (const auto& file : pathsIn(folder, [](const auto&) { return true; })) {
     const auto image = vision::decodeImageFile(file.string(), std::nullopt);
     if (image) {
       return std::pair(static_cast<std::uint32_t>(image->cols),

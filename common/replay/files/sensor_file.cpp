@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
 #include <cmath>
 #include <fstream>
 
 #include "common/base/errors.h"
+#include "common/math/so3.h"
 #include "common/replay/files/text_file.h"
 
 namespace perdure::replay {
@@ -117,10 +117,7 @@ std::optional<RigidTransform> SensorFile::transform(const char* key) const {
   const auto v = numbers(key, 16);
   const Eigen::Matrix4d m = Eigen::Map<const RowMajor>(v.data());
   const Eigen::Matrix3d R = m.topLeftCorner<3, 3>();
-  const double error = (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (!(error <= 1e-2) || R.determinant() < 0.0) {
-    wrong(key, "is not a rotation and a translation");
-  }
+  if (!isRotation(R)) wrong(key, "is not a rotation and a translation");
   return RigidTransform(R, Eigen::Vector3d(m.topRightCorner<3, 1>()));
 }
 

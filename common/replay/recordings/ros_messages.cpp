@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "common/base/errors.h"
+#include "common/base/folder.h"
 #include "common/replay/recordings/recorded_messages.h"
 #include "common/replay/recordings/unpack.h"
 #include "common/ros/definition.h"
@@ -53,16 +53,10 @@ class McapSource : public RosSource {
 };
 
 std::vector<fs::path> filesWith(const fs::path& path, const char* extension) {
+  const auto has = [&](const fs::path& file) { return file.extension() == extension; };
   std::error_code ignored;
-  if (!fs::is_directory(path, ignored)) {
-    return path.extension() == extension ? std::vector{path} : std::vector<fs::path>();
-  }
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(path, ignored)) {
-    if (entry.path().extension() == extension) files.push_back(entry.path());
-  }
-  std::sort(files.begin(), files.end());
-  return files;
+  if (fs::is_directory(path, ignored)) return pathsIn(path, has);
+  return has(path) ? std::vector{path} : std::vector<fs::path>();
 }
 
 bool holdsRos(const fs::path& path) {

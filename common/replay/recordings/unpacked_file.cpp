@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "common/base/errors.h"
+#include "common/base/folder.h"
 
 namespace perdure::replay {
 namespace {
@@ -184,18 +185,12 @@ bool isPacked(const fs::path& file, std::string_view extension) {
 
 std::vector<fs::path> packedFiles(const fs::path& path, std::string_view extension) {
   std::error_code ignored;
-  std::vector<fs::path> files;
-  if (!fs::is_directory(path, ignored)) {
-    if (isPacked(path, extension)) files.push_back(path);
-    return files;
+  if (fs::is_directory(path, ignored)) {
+    return pathsIn(path, [&](const fs::path& file) {
+      return isPacked(file, extension) && !fs::exists(file.parent_path() / file.stem(), ignored);
+    });
   }
-  for (const auto& entry : fs::directory_iterator(path, ignored)) {
-    const fs::path& file = entry.path();
-    const bool beside = fs::exists(file.parent_path() / file.stem(), ignored);
-    if (isPacked(file, extension) && !beside) files.push_back(file);
-  }
-  std::sort(files.begin(), files.end());
-  return files;
+  return isPacked(path, extension) ? std::vector{path} : std::vector<fs::path>();
 }
 
 UnpackedFiles unpackedFiles(const fs::path& path, std::string_view extension) {
