@@ -1,5 +1,7 @@
 #include "common/replay/recording.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <tuple>
 
@@ -29,14 +31,13 @@ std::optional<std::pair<std::uint32_t, std::uint32_t>> firstImageSize(
   return std::nullopt;
 }
 
-void noteOrder(const StampOrder& order, const std::string& kind, std::size_t all,
-               Recording& recording) {
+void noteOrder(const StampOrder& order, const std::string& kind, const std::string& where,
+               const std::string& all, Recording& recording) {
   const auto note = [&](std::size_t count, const char* reason, const char* what) {
     if (count == 0) return;
     recording.reasons.add(kind + reason, count);
     if (what == nullptr) return;
-    recording.notes.push_back(kind + ": " + std::to_string(count) + " of " + std::to_string(all) +
-                              what);
+    recording.notes.push_back(fmt::format("{}: {} of {}{}", where, count, all, what));
   };
   note(order.repeated, "_not_increasing", nullptr);
   note(order.strays, "_stray", " have a stamp far from their neighbours' and were left out");
