@@ -52,6 +52,17 @@ Result<std::vector<std::uint8_t>> unpacked(const ChunkHead& head, Bytes packed) 
   return records;
 }
 
+/// Adds a schema or a channel; ignores other records. Returns false if it is malformed.
+bool addTo(Catalogue& catalogue, const Record& record) {
+  const auto add = [&]<class M>(std::map<std::uint16_t, M>& to) {
+    const auto one = recordFrom<M>(record.content);
+    if (one) to.emplace(one->id, *one);
+    return one.has_value();
+  };
+  if (record.op == Op::kSchema) return add(catalogue.schemas);
+  return record.op != Op::kChannel || add(catalogue.channels);
+}
+
 const Reason kEndsWithinRecord{"chunk_damaged", "a chunk ends within a record"};
 
 }  // namespace
@@ -86,12 +97,8 @@ bool forEachMessage(Bytes records, const std::function<void(const Message&, std:
       const auto message = messageFrom(record->content);
       if (!message) return false;
       visit(*message, offset);
-    } else if (record->op == Op::kSchema) {
-      if (auto schema = recordFrom<Schema>(record->content))
-        other.schemas.emplace(schema->id, *schema);
-    } else if (record->op == Op::kChannel) {
-      if (auto channel = recordFrom<Channel>(record->content))
-        other.channels.emplace(channel->id, *channel);
+    } else {
+      addTo(other, *record);
     }
   }
   return true;
@@ -143,15 +150,8 @@ Reader::Summary Reader::takeSummary(Bytes records) {
   while (!records.empty()) {
     const auto record = takeRecord(records);
     if (!record) return Summary::kWrong;
-    if (record->op == Op::kSchema) {
-      const auto schema = recordFrom<Schema>(record->content);
-      if (!schema) return Summary::kWrong;
-      catalogue_.schemas.emplace(schema->id, *schema);
-    } else if (record->op == Op::kChannel) {
-      const auto channel = recordFrom<Channel>(record->content);
-      if (!channel) return Summary::kWrong;
-      catalogue_.channels.emplace(channel->id, *channel);
-    } else if (record->op == Op::kChunkIndex) {
+    if (!addTo(catalogue_, *record)) return Summary::kWrong;
+    if (record->op == Op::kChunkIndex) {
       const auto chunk = recordFrom<ChunkIndex>(record->content);
       if (!chunk) return Summary::kWrong;
       chunks_.push_back(*chunk);
@@ -223,19 +223,10 @@ bool Reader::scanRecord(Op op, std::uint64_t at, std::uint64_t length) {
   if (length > kMostContent) return false;
   const auto content = file_.read(at + kRecordHead, length);
   if (content.size() != length) return false;
-  if (op == Op::kSchema) {
-    const auto schema = recordFrom<Schema>(content);
-    if (schema) catalogue_.schemas.emplace(schema->id, *schema);
-    return schema.has_value();
-  }
-  if (op == Op::kChannel) {
-    const auto channel = recordFrom<Channel>(content);
-    if (channel) catalogue_.channels.emplace(channel->id, *channel);
-    return channel.has_value();
-  }
+  if (!addTo(catalogue_, {op, content})) return false;
   if (op == Op::kMessage) {
     addBare(at, length);
-  } else {
+  } else if (op == Op::kMessageIndex) {
     scanMessageIndex(at, length, content);
   }
   return true;
