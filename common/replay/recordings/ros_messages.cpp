@@ -139,8 +139,8 @@ bool RosMessages::unpack(RosMessage& message) {
   }
   auto whole = wholeOfZstd(message.data, kLargest);
   if (!whole) {
-    reasons_.add("message_packing_damaged");
-    last_problem_ = message.topic + " has a message that is packed by zstd and cannot be unpacked";
+    count({"message_packing_damaged",
+           message.topic + " has a message that is packed by zstd and cannot be unpacked"});
     return false;
   }
   const auto bytes = std::make_shared<const std::vector<std::uint8_t>>(*std::move(whole));
