@@ -58,40 +58,22 @@ std::vector<char*> pointersTo(std::vector<std::string>& words) {
 /// The data that the child needs. They are prepared before fork, because only system calls are safe
 /// after it.
 struct Start {
-  std::string program, folder;
-  std::vector<std::string> words, variables;
-  std::vector<char*> arguments, environment;
-  bool own_session, ends_with_parent;
+  const ProgramOptions& options;
+  std::string program;
   int output;  ///< -1: the output of this process
   int report;  ///< pipe for errno if the program cannot be run
+  std::vector<std::string> words = options.command,
+                           variables = environmentWith(options.environment);
+  std::vector<char*> arguments = pointersTo(words), environment = pointersTo(variables);
   pid_t parent = getpid();
 };
 
-Start startOf(const ProgramOptions& options, int output, int report) {
-  check(!options.command.empty(), "a command names its program");
-  const auto program = findProgram(options.command[0]);
-  if (!program) refuse(options.command[0], "it is not in PATH");
-  Start start{.program = program->string(),
-              .folder = options.folder.string(),
-              .words = options.command,
-              .variables = environmentWith(options.environment),
-              .arguments = {},
-              .environment = {},
-              .own_session = options.own_session,
-              .ends_with_parent = options.ends_with_parent,
-              .output = output,
-              .report = report};
-  start.arguments = pointersTo(start.words);
-  start.environment = pointersTo(start.variables);
-  return start;
-}
-
 [[noreturn]] void becomeProgram(const Start& start) {
-  if (start.own_session) {
+  if (start.options.own_session) {
     setsid();
     dup2(open("/dev/null", O_RDONLY), STDIN_FILENO);
   }
-  if (start.ends_with_parent) {
+  if (start.options.ends_with_parent) {
     prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (getppid() != start.parent) _exit(127);
   }
@@ -102,7 +84,7 @@ Start startOf(const ProgramOptions& options, int output, int report) {
     dup2(start.output, STDOUT_FILENO);
     dup2(start.output, STDERR_FILENO);
   }
-  if (start.folder.empty() || chdir(start.folder.c_str()) == 0) {
+  if (start.options.folder.empty() || chdir(start.options.folder.c_str()) == 0) {
     execve(start.program.c_str(), start.arguments.data(), start.environment.data());
   }
   const int why = errno;
@@ -112,8 +94,11 @@ Start startOf(const ProgramOptions& options, int output, int report) {
 
 /// Returns the id of the child process after its execve has succeeded.
 pid_t launch(const ProgramOptions& options, int output) {
+  check(!options.command.empty(), "a command names its program");
+  const auto program = findProgram(options.command[0]);
+  if (!program) refuse(options.command[0], "it is not in PATH");
   Pipe report;
-  const Start start = startOf(options, output, report.write_end.get());
+  const Start start{options, program->string(), output, report.write_end.get()};
   const pid_t pid = fork();
   if (pid < 0) refuse(options.command[0], std::strerror(errno));
   if (pid == 0) becomeProgram(start);
