@@ -13,16 +13,8 @@ namespace perdure::replay {
 namespace {
 
 const char* nameOf(DistortionModel model) {
-  switch (model) {
-    case DistortionModel::kNone:
-      return "none";
-    case DistortionModel::kRadialTangential:
-    case DistortionModel::kRational:
-      return "radial-tangential";
-    case DistortionModel::kEquidistant:
-      return "equidistant";
-  }
-  return "none";
+  if (model == DistortionModel::kNone) return "none";
+  return model == DistortionModel::kEquidistant ? "equidistant" : "radial-tangential";
 }
 
 }  // namespace
