@@ -9,28 +9,19 @@
 namespace perdure::config {
 namespace {
 
-template <class... F>
-struct Overloaded : F... {
-  using F::operator()...;
-};
-template <class... F>
-Overloaded(F...) -> Overloaded<F...>;
-
-std::string listText(const auto& values, auto toText) {
+std::string textOf(double value) { return numberText(value); }
+std::string textOf(std::int64_t value) { return std::to_string(value); }
+std::string textOf(bool value) { return value ? "true" : "false"; }
+std::string textOf(const std::string& value) { return quoted(value); }
+template <class Value>
+std::string textOf(const std::vector<Value>& values) {
   std::string text = "[";
-  for (const auto& value : values) text += (text.size() > 1 ? ", " : "") + toText(value);
+  for (const Value& value : values) text += (text.size() > 1 ? ", " : "") + textOf(value);
   return text + "]";
 }
 
 std::string valueText(const Field& field) {
-  return std::visit(
-      Overloaded{[](const double* v) { return numberText(*v); },
-                 [](const std::int64_t* v) { return std::to_string(*v); },
-                 [](const bool* v) { return std::string(*v ? "true" : "false"); },
-                 [](const std::string* v) { return quoted(*v); },
-                 [](const std::vector<double>* v) { return listText(*v, numberText); },
-                 [](const std::vector<std::string>* v) { return listText(*v, quoted); }},
-      field.target);
+  return std::visit([](const auto* value) { return textOf(*value); }, field.target);
 }
 
 std::string limitsText(const Field& field) {
@@ -51,7 +42,7 @@ std::string commentOf(const Field& field) {
 }
 
 /// The fields whose keys begin with `prefix`; groups in order of first appearance, each once.
-std::string textOf(const Fields& fields, const std::string& prefix, const std::string& indent) {
+std::string yamlOf(const Fields& fields, const std::string& prefix, const std::string& indent) {
   std::string text;
   std::set<std::string> groups;
   for (const Field& field : fields.all()) {
@@ -62,7 +53,7 @@ std::string textOf(const Fields& fields, const std::string& prefix, const std::s
       text += indent + "# " + commentOf(field) + "\n";
       text += indent + name + ": " + valueText(field) + "\n";
     } else if (groups.insert(name).second) {
-      text += indent + name + ":\n" + textOf(fields, prefix + name + ".", indent + "  ");
+      text += indent + name + ":\n" + yamlOf(fields, prefix + name + ".", indent + "  ");
     }
   }
   return text;
@@ -114,7 +105,7 @@ std::string quoted(const std::string& text) {
   return out + "\"";
 }
 
-std::string toYaml(const Fields& fields) { return textOf(fields, "", ""); }
+std::string toYaml(const Fields& fields) { return yamlOf(fields, "", ""); }
 
 std::string toMarkdown(const Fields& fields) {
   std::string out = "| key | default | unit | range | meaning |\n| --- | --- | --- | --- | --- |\n";

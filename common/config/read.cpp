@@ -234,12 +234,6 @@ std::optional<YAML::Mark> afterFirstDocument(const std::string& yaml) {
   return ignore.start;
 }
 
-Problem syntaxProblem(const YAML::Exception& error, const std::string& file) {
-  const bool known = !error.mark.is_null();
-  return {file, known ? error.mark.line + 1 : 0, known ? error.mark.column + 1 : 0,
-          "is not YAML: " + error.msg};
-}
-
 }  // namespace
 
 std::vector<Problem> readYaml(Fields& fields, const std::string& yaml, const std::string& file) {
@@ -254,9 +248,7 @@ std::vector<Problem> readYaml(Fields& fields, const std::string& yaml, const std
       reader.problem(root, "is not a list of `key: value` lines");
     }
   } catch (const YAML::Exception& error) {
-    std::vector<Problem> problems = reader.take();
-    problems.push_back(syntaxProblem(error, file));
-    return problems;
+    reader.problem(error.mark, "is not YAML: " + error.msg);
   }
   return reader.take();
 }
@@ -281,7 +273,7 @@ std::vector<Problem> assign(Fields& fields, const std::string& assignment) {
     map[assignment.substr(0, equals)] = YAML::Load(assignment.substr(equals + 1));
     reader.readGroup(map, "");
   } catch (const YAML::Exception& error) {
-    return {{file, 0, 0, "the value is not YAML: " + error.msg}};
+    reader.problem(error.mark, "the value is not YAML: " + error.msg);
   }
   return reader.take();
 }

@@ -258,11 +258,6 @@ void noteChoice(const std::vector<fs::path>& files, Recording& recording) {
   if (std::find(notes.begin(), notes.end(), note) == notes.end()) recording.notes.push_back(note);
 }
 
-void noteKeys(const SensorFile& file, Recording& recording) {
-  const auto keys = file.unknownKeys();
-  recording.notes.insert(recording.notes.end(), keys.begin(), keys.end());
-}
-
 /// The sources of a folder's calibration, in this order: each sensor's sensor.yaml, the given rig
 /// file, files of Kalibr (camchain*.yaml, imu*.yaml).
 class EurocCalibration {
@@ -286,7 +281,7 @@ class EurocCalibration {
     if (file.has("imu0")) file = file.section("imu0");
     T_BI_ = file.T_BS();
     const ImuCalibration imu = readImuCalibration(file);
-    noteKeys(file, recording);
+    file.noteUnknownKeys(recording.notes);
     return imu;
   }
 
@@ -300,7 +295,7 @@ class EurocCalibration {
     SensorFile file(path);
     if (file.has(name)) file = file.section(name);
     CameraCalibration camera = readCamera(file, name);
-    noteKeys(file, recording);
+    file.noteUnknownKeys(recording.notes);
     camera.T_BC = T_BI_.inverse() * camera.T_BC;
     return camera;
   }

@@ -331,10 +331,7 @@ Recording readSevenScenes(const DatasetOptions& options) {
   }
   const Eigen::Vector3d up = upOf(folder, sensor, files, poses, recording);
   recording.truth = truthOf(poses, up);
-  if (sensor) {
-    const auto notes = sensor->unknownKeys();
-    recording.notes.insert(recording.notes.end(), notes.begin(), notes.end());
-  }
+  if (sensor) sensor->noteUnknownKeys(recording.notes);
   return recording;
 }
 

@@ -118,7 +118,7 @@ void SensorFile::wrong(const std::string& key, const std::string& what) const {
                      name_ + ": " + key + " " + what + "; compare it with a sensor.yaml of EuRoC");
 }
 
-std::vector<std::string> SensorFile::unknownKeys() const {
+void SensorFile::noteUnknownKeys(std::vector<std::string>& notes) const {
   // Keys of EuRoC, Kalibr and ROS that are not used here.
   static const std::set<std::string> kOfNoUse{"sensor_type",
                                               "comment",
@@ -138,13 +138,11 @@ std::vector<std::string> SensorFile::unknownKeys() const {
                                               "cam0",
                                               "cam1",
                                               "imu0"};
-  std::vector<std::string> sentences;
   for (const auto& entry : root_) {
     const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : std::string();
     if (key.empty() || asked_.contains(key) || kOfNoUse.contains(key)) continue;
-    sentences.push_back(name_ + ": the key `" + key + "` is not known and has no effect");
+    notes.push_back(name_ + ": the key `" + key + "` is not known and has no effect");
   }
-  return sentences;
 }
 
 std::string cameraKeys(const CameraCalibration& camera) {
