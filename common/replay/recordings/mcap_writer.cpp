@@ -65,8 +65,7 @@ void putIndexes(std::vector<std::uint8_t>& to, std::uint64_t at, const Draft::In
 class Summary {
  public:
   explicit Summary(std::uint64_t at) : at_(at) {}
-  template <class Group>
-  void group(Op op, Group put) {
+  void group(Op op, auto put) {
     const std::size_t before = bytes_.size();
     put(bytes_);
     if (bytes_.size() == before) return;
