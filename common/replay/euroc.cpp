@@ -161,16 +161,7 @@ void readFrames(const fs::path& folder, std::size_t camera, bool look, Recording
     // A skipped row retains its number; a list that was sorted is numbered again.
     const std::uint64_t number = table.wasSorted() ? row.number : recording.frames.size();
     Recording::FrameFile frame{row.time, number, camera, list.pathOf(row)};
-    if (camera != 0) {
-      const auto* pair = pairOf(first, row.time);
-      if (!pair) {
-        recording.reasons.add("stereo_unmatched");
-        recording.unpaired.push_back(row.time);
-        continue;
-      }
-      frame.index = pair->index;
-      frame.time = pair->time;
-    }
+    if (camera != 0 && !pairWith(first, frame, recording)) continue;
     recording.frames.push_back(std::move(frame));
   }
   list.close(recording);

@@ -56,11 +56,18 @@ void sortFrames(Recording& recording) {
                    });
 }
 
-const Recording::FrameFile* pairOf(const std::vector<Recording::FrameFile>& first, TimePoint time) {
+bool pairWith(const std::vector<Recording::FrameFile>& first, Recording::FrameFile& frame,
+              Recording& recording) {
   const auto at = std::lower_bound(
-      first.begin(), first.end(), time,
-      [](const auto& frame, TimePoint of) { return between(of, frame.time) > kPairedWithin; });
-  return at != first.end() && between(at->time, time) <= kPairedWithin ? &*at : nullptr;
+      first.begin(), first.end(), frame.time,
+      [](const auto& one, TimePoint time) { return between(time, one.time) > kPairedWithin; });
+  if (at == first.end() || between(at->time, frame.time) > kPairedWithin) {
+    recording.reasons.add("stereo_unmatched");
+    recording.unpaired.push_back(frame.time);
+    return false;
+  }
+  frame.index = at->index, frame.time = at->time;
+  return true;
 }
 
 double rateOf(const std::vector<Recording::FrameFile>& frames, std::size_t camera) {

@@ -62,8 +62,10 @@ void orderByTime(std::vector<Item>& items, const std::string& kind, Recording& r
 /// Sorts frames by time, then camera.
 void sortFrames(Recording& recording);
 inline constexpr Duration kPairedWithin = std::chrono::milliseconds(5);
-/// The frame of cam0 taken within kPairedWithin; `first` is sorted by time.
-const Recording::FrameFile* pairOf(const std::vector<Recording::FrameFile>& first, TimePoint time);
+/// Gives a frame of cam1 the index and the time of the frame of cam0 taken within kPairedWithin.
+/// Counts the frame and returns false if there is none. `first` is sorted by time.
+bool pairWith(const std::vector<Recording::FrameFile>& first, Recording::FrameFile& frame,
+              Recording& recording);
 /// Frame rate of a camera in Hz; 1 if it cannot be determined.
 double rateOf(const std::vector<Recording::FrameFile>& frames, std::size_t camera);
 

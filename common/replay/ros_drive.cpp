@@ -251,15 +251,7 @@ class RosDriveReader {
     for (const RosImage& seen : camera.images) {
       Recording::FrameFile frame{seen.time, recording_.frames.size(), index, {}};
       frame.load = [store, seen] { return store->at(seen); };
-      if (index > 0) {
-        const auto* pair = pairOf(first, seen.time);
-        if (pair == nullptr) {
-          recording_.reasons.add("stereo_unmatched");
-          recording_.unpaired.push_back(seen.time);
-          continue;
-        }
-        frame.index = pair->index, frame.time = pair->time;
-      }
+      if (index > 0 && !pairWith(first, frame, recording_)) continue;
       recording_.frames.push_back(std::move(frame));
     }
   }
