@@ -1,6 +1,8 @@
 // Checks against programming errors: conditions that must hold, checked in every build type.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <source_location>
 #include <string_view>
 
@@ -13,7 +15,16 @@ namespace perdure {
 /// external input.
 inline void check(bool condition, std::string_view what,
                   const std::source_location& where = std::source_location::current()) {
-  if (!condition) [[unlikely]] failCheck(what, where);
+  if (!condition) [[unlikely]]
+    failCheck(what, where);
+}
+
+/// The name of an enumerator of an enumeration without gaps from 0.
+template <std::size_t N>
+const char* nameAt(const std::array<const char*, N>& names, auto enumerator) {
+  const auto position = static_cast<std::size_t>(enumerator);
+  check(position < N, "an enumerator is one of those declared");
+  return names[position];
 }
 
 }  // namespace perdure

@@ -26,9 +26,9 @@ CheckedFile::CheckedFile(fs::path file) : file_(std::move(file)), written_(place
   stream_.open(written_, std::ios::binary | std::ios::trunc);
   if (stream_) return;
   if (errno == ENOSPC) throwUnwritten(file_);
-  throw StartupError(ExitCode::kUnavailable, file_.string() + " cannot be written (" +
-                                                 std::strerror(errno) +
-                                                 "); give --out a folder that you may write");
+  throw StartupError(ExitCode::kUnavailable,
+                     "{} cannot be written ({}); give --out a folder that you may write",
+                     file_.c_str(), std::strerror(errno));
 }
 
 CheckedFile::~CheckedFile() {
@@ -68,8 +68,8 @@ void throwUnwritten(const fs::path& file, std::string_view why) {
   std::string reason(why);
   if (reason.empty()) reason = errno != 0 ? std::strerror(errno) : "not all of it could be written";
   throw StartupError(ExitCode::kInputOutput,
-                     file.string() + ": " + reason +
-                         "; free space, or write to another disk: the results are not whole");
+                     "{}: {}; free space, or write to another disk: the results are not whole",
+                     file.c_str(), reason);
 }
 
 }  // namespace perdure

@@ -1,8 +1,11 @@
 // Reasons why a program cannot start, with the exit status of sysexits.h.
 #pragma once
 
+#include <fmt/core.h>
+
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace perdure {
 
@@ -22,6 +25,12 @@ class StartupError : public std::runtime_error {
  public:
   StartupError(ExitCode code, const std::string& message)
       : std::runtime_error(message), code_(code) {}
+  /// The message as of fmt::format.
+  template <class First, class... More>
+  StartupError(ExitCode code, fmt::format_string<First, More...> format, First&& first,
+               More&&... more)
+      : StartupError(
+            code, fmt::format(format, std::forward<First>(first), std::forward<More>(more)...)) {}
   ExitCode code() const { return code_; }
 
  private:

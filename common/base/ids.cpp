@@ -1,6 +1,7 @@
 #include "common/base/ids.h"
 
-#include <array>
+#include <fmt/core.h>
+
 #include <random>
 
 namespace perdure {
@@ -21,11 +22,6 @@ std::uint64_t digest(std::string_view bytes) {
   return hash;
 }
 
-std::string toHex(std::uint64_t value) {
-  constexpr char kDigits[] = "0123456789abcdef";
-  std::array<char, 16> text{};
-  for (int i = 15; i >= 0; --i, value >>= 4) text[static_cast<std::size_t>(i)] = kDigits[value & 15];
-  return {text.data(), text.size()};
-}
+std::string toHex(std::uint64_t value) { return fmt::format("{:016x}", value); }
 
 }  // namespace perdure

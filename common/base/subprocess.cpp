@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "common/base/check.h"
+#include "common/base/descriptor.h"
 #include "common/base/errors.h"
 
 namespace perdure {
@@ -26,32 +27,12 @@ constexpr std::chrono::milliseconds kStep{10};
   throw StartupError(ExitCode::kUnavailable, program + " cannot be started: " + why);
 }
 
-class Descriptor {
- public:
-  explicit Descriptor(int fd = -1) : fd_(fd) {}
-  ~Descriptor() { close(); }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int get() const { return fd_; }
-  void reset(int fd) {
-    close();
-    fd_ = fd;
-  }
-  void close() {
-    if (fd_ >= 0) ::close(fd_);
-    fd_ = -1;
-  }
-
- private:
-  int fd_;
-};
-
 struct Pipe {
   Descriptor read_end, write_end;
   Pipe() {
     int ends[2];
     check(pipe2(ends, O_CLOEXEC) == 0, "a pipe can be made");
-    read_end.reset(ends[0]), write_end.reset(ends[1]);
+    read_end = Descriptor(ends[0]), write_end = Descriptor(ends[1]);
   }
 };
 
@@ -77,40 +58,22 @@ std::vector<char*> pointersTo(std::vector<std::string>& words) {
 /// The data that the child needs. They are prepared before fork, because only system calls are safe
 /// after it.
 struct Start {
-  std::string program, folder;
-  std::vector<std::string> words, variables;
-  std::vector<char*> arguments, environment;
-  bool own_session, ends_with_parent;
+  const ProgramOptions& options;
+  std::string program;
   int output;  ///< -1: the output of this process
   int report;  ///< pipe for errno if the program cannot be run
+  std::vector<std::string> words = options.command,
+                           variables = environmentWith(options.environment);
+  std::vector<char*> arguments = pointersTo(words), environment = pointersTo(variables);
   pid_t parent = getpid();
 };
 
-Start startOf(const ProgramOptions& options, int output, int report) {
-  check(!options.command.empty(), "a command names its program");
-  const auto program = findProgram(options.command[0]);
-  if (!program) refuse(options.command[0], "it is not in PATH");
-  Start start{.program = program->string(),
-              .folder = options.folder.string(),
-              .words = options.command,
-              .variables = environmentWith(options.environment),
-              .arguments = {},
-              .environment = {},
-              .own_session = options.own_session,
-              .ends_with_parent = options.ends_with_parent,
-              .output = output,
-              .report = report};
-  start.arguments = pointersTo(start.words);
-  start.environment = pointersTo(start.variables);
-  return start;
-}
-
 [[noreturn]] void becomeProgram(const Start& start) {
-  if (start.own_session) {
+  if (start.options.own_session) {
     setsid();
     dup2(open("/dev/null", O_RDONLY), STDIN_FILENO);
   }
-  if (start.ends_with_parent) {
+  if (start.options.ends_with_parent) {
     prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (getppid() != start.parent) _exit(127);
   }
@@ -121,7 +84,7 @@ Start startOf(const ProgramOptions& options, int output, int report) {
     dup2(start.output, STDOUT_FILENO);
     dup2(start.output, STDERR_FILENO);
   }
-  if (start.folder.empty() || chdir(start.folder.c_str()) == 0) {
+  if (start.options.folder.empty() || chdir(start.options.folder.c_str()) == 0) {
     execve(start.program.c_str(), start.arguments.data(), start.environment.data());
   }
   const int why = errno;
@@ -131,8 +94,11 @@ Start startOf(const ProgramOptions& options, int output, int report) {
 
 /// Returns the id of the child process after its execve has succeeded.
 pid_t launch(const ProgramOptions& options, int output) {
+  check(!options.command.empty(), "a command names its program");
+  const auto program = findProgram(options.command[0]);
+  if (!program) refuse(options.command[0], "it is not in PATH");
   Pipe report;
-  const Start start = startOf(options, output, report.write_end.get());
+  const Start start{options, program->string(), output, report.write_end.get()};
   const pid_t pid = fork();
   if (pid < 0) refuse(options.command[0], std::strerror(errno));
   if (pid == 0) becomeProgram(start);
@@ -182,8 +148,8 @@ std::optional<std::filesystem::path> findProgram(const std::string& name) {
 Subprocess::Subprocess(const ProgramOptions& options) {
   Descriptor log;
   if (!options.log.empty()) {
-    log.reset(open(options.log.c_str(), O_CREAT | O_APPEND | O_WRONLY | O_CLOEXEC, 0644));
-    if (log.get() < 0) {
+    log = Descriptor(open(options.log.c_str(), O_CREAT | O_APPEND | O_WRONLY | O_CLOEXEC, 0644));
+    if (!log.open()) {
       refuse(options.command[0],
              options.log.string() + " cannot be written: " + std::strerror(errno));
     }

@@ -6,6 +6,9 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
+
+#include "common/bus/endpoint.h"
 
 namespace perdure::bus {
 
@@ -14,36 +17,13 @@ struct QosDeleter {
 };
 using QosPtr = std::unique_ptr<dds_qos_t, QosDeleter>;
 
-// Status counts of a reader or a writer since its start, as DDS reports them.
+/// The entity of a handle that DDS returned. Throws StartupError if it is an error.
+Entity created(dds_entity_t handle, const std::string& what);
 
-inline std::size_t matchedWriters(dds_entity_t reader) {
-  dds_subscription_matched_status_t status{};
-  dds_get_subscription_matched_status(reader, &status);
-  return status.current_count;
-}
-
-inline std::size_t matchedReaders(dds_entity_t writer) {
-  dds_publication_matched_status_t status{};
-  dds_get_publication_matched_status(writer, &status);
-  return status.current_count;
-}
-
-inline std::uint64_t writersWithOtherQos(dds_entity_t reader) {
-  dds_requested_incompatible_qos_status_t status{};
-  dds_get_requested_incompatible_qos_status(reader, &status);
-  return status.total_count;
-}
-
-inline std::uint64_t readersWithOtherQos(dds_entity_t writer) {
-  dds_offered_incompatible_qos_status_t status{};
-  dds_get_offered_incompatible_qos_status(writer, &status);
-  return status.total_count;
-}
-
-inline std::uint64_t samplesLost(dds_entity_t reader) {
-  dds_sample_lost_status_t status{};
-  dds_get_sample_lost_status(reader, &status);
-  return status.total_count;
-}
+/// QoS of a writer. `through`: whether it may use shared memory. Cyclone excludes endpoints that
+/// ignore their own participant from shared memory. Exclusive writers are excluded by their
+/// liveliness, and their readers may need messages of their own participant.
+QosPtr writerQos(const Qos& qos, const WriterOptions& options, const SharedMemory& memory,
+                 bool through);
 
 }  // namespace perdure::bus

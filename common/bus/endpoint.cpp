@@ -16,9 +16,7 @@ dds_duration_t duration(double seconds) {
   return seconds > 0 ? static_cast<dds_duration_t>(seconds * 1e9) : DDS_INFINITY;
 }
 
-/// `through`: whether this endpoint may use shared memory. Cyclone excludes endpoints that ignore
-/// their own participant from shared memory. Exclusive writers are excluded by their liveliness,
-/// and their readers may need messages of their own participant.
+/// `through` as for writerQos().
 QosPtr commonQos(const Qos& qos, const SharedMemory& memory, bool through) {
   constexpr double kMaxBlocking = 0.1;
   QosPtr result(dds_create_qos());
@@ -43,44 +41,10 @@ QosPtr readerQos(const Qos& qos, const SharedMemory& memory, ReadFrom from) {
   return result;
 }
 
-QosPtr writerQos(const Qos& qos, const WriterOptions& options, const SharedMemory& memory,
-                 bool through) {
-  QosPtr result = commonQos(qos, memory, through);
-  dds_qset_writer_data_lifecycle(result.get(), false);  // instances outlive their writer
-  const bool kept = qos.kept && !(memory.on() && through);
-  if (kept) dds_qset_durability(result.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
-  if (qos.latched || kept) {
-    dds_qset_durability_service(result.get(), 0, DDS_HISTORY_KEEP_LAST, kept ? 1 : qos.depth,
-                                DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
-  }
-  const double lease = options.lease_s > 0 ? options.lease_s : qos.lease_s;
-  if (qos.exclusive) {
-    dds_qset_ownership_strength(result.get(), options.strength);
-    dds_qset_liveliness(result.get(), DDS_LIVELINESS_MANUAL_BY_TOPIC, duration(lease));
-  } else if (lease > 0) {
-    dds_qset_liveliness(result.get(), DDS_LIVELINESS_AUTOMATIC, duration(lease));
-  }
-  return result;
-}
-
 const TopicInfo& infoOf(const std::string& topic) {
   const TopicInfo* info = findTopic(topic);
   check(info != nullptr, "a topic stands in the list of common/wire/topics.h");
   return *info;
-}
-
-Entity created(dds_entity_t handle, const std::string& what) {
-  if (handle == DDS_RETCODE_NOT_ALLOWED_BY_SECURITY) {
-    throw StartupError(ExitCode::kConfiguration,
-                       "the identity of this process may not make " + what +
-                           "; bus.identity names it, and `perdure security` says what each role "
-                           "may do");
-  }
-  if (handle < 0) {
-    throw StartupError(ExitCode::kUnavailable,
-                       "DDS cannot create " + what + ": " + dds_strretcode(-handle));
-  }
-  return Entity(handle);
 }
 
 /// Shared memory is refused for topics with keys or latching, because Cyclone 0.10.2 loses messages
@@ -149,6 +113,40 @@ std::string errorWord(dds_return_t code) {
 
 }  // namespace
 
+QosPtr writerQos(const Qos& qos, const WriterOptions& options, const SharedMemory& memory,
+                 bool through) {
+  QosPtr result = commonQos(qos, memory, through);
+  dds_qset_writer_data_lifecycle(result.get(), false);  // instances outlive their writer
+  const bool kept = qos.kept && !(memory.on() && through);
+  if (kept) dds_qset_durability(result.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
+  if (qos.latched || kept) {
+    dds_qset_durability_service(result.get(), 0, DDS_HISTORY_KEEP_LAST, kept ? 1 : qos.depth,
+                                DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
+  }
+  const double lease = options.lease_s > 0 ? options.lease_s : qos.lease_s;
+  if (qos.exclusive) {
+    dds_qset_ownership_strength(result.get(), options.strength);
+    dds_qset_liveliness(result.get(), DDS_LIVELINESS_MANUAL_BY_TOPIC, duration(lease));
+  } else if (lease > 0) {
+    dds_qset_liveliness(result.get(), DDS_LIVELINESS_AUTOMATIC, duration(lease));
+  }
+  return result;
+}
+
+Entity created(dds_entity_t handle, const std::string& what) {
+  if (handle == DDS_RETCODE_NOT_ALLOWED_BY_SECURITY) {
+    throw StartupError(ExitCode::kConfiguration,
+                       "the identity of this process may not make " + what +
+                           "; bus.identity names it, and `perdure security` says what each role "
+                           "may do");
+  }
+  if (handle < 0) {
+    throw StartupError(ExitCode::kUnavailable,
+                       "DDS cannot create " + what + ": " + dds_strretcode(-handle));
+  }
+  return Entity(handle);
+}
+
 Endpoint::Endpoint(std::string topic, std::shared_ptr<const Entity> entity)
     : topic_(std::move(topic)),
       count_prefix_(topic_),
@@ -180,13 +178,47 @@ void Endpoint::add(ReasonCounts& counts, const char* what, std::uint64_t n) cons
 
 void Endpoint::addRefusals(ReasonCounts& counts) const {
   const std::lock_guard lock(mutex_);
-  for (const auto& [reason, n] : refusals_.all()) counts.add(reason, n);
+  counts.add(refusals_);
+}
+
+Result<void> Endpoint::outcome(const char* what, std::int32_t code) {
+  if (code == DDS_RETCODE_OK) return {};
+  const Reason reason{errorWord(code), std::string("DDS: ") + dds_strretcode(-code)};
+  count(what, reason);
+  return tl::unexpected(reason);
+}
+
+std::size_t AnyReader::matched() const {
+  dds_subscription_matched_status_t status{};
+  dds_get_subscription_matched_status(handle(), &status);
+  return status.current_count;
+}
+
+void AnyReader::report(ReasonCounts& counts) const {
+  addRefusals(counts);
+  dds_requested_incompatible_qos_status_t incompatible{};
+  dds_get_requested_incompatible_qos_status(handle(), &incompatible);
+  add(counts, "incompatible_qos", incompatible.total_count);
+  dds_sample_lost_status_t lost{};
+  dds_get_sample_lost_status(handle(), &lost);
+  add(counts, "sample_lost", lost.total_count);
+}
+
+std::size_t AnyWriter::matched() const {
+  dds_publication_matched_status_t status{};
+  dds_get_publication_matched_status(handle(), &status);
+  return status.current_count;
+}
+
+void AnyWriter::report(ReasonCounts& counts) const {
+  addRefusals(counts);
+  dds_offered_incompatible_qos_status_t incompatible{};
+  dds_get_offered_incompatible_qos_status(handle(), &incompatible);
+  add(counts, "incompatible_qos", incompatible.total_count);
 }
 
 RawReader::RawReader(const Participant& participant, const std::string& topic, ReadFrom from)
-    : Endpoint(topic, createReader(participant, topic, from)) {}
-
-std::size_t RawReader::matched() const { return matchedWriters(handle()); }
+    : AnyReader(topic, createReader(participant, topic, from)) {}
 
 std::size_t RawReader::silent() const {
   dds_liveliness_changed_status_t liveliness{};
@@ -214,9 +246,7 @@ std::optional<std::int32_t> RawReader::strongestBut(const RawWriter& own) const 
 }
 
 void RawReader::report(ReasonCounts& counts) const {
-  addRefusals(counts);
-  add(counts, "incompatible_qos", writersWithOtherQos(handle()));
-  add(counts, "sample_lost", samplesLost(handle()));
+  AnyReader::report(counts);
   dds_sample_rejected_status_t rejected{};
   dds_get_sample_rejected_status(handle(), &rejected);
   add(counts, "sample_rejected", rejected.total_count);
@@ -255,13 +285,11 @@ bool RawReader::takeBatchInPlace(const InPlace& on_value) {
 
 RawWriter::RawWriter(const Participant& participant, const std::string& topic,
                      const WriterOptions& options)
-    : Endpoint(topic, createWriter(participant, topic, options, infoOf(topic).qos.shared_memory)),
+    : AnyWriter(topic, createWriter(participant, topic, options, infoOf(topic).qos.shared_memory)),
       participant_(participant),
       options_(options),
       strength_(options.strength),
       in_shared_memory_(dds_is_shared_memory_available(handle())) {}
-
-std::size_t RawWriter::matched() const { return matchedReaders(handle()); }
 
 void RawWriter::setStrength(std::int32_t strength) {
   const QosPtr qos(dds_create_qos());
@@ -284,8 +312,7 @@ bool RawWriter::waitForAcknowledgement(double seconds) {
 }
 
 void RawWriter::report(ReasonCounts& counts) const {
-  addRefusals(counts);
-  add(counts, "incompatible_qos", readersWithOtherQos(handle()));
+  AnyWriter::report(counts);
   add(counts, "liveliness_lost", livelinessLost());
 }
 
@@ -326,10 +353,7 @@ Result<void> RawWriter::writeWire(const void* wire, std::size_t bytes) {
                                       "the services again where processes were killed often"});
     code = dds_write(handle(), wire);
   }
-  if (code == DDS_RETCODE_OK) return {};
-  const Reason reason{errorWord(code), std::string("DDS: ") + dds_strretcode(-code)};
-  count("write", reason);
-  return tl::unexpected(reason);
+  return outcome("write", code);
 }
 
 void RawWriter::unregisterWire(const void* wire) { dds_unregister_instance(handle(), wire); }
@@ -337,10 +361,7 @@ void RawWriter::unregisterWire(const void* wire) { dds_unregister_instance(handl
 Result<void> RawWriter::disposeWire(const void* wire) {
   const dds_return_t code = dds_dispose(handle(), wire);
   dds_unregister_instance(handle(), wire);  // hides the disposal from late joiners
-  if (code == DDS_RETCODE_OK) return {};
-  const Reason reason{errorWord(code), std::string("DDS: ") + dds_strretcode(-code)};
-  count("dispose", reason);
-  return tl::unexpected(reason);
+  return outcome("dispose", code);
 }
 
 }  // namespace perdure::bus

@@ -39,6 +39,8 @@ class Endpoint {
   /// Adds "<topic>_<what>" if it is not 0.
   void add(ReasonCounts& counts, const char* what, std::uint64_t n) const;
   void addRefusals(ReasonCounts& counts) const;
+  /// Counts a failure of DDS as <topic>_<what>_<error>.
+  Result<void> outcome(const char* what, std::int32_t code);
 
  private:
   std::string topic_, count_prefix_;
@@ -49,6 +51,31 @@ class Endpoint {
   std::map<std::string, std::string> first_details_;
 };
 
+/// A reader of Perdure's or of foreign messages.
+class AnyReader : public Endpoint {
+ public:
+  /// The number of writers matched now.
+  std::size_t matched() const;
+  /// Adds the counts of DDS and of the checks since the start: <topic>_malformed_<reason>,
+  /// _incompatible_qos, _sample_lost.
+  void report(ReasonCounts& counts) const;
+
+ protected:
+  using Endpoint::Endpoint;
+};
+
+/// A writer of Perdure's or of foreign messages.
+class AnyWriter : public Endpoint {
+ public:
+  /// The number of readers matched now.
+  std::size_t matched() const;
+  /// Adds <topic>_write_<error>, _incompatible_qos.
+  void report(ReasonCounts& counts) const;
+
+ protected:
+  using Endpoint::Endpoint;
+};
+
 class RawWriter;
 
 /// The earlier messages that a reader of a non-latched topic receives.
@@ -57,17 +84,14 @@ enum class ReadFrom {
   kKept,  ///< the newest message, from writers that store it (Qos::kept); no others match
 };
 
-class RawReader : public Endpoint {
+class RawReader : public AnyReader {
  public:
-  /// The number of writers matched now.
-  std::size_t matched() const;
   /// The number of matched writers that missed their lease: killed, stopped or disconnected.
   std::size_t silent() const;
   /// The highest strength among the matched writers of an exclusive topic, except `own`. Returns
   /// nothing if there are no others.
   std::optional<std::int32_t> strongestBut(const RawWriter& own) const;
-  /// Adds the counts of DDS and of the checks since the start: <topic>_malformed_<reason>,
-  /// _incompatible_qos, _sample_lost, _in_shared_memory, _writers_silent (present number).
+  /// Also adds _sample_rejected, _in_shared_memory, _writers_silent (present number).
   void report(ReasonCounts& counts) const;
 
  protected:
@@ -124,10 +148,8 @@ class Reader : public RawReader {
   }
 };
 
-class RawWriter : public Endpoint {
+class RawWriter : public AnyWriter {
  public:
-  /// The number of readers matched now.
-  std::size_t matched() const;
   std::int32_t strength() const { return strength_; }
   /// Sets the strength on an exclusive topic. It may be called at any time.
   void setStrength(std::int32_t strength);
@@ -137,8 +159,8 @@ class RawWriter : public Endpoint {
   std::uint64_t livelinessLost() const;
   /// Waits until every matched reader has acknowledged all messages. Returns false on timeout.
   bool waitForAcknowledgement(double seconds);
-  /// Adds <topic>_refused_<reason> (invalid values of this process), _write_<error>,
-  /// _incompatible_qos, _liveliness_lost, _left_shared_memory_<reason>.
+  /// Also adds <topic>_refused_<reason> (invalid values of this process), _liveliness_lost,
+  /// _left_shared_memory_<reason>.
   void report(ReasonCounts& counts) const;
 
  protected:
@@ -184,7 +206,7 @@ class Writer : public RawWriter {
   /// Disposes the instance with this value's key, also for late joiners. Only the key is read.
   Result<void> dispose(const T& key) {
     typename wire::Type<T>::Wire sample;
-    wire::encodeKey(key, sample, arena_);
+    (void)wire::encode(key, sample, arena_);  // other fields need not be valid
     return disposeWire(&sample);
   }
 

@@ -92,7 +92,7 @@ bool SecurityLog::take(const std::string& message) {
 
 void SecurityLog::report(ReasonCounts& counts) const {
   const std::lock_guard lock(mutex_);
-  for (const auto& [reason, n] : counts_.all()) counts.add(reason, n);
+  counts.add(counts_);
 }
 
 std::map<std::string, std::string> SecurityLog::firstDetails() const {

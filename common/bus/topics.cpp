@@ -26,10 +26,7 @@ std::span<const TopicInfo> topicTable() {
 
 const TopicInfo* findTopic(std::string_view name) {
   for (const TopicInfo& info : topicTable()) {
-    const bool of_cameras = info.name.ends_with('/');
-    if (of_cameras ? name.starts_with(info.name) && name != info.name : name == info.name) {
-      return &info;
-    }
+    if (isRowOf(info.name, name)) return &info;
   }
   return nullptr;
 }

@@ -43,14 +43,18 @@ inline const Topic<T> kTopic{std::string(wire::nameOfTopic<T>())};
 
 inline Topic<Frame> frameTopic(const std::string& camera) { return {kTopic<Frame>.name + camera}; }
 
+/// Returns whether the row `row` of the table is that of a topic.
+inline bool isRowOf(std::string_view row, std::string_view topic) {
+  return row.ends_with('/') ? topic.starts_with(row) && topic != row : topic == row;
+}
+
 /// Calls visit(Topic<T>) with the type that belongs to a name. Returns false if the name is
 /// unknown.
 template <class Visit>
 bool withTopic(const std::string& name, Visit visit) {
   bool found = false;
   wire::forEachTopic([&]<class Row>(const Row& row) {
-    const bool of_cameras = row.name.ends_with('/');
-    if (of_cameras ? !name.starts_with(row.name) || name == row.name : name != row.name) return;
+    if (!isRowOf(row.name, name)) return;
     found = true;
     visit(Topic<typename Row::Message>{name});
   });

@@ -11,14 +11,12 @@ namespace {
 
 constexpr double kMinDepth = 1e-3;
 
-using Coefficients = std::array<double, 8>;
-
 /// A radial factor as a function of the squared radius, and its derivative.
 struct Radial {
   double value, slope;
 };
 
-Radial radialOf(DistortionModel model, const Coefficients& d, double r2) {
+Radial radialOf(DistortionModel model, const LensCoefficients& d, double r2) {
   const double k1 = d[0], k2 = d[1];
   const Radial brown{1.0 + k1 * r2 + k2 * r2 * r2, k1 + 2.0 * k2 * r2};
   if (model != DistortionModel::kRational) return brown;
@@ -29,29 +27,13 @@ Radial radialOf(DistortionModel model, const Coefficients& d, double r2) {
   return {above / below, (above_slope * below - above * below_slope) / (below * below)};
 }
 
-Eigen::Vector2d distortRadTan(DistortionModel model, const Coefficients& d,
-                              const Eigen::Vector2d& n, Eigen::Matrix2d* J) {
-  const double x = n.x(), y = n.y(), r2 = x * x + y * y;
-  const double p1 = d[2], p2 = d[3];
-  const auto [radial, slope] = radialOf(model, d, r2);
-  if (J) {
-    const double dr = 2.0 * slope;
-    (*J)(0, 0) = radial + x * x * dr + 2.0 * p1 * y + 6.0 * p2 * x;
-    (*J)(0, 1) = x * y * dr + 2.0 * p1 * x + 2.0 * p2 * y;
-    (*J)(1, 0) = (*J)(0, 1);
-    (*J)(1, 1) = radial + y * y * dr + 6.0 * p1 * y + 2.0 * p2 * x;
-  }
-  return {x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-          y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y};
-}
-
 /// d (distorted angle) / d (angle off the axis).
-double slopeOfEquidistant(const Coefficients& d, double angle) {
+double slopeOfEquidistant(const LensCoefficients& d, double angle) {
   const double t2 = angle * angle;
   return 1.0 + t2 * (3.0 * d[0] + t2 * (5.0 * d[1] + t2 * (7.0 * d[2] + t2 * 9.0 * d[3])));
 }
 
-Eigen::Vector2d distortEquidistant(const Coefficients& d, const Eigen::Vector2d& n,
+Eigen::Vector2d distortEquidistant(const LensCoefficients& d, const Eigen::Vector2d& n,
                                    Eigen::Matrix2d* J) {
   const double r = n.norm();
   if (r < 1e-9) {
@@ -70,7 +52,7 @@ Eigen::Vector2d distortEquidistant(const Coefficients& d, const Eigen::Vector2d&
 
 constexpr double kLeastSlope = 0.05;
 
-double monotoneRadius2OfEquidistant(const Coefficients& d) {
+double monotoneRadius2OfEquidistant(const LensCoefficients& d) {
   for (double angle = 0.01; angle < 1.57; angle += 0.01) {
     if (!(slopeOfEquidistant(d, angle) > kLeastSlope)) return std::pow(std::tan(angle), 2);
   }
@@ -78,7 +60,7 @@ double monotoneRadius2OfEquidistant(const Coefficients& d) {
 }
 
 // The squared radius at which the distorted radius stops growing. Beyond it the mapping folds back.
-double monotoneRadius2(DistortionModel model, const Coefficients& d) {
+double monotoneRadius2(DistortionModel model, const LensCoefficients& d) {
   if (model == DistortionModel::kNone) return std::numeric_limits<double>::infinity();
   if (model == DistortionModel::kEquidistant) return monotoneRadius2OfEquidistant(d);
   for (double r2 = 0.01; r2 < 25.0; r2 += 0.01) {
@@ -89,6 +71,22 @@ double monotoneRadius2(DistortionModel model, const Coefficients& d) {
 }
 
 }  // namespace
+
+Eigen::Vector2d distortRadTan(DistortionModel model, const LensCoefficients& d,
+                              const Eigen::Vector2d& n, Eigen::Matrix2d* J) {
+  const double x = n.x(), y = n.y(), r2 = x * x + y * y;
+  const double p1 = d[2], p2 = d[3];
+  const auto [radial, slope] = radialOf(model, d, r2);
+  if (J) {
+    const double dr = 2.0 * slope;
+    (*J)(0, 0) = radial + x * x * dr + 2.0 * p1 * y + 6.0 * p2 * x;
+    (*J)(0, 1) = x * y * dr + 2.0 * p1 * x + 2.0 * p2 * y;
+    (*J)(1, 0) = (*J)(0, 1);
+    (*J)(1, 1) = radial + y * y * dr + 6.0 * p1 * y + 2.0 * p2 * x;
+  }
+  return {x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+          y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y};
+}
 
 CameraModel::CameraModel(const CameraCalibration& c)
     : calibration_(c),

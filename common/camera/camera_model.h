@@ -11,6 +11,12 @@
 
 namespace perdure {
 
+using LensCoefficients = std::array<double, 8>;  ///< k1 k2 p1 p2 k3 k4 k5 k6; those absent are 0
+
+/// Radial-tangential or rational distortion of a normalised point; J = d distorted / d normalised.
+Eigen::Vector2d distortRadTan(DistortionModel model, const LensCoefficients& d,
+                              const Eigen::Vector2d& normalised, Eigen::Matrix2d* J);
+
 class CameraModel {
  public:
   /// Checks that the calibration is usable (focal lengths > 0, as many coefficients as the model
@@ -44,7 +50,7 @@ class CameraModel {
  private:
   CameraCalibration calibration_;
   double width_, height_, fx_, fy_, cx_, cy_;
-  std::array<double, 8> d_{};
+  LensCoefficients d_{};
   double max_radius2_;  ///< squared normalised radius up to which the distortion is monotone
   RigidTransform T_BC_;
 };

@@ -40,20 +40,6 @@ Divisor divisorOf(const WideLens& lens, const Eigen::Vector3d& p) {
   return {lens.b * d2 + (1 - lens.b) * shifted, lens.b * d2_slope + (1 - lens.b) * shifted_slope};
 }
 
-/// Radial-tangential distortion of the unified model's image plane.
-Eigen::Vector2d distorted(const std::array<double, 4>& d, const Eigen::Vector2d& n,
-                          Eigen::Matrix2d* J) {
-  const double x = n.x(), y = n.y(), r2 = n.squaredNorm(), p1 = d[2], p2 = d[3];
-  const double radial = 1 + d[0] * r2 + d[1] * r2 * r2, slope = 2 * (d[0] + 2 * d[1] * r2);
-  if (J) {
-    (*J)(0, 0) = radial + x * x * slope + 2 * p1 * y + 6 * p2 * x;
-    (*J)(0, 1) = (*J)(1, 0) = x * y * slope + 2 * p1 * x + 2 * p2 * y;
-    (*J)(1, 1) = radial + y * y * slope + 6 * p1 * y + 2 * p2 * x;
-  }
-  return {x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
-          y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y};
-}
-
 struct Sample {
   double angle;
   Eigen::Vector2d side, pixel;  ///< side: the direction in the image
@@ -86,8 +72,11 @@ std::optional<Eigen::Vector2d> project(const WideLens& lens, const Eigen::Vector
   // Beyond this limit the projection folds back.
   if (!(divisor.value > 1e-6 * p.norm())) return std::nullopt;
   const Eigen::Vector2d n = p.head<2>() / divisor.value;
+  const auto& [k1, k2, p1, p2] = lens.distortion;
+  const LensCoefficients d{k1, k2, p1, p2};
   Eigen::Matrix2d J_n;
-  const Eigen::Vector2d m = distorted(lens.distortion, n, J ? &J_n : nullptr);
+  const Eigen::Vector2d m =
+      distortRadTan(DistortionModel::kRadialTangential, d, n, J ? &J_n : nullptr);
   if (J) {
     Eigen::Matrix<double, 2, 3> J_p = -n * divisor.slope.transpose() / divisor.value;
     J_p(0, 0) += 1 / divisor.value;

@@ -5,52 +5,46 @@
 
 namespace perdure::config {
 
-Field& Fields::add(std::string key, Doc doc) {
+Field& Fields::add(std::string key, Field::Target target, Doc doc) {
   for (const Field& field : fields_) check(field.key != key, "each key is described once");
   Field& field = fields_.emplace_back();
   field.key = std::move(key);
+  field.target = target;
   field.doc = std::move(doc);
   field.expert = expert_;
   return field;
 }
 
 void Fields::number(std::string key, double& target, Range range, Doc doc) {
-  Field& field = add(std::move(key), std::move(doc));
-  field.target = &target;
-  field.range = range;
+  add(std::move(key), &target, std::move(doc)).range = range;
 }
 
 void Fields::integer(std::string key, std::int64_t& target, Range range, Doc doc) {
-  Field& field = add(std::move(key), std::move(doc));
-  field.target = &target;
-  field.range = range;
+  add(std::move(key), &target, std::move(doc)).range = range;
 }
 
 void Fields::boolean(std::string key, bool& target, Doc doc) {
-  add(std::move(key), std::move(doc)).target = &target;
+  add(std::move(key), &target, std::move(doc));
 }
 
 void Fields::text(std::string key, std::string& target, Doc doc) {
-  add(std::move(key), std::move(doc)).target = &target;
+  add(std::move(key), &target, std::move(doc));
 }
 
 void Fields::choice(std::string key, std::string& target, std::vector<std::string> choices,
                     Doc doc) {
-  Field& field = add(std::move(key), std::move(doc));
-  field.target = &target;
-  field.choices = std::move(choices);
+  add(std::move(key), &target, std::move(doc)).choices = std::move(choices);
 }
 
 void Fields::numbers(std::string key, std::vector<double>& target, Range range, Doc doc,
                      std::size_t length) {
-  Field& field = add(std::move(key), std::move(doc));
-  field.target = &target;
+  Field& field = add(std::move(key), &target, std::move(doc));
   field.range = range;
   field.length = length;
 }
 
 void Fields::texts(std::string key, std::vector<std::string>& target, Doc doc) {
-  add(std::move(key), std::move(doc)).target = &target;
+  add(std::move(key), &target, std::move(doc));
 }
 
 void Fields::formerly(std::string key, std::string sentence) {

@@ -30,10 +30,10 @@ inline Range between(double low, double high) { return {low, high, false}; }
 
 /// A field bound to a variable, which has its default value until a file or --set changes it.
 struct Field {
+  using Target = std::variant<double*, std::int64_t*, bool*, std::string*, std::vector<double>*,
+                              std::vector<std::string>*>;
   std::string key;  ///< dotted key, such as "tracker.max_points"
-  std::variant<double*, std::int64_t*, bool*, std::string*, std::vector<double>*,
-               std::vector<std::string>*>
-      target;
+  Target target;
   Range range;                       ///< range of numbers, and of each number in a list
   std::vector<std::string> choices;  ///< allowed values of strings; empty: any
   std::size_t length = 0;            ///< required length of lists; 0: any
@@ -70,7 +70,7 @@ class Fields {
   std::vector<Field>& all() { return fields_; }
 
  private:
-  Field& add(std::string key, Doc doc);
+  Field& add(std::string key, Field::Target target, Doc doc);
   std::vector<Field> fields_;
   std::map<std::string, std::string> formerly_;
   bool expert_ = false;

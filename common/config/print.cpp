@@ -1,6 +1,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <set>
 
 #include "common/config/fields.h"
 #include "common/config/text.h"
@@ -8,39 +9,23 @@
 namespace perdure::config {
 namespace {
 
-template <class... F>
-struct Overloaded : F... {
-  using F::operator()...;
-};
-template <class... F>
-Overloaded(F...) -> Overloaded<F...>;
-
-template <class List, class ToText>
-std::string listText(const List& values, ToText toText) {
+std::string textOf(double value) { return numberText(value); }
+std::string textOf(std::int64_t value) { return std::to_string(value); }
+std::string textOf(bool value) { return value ? "true" : "false"; }
+std::string textOf(const std::string& value) { return quoted(value); }
+template <class Value>
+std::string textOf(const std::vector<Value>& values) {
   std::string text = "[";
-  for (const auto& value : values) text += (text.size() > 1 ? ", " : "") + toText(value);
+  for (const Value& value : values) text += (text.size() > 1 ? ", " : "") + textOf(value);
   return text + "]";
 }
 
 std::string valueText(const Field& field) {
-  return std::visit(
-      Overloaded{[](const double* v) { return numberText(*v); },
-                 [](const std::int64_t* v) { return std::to_string(*v); },
-                 [](const bool* v) { return std::string(*v ? "true" : "false"); },
-                 [](const std::string* v) { return quoted(*v); },
-                 [](const std::vector<double>* v) { return listText(*v, numberText); },
-                 [](const std::vector<std::string>* v) { return listText(*v, quoted); }},
-      field.target);
-}
-
-std::string choicesText(const Field& field, const std::string& separator) {
-  std::string text;
-  for (const std::string& choice : field.choices) text += (text.empty() ? "" : separator) + choice;
-  return text;
+  return std::visit([](const auto* value) { return textOf(*value); }, field.target);
 }
 
 std::string limitsText(const Field& field) {
-  std::string text = field.choices.empty() ? rangeText(field.range, "") : choicesText(field, ", ");
+  std::string text = field.choices.empty() ? rangeText(field.range, "") : choicesText(field);
   if (field.length > 0) {
     text += (text.empty() ? "" : "; ") + std::to_string(field.length) + " values";
   }
@@ -56,48 +41,31 @@ std::string commentOf(const Field& field) {
   return text;
 }
 
-/// Groups in order of first appearance, each key once.
-struct Group {
-  std::string name;
-  const Field* field = nullptr;
-  std::vector<Group> children;
-
-  Group& child(const std::string& child_name) {
-    for (Group& c : children) {
-      if (c.name == child_name) return c;
-    }
-    children.push_back({child_name, nullptr, {}});
-    return children.back();
-  }
-};
-
-Group treeOf(const Fields& fields) {
-  Group root;
+/// The fields whose keys begin with `prefix`; groups in order of first appearance, each once.
+std::string yamlOf(const Fields& fields, const std::string& prefix, const std::string& indent) {
+  std::string text;
+  std::set<std::string> groups;
   for (const Field& field : fields.all()) {
-    Group* group = &root;
-    std::size_t begin = 0;
-    for (std::size_t dot; (dot = field.key.find('.', begin)) != std::string::npos;
-         begin = dot + 1) {
-      group = &group->child(field.key.substr(begin, dot - begin));
-    }
-    group->child(field.key.substr(begin)).field = &field;
-  }
-  return root;
-}
-
-void print(const Group& group, const std::string& indent, std::string& out) {
-  for (const Group& child : group.children) {
-    if (child.field != nullptr) {
-      out += indent + "# " + commentOf(*child.field) + "\n";
-      out += indent + child.name + ": " + valueText(*child.field) + "\n";
-    } else {
-      out += indent + child.name + ":\n";
-      print(child, indent + "  ", out);
+    if (!field.key.starts_with(prefix)) continue;
+    const std::size_t dot = field.key.find('.', prefix.size());
+    const std::string name = field.key.substr(prefix.size(), dot - prefix.size());
+    if (dot == std::string::npos) {
+      text += indent + "# " + commentOf(field) + "\n";
+      text += indent + name + ": " + valueText(field) + "\n";
+    } else if (groups.insert(name).second) {
+      text += indent + name + ":\n" + yamlOf(fields, prefix + name + ".", indent + "  ");
     }
   }
+  return text;
 }
 
 }  // namespace
+
+std::string choicesText(const Field& field) {
+  std::string text;
+  for (const std::string& choice : field.choices) text += (text.empty() ? "" : ", ") + choice;
+  return text;
+}
 
 std::string numberText(double value) {
   if (std::isnan(value)) return ".nan";
@@ -137,11 +105,7 @@ std::string quoted(const std::string& text) {
   return out + "\"";
 }
 
-std::string toYaml(const Fields& fields) {
-  std::string out;
-  print(treeOf(fields), "", out);
-  return out;
-}
+std::string toYaml(const Fields& fields) { return yamlOf(fields, "", ""); }
 
 std::string toMarkdown(const Fields& fields) {
   std::string out = "| key | default | unit | range | meaning |\n| --- | --- | --- | --- | --- |\n";

@@ -23,26 +23,17 @@ std::string shortened(const std::string& text) {
   return text.size() <= kLongest ? text : text.substr(0, kLongest) + "…";
 }
 
-std::optional<double> parseNumber(const YAML::Node& node) {
+/// The node as a finite number.
+template <class Number>
+std::optional<Number> parse(const YAML::Node& node) {
   if (!node.IsScalar() || node.Tag() == "!") return std::nullopt;  // "!" marks quoted values
   const std::string& text = node.Scalar();
   const char* begin = text.data() + (text.starts_with('+') ? 1 : 0);
   const char* end = text.data() + text.size();
-  double value = 0;
-  const auto [stop, error] = std::from_chars(begin, end, value);
-  if (error != std::errc() || stop != end || !std::isfinite(value)) return std::nullopt;
-  return value;
-}
-
-std::optional<std::int64_t> parseInteger(const YAML::Node& node) {
-  if (!node.IsScalar() || node.Tag() == "!") return std::nullopt;
-  const std::string& text = node.Scalar();
-  const char* begin = text.data() + (text.starts_with('+') ? 1 : 0);
-  const char* end = text.data() + text.size();
-  std::int64_t value = 0;
+  Number value = 0;
   const auto [stop, error] = std::from_chars(begin, end, value);
   if (error != std::errc() || stop != end) return std::nullopt;
-  return value;
+  return std::isfinite(static_cast<double>(value)) ? std::optional(value) : std::nullopt;
 }
 
 bool inside(double value, const Range& range) {
@@ -139,7 +130,7 @@ class Reader {
   }
 
   std::optional<double> number(const Field& field, const YAML::Node& node) {
-    const std::optional<double> value = parseNumber(node);
+    const std::optional<double> value = parse<double>(node);
     if (!value) {
       refuse(field, node, field.doc.unit.empty() ? "a number" : "a number of " + field.doc.unit);
     } else if (!inside(*value, field.range)) {
@@ -154,7 +145,7 @@ class Reader {
   }
 
   void read(const Field& field, const YAML::Node& node, std::int64_t& target) {
-    const std::optional<std::int64_t> value = parseInteger(node);
+    const std::optional<std::int64_t> value = parse<std::int64_t>(node);
     if (!value) return refuse(field, node, "a whole number");
     if (!inside(static_cast<double>(*value), field.range)) {
       return refuse(field, node, rangeText(field.range, field.doc.unit));
@@ -175,9 +166,7 @@ class Reader {
     const std::string& value = node.Scalar();
     const auto& choices = field.choices;
     if (!choices.empty() && std::find(choices.begin(), choices.end(), value) == choices.end()) {
-      std::string list;
-      for (const std::string& choice : choices) list += (list.empty() ? "" : ", ") + choice;
-      return refuse(field, node, "one of " + list);
+      return refuse(field, node, "one of " + choicesText(field));
     }
     target = value;
   }
@@ -245,12 +234,6 @@ std::optional<YAML::Mark> afterFirstDocument(const std::string& yaml) {
   return ignore.start;
 }
 
-Problem syntaxProblem(const YAML::Exception& error, const std::string& file) {
-  const bool known = !error.mark.is_null();
-  return {file, known ? error.mark.line + 1 : 0, known ? error.mark.column + 1 : 0,
-          "is not YAML: " + error.msg};
-}
-
 }  // namespace
 
 std::vector<Problem> readYaml(Fields& fields, const std::string& yaml, const std::string& file) {
@@ -265,9 +248,7 @@ std::vector<Problem> readYaml(Fields& fields, const std::string& yaml, const std
       reader.problem(root, "is not a list of `key: value` lines");
     }
   } catch (const YAML::Exception& error) {
-    std::vector<Problem> problems = reader.take();
-    problems.push_back(syntaxProblem(error, file));
-    return problems;
+    reader.problem(error.mark, "is not YAML: " + error.msg);
   }
   return reader.take();
 }
@@ -292,7 +273,7 @@ std::vector<Problem> assign(Fields& fields, const std::string& assignment) {
     map[assignment.substr(0, equals)] = YAML::Load(assignment.substr(equals + 1));
     reader.readGroup(map, "");
   } catch (const YAML::Exception& error) {
-    return {{file, 0, 0, "the value is not YAML: " + error.msg}};
+    reader.problem(error.mark, "the value is not YAML: " + error.msg);
   }
   return reader.take();
 }

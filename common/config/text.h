@@ -7,6 +7,8 @@
 
 namespace perdure::config {
 
+/// "a, b, c".
+std::string choicesText(const Field& field);
 /// The shortest decimal number that reads back to the same double.
 std::string numberText(double value);
 /// "> 0", "≥ 1", "0 … 5", or empty for any value. The unit is appended if there is one.

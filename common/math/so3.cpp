@@ -51,9 +51,15 @@ Eigen::Matrix3d rightJacobianInverseSo3(const Eigen::Vector3d& theta) {
   const double a2 = theta.squaredNorm();
   const double a = std::sqrt(a2);
   const Eigen::Matrix3d W = skew(theta);
-  const double c = a < 1e-3 ? 1.0 / 12.0 + a2 / 720.0
-                            : 1.0 / a2 - (1.0 + std::cos(a)) / (2.0 * a * std::sin(a));
+  const double c =
+      a < 1e-3 ? 1.0 / 12.0 + a2 / 720.0 : 1.0 / a2 - (1.0 + std::cos(a)) / (2.0 * a * std::sin(a));
   return Eigen::Matrix3d::Identity() + 0.5 * W + c * W * W;
+}
+
+bool isRotation(const Eigen::Matrix3d& R) {
+  constexpr double kTolerance = 1e-2;
+  const double error = (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  return error <= kTolerance && !(R.determinant() < 0.0);
 }
 
 double wrapAngle(double angle) {

@@ -20,6 +20,9 @@ Eigen::Matrix3d rightJacobianSo3(const Eigen::Vector3d& theta);
 /// J_r^-1 with Log(Exp(theta) Exp(d)) ≈ theta + J_r^-1(theta) d; |theta| < 2 pi.
 Eigen::Matrix3d rightJacobianInverseSo3(const Eigen::Vector3d& theta);
 
+/// Returns whether R is orthonormal to 1e-2 and right-handed. Not for NaN.
+bool isRotation(const Eigen::Matrix3d& R);
+
 /// An angle in radians, wrapped into (-pi, pi].
 double wrapAngle(double angle);
 /// Yaw about +z of a rotation (x axis projected on the horizontal plane), in (-pi, pi].

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "common/base/algorithms/median.h"
 #include "common/base/errors.h"
 #include "common/replay/image_check.h"
 #include "common/replay/stamp_check.h"
@@ -23,13 +24,6 @@ struct Unit {
   double low, high;
   const char *code, *text;
 };
-
-double medianOf(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Returns true if the forces have no common direction and widely varying magnitudes. Gravity would
 /// give them both a common direction and a similar magnitude.

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <set>
 
+#include "common/base/algorithms/median.h"
 #include "common/base/errors.h"
 #include "common/replay/files/rig_file.h"
 #include "common/replay/files/stamps.h"
@@ -26,9 +27,7 @@ Duration usualInterval(const std::vector<ImuSample>& samples) {
   for (std::size_t i = 1; i < samples.size(); ++i) {
     intervals.push_back(between(samples[i].time, samples[i - 1].time));
   }
-  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
-  std::nth_element(intervals.begin(), middle, intervals.end());
-  return *middle;
+  return medianOf(std::move(intervals));
 }
 
 std::string nameOf(const Recording::FrameFile& file) {

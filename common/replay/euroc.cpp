@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "common/base/errors.h"
+#include "common/base/folder.h"
 #include "common/replay/files/image_folder.h"
 #include "common/replay/files/rig_file.h"
 #include "common/replay/files/sensor_file.h"
@@ -25,12 +26,6 @@ constexpr char kImuColumns[] =
     "seven columns are awaited: timestamp [ns], w_x, w_y, w_z [rad/s], a_x, a_y, a_z [m/s^2]";
 
 using Fields = std::vector<std::string_view>;
-
-void addNotes(const SensorTable& table, Recording& recording) {
-  for (const auto& [reason, n] : table.reasons().all()) recording.reasons.add(reason, n);
-  const auto& notes = table.notes();
-  recording.notes.insert(recording.notes.end(), notes.begin(), notes.end());
-}
 
 std::string judgeImu(const Fields& fields) {
   if (fields.size() != 7)
@@ -57,13 +52,12 @@ bool namesForceFirst(const std::vector<std::string>& head) {
 
 void readImu(const fs::path& folder, Recording& recording) {
   const fs::path file = folder / "data.csv";
-  const SensorTable table(file, "imu", judgeImu);
-  addNotes(table, recording);
+  const SensorTable table(file, "imu", recording, judgeImu);
   if (table.rows().empty()) {
     throw StartupError(ExitCode::kData,
-                       file.string() +
-                           " has no inertial sample (a head at most); fetch it again, or see why "
-                           "the recorder wrote none");
+                       "{} has no inertial sample (a head at most); fetch it again, or see why the "
+                       "recorder wrote none",
+                       file.c_str());
   }
   const bool force_first = namesForceFirst(table.head());
   if (force_first) {
@@ -83,11 +77,10 @@ void readImu(const fs::path& folder, Recording& recording) {
 
 void readSpeed(const fs::path& folder, Recording& recording) {
   const double sigma = SensorFile(folder / "sensor.yaml").number("sigma", 1e-6);
-  const SensorTable table(folder / "data.csv", "speed", [](const Fields& fields) {
+  const SensorTable table(folder / "data.csv", "speed", recording, [](const Fields& fields) {
     const bool whole = fields.size() >= 2 && parseNumber(fields[1]);
     return whole ? "" : "not two numbers; timestamp [ns] and speed [m/s] are awaited";
   });
-  addNotes(table, recording);
   for (const TableRow& row : table.rows()) {
     SpeedSample sample;
     sample.time = row.time;
@@ -122,28 +115,26 @@ class FrameList {
   void close(Recording& recording) const {
     if (!look_ || named_ == 0) return;
     const std::string images = (folder_ / "data").string();
+    const std::string list = (folder_ / "data.csv").string();
     if (found_ == 0 && images_.size() == 0) {
       const std::string others = images_.others();
-      throw StartupError(ExitCode::kData,
-                         (folder_ / "data.csv").string() + " names " + std::to_string(named_) +
-                             " images, the first of them `" + first_ + "`; " + images + " holds " +
-                             (others.empty() ? "no file: unpack or copy them into it" : others));
+      throw StartupError(ExitCode::kData, "{} names {} images, the first of them `{}`; {} holds {}",
+                         list, named_, first_, images,
+                         others.empty() ? "no file: unpack or copy them into it" : others);
     }
     if (found_ == 0) {
-      throw StartupError(ExitCode::kData, (folder_ / "data.csv").string() + " names " +
-                                              std::to_string(named_) + " images, " + images +
-                                              " holds " + std::to_string(images_.size()) +
-                                              ", and none agrees: the first of the list is `" +
-                                              first_ + "`, that of the folder `" + images_.first() +
-                                              "`; the second column must hold the names of the "
-                                              "files, or the stamps must be their names");
+      throw StartupError(
+          ExitCode::kData,
+          "{} names {} images, {} holds {}, and none agrees: the first of the list is `{}`, that "
+          "of the folder `{}`; the second column must hold the names of the files, or the stamps "
+          "must be their names",
+          list, named_, images, images_.size(), first_, images_.first());
     }
     if (images_.foundOtherwise() == 0) return;
-    recording.notes.push_back((folder_ / "data.csv").string() + ": " +
-                              std::to_string(images_.foundOtherwise()) + " of " +
-                              std::to_string(named_) +
-                              " images are not there by the name in the list and were found by its "
-                              "stem or stamp");
+    recording.notes.push_back(
+        fmt::format("{}: {} of {} images are not there by the name in the list and were found by "
+                    "its stem or stamp",
+                    list, images_.foundOtherwise(), named_));
   }
 
  private:
@@ -156,9 +147,8 @@ class FrameList {
 
 /// Reads the frames of one camera; frames of cam1 have the index of cam0's frame at the same time.
 void readFrames(const fs::path& folder, std::size_t camera, bool look, Recording& recording) {
-  const SensorTable table(folder / "data.csv", camera == 0 ? "frame" : "stereo",
+  const SensorTable table(folder / "data.csv", camera == 0 ? "frame" : "stereo", recording,
                           [](const Fields&) { return std::string(); });
-  addNotes(table, recording);
   const std::vector<Recording::FrameFile> first = recording.frames;
   FrameList list(folder, look);
   if (camera == 0) recording.frame_count = table.lines();
@@ -171,16 +161,7 @@ void readFrames(const fs::path& folder, std::size_t camera, bool look, Recording
     // A skipped row retains its number; a list that was sorted is numbered again.
     const std::uint64_t number = table.wasSorted() ? row.number : recording.frames.size();
     Recording::FrameFile frame{row.time, number, camera, list.pathOf(row)};
-    if (camera != 0) {
-      const auto* pair = pairOf(first, row.time);
-      if (!pair) {
-        recording.reasons.add("stereo_unmatched");
-        recording.unpaired.push_back(row.time);
-        continue;
-      }
-      frame.index = pair->index;
-      frame.time = pair->time;
-    }
+    if (camera != 0 && !pairWith(first, frame, recording)) continue;
     recording.frames.push_back(std::move(frame));
   }
   list.close(recording);
@@ -190,13 +171,12 @@ PoseFile readGroundTruth(const fs::path& file, const RigidTransform& T_BI, Recor
   const auto unitOf = [](const std::vector<double>& v) {
     return Eigen::Quaterniond(v[3], v[4], v[5], v[6]);
   };
-  const SensorTable table(file, "truth", [&](const Fields& fields) -> std::string {
+  const SensorTable table(file, "truth", recording, [&](const Fields& fields) -> std::string {
     if (fields.size() < 8) return "fewer than eight columns: timestamp [ns], p, q (w x y z)";
     const auto v = parseNumbers({fields.begin() + 1, fields.begin() + 8});
     if (!v) return "not eight numbers";
     return std::abs(unitOf(*v).norm() - 1.0) > 1e-2 ? "the quaternion's norm is not 1" : "";
   });
-  addNotes(table, recording);
   std::vector<StampedPose> poses;
   for (const TableRow& row : table.rows()) {
     const auto v = *parseNumbers({row.fields.begin() + 1, row.fields.begin() + 8});
@@ -246,18 +226,12 @@ std::vector<fs::path> kalibrFiles(const fs::path& mav0, const std::string& of) {
   constexpr char kChain[] = "camchain";
   std::vector<fs::path> all;
   for (const fs::path& folder : {mav0, mav0.parent_path(), mav0.parent_path() / "dso"}) {
-    std::vector<fs::path> found;
-    std::error_code ignored;
-    for (const auto& entry : fs::directory_iterator(folder, ignored)) {
-      const fs::path& file = entry.path();
+    const auto found = pathsIn(folder, [&](const fs::path& file) {
       const std::string name = file.filename().string();
       const bool is_yaml = file.extension() == ".yaml" || file.extension() == ".yml";
       const bool is_chain = name.find(kChain) != std::string::npos;
-      if (is_yaml && (of == kChain ? is_chain : !is_chain && isWordIn(name, of))) {
-        found.push_back(file);
-      }
-    }
-    std::sort(found.begin(), found.end());
+      return is_yaml && (of == kChain ? is_chain : !is_chain && isWordIn(name, of));
+    });
     all.insert(all.end(), found.begin(), found.end());
   }
   return all;
@@ -266,20 +240,13 @@ std::vector<fs::path> kalibrFiles(const fs::path& mav0, const std::string& of) {
 /// If there are several files, notes which of them is used.
 void noteChoice(const std::vector<fs::path>& files, Recording& recording) {
   if (files.size() < 2) return;
-  std::string others;
-  for (std::size_t i = 1; i < files.size(); ++i) {
-    others += (i == 1 ? "" : ", ") + files[i].string();
-  }
+  std::vector<std::string> others;
+  for (std::size_t i = 1; i < files.size(); ++i) others.push_back(files[i].string());
   const std::string note =
       fmt::format("the calibration is that of {}, not of {}; --rig FILE takes another",
-                  files[0].string(), others);
+                  files[0].string(), fmt::join(others, ", "));
   const auto& notes = recording.notes;
   if (std::find(notes.begin(), notes.end(), note) == notes.end()) recording.notes.push_back(note);
-}
-
-void noteKeys(const SensorFile& file, Recording& recording) {
-  const auto keys = file.unknownKeys();
-  recording.notes.insert(recording.notes.end(), keys.begin(), keys.end());
 }
 
 /// The sources of a folder's calibration, in this order: each sensor's sensor.yaml, the given rig
@@ -305,7 +272,7 @@ class EurocCalibration {
     if (file.has("imu0")) file = file.section("imu0");
     T_BI_ = file.T_BS();
     const ImuCalibration imu = readImuCalibration(file);
-    noteKeys(file, recording);
+    file.noteUnknownKeys(recording.notes);
     return imu;
   }
 
@@ -319,7 +286,7 @@ class EurocCalibration {
     SensorFile file(path);
     if (file.has(name)) file = file.section(name);
     CameraCalibration camera = readCamera(file, name);
-    noteKeys(file, recording);
+    file.noteUnknownKeys(recording.notes);
     camera.T_BC = T_BI_.inverse() * camera.T_BC;
     return camera;
   }

@@ -2,6 +2,8 @@
 // body is the IMU of the OXTS unit: x forward, y left, z up. Stamps are those of the files (OXTS is
 // 7 ms after the images). The right image has the stamp of the left one, because one trigger
 // exposes both.
+#include <fmt/format.h>
+
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -30,11 +32,7 @@ enum OxtsField : std::size_t {
   kWx = 17
 };
 
-std::string tenDigits(std::size_t number) {
-  char text[24];
-  std::snprintf(text, sizeof text, "%010zu", number);
-  return text;
-}
+std::string tenDigits(std::size_t number) { return fmt::format("{:010}", number); }
 
 /// Parses "2011-09-26 13:04:32.345808896" as UTC.
 std::optional<TimePoint> parseStamp(const std::string& text) {

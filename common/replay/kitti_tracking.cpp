@@ -1,9 +1,11 @@
 // KITTI tracking: calib/SEQUENCE.txt and, if present, image_02, image_03, label_02. The sequences
 // have no stamps: 10 Hz from t = 0 is assumed.
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <cstdio>
 
 #include "common/base/errors.h"
+#include "common/base/folder.h"
 #include "common/replay/files/kitti_calibration.h"
 #include "common/replay/files/kitti_labels.h"
 #include "common/replay/files/text_file.h"
@@ -18,23 +20,19 @@ constexpr Duration kInterval = std::chrono::milliseconds(100);
 constexpr std::int64_t kMostImages = 1'000'000;  // image names have six digits
 
 std::string availableSequences(const fs::path& root) {
+  const auto isText = [](const fs::path& file) { return file.extension() == ".txt"; };
   std::vector<std::string> names;
-  for (const auto& entry : fs::directory_iterator(root / "calib")) {
-    if (entry.path().extension() == ".txt") names.push_back(entry.path().stem().string());
-  }
-  std::sort(names.begin(), names.end());
-  std::string list;
-  for (const auto& name : names) list += (list.empty() ? "" : ", ") + name;
-  return list.empty() ? "none" : list;
+  for (const fs::path& file : pathsIn(root / "calib", isText))
+    names.push_back(file.stem().string());
+  return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
 }
 
 fs::path calibrationFile(const DatasetOptions& options) {
   const auto& sequence = options.sequence;
   if (sequence.empty()) {
     throw StartupError(ExitCode::kUsage,
-                       options.path.string() +
-                           " holds several sequences: name one with --sequence (" +
-                           availableSequences(options.path) + ")");
+                       "{} holds several sequences: name one with --sequence ({})",
+                       options.path.c_str(), availableSequences(options.path));
   }
   const fs::path file = options.path / "calib" / (sequence + ".txt");
   if (!fs::exists(file)) {
@@ -70,11 +68,10 @@ std::size_t countFrames(const DatasetOptions& options, const fs::path& images) {
 
 void addFrames(const fs::path& folder, std::size_t camera, Recording& recording) {
   for (std::size_t i = 0; i < recording.frame_count; ++i) {
-    char name[24];
-    std::snprintf(name, sizeof name, "%06zu", i);
     const bool has_images = fs::is_directory(folder);
-    recording.frames.push_back({TimePoint(static_cast<std::int64_t>(i) * kInterval), i, camera,
-                                has_images ? imagePath(folder, name).string() : ""});
+    recording.frames.push_back(
+        {TimePoint(static_cast<std::int64_t>(i) * kInterval), i, camera,
+         has_images ? imagePath(folder, fmt::format("{:06}", i)).string() : ""});
   }
 }
 

@@ -58,8 +58,7 @@ struct Mode {
 };
 
 /// The normal with the most neighbours, among those that `allowed` accepts.
-template <class Allowed>
-Mode densest(const std::vector<Eigen::Vector3d>& normals, Allowed&& allowed) {
+Mode densest(const std::vector<Eigen::Vector3d>& normals, const auto& allowed) {
   Mode best;
   const std::size_t step = std::max<std::size_t>(1, normals.size() / kCandidates);
   for (std::size_t i = 0; i < normals.size(); i += step) {

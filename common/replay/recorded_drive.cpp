@@ -63,7 +63,7 @@ class DriveReader {
              topic.starts_with(kFramePrefix);
     });
     while (const auto message = messages_.next()) take(*message);
-    for (const auto& [reason, n] : messages_.reasons().all()) recording_.reasons.add(reason, n);
+    recording_.reasons.add(messages_.reasons());
     if (recording_.calibration.cameras.empty()) {
       refuseStrangers();
       const std::string& problem = messages_.lastProblem();

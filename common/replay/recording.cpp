@@ -1,8 +1,11 @@
 #include "common/replay/recording.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <tuple>
 
+#include "common/base/folder.h"
 #include "common/replay/files/stamps.h"
 #include "common/vision/decode.h"
 
@@ -18,12 +21,7 @@ std::filesystem::path imagePath(const std::filesystem::path& folder, const std::
 
 std::optional<std::pair<std::uint32_t, std::uint32_t>> firstImageSize(
     const std::filesystem::path& folder) {
-  std::vector<std::filesystem::path> files;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    files.push_back(entry.path());
-  }
-  std::sort(files.begin(), files.end());
-  for (const auto& file : files) {
+  for (const auto& file : pathsIn(folder, [](const auto&) { return true; })) {
     const auto image = vision::decodeImageFile(file.string(), std::nullopt);
     if (image) {
       return std::pair(static_cast<std::uint32_t>(image->cols),
@@ -33,14 +31,13 @@ std::optional<std::pair<std::uint32_t, std::uint32_t>> firstImageSize(
   return std::nullopt;
 }
 
-void noteOrder(const StampOrder& order, const std::string& kind, std::size_t all,
-               Recording& recording) {
+void noteOrder(const StampOrder& order, const std::string& kind, const std::string& where,
+               const std::string& all, Recording& recording) {
   const auto note = [&](std::size_t count, const char* reason, const char* what) {
     if (count == 0) return;
     recording.reasons.add(kind + reason, count);
     if (what == nullptr) return;
-    recording.notes.push_back(kind + ": " + std::to_string(count) + " of " + std::to_string(all) +
-                              what);
+    recording.notes.push_back(fmt::format("{}: {} of {}{}", where, count, all, what));
   };
   note(order.repeated, "_not_increasing", nullptr);
   note(order.strays, "_stray", " have a stamp far from their neighbours' and were left out");
@@ -59,11 +56,18 @@ void sortFrames(Recording& recording) {
                    });
 }
 
-const Recording::FrameFile* pairOf(const std::vector<Recording::FrameFile>& first, TimePoint time) {
+bool pairWith(const std::vector<Recording::FrameFile>& first, Recording::FrameFile& frame,
+              Recording& recording) {
   const auto at = std::lower_bound(
-      first.begin(), first.end(), time,
-      [](const auto& frame, TimePoint of) { return between(of, frame.time) > kPairedWithin; });
-  return at != first.end() && between(at->time, time) <= kPairedWithin ? &*at : nullptr;
+      first.begin(), first.end(), frame.time,
+      [](const auto& one, TimePoint time) { return between(time, one.time) > kPairedWithin; });
+  if (at == first.end() || between(at->time, frame.time) > kPairedWithin) {
+    recording.reasons.add("stereo_unmatched");
+    recording.unpaired.push_back(frame.time);
+    return false;
+  }
+  frame.index = at->index, frame.time = at->time;
+  return true;
 }
 
 double rateOf(const std::vector<Recording::FrameFile>& frames, std::size_t camera) {

@@ -12,9 +12,9 @@
 
 namespace perdure::replay {
 
-/// Counts and notes the stamps that an order leaves out or moves.
-void noteOrder(const StampOrder& order, const std::string& kind, std::size_t all,
-               Recording& recording);
+/// Counts and notes the stamps that an order leaves out or moves, of `all` in `where`.
+void noteOrder(const StampOrder& order, const std::string& kind, const std::string& where,
+               const std::string& all, Recording& recording);
 
 /// Returns whether the folder has the layout of a kind. The reader then reports missing parts.
 bool looksLikeEuroc(const std::filesystem::path& folder);
@@ -40,23 +40,32 @@ std::optional<std::pair<std::uint32_t, std::uint32_t>> firstImageSize(
 /// Sorts the samples by time and numbers them. Samples left out are counted as imu_not_increasing
 /// or imu_stray, moved ones as imu_unsorted (files/stamps.h).
 void orderImu(Recording& recording);
-/// Sorts items by their stamps, and counts KIND_not_increasing, KIND_stray, KIND_unsorted.
-template <class Item, class TimeOf>
-void orderByTime(std::vector<Item>& items, const std::string& kind, Recording& recording,
-                 TimeOf&& timeOf) {
+/// Sorts items by their stamps, and counts KIND_not_increasing, KIND_stray, KIND_unsorted. Notes
+/// name `where` and `all`. Returns whether the items were sorted.
+template <class Item>
+bool orderByTime(std::vector<Item>& items, const std::string& kind, const std::string& where,
+                 const std::string& all, Recording& recording, const auto& timeOf) {
   std::vector<TimePoint> stamps;
   for (const Item& item : items) stamps.push_back(timeOf(item));
   const StampOrder order = orderOf(stamps);
-  noteOrder(order, kind, items.size(), recording);
+  noteOrder(order, kind, where, all, recording);
   std::vector<Item> ordered;
   for (const std::size_t i : order.kept) ordered.push_back(std::move(items[i]));
   items = std::move(ordered);
+  return order.moved == 0;
+}
+template <class Item>
+void orderByTime(std::vector<Item>& items, const std::string& kind, Recording& recording,
+                 const auto& timeOf) {
+  orderByTime(items, kind, kind, std::to_string(items.size()), recording, timeOf);
 }
 /// Sorts frames by time, then camera.
 void sortFrames(Recording& recording);
 inline constexpr Duration kPairedWithin = std::chrono::milliseconds(5);
-/// The frame of cam0 taken within kPairedWithin; `first` is sorted by time.
-const Recording::FrameFile* pairOf(const std::vector<Recording::FrameFile>& first, TimePoint time);
+/// Gives a frame of cam1 the index and the time of the frame of cam0 taken within kPairedWithin.
+/// Counts the frame and returns false if there is none. `first` is sorted by time.
+bool pairWith(const std::vector<Recording::FrameFile>& first, Recording::FrameFile& frame,
+              Recording& recording);
 /// Frame rate of a camera in Hz; 1 if it cannot be determined.
 double rateOf(const std::vector<Recording::FrameFile>& frames, std::size_t camera);
 

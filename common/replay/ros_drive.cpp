@@ -172,8 +172,7 @@ class RosDriveReader {
     }
     messages_.rewind(wanted);
     while (const auto message = messages_.next()) take(*message);
-    const ReasonCounts reasons = messages_.reasons();
-    for (const auto& [reason, n] : reasons.all()) recording_.reasons.add(reason, n);
+    recording_.reasons.add(messages_.reasons());
     if (!messages_.lastProblem().empty()) recording_.notes.push_back(messages_.lastProblem());
     if (unstamped_ == 0) return;
     recording_.notes.push_back(file_ + ": " + std::to_string(unstamped_) +
@@ -252,15 +251,7 @@ class RosDriveReader {
     for (const RosImage& seen : camera.images) {
       Recording::FrameFile frame{seen.time, recording_.frames.size(), index, {}};
       frame.load = [store, seen] { return store->at(seen); };
-      if (index > 0) {
-        const auto* pair = pairOf(first, seen.time);
-        if (pair == nullptr) {
-          recording_.reasons.add("stereo_unmatched");
-          recording_.unpaired.push_back(seen.time);
-          continue;
-        }
-        frame.index = pair->index, frame.time = pair->time;
-      }
+      if (index > 0 && !pairWith(first, frame, recording_)) continue;
       recording_.frames.push_back(std::move(frame));
     }
   }

@@ -1,5 +1,7 @@
 #include "common/replay/ros_topics.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstring>
 
@@ -29,9 +31,7 @@ std::vector<std::string> ofTypes(const RosTopics& topics, std::vector<std::strin
 }
 
 std::string listOf(const std::vector<std::string>& names) {
-  std::string list;
-  for (const auto& name : names) list += (list.empty() ? "" : ", ") + name;
-  return list;
+  return fmt::format("{}", fmt::join(names, ", "));
 }
 
 /// "left" → "1st", "cam1" → "cam0": replaces the second name of a pair by the first.

@@ -5,12 +5,15 @@
 // comes from sensor.yaml, otherwise from the level planes of the depth images. W is the frame of
 // the poses after the smallest rotation that makes z vertical. The body is the depth camera, x
 // forward, y left, z up. Colour and depth come from two cameras and are not registered.
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <cstdio>
 #include <map>
 #include <string>
 
 #include "common/base/errors.h"
+#include "common/base/folder.h"
+#include "common/math/so3.h"
 #include "common/replay/files/rig_file.h"
 #include "common/replay/files/sensor_file.h"
 #include "common/replay/files/text_file.h"
@@ -94,12 +97,11 @@ bool holdsFrames(const fs::path& folder) {
 
 std::vector<std::string> sequencesOf(const fs::path& scene) {
   std::vector<std::string> names;
-  std::error_code ignored;
-  for (const auto& entry : fs::directory_iterator(scene, ignored)) {
-    const std::string name = entry.path().filename().string();
-    if (name.starts_with("seq-") && entry.is_directory()) names.push_back(name);
+  for (const fs::path& folder : pathsIn(scene, [](const fs::path& path) {
+         return path.filename().string().starts_with("seq-") && fs::is_directory(path);
+       })) {
+    names.push_back(folder.filename().string());
   }
-  std::sort(names.begin(), names.end());
   return names;
 }
 
@@ -107,13 +109,11 @@ std::vector<std::string> sequencesOf(const fs::path& scene) {
 fs::path sequenceFolder(const DatasetOptions& options) {
   if (hasFolders(options.path) || holdsFrames(options.path)) return options.path;
   const auto names = sequencesOf(options.path);
-  std::string list;
-  for (const auto& name : names) list += (list.empty() ? "" : ", ") + name;
   const bool known = std::find(names.begin(), names.end(), options.sequence) != names.end();
   if (known) return options.path / options.sequence;
   throw StartupError(ExitCode::kUsage,
-                     options.path.string() +
-                         " holds sequences of a scene: name one with --sequence (" + list + ")");
+                     "{} holds sequences of a scene: name one with --sequence ({})",
+                     options.path.c_str(), fmt::join(names, ", "));
 }
 
 /// sensor.yaml of the sequence or of its scene. Returns nothing if there is none.
@@ -180,19 +180,23 @@ CameraCalibration cameraOf(const std::optional<SensorFile>& sensor, const Datase
 }
 
 /// The pose of the camera in the frame P of the poses. Returns nothing if tracking was lost
-/// (numbers that are not finite); other errors are appended to `wrong`.
-std::optional<RigidTransform> readPose(const fs::path& file, std::string& wrong) {
+/// (numbers that are not finite), which is counted; other errors are added to `wrong`.
+std::optional<RigidTransform> readPose(const fs::path& file, Complaints& wrong,
+                                       ReasonCounts& reasons) {
   std::vector<double> v;
   const auto is_lost = [](const std::string& text) {
     const std::string lower = toLower(text);
     return lower.find("inf") != lower.npos || lower.find("nan") != lower.npos;
   };
   const auto complain = [&](const std::string& what) {
-    wrong = file.string() + ": " + what;
+    wrong.add(file.string() + ": " + what);
     return std::nullopt;
   };
   for (const auto& line : readLines(file, "each frame has a pose file")) {
-    if (is_lost(line.text)) return std::nullopt;
+    if (is_lost(line.text)) {
+      reasons.add("pose_lost");
+      return std::nullopt;
+    }
     const auto numbers = parseNumbers(split(line.text, ' '));
     if (!numbers) return complain("line " + std::to_string(line.number) + " is not of numbers");
     v.insert(v.end(), numbers->begin(), numbers->end());
@@ -202,11 +206,7 @@ std::optional<RigidTransform> readPose(const fs::path& file, std::string& wrong)
   }
   const auto T = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(v.data());
   const Eigen::Matrix3d R = T.topLeftCorner<3, 3>();
-  constexpr double kTolerance = 1e-2;
-  const double error = (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (!(error <= kTolerance) || R.determinant() < 0.0) {
-    return complain("the rotation is not orthonormal and right-handed");
-  }
+  if (!isRotation(R)) return complain("the rotation is not orthonormal and right-handed");
   if (!T.row(3).isApprox(Eigen::RowVector4d(0, 0, 0, 1), 1e-6)) {
     return complain("the last row of a pose is 0 0 0 1");
   }
@@ -217,29 +217,21 @@ std::optional<RigidTransform> readPose(const fs::path& file, std::string& wrong)
   return RigidTransform(R, p);
 }
 
-/// T_PC by frame. Invalid files are refused; the message names the first ten.
+/// T_PC by frame. Invalid files are refused.
 std::map<std::size_t, RigidTransform> readPoses(const SceneFiles& files, Recording& recording) {
   std::map<std::size_t, RigidTransform> poses;
-  std::string all;
-  std::size_t count = 0;
+  Complaints wrong;
   for (const auto& [index, image] : files.colour) {
     const auto file = files.pose.find(index);
     if (file == files.pose.end()) {
       recording.reasons.add("pose_missing");
       continue;
     }
-    std::string wrong;
-    const auto pose = readPose(file->second, wrong);
-    if (pose) {
+    if (const auto pose = readPose(file->second, wrong, recording.reasons)) {
       poses.emplace(index, *pose);
-    } else if (wrong.empty()) {
-      recording.reasons.add("pose_lost");
-    } else if (++count <= 10) {
-      all += (all.empty() ? "" : "\n") + wrong;
     }
   }
-  if (count > 10) all += "\nand " + std::to_string(count - 10) + " more";
-  if (count > 0) throw StartupError(ExitCode::kData, all);
+  wrong.throwIfAny();
   return poses;
 }
 
@@ -291,12 +283,10 @@ Eigen::Vector3d upOf(const fs::path& folder, const std::optional<SensorFile>& se
     return up.stableNormalized();
   }
   const UpEstimate estimate = estimateUp(folder, files, poses);
-  char text[200];
-  std::snprintf(text, sizeof text,
-                "gravity is not given and was taken from level planes of the depth images: up is "
-                "[%.4f, %.4f, %.4f] in the poses' frame (%zu of %zu patches)",
-                estimate.up.x(), estimate.up.y(), estimate.up.z(), estimate.patches, estimate.all);
-  recording.notes.emplace_back(text);
+  recording.notes.push_back(fmt::format(
+      "gravity is not given and was taken from level planes of the depth images: up is "
+      "[{:.4f}, {:.4f}, {:.4f}] in the poses' frame ({} of {} patches)",
+      estimate.up.x(), estimate.up.y(), estimate.up.z(), estimate.patches, estimate.all));
   return estimate.up;
 }
 
@@ -341,10 +331,7 @@ Recording readSevenScenes(const DatasetOptions& options) {
   }
   const Eigen::Vector3d up = upOf(folder, sensor, files, poses, recording);
   recording.truth = truthOf(poses, up);
-  if (sensor) {
-    const auto notes = sensor->unknownKeys();
-    recording.notes.insert(recording.notes.end(), notes.begin(), notes.end());
-  }
+  if (sensor) sensor->noteUnknownKeys(recording.notes);
   return recording;
 }
 

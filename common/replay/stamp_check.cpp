@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "common/base/algorithms/median.h"
 #include "common/replay/files/stamps.h"
 
 namespace perdure::replay {
@@ -23,9 +24,7 @@ std::optional<double> intervalOf(StampList stamps) {
   }
   constexpr std::size_t kFewIntervals = 5;
   if (intervals.size() < kFewIntervals) return std::nullopt;
-  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
-  std::nth_element(intervals.begin(), middle, intervals.end());
-  return static_cast<double>(*middle);
+  return static_cast<double>(medianOf(std::move(intervals)));
 }
 
 StampList stampsOfImu(const Recording& recording) {

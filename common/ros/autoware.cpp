@@ -11,8 +11,6 @@
 namespace perdure::ros::autoware {
 namespace {
 
-constexpr double kUnknownVariance = 1e6;  ///< ROS filters ignore such values
-using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
 using Kinematics = TrackedObjectKinematics;
 using Label = ObjectClassification;
 
@@ -48,18 +46,6 @@ Uuid uuidOf(ObjectId id) {
   return uuid;
 }
 
-/// Pose covariance in M from centre and yaw; the yaw is about `up`.
-std::array<double, 36> poseCovariance(const ClassBelief& belief, const Eigen::Vector3d& up_W,
-                                      const Eigen::Matrix3d& R_MW) {
-  Eigen::Matrix<double, 6, 4> J = Eigen::Matrix<double, 6, 4>::Zero();
-  J.topLeftCorner<3, 3>() = R_MW;
-  J.block<3, 1>(3, 3) = R_MW * up_W;
-  const Matrix6 covariance = J * belief.covariance.topLeftCorner<4, 4>() * J.transpose();
-  std::array<double, 36> numbers{};
-  std::copy_n(covariance.data(), numbers.size(), numbers.begin());
-  return numbers;
-}
-
 std::array<double, 36> nothingKnown() {
   std::array<double, 36> numbers{};
   for (std::size_t i = 0; i < 6; ++i) numbers[7 * i] = kUnknownVariance;
@@ -71,7 +57,7 @@ Kinematics kinematicsOf(const ObjectBelief& object, const Objects& all, const Cu
   constexpr double kMoves = 0.5, kAxisUnknown = 1.0;  // probability; σ of the yaw, rad
   Kinematics kinematics;
   kinematics.pose_with_covariance.pose = poseOf(T_MW * box.T_WO);
-  kinematics.pose_with_covariance.covariance = poseCovariance(object.best(), all.up_W, T_MW.R());
+  kinematics.pose_with_covariance.covariance = poseCovarianceOf(object.best(), all.up_W, T_MW.R());
   const Eigen::Vector3d v = box.T_WO.R().transpose() * object.velocity;
   kinematics.twist_with_covariance.twist.linear = {v.x(), v.y(), v.z()};
   kinematics.twist_with_covariance.covariance = nothingKnown();

@@ -51,10 +51,7 @@ class CdrWriter {
     count(items.size());
     for (const X& item : items) (*this)(name, item);
   }
-  template <Struct M>
-  void operator()(const char*, const M& message) {
-    M::fields(message, *this);
-  }
+  void operator()(const char*, const Struct auto& message) { message.fields(message, *this); }
 
  private:
   void count(std::size_t n) { (*this)("", static_cast<std::uint32_t>(n)); }
@@ -125,8 +122,7 @@ class BytesReader {
   bool swapped_ = false, whole_ = true;
 };
 
-template <Struct M>
-std::vector<std::uint8_t> cdrOf(const M& message) {
+std::vector<std::uint8_t> cdrOf(const Struct auto& message) {
   std::vector<std::uint8_t> bytes;
   CdrWriter writer(bytes);
   writer("", message);

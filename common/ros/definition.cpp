@@ -78,13 +78,6 @@ class Walk {
   std::string message_;
 };
 
-template <class M>
-std::vector<Definition> definitionsIn() {
-  std::vector<Definition> all;
-  Walk(all).visit<M>();
-  return all;
-}
-
 }  // namespace
 
 std::string ros2Name(const std::string& type) {
@@ -102,7 +95,8 @@ std::string plainName(const std::string& name) {
 
 template <class M>
 std::string definitionOf() {
-  auto all = definitionsIn<M>();
+  std::vector<Definition> all;
+  Walk(all).visit<M>();
   std::string text = all.back().message;
   all.pop_back();
   for (const Definition& part : all) {

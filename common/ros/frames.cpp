@@ -1,5 +1,7 @@
 #include "common/ros/frames.h"
 
+#include <algorithm>
+
 namespace perdure::ros {
 namespace {
 
@@ -29,6 +31,21 @@ Header headerOf(TimePoint time, const std::string& frame) { return {rosTime(time
 Point pointOf(const Eigen::Vector3d& p) { return {p.x(), p.y(), p.z()}; }
 
 Pose poseOf(const RigidTransform& T) { return {pointOf(T.p), quaternionOf(T.q)}; }
+
+std::array<double, 36> numbersOf(const Matrix6& matrix) {
+  std::array<double, 36> numbers{};
+  std::copy_n(matrix.data(), numbers.size(), numbers.begin());
+  return numbers;
+}
+
+/// The rotation vector is yaw · up.
+std::array<double, 36> poseCovarianceOf(const ClassBelief& belief, const Eigen::Vector3d& up,
+                                        const Eigen::Matrix3d& R) {
+  Eigen::Matrix<double, 6, 4> J = Eigen::Matrix<double, 6, 4>::Zero();
+  J.topLeftCorner<3, 3>() = R;
+  J.block<3, 1>(3, 3) = R * up;
+  return numbersOf(J * belief.covariance.topLeftCorner<4, 4>() * J.transpose());
+}
 
 TransformStamped transformOf(TimePoint time, const std::string& parent, const std::string& child,
                              const RigidTransform& T) {

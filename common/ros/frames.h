@@ -2,10 +2,12 @@
 // → base_link (the body, which is the IMU) → <camera>_link → <camera>_optical.
 #pragma once
 
+#include <array>
 #include <string>
 
 #include "common/math/rigid_transform.h"
 #include "common/ros/messages.h"
+#include "common/types/objects.h"
 #include "common/types/sensors.h"
 
 namespace perdure::ros {
@@ -19,6 +21,13 @@ Time rosTime(TimePoint time);
 Header headerOf(TimePoint time, const std::string& frame);
 Point pointOf(const Eigen::Vector3d& p);
 Pose poseOf(const RigidTransform& T);
+/// Variance of unknown values; ROS filters ignore such values.
+inline constexpr double kUnknownVariance = 1e6;
+using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
+std::array<double, 36> numbersOf(const Matrix6& matrix);
+/// Pose covariance from an object's centre and yaw about the vertical, rotated by R.
+std::array<double, 36> poseCovarianceOf(const ClassBelief& belief, const Eigen::Vector3d& up,
+                                        const Eigen::Matrix3d& R = Eigen::Matrix3d::Identity());
 /// T_parent_child.
 TransformStamped transformOf(TimePoint time, const std::string& parent, const std::string& child,
                              const RigidTransform& T);

@@ -23,9 +23,8 @@ Outlet Mirror::outletOf(const std::string& topic, bool latched) const {
   return {topic, M::kType, latched, definitionOf<M>()};
 }
 
-template <class Make>
-void Mirror::say(const std::string& topic, Make make, bool latched) {
-  using M = std::invoke_result_t<Make>;
+void Mirror::say(const std::string& topic, auto make, bool latched) {
+  using M = decltype(make());
   auto known = outlets_.find(topic);
   if (known == outlets_.end()) known = outlets_.emplace(topic, outletOf<M>(topic, latched)).first;
   if (latched || !wanted_ || wanted_(known->second)) out_(known->second, cdrOf(make()));

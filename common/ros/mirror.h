@@ -62,8 +62,7 @@ class Mirror {
 
  private:
   /// `make()` creates the message; it is called only if a reader exists.
-  template <class Make>
-  void say(const std::string& topic, Make make, bool latched = false);
+  void say(const std::string& topic, auto make, bool latched = false);
   template <class M>
   Outlet outletOf(const std::string& topic, bool latched = false) const;
   void sayInfo(const CameraCalibration& camera, TimePoint time);

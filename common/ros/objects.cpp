@@ -13,23 +13,7 @@
 namespace perdure::ros {
 namespace {
 
-using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
-constexpr double kUnknownVariance = 1e6;  ///< ROS filters ignore such values
 constexpr double kLeastScore = 0.01;
-
-std::array<double, 36> numbersOf(const Matrix6& matrix) {
-  std::array<double, 36> numbers{};
-  std::copy_n(matrix.data(), numbers.size(), numbers.begin());
-  return numbers;
-}
-
-/// Pose covariance from centre and yaw. The rotation vector is yaw · up.
-Matrix6 poseCovarianceOf(const ClassBelief& belief, const Eigen::Vector3d& up) {
-  Eigen::Matrix<double, 6, 4> J = Eigen::Matrix<double, 6, 4>::Zero();
-  J.topLeftCorner<3, 3>().setIdentity();
-  J.block<3, 1>(3, 3) = up;
-  return J * belief.covariance.topLeftCorner<4, 4>() * J.transpose();
-}
 
 ObjectBelief withBest(const ObjectBelief& object, const ClassBelief& belief) {
   ObjectBelief one;
@@ -48,7 +32,7 @@ Detection3D detectionOf(const ObjectBelief& object, const Objects& all, const He
     ObjectHypothesisWithPose result;
     result.hypothesis = {belief.name, object.existence * belief.probability};
     result.pose.pose = poseOf(cuboidOf(withBest(object, belief), all.up_W).T_WO);
-    result.pose.covariance = numbersOf(poseCovarianceOf(belief, all.up_W));
+    result.pose.covariance = poseCovarianceOf(belief, all.up_W);
     detection.results.push_back(std::move(result));
   }
   return detection;

@@ -139,9 +139,8 @@ void Context::countReasons(std::function<void(ReasonCounts&)> source) {
 }
 
 void Context::countReasons(std::function<const ReasonCounts&()> source) {
-  reason_sources_.push_back([source = std::move(source)](ReasonCounts& counts) {
-    for (const auto& [reason, n] : source().all()) counts.add(reason, n);
-  });
+  reason_sources_.push_back(
+      [source = std::move(source)](ReasonCounts& counts) { counts.add(source()); });
 }
 
 void Context::run() {

@@ -71,26 +71,22 @@ class ObjectReader {
   }
   std::string text(const char* key) const {
     const Json& value = member(json_, key);
-    if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
-      refuse(where_, std::string(key) + " is not a name");
-    }
-    return value.get<std::string>();
+    if (!value.is_string() || value == "") refuse(where_, std::string(key) + " is not a name");
+    return value;
   }
   bool boolean(const char* key) const {
     const Json& value = member(json_, key);
     if (!value.is_boolean()) refuse(where_, std::string(key) + " is neither true nor false");
-    return value.get<bool>();
+    return value;
   }
   Eigen::Vector3d vector(const Json& parent, const char* key) const {
     const Json& value = member(parent, key);
-    Eigen::Vector3d v;
-    if (!value.is_array() || value.size() != 3)
+    const auto isNumber = [](const Json& one) { return one.is_number(); };
+    if (!value.is_array() || value.size() != 3 ||
+        !std::all_of(value.begin(), value.end(), isNumber)) {
       refuse(where_, std::string(key) + " has not 3 numbers");
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (!value[i].is_number()) refuse(where_, std::string(key) + " has not 3 numbers");
-      v[static_cast<Eigen::Index>(i)] = value[i].get<double>();
     }
-    return v;
+    return Eigen::Vector3d(value[0].get<double>(), value[1].get<double>(), value[2].get<double>());
   }
   std::vector<TruthKey> keys() const {
     const Json& list = member(json_, "keys");

@@ -56,8 +56,7 @@ inline constexpr double kUnitTolerance = 1e-3;
 template <class D, class T>
 concept Is = std::same_as<std::remove_cv_t<D>, T>;
 
-template <class A, Is<FrameStamp> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<FrameStamp> auto& d, auto& w) {
   a.value("source", d.source, w.source);
   a.value("sequence", d.sequence, w.seq);
   a.time("time_ns", d.time, w.time_ns);
@@ -65,8 +64,7 @@ void describe(A& a, D& d, W& w) {
   a.ensure("captured_ns", "out_of_range", [&] { return isTime(d.captured_ns); });
 }
 
-template <class A, Is<WorldId> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<WorldId> auto& d, auto& w) {
   a.value("world", d.world, w.world);
   a.value("epoch", d.epoch, w.epoch);
 }

@@ -14,19 +14,9 @@ double intersectionOverUnion(const Box& a, const Box& b) {
 }
 
 const char* nameOf(SwapStep step) {
-  switch (step) {
-    case SwapStep::kRehearsing:
-      return "rehearsing";
-    case SwapStep::kTookOver:
-      return "took_over";
-    case SwapStep::kPassed:
-      return "passed";
-    case SwapStep::kRolledBack:
-      return "rolled_back";
-    case SwapStep::kRetired:
-      return "retired";
-  }
-  failCheck("a step of a swap is one of those declared", std::source_location::current());
+  static constexpr std::array kNames{"rehearsing", "took_over", "passed", "rolled_back", "retired"};
+  static_assert(kNames.size() == static_cast<std::size_t>(SwapStep::kRetired) + 1);
+  return nameAt(kNames, step);
 }
 
 }  // namespace perdure

@@ -104,8 +104,7 @@ struct SwapNotice {
 
 namespace perdure::wire {
 
-template <class A, class D, class W>
-void describeBox(A& a, D& d, W& w) {
+void describeBox(auto& a, auto& d, auto& w) {
   a.number("x1", d.x1, w[0], kPixel);
   a.number("y1", d.y1, w[1], kPixel);
   a.number("x2", d.x2, w[2], kPixel);
@@ -113,8 +112,7 @@ void describeBox(A& a, D& d, W& w) {
   a.ensure("box", "out_of_range", [&] { return d.x1 < d.x2 && d.y1 < d.y2; });
 }
 
-template <class A, Is<Detection> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<Detection> auto& d, auto& w) {
   describeBox(a, d.box, w.corners);
   a.numbers("activations", d.activations, w.activations, kLogit, kClasses + 1);
   a.optionalNumber("azimuth", d.azimuth, w.has_azimuth, w.azimuth, kAngle);
@@ -128,8 +126,7 @@ void describe(A& a, D& d, W& w) {
   a.value("primed_for", d.primed_for, w.primed_for);
 }
 
-template <class A, Is<Detections> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<Detections> auto& d, auto& w) {
   a.object("stamp", d.stamp, w.stamp);
   a.name("camera", d.camera, w.camera);
   a.value("instance", d.instance, w.source);
@@ -139,8 +136,7 @@ void describe(A& a, D& d, W& w) {
   a.number("forward_s", d.forward_s, w.forward_s, kNotNegative);
 }
 
-template <class A, Is<ModelInfo> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<ModelInfo> auto& d, auto& w) {
   a.value("hash", d.hash, w.model_hash);
   a.value("instance", d.instance, w.source);
   a.text("name", d.name, w.name, kTextLength);
@@ -156,8 +152,7 @@ void describe(A& a, D& d, W& w) {
   a.choice("boxes", d.boxes, w.boxes, BoxExtent::kOutline);
 }
 
-template <class A, Is<SwapNotice> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<SwapNotice> auto& d, auto& w) {
   a.value("instance", d.instance, w.source);
   a.value("about", d.about, w.about);
   a.choice("step", d.step, w.step, SwapStep::kRetired);

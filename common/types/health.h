@@ -29,8 +29,7 @@ struct Health {
 
 namespace perdure::wire {
 
-template <class A, Is<Health> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<Health> auto& d, auto& w) {
   a.name("process", d.process, w.process);
   a.value("instance", d.instance, w.source);
   a.value("pid", d.pid, w.pid);

@@ -1,6 +1,7 @@
 #include "common/types/ledger.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "common/base/check.h"
@@ -8,61 +9,18 @@
 namespace perdure {
 
 const char* nameOf(ExistenceEvidence kind) {
-  switch (kind) {
-    case ExistenceEvidence::kPrior:
-      return "prior";
-    case ExistenceEvidence::kHit:
-      return "hit";
-    case ExistenceEvidence::kRepeated:
-      return "repeated";
-    case ExistenceEvidence::kMiss:
-      return "miss";
-    case ExistenceEvidence::kUnmappedOccluder:
-      return "screened";
-    case ExistenceEvidence::kHidden:
-      return "hidden";
-    case ExistenceEvidence::kAway:
-      return "away";
-    case ExistenceEvidence::kTime:
-      return "time";
-    case ExistenceEvidence::kMisshapen:
-      return "misshapen";
-    case ExistenceEvidence::kLost:
-      return "lost";
-    case ExistenceEvidence::kShared:
-      return "shared";
-    case ExistenceEvidence::kMerge:
-      return "merge";
-    case ExistenceEvidence::kRestore:
-      return "restore";
-    case ExistenceEvidence::kRecall:
-      return "recall";
-  }
-  failCheck("evidence of existence is one of those declared", std::source_location::current());
+  static constexpr std::array kNames{"prior",  "hit",   "repeated", "miss",      "screened",
+                                     "hidden", "away",  "time",     "misshapen", "lost",
+                                     "shared", "merge", "restore",  "recall"};
+  static_assert(kNames.size() == kExistenceEvidences);
+  return nameAt(kNames, kind);
 }
 
 const char* nameOf(ClassEvidence kind) {
-  switch (kind) {
-    case ClassEvidence::kPrior:
-      return "prior";
-    case ClassEvidence::kActivation:
-      return "activation";
-    case ClassEvidence::kGeometry:
-      return "geometry";
-    case ClassEvidence::kMiss:
-      return "miss";
-    case ClassEvidence::kMotion:
-      return "motion";
-    case ClassEvidence::kPruning:
-      return "pruning";
-    case ClassEvidence::kMerge:
-      return "merge";
-    case ClassEvidence::kRestore:
-      return "restore";
-    case ClassEvidence::kContext:
-      return "context";
-  }
-  failCheck("evidence of a class is one of those declared", std::source_location::current());
+  static constexpr std::array kNames{"prior",   "activation", "geometry", "miss",   "motion",
+                                     "pruning", "merge",      "restore",  "context"};
+  static_assert(kNames.size() == kClassEvidences);
+  return nameAt(kNames, kind);
 }
 
 double Ledger::logOdds() const {

@@ -95,8 +95,7 @@ double logOdds(double probability);
 
 namespace perdure::wire {
 
-template <class A, Is<LedgerEntry> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<LedgerEntry> auto& d, auto& w) {
   a.number("log_odds", d.log_odds, w.log_odds, kNats);
   a.value("count", d.count, w.count);
   a.time("first_ns", d.first, w.first_ns);
@@ -104,22 +103,19 @@ void describe(A& a, D& d, W& w) {
   a.ensure("last_ns", "out_of_range", [&] { return d.first <= d.last; });
 }
 
-template <class A, Is<ClassLedger> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<ClassLedger> auto& d, auto& w) {
   a.name("name", d.name, w.name);
   a.numbers("log_odds", d.log_odds, w.log_odds, kNats, kEvidenceKinds);
 }
 
-template <class A, Is<OustedClass> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<OustedClass> auto& d, auto& w) {
   a.name("name", d.name, w.name);
   a.name("by", d.by, w.by);
   a.time("at_ns", d.at, w.at_ns);
   a.numbers("log_odds", d.log_odds, w.log_odds, kNats, kEvidenceKinds);
 }
 
-template <class A, Is<Ledger> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<Ledger> auto& d, auto& w) {
   a.list("existence", d.existence, w.why_existence, kEvidenceKinds);
   a.list("classes", d.classes, w.why_classes, kClasses + 1);
   a.list("ousted", d.ousted, w.why_ousted, 1);

@@ -186,8 +186,7 @@ struct MapNear {
 
 namespace perdure::wire {
 
-template <class A, Is<MapObject> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<MapObject> auto& d, auto& w) {
   a.value("id", d.id, w.object_id);
   a.ensure("id", "out_of_range", [&] { return d.id != 0; });
   a.object("world", d.world, w.reference);
@@ -204,8 +203,7 @@ void describe(A& a, D& d, W& w) {
   a.value("provisional", d.provisional, w.provisional);
 }
 
-template <class A, Is<MapTile> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<MapTile> auto& d, auto& w) {
   a.value("x", d.x, w.x);
   a.value("y", d.y, w.y);
   a.value("part", d.part, w.part);
@@ -215,8 +213,7 @@ void describe(A& a, D& d, W& w) {
   a.list("objects", d.objects, w.items, kMapTileCapacity);
 }
 
-template <class A, Is<MapHeader> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<MapHeader> auto& d, auto& w) {
   a.value("instance", d.instance, w.source);
   a.value("revision", d.revision, w.revision);
   a.number("tile_size_m", d.tile_size_m, w.tile_size_m, kPositive);
@@ -224,8 +221,7 @@ void describe(A& a, D& d, W& w) {
   a.value("objects", d.objects, w.object_count);
 }
 
-template <class A, Is<MapFrame> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<MapFrame> auto& d, auto& w) {
   a.object("stamp", d.stamp, w.stamp);
   a.value("instance", d.instance, w.source);
   a.object("world", d.world, w.reference);
@@ -238,15 +234,13 @@ void describe(A& a, D& d, W& w) {
   a.value("anchors", d.anchors, w.anchor_count);
 }
 
-template <class A, Is<Member> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<Member> auto& d, auto& w) {
   a.value("track", d.track, w.track);
   a.value("object", d.object, w.object);
   a.ensure("object", "out_of_range", [&] { return d.track != 0 && d.object != 0; });
 }
 
-template <class A, Is<MapNear> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<MapNear> auto& d, auto& w) {
   a.object("stamp", d.stamp, w.stamp);
   a.value("instance", d.instance, w.source);
   a.value("client", d.client, w.client);
@@ -261,8 +255,7 @@ void describe(A& a, D& d, W& w) {
   a.list("as_published", d.as_published, w.as_published, kObjects);
 }
 
-template <class A, Is<MapQuery> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<MapQuery> auto& d, auto& w) {
   a.value("client", d.client, w.client);
   a.value("request", d.request, w.request);
   a.choice("kind", d.kind, w.kind, MapQueryKind::kGraph);
@@ -275,8 +268,7 @@ void describe(A& a, D& d, W& w) {
   a.value("limit", d.limit, w.limit);
 }
 
-template <class A, Is<MapAnchor> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<MapAnchor> auto& d, auto& w) {
   a.value("id", d.id, w.anchor_id);
   a.ensure("id", "out_of_range", [&] { return d.id != 0; });
   a.value("previous", d.previous, w.previous);
@@ -288,14 +280,12 @@ void describe(A& a, D& d, W& w) {
   a.value("objects", d.objects, w.object_count);
 }
 
-template <class A, Is<MapLoopPair> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<MapLoopPair> auto& d, auto& w) {
   a.value("known", d.known, w.known);
   a.value("seen", d.seen, w.seen);
 }
 
-template <class A, Is<MapLoop> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<MapLoop> auto& d, auto& w) {
   a.value("id", d.id, w.loop_id);
   a.value("a", d.a, w.a);
   a.value("b", d.b, w.b);
@@ -310,8 +300,7 @@ void describe(A& a, D& d, W& w) {
   a.value("landmarks", d.landmarks, w.landmark_count);
 }
 
-template <class A, Is<MapReply> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<MapReply> auto& d, auto& w) {
   a.value("client", d.client, w.client);
   a.value("request", d.request, w.request);
   a.value("instance", d.instance, w.source);

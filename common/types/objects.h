@@ -161,8 +161,7 @@ struct Predictions {
 
 namespace perdure::wire {
 
-template <class A, Is<ClassBelief> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<ClassBelief> auto& d, auto& w) {
   a.name("name", d.name, w.name);
   a.probability("probability", d.probability, w.probability);
   a.matrix("mean", d.mean, w.mean, kCoordinate);
@@ -178,8 +177,7 @@ bool sumsToOne(const D& classes) {
   return !classes.empty() && sum > 1 - kUnitTolerance && sum < 1 + kUnitTolerance;
 }
 
-template <class A, Is<ObjectBelief> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<ObjectBelief> auto& d, auto& w) {
   a.value("id", d.id, w.object_id);
   a.ensure("id", "out_of_range", [&] { return d.id != 0; });
   a.probability("existence", d.existence, w.existence);
@@ -202,16 +200,14 @@ void describe(A& a, D& d, W& w) {
   a.value("track", d.track, w.track);
 }
 
-template <class A, Is<EndedTrack> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<EndedTrack> auto& d, auto& w) {
   a.value("track", d.track, w.track);
   a.value("into", d.into, w.into);
   a.time("time_ns", d.time, w.time_ns);
   a.ensure("track", "out_of_range", [&] { return d.track != 0 && d.track != d.into; });
 }
 
-template <class A, Is<Objects> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<Objects> auto& d, auto& w) {
   a.object("stamp", d.stamp, w.stamp);
   a.value("instance", d.instance, w.source);
   a.object("world", d.world, w.reference);
@@ -226,8 +222,7 @@ void describe(A& a, D& d, W& w) {
   a.list("ended", d.ended, w.ended, kMostEnded);
 }
 
-template <class A, Is<ObjectState> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<ObjectState> auto& d, auto& w) {
   a.object("stamp", d.stamp, w.stamp);
   a.value("instance", d.instance, w.source);
   a.object("world", d.world, w.reference);
@@ -236,8 +231,7 @@ void describe(A& a, D& d, W& w) {
   a.ensureWire("id", "size_mismatch", [&] { return w.object_id == w.belief.object_id; });
 }
 
-template <class A, Is<Event> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<Event> auto& d, auto& w) {
   a.object("stamp", d.stamp, w.stamp);
   a.value("instance", d.instance, w.source);
   a.object("world", d.world, w.reference);
@@ -252,8 +246,7 @@ void describe(A& a, D& d, W& w) {
   a.number("returns_latest", d.returns_in_s[2], w.returns_in[2], kNotNegative);
 }
 
-template <class A, Is<Prediction> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<Prediction> auto& d, auto& w) {
   a.value("object_id", d.object_id, w.object_id);
   a.text("class_name", d.class_name, w.class_name, kNameLength);
   describeBox(a, d.box, w.corners);
@@ -268,8 +261,7 @@ void describe(A& a, D& d, W& w) {
   a.number("sigma_y2", d.side_sigma[3], w.side_sigma[3], kNotNegative);
 }
 
-template <class A, Is<Predictions> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<Predictions> auto& d, auto& w) {
   a.object("stamp", d.stamp, w.stamp);
   a.value("instance", d.instance, w.source);
   a.text("camera", d.camera, w.camera, kNameLength);

@@ -64,8 +64,7 @@ struct Landmarks {
 
 namespace perdure::wire {
 
-template <class A, Is<Odometry> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<Odometry> auto& d, auto& w) {
   a.object("stamp", d.stamp, w.stamp);
   a.value("instance", d.instance, w.source);
   a.object("world", d.world, w.reference);
@@ -82,8 +81,7 @@ void describe(A& a, D& d, W& w) {
   a.symmetric("increment_covariance", d.increment_covariance, w.increment_covariance);
 }
 
-template <class A, Is<Landmark> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<Landmark> auto& d, auto& w) {
   a.value("id", d.id, w.landmark_id);
   a.matrix("p_W", d.p_W, w.p_W, kCoordinate);
   a.symmetric("covariance", d.covariance, w.covariance);
@@ -92,8 +90,7 @@ void describe(A& a, D& d, W& w) {
   a.bytes("descriptor", d.descriptor, w.descriptor);
 }
 
-template <class A, Is<Landmarks> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<Landmarks> auto& d, auto& w) {
   a.object("stamp", d.stamp, w.stamp);
   a.value("instance", d.instance, w.source);
   a.object("world", d.world, w.reference);

@@ -109,8 +109,7 @@ struct Calibration {
 
 namespace perdure::wire {
 
-template <class A, Is<Frame> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<Frame> auto& d, auto& w) {
   a.object("stamp", d.stamp, w.stamp);
   a.name("camera", d.camera, w.camera);
   a.value("width", d.width, w.width);
@@ -121,8 +120,7 @@ void describe(A& a, D& d, W& w) {
   a.pixels("pixels", d, w);
 }
 
-template <class A, Is<ImuSample> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<ImuSample> auto& d, auto& w) {
   a.value("source", d.source, w.source);
   a.value("sequence", d.sequence, w.seq);
   a.time("time_ns", d.time, w.time_ns);
@@ -130,8 +128,7 @@ void describe(A& a, D& d, W& w) {
   a.matrix("accel", d.accel, w.accel, kAcceleration);
 }
 
-template <class A, Is<SpeedSample> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<SpeedSample> auto& d, auto& w) {
   a.value("source", d.source, w.source);
   a.value("sequence", d.sequence, w.seq);
   a.time("time_ns", d.time, w.time_ns);
@@ -139,8 +136,7 @@ void describe(A& a, D& d, W& w) {
   a.number("sigma", d.sigma, w.sigma, kPositive);
 }
 
-template <class A, Is<CameraCalibration> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<CameraCalibration> auto& d, auto& w) {
   a.name("name", d.name, w.name);
   a.value("width", d.width, w.width);
   a.value("height", d.height, w.height);
@@ -163,8 +159,7 @@ void describe(A& a, D& d, W& w) {
   a.number("rate_hz", d.rate_hz, w.rate_hz, kNotNegative);
 }
 
-template <class A, Is<ImuCalibration> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<ImuCalibration> auto& d, auto& w) {
   a.number("gyro_noise", d.gyro_noise, w.gyro_noise, kNotNegative);
   a.number("gyro_bias_walk", d.gyro_bias_walk, w.gyro_bias_walk, kNotNegative);
   a.number("accel_noise", d.accel_noise, w.accel_noise, kNotNegative);
@@ -172,8 +167,7 @@ void describe(A& a, D& d, W& w) {
   a.number("rate_hz", d.rate_hz, w.rate_hz, kNotNegative);
 }
 
-template <class A, Is<GeoAnchor> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<GeoAnchor> auto& d, auto& w) {
   a.time("time_ns", d.time, w.time_ns);
   a.number("latitude_deg", d.latitude_deg, w.latitude_deg, kLatitudeDeg);
   a.number("longitude_deg", d.longitude_deg, w.longitude_deg, kLongitudeDeg);
@@ -181,8 +175,7 @@ void describe(A& a, D& d, W& w) {
   a.number("yaw", d.yaw, w.yaw, kAngle);
 }
 
-template <class A, Is<Calibration> D, class W>
-void describe(A& a, D& d, W& w) {
+void describe(auto& a, Is<Calibration> auto& d, auto& w) {
   a.value("source", d.source, w.source);
   a.list("cameras", d.cameras, w.cameras, kCameras);
   a.optional("imu", d.imu, w.has_imu, w.imu);

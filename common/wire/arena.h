@@ -2,8 +2,8 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
-#include <vector>
+#include <cstring>
+#include <memory_resource>
 
 namespace perdure::wire {
 
@@ -13,19 +13,15 @@ class Arena {
   template <class T>
   T* allocate(std::size_t count) {
     static_assert(std::is_trivially_copyable_v<T>);
-    return static_cast<T*>(allocateBytes(count * sizeof(T)));
+    void* const place = memory_.allocate(count * sizeof(T), alignof(std::max_align_t));
+    std::memset(place, 0, count * sizeof(T));
+    return static_cast<T*>(place);
   }
-  void clear();
+  void clear() { memory_.release(); }
 
  private:
-  struct Block {
-    std::unique_ptr<std::byte[]> bytes;
-    std::size_t size = 0;
-  };
-  void* allocateBytes(std::size_t size);
-
-  std::vector<Block> blocks_;
-  std::size_t block_ = 0, used_ = 0;
+  std::pmr::unsynchronized_pool_resource blocks_;  ///< keeps released blocks
+  std::pmr::monotonic_buffer_resource memory_{64 << 10, &blocks_};
 };
 
 }  // namespace perdure::wire

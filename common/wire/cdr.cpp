@@ -87,4 +87,12 @@ std::span<const std::uint8_t> payloadInPlace(std::span<const std::uint8_t> messa
   return plain ? message.subspan(kHeader) : std::span<const std::uint8_t>();
 }
 
+const dds_topic_descriptor_t* plainTwinOf(const std::string& type_name) {
+  const dds_topic_descriptor_t* found = nullptr;
+  forEachTopic([&](const auto& row) {
+    if (row.descriptor().m_typename == type_name) found = row.twin();
+  });
+  return found;
+}
+
 }  // namespace perdure::wire

@@ -68,4 +68,8 @@ Result<std::vector<std::uint8_t>> encodeCdr(const T& value) {
 /// #include. The result is empty if the type is unknown.
 std::string idlOf(std::string_view type_name);
 
+/// The variant of a type such as "perdure::msg::Objects" in which every struct is final, with the
+/// same memory layout. Returns nullptr if the type itself is final, or unknown.
+const dds_topic_descriptor_t* plainTwinOf(const std::string& type_name);
+
 }  // namespace perdure::wire

@@ -14,7 +14,7 @@
 namespace perdure::wire {
 
 /// Fills `wire`, which refers to texts and pixels of `value` and to sequences in `arena`. It is
-/// valid as long as both exist unchanged.
+/// valid as long as both exist unchanged. If a field is refused, the key's fields are still set.
 template <class T>
 Result<void> encode(const T& value, typename Type<T>::Wire& wire, Arena& arena);
 
@@ -30,10 +30,6 @@ template <class T>
 inline constexpr bool kDecodedInPlace = false;
 template <>
 inline constexpr bool kDecodedInPlace<Frame> = true;
-
-/// Encodes without checks, for a dispose, which reads the key's fields only.
-template <class T>
-void encodeKey(const T& value, typename Type<T>::Wire& wire, Arena& arena);
 
 /// Decodes a dispose: a value in which only the key's fields are defined.
 template <class T>

@@ -116,8 +116,9 @@ Bytes recording(bool finished) {
 
 template <class T>
 void putChannel(Bytes& file, std::uint16_t id, const std::string& topic) {
-  replay::mcap::putSchema(file, {id, wire::Type<T>::descriptor().m_typename, "omgidl", ""});
-  replay::mcap::putChannel(file, {id, id, topic, "cdr", {}});
+  replay::mcap::putRecord(
+      file, replay::mcap::Schema{id, wire::Type<T>::descriptor().m_typename, "omgidl", ""});
+  replay::mcap::putRecord(file, replay::mcap::Channel{id, id, topic, "cdr", {}});
 }
 template <class T>
 void putAlone(Bytes& file, std::uint16_t channel, const T& message, std::uint64_t log_ns) {
@@ -170,12 +171,12 @@ Bytes packedByOthers(const std::string& compression) {
   }
   Bytes file(replay::mcap::kMagic.begin(), replay::mcap::kMagic.end()), chunk;
   replay::mcap::Put put(chunk);
-  put.number(std::uint64_t{1000});
-  put.number(std::uint64_t{1003});
-  put.number(std::uint64_t{content.size()});
-  put.number(std::uint32_t{0});
-  put.text(compression);
-  put.number(std::uint64_t{packed.size()});
+  put(std::uint64_t{1000});
+  put(std::uint64_t{1003});
+  put(std::uint64_t{content.size()});
+  put(std::uint32_t{0});
+  put(compression);
+  put(std::uint64_t{packed.size()});
   put.bytes(packed);
   replay::mcap::Put(file).record(replay::mcap::Op::kChunk, chunk);
   return file;
@@ -238,8 +239,10 @@ std::vector<Bytes> recordSeeds() {
     replay::mcap::Put(records).record(op, content);
   };
   Bytes schema, channel;
-  replay::mcap::putSchema(schema, {1, "perdure::msg::Imu", "omgidl", "struct Imu {};"});
-  replay::mcap::putChannel(channel, {1, 1, "perdure/ego/imu", "cdr", {{"key", "value"}}});
+  replay::mcap::putRecord(schema,
+                          replay::mcap::Schema{1, "perdure::msg::Imu", "omgidl", "struct Imu {};"});
+  replay::mcap::putRecord(
+      channel, replay::mcap::Channel{1, 1, "perdure/ego/imu", "cdr", {{"key", "value"}}});
   put(replay::mcap::Op::kSchema, schema);
   put(replay::mcap::Op::kChannel, channel);
   return {records};

@@ -64,7 +64,7 @@ class Import {
       if (file.has(name)) takeCamera(file.section(name), path.string() + ": " + name);
     }
     if (file.has("imu0")) takeImu(file.section("imu0"), path.string() + ": imu0");
-    for (const std::string& sentence : file.unknownKeys()) result_.ignored.push_back(sentence);
+    file.noteUnknownKeys(result_.ignored);
   }
 
   void takeCamera(const SensorFile& file, const std::string& from) {
@@ -108,7 +108,7 @@ class Import {
   }
 
   void noteKeys(const SensorFile& file) {
-    for (const std::string& sentence : file.unknownKeys()) result_.ignored.push_back(sentence);
+    file.noteUnknownKeys(result_.ignored);
   }
 
   std::vector<RigidTransform> places_;

@@ -13,7 +13,6 @@
 #include "common/replay/recordings/recorded_messages.h"
 #include "common/replay/recordings/recording_writer.h"
 #include "common/replay/recordings/ros_messages.h"
-#include "common/wire/plain_twin.h"
 #include "tools/record/repair.h"
 #include "tools/record/ros_export.h"
 

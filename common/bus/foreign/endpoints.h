@@ -24,32 +24,26 @@ struct ForeignTopic {
 };
 
 /// Readers and writers ignore their own participant, so that mirrored messages do not return.
-class ForeignReader : public Endpoint {
+class ForeignReader : public AnyReader {
  public:
   /// `cdr` includes its header of four bytes. It stays valid as long as it has an owner.
   using Handler = std::function<void(const SharedBytes& cdr)>;
 
   ForeignReader(const Participant& participant, const ForeignTopic& topic);
 
-  std::size_t matched() const;
   /// Passes at most one batch to the handler, in order. Returns true if more messages may be
   /// available.
   bool drainBatch(const Handler& handler);
-  /// Adds <count>_incompatible_qos, _sample_lost.
-  void report(ReasonCounts& counts) const;
 };
 
-class ForeignWriter : public Endpoint {
+class ForeignWriter : public AnyWriter {
  public:
   ForeignWriter(const Participant& participant, const ForeignTopic& topic);
   ~ForeignWriter();
 
-  std::size_t matched() const;
   /// `cdr` includes its header. Messages that cannot be written are counted, and the reason is
   /// returned.
   Result<void> write(std::vector<std::uint8_t> cdr);
-  /// Adds <count>_write_<error>, _incompatible_qos.
-  void report(ReasonCounts& counts) const;
 
  private:
   ddsi_sertype* type_;

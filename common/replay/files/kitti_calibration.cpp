@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/base/errors.h"
+#include "common/math/so3.h"
 #include "common/replay/files/text_file.h"
 
 namespace perdure::replay {
@@ -73,9 +74,7 @@ class Entries {
     return Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(get(names, 12).data());
   }
   Eigen::Matrix3d checked(const std::vector<std::string>& names, const Eigen::Matrix3d& R) const {
-    constexpr double kTolerance = 1e-2;
-    const double error = (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-    if (!(error <= kTolerance) || R.determinant() < 0.0) wrong(names.front(), "is no rotation");
+    if (!isRotation(R)) wrong(names.front(), "is no rotation");
     return R;
   }
   [[noreturn]] void wrong(const std::string& name, const std::string& what) const {

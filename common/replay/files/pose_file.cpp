@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/base/errors.h"
+#include "common/math/so3.h"
 #include "common/replay/files/pose_columns.h"
 #include "common/replay/files/stamps.h"
 #include "common/replay/files/text_file.h"
@@ -90,23 +91,16 @@ void addKitti(const TextLine& line, const std::vector<std::string_view>& fields,
                      "write 12 or 16 finite numbers, row by row, with decimal points; where a "
                      "frame's pose is not known, give lines t x y z qx qy qz qw of the others");
   }
-  Eigen::Matrix3d R;
-  Eigen::Vector3d p;
-  for (std::size_t row = 0; row < 3; ++row) {
-    const auto i = static_cast<Eigen::Index>(row);
-    for (std::size_t col = 0; col < 3; ++col) {
-      R(i, static_cast<Eigen::Index>(col)) = (*v)[row * 4 + col];
-    }
-    p(i) = (*v)[row * 4 + 3];
-  }
-  const double error = (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (!(error <= kUnitTolerance) || R.determinant() < 0) {
+  using RowMajor = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
+  const RowMajor T = Eigen::Map<const RowMajor>(v->data());
+  const Eigen::Matrix3d R = T.leftCols<3>();
+  if (!isRotation(R)) {
     return wrong.add(line.number, "the rotation is not orthonormal and right-handed");
   }
   if (v->size() == 16 && ((*v)[12] != 0 || (*v)[13] != 0 || (*v)[14] != 0 || (*v)[15] != 1)) {
     return wrong.add(line.number, "the last row of a 4x4 pose is 0 0 0 1");
   }
-  poses.push_back({TimePoint{}, RigidTransform(R, p)});
+  poses.push_back({TimePoint{}, RigidTransform(R, T.col(3))});
 }
 
 }  // namespace

@@ -26,12 +26,6 @@ std::string indented(const std::string& text) {
   return result;
 }
 
-void addNotes(const SensorFile& file, std::vector<std::string>* notes) {
-  if (!notes) return;
-  const auto keys = file.unknownKeys();
-  notes->insert(notes->end(), keys.begin(), keys.end());
-}
-
 SensorFile opened(const std::filesystem::path& path) {
   if (!std::filesystem::is_regular_file(path)) {
     throw StartupError(
@@ -57,14 +51,14 @@ RigParts readRigParts(const std::filesystem::path& path, std::vector<std::string
         rig.cameras.empty() ? std::nullopt : placeInChain(section, rig.cameras.back());
     rig.cameras.push_back(readCamera(section, name, in_chain));
     takeTopic(section, name);
-    addNotes(section, notes);
+    if (notes) section.noteUnknownKeys(*notes);
   }
   if (file.has("imu0")) {
     const SensorFile imu = file.section("imu0");
     rig.imu = readImuCalibration(imu);
     takeTopic(imu, "imu");
     for (auto& camera : rig.cameras) camera.T_BC = imu.T_BS().inverse() * camera.T_BC;
-    addNotes(imu, notes);
+    if (notes) imu.noteUnknownKeys(*notes);
   }
   return parts;
 }

@@ -2,27 +2,19 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
 #include <cmath>
 #include <fstream>
 
 #include "common/base/errors.h"
+#include "common/math/so3.h"
 #include "common/replay/files/text_file.h"
 
 namespace perdure::replay {
 namespace {
 
 const char* nameOf(DistortionModel model) {
-  switch (model) {
-    case DistortionModel::kNone:
-      return "none";
-    case DistortionModel::kRadialTangential:
-    case DistortionModel::kRational:
-      return "radial-tangential";
-    case DistortionModel::kEquidistant:
-      return "equidistant";
-  }
-  return "none";
+  if (model == DistortionModel::kNone) return "none";
+  return model == DistortionModel::kEquidistant ? "equidistant" : "radial-tangential";
 }
 
 }  // namespace
@@ -117,10 +109,7 @@ std::optional<RigidTransform> SensorFile::transform(const char* key) const {
   const auto v = numbers(key, 16);
   const Eigen::Matrix4d m = Eigen::Map<const RowMajor>(v.data());
   const Eigen::Matrix3d R = m.topLeftCorner<3, 3>();
-  const double error = (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (!(error <= 1e-2) || R.determinant() < 0.0) {
-    wrong(key, "is not a rotation and a translation");
-  }
+  if (!isRotation(R)) wrong(key, "is not a rotation and a translation");
   return RigidTransform(R, Eigen::Vector3d(m.topRightCorner<3, 1>()));
 }
 
@@ -129,7 +118,7 @@ void SensorFile::wrong(const std::string& key, const std::string& what) const {
                      name_ + ": " + key + " " + what + "; compare it with a sensor.yaml of EuRoC");
 }
 
-std::vector<std::string> SensorFile::unknownKeys() const {
+void SensorFile::noteUnknownKeys(std::vector<std::string>& notes) const {
   // Keys of EuRoC, Kalibr and ROS that are not used here.
   static const std::set<std::string> kOfNoUse{"sensor_type",
                                               "comment",
@@ -149,13 +138,11 @@ std::vector<std::string> SensorFile::unknownKeys() const {
                                               "cam0",
                                               "cam1",
                                               "imu0"};
-  std::vector<std::string> sentences;
   for (const auto& entry : root_) {
     const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : std::string();
     if (key.empty() || asked_.contains(key) || kOfNoUse.contains(key)) continue;
-    sentences.push_back(name_ + ": the key `" + key + "` is not known and has no effect");
+    notes.push_back(name_ + ": the key `" + key + "` is not known and has no effect");
   }
-  return sentences;
 }
 
 std::string cameraKeys(const CameraCalibration& camera) {

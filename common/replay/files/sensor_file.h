@@ -38,8 +38,8 @@ class SensorFile {
   /// The pose of the sensor in the body; the identity if the file does not contain it.
   RigidTransform T_BS() const { return transform("T_BS").value_or(RigidTransform()); }
   [[noreturn]] void wrong(const std::string& key, const std::string& what) const;
-  /// A sentence for each key that was not read and is not known as irrelevant.
-  std::vector<std::string> unknownKeys() const;
+  /// Adds a sentence for each key that was not read and is not known as irrelevant.
+  void noteUnknownKeys(std::vector<std::string>& notes) const;
 
  private:
   SensorFile(std::string name, YAML::Node root) : name_(std::move(name)), root_(std::move(root)) {

@@ -7,9 +7,9 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/result.h"
 #include "common/base/time.h"
 #include "common/replay/files/text_file.h"
+#include "common/replay/recording.h"
 
 namespace perdure::replay {
 
@@ -24,11 +24,13 @@ class SensorTable {
   /// Returns the reason why a row cannot be used; "" if it can.
   using Judge = std::function<std::string(const std::vector<std::string_view>& fields)>;
 
-  /// `kind` is the prefix of the counted reasons: KIND_malformed, KIND_not_increasing (a repeated
-  /// stamp), KIND_stray (a stamp far from those of its neighbours), KIND_unsorted (rows that were
-  /// moved). Fields are separated by commas, semicolons or blanks. If fewer than half of the rows
-  /// can be used, throws StartupError(kData) with the first wrong line.
-  SensorTable(const std::filesystem::path& file, const std::string& kind, const Judge& judge);
+  /// `kind` is the prefix of the reasons counted in `recording`: KIND_malformed,
+  /// KIND_not_increasing (a repeated stamp), KIND_stray (a stamp far from those of its neighbours),
+  /// KIND_unsorted (rows that were moved). Repairs are noted there, a sentence each. Fields are
+  /// separated by commas, semicolons or blanks. If fewer than half of the rows can be used, throws
+  /// StartupError(kData) with the first wrong line.
+  SensorTable(const std::filesystem::path& file, const std::string& kind, Recording& recording,
+              const Judge& judge);
   SensorTable(const SensorTable&) = delete;  // rows refer to its text
   SensorTable& operator=(const SensorTable&) = delete;
 
@@ -38,25 +40,16 @@ class SensorTable {
   const std::vector<TableRow>& rows() const { return rows_; }
   /// Number of rows in the file, including wrong ones.
   std::size_t lines() const { return lines_; }
-  bool wasSorted() const { return reasons_.of(kind_ + "_unsorted") == 0; }
-  const ReasonCounts& reasons() const { return reasons_; }
-  /// Repairs, a sentence each.
-  const std::vector<std::string>& notes() const { return notes_; }
+  bool wasSorted() const { return sorted_; }
 
  private:
-  void read(const Judge& judge);
   void takeHead(std::string_view line);
-  void order();
-  void note(std::size_t count, const std::string& what);
 
-  std::filesystem::path file_;
-  std::string kind_;
   std::vector<TextLine> text_;
   std::vector<std::string> head_;
   std::vector<TableRow> rows_;
   std::size_t lines_ = 0;
-  ReasonCounts reasons_;
-  std::vector<std::string> notes_;
+  bool sorted_ = true;
 };
 
 }  // namespace perdure::replay

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "common/base/algorithms/median.h"
 #include "common/replay/files/text_file.h"
 
 namespace perdure::replay {
@@ -64,10 +65,7 @@ Duration medianInterval(const std::vector<TimePoint>& sorted) {
   for (std::size_t i = 1; i < sorted.size(); ++i) {
     intervals.push_back(between(sorted[i], sorted[i - 1]));
   }
-  if (intervals.empty()) return Duration{0};
-  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
-  std::nth_element(intervals.begin(), middle, intervals.end());
-  return *middle;
+  return medianOf(std::move(intervals));
 }
 
 bool areFew(std::size_t count, std::size_t all) {

@@ -1,5 +1,7 @@
 #include "common/replay/files/text_file.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 #include <charconv>
@@ -29,8 +31,7 @@ std::optional<Number> parseWhole(std::string_view text) {
 std::vector<TextLine> readLines(const std::filesystem::path& path, std::string_view mend) {
   std::ifstream file(path);
   if (!file || std::filesystem::is_directory(path)) {
-    throw StartupError(ExitCode::kUnavailable,
-                       path.string() + " cannot be read; " + std::string(mend));
+    throw StartupError(ExitCode::kUnavailable, "{} cannot be read; {}", path.c_str(), mend);
   }
   std::vector<TextLine> lines;
   std::string text;
@@ -46,8 +47,7 @@ std::vector<TextLine> readLines(const std::filesystem::path& path, std::string_v
 }
 
 void throwMissing(const std::filesystem::path& path, std::string_view what, std::string_view mend) {
-  throw StartupError(ExitCode::kUnavailable, std::string(what) + " is missing: " + path.string() +
-                                                 "; " + std::string(mend));
+  throw StartupError(ExitCode::kUnavailable, "{} is missing: {}; {}", what, path.c_str(), mend);
 }
 
 std::string_view trim(std::string_view text) {
@@ -115,18 +115,19 @@ bool isHeader(const std::vector<std::string_view>& fields) {
 }
 
 void Complaints::add(std::size_t line, std::string_view what) {
+  add(fmt::format("{}:{}: {}", file_.c_str(), line, what));
+}
+
+void Complaints::add(std::string_view sentence) {
   if (++count_ > kShownComplaints) return;
   if (!text_.empty()) text_ += '\n';
-  text_ += file_.string() + ":" + std::to_string(line) + ": " + std::string(what);
+  text_ += sentence;
 }
 
 void Complaints::throwIfAny() const {
-  if (empty()) return;
-  std::string message = text_;
-  if (count_ > kShownComplaints) {
-    message += "\nand " + std::to_string(count_ - kShownComplaints) + " more";
-  }
-  throw StartupError(ExitCode::kData, message);
+  if (count_ == 0) return;
+  if (count_ <= kShownComplaints) throw StartupError(ExitCode::kData, text_);
+  throw StartupError(ExitCode::kData, "{}\nand {} more", text_, count_ - kShownComplaints);
 }
 
 }  // namespace perdure::replay

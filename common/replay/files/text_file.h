@@ -43,12 +43,13 @@ std::optional<std::vector<double>> parseNumbers(const std::vector<std::string_vi
 /// like a number.
 bool isHeader(const std::vector<std::string_view>& fields);
 
-/// Collects the errors of one file and throws them together: "file:line: what".
+/// Collects errors and throws them together.
 class Complaints {
  public:
-  explicit Complaints(std::filesystem::path file) : file_(std::move(file)) {}
+  explicit Complaints(std::filesystem::path file = {}) : file_(std::move(file)) {}
+  /// Adds "file:line: what".
   void add(std::size_t line, std::string_view what);
-  bool empty() const { return count_ == 0; }
+  void add(std::string_view sentence);
   /// Throws StartupError(kData) with the first ten errors and the number of the others, if any.
   void throwIfAny() const;
 

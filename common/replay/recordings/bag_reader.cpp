@@ -1,12 +1,7 @@
 // Bags of ROS 1 (format 2.0): records of named fields and data, and messages in chunks, each
 // followed by an index. The reader scans the record headers. A bag that was never closed
 // (`.bag.active`, or renamed) is therefore read as far as possible.
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
 #include <functional>
 #include <queue>
@@ -14,6 +9,7 @@
 
 #include "common/base/errors.h"
 #include "common/replay/recordings/mcap_format.h"
+#include "common/replay/recordings/read_file.h"
 #include "common/replay/recordings/ros_messages.h"
 #include "common/replay/recordings/unpack.h"
 
@@ -34,7 +30,7 @@ template <class X>
 X numberIn(std::string_view bytes) {
   X x = 0;
   mcap::Take take({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
-  take.number(x);
+  take(x);
   return x;
 }
 
@@ -44,7 +40,7 @@ std::optional<HeadFields> fieldsOf(Bytes head) {
   mcap::Take take(head);
   while (!take.rest().empty()) {
     std::string field;
-    if (!take.text(field)) return std::nullopt;
+    if (!take(field)) return std::nullopt;
     const auto sign = field.find('=');
     if (sign == std::string::npos) return std::nullopt;
     fields[field.substr(0, sign)] = field.substr(sign + 1);
@@ -77,8 +73,7 @@ struct ChunkPlace {
 
 class Bag : public RosSource {
  public:
-  explicit Bag(const std::filesystem::path& path) : path_(path) {
-    open();
+  explicit Bag(const std::filesystem::path& path) : file_(opened(path)) {
     walk();
     for (ChunkPlace& chunk : chunks_) {
       if (chunk.connections.empty()) {
@@ -98,9 +93,6 @@ class Bag : public RosSource {
     std::stable_sort(chunks_.begin(), chunks_.end(),
                      [](const auto& a, const auto& b) { return a.start_ns < b.start_ns; });
   }
-  ~Bag() override { close(file_); }
-  Bag(const Bag&) = delete;
-  Bag& operator=(const Bag&) = delete;
 
   void rewind(const std::set<std::string>& wanted, std::uint64_t from_ns) override {
     wanted_ = wanted;
@@ -130,66 +122,45 @@ class Bag : public RosSource {
   };
   using Records = std::shared_ptr<const std::vector<std::uint8_t>>;
 
-  void open() {
-    file_ = ::open(path_.c_str(), O_RDONLY | O_CLOEXEC);
-    struct stat status {};
-    if (file_ < 0 || fstat(file_, &status) != 0 || !S_ISREG(status.st_mode)) {
-      throw StartupError(ExitCode::kUnavailable,
-                         path_.string() + ": " + (file_ < 0 ? std::strerror(errno) : "not a file"));
+  static ReadFile opened(const std::filesystem::path& path) {
+    auto file = ReadFile::open(path);
+    if (!file) throw StartupError(ExitCode::kUnavailable, file.error().detail);
+    if (file->size() == 0) {
+      throw StartupError(ExitCode::kUnavailable, "{} is empty, 0 bytes; fetch it again",
+                         path.c_str());
     }
-    size_ = static_cast<std::uint64_t>(status.st_size);
-    if (size_ == 0) {
-      close(file_);
-      throw StartupError(ExitCode::kUnavailable,
-                         path_.string() + " is empty, 0 bytes; fetch it again");
+    const auto begin = file->read(0, kMagic.size());
+    if (std::equal(begin.begin(), begin.end(), kMagic.begin(), kMagic.end())) {
+      return *std::move(file);
     }
-    const auto begin = read(0, kMagic.size());
-    if (std::equal(begin.begin(), begin.end(), kMagic.begin(), kMagic.end())) return;
-    close(file_);
     const bool older = std::string(begin.begin(), begin.end()).starts_with("#ROSBAG V1");
-    throw StartupError(
-        ExitCode::kUnavailable,
-        path_.string() + (older ? " is a bag of format 1; `rosbag fix` makes a newer "
-                                  "one of it"
-                                : " is no bag of ROS 1; fetch it again"));
-  }
-
-  std::vector<std::uint8_t> read(std::uint64_t at, std::uint64_t length) const {
-    std::vector<std::uint8_t> bytes(at < size_ ? std::min(length, size_ - at) : 0);
-    std::size_t done = 0;
-    while (done < bytes.size()) {
-      const ssize_t n =
-          pread(file_, bytes.data() + done, bytes.size() - done, static_cast<off_t>(at + done));
-      if (n < 0 && errno == EINTR) continue;
-      if (n <= 0) break;
-      done += static_cast<std::size_t>(n);
-    }
-    bytes.resize(done);
-    return bytes;
+    throw StartupError(ExitCode::kUnavailable, "{} {}", path.c_str(),
+                       older ? "is a bag of format 1; `rosbag fix` makes a newer one of it"
+                             : "is no bag of ROS 1; fetch it again");
   }
 
   void walk() {
     std::uint64_t at = kMagic.size();
-    while (at < size_) {
+    while (at < file_.size()) {
       const auto length = numberAt(at);
       const std::uint64_t data_at = at + 8 + length.value_or(0);
-      if (!length || *length > kMostHead || data_at > size_) return cutAt(at);
-      const auto fields = fieldsOf(read(at + 4, *length));
+      if (!length || *length > kMostHead || data_at > file_.size()) return cutAt(at);
+      const auto fields = fieldsOf(file_.read(at + 4, *length));
       const auto data = numberAt(data_at - 4);
-      if (!fields || !data || *data > size_ - data_at) return cutAt(at);
+      if (!fields || !data || *data > file_.size() - data_at) return cutAt(at);
       take(*fields, data_at, *data);
       at = data_at + *data;
     }
   }
 
   std::optional<std::uint32_t> numberAt(std::uint64_t at) const {
-    const auto bytes = read(at, 4);
+    const auto bytes = file_.read(at, 4);
     std::uint32_t number = 0;
-    return mcap::Take(bytes).number(number) ? std::optional(number) : std::nullopt;
+    return mcap::Take(bytes)(number) ? std::optional(number) : std::nullopt;
   }
 
   void cutAt(std::uint64_t at) {
-    count({"unfinished", path_.string() + " was not finished: " + std::to_string(size_ - at) +
+    count({"unfinished", name() + " was not finished: " + std::to_string(file_.size() - at) +
                              " bytes at its end are lost; `rosbag reindex` makes it whole"});
   }
 
@@ -199,15 +170,16 @@ class Bag : public RosSource {
       chunks_.push_back({at, length, numberIn<std::uint32_t>(valueOf(fields, "size")),
                          valueOf(fields, "compression")});
     } else if (op == Op::kConnection) {
-      takeConnection(fields, length > kMostHead ? std::vector<std::uint8_t>() : read(at, length));
+      takeConnection(fields,
+                     length > kMostHead ? std::vector<std::uint8_t>() : file_.read(at, length));
     } else if (op == Op::kIndex && !chunks_.empty()) {
-      takeIndex(fields, read(at, length));
+      takeIndex(fields, file_.read(at, length));
     }
   }
 
   void takeConnection(const HeadFields& fields, Bytes data) {
     const auto more = fieldsOf(data);
-    if (!more) return count({"connection_damaged", path_.string() + ": a topic of no type"});
+    if (!more) return count({"connection_damaged", name() + ": a topic of no type"});
     connections_[numberIn<std::uint32_t>(valueOf(fields, "conn"))] = {valueOf(fields, "topic"),
                                                                       valueOf(*more, "type")};
   }
@@ -216,7 +188,7 @@ class Bag : public RosSource {
     const auto connection = numberIn<std::uint32_t>(valueOf(fields, "conn"));
     mcap::Take take(entries);
     std::uint32_t seconds = 0, rest = 0, offset = 0;
-    while (take.number(seconds) && take.number(rest) && take.number(offset)) {
+    while (take(seconds) && take(rest) && take(offset)) {
       note(chunks_.back(), connection, nanoseconds(seconds, rest));
     }
   }
@@ -251,8 +223,8 @@ class Bag : public RosSource {
   }
 
   Result<Records> unpack(const ChunkPlace& chunk) const {
-    auto packed = read(chunk.at, chunk.packed);
-    if (packed.size() != chunk.packed) return fail("file", path_.string() + " cannot be read");
+    auto packed = file_.read(chunk.at, chunk.packed);
+    if (packed.size() != chunk.packed) return fail("file", name() + " cannot be read");
     if (chunk.compression.empty() || chunk.compression == "none")
       return std::make_shared<const std::vector<std::uint8_t>>(std::move(packed));
     std::vector<std::uint8_t> records;
@@ -262,11 +234,11 @@ class Bag : public RosSource {
       records = unpackedLz4(packed, kMostChunk);
     } else {
       return fail("chunk_of_other_compression",
-                  path_.string() + ": chunks packed by " + chunk.compression +
+                  name() + ": chunks packed by " + chunk.compression +
                       " are not read; `rosbag decompress` unpacks them");
     }
     if (records.size() != chunk.unpacked) {
-      return fail("chunk_damaged", path_.string() + ": a chunk does not unpack");
+      return fail("chunk_damaged", name() + ": a chunk does not unpack");
     }
     return std::make_shared<const std::vector<std::uint8_t>>(std::move(records));
   }
@@ -277,11 +249,11 @@ class Bag : public RosSource {
     while (!take.rest().empty()) {
       std::uint32_t length = 0;
       Bytes head, data;
-      const bool whole = take.number(length) && take.bytes(head, length) && take.number(length) &&
-                         take.bytes(data, length);
+      const bool whole =
+          take(length) && take.bytes(head, length) && take(length) && take.bytes(data, length);
       const auto fields = whole ? fieldsOf(head) : std::nullopt;
       if (!fields) {
-        return count({"chunk_damaged", path_.string() + ": a chunk ends within a record"});
+        return count({"chunk_damaged", name() + ": a chunk ends within a record"});
       }
       const auto op = opOf(*fields);
       if (op == Op::kConnection) takeConnection(*fields, data);
@@ -307,7 +279,7 @@ class Bag : public RosSource {
       if (const auto still = one.lock()) sum += still->size();
     if (sum > kMostHeld) {
       throw StartupError(ExitCode::kUnavailable,
-                         path_.string() +
+                         name() +
                              ": the times of more than 1 GiB of its chunks overlap; "
                              "record again, or sort it: `rosbag filter IN OUT True`");
     }
@@ -327,9 +299,9 @@ class Bag : public RosSource {
     });
   }
 
-  std::filesystem::path path_;
-  int file_ = -1;
-  std::uint64_t size_ = 0;
+  std::string name() const { return file_.path().string(); }
+
+  ReadFile file_;
   std::map<std::uint32_t, std::pair<std::string, std::string>> connections_;  ///< topic and type
   std::map<std::uint32_t, std::uint64_t> counts_;
   std::vector<ChunkPlace> chunks_;  ///< sorted by time

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <concepts>
 #include <cstdint>
 #include <cstring>
 #include <map>
@@ -36,17 +37,26 @@ enum class Op : std::uint8_t {
   kDataEnd = 0x0F,
 };
 
+/// Each record lists its fields once, for writing and reading.
 struct Schema {
+  static constexpr Op kOp = Op::kSchema;
   std::uint16_t id = 0;
   std::string name, encoding, text;
   bool operator==(const Schema&) const = default;
+  static bool fields(auto& m, auto& a) {
+    return a(m.id) && a(m.name) && a(m.encoding) && a(m.text) && m.id != 0;
+  }
 };
 
 struct Channel {
+  static constexpr Op kOp = Op::kChannel;
   std::uint16_t id = 0, schema = 0;
   std::string topic, encoding;
   std::map<std::string, std::string> metadata = {};
   bool operator==(const Channel&) const = default;
+  static bool fields(auto& m, auto& a) {
+    return a(m.id) && a(m.schema) && a(m.topic) && a(m.encoding) && a(m.metadata);
+  }
 };
 
 struct Message {
@@ -54,21 +64,37 @@ struct Message {
   std::uint32_t sequence = 0;
   std::uint64_t log_ns = 0, publish_ns = 0;  ///< times since the epoch
   Bytes data = {};
+  /// All except the data, which are the rest of the record.
+  static bool fields(auto& m, auto& a) {
+    return a(m.channel) && a(m.sequence) && a(m.log_ns) && a(m.publish_ns);
+  }
 };
 
 struct ChunkIndex {
+  static constexpr Op kOp = Op::kChunkIndex;
   std::uint64_t start_ns = 0, end_ns = 0;  ///< log times of the first and the last message
   std::uint64_t offset = 0, length = 0;    ///< the chunk's record, including its header
   std::map<std::uint16_t, std::uint64_t> index_offsets = {};  ///< offsets by channel
   std::uint64_t index_length = 0;
   std::string compression = {};
   std::uint64_t packed = 0, unpacked = 0;  ///< size of its records in bytes
+  static bool fields(auto& m, auto& a) {
+    return a(m.start_ns) && a(m.end_ns) && a(m.offset) && a(m.length) && a(m.index_offsets) &&
+           a(m.index_length) && a(m.compression) && a(m.packed) && a(m.unpacked);
+  }
 };
 
 struct Statistics {
+  static constexpr Op kOp = Op::kStatistics;
   std::uint64_t messages = 0, start_ns = 0, end_ns = 0;
-  std::uint32_t schemas = 0, channels = 0, chunks = 0;
+  std::uint16_t schemas = 0;
+  std::uint32_t channels = 0, chunks = 0;
   std::map<std::uint16_t, std::uint64_t> by_channel = {};
+  static bool fields(auto& m, auto& a) {
+    std::uint32_t attachments = 0, metadata = 0;
+    return a(m.messages) && a(m.schemas) && a(m.channels) && a(attachments) && a(metadata) &&
+           a(m.chunks) && a(m.start_ns) && a(m.end_ns) && a(m.by_channel);
+  }
 };
 
 /// Appends values.
@@ -76,16 +102,34 @@ class Put {
  public:
   explicit Put(std::vector<std::uint8_t>& to) : to_(to) {}
 
-  template <class X>
-  void number(X x) {
-    for (std::size_t i = 0; i < sizeof(X); ++i) {
+  bool operator()(std::unsigned_integral auto x) {
+    for (std::size_t i = 0; i < sizeof x; ++i) {
       to_.push_back(static_cast<std::uint8_t>(static_cast<std::uint64_t>(x) >> (8 * i)));
     }
+    return true;
+  }
+  bool operator()(std::string_view text) {
+    (*this)(static_cast<std::uint32_t>(text.size()));
+    to_.insert(to_.end(), text.begin(), text.end());
+    return true;
+  }
+  template <class Key, class Value>
+  bool operator()(const std::map<Key, Value>& map) {
+    std::vector<std::uint8_t> entries;
+    for (const auto& [key, value] : map) {
+      Put{entries}(key);
+      Put{entries}(value);
+    }
+    (*this)(static_cast<std::uint32_t>(entries.size()));
+    bytes(entries);
+    return true;
   }
   void bytes(Bytes bytes) { to_.insert(to_.end(), bytes.begin(), bytes.end()); }
-  void text(std::string_view text);
-  void counts(const std::map<std::uint16_t, std::uint64_t>& map);
-  void record(Op op, const std::vector<std::uint8_t>& content);
+  void record(Op op, Bytes content) {
+    (*this)(static_cast<std::uint8_t>(op));
+    (*this)(std::uint64_t{content.size()});
+    bytes(content);
+  }
 
  private:
   std::vector<std::uint8_t>& to_;
@@ -96,8 +140,8 @@ class Take {
  public:
   explicit Take(Bytes bytes) : bytes_(bytes) {}
 
-  template <class X>
-  bool number(X& x) {
+  template <std::unsigned_integral X>
+  bool operator()(X& x) {
     if (bytes_.size() < sizeof(X)) return false;
     std::uint64_t value = 0;
     for (std::size_t i = 0; i < sizeof(X); ++i) value |= std::uint64_t{bytes_[i]} << (8 * i);
@@ -105,12 +149,40 @@ class Take {
     bytes_ = bytes_.subspan(sizeof(X));
     return true;
   }
-  bool bytes(Bytes& part, std::uint64_t length);
-  bool text(std::string& text);
-  bool counts(std::map<std::uint16_t, std::uint64_t>& map);
+  bool operator()(std::string& text) {
+    Bytes part;
+    if (!counted(part)) return false;
+    text.assign(part.begin(), part.end());
+    return true;
+  }
+  template <class Key, class Value>
+  bool operator()(std::map<Key, Value>& map) {
+    Bytes part;
+    if (!counted(part)) return false;
+    Take entries(part);
+    while (!entries.rest().empty()) {
+      Key key{};
+      Value value{};
+      if (!entries(key) || !entries(value)) return false;
+      map[key] = value;
+    }
+    return true;
+  }
+  bool bytes(Bytes& part, std::uint64_t length) {
+    if (length > bytes_.size()) return false;
+    part = bytes_.first(length);
+    bytes_ = bytes_.subspan(length);
+    return true;
+  }
   Bytes rest() const { return bytes_; }
 
  private:
+  /// Reads a length of four bytes and that number of bytes.
+  bool counted(Bytes& part) {
+    std::uint32_t length = 0;
+    return (*this)(length) && bytes(part, length);
+  }
+
   Bytes bytes_;
 };
 
@@ -121,17 +193,22 @@ struct Record {
 /// Removes the first record from `bytes` and returns it. Returns nothing if it is truncated.
 std::optional<Record> takeRecord(Bytes& bytes);
 
-void putSchema(std::vector<std::uint8_t>& to, const Schema& schema);
-void putChannel(std::vector<std::uint8_t>& to, const Channel& channel);
+template <class M>
+void putRecord(std::vector<std::uint8_t>& to, const M& record) {
+  std::vector<std::uint8_t> content;
+  Put put(content);
+  M::fields(record, put);
+  Put(to).record(M::kOp, content);
+}
+/// Returns nothing if the content is truncated or invalid.
+template <class M>
+std::optional<M> recordFrom(Bytes content) {
+  Take take(content);
+  M record;
+  return M::fields(record, take) ? std::optional(std::move(record)) : std::nullopt;
+}
 void putMessage(std::vector<std::uint8_t>& to, const Message& message);
-void putChunkIndex(std::vector<std::uint8_t>& to, const ChunkIndex& index);
-void putStatistics(std::vector<std::uint8_t>& to, const Statistics& statistics);
-
-std::optional<Schema> schemaFrom(Bytes content);
-std::optional<Channel> channelFrom(Bytes content);
 std::optional<Message> messageFrom(Bytes content);
-std::optional<ChunkIndex> chunkIndexFrom(Bytes content);
-std::optional<Statistics> statisticsFrom(Bytes content);
 
 /// CRC-32 (ISO-HDLC) as used by MCAP; `before` is the checksum of the preceding bytes.
 std::uint32_t crc(Bytes bytes, std::uint32_t before = 0);

@@ -1,11 +1,6 @@
 #include "common/replay/recordings/mcap_reader.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
 
 #include "common/replay/recordings/unpack.h"
 
@@ -26,9 +21,8 @@ std::optional<ChunkHead> chunkHeadFrom(Bytes content) {
   Take take(content);
   ChunkHead head;
   ChunkIndex& place = head.place;
-  const bool whole = take.number(place.start_ns) && take.number(place.end_ns) &&
-                     take.number(place.unpacked) && take.number(head.crc) &&
-                     take.text(place.compression) && take.number(place.packed);
+  const bool whole = take(place.start_ns) && take(place.end_ns) && take(place.unpacked) &&
+                     take(head.crc) && take(place.compression) && take(place.packed);
   head.records_at = content.size() - take.rest().size();
   return whole ? std::optional(head) : std::nullopt;
 }
@@ -56,6 +50,17 @@ Result<std::vector<std::uint8_t>> unpacked(const ChunkHead& head, Bytes packed) 
   if (head.crc != 0 && crc(records) != head.crc)
     return fail("chunk_damaged", "a chunk with a wrong checksum");
   return records;
+}
+
+/// Adds a schema or a channel; ignores other records. Returns false if it is malformed.
+bool addTo(Catalogue& catalogue, const Record& record) {
+  const auto add = [&]<class M>(std::map<std::uint16_t, M>& to) {
+    const auto one = recordFrom<M>(record.content);
+    if (one) to.emplace(one->id, *one);
+    return one.has_value();
+  };
+  if (record.op == Op::kSchema) return add(catalogue.schemas);
+  return record.op != Op::kChannel || add(catalogue.channels);
 }
 
 const Reason kEndsWithinRecord{"chunk_damaged", "a chunk ends within a record"};
@@ -92,82 +97,36 @@ bool forEachMessage(Bytes records, const std::function<void(const Message&, std:
       const auto message = messageFrom(record->content);
       if (!message) return false;
       visit(*message, offset);
-    } else if (record->op == Op::kSchema) {
-      if (auto schema = schemaFrom(record->content)) other.schemas.emplace(schema->id, *schema);
-    } else if (record->op == Op::kChannel) {
-      if (auto channel = channelFrom(record->content))
-        other.channels.emplace(channel->id, *channel);
+    } else {
+      addTo(other, *record);
     }
   }
   return true;
 }
 
 Result<Reader> Reader::open(const std::filesystem::path& path) {
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  struct stat status {};
-  if (file < 0 || fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) {
-    const std::string why = file < 0 ? std::strerror(errno) : "not a file";
-    if (file >= 0) close(file);
-    return fail("file", path.string() + ": " + why);
-  }
-  Reader reader(path, file, static_cast<std::uint64_t>(status.st_size));
-  const auto magic = reader.read(0, kMagic.size());
+  auto file = ReadFile::open(path);
+  if (!file) return tl::unexpected(file.error());
+  Reader reader(*std::move(file));
+  const auto magic = reader.file_.read(0, kMagic.size());
   const bool begun = std::equal(magic.begin(), magic.end(), kMagic.begin());
-  if (!begun || (magic.size() < kMagic.size() && reader.size_ > 0)) {
+  if (!begun || (magic.size() < kMagic.size() && reader.size() > 0)) {
     return fail("not_mcap",
                 path.string() + " is no MCAP file; recordings come from perdure record");
   }
   const Summary summary = reader.readSummary();
   reader.finished_ = reader.by_summary_ = summary == Summary::kHolds;
   if (!reader.finished_) reader.finished_ = reader.scan() && summary == Summary::kTooLittle;
-  if (reader.finished_) reader.whole_ = reader.size_;
+  if (reader.finished_) reader.whole_ = reader.size();
   return reader;
-}
-
-Reader::Reader(Reader&& other) noexcept
-    : path_(std::move(other.path_)),
-      file_(std::exchange(other.file_, -1)),
-      size_(other.size_),
-      whole_(other.whole_),
-      damage_(std::move(other.damage_)),
-      finished_(other.finished_),
-      by_summary_(other.by_summary_),
-      followed_(other.followed_),
-      catalogue_(std::move(other.catalogue_)),
-      chunks_(std::move(other.chunks_)),
-      statistics_(std::move(other.statistics_)),
-      last_index_(std::move(other.last_index_)) {}
-
-Reader::~Reader() { letGo(); }
-
-void Reader::letGo() {
-  if (file_ >= 0) close(file_);
-  file_ = -1;
-}
-
-/// Returns fewer bytes if the file ends earlier or cannot be read.
-std::vector<std::uint8_t> Reader::read(std::uint64_t at, std::uint64_t length) const {
-  const int file = file_ >= 0 ? file_ : ::open(path_.c_str(), O_RDONLY | O_CLOEXEC);
-  std::vector<std::uint8_t> bytes(at < size_ ? std::min(length, size_ - at) : 0);
-  std::size_t done = 0;
-  while (done < bytes.size()) {
-    const ssize_t n =
-        pread(file, bytes.data() + done, bytes.size() - done, static_cast<off_t>(at + done));
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) break;
-    done += static_cast<std::size_t>(n);
-  }
-  bytes.resize(done);
-  if (file_ < 0 && file >= 0) close(file);
-  return bytes;
 }
 
 /// Missing optional parts (the whole summary, statistics, indexes) are not an error.
 Reader::Summary Reader::readSummary() {
   constexpr std::uint64_t kEnd = kRecordHead + kFooterContent + kMagic.size();
-  if (size_ < kMagic.size() + kEnd) return Summary::kTooLittle;
-  const std::uint64_t footer_at = size_ - kEnd;
-  const auto end = read(footer_at, kEnd);
+  if (size() < kMagic.size() + kEnd) return Summary::kTooLittle;
+  const std::uint64_t footer_at = size() - kEnd;
+  const auto end = file_.read(footer_at, kEnd);
   Bytes rest(end);
   const auto footer = takeRecord(rest);
   if (!footer || footer->op != Op::kFooter || !std::equal(rest.begin(), rest.end(), kMagic.begin()))
@@ -175,12 +134,12 @@ Reader::Summary Reader::readSummary() {
   Take take(footer->content);
   std::uint64_t summary_at = 0, offsets_at = 0;
   std::uint32_t checksum = 0;
-  const bool whole = take.number(summary_at) && take.number(offsets_at) && take.number(checksum);
+  const bool whole = take(summary_at) && take(offsets_at) && take(checksum);
   if (whole && summary_at == 0) return Summary::kTooLittle;
   if (!whole || summary_at < kMagic.size() || summary_at > footer_at) return Summary::kWrong;
   if (footer_at - summary_at > kMostContent) return Summary::kWrong;
-  const std::uint64_t covered = size_ - summary_at - kMagic.size() - sizeof checksum;
-  const auto summary = read(summary_at, covered);
+  const std::uint64_t covered = size() - summary_at - kMagic.size() - sizeof checksum;
+  const auto summary = file_.read(summary_at, covered);
   if (summary.size() != covered || (checksum != 0 && crc(summary) != checksum))
     return Summary::kWrong;
   return takeSummary(Bytes(summary).first(footer_at - summary_at));
@@ -191,20 +150,13 @@ Reader::Summary Reader::takeSummary(Bytes records) {
   while (!records.empty()) {
     const auto record = takeRecord(records);
     if (!record) return Summary::kWrong;
-    if (record->op == Op::kSchema) {
-      const auto schema = schemaFrom(record->content);
-      if (!schema) return Summary::kWrong;
-      catalogue_.schemas.emplace(schema->id, *schema);
-    } else if (record->op == Op::kChannel) {
-      const auto channel = channelFrom(record->content);
-      if (!channel) return Summary::kWrong;
-      catalogue_.channels.emplace(channel->id, *channel);
-    } else if (record->op == Op::kChunkIndex) {
-      const auto chunk = chunkIndexFrom(record->content);
+    if (!addTo(catalogue_, *record)) return Summary::kWrong;
+    if (record->op == Op::kChunkIndex) {
+      const auto chunk = recordFrom<ChunkIndex>(record->content);
       if (!chunk) return Summary::kWrong;
       chunks_.push_back(*chunk);
     } else if (record->op == Op::kStatistics) {
-      const auto statistics = statisticsFrom(record->content);
+      const auto statistics = recordFrom<Statistics>(record->content);
       if (!statistics) return Summary::kWrong;
       statistics_ = *statistics;
       counted = true;
@@ -217,8 +169,8 @@ Reader::Summary Reader::takeSummary(Bytes records) {
 /// Returns whether all chunks lie within the file.
 bool Reader::plausible() const {
   return std::all_of(chunks_.begin(), chunks_.end(), [this](const ChunkIndex& chunk) {
-    return chunk.offset >= kMagic.size() && chunk.offset <= size_ && chunk.length >= kRecordHead &&
-           chunk.length <= size_ - chunk.offset;
+    return chunk.offset >= kMagic.size() && chunk.offset <= size() && chunk.length >= kRecordHead &&
+           chunk.length <= size() - chunk.offset;
   });
 }
 
@@ -235,15 +187,15 @@ bool Reader::scan() {
   catalogue_ = {};
   chunks_.clear();
   statistics_ = {};
-  std::uint64_t at = whole_ = std::min<std::uint64_t>(size_, kMagic.size());
+  std::uint64_t at = whole_ = std::min<std::uint64_t>(size(), kMagic.size());
   bool in_data = true;
-  while (at + kRecordHead <= size_) {
-    const auto head = read(at, kRecordHead);
+  while (at + kRecordHead <= size()) {
+    const auto head = file_.read(at, kRecordHead);
     Take take(head);
     std::uint8_t op = 0;
     std::uint64_t length = 0;
-    if (!take.number(op) || !take.number(length) || op == 0) return false;
-    if (length > size_ - at - kRecordHead) return false;  // truncated
+    if (!take(op) || !take(length) || op == 0) return false;
+    if (length > size() - at - kRecordHead) return false;  // truncated
     const std::uint64_t end = at + kRecordHead + length;
     if (static_cast<Op>(op) == Op::kFooter) return endsAt(end);
     if (static_cast<Op>(op) == Op::kDataEnd) in_data = false;
@@ -254,8 +206,8 @@ bool Reader::scan() {
 }
 
 bool Reader::endsAt(std::uint64_t end) {
-  const auto magic = read(end, kMagic.size());
-  const auto next = read(end + kMagic.size(), kMagic.size());
+  const auto magic = file_.read(end, kMagic.size());
+  const auto next = file_.read(end + kMagic.size(), kMagic.size());
   if (!std::equal(magic.begin(), magic.end(), kMagic.begin(), kMagic.end())) return false;
   followed_ = std::equal(next.begin(), next.end(), kMagic.begin(), kMagic.end());
   return next.empty();
@@ -269,21 +221,12 @@ bool Reader::scanRecord(Op op, std::uint64_t at, std::uint64_t length) {
     return true;
   }
   if (length > kMostContent) return false;
-  const auto content = read(at + kRecordHead, length);
+  const auto content = file_.read(at + kRecordHead, length);
   if (content.size() != length) return false;
-  if (op == Op::kSchema) {
-    const auto schema = schemaFrom(content);
-    if (schema) catalogue_.schemas.emplace(schema->id, *schema);
-    return schema.has_value();
-  }
-  if (op == Op::kChannel) {
-    const auto channel = channelFrom(content);
-    if (channel) catalogue_.channels.emplace(channel->id, *channel);
-    return channel.has_value();
-  }
+  if (!addTo(catalogue_, {op, content})) return false;
   if (op == Op::kMessage) {
     addBare(at, length);
-  } else {
+  } else if (op == Op::kMessageIndex) {
     scanMessageIndex(at, length, content);
   }
   return true;
@@ -299,7 +242,7 @@ bool Reader::scanChunk(std::uint64_t at, std::uint64_t length) {
     return true;
   }
   constexpr std::uint64_t kHead = 256;
-  const auto content = read(at + kRecordHead, std::min(length, kHead));
+  const auto content = file_.read(at + kRecordHead, std::min(length, kHead));
   const auto head = chunkHeadFrom(content);
   if (!head) return false;
   place = head->place;
@@ -344,7 +287,7 @@ void Reader::check() {
 void Reader::scanMessageIndex(std::uint64_t at, std::uint64_t length, Bytes content) {
   Take take(content);
   std::uint16_t channel = 0;
-  if (chunks_.empty() || !take.number(channel) || !last_index_.contains(channel)) return;
+  if (chunks_.empty() || !take(channel) || !last_index_.contains(channel)) return;
   ChunkIndex& chunk = chunks_.back();
   chunk.index_offsets[channel] = at;
   chunk.index_length += kRecordHead + length;
@@ -353,7 +296,7 @@ void Reader::scanMessageIndex(std::uint64_t at, std::uint64_t length, Bytes cont
 
 /// Adds a message outside chunks, as minimal writers produce.
 void Reader::addBare(std::uint64_t at, std::uint64_t length) {
-  const auto message = messageFrom(read(at + kRecordHead, length));
+  const auto message = messageFrom(file_.read(at + kRecordHead, length));
   if (!message) return;
   ChunkIndex place{message->log_ns, message->log_ns, at, kRecordHead + length, {}, 0, kBare};
   chunks_.push_back(place);
@@ -366,7 +309,7 @@ void Reader::addBare(std::uint64_t at, std::uint64_t length) {
 Result<Records> Reader::unpack(const ChunkIndex& chunk) const {
   auto records = recordsOf(chunk);
   if (records) return records;
-  return fail(records.error().code, path_.string() + ": " + records.error().detail + " (at byte " +
+  return fail(records.error().code, path().string() + ": " + records.error().detail + " (at byte " +
                                         std::to_string(chunk.offset) + ")");
 }
 
@@ -374,7 +317,7 @@ Result<Records> Reader::recordsOf(const ChunkIndex& chunk) const {
   if (chunk.length > kMostRecords + kMostContent) {
     return fail("chunk_too_large", "a chunk of " + std::to_string(chunk.length) + " bytes");
   }
-  auto bytes = read(chunk.offset, chunk.length);
+  auto bytes = file_.read(chunk.offset, chunk.length);
   if (chunk.compression == kBare) {
     return std::make_shared<const std::vector<std::uint8_t>>(std::move(bytes));
   }
@@ -391,12 +334,12 @@ Result<Records> Reader::recordsOf(const ChunkIndex& chunk) const {
 }
 
 Result<void> Reader::finishable() const {
-  if (followed_) return fail("followed", sentenceOfFollowed(path_));
+  if (followed_) return fail("followed", sentenceOfFollowed(path()));
   const bool bare = std::any_of(chunks_.begin(), chunks_.end(),
                                 [](const auto& chunk) { return chunk.compression == kBare; });
   if (!bare) return {};
   return fail("not_chunked",
-              path_.string() + " holds messages outside of chunks; it reads as it is");
+              path().string() + " holds messages outside of chunks; it reads as it is");
 }
 
 Result<void> Reader::finish() {
@@ -412,7 +355,7 @@ Result<void> Reader::finish() {
     last->index_length = 0;
     chunks.pop_back();
   }
-  auto writer = Writer::resume(path_, end, catalogue_, std::move(chunks), statistics_);
+  auto writer = Writer::resume(path(), end, catalogue_, std::move(chunks), statistics_);
   if (!writer) return tl::unexpected(writer.error());
   if (last) {
     if (auto written = writer->appendIndex(*last, last_index_); !written) return written;

@@ -12,6 +12,7 @@
 
 #include "common/base/result.h"
 #include "common/replay/recordings/mcap_writer.h"
+#include "common/replay/recordings/read_file.h"
 
 namespace perdure::replay::mcap {
 
@@ -27,11 +28,8 @@ class Reader {
  public:
   /// Reasons: "file", "not_mcap"; the detail states the fix.
   static Result<Reader> open(const std::filesystem::path& path);
-  Reader(Reader&& other) noexcept;
-  Reader& operator=(Reader&&) = delete;
-  ~Reader();
 
-  const std::filesystem::path& path() const { return path_; }
+  const std::filesystem::path& path() const { return file_.path(); }
   /// Returns whether the file is complete: a footer, the magic, and no wrong summary. Otherwise a
   /// scan has found all complete records.
   bool finished() const { return finished_; }
@@ -41,9 +39,9 @@ class Reader {
   const Catalogue& catalogue() const { return catalogue_; }
   const std::vector<ChunkIndex>& chunks() const { return chunks_; }
   const Statistics& statistics() const { return statistics_; }
-  std::uint64_t size() const { return size_; }
+  std::uint64_t size() const { return file_.size(); }
   /// Number of bytes after the last complete chunk of an unfinished file.
-  std::uint64_t cutBytes() const { return size_ - whole_; }
+  std::uint64_t cutBytes() const { return size() - whole_; }
   /// Damage found by a scan.
   const std::vector<Damage>& damage() const { return damage_; }
   /// Unpacks every chunk of the summary. damage() is then complete, and chunks() and statistics()
@@ -55,7 +53,7 @@ class Reader {
   Result<Records> unpack(const ChunkIndex& chunk) const;
 
   /// Closes the file; from now on unpack() opens it for each call.
-  void letGo();
+  void letGo() { file_.letGo(); }
 
   /// Completes an unfinished file: cuts incomplete data (cutBytes) and writes the summary. Fails
   /// with the reasons of finishable().
@@ -64,8 +62,7 @@ class Reader {
   Result<void> finishable() const;
 
  private:
-  Reader(std::filesystem::path path, int file, std::uint64_t size)
-      : path_(std::move(path)), file_(file), size_(size) {}
+  explicit Reader(ReadFile file) : file_(std::move(file)) {}
   enum class Summary { kHolds, kTooLittle, kWrong };
   Summary readSummary();
   Summary takeSummary(Bytes records);
@@ -79,11 +76,9 @@ class Reader {
   bool countMessages(const Records& records);
   void scanMessageIndex(std::uint64_t at, std::uint64_t length, Bytes content);
   void addBare(std::uint64_t at, std::uint64_t length);
-  std::vector<std::uint8_t> read(std::uint64_t at, std::uint64_t length) const;
 
-  std::filesystem::path path_;
-  int file_ = -1;
-  std::uint64_t size_ = 0, whole_ = 0;
+  ReadFile file_;
+  std::uint64_t whole_ = 0;
   std::vector<Damage> damage_;
   bool finished_ = false, by_summary_ = false, followed_ = false;
   Catalogue catalogue_;

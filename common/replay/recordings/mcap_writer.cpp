@@ -16,16 +16,16 @@ namespace {
 constexpr char kLibrary[] = "perdure";
 constexpr char kZstd[] = "zstd";
 
-Result<int> opened(const std::filesystem::path& path, int flags) {
-  const int file = open(path.c_str(), flags | O_CLOEXEC, 0644);
-  if (file >= 0) return file;
-  return fail("file", path.string() + ": " + std::strerror(errno));
+Result<Descriptor> opened(const std::filesystem::path& path, int flags) {
+  Descriptor file(open(path.c_str(), flags | O_CLOEXEC, 0644));
+  if (file.open()) return file;
+  return fail("file", "{}: {}", path.c_str(), std::strerror(errno));
 }
 
 std::vector<std::uint8_t> beginning(const std::string& profile = {}) {
   std::vector<std::uint8_t> bytes(kMagic.begin(), kMagic.end()), header;
-  Put(header).text(profile);
-  Put(header).text(kLibrary);
+  Put{header}(profile);
+  Put{header}(kLibrary);
   Put(bytes).record(Op::kHeader, header);
   return bytes;
 }
@@ -50,11 +50,11 @@ void putIndexes(std::vector<std::uint8_t>& to, std::uint64_t at, const Draft::In
     place.index_offsets[channel] = at + to.size();
     std::vector<std::uint8_t> content;
     Put put(content);
-    put.number(channel);
-    put.number(static_cast<std::uint32_t>(entries.size() * 2 * sizeof(std::uint64_t)));
+    put(channel);
+    put(static_cast<std::uint32_t>(entries.size() * 2 * sizeof(std::uint64_t)));
     for (const auto& [log_ns, offset] : entries) {
-      put.number(log_ns);
-      put.number(offset);
+      put(log_ns);
+      put(offset);
     }
     Put(to).record(Op::kMessageIndex, content);
   }
@@ -65,15 +65,14 @@ void putIndexes(std::vector<std::uint8_t>& to, std::uint64_t at, const Draft::In
 class Summary {
  public:
   explicit Summary(std::uint64_t at) : at_(at) {}
-  template <class Group>
-  void group(Op op, Group put) {
+  void group(Op op, auto put) {
     const std::size_t before = bytes_.size();
     put(bytes_);
     if (bytes_.size() == before) return;
     std::vector<std::uint8_t> content;
-    Put(content).number(static_cast<std::uint8_t>(op));
-    Put(content).number(at_ + before);
-    Put(content).number(static_cast<std::uint64_t>(bytes_.size() - before));
+    Put{content}(static_cast<std::uint8_t>(op));
+    Put{content}(at_ + before);
+    Put{content}(static_cast<std::uint64_t>(bytes_.size() - before));
     Put(offsets_).record(Op::kSummaryOffset, content);
   }
   /// Returns the summary with the footer and the magic. The footer's checksum covers all bytes from
@@ -82,11 +81,11 @@ class Summary {
     const std::uint64_t offsets_at = at_ + bytes_.size();
     Put put(bytes_);
     put.bytes(offsets_);
-    put.number(static_cast<std::uint8_t>(Op::kFooter));
-    put.number(static_cast<std::uint64_t>(kFooterContent));
-    put.number(at_);
-    put.number(offsets_at);
-    put.number(crc(bytes_));
+    put(static_cast<std::uint8_t>(Op::kFooter));
+    put(static_cast<std::uint64_t>(kFooterContent));
+    put(at_);
+    put(offsets_at);
+    put(crc(bytes_));
     put.bytes(kMagic);
     return std::move(bytes_);
   }
@@ -125,12 +124,12 @@ Chunk pack(const Draft& draft) {
   std::vector<std::uint8_t> content;
   content.reserve(packed.size() + 64);
   Put put(content);
-  put.number(draft.startNs());
-  put.number(draft.endNs());
-  put.number(static_cast<std::uint64_t>(draft.bytes()));
-  put.number(crc(draft.records()));
-  put.text(kZstd);
-  put.number(static_cast<std::uint64_t>(packed.size()));
+  put(draft.startNs());
+  put(draft.endNs());
+  put(static_cast<std::uint64_t>(draft.bytes()));
+  put(crc(draft.records()));
+  put(kZstd);
+  put(static_cast<std::uint64_t>(packed.size()));
   put.bytes(packed);
   Put(chunk.record).record(Op::kChunk, content);
   chunk.place.length = chunk.record.size();
@@ -138,9 +137,9 @@ Chunk pack(const Draft& draft) {
 }
 
 Result<Writer> Writer::create(const std::filesystem::path& path, const std::string& profile) {
-  const auto file = opened(path, O_WRONLY | O_CREAT | O_EXCL);
+  auto file = opened(path, O_WRONLY | O_CREAT | O_EXCL);
   if (!file) return tl::unexpected(file.error());
-  Writer writer(path, *file);
+  Writer writer(path, *std::move(file));
   if (auto written = writer.write(beginning(profile)); !written) {
     std::error_code ignored;
     std::filesystem::remove(path, ignored);
@@ -152,11 +151,11 @@ Result<Writer> Writer::create(const std::filesystem::path& path, const std::stri
 Result<Writer> Writer::resume(const std::filesystem::path& path, std::uint64_t end,
                               const Catalogue& catalogue, std::vector<ChunkIndex> chunks,
                               const Statistics& counted) {
-  const auto file = opened(path, O_WRONLY);
+  auto file = opened(path, O_WRONLY);
   if (!file) return tl::unexpected(file.error());
-  Writer writer(path, *file);
-  if (ftruncate(*file, static_cast<off_t>(end)) != 0) {
-    return fail("file", path.string() + ": " + std::strerror(errno));
+  Writer writer(path, *std::move(file));
+  if (ftruncate(writer.file_.get(), static_cast<off_t>(end)) != 0) {
+    return fail("file", "{}: {}", path.c_str(), std::strerror(errno));
   }
   writer.size_ = end;
   writer.catalogue_ = catalogue;
@@ -167,41 +166,19 @@ Result<Writer> Writer::resume(const std::filesystem::path& path, std::uint64_t e
   return writer;
 }
 
-Writer::Writer(Writer&& other) noexcept
-    : path_(std::move(other.path_)),
-      file_(std::exchange(other.file_, -1)),
-      size_(other.size_),
-      catalogue_(std::move(other.catalogue_)),
-      chunks_(std::move(other.chunks_)),
-      statistics_(std::move(other.statistics_)) {}
-
-Writer& Writer::operator=(Writer&& other) noexcept {
-  std::swap(path_, other.path_);
-  std::swap(file_, other.file_);
-  std::swap(size_, other.size_);
-  std::swap(catalogue_, other.catalogue_);
-  std::swap(chunks_, other.chunks_);
-  std::swap(statistics_, other.statistics_);
-  return *this;
-}
-
-Writer::~Writer() {
-  if (file_ >= 0) close(file_);
-}
-
 Result<void> Writer::write(const std::vector<std::uint8_t>& bytes) {
   std::size_t done = 0;
   while (done < bytes.size()) {
-    const ssize_t n =
-        pwrite(file_, bytes.data() + done, bytes.size() - done, static_cast<off_t>(size_ + done));
+    const ssize_t n = pwrite(file_.get(), bytes.data() + done, bytes.size() - done,
+                             static_cast<off_t>(size_ + done));
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0) {
       const int error = n < 0 ? errno : ENOSPC;
-      if (ftruncate(file_, static_cast<off_t>(size_)) != 0) {
-        return fail("file", path_.string() + ": " + std::strerror(errno));
+      if (ftruncate(file_.get(), static_cast<off_t>(size_)) != 0) {
+        return fail("file", "{}: {}", path_.c_str(), std::strerror(errno));
       }
       const bool full = error == ENOSPC || error == EDQUOT;
-      return fail(full ? "disk_full" : "file", path_.string() + ": " + std::strerror(error));
+      return fail(full ? "disk_full" : "file", "{}: {}", path_.c_str(), std::strerror(error));
     }
     done += static_cast<std::size_t>(n);
   }
@@ -217,8 +194,8 @@ Result<void> Writer::append(const Chunk& chunk, const Catalogue& catalogue) {
     const Channel& channel = catalogue.channels.at(id);
     const Schema& schema = catalogue.schemas.at(channel.schema);
     if (!catalogue_.schemas.contains(schema.id) && added.schemas.emplace(schema.id, schema).second)
-      putSchema(bytes, schema);
-    putChannel(bytes, channel);
+      putRecord(bytes, schema);
+    putRecord(bytes, channel);
     added.channels.emplace(id, channel);
   }
   ChunkIndex place = chunk.place;
@@ -248,21 +225,21 @@ Result<void> Writer::appendIndex(ChunkIndex& chunk, const Draft::Index& index) {
 
 std::vector<std::uint8_t> Writer::summary() const {
   std::vector<std::uint8_t> end{static_cast<std::uint8_t>(Op::kDataEnd), 4, 0, 0, 0, 0, 0, 0, 0};
-  Put(end).number(std::uint32_t{0});  // no checksum of the data section, because each chunk has one
+  Put{end}(std::uint32_t{0});  // no checksum of the data section, because each chunk has one
   Statistics statistics = statistics_;
-  statistics.schemas = static_cast<std::uint32_t>(catalogue_.schemas.size());
+  statistics.schemas = static_cast<std::uint16_t>(catalogue_.schemas.size());
   statistics.channels = static_cast<std::uint32_t>(catalogue_.channels.size());
   statistics.chunks = static_cast<std::uint32_t>(chunks_.size());
   Summary summary(size_ + end.size());
   summary.group(Op::kSchema, [&](auto& to) {
-    for (const auto& [id, schema] : catalogue_.schemas) putSchema(to, schema);
+    for (const auto& [id, schema] : catalogue_.schemas) putRecord(to, schema);
   });
   summary.group(Op::kChannel, [&](auto& to) {
-    for (const auto& [id, channel] : catalogue_.channels) putChannel(to, channel);
+    for (const auto& [id, channel] : catalogue_.channels) putRecord(to, channel);
   });
-  summary.group(Op::kStatistics, [&](auto& to) { putStatistics(to, statistics); });
+  summary.group(Op::kStatistics, [&](auto& to) { putRecord(to, statistics); });
   summary.group(Op::kChunkIndex, [&](auto& to) {
-    for (const ChunkIndex& chunk : chunks_) putChunkIndex(to, chunk);
+    for (const ChunkIndex& chunk : chunks_) putRecord(to, chunk);
   });
   Put(end).bytes(summary.finished());
   return end;
@@ -270,6 +247,6 @@ std::vector<std::uint8_t> Writer::summary() const {
 
 Result<void> Writer::finish() { return write(summary()); }
 
-void Writer::sync() const { fdatasync(file_); }
+void Writer::sync() const { fdatasync(file_.get()); }
 
 }  // namespace perdure::replay::mcap

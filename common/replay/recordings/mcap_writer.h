@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/base/descriptor.h"
 #include "common/base/errors.h"
 #include "common/base/result.h"
 #include "common/replay/recordings/mcap_format.h"
@@ -66,9 +67,6 @@ class Writer {
   static Result<Writer> resume(const std::filesystem::path& path, std::uint64_t end,
                                const Catalogue& catalogue, std::vector<ChunkIndex> chunks,
                                const Statistics& counted);
-  Writer(Writer&& other) noexcept;
-  Writer& operator=(Writer&& other) noexcept;
-  ~Writer();
 
   /// Writes the chunk, and those of its schemas and channels that are new to this file. On failure
   /// ("disk_full", "file") the file is restored, and the call may be repeated.
@@ -85,12 +83,13 @@ class Writer {
   const Statistics& statistics() const { return statistics_; }
 
  private:
-  Writer(std::filesystem::path path, int file) : path_(std::move(path)), file_(file) {}
+  Writer(std::filesystem::path path, Descriptor file)
+      : path_(std::move(path)), file_(std::move(file)) {}
   Result<void> write(const std::vector<std::uint8_t>& bytes);
   std::vector<std::uint8_t> summary() const;
 
   std::filesystem::path path_;
-  int file_ = -1;
+  Descriptor file_;
   std::uint64_t size_ = 0;
   Catalogue catalogue_;
   std::vector<ChunkIndex> chunks_;

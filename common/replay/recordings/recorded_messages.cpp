@@ -4,6 +4,7 @@
 #include <tuple>
 
 #include "common/base/errors.h"
+#include "common/base/folder.h"
 #include "common/base/ids.h"
 
 namespace perdure::replay {
@@ -16,15 +17,10 @@ constexpr char kExtension[] = ".mcap";
 /// The recording files that are not compressed as a whole.
 std::vector<fs::path> plainFilesIn(const fs::path& path) {
   std::error_code ignored;
-  std::vector<fs::path> files;
-  if (!fs::is_directory(path, ignored)) {
-    if (!isPacked(path, kExtension)) files.push_back(path);
-    return files;
+  if (fs::is_directory(path, ignored)) {
+    return pathsIn(path, [](const fs::path& file) { return file.extension() == kExtension; });
   }
-  for (const auto& entry : fs::directory_iterator(path, ignored)) {
-    if (entry.path().extension() == kExtension) files.push_back(entry.path());
-  }
-  return files;
+  return isPacked(path, kExtension) ? std::vector<fs::path>() : std::vector{path};
 }
 
 /// Returns true for topics that a recorder repeats at the start of each segment.

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "common/base/errors.h"
+#include "common/base/folder.h"
 #include "common/replay/recordings/recorded_messages.h"
 #include "common/replay/recordings/unpack.h"
 #include "common/ros/definition.h"
@@ -53,16 +53,10 @@ class McapSource : public RosSource {
 };
 
 std::vector<fs::path> filesWith(const fs::path& path, const char* extension) {
+  const auto has = [&](const fs::path& file) { return file.extension() == extension; };
   std::error_code ignored;
-  if (!fs::is_directory(path, ignored)) {
-    return path.extension() == extension ? std::vector{path} : std::vector<fs::path>();
-  }
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(path, ignored)) {
-    if (entry.path().extension() == extension) files.push_back(entry.path());
-  }
-  std::sort(files.begin(), files.end());
-  return files;
+  if (fs::is_directory(path, ignored)) return pathsIn(path, has);
+  return has(path) ? std::vector{path} : std::vector<fs::path>();
 }
 
 bool holdsRos(const fs::path& path) {
@@ -107,9 +101,7 @@ std::vector<std::string> RosMessages::notes() const {
 
 ReasonCounts RosMessages::reasons() const {
   ReasonCounts all = reasons_;
-  for (const auto& source : sources_) {
-    for (const auto& [reason, n] : source->reasons().all()) all.add(reason, n);
-  }
+  for (const auto& source : sources_) all.add(source->reasons());
   return all;
 }
 
@@ -147,8 +139,8 @@ bool RosMessages::unpack(RosMessage& message) {
   }
   auto whole = wholeOfZstd(message.data, kLargest);
   if (!whole) {
-    reasons_.add("message_packing_damaged");
-    last_problem_ = message.topic + " has a message that is packed by zstd and cannot be unpacked";
+    count({"message_packing_damaged",
+           message.topic + " has a message that is packed by zstd and cannot be unpacked"});
     return false;
   }
   const auto bytes = std::make_shared<const std::vector<std::uint8_t>>(*std::move(whole));

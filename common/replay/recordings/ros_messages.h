@@ -31,7 +31,7 @@ struct RosTopic {
 };
 using RosTopics = std::map<std::string, RosTopic>;
 
-/// One recording file of any format.
+/// A recording of any format.
 class RosSource {
  public:
   virtual ~RosSource() = default;
@@ -63,7 +63,8 @@ class RosSource {
 std::unique_ptr<RosSource> openBag(const std::filesystem::path& file);
 std::unique_ptr<RosSource> openDb3(const std::filesystem::path& file);
 
-class RosMessages {
+/// All files of a recording.
+class RosMessages : public RosSource {
  public:
   /// Returns whether the path is such a file, or a folder with such files. Recordings of Perdure
   /// are excluded.
@@ -71,16 +72,12 @@ class RosMessages {
   /// Throws StartupError with the fix.
   explicit RosMessages(const std::filesystem::path& path);
 
-  const RosTopics& topics() const { return topics_; }
-  std::uint64_t startNs() const { return start_ns_; }
-  std::uint64_t endNs() const { return end_ns_; }
-  /// Notes for users about unpacked files.
-  std::vector<std::string> notes() const;
+  std::vector<std::string> notes() const override;
+  /// The counts of all files.
   ReasonCounts reasons() const;
-  /// The problem counted last, as text for users.
   std::string lastProblem() const;
-  void rewind(const std::set<std::string>& wanted, std::uint64_t from_ns = 0);
-  std::optional<RosMessage> next();
+  void rewind(const std::set<std::string>& wanted, std::uint64_t from_ns = 0) override;
+  std::optional<RosMessage> next() override;
 
   /// Decodes a message as M. Reason: "malformed".
   template <class M>
@@ -97,10 +94,6 @@ class RosMessages {
   UnpackedFiles unpacked_;  ///< for SQLite files; must be destroyed after the sources
   std::vector<std::unique_ptr<RosSource>> sources_;
   std::vector<std::optional<RosMessage>> heads_;  ///< the next message of each source
-  RosTopics topics_;
-  std::uint64_t start_ns_ = UINT64_MAX, end_ns_ = 0;
-  ReasonCounts reasons_;  ///< counts not included in those of the sources
-  std::string last_problem_;
 };
 
 }  // namespace perdure::replay

@@ -11,9 +11,11 @@
 #include <cstring>
 #include <map>
 #include <mutex>
+#include <span>
 #include <vector>
 
 #include "common/base/errors.h"
+#include "common/base/folder.h"
 
 namespace perdure::replay {
 namespace {
@@ -56,59 +58,18 @@ fs::path newFolder(const fs::path& packed) {
                             to.parent_path().parent_path().string(), sizeOf(free + came)));
 }
 
-/// Decompresses in steps, frame by frame.
-class Unpacking {
- public:
-  explicit Unpacking(OpenFile in) : in_(std::move(in)), room_(ZSTD_DStreamOutSize()) { read(); }
-
-  bool empty() const { return filled_.size == 0; }
-  /// Returns whether the available bytes match the start of a zstd frame.
-  bool looksPacked() const {
-    constexpr std::array<std::uint8_t, 4> kFrame{0x28, 0xB5, 0x2F, 0xFD},
-        kSkippable{0x50, 0x2A, 0x4D, 0x18};
-    const std::size_t size = std::min(filled_.size, kFrame.size());
-    const auto begins = [&](const auto& magic, std::uint8_t mask) {
-      return size > 0 && (packed_[0] & mask) == magic[0] &&
-             std::equal(magic.begin() + 1, magic.begin() + static_cast<long>(size),
-                        packed_.begin() + 1);
-    };
-    return begins(kFrame, 0xFF) || begins(kSkippable, 0xF0);
-  }
-  /// Size stated in the first frame; 0 if it is not stated.
-  std::uint64_t size() const {
-    const auto size = ZSTD_getFrameContentSize(packed_.data(), filled_.size);
-    return size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR ? 0 : size;
-  }
-  /// The next data; empty at the end, or if whole() indicates that data are missing.
-  std::vector<std::uint8_t> next() {
-    while (true) {
-      if (filled_.pos == filled_.size) read();
-      ZSTD_outBuffer out{room_.data(), room_.size(), 0};
-      const std::size_t before = filled_.pos;
-      const std::size_t state = ZSTD_decompressStream(context_.get(), &out, &filled_);
-      if (ZSTD_isError(state) != 0) return damaged();
-      if (out.pos > 0 || filled_.pos > before) whole_ = state == 0;
-      if (out.pos > 0) return {room_.begin(), room_.begin() + static_cast<long>(out.pos)};
-      if (filled_.size == 0) return {};
-    }
-  }
-  bool whole() const { return whole_; }
-
- private:
-  void read() {
-    filled_ = {packed_.data(), std::fread(packed_.data(), 1, packed_.size(), in_.get()), 0};
-  }
-  std::vector<std::uint8_t> damaged() {
-    whole_ = false;
-    return {};
-  }
-
-  OpenFile in_;
-  std::vector<std::uint8_t> packed_ = std::vector<std::uint8_t>(ZSTD_DStreamInSize()), room_;
-  std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context_{ZSTD_createDCtx(), &ZSTD_freeDCtx};
-  ZSTD_inBuffer filled_{};
-  bool whole_ = false;
-};
+/// Returns whether the bytes match the start of a zstd frame.
+bool looksPacked(std::span<const std::uint8_t> bytes) {
+  constexpr std::array<std::uint8_t, 4> kFrame{0x28, 0xB5, 0x2F, 0xFD},
+      kSkippable{0x50, 0x2A, 0x4D, 0x18};
+  const std::size_t size = std::min(bytes.size(), kFrame.size());
+  const auto begins = [&](const auto& magic, std::uint8_t mask) {
+    return (bytes[0] & mask) == magic[0] &&
+           std::equal(magic.begin() + 1, magic.begin() + static_cast<long>(size),
+                      bytes.begin() + 1);
+  };
+  return begins(kFrame, 0xFF) || begins(kSkippable, 0xF0);
+}
 
 }  // namespace
 
@@ -129,31 +90,49 @@ UnpackedFile::~UnpackedFile() {
 }
 
 void UnpackedFile::unpack() {
-  OpenFile in(std::fopen(packed_.c_str(), "rb"));
+  const OpenFile in(std::fopen(packed_.c_str(), "rb"));
   if (!in) throwUnusable(packed_, std::string("cannot be read: ") + std::strerror(errno));
-  Unpacking unpacking(std::move(in));
-  if (unpacking.empty()) {
+  std::vector<std::uint8_t> packed(ZSTD_DStreamInSize()), room(ZSTD_DStreamOutSize());
+  const auto read = [&] {
+    return ZSTD_inBuffer{packed.data(), std::fread(packed.data(), 1, packed.size(), in.get()), 0};
+  };
+  ZSTD_inBuffer filled = read();
+  if (filled.size == 0) {
     throwUnusable(packed_, "is empty; copy it again from where it was recorded");
   }
-  if (!unpacking.looksPacked()) {
+  if (!looksPacked({packed.data(), filled.size})) {
     throwUnusable(packed_,
                   fmt::format("is not packed by zstd, though its name says so; if it was never "
                               "packed, name it {}",
                               packed_.stem().string()));
   }
-  const std::uint64_t stated = unpacking.size();
+  const auto size = ZSTD_getFrameContentSize(packed.data(), filled.size);
+  const bool known = size != ZSTD_CONTENTSIZE_UNKNOWN && size != ZSTD_CONTENTSIZE_ERROR;
+  const std::uint64_t stated = known ? size : 0;  // of the first frame
   std::error_code unknown;
   const auto space = fs::space(path_.parent_path(), unknown);
   if (!unknown && stated > space.available) throwFull(packed_, path_, stated, 0);
-  OpenFile out(std::fopen(path_.c_str(), "wb"));
+  const OpenFile out(std::fopen(path_.c_str(), "wb"));
   if (!out) throwUnusable(packed_, "cannot be unpacked: " + std::string(std::strerror(errno)));
-  for (auto bytes = unpacking.next(); !bytes.empty(); bytes = unpacking.next()) {
-    const std::size_t written = std::fwrite(bytes.data(), 1, bytes.size(), out.get());
+  const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(),
+                                                                     &ZSTD_freeDCtx);
+  bool whole = false;
+  while (filled.size > 0) {
+    ZSTD_outBuffer step{room.data(), room.size(), 0};
+    const std::size_t before = filled.pos;
+    const std::size_t state = ZSTD_decompressStream(context.get(), &step, &filled);
+    if (ZSTD_isError(state) != 0) {
+      whole = false;
+      break;
+    }
+    if (step.pos > 0 || filled.pos > before) whole = state == 0;
+    const std::size_t written = std::fwrite(room.data(), 1, step.pos, out.get());
     size_ += written;
-    if (written < bytes.size()) throwFull(packed_, path_, stated, size_);
+    if (written < step.pos) throwFull(packed_, path_, stated, size_);
+    if (filled.pos == filled.size && step.pos < step.size) filled = read();
   }
   if (std::fflush(out.get()) != 0) throwFull(packed_, path_, stated, size_);
-  if (!unpacking.whole()) {
+  if (!whole) {
     throwUnusable(packed_, fmt::format("is damaged or cut: {} of it can be unpacked; copy it again "
                                        "from where it was recorded",
                                        sizeOf(size_)));
@@ -184,18 +163,12 @@ bool isPacked(const fs::path& file, std::string_view extension) {
 
 std::vector<fs::path> packedFiles(const fs::path& path, std::string_view extension) {
   std::error_code ignored;
-  std::vector<fs::path> files;
-  if (!fs::is_directory(path, ignored)) {
-    if (isPacked(path, extension)) files.push_back(path);
-    return files;
+  if (fs::is_directory(path, ignored)) {
+    return pathsIn(path, [&](const fs::path& file) {
+      return isPacked(file, extension) && !fs::exists(file.parent_path() / file.stem(), ignored);
+    });
   }
-  for (const auto& entry : fs::directory_iterator(path, ignored)) {
-    const fs::path& file = entry.path();
-    const bool beside = fs::exists(file.parent_path() / file.stem(), ignored);
-    if (isPacked(file, extension) && !beside) files.push_back(file);
-  }
-  std::sort(files.begin(), files.end());
-  return files;
+  return isPacked(path, extension) ? std::vector{path} : std::vector<fs::path>();
 }
 
 UnpackedFiles unpackedFiles(const fs::path& path, std::string_view extension) {

@@ -39,8 +39,7 @@ Trajectory handheldMotion(const std::vector<Look>& looks, double interval_s, dou
   return Trajectory(0.0, interval_s, std::move(controls));
 }
 
-Trajectory handheldMotion(const GroundPath& path, const Drive& drive, const Gaze& gaze,
-                          double height) {
+Trajectory handheldMotion(const GroundPath& path, const Drive& drive, double height) {
   std::vector<Look> looks;
   for (std::size_t i = 0; i < drive.distance.size(); ++i) {
     const double t = drive.interval_s * static_cast<double>(i);
@@ -51,10 +50,9 @@ Trajectory handheldMotion(const GroundPath& path, const Drive& drive, const Gaze
     const auto wave = [&](double period) { return wanders * std::sin(2.0 * M_PI * t / period); };
     Look look;
     look.point = p.position;
-    look.yaw = p.heading + gaze.middle + gaze.swing * wave(gaze.period_s) +
-               gaze.second_swing * wave(gaze.second_period_s);
-    look.pitch_down = gaze.pitch_down + gaze.nod * wave(2.9);
-    look.roll = gaze.tilt * wave(4.3);
+    look.yaw = p.heading + wave(13.0) + 0.18 * wave(4.7);  // to each side
+    look.pitch_down = 0.12 + 0.07 * wave(2.9);
+    look.roll = 0.05 * wave(4.3);
     looks.push_back(look);
   }
   return handheldMotion(looks, drive.interval_s, height);

@@ -100,28 +100,27 @@ void putThingsThatChange(SceneBuilder& builder) {
   builder.mustPut(builder.draw("couch"), {{3.6, 0.4}, M_PI, 0.0});
 }
 
-}  // namespace
-
-Scene makeOcclusion(std::uint64_t seed, const SceneOptions& options) {
-  SceneBuilder builder("occlusion", seed, options);
+Scene makeHiding(SceneBuilder& builder, double by_default, Trajectory (*motion)(double seconds),
+                 void (*putThings)(SceneBuilder& builder)) {
   Room room(builder, 9.0, 7.0);
-  const double seconds = builder.seconds(kOcclusionSeconds);
-  builder.setBody(walkPast(seconds), seconds, 0.42, 2.0);
-  builder.scene().rig = makeRig(Carrier::kHand, options, builder.dice(), 0.0);
-  putHiddenChair(builder);
+  const double seconds = builder.seconds(by_default);
+  builder.setBody(motion(seconds), seconds, 0.42, 2.0);
+  builder.scene().rig = makeRig(Carrier::kHand, builder.options(), builder.dice(), 0.0);
+  putThings(builder);
   room.furnishWalls();
   return builder.take();
 }
 
+}  // namespace
+
+Scene makeOcclusion(std::uint64_t seed, const SceneOptions& options) {
+  SceneBuilder builder("occlusion", seed, options);
+  return makeHiding(builder, kOcclusionSeconds, walkPast, putHiddenChair);
+}
+
 Scene makeVanish(std::uint64_t seed, const SceneOptions& options) {
   SceneBuilder builder("vanish", seed, options);
-  Room room(builder, 9.0, 7.0);
-  const double seconds = builder.seconds(kVanishSeconds);
-  builder.setBody(lookTwice(seconds), seconds, 0.42, 2.0);
-  builder.scene().rig = makeRig(Carrier::kHand, options, builder.dice(), 0.0);
-  putThingsThatChange(builder);
-  room.furnishWalls();
-  return builder.take();
+  return makeHiding(builder, kVanishSeconds, lookTwice, putThingsThatChange);
 }
 
 }  // namespace perdure::sim

@@ -22,8 +22,8 @@ Scene makeRoom(std::uint64_t seed, const SceneOptions& options) {
   const SpeedLimits limits{dice.uniform(0.75, 0.9), 0.6, 0.5, 0.5};
   const Drive walk = drive(way, limits, dice.uniform(0.0, way.length()),
                            std::numeric_limits<double>::infinity(), 1.2, seconds + 2.0);
-  builder.setBody(handheldMotion(way, walk, Gaze{}, kRoomCameraHeight - kCameraAboveBody), seconds,
-                  0.42, 2.0);
+  builder.setBody(handheldMotion(way, walk, kRoomCameraHeight - kCameraAboveBody), seconds, 0.42,
+                  2.0);
   builder.scene().rig = makeRig(Carrier::kHand, options, dice, 0.0);
   room.putTable({dice.uniform(-0.2, 0.2), dice.uniform(-0.1, 0.1)},
                 0.5 * M_PI + dice.uniform(-0.1, 0.1), 4, 2);

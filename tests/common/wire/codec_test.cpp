@@ -130,7 +130,7 @@ TEST(CodecOfKeys, CarryTheKeyOfADisposedObject) {
   ObjectState gone;
   gone.object.id = 42;
   perdure_msg_ObjectState wire;
-  encodeKey(gone, wire, arena);
+  (void)encode(gone, wire, arena);
   EXPECT_EQ(wire.object_id, 42u);
   perdure_msg_ObjectState key_only{};
   key_only.object_id = 43;

@@ -36,17 +36,9 @@ class Room {
   double length_, width_;
 };
 
-/// The gaze of a walking person: oscillates about the direction of the path.
-struct Gaze {
-  double swing = 1.0, period_s = 13.0;  ///< amplitude of the yaw to each side, radians
-  double second_swing = 0.18, second_period_s = 4.7;
-  double middle = 0.0;                                ///< mean direction relative to the path
-  double pitch_down = 0.12, nod = 0.07, tilt = 0.05;  ///< radians
-};
-
-/// The motion of a camera in the hand of a walking person: steps, sway and a wandering gaze.
-Trajectory handheldMotion(const GroundPath& path, const Drive& drive, const Gaze& gaze,
-                          double height);
+/// The motion of a camera in the hand of a walking person: steps, sway and a gaze that oscillates
+/// about the direction of the path.
+Trajectory handheldMotion(const GroundPath& path, const Drive& drive, double height);
 /// One pose per interval, for a person whose path and gaze are given.
 struct Look {
   Eigen::Vector2d point = Eigen::Vector2d::Zero();

@@ -65,8 +65,9 @@ bool Streets::onAnotherRoad(const Road& road, const Solid& solid, double margin)
   });
 }
 
-bool Streets::nearACrossing(const Road& road, const Solid& solid) const {
-  return onAnotherRoad(road, solid, kCrossingClearance);
+void Streets::put(const Road& road, PropKind kind, const Eigen::Vector3d& size,
+                  const Place& place) {
+  if (!onAnotherRoad(road, solidAt(place, size), 0.5)) builder_.put(kind, size, place);
 }
 
 void Streets::furnish() {
@@ -114,9 +115,7 @@ void Streets::closeEnds(const Road& road) {
     const Eigen::Vector2d end = at_end ? road.to : road.from;
     const Eigen::Vector2d point = end + (at_end ? 7.0 : -7.0) * way;
     const Place place{point, wrapAngle(heading + (at_end ? -M_PI_2 : M_PI_2)), 0.0};
-    if (!onAnotherRoad(road, solidAt(place, size), 0.5)) {
-      builder_.put(PropKind::kFacade, size, place);
-    }
+    put(road, PropKind::kFacade, size, place);
   }
 }
 
@@ -134,7 +133,7 @@ void Streets::park(const Road& road, int side) {
     const double length = vehicle.size.x();
     const Place place =
         placeAt(road, side, along + 0.5 * length, across, turned + dice.uniform(-0.03, 0.03));
-    const bool stands = !nearACrossing(road, solidAt(place, vehicle.size)) &&
+    const bool stands = !onAnotherRoad(road, solidAt(place, vehicle.size), kCrossingClearance) &&
                         builder_.put(std::move(vehicle), place, 0.25);
     // Many gaps are small, and few are large.
     const double gap = 0.6 - (furnishing_.mean_gap - 0.6) * std::log(1.0 - dice.unit());
@@ -150,13 +149,13 @@ void Streets::plant(const Road& road, int side) {
     const double crown = dice.uniform(2.2, 3.2);
     const Place place = placeAt(road, side, along, kerb + 0.9, dice.uniform(-M_PI, M_PI));
     const Eigen::Vector3d size(crown, crown, dice.uniform(6.5, 8.5));
-    if (!onAnotherRoad(road, solidAt(place, size), 0.5)) builder_.put(PropKind::kTree, size, place);
+    put(road, PropKind::kTree, size, place);
   }
   for (double along = 6.0; along < lengthOf(road);
        along += dice.uniform(0.8, 1.2) * furnishing_.pole_every) {
     const Place place = placeAt(road, side, along, kerb + 0.45, 0.0);
     const Eigen::Vector3d size(0.16, 0.16, dice.uniform(4.5, 7.0));
-    if (!onAnotherRoad(road, solidAt(place, size), 0.5)) builder_.put(PropKind::kPole, size, place);
+    put(road, PropKind::kPole, size, place);
   }
   for (double along = 3.0; along < lengthOf(road) - 6.0; along += 9.0) {
     if (!dice.chance(furnishing_.hedge_share)) continue;
@@ -166,8 +165,7 @@ void Streets::plant(const Road& road, int side) {
                                dice.uniform(0.7, 1.5));
     const double across = at_kerb ? kerb + 0.55 : kerb + furnishing_.pavement - 0.4;
     const Place place = placeAt(road, side, along + 0.5 * size.x(), across, M_PI);
-    if (!onAnotherRoad(road, solidAt(place, size), 0.5))
-      builder_.put(PropKind::kHedge, size, place);
+    put(road, PropKind::kHedge, size, place);
   }
 }
 

@@ -47,7 +47,8 @@ class Streets {
  private:
   Place placeAt(const Road& road, int side, double along, double across, double yaw) const;
   bool onAnotherRoad(const Road& road, const Solid& solid, double margin) const;
-  bool nearACrossing(const Road& road, const Solid& solid) const;
+  /// Places scenery that does not stand on another road.
+  void put(const Road& road, PropKind kind, const Eigen::Vector3d& size, const Place& place);
   void closeEnds(const Road& road);
 
   SceneBuilder& builder_;

@@ -215,8 +215,8 @@ TEST_F(Mcap, AnEmptyFileIsARecordingWithoutMessages) {
 
 TEST_F(Mcap, MessagesOutsideOfChunksAreReadToo) {
   std::vector<std::uint8_t> bytes(kMagic.begin(), kMagic.end());
-  putSchema(bytes, catalogue.schemas[1]);
-  putChannel(bytes, catalogue.channels[1]);
+  putRecord(bytes, catalogue.schemas[1]);
+  putRecord(bytes, catalogue.channels[1]);
   const std::vector<std::uint8_t> data{1, 2, 3};
   for (std::uint32_t i = 0; i < 3; ++i) putMessage(bytes, {1, i, 10 * i, 0, data});
   write(file, bytes);

@@ -85,15 +85,15 @@ class PackedChunks : public testing::TestWithParam<Packing> {
 
   void write(const Buffer& packed, std::uint64_t size) {
     Buffer bytes(kMagic.begin(), kMagic.end()), chunk;
-    putSchema(bytes, {1, "a", "omgidl", "struct a {};"});
-    putChannel(bytes, {1, 1, "perdure/ego/imu", "cdr"});
+    putRecord(bytes, Schema{1, "a", "omgidl", "struct a {};"});
+    putRecord(bytes, Channel{1, 1, "perdure/ego/imu", "cdr"});
     Put put(chunk);
-    put.number(std::uint64_t{0});
-    put.number(std::uint64_t{kMessages - 1});
-    put.number(size);
-    put.number(crc(records_));
-    put.text(GetParam().compression);
-    put.number(std::uint64_t{packed.size()});
+    put(std::uint64_t{0});
+    put(std::uint64_t{kMessages - 1});
+    put(size);
+    put(crc(records_));
+    put(GetParam().compression);
+    put(std::uint64_t{packed.size()});
     put.bytes(packed);
     Put(bytes).record(Op::kChunk, chunk);
     std::ofstream(file_, std::ios::binary)
