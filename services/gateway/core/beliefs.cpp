@@ -102,54 +102,40 @@ void putClasses(JsonWriter& json, const ObjectBelief& object) {
   json.end(']');
 }
 
-std::string thing(const Event& event) {
-  if (event.object_id == 0) return "";
-  const std::string name = event.class_name.empty() ? "object" : event.class_name;
-  return fmt::format("{} {}", name, event.object_id);
-}
+/// Sentences about events, with fmt's names of sentenceOf().
+constexpr std::pair<EventKind, const char*> kSentences[] = {
+    {EventKind::kBorn, "{what} is seen for the first time"},
+    {EventKind::kConfirmed, "{what} is confirmed ({p:.2f})"},
+    {EventKind::kClassResolved, "object {id} is a {class} ({p:.2f})"},
+    {EventKind::kOccluded, "{what} is hidden{by}"},
+    {EventKind::kLeftView, "{what} has left the view"},
+    {EventKind::kReappeared, "{what} is seen again"},
+    {EventKind::kMerged, "{what} and {other} are one"},
+    {EventKind::kArchived, "{what} is kept on the map only"},
+    {EventKind::kRecalled, "{what} is recalled from the map"},
+    {EventKind::kMissing, "{what} is not where it should be"},
+    {EventKind::kGone, "{what} is gone"},
+    {EventKind::kMoved, "{what} has moved"},
+    {EventKind::kPredictedReturn,
+     "{what} should be seen again in {in:.1f} s ({low:.1f} to {high:.1f})"},
+    {EventKind::kModelChanged, "the network was changed"},
+    {EventKind::kRestored, "the working set was restored"},
+    {EventKind::kLoopClosed, "the map closed a loop"},
+    {EventKind::kLoopWithdrawn, "the map took a loop back"},
+    {EventKind::kRelocalised, "this session is found on the map of before"}};
 
 /// Describes an event in a sentence.
 std::string sentenceOf(const Event& e) {
-  const std::string what = thing(e);
-  const std::string other = e.other_id == 0 ? "" : fmt::format("{}", e.other_id);
-  switch (e.kind) {
-    case EventKind::kBorn:
-      return what + " is seen for the first time";
-    case EventKind::kConfirmed:
-      return fmt::format("{} is confirmed ({:.2f})", what, e.probability);
-    case EventKind::kClassResolved:
-      return fmt::format("object {} is a {} ({:.2f})", e.object_id, e.class_name, e.probability);
-    case EventKind::kOccluded:
-      return what + " is hidden" + (other.empty() ? "" : " by " + other);
-    case EventKind::kLeftView:
-      return what + " has left the view";
-    case EventKind::kReappeared:
-      return what + " is seen again";
-    case EventKind::kMerged:
-      return fmt::format("{} and {} are one", what, e.other_id);
-    case EventKind::kArchived:
-      return what + " is kept on the map only";
-    case EventKind::kRecalled:
-      return what + " is recalled from the map";
-    case EventKind::kMissing:
-      return what + " is not where it should be";
-    case EventKind::kGone:
-      return what + " is gone";
-    case EventKind::kMoved:
-      return what + " has moved";
-    case EventKind::kPredictedReturn:
-      return fmt::format("{} should be seen again in {:.1f} s ({:.1f} to {:.1f})", what,
-                         e.returns_in_s[0], e.returns_in_s[1], e.returns_in_s[2]);
-    case EventKind::kModelChanged:
-      return "the network was changed";
-    case EventKind::kRestored:
-      return "the working set was restored";
-    case EventKind::kLoopClosed:
-      return "the map closed a loop";
-    case EventKind::kLoopWithdrawn:
-      return "the map took a loop back";
-    case EventKind::kRelocalised:
-      return "this session is found on the map of before";
+  const std::string name = e.class_name.empty() ? "object" : e.class_name;
+  const std::string what = e.object_id == 0 ? "" : fmt::format("{} {}", name, e.object_id);
+  const std::string by = e.other_id == 0 ? "" : fmt::format(" by {}", e.other_id);
+  for (const auto& [kind, sentence] : kSentences) {
+    if (kind != e.kind) continue;
+    return fmt::format(fmt::runtime(sentence), fmt::arg("what", what), fmt::arg("by", by),
+                       fmt::arg("id", e.object_id), fmt::arg("class", e.class_name),
+                       fmt::arg("p", e.probability), fmt::arg("other", e.other_id),
+                       fmt::arg("in", e.returns_in_s[0]), fmt::arg("low", e.returns_in_s[1]),
+                       fmt::arg("high", e.returns_in_s[2]));
   }
   return perdure::nameOf(e.kind);
 }
