@@ -185,19 +185,10 @@ void describe(Config& c, config::Fields& fields) {
   fields.expert(false);
 }
 
-/// Each camera needs its own id, so that left and right are not exchanged.
-void requireTwoIds(const CameraConfig& camera) {
-  if (camera.second.empty()) return;
-  if (camera.id.empty()) {
-    throw StartupError(ExitCode::kConfiguration,
-                       "camera.second is given and camera.id is empty; with two cameras name both, "
-                       "as `perdure-capture --list` does.");
-  }
-  if (camera.id == camera.second) {
-    throw StartupError(ExitCode::kConfiguration,
-                       "camera.id and camera.second are the same; name two cameras, as "
-                       "`perdure-capture --list` does, or leave camera.second empty.");
-  }
+namespace {
+
+void refuseIf(bool wrong, const std::string& sentence) {
+  if (wrong) throw StartupError(ExitCode::kConfiguration, sentence);
 }
 
 bool isRotation(const std::vector<double>& rows) {
@@ -208,52 +199,48 @@ bool isRotation(const std::vector<double>& rows) {
          R.determinant() > 0.0;
 }
 
-void requireSource(const Config& config) {
-  const bool live = config.source == "libcamera";
-  if (live && config.rig.empty()) {
-    throw StartupError(ExitCode::kConfiguration,
-                       "source: libcamera needs rig: a file with the lens of the camera, its place "
-                       "on the IMU and the IMU's noise; `perdure calibrate` writes it.");
-  }
-  if (live) requireTwoIds(config.camera);
+void requireSensors(const Config& config) {
+  refuseIf(config.rig.empty(),
+           "source: libcamera needs rig: a file with the lens of the camera, its place "
+           "on the IMU and the IMU's noise; `perdure calibrate` writes it.");
+  // Each camera needs its own id, so that left and right are not exchanged.
+  const std::string &id = config.camera.id, &second = config.camera.second;
+  refuseIf(!second.empty() && id.empty(),
+           "camera.second is given and camera.id is empty; with two cameras name both, "
+           "as `perdure-capture --list` does.");
+  refuseIf(!second.empty() && id == second,
+           "camera.id and camera.second are the same; name two cameras, as "
+           "`perdure-capture --list` does, or leave camera.second empty.");
   const auto& crop = config.camera.crop;
   const bool whole =
       std::all_of(crop.begin(), crop.end(), [](double c) { return c >= 0 && c == std::floor(c); });
-  if (live && !crop.empty() && (crop.size() != 4 || crop[2] < 1 || crop[3] < 1 || !whole)) {
-    throw StartupError(
-        ExitCode::kConfiguration,
-        "camera.crop is not [x, y, width, height] in whole pixels with a width and height "
-        "above 0; give these four, or none.");
-  }
-  if (live && !config.imu.mount.empty() && config.imu.mount.size() != 9) {
-    throw StartupError(ExitCode::kConfiguration,
-                       "imu.mount has " + std::to_string(config.imu.mount.size()) +
-                           " numbers; give the 9 of a rotation, row by row, or none.");
-  }
-  if (live && config.imu.mount.size() == 9 && !isRotation(config.imu.mount)) {
-    throw StartupError(ExitCode::kConfiguration,
-                       "imu.mount is no rotation: rows of length 1 at right angles, and no mirror "
-                       "image; give the 9 numbers of a rotation, row by row, or none.");
-  }
-  if (live && !config.gnss.antenna.empty() && config.gnss.antenna.size() != 3) {
-    throw StartupError(ExitCode::kConfiguration,
-                       "gnss.antenna is not [x, y, z]; give these three in metres, or none.");
-  }
-  if (live && config.speed.source == "gnss" && config.gnss.source == "none") {
-    throw StartupError(ExitCode::kConfiguration,
-                       "speed.source: gnss needs a receiver: set gnss.source to gpsd or nmea.");
-  }
-  if (live && config.speed.source == "udp" && config.gnss.source == "nmea" &&
-      config.speed.address == addressOf(config.gnss)) {
-    throw StartupError(ExitCode::kConfiguration,
-                       "speed.address and gnss.address are the same, and one of them would hear "
-                       "nothing; set speed.source: gnss, which takes both from one receiver.");
-  }
-  if (!live && config.dataset.path.empty()) {
-    throw StartupError(ExitCode::kConfiguration,
-                       "No drive is configured; set dataset.path to a folder in EuRoC, KITTI raw "
-                       "or KITTI tracking layout, or to a recording (.mcap).");
-  }
+  refuseIf(!crop.empty() && (crop.size() != 4 || crop[2] < 1 || crop[3] < 1 || !whole),
+           "camera.crop is not [x, y, width, height] in whole pixels with a width and height "
+           "above 0; give these four, or none.");
+  const auto& mount = config.imu.mount;
+  refuseIf(!mount.empty() && mount.size() != 9,
+           "imu.mount has " + std::to_string(mount.size()) +
+               " numbers; give the 9 of a rotation, row by row, or none.");
+  refuseIf(!mount.empty() && !isRotation(mount),
+           "imu.mount is no rotation: rows of length 1 at right angles, and no mirror "
+           "image; give the 9 numbers of a rotation, row by row, or none.");
+  refuseIf(!config.gnss.antenna.empty() && config.gnss.antenna.size() != 3,
+           "gnss.antenna is not [x, y, z]; give these three in metres, or none.");
+  refuseIf(config.speed.source == "gnss" && config.gnss.source == "none",
+           "speed.source: gnss needs a receiver: set gnss.source to gpsd or nmea.");
+  refuseIf(config.speed.source == "udp" && config.gnss.source == "nmea" &&
+               config.speed.address == addressOf(config.gnss),
+           "speed.address and gnss.address are the same, and one of them would hear "
+           "nothing; set speed.source: gnss, which takes both from one receiver.");
+}
+
+}  // namespace
+
+void requireSource(const Config& config) {
+  if (config.source == "libcamera") return requireSensors(config);
+  refuseIf(config.dataset.path.empty(),
+           "No drive is configured; set dataset.path to a folder in EuRoC, KITTI raw "
+           "or KITTI tracking layout, or to a recording (.mcap).");
 }
 
 }  // namespace perdure::capture

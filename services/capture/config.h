@@ -41,13 +41,16 @@ struct RunConfig {
 };
 
 struct CameraConfig {
-  std::string id, second;  ///< ids of cam0 and cam1; if `second` is empty, there is one camera
-  std::string format = "auto";
-  double rate_hz = 20.0, exposure_ms = 0.0, gain = 0.0;
-  std::string flip = "none";
-  std::string focus = "as_is";
-  double lens_dioptres = 0.0;  ///< lens position for camera.focus: manual
-  std::vector<double> crop;    ///< empty, or 4 values: x, y, width, height on the sensor
+  /// libcamera's ids of cam0 and cam1, or parts of them. If `id` is empty, the first camera is
+  /// used; if `second` is empty, there is one camera.
+  std::string id, second;
+  std::string format = "auto";  ///< libcamera's name, for example "YUYV"; auto: the best available
+  double rate_hz = 20.0;
+  double exposure_ms = 0.0, gain = 0.0;  ///< 0: automatic
+  std::string flip = "none";             ///< none, horizontal, vertical, both
+  std::string focus = "as_is";           ///< as_is, auto, or manual (at lens_dioptres)
+  double lens_dioptres = 0.0;            ///< 1/m; 0: infinity
+  std::vector<double> crop;              ///< x, y, width, height, pixels of the sensor; empty: all
 };
 
 struct ImuConfig {

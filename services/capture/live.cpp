@@ -36,20 +36,12 @@ Calibration rigOf(const Config& config, InstanceId source, std::string& unused) 
 }
 
 CameraSettings cameraSettings(const Config& config, const CameraCalibration& camera) {
-  CameraSettings settings;
+  CameraSettings settings{config.camera};
   const bool second = camera.name == cameraName(1);
-  settings.id = second ? config.camera.second : config.camera.id;
+  if (second) settings.id = config.camera.second;
   settings.id_alone = camerasOf(config) > 1;
   settings.width = camera.width;
   settings.height = camera.height;
-  settings.format = config.camera.format;
-  settings.rate_hz = config.camera.rate_hz;
-  settings.exposure_ms = config.camera.exposure_ms;
-  settings.gain = config.camera.gain;
-  settings.focus = config.camera.focus;
-  settings.lens_dioptres = config.camera.lens_dioptres;
-  settings.flip = config.camera.flip;
-  settings.crop = config.camera.crop;
   settings.readout_s = camera.readout_s;
   settings.encoding = second ? config.image.cam1 : config.image.cam0;
   if (config.image.compress == "jpeg")

@@ -1,6 +1,8 @@
 // perdure-gateway: publishes the data of the bus for browsers, Foxglove and Prometheus.
+#include <algorithm>
 #include <chrono>
 #include <functional>
+#include <list>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -9,19 +11,14 @@
 
 #include "common/bus/discovery.h"
 #include "common/bus/topics.h"
-#include "common/service/service.h"
+#include "common/service/on_demand.h"
 #include "common/wire/cdr.h"
 #include "services/gateway/node.h"
-#include "services/gateway/readers.h"
 #include "services/gateway/web/server.h"
 
 namespace {
 
 using namespace perdure;
-using gateway::BytesOnDemand;
-using gateway::NewestOfBefore;
-using gateway::OnDemand;
-using gateway::ReaderOnDemand;
 namespace web = gateway::web;
 
 std::int64_t monotonicNs() {
@@ -105,72 +102,120 @@ class Beginning {
   std::int64_t until_ns_ = 0;
 };
 
-/// Reads objects and their related topics, which nearly all channels use.
-void listenToObjects(service::Context& context, gateway::Node& node, Beginning& beginning,
-                     const gateway::Config& config,
-                     std::vector<std::unique_ptr<OnDemand>>& readers) {
-  gateway::Channels all;
-  for (const auto& channel : gateway::channelTable(config.cameras)) all.insert(channel.id);
-  readers.push_back(std::make_unique<NewestOfBefore<Objects>>(context, bus::kTopic<Objects>, all,
-                                                              [&](const Objects& m) {
-                                                                node.onObjectsOfBefore(m);
-                                                                beginning.heard();
-                                                              }));
-  readers.push_back(std::make_unique<ReaderOnDemand<Odometry>>(
-      context, bus::kTopic<Odometry>, all,
-      [&](const Odometry& m) { node.onOdometry(m, monotonicNs()); }));
-  readers.push_back(std::make_unique<ReaderOnDemand<Objects>>(context, bus::kTopic<Objects>, all,
-                                                              [&](const Objects& m) {
-                                                                context.health().frameIn();
-                                                                node.onObjects(m, monotonicNs());
-                                                                context.health().frameOut();
-                                                                beginning.heard();
-                                                              }));
-}
-
-std::vector<std::unique_ptr<OnDemand>> listenOnDemand(service::Context& context,
-                                                      gateway::Node& node, Beginning& beginning,
-                                                      const gateway::Config& config) {
-  using namespace gateway;
-  std::vector<std::unique_ptr<OnDemand>> readers;
-  Channels for_detections{kDetections};
-  for (std::size_t i = 0; i < config.cameras.size(); ++i) {
-    for_detections.insert(cameraChannel(i, kAnnotations));
-    for_detections.insert(cameraChannel(i, kLikelihood));
-    readers.push_back(std::make_unique<ReaderOnDemand<Frame>>(
-        context, bus::frameTopic(config.cameras[i]), Channels{cameraChannel(i, kImage)},
-        [&node, i](const Frame& m) { node.onFrame(i, m); }));
-    readers.push_back(std::make_unique<NewestOfBefore<Frame>>(
-        context, bus::frameTopic(config.cameras[i]), Channels{cameraChannel(i, kImage)},
-        [&node, &beginning, i](const Frame& m) {
-          beginning.afterwards([&node, i, m] { node.onFrameOfBefore(i, m); });
-        }));
+/// Readers that are open while viewers need them.
+class Readers {
+ public:
+  Readers(service::Context& context, gateway::Node& node, Beginning& beginning, web::Server& server,
+          const gateway::Config& config)
+      : context_(context), node_(node), beginning_(beginning) {
+    listenToCameras(config);
+    add(bus::kTopic<Landmarks>, {gateway::kLandmarks},
+        [this](const Landmarks& m) { node_.onLandmarks(m); });
+    add(
+        bus::kTopic<MapTile>, {gateway::kMap, gateway::kMapScene},
+        [this](const MapTile& m) { node_.onMapTile(m); },
+        [this](const MapTile& key) { node_.onMapTileGone(key); });
+    listenToObjects(config);
+    listenToRaw(server);
   }
-  readers.push_back(std::make_unique<ReaderOnDemand<Detections>>(
-      context, bus::kTopic<Detections>, for_detections,
-      [&](const Detections& m) { node.onDetections(m); }));
-  readers.push_back(std::make_unique<ReaderOnDemand<Landmarks>>(
-      context, bus::kTopic<Landmarks>, Channels{kLandmarks},
-      [&](const Landmarks& m) { node.onLandmarks(m); }));
-  readers.push_back(std::make_unique<ReaderOnDemand<MapTile>>(
-      context, bus::kTopic<MapTile>, Channels{kMap, kMapScene},
-      [&](const MapTile& m) { node.onMapTile(m); },
-      [&](const MapTile& key) { node.onMapTileGone(key); }));
-  return readers;
-}
+  /// Sets the channels that clients view, and opens or closes the readers.
+  void follow(const gateway::Channels& wanted) {
+    wanted_ = wanted;
+    follow();
+  }
+  void follow() {
+    for (service::OnDemand& reader : readers_) reader.follow();
+  }
 
-void listenToRaw(service::Context& context, web::Server& server,
-                 std::vector<std::unique_ptr<OnDemand>>& readers) {
-  std::uint32_t id = gateway::kRaw;
-  for (const char* topic : kRawTopics) {
-    readers.push_back(std::make_unique<BytesOnDemand>(
-        context, topic, gateway::Channels{id}, [&server, id](const bus::CdrMessage& m) {
+ private:
+  service::OnDemand::Wanted any(gateway::Channels channels) const {
+    return [this, channels = std::move(channels)] {
+      return std::any_of(channels.begin(), channels.end(),
+                         [this](std::uint32_t channel) { return wanted_.contains(channel); });
+    };
+  }
+  template <class T>
+  void add(const bus::Topic<T>& topic, gateway::Channels channels,
+           std::type_identity_t<Sink<T>> handler, std::type_identity_t<Sink<T>> on_gone = {}) {
+    readers_.emplace_back(context_, topic, any(std::move(channels)), std::move(handler),
+                          std::move(on_gone));
+  }
+  /// Delivers the newest earlier message, which writers store (bus::Qos::kept), to new viewers. The
+  /// reader is closed after the first message. From writers without stored messages, it receives
+  /// none.
+  template <class T>
+  void addNewestOfBefore(const bus::Topic<T>& topic, gateway::Channels channels,
+                         std::type_identity_t<Sink<T>> handler) {
+    const auto heard = std::make_shared<bool>(false);
+    readers_.emplace_back(
+        context_,
+        [heard, viewed = any(std::move(channels))] {
+          if (!viewed()) *heard = false;
+          return viewed() && !*heard;
+        },
+        [this, topic, heard, handler = std::move(handler)] {
+          auto reader =
+              std::make_shared<bus::Reader<T>>(context_.participant(), topic, bus::ReadFrom::kKept);
+          context_.loop().on(*reader, [this, heard, handler](const T& message) {
+            if (!std::exchange(*heard, true)) handler(message);
+            context_.loop().wake();  // a reader must not be closed while messages are delivered
+          });
+          return reader;
+        });
+  }
+  void listenToCameras(const gateway::Config& config) {
+    using namespace gateway;
+    Channels for_detections{kDetections};
+    for (std::size_t i = 0; i < config.cameras.size(); ++i) {
+      for_detections.insert(cameraChannel(i, kAnnotations));
+      for_detections.insert(cameraChannel(i, kLikelihood));
+      const auto topic = bus::frameTopic(config.cameras[i]);
+      add(topic, {cameraChannel(i, kImage)}, [this, i](const Frame& m) { node_.onFrame(i, m); });
+      addNewestOfBefore(topic, {cameraChannel(i, kImage)}, [this, i](const Frame& m) {
+        beginning_.afterwards([this, i, m] { node_.onFrameOfBefore(i, m); });
+      });
+    }
+    add(bus::kTopic<Detections>, for_detections,
+        [this](const Detections& m) { node_.onDetections(m); });
+  }
+  /// Reads objects and their related topics, which nearly all channels use.
+  void listenToObjects(const gateway::Config& config) {
+    gateway::Channels all;
+    for (const auto& channel : gateway::channelTable(config.cameras)) all.insert(channel.id);
+    addNewestOfBefore(bus::kTopic<Objects>, all, [this](const Objects& m) {
+      node_.onObjectsOfBefore(m);
+      beginning_.heard();
+    });
+    add(bus::kTopic<Odometry>, all,
+        [this](const Odometry& m) { node_.onOdometry(m, monotonicNs()); });
+    add(bus::kTopic<Objects>, all, [this](const Objects& m) {
+      context_.health().frameIn();
+      node_.onObjects(m, monotonicNs());
+      context_.health().frameOut();
+      beginning_.heard();
+    });
+  }
+  void listenToRaw(web::Server& server) {
+    std::uint32_t id = gateway::kRaw;
+    for (const char* topic : kRawTopics) {
+      readers_.emplace_back(context_, any({id}), [this, &server, topic, id] {
+        auto reader = std::make_shared<bus::CdrReader>(context_.participant(), topic);
+        context_.loop().on(*reader, [&server, id](const bus::CdrMessage& m) {
           server.publish({id, fromNanoseconds(m.written_ns),
                           std::make_shared<const std::string>(m.bytes.begin(), m.bytes.end())});
-        }));
-    ++id;
+        });
+        return reader;
+      });
+      ++id;
+    }
   }
-}
+
+  service::Context& context_;
+  gateway::Node& node_;
+  Beginning& beginning_;
+  gateway::Channels wanted_;
+  std::list<service::OnDemand> readers_;
+};
 
 /// Services whose work another program does: the bridge to ROS 2, or a custom driver.
 std::map<std::string, std::string> standIns(const bus::Participant& participant,
@@ -237,10 +282,7 @@ void serve(service::Context& context, const gateway::Config& config, const std::
                       .query = [&](const MapQuery& query) { (void)questions.write(query); }});
   listenAlways(context, node);
   Beginning beginning(node);
-  auto readers = listenOnDemand(context, node, beginning, config);
-  listenToObjects(context, node, beginning, config, readers);
-  listenToRaw(context, server, readers);
-  gateway::Channels followed;
+  Readers readers(context, node, beginning, server, config);
   context.loop().onWake([&] {
     std::vector<gateway::Channels> changes;
     std::vector<gateway::Call> calls;
@@ -251,12 +293,9 @@ void serve(service::Context& context, const gateway::Config& config, const std::
     }
     for (const gateway::Channels& wanted : changes) {
       beginning.setWanted(wanted, monotonicNs());
-      for (const auto& reader : readers) reader->follow(wanted);
-      followed = wanted;
+      readers.follow(wanted);
     }
-    if (changes.empty()) {
-      for (const auto& reader : readers) reader->follow(followed);
-    }
+    if (changes.empty()) readers.follow();
     for (const gateway::Call& call : calls) node.onCall(call, monotonicNs());
   });
   context.loop().every(

@@ -34,8 +34,15 @@ bool Node::Pace::due(TimePoint time) {
   return true;
 }
 
-void Node::send(std::uint32_t channel, std::string payload) {
-  outputs_.message({channel, time_, std::make_shared<const std::string>(std::move(payload))});
+void Node::send(std::uint32_t channel, std::string payload, std::optional<TimePoint> time) {
+  outputs_.message(
+      {channel, time.value_or(time_), std::make_shared<const std::string>(std::move(payload))});
+}
+
+void Node::sendWanted(std::initializer_list<std::uint32_t> channels) {
+  for (const std::uint32_t channel : channels) {
+    if (wants(channel)) sendNow(channel);
+  }
 }
 
 void Node::newest(TimePoint time) {
@@ -44,14 +51,10 @@ void Node::newest(TimePoint time) {
   if (!wanted_.empty()) outputs_.time(time);
 }
 
-RigidTransform Node::pose() const {
-  if (odometry_) return odometry_->T_WB;
-  return objects_ ? objects_->T_WB : RigidTransform();
-}
-
-WorldId Node::world() const {
-  if (odometry_) return odometry_->world;
-  return objects_ ? objects_->world : WorldId{};
+std::optional<Node::Body> Node::body() const {
+  if (odometry_) return Body{odometry_->stamp.time, odometry_->world, odometry_->T_WB};
+  if (objects_) return Body{objects_->stamp.time, objects_->world, objects_->T_WB};
+  return std::nullopt;
 }
 
 void Node::setWanted(const Channels& wanted) {
@@ -68,14 +71,11 @@ void Node::setWanted(const Channels& wanted) {
 
 /// Sends the current state to the first viewer.
 void Node::sendNow(std::uint32_t channel) {
-  const bool placed = odometry_ || objects_;
   switch (channel) {
     case kTransforms:
-      if (placed) {
-        send(kTransforms, frameTransforms(time_, map_.T_MW(world()), pose(),
-                                          calibration_ ? &*calibration_ : nullptr));
-      }
-      return;
+      if (!body()) return;
+      return send(kTransforms, frameTransforms(time_, map_.T_MW(world()), pose(),
+                                               calibration_ ? &*calibration_ : nullptr));
     case kMapToOdom:
       if (const MapFrame* frame = map_.frameOf(world())) send(kMapToOdom, mapFrameJson(*frame));
       return;
@@ -89,7 +89,7 @@ void Node::sendNow(std::uint32_t channel) {
       if (graph_) sendGraph(channel);
       return;
     case kPose:
-      if (placed) send(kPose, poseInFrame(time_, pose()));
+      if (body()) send(kPose, poseInFrame(time_, pose()));
       return;
     case kTrajectory:
       if (trajectory_.size() > 0) send(kTrajectory, trajectory_.posesInFrame());
@@ -133,8 +133,7 @@ void Node::onCalibration(const Calibration& calibration) {
     cameras_[i].reset();
     if (camera == nullptr) continue;
     cameras_[i].emplace(*camera);
-    const std::uint32_t channel = cameraChannel(i, kCalibration);
-    if (wants(channel)) send(channel, cameraCalibration(*camera, time_));
+    sendWanted({cameraChannel(i, kCalibration)});
   }
 }
 
@@ -143,9 +142,8 @@ void Node::onFrame(std::size_t camera, const Frame& frame) {
   if (!wants(channel) || !image_pace_[camera].due(frame.stamp.time)) return;
   const auto jpeg = vision::compressed(frame, static_cast<int>(config_.image_quality));
   if (!jpeg) return reasons_.add("image_" + jpeg.error().code);
-  outputs_.message({channel, frame.stamp.time,
-                    std::make_shared<const std::string>(
-                        compressedImage(frame.stamp, config_.cameras[camera], *jpeg->data))});
+  send(channel, compressedImage(frame.stamp, config_.cameras[camera], *jpeg->data),
+       frame.stamp.time);
 }
 
 /// Ignored if a live frame is newer.
@@ -164,11 +162,12 @@ void Node::onOdometry(const Odometry& odometry, std::int64_t now_ns) {
   placeEvents();
   newest(odometry.stamp.time);
   trajectory_.add(odometry.stamp.time, odometry.world, odometry.T_WB);
-  if (!pose_pace_.due(odometry.stamp.time)) return;
-  for (const std::uint32_t channel : {kTransforms, kPose}) {
-    if (wants(channel)) sendNow(channel);
-  }
-  if (wants(kTrajectory) && trajectory_pace_.due(odometry.stamp.time)) sendNow(kTrajectory);
+  if (pose_pace_.due(odometry.stamp.time)) sendPose(odometry.stamp.time);
+}
+
+void Node::sendPose(TimePoint time) {
+  sendWanted({kTransforms, kPose});
+  if (wants(kTrajectory) && trajectory_pace_.due(time)) sendNow(kTrajectory);
 }
 
 void Node::onLandmarks(const Landmarks& landmarks) {
@@ -189,7 +188,7 @@ void Node::onDetections(const Detections& detections) {
 
 void Node::onModel(const ModelInfo& model) {
   model_ = model;
-  if (wants(kModel)) sendNow(kModel);
+  sendWanted({kModel});
 }
 
 /// After a time without viewers, trajectory and histories begin at the next viewer.
@@ -236,15 +235,9 @@ void Node::take(const Objects& objects) {
 }
 
 void Node::sendObjects() {
-  for (const std::uint32_t channel : {kObjects, kScene}) {
-    if (wants(channel)) sendNow(channel);
-  }
+  sendWanted({kObjects, kScene});
   for (std::size_t i = 0; i < config_.cameras.size(); ++i) sendAnnotations(i, false);
-  if (odometry_) return;  // odometry messages already send these channels
-  for (const std::uint32_t channel : {kTransforms, kPose}) {
-    if (wants(channel)) sendNow(channel);
-  }
-  if (wants(kTrajectory) && trajectory_pace_.due(objects_->stamp.time)) sendNow(kTrajectory);
+  if (!odometry_) sendPose(objects_->stamp.time);  // otherwise odometry messages send it
 }
 
 /// The detections of a frame may arrive after the objects, so the annotations wait for them.
@@ -264,16 +257,14 @@ void Node::sendAnnotations(std::size_t camera, bool now) {
     return;
   }
   const Detections* detections = same ? &found->second : nullptr;
-  const auto say = [&](CameraPart part, std::string payload) {
-    outputs_.message({cameraChannel(camera, part), objects_->stamp.time,
-                      std::make_shared<const std::string>(std::move(payload))});
-  };
   if (wants(cameraChannel(camera, kAnnotations)))
-    say(kAnnotations, imageAnnotations(*objects_, *cameras_[camera], detections));
+    send(cameraChannel(camera, kAnnotations),
+         imageAnnotations(*objects_, *cameras_[camera], detections), objects_->stamp.time);
   // Without received detections, the likelihood is not known.
   if (wants(cameraChannel(camera, kLikelihood)) && found != detections_.end())
-    say(kLikelihood,
-        likelihoodRegions(*objects_, *cameras_[camera], detections, model_ ? &*model_ : nullptr));
+    send(cameraChannel(camera, kLikelihood),
+         likelihoodRegions(*objects_, *cameras_[camera], detections, model_ ? &*model_ : nullptr),
+         objects_->stamp.time);
 }
 
 void Node::sendAwaited() {
@@ -283,9 +274,7 @@ void Node::sendAwaited() {
 void Node::onMapFrame(const MapFrame& frame) {
   map_.follow(frame);
   graph_pace_.changed();
-  for (const std::uint32_t channel : {kMapToOdom, kTransforms}) {
-    if (wants(channel)) sendNow(channel);
-  }
+  sendWanted({kMapToOdom, kTransforms});
 }
 
 std::size_t Node::sendMap() {

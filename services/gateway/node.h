@@ -87,12 +87,15 @@ class Node {
   };
 
   bool wants(std::uint32_t channel) const { return wanted_.contains(channel); }
-  void send(std::uint32_t channel, std::string payload);
+  /// `time`: by default, that of the newest message.
+  void send(std::uint32_t channel, std::string payload, std::optional<TimePoint> time = {});
+  void sendWanted(std::initializer_list<std::uint32_t> channels);
   void sendNow(std::uint32_t channel);
   void sendNow(std::size_t camera, std::uint32_t channel);
   void take(const Objects& objects);
   void beginAnew(TimePoint time);
   void sendObjects();
+  void sendPose(TimePoint time);
   void sendAnnotations(std::size_t camera, bool now);
   void sendAwaited();
   struct Happened {
@@ -101,7 +104,6 @@ class Node {
   };
   void sendEvent(const Happened& happened, bool as_log);
   std::optional<Eigen::Vector3d> placeOf(const Event& event) const;
-  std::optional<TimePoint> timeOfPose() const;
   void placeEvents();
   bool wantsTiles() const { return wants(kMap) || wants(kMapScene); }
   std::size_t sendMap();  ///< number of objects sent
@@ -113,12 +115,20 @@ class Node {
   void sendGraph(std::uint32_t channel);
   void noteReturns(const Event& event);
   void newest(TimePoint time);
-  RigidTransform pose() const;
-  WorldId world() const;  ///< the current W
+  /// Newest pose of the body, from odometry or else from objects.
+  struct Body {
+    TimePoint time;
+    WorldId world;
+    RigidTransform T_WB;
+  };
+  std::optional<Body> body() const;
+  RigidTransform pose() const { return body().value_or(Body{}).T_WB; }
+  WorldId world() const { return body().value_or(Body{}).world; }  ///< the current W
   void ask(const Call& call, MapQuery query, std::int64_t now_ns);
   void askForObject(const Call& call, std::int64_t now_ns);
   void askForMap(const Call& call, std::int64_t now_ns);
   void fail(const Call& call, const std::string& sentence);
+  void answer(const Call& call, std::string payload, bool ok = true);
 
   const Config config_;
   const InstanceId instance_;

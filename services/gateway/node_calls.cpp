@@ -74,7 +74,11 @@ void Node::fail(const Call& call, const std::string& sentence) {
     graph_pace_.refused(ticked_ns_);
     return onNoGraph(sentence);
   }
-  outputs_.answer({call.client, call.service, call.call, false, sentence});
+  answer(call, sentence, false);
+}
+
+void Node::answer(const Call& call, std::string payload, bool ok) {
+  outputs_.answer({call.client, call.service, call.call, ok, std::move(payload)});
 }
 
 void Node::onCall(const Call& call, std::int64_t now_ns) {
@@ -95,9 +99,7 @@ void Node::askForObject(const Call& call, std::int64_t now_ns) {
       const auto returns = returns_.find(*id);
       const auto found =
           returns == returns_.end() ? std::optional<Event>() : std::optional(returns->second);
-      outputs_.answer({call.client, call.service, call.call, true,
-                       objectInFull(object, found, history_.of(*id))});
-      return;
+      return answer(call, objectInFull(object, found, history_.of(*id)));
     }
   }
   MapQuery query;
@@ -139,14 +141,12 @@ void Node::onMapReply(const MapReply& reply) {
     return onMapGraph(reply);
   }
   if (call.service == kMapQueryService) {
-    outputs_.answer(
-        {call.client, call.service, call.call, true, mapReplyJson(reply, map_.mapOf(world()))});
+    answer(call, mapReplyJson(reply, map_.mapOf(world())));
   } else if (reply.beliefs.empty() || reply.beliefs.front().classes.empty()) {
-    outputs_.answer({call.client, call.service, call.call, true, R"({"found":false})"});
+    answer(call, R"({"found":false})");
   } else {
     const ObjectBelief& object = reply.beliefs.front();
-    outputs_.answer({call.client, call.service, call.call, true,
-                     objectInFull(object, std::nullopt, history_.of(object.id))});
+    answer(call, objectInFull(object, std::nullopt, history_.of(object.id)));
   }
 }
 

@@ -31,22 +31,18 @@ void Node::placeEvents() {
   for (Happened& happened : events_) {
     if (happened.event.object_id != 0 || happened.place) continue;
     happened.place = placeOf(happened.event);
-    unplaced_ = unplaced_ || (!happened.place && happened.event.stamp.time >= timeOfPose());
+    unplaced_ = unplaced_ || (!happened.place && happened.event.stamp.time >= body()->time);
   }
-}
-
-std::optional<TimePoint> Node::timeOfPose() const {
-  if (odometry_) return odometry_->stamp.time;
-  return objects_ ? std::optional(objects_->stamp.time) : std::nullopt;
 }
 
 /// Position of an object's event: the estimate of the object. Position of an event of the whole
 /// map: the vehicle at that time.
 std::optional<Eigen::Vector3d> Node::placeOf(const Event& event) const {
-  if (event.world != world() || !(odometry_ || objects_)) return std::nullopt;
+  const auto now = body();
+  if (!now || event.world != now->world) return std::nullopt;
   if (event.object_id == 0) {
-    const TimePoint then = event.stamp.time, known = *timeOfPose();
-    return then < known + kThen && known < then + kThen ? std::optional(pose().p) : std::nullopt;
+    const TimePoint then = event.stamp.time, known = now->time;
+    return then < known + kThen && known < then + kThen ? std::optional(now->T_WB.p) : std::nullopt;
   }
   if (!objects_) return std::nullopt;
   for (const ObjectBelief& object : objects_->objects) {
@@ -58,9 +54,8 @@ std::optional<Eigen::Vector3d> Node::placeOf(const Event& event) const {
 void Node::sendEvent(const Happened& happened, bool as_log) {
   const Event& event = happened.event;
   const auto place = happened.place ? happened.place : placeOf(event);
-  outputs_.message(
-      {as_log ? kLog : kEvents, event.stamp.time,
-       std::make_shared<const std::string>(as_log ? eventLog(event) : eventJson(event, place))});
+  send(as_log ? kLog : kEvents, as_log ? eventLog(event) : eventJson(event, place),
+       event.stamp.time);
 }
 
 /// A prediction is valid until the object is detected again or removed.

@@ -25,9 +25,7 @@ void Node::followGraph(std::int64_t now_ns) {
 void Node::onMapGraph(const MapReply& reply) {
   graph_ = reply;
   why_no_graph_ = reply.anchors.empty() ? "The map has no anchors yet." : "";
-  for (const std::uint32_t channel : {kMapGraph, kMapGraphScene}) {
-    if (wants(channel)) sendGraph(channel);
-  }
+  sendWanted({kMapGraph, kMapGraphScene});
 }
 
 /// The known graph stays, because a recording has it without a map store.

@@ -49,13 +49,7 @@ class JsonReader {
   }
 
   void positiveInteger(const std::string& key, int& target) {
-    const Json* value = need(key);
-    if (!value) return;
-    if (!value->is_number_integer() || value->get<std::int64_t>() < 1 ||
-        value->get<std::int64_t>() > 8192) {
-      return complain(key, "is not an integer from 1 to 8192");
-    }
-    target = value->get<int>();
+    if (need(key)) integer(key, target, 1, 8192);
   }
 
   /// The target does not change if the key is absent.

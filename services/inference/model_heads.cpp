@@ -6,6 +6,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "services/inference/core/network/tensors.h"
+
 namespace perdure::inference {
 
 std::vector<std::string> linesOf(const ListFile& list, JsonReader& reader) {
@@ -153,37 +155,16 @@ std::vector<std::pair<double, double>> anchorsOf(JsonReader& reader) {
   return found;
 }
 
-void readTensors(JsonReader& reader, ModelDescription& model, Level& level) {
-  switch (model.family) {
-    case Family::kYoloFastest:
-    case Family::kYolov5:
-      level.tensor = reader.text("tensor", true);
-      level.anchors = anchorsOf(reader);
-      break;
-    case Family::kYoloFastestV2:
-      level.box = reader.text("box", true);
-      level.objectness = reader.text("objectness", true);
-      level.classes = reader.text("classes", true);
-      level.anchors = anchorsOf(reader);
-      break;
-    case Family::kYolov8:
-    case Family::kNanoDet:
-      level.tensor = reader.text("tensor", false);
-      if (level.tensor.empty()) {
-        level.box = reader.text("box", true);
-        level.classes = reader.text("classes", true);
-      }
-      break;
-    case Family::kPerdure:
-      level.box = reader.text("box", true);
-      level.logits = reader.text("logits", true);
-      if (model.azimuth.bins > 0) level.azimuth = reader.text("azimuth", true);
-      if (model.spread_scale > 0) level.spread = reader.text("spread", true);
-      break;
-    default:
-      level.box = reader.text("box", true);
-      level.objectness = reader.text("objectness", true);
-      level.classes = reader.text("classes", true);
+void readTensors(JsonReader& reader, const ModelDescription& model, Level& level) {
+  if (model.family == Family::kYolov8 || model.family == Family::kNanoDet) {
+    level.tensor = reader.text("tensor", false);
+  }
+  for (const LevelTensor& tensor : levelTensors(model, level)) {
+    level.*tensor.name = reader.text(tensor.key, true);
+  }
+  if (model.family == Family::kYoloFastest || model.family == Family::kYolov5 ||
+      model.family == Family::kYoloFastestV2) {
+    level.anchors = anchorsOf(reader);
   }
 }
 

@@ -143,7 +143,7 @@ void Worker::noteFailure(const Reason& reason) {
     adoptStrength(now);
     bus_.detections.release();  // the next result, which would inform readers, may be far off
   }
-  swap_.ownFailure(reason, now);
+  swap_.ownFailure(reason);
   obey();
 }
 

@@ -2,6 +2,7 @@
 // libraries.
 #include <chrono>
 #include <functional>
+#include <list>
 #include <memory>
 #include <set>
 #include <vector>
@@ -9,7 +10,7 @@
 #include "common/bus/topics.h"
 #include "common/replay/files/rig_file.h"
 #include "common/ros/bytes.h"
-#include "common/service/service.h"
+#include "common/service/on_demand.h"
 #include "common/vision/jpeg.h"
 #include "services/ros2/node.h"
 #include "services/ros2/ros_side.h"
@@ -21,48 +22,6 @@ using namespace perdure;
 std::int64_t monotonicNs() {
   return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
 }
-
-/// A reader of the bus that exists only while ROS has readers of its output.
-class Follower {
- public:
-  virtual ~Follower() = default;
-  virtual void follow() = 0;
-};
-
-template <class T>
-class FollowerOf : public Follower {
- public:
-  FollowerOf(service::Context& context, bus::Topic<T> topic, std::function<bool()> wanted,
-             Sink<T> handler)
-      : context_(context),
-        topic_(std::move(topic)),
-        wanted_(std::move(wanted)),
-        handler_(std::move(handler)) {
-    context.countReasons([this](ReasonCounts& counts) {
-      for (const auto& [reason, n] : before_.all()) counts.add(reason, n);
-      if (reader_) reader_->report(counts);
-    });
-  }
-  void follow() override {
-    if (wanted_() == (reader_ != nullptr)) return;
-    if (reader_) {
-      reader_->report(before_);
-      context_.loop().off(*reader_);
-      reader_.reset();
-      return;
-    }
-    reader_ = std::make_unique<bus::Reader<T>>(context_.participant(), topic_);
-    context_.loop().on(*reader_, handler_);
-  }
-
- private:
-  service::Context& context_;
-  const bus::Topic<T> topic_;
-  const std::function<bool()> wanted_;
-  const Sink<T> handler_;
-  std::unique_ptr<bus::Reader<T>> reader_;
-  ReasonCounts before_;
-};
 
 /// Output side: publishes the data of the bus in ROS.
 class Outwards {
@@ -81,7 +40,7 @@ class Outwards {
     listenAlways();
     followWhatIsWanted();
     context.loop().onWake([this] {
-      for (const auto& one : followers_) one->follow();
+      for (auto& one : followers_) one.follow();
     });
     context.every(std::chrono::milliseconds(200), [this] { context_.loop().wake(); });
     context.countReasons([this]() -> const ReasonCounts& { return reasons_; });
@@ -102,13 +61,13 @@ class Outwards {
 
   template <class T>
   void add(const bus::Topic<T>& topic, std::vector<std::string> outlets, Sink<T> handler) {
-    followers_.push_back(std::make_unique<FollowerOf<T>>(
+    followers_.emplace_back(
         context_, topic,
         [this, outlets = std::move(outlets)] {
           return std::any_of(outlets.begin(), outlets.end(),
                              [this](const std::string& one) { return ros_.wants(one); });
         },
-        std::move(handler)));
+        std::move(handler));
   }
 
   void followWhatIsWanted() {
@@ -154,7 +113,7 @@ class Outwards {
   const ros2::Config& config_;
   ros2::RosSide& ros_;
   ros::Mirror mirror_;
-  std::vector<std::unique_ptr<Follower>> followers_;
+  std::list<service::OnDemand> followers_;  ///< open while ROS has readers of their output
   ReasonCounts reasons_;
 };
 

@@ -7,29 +7,20 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "common/base/result.h"
 #include "common/types/sensors.h"
+#include "services/capture/config.h"
 
 namespace perdure::capture {
 
-struct CameraSettings {
-  std::string id;                       ///< libcamera's id, or a part of it; empty: the first
-                                        ///< camera
+/// The configuration of one camera, whose id is in `id`.
+struct CameraSettings : CameraConfig {
   bool id_alone = false;                ///< the id must match one camera only
   std::uint32_t width = 0, height = 0;  ///< pixels, as in the calibration of the rig
-  std::string format = "auto";          ///< libcamera's name, for example "YUYV"; auto: the best
-                                        ///< format available
-  double rate_hz = 20.0;
-  double exposure_ms = 0.0, gain = 0.0;  ///< 0: automatic
-  std::string focus = "as_is";           ///< as_is, auto, or manual (at lens_dioptres)
-  double lens_dioptres = 0.0;            ///< 1/m; 0: infinity
-  std::string flip = "none";             ///< none, horizontal, vertical, both
-  std::vector<double> crop = {};         ///< x, y, width, height, pixels of the sensor; empty: all
-  double readout_s = 0.0;                ///< s, from first to last row
-  int jpeg_quality = 0;                  ///< 1 … 100: images are sent as JPEG; 0: raw
-  std::string encoding = "as_is";        ///< as_is, mono8, bgr8
+  double readout_s = 0.0;               ///< s, from first to last row
+  int jpeg_quality = 0;                 ///< 1 … 100: images are sent as JPEG; 0: raw
+  std::string encoding = "as_is";       ///< as_is, mono8, bgr8
 };
 
 /// An image with the numbering of the driver.

@@ -1,30 +1,33 @@
 #include "services/capture/live/pixels.h"
 
+#include <algorithm>
+#include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 namespace perdure::capture {
 namespace {
 
-bool isHalved(PixelLayout layout) {
-  return layout == PixelLayout::kNv12 || layout == PixelLayout::kNv21 ||
-         layout == PixelLayout::kYuv420;
-}
+/// A layout with one plane, and OpenCV's conversions of it; -1: none is needed.
+struct OnePlane {
+  PixelLayout layout;
+  int bytes;  ///< of a pixel
+  int to_grey, to_colour;
+};
+constexpr OnePlane kOnePlane[] = {
+    {PixelLayout::kGrey, 1, -1, cv::COLOR_GRAY2BGR},
+    {PixelLayout::kBgr, 3, cv::COLOR_BGR2GRAY, -1},
+    {PixelLayout::kRgb, 3, cv::COLOR_RGB2GRAY, cv::COLOR_RGB2BGR},
+    {PixelLayout::kBgrx, 4, cv::COLOR_BGRA2GRAY, cv::COLOR_BGRA2BGR},
+    {PixelLayout::kRgbx, 4, cv::COLOR_RGBA2GRAY, cv::COLOR_RGBA2BGR},
+    {PixelLayout::kYuyv, 2, cv::COLOR_YUV2GRAY_YUY2, cv::COLOR_YUV2BGR_YUY2},
+    {PixelLayout::kUyvy, 2, cv::COLOR_YUV2GRAY_UYVY, cv::COLOR_YUV2BGR_UYVY}};
 
-std::size_t bytesPerPixel(PixelLayout layout) {
-  switch (layout) {
-    case PixelLayout::kBgr:
-    case PixelLayout::kRgb:
-      return 3;
-    case PixelLayout::kBgrx:
-    case PixelLayout::kRgbx:
-      return 4;
-    case PixelLayout::kYuyv:
-    case PixelLayout::kUyvy:
-      return 2;
-    default:
-      return 1;
-  }
+/// nullptr for the layouts with halved colours.
+const OnePlane* onePlaneOf(PixelLayout layout) {
+  const auto* found = std::find_if(std::begin(kOnePlane), std::end(kOnePlane),
+                                   [&](const OnePlane& one) { return one.layout == layout; });
+  return found == std::end(kOnePlane) ? nullptr : found;
 }
 
 /// OpenCV's constructor takes mutable bytes, although they are only read here.
@@ -40,8 +43,9 @@ bool holds(const ImagePlane& plane, std::size_t rows, std::size_t row_bytes) {
 
 bool suffices(PixelLayout layout, std::size_t width, std::size_t height,
               const std::vector<ImagePlane>& planes) {
-  if (!isHalved(layout)) {
-    return planes.size() == 1 && holds(planes[0], height, width * bytesPerPixel(layout));
+  if (const OnePlane* one = onePlaneOf(layout)) {
+    return planes.size() == 1 &&
+           holds(planes[0], height, width * static_cast<std::size_t>(one->bytes));
   }
   const bool apart = layout == PixelLayout::kYuv420;
   bool enough = planes.size() == (apart ? 3U : 2U) && holds(planes[0], height, width);
@@ -73,35 +77,10 @@ cv::Mat fromTwoPlanes(PixelLayout layout, int width, int height,
   return colour;
 }
 
-cv::Mat fromOnePlane(PixelLayout layout, int width, int height, const ImagePlane& plane,
+cv::Mat fromOnePlane(const OnePlane& layout, int width, int height, const ImagePlane& plane,
                      bool grey) {
-  const cv::Mat image = view(plane, height, width, static_cast<int>(bytesPerPixel(layout)));
-  int code = -1;
-  switch (layout) {
-    case PixelLayout::kGrey:
-      code = grey ? -1 : cv::COLOR_GRAY2BGR;
-      break;
-    case PixelLayout::kBgr:
-      code = grey ? cv::COLOR_BGR2GRAY : -1;
-      break;
-    case PixelLayout::kRgb:
-      code = grey ? cv::COLOR_RGB2GRAY : cv::COLOR_RGB2BGR;
-      break;
-    case PixelLayout::kBgrx:
-      code = grey ? cv::COLOR_BGRA2GRAY : cv::COLOR_BGRA2BGR;
-      break;
-    case PixelLayout::kRgbx:
-      code = grey ? cv::COLOR_RGBA2GRAY : cv::COLOR_RGBA2BGR;
-      break;
-    case PixelLayout::kYuyv:
-      code = grey ? cv::COLOR_YUV2GRAY_YUY2 : cv::COLOR_YUV2BGR_YUY2;
-      break;
-    case PixelLayout::kUyvy:
-      code = grey ? cv::COLOR_YUV2GRAY_UYVY : cv::COLOR_YUV2BGR_UYVY;
-      break;
-    default:
-      break;
-  }
+  const cv::Mat image = view(plane, height, width, layout.bytes);
+  const int code = grey ? layout.to_grey : layout.to_colour;
   if (code < 0) return image.clone();
   cv::Mat converted;
   cv::cvtColor(image, converted, code);
@@ -131,16 +110,17 @@ Result<Frame> packed(PixelLayout layout, std::uint32_t width, std::uint32_t heig
     if (!decoded) return tl::unexpected(decoded.error());
     image = *decoded;
   } else {
-    const bool even = width % 2 == 0 && (height % 2 == 0 || !isHalved(layout));
-    if ((isHalved(layout) || bytesPerPixel(layout) == 2) && !even) {
+    const OnePlane* one = onePlaneOf(layout);
+    const bool even = width % 2 == 0 && (one || height % 2 == 0);
+    if ((!one || one->bytes == 2) && !even) {
       return fail("image_size", "an odd size of a format with halved colours");
     }
     if (!suffices(layout, width, height, planes)) {
       return fail("image_truncated", "a buffer is shorter than its image");
     }
-    image = layout == PixelLayout::kYuv420 ? fromThreePlanes(w, h, planes, grey)
-            : isHalved(layout)             ? fromTwoPlanes(layout, w, h, planes, grey)
-                                           : fromOnePlane(layout, w, h, planes[0], grey);
+    image = one                              ? fromOnePlane(*one, w, h, planes[0], grey)
+            : layout == PixelLayout::kYuv420 ? fromThreePlanes(w, h, planes, grey)
+                                             : fromTwoPlanes(layout, w, h, planes, grey);
   }
   Frame frame;
   frame.width = width;

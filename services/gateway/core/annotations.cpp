@@ -34,20 +34,16 @@ void addStrokes(const CameraModel& camera, const Eigen::Vector3d& a, const Eigen
 }
 
 void putPoint(JsonWriter& json, const Point& p) {
-  json.begin('{').key("x").number(p.x(), 1).key("y").number(p.y(), 1).end('}');
+  json.begin('{').with("x", p.x(), 1).with("y", p.y(), 1).end('}');
 }
 
 void putLines(JsonWriter& json, TimePoint time, PointsType type, const std::vector<Point>& points,
               const Colour& colour, double thickness, const Colour& fill = {0, 0, 0, 0}) {
-  json.begin('{').key("timestamp");
-  putTime(json, time);
-  json.key("type").integer(static_cast<int>(type)).key("points").begin('[');
+  json.begin('{').with("timestamp", time).with("type", static_cast<int>(type)).key("points");
+  json.begin('[');
   for (const Point& point : points) putPoint(json, point);
-  json.end(']').key("outline_color");
-  putColour(json, colour);
-  json.key("outline_colors").begin('[').end(']').key("fill_color");
-  putColour(json, fill);
-  json.key("thickness").number(thickness).end('}');
+  json.end(']').with("outline_color", colour).key("outline_colors").begin('[').end(']');
+  json.with("fill_color", fill).with("thickness", thickness).end('}');
 }
 
 struct Label {
@@ -57,15 +53,10 @@ struct Label {
 };
 
 void putLabel(JsonWriter& json, TimePoint time, const Label& label) {
-  json.begin('{').key("timestamp");
-  putTime(json, time);
-  json.key("position");
+  json.begin('{').with("timestamp", time).key("position");
   putPoint(json, label.at);
-  json.key("text").text(label.text).key("font_size").number(11).key("text_color");
-  putColour(json, {1, 1, 1, 1});
-  json.key("background_color");
-  putColour(json, label.colour);
-  json.end('}');
+  json.with("text", label.text).with("font_size", 11).with("text_color", Colour{1, 1, 1, 1});
+  json.with("background_color", label.colour).end('}');
 }
 
 /// Strokes of the object's cuboid in the image.
@@ -215,9 +206,8 @@ std::string likelihoodRegions(const Objects& objects, const CameraModel& camera,
   std::sort(regions.begin(), regions.end(),
             [](const Region& a, const Region& b) { return a.distance > b.distance; });
   JsonWriter json(1024 + 2048 * regions.size());
-  json.begin('{').key("timestamp");
-  putTime(json, objects.stamp.time);
-  json.key("circles").begin('[').end(']').key("points").begin('[');
+  json.begin('{').with("timestamp", objects.stamp.time).key("circles").begin('[').end(']');
+  json.key("points").begin('[');
   for (const Region& region : regions) {
     const double b = region.brightness;
     putLines(json, objects.stamp.time, kLineLoop, region.outline, region.colour.withAlpha(0.9), 1.5,
@@ -231,9 +221,8 @@ std::string likelihoodRegions(const Objects& objects, const CameraModel& camera,
 std::string imageAnnotations(const Objects& objects, const CameraModel& camera,
                              const Detections* detections) {
   JsonWriter json(1024 + 3072 * objects.objects.size());
-  json.begin('{').key("timestamp");
-  putTime(json, objects.stamp.time);
-  json.key("circles").begin('[').end(']').key("points").begin('[');
+  json.begin('{').with("timestamp", objects.stamp.time).key("circles").begin('[').end(']');
+  json.key("points").begin('[');
   if (detections != nullptr) {
     for (const Detection& one : detections->detections) putDetection(json, objects.stamp.time, one);
   }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <concepts>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -72,6 +73,34 @@ class JsonWriter {
     text(name);
     out_ += ':';
     return *this;
+  }
+  /// Writes a member: a key, and a bool, a number, a text, a list of numbers, or a value of a
+  /// type with a function put(JsonWriter&, value).
+  template <class Value, class... Decimals>
+  JsonWriter& with(std::string_view name, const Value& value, Decimals... decimals) {
+    key(name);
+    if constexpr (std::same_as<Value, bool>) {
+      boolean(value);
+    } else if constexpr (std::integral<Value>) {
+      integer(value);
+    } else if constexpr (std::floating_point<Value>) {
+      number(value, decimals...);
+    } else if constexpr (std::convertible_to<const Value&, std::string_view>) {
+      text(value);
+    } else if constexpr (std::convertible_to<const Value&, std::span<const double>>) {
+      list(value, decimals...);
+    } else {
+      put(*this, value);
+    }
+    return *this;
+  }
+  JsonWriter& with(std::string_view name, std::span<const double> values, int decimals = 4) {
+    return key(name).list(values, decimals);
+  }
+  JsonWriter& list(std::span<const double> values, int decimals = 4) {
+    begin('[');
+    for (const double value : values) number(value, decimals);
+    return end(']');
   }
   /// Writes text that is already JSON.
   JsonWriter& raw(std::string_view json) {

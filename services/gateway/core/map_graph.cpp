@@ -33,31 +33,27 @@ std::string sessionOf(const MapAnchor& anchor) {
 
 /// Writes an empty list if sigma is not known.
 void putSigma(JsonWriter& json, const Eigen::Vector4d& sigma, bool known) {
-  json.key("sigma");
-  putNumbers(json, {sigma.data(), known ? 4U : 0U}, 4);
+  json.with("sigma", {sigma.data(), known ? 4U : 0U}, 4);
 }
 
 void putAnchor(JsonWriter& json, const MapAnchor& anchor) {
-  json.begin('{').key("id").integer(anchor.id).key("previous").integer(anchor.previous);
-  json.key("session").text(sessionOf(anchor)).key("at");
-  putNumbers(json, {anchor.p.data(), 3}, 3);
-  json.key("yaw").number(anchor.yaw, 4);
+  json.begin('{').with("id", anchor.id).with("previous", anchor.previous);
+  json.with("session", sessionOf(anchor)).with("at", {anchor.p.data(), 3}, 3);
+  json.with("yaw", anchor.yaw, 4);
   putSigma(json, anchor.sigma, hasSigma(anchor));
-  json.key("objects").integer(anchor.objects).end('}');
+  json.with("objects", anchor.objects).end('}');
 }
 
 void putLoop(JsonWriter& json, const MapLoop& loop) {
-  json.begin('{').key("id").integer(loop.id).key("a").integer(loop.a).key("b").integer(loop.b);
-  json.key("kind").text(wordOf(loop.kind)).key("state").text(nameOf(loop.state));
-  json.key("residual");
-  putNumbers(json, {loop.residual.data(), 4}, 4);
+  json.begin('{').with("id", loop.id).with("a", loop.a).with("b", loop.b);
+  json.with("kind", wordOf(loop.kind)).with("state", nameOf(loop.state));
+  json.with("residual", {loop.residual.data(), 4}, 4);
   putSigma(json, loop.sigma, hasSigma(loop));
-  json.key("chi2").number(loop.chi2, 3).key("weight").number(loop.weight, 3);
-  json.key("pairs").begin('[');
+  json.with("chi2", loop.chi2, 3).with("weight", loop.weight, 3).key("pairs").begin('[');
   for (const MapLoopPair& pair : loop.pairs) {
     json.begin('[').integer(pair.known).integer(pair.seen).end(']');
   }
-  json.end(']').key("landmarks").integer(loop.landmarks).end('}');
+  json.end(']').with("landmarks", loop.landmarks).end('}');
 }
 
 /// Text of [p, yaw] for people.
@@ -89,30 +85,15 @@ void putSphere(JsonWriter& json, TimePoint time, const MapAnchor& anchor) {
   putPair(json, "session", sessionOf(anchor));
   putPair(json, "sigma x y z, yaw", sigmaInWords(anchor.sigma, hasSigma(anchor)));
   putPair(json, "objects", std::to_string(anchor.objects));
-  json.end(']').key("spheres").begin('[').begin('{').key("pose");
-  putPose(json, {rotationOfYaw(anchor.yaw), anchor.p});
-  json.key("size");
-  putVector(json, Eigen::Vector3d::Constant(kSize_m));
-  json.key("color");
-  putColour(json, hasSigma(anchor) ? Colour{0.56, 0.72, 0.87, 0.9} : Colour{0.55, 0.55, 0.55, 0.9});
-  json.end('}').end(']');
+  json.end(']');
+  putSolid(json, "spheres", {rotationOfYaw(anchor.yaw), anchor.p},
+           Eigen::Vector3d::Constant(kSize_m),
+           hasSigma(anchor) ? Colour{0.56, 0.72, 0.87, 0.9} : Colour{0.55, 0.55, 0.55, 0.9});
   endEntity(json, {"arrows", "cubes", "cylinders", "lines", "triangles", "texts", "models"});
 }
 
-void putLine(JsonWriter& json, LineType type, double thickness_px,
-             const std::vector<Eigen::Vector3d>& points, const Colour& colour) {
-  json.key("lines").begin('[').begin('{').key("type").integer(static_cast<int>(type));
-  json.key("pose");
-  putPose(json, {});
-  json.key("thickness").number(thickness_px).key("scale_invariant").boolean(true);
-  json.key("points").begin('[');
-  for (const Eigen::Vector3d& point : points) putVector(json, point);
-  json.end(']').key("color");
-  putColour(json, colour);
-  json.key("colors").begin('[').end(']').key("indices").begin('[').end(']');
-  json.end('}').end(']');
-  endEntity(json, {"arrows", "cubes", "spheres", "cylinders", "triangles", "texts", "models"});
-}
+constexpr std::initializer_list<const char*> kNoneButLines = {
+    "arrows", "cubes", "spheres", "cylinders", "triangles", "texts", "models"};
 
 using AnchorsById = std::map<AnchorNumber, const MapAnchor*>;
 
@@ -131,6 +112,7 @@ void putWay(JsonWriter& json, TimePoint time, const MapReply& graph, const Ancho
   if (graph.truncated) putPair(json, "shown", "those nearest to the vehicle");
   json.end(']');
   putLine(json, LineType::kSegments, 1.5, ends, {0.44, 0.58, 0.72, 0.6});
+  endEntity(json, kNoneButLines);
 }
 
 /// Draws a raised arch between the ends of the loop, because both may lie on the trajectory.
@@ -150,6 +132,7 @@ void putArch(JsonWriter& json, TimePoint time, const MapLoop& loop, const Eigen:
   putPair(json, "by objects", witnessesOf(loop));
   json.end(']');
   putLine(json, LineType::kStrip, 3.0, {a, top, b}, colourOf(loop));
+  endEntity(json, kNoneButLines);
 }
 
 }  // namespace
@@ -186,11 +169,9 @@ MapReply graphOn(const WorldId& map, MapReply reply) {
 
 std::string mapGraphJson(const MapReply& graph, const std::string& why_none, TimePoint time) {
   JsonWriter json(512 + 160 * graph.anchors.size() + 256 * graph.loops.size());
-  json.begin('{').key("timestamp");
-  putTime(json, time);
-  json.key("frame_id").text(kMapFrame).key("why_none").text(why_none);
-  json.key("all_anchors").integer(graph.anchor_count).key("all_loops").integer(graph.loop_count);
-  json.key("truncated").boolean(graph.truncated).key("anchors").begin('[');
+  json.begin('{').with("timestamp", time).with("frame_id", kMapFrame).with("why_none", why_none);
+  json.with("all_anchors", graph.anchor_count).with("all_loops", graph.loop_count);
+  json.with("truncated", graph.truncated).key("anchors").begin('[');
   for (const MapAnchor& anchor : graph.anchors) putAnchor(json, anchor);
   json.end(']').key("loops").begin('[');
   for (const MapLoop& loop : graph.loops) putLoop(json, loop);

@@ -62,16 +62,11 @@ std::string mapFrameJson(const MapFrame& frame) {
   const Eigen::Vector4d sigma = frame.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
   const std::size_t known = hasCovariance(frame) ? 4 : 0;
   JsonWriter json;
-  json.begin('{').key("timestamp");
-  putTime(json, frame.stamp.time);
-  json.key("world").text(toHex(frame.world.world)).key("epoch").integer(frame.world.epoch);
-  json.key("map").text(toHex(frame.map.world)).key("map_epoch").integer(frame.map.epoch);
-  json.key("T_MW");
-  putNumbers(json, pose, 6);
-  json.key("body_sigma");
-  putNumbers(json, {sigma.data(), known}, 4);
-  json.key("revision").integer(frame.revision).key("sessions").integer(frame.sessions);
-  json.key("loops").integer(frame.loops).key("anchors").integer(frame.anchors);
+  json.begin('{').with("timestamp", frame.stamp.time).with("world", toHex(frame.world.world));
+  json.with("epoch", frame.world.epoch).with("map", toHex(frame.map.world));
+  json.with("map_epoch", frame.map.epoch).with("T_MW", pose, 6);
+  json.with("body_sigma", {sigma.data(), known}, 4).with("revision", frame.revision);
+  json.with("sessions", frame.sessions).with("loops", frame.loops).with("anchors", frame.anchors);
   return json.end('}').take();
 }
 

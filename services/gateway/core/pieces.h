@@ -3,8 +3,8 @@
 
 #include <Eigen/Core>
 #include <initializer_list>
-#include <span>
 #include <string>
+#include <vector>
 
 #include "common/base/time.h"
 #include "common/math/rigid_transform.h"
@@ -18,13 +18,11 @@ inline constexpr char kMapFrame[] = "map", kOdomFrame[] = "odom", kBodyFrame[] =
 std::string opticalFrame(const std::string& camera);
 
 /// Writes {"sec", "nsec"}; times before 1970 become 0.
-void putTime(JsonWriter& json, TimePoint time);
-void putVector(JsonWriter& json, const Eigen::Vector3d& v);
-void putQuaternion(JsonWriter& json, const Eigen::Quaterniond& q);
-void putPose(JsonWriter& json, const RigidTransform& T);
-void putColour(JsonWriter& json, const Colour& colour);
-/// Writes a list of numbers, for example [1, 2, 3].
-void putNumbers(JsonWriter& json, std::span<const double> values, int decimals = 4);
+void put(JsonWriter& json, TimePoint time);
+void put(JsonWriter& json, const Eigen::Vector3d& v);
+void put(JsonWriter& json, const Eigen::Quaterniond& q);
+void put(JsonWriter& json, const RigidTransform& T);
+void put(JsonWriter& json, const Colour& colour);
 
 /// Constants of foxglove.SceneUpdate.
 enum class DeletionType { kMatching = 0, kAll = 1 };
@@ -34,6 +32,12 @@ void putDeletion(JsonWriter& json, TimePoint time, DeletionType type, const std:
 void beginEntity(JsonWriter& json, TimePoint time, const char* frame, const std::string& id);
 /// Ends a scene entity. `without`: primitive types that it does not contain.
 void endEntity(JsonWriter& json, std::initializer_list<const char*> without);
+/// Writes the list of the primitive type `name` ("cubes", "spheres") with one solid.
+void putSolid(JsonWriter& json, const char* name, const RigidTransform& pose,
+              const Eigen::Vector3d& size, const Colour& colour);
+/// Writes the list of lines with one line.
+void putLine(JsonWriter& json, LineType type, double thickness_px,
+             const std::vector<Eigen::Vector3d>& points, const Colour& colour);
 /// Writes an item of metadata.
 void putPair(JsonWriter& json, const char* name, const std::string& value);
 

@@ -17,40 +17,6 @@ double opacityOf(const ObjectBelief& object) {
   return isInSight(object) ? 0.9 : isHidden(object) ? 0.8 : 0.35;
 }
 
-void putCube(JsonWriter& json, const ObjectBelief& object, const Cuboid& cuboid) {
-  json.key("cubes").begin('[');
-  if (isInSight(object)) {
-    json.begin('{').key("pose");
-    putPose(json, cuboid.T_WO);
-    json.key("size");
-    putVector(json, cuboid.size);
-    json.key("color");
-    putColour(json, classColour(object.best().name).withAlpha(0.35 * object.existence));
-    json.end('}');
-  }
-  json.end(']');
-}
-
-struct EdgeLook {
-  double thickness = 1;  ///< px
-  bool dashed = false;
-  Colour colour;
-};
-
-void putEdges(JsonWriter& json, const Cuboid& cuboid, const EdgeLook& look) {
-  json.key("lines").begin('[').begin('{').key("type").integer(
-      static_cast<int>(LineType::kSegments));
-  json.key("pose");
-  putPose(json, {});
-  json.key("thickness").number(look.thickness).key("scale_invariant").boolean(true);
-  json.key("points").begin('[');
-  for (const Eigen::Vector3d& end : strokesOf(cuboid, look.dashed)) putVector(json, end);
-  json.end(']').key("color");
-  putColour(json, look.colour);
-  json.key("colors").begin('[').end(']').key("indices").begin('[').end(']');
-  json.end('}').end(']');
-}
-
 void putEllipsoid(JsonWriter& json, const ObjectBelief& object) {
   const Eigen::Matrix3d P = object.best().covariance.topLeftCorner<3, 3>();
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
@@ -58,26 +24,19 @@ void putEllipsoid(JsonWriter& json, const ObjectBelief& object) {
   Eigen::Matrix3d axes = eigen.eigenvectors();
   if (axes.determinant() < 0) axes.col(0) *= -1;
   const Eigen::Vector3d radii = kEllipsoidSigmas * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt();
-  json.key("spheres").begin('[').begin('{').key("pose");
-  putPose(json, RigidTransform(axes, Eigen::Vector3d(object.best().mean.head<3>())));
-  json.key("size");
-  putVector(json, 2 * radii);
-  json.key("color");
-  putColour(json, {1, 1, 1, 0.25});
-  json.end('}').end(']');
+  putSolid(json, "spheres", {axes, Eigen::Vector3d(object.best().mean.head<3>())}, 2 * radii,
+           {1, 1, 1, 0.25});
 }
 
 void putLabel(JsonWriter& json, const Cuboid& cuboid, const std::string& text, double opacity) {
   constexpr double kAbove = 0.3;  // m
   const Eigen::Vector3d up = cuboid.T_WO.q * Eigen::Vector3d::UnitZ();
-  json.key("texts").begin('[').begin('{').key("pose");
-  putPose(json, {Eigen::Quaterniond::Identity(),
-                 Eigen::Vector3d(cuboid.T_WO.p + up * (cuboid.size.z() / 2 + kAbove))});
-  json.key("billboard").boolean(true).key("font_size").number(12);
-  json.key("scale_invariant").boolean(true).key("color");
-  putColour(json, {1, 1, 1, opacity});
-  json.key("text").text(text);
-  json.end('}').end(']');
+  json.key("texts").begin('[').begin('{');
+  json.with("pose",
+            RigidTransform{Eigen::Quaterniond::Identity(),
+                           Eigen::Vector3d(cuboid.T_WO.p + up * (cuboid.size.z() / 2 + kAbove))});
+  json.with("billboard", true).with("font_size", 12).with("scale_invariant", true);
+  json.with("color", Colour{1, 1, 1, opacity}).with("text", text).end('}').end(']');
 }
 
 std::string percent(double probability) {
@@ -99,10 +58,14 @@ void putEntity(JsonWriter& json, const Objects& objects, const ObjectBelief& obj
   const Cuboid cuboid = cuboidOf(object, objects.up_W);
   beginEntity(json, objects.stamp.time, kOdomFrame, std::to_string(object.id));
   putMetadata(json, object);
-  putCube(json, object, cuboid);
-  putEdges(json, cuboid,
-           {isInSight(object) ? 2 : 1.5, isHidden(object),
-            classColour(object.best().name).withAlpha(opacityOf(object))});
+  const Colour colour = classColour(object.best().name);
+  if (isInSight(object)) {
+    putSolid(json, "cubes", cuboid.T_WO, cuboid.size, colour.withAlpha(0.35 * object.existence));
+  } else {
+    json.key("cubes").begin('[').end(']');
+  }
+  putLine(json, LineType::kSegments, isInSight(object) ? 2 : 1.5,
+          strokesOf(cuboid, isHidden(object)), colour.withAlpha(opacityOf(object)));
   putEllipsoid(json, object);
   putLabel(json, cuboid, nameOf(object) + (isHidden(object) ? " (hidden)" : ""), opacityOf(object));
   endEntity(json, {"arrows", "cylinders", "triangles", "models"});
@@ -110,8 +73,7 @@ void putEntity(JsonWriter& json, const Objects& objects, const ObjectBelief& obj
 
 void putEntity(JsonWriter& json, TimePoint time, const MapObject& object) {
   constexpr double kFaint = 0.3, kFaintest = 0.1;
-  const Eigen::Quaterniond yaw(Eigen::AngleAxisd(object.mean[3], Eigen::Vector3d::UnitZ()));
-  const Cuboid cuboid{RigidTransform(yaw, Eigen::Vector3d(object.mean.head<3>())),
+  const Cuboid cuboid{{rotationOfYaw(object.mean[3]), Eigen::Vector3d(object.mean.head<3>())},
                       object.mean.tail<3>().array().exp().matrix()};
   const Colour colour = classColour(object.class_name);
   beginEntity(json, time, kMapFrame, "map " + std::to_string(object.id));
@@ -119,14 +81,10 @@ void putEntity(JsonWriter& json, TimePoint time, const MapObject& object) {
   putPair(json, "exists", percent(object.existence));
   putPair(json, object.class_name.c_str(), percent(object.class_probability));
   if (object.provisional) putPair(json, "provisional", "its session is not found on the map yet");
-  json.end(']').key("cubes").begin('[').begin('{').key("pose");
-  putPose(json, cuboid.T_WO);
-  json.key("size");
-  putVector(json, cuboid.size);
-  json.key("color");
-  putColour(json, colour.withAlpha(kFaintest));
-  json.end('}').end(']');
-  putEdges(json, cuboid, {1, object.provisional, colour.withAlpha(kFaint)});
+  json.end(']');
+  putSolid(json, "cubes", cuboid.T_WO, cuboid.size, colour.withAlpha(kFaintest));
+  putLine(json, LineType::kSegments, 1, strokesOf(cuboid, object.provisional),
+          colour.withAlpha(kFaint));
   const std::string name = object.class_name + " " + std::to_string(object.id);
   putLabel(json, cuboid, name + (object.provisional ? " (provisional)" : ""), kFaint);
   endEntity(json, {"spheres", "arrows", "cylinders", "triangles", "models"});

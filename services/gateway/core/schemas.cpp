@@ -1,412 +1,273 @@
 #include "services/gateway/core/schemas.h"
 
+#include <map>
 #include <nlohmann/json.hpp>
+#include <utility>
 
-namespace perdure::gateway::schemas {
+#include "common/base/check.h"
+
+namespace perdure::gateway {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json number() { return {{"type", "number"}}; }
-Json integer() { return {{"type", "integer"}}; }
-Json natural() { return {{"type", "integer"}, {"minimum", 0}}; }
-Json text() { return {{"type", "string"}}; }
-Json boolean() { return {{"type", "boolean"}}; }
-Json bytes() { return {{"type", "string"}, {"contentEncoding", "base64"}}; }
-Json listOf(const Json& item) { return {{"type", "array"}, {"items", item}}; }
-Json said(Json schema, const char* what) {
-  schema["description"] = what;
-  return schema;
+/// A type begins with its name at the start of a line; with "!", the schema has the name as its
+/// title. Its members follow, separated by semicolons: name, type, and after a colon the
+/// description, which ends with the line. A type must be above its first use.
+constexpr std::string_view kTypes = R"(
+time!
+ sec natural; nsec natural
+duration!
+ sec integer; nsec natural
+vector3
+ x number; y number; z number
+point2
+ x number; y number
+quaternion
+ x number; y number; z number; w number
+pose
+ position vector3; orientation quaternion
+colour
+ r number; g number; b number; a number
+pair
+ key text; value text
+transform
+ timestamp time; parent_frame_id text; child_frame_id text; translation vector3
+ rotation quaternion
+solid
+ pose pose; size vector3; color colour
+arrow
+ pose pose; shaft_length number; shaft_diameter number; head_length number; head_diameter number
+ color colour
+cylinder
+ pose pose; size vector3; bottom_scale number; top_scale number; color colour
+lines
+ type natural; pose pose; thickness number; scale_invariant boolean; points vector3[]
+ color colour; colors colour[]; indices natural[]
+triangles
+ pose pose; points vector3[]; color colour; colors colour[]; indices natural[]
+text_primitive
+ pose pose; billboard boolean; font_size number; scale_invariant boolean; color colour; text text
+model
+ pose pose; scale vector3; color colour; override_color boolean; url text; media_type text
+ data bytes
+entity
+ timestamp time; frame_id text; id text; lifetime duration; frame_locked boolean; metadata pair[]
+ arrows arrow[]; cubes solid[]; spheres solid[]; cylinders cylinder[]; lines lines[]
+ triangles triangles[]; texts text_primitive[]; models model[]
+deletion
+ timestamp time; type natural; id text
+packed_field
+ name text; offset natural; type natural
+circle_annotation
+ timestamp time; position point2; diameter number; thickness number; fill_color colour
+ outline_color colour; metadata pair[]
+points_annotation
+ timestamp time; type natural; points point2[]; outline_color colour; outline_colors colour[]
+ fill_color colour; thickness number; metadata pair[]
+text_annotation
+ timestamp time; position point2; text text; font_size number; text_color colour
+ background_color colour; metadata pair[]
+foxglove.FrameTransforms!
+ transforms transform[]
+foxglove.SceneUpdate!
+ deletions deletion[]; entities entity[]
+foxglove.PoseInFrame!
+ timestamp time; frame_id text; pose pose
+foxglove.PosesInFrame!
+ timestamp time; frame_id text; poses pose[]
+foxglove.PointCloud!
+ timestamp time; frame_id text; pose pose; point_stride natural; fields packed_field[]; data bytes
+foxglove.Log!
+ timestamp time; level natural; message text; name text; file text; line natural
+foxglove.CameraCalibration!
+ timestamp time; frame_id text; width natural; height natural; distortion_model text
+ D number[]; K number[]; R number[]; P number[]
+foxglove.ImageAnnotations!
+ timestamp time; circles circle_annotation[]; points points_annotation[]
+ texts text_annotation[]; metadata pair[]
+object_summary
+ id natural; class text
+ p number: probability of the class
+ r number: probability that it exists
+ c number[]: centre in frame_id, m
+ yaw number: about the vertical, rad
+ size number[]: length, width, height, m
+ cov number[]: of the centre, m^2: xx xy xz yy yz zz
+ yaw_sigma number
+ size_sigma number[]: standard deviation, m
+ visibility text: visible, partial, occluded, out_of_view, behind
+ fraction number: of it that is visible
+ blocked_by natural: id of what hides it; 0: nothing that has one
+ confirmed boolean
+ moving number: probability that it moves
+ velocity number[]: m/s
+ hits natural
+ first_s number: first seen, s of the sensor clock
+ last_s number: last seen, s of the sensor clock
+ recalled boolean: came back from the map and not seen since
+ provisional boolean: its session is not found on the map yet
+ elsewhere boolean: on a map whose place in `map` is not known
+perdure.Objects!
+ timestamp time; frame_id text
+ world text: a new one, or a new epoch, is a new frame of reference
+ epoch natural; sequence natural
+ latency_ms number: from capture; below 0: not known
+ body number[]: pose: x y z, quaternion x y z w
+ up number[]: against gravity; yaws are about it
+ objects object_summary[]
+class_belief
+ class text; p number
+ mean number[]: x y z yaw log l, log w, log h
+ covariance number[][]: 7 x 7
+perdure.Object!
+ found boolean; object object_summary; classes class_belief[]
+ existence object: evidence by kind, nats and counts
+ ledger object: of each class: evidence by kind, nats
+ ousted object: the class that was given up last
+ returns object: when it should be seen again, s
+ history number[][]: time s, r, p, visible fraction
+perdure.Event!
+ timestamp time
+ world text: which odom frame, with the epoch
+ epoch natural; event text; object_id natural; other_id natural; class text; probability number
+ detail text
+ returns_in_s number[]: expected, and a 90 % interval
+ at number[]: x y z in odom, where it is known
+service
+ process text; state text; message text
+ age_s number: since it was heard
+ frames_in natural; frames_out natural; dropped natural; rate_hz number
+ cpu number: of one core; below 0: not known yet
+ rss_mb number; reasons object
+ stood_in_for boolean: another process does its work
+silence
+ objects number; odometry number
+perdure.Health!
+ vehicle text; services service[]
+ silent_s silence: since the last message; below 0: none came
+detection
+ box number[]: x1 y1 x2 y2, px
+ class text: the likeliest against clutter
+ nats number: log-likelihood ratio against clutter
+ primed boolean
+perdure.Detections!
+ timestamp time; camera text; sequence natural; detections detection[]
+perdure.Map!
+ timestamp time; frame_id text
+ all natural: objects on the map
+ elsewhere natural: objects of maps whose place here is not known
+ objects object_summary[]: those nearest to the body
+perdure.MapFrame!
+ timestamp time; world text; epoch natural
+ map text: the world that the map began as
+ map_epoch natural
+ T_MW number[]: odom in map: x y z, quaternion x y z w
+ body_sigma number[]: of the body in map: x y z m, yaw rad; empty: not known
+ revision natural: changes of the graph
+ sessions natural: that hang together with this one, itself included
+ loops natural: that are believed
+ anchors natural
+anchor
+ id natural
+ previous natural: of the same session; 0: none
+ session text: the odom frame of its way, world/epoch
+ at number[]: x y z in map, m
+ yaw number
+ sigma number[]: x y z m, yaw rad, relative to the first anchor
+ objects natural: that were last seen from there
+loop
+ id natural
+ a natural: the anchor that was known
+ b natural: the anchor where the vehicle was
+ kind text: loop, or tie: by objects with their ids
+ state text: tentative, confirmed, withdrawn
+ residual number[]: measured less as it lies: x y z m, yaw rad, in axes of a
+ sigma number[]: of the measurement; empty: not known
+ chi2 number: of the residual, 4 degrees of freedom
+ weight number: by which it counts, 0 to 1
+ pairs natural[][]: ids that it found to be one: known, seen
+ landmarks natural: that look alike
+perdure.MapGraph!
+ timestamp time; frame_id text
+ why_none text: a sentence, where there is no graph
+ all_anchors natural: of the map
+ all_loops natural
+ truncated boolean: these are the nearest to the vehicle
+ anchors anchor[]
+ loops loop[]: between these anchors
+perdure.Model!
+ name text; hash text; classes text[]; input_width natural; input_height natural
+perdure.ObjectRequest!
+ id natural
+perdure.MapRequest!
+ id natural; class text
+ near number[]: x y z, m; with radius
+ radius number
+ low number[]: x y z, m: a box, with high
+ high number[]; limit natural
+perdure.MapReply!
+ truncated boolean; objects object_summary[]
+)";
+
+using Types = std::map<std::string, Json, std::less<>>;
+
+/// Text before the separator, which is removed from `rest` with this text.
+std::string_view cut(std::string_view& rest, std::string_view separator) {
+  const std::size_t at = rest.find(separator);
+  const std::string_view part = rest.substr(0, at);
+  rest.remove_prefix(at == rest.npos ? rest.size() : at + separator.size());
+  return part;
 }
 
-using Members = std::initializer_list<std::pair<const char*, Json>>;
-Json object(Members members, const char* title = nullptr) {
-  Json json = {{"type", "object"}};
-  if (title != nullptr) json["title"] = title;
-  for (const auto& [name, schema] : members) json["properties"][name] = schema;
-  return json;
+Json typeOf(std::string_view name, const Types& known) {
+  if (name.ends_with("[]")) {
+    return {{"type", "array"}, {"items", typeOf(name.substr(0, name.size() - 2), known)}};
+  }
+  const auto found = known.find(name);
+  check(found != known.end(), "a schema's member has a known type");
+  return found->second;
 }
 
-Json time() { return object({{"sec", natural()}, {"nsec", natural()}}, "time"); }
-Json duration() { return object({{"sec", integer()}, {"nsec", natural()}}, "duration"); }
-Json vector3() { return object({{"x", number()}, {"y", number()}, {"z", number()}}); }
-Json point2() { return object({{"x", number()}, {"y", number()}}); }
-Json quaternion() {
-  return object({{"x", number()}, {"y", number()}, {"z", number()}, {"w", number()}});
-}
-Json pose() { return object({{"position", vector3()}, {"orientation", quaternion()}}); }
-Json colour() {
-  return object({{"r", number()}, {"g", number()}, {"b", number()}, {"a", number()}});
-}
-Json metadata() { return listOf(object({{"key", text()}, {"value", text()}})); }
-
-Json transform() {
-  return object({{"timestamp", time()},
-                 {"parent_frame_id", text()},
-                 {"child_frame_id", text()},
-                 {"translation", vector3()},
-                 {"rotation", quaternion()}});
+void addMembers(std::string_view line, const Types& known, Json& properties) {
+  while (!line.empty()) {
+    const bool described = line.find(": ") < line.find("; ");
+    std::string_view member = cut(line, described ? ": " : "; ");
+    const std::string name(cut(member, " "));
+    properties[name] = typeOf(member, known);
+    if (described) properties[name]["description"] = std::exchange(line, {});
+  }
 }
 
-Json solid() { return object({{"pose", pose()}, {"size", vector3()}, {"color", colour()}}); }
-Json arrow() {
-  return object({{"pose", pose()},
-                 {"shaft_length", number()},
-                 {"shaft_diameter", number()},
-                 {"head_length", number()},
-                 {"head_diameter", number()},
-                 {"color", colour()}});
-}
-Json cylinder() {
-  return object({{"pose", pose()},
-                 {"size", vector3()},
-                 {"bottom_scale", number()},
-                 {"top_scale", number()},
-                 {"color", colour()}});
-}
-Json lines() {
-  return object({{"type", natural()},
-                 {"pose", pose()},
-                 {"thickness", number()},
-                 {"scale_invariant", boolean()},
-                 {"points", listOf(vector3())},
-                 {"color", colour()},
-                 {"colors", listOf(colour())},
-                 {"indices", listOf(natural())}});
-}
-Json triangles() {
-  return object({{"pose", pose()},
-                 {"points", listOf(vector3())},
-                 {"color", colour()},
-                 {"colors", listOf(colour())},
-                 {"indices", listOf(natural())}});
-}
-Json textPrimitive() {
-  return object({{"pose", pose()},
-                 {"billboard", boolean()},
-                 {"font_size", number()},
-                 {"scale_invariant", boolean()},
-                 {"color", colour()},
-                 {"text", text()}});
-}
-Json model3d() {
-  return object({{"pose", pose()},
-                 {"scale", vector3()},
-                 {"color", colour()},
-                 {"override_color", boolean()},
-                 {"url", text()},
-                 {"media_type", text()},
-                 {"data", bytes()}});
-}
-
-Json entity() {
-  return object({{"timestamp", time()},
-                 {"frame_id", text()},
-                 {"id", text()},
-                 {"lifetime", duration()},
-                 {"frame_locked", boolean()},
-                 {"metadata", metadata()},
-                 {"arrows", listOf(arrow())},
-                 {"cubes", listOf(solid())},
-                 {"spheres", listOf(solid())},
-                 {"cylinders", listOf(cylinder())},
-                 {"lines", listOf(lines())},
-                 {"triangles", listOf(triangles())},
-                 {"texts", listOf(textPrimitive())},
-                 {"models", listOf(model3d())}});
-}
-
-/// Schema of one object, common to `objects` and the map.
-Json glance() {
-  return object({{"id", natural()},
-                 {"class", text()},
-                 {"p", said(number(), "probability of the class")},
-                 {"r", said(number(), "probability that it exists")},
-                 {"c", said(listOf(number()), "centre in frame_id, m")},
-                 {"yaw", said(number(), "about the vertical, rad")},
-                 {"size", said(listOf(number()), "length, width, height, m")},
-                 {"cov", said(listOf(number()), "of the centre, m^2: xx xy xz yy yz zz")},
-                 {"yaw_sigma", number()},
-                 {"size_sigma", said(listOf(number()), "standard deviation, m")},
-                 {"visibility", said(text(), "visible, partial, occluded, out_of_view, behind")},
-                 {"fraction", said(number(), "of it that is visible")},
-                 {"blocked_by", said(natural(), "id of what hides it; 0: nothing that has one")},
-                 {"confirmed", boolean()},
-                 {"moving", said(number(), "probability that it moves")},
-                 {"velocity", said(listOf(number()), "m/s")},
-                 {"hits", natural()},
-                 {"first_s", said(number(), "first seen, s of the sensor clock")},
-                 {"last_s", said(number(), "last seen, s of the sensor clock")},
-                 {"recalled", said(boolean(), "came back from the map and not seen since")},
-                 {"provisional", said(boolean(), "its session is not found on the map yet")},
-                 {"elsewhere", said(boolean(), "on a map whose place in `map` is not known")}});
+Types readTypes() {
+  Types known = {{"number", {{"type", "number"}}},
+                 {"integer", {{"type", "integer"}}},
+                 {"natural", {{"type", "integer"}, {"minimum", 0}}},
+                 {"text", {{"type", "string"}}},
+                 {"boolean", {{"type", "boolean"}}},
+                 {"bytes", {{"type", "string"}, {"contentEncoding", "base64"}}},
+                 {"object", {{"type", "object"}}}};
+  Json* type = nullptr;
+  for (std::string_view rest = kTypes.substr(1); !rest.empty();) {
+    const std::string_view line = cut(rest, "\n");
+    if (line.starts_with(' ')) {
+      addMembers(line.substr(1), known, (*type)["properties"]);
+      continue;
+    }
+    const bool titled = line.ends_with('!');
+    const std::string name(line.substr(0, line.size() - (titled ? 1 : 0)));
+    type = &known[name];
+    (*type)["type"] = "object";
+    if (titled) (*type)["title"] = name;
+  }
+  return known;
 }
 
 }  // namespace
 
-std::string frameTransforms() {
-  return object({{"transforms", listOf(transform())}}, "foxglove.FrameTransforms").dump();
-}
-
-std::string sceneUpdate() {
-  const Json deletion = object({{"timestamp", time()}, {"type", natural()}, {"id", text()}});
-  return object({{"deletions", listOf(deletion)}, {"entities", listOf(entity())}},
-                "foxglove.SceneUpdate")
-      .dump();
-}
-
-std::string poseInFrame() {
-  return object({{"timestamp", time()}, {"frame_id", text()}, {"pose", pose()}},
-                "foxglove.PoseInFrame")
-      .dump();
-}
-
-std::string posesInFrame() {
-  return object({{"timestamp", time()}, {"frame_id", text()}, {"poses", listOf(pose())}},
-                "foxglove.PosesInFrame")
-      .dump();
-}
-
-std::string pointCloud() {
-  const Json field = object({{"name", text()}, {"offset", natural()}, {"type", natural()}});
-  return object({{"timestamp", time()},
-                 {"frame_id", text()},
-                 {"pose", pose()},
-                 {"point_stride", natural()},
-                 {"fields", listOf(field)},
-                 {"data", bytes()}},
-                "foxglove.PointCloud")
-      .dump();
-}
-
-std::string log() {
-  return object({{"timestamp", time()},
-                 {"level", natural()},
-                 {"message", text()},
-                 {"name", text()},
-                 {"file", text()},
-                 {"line", natural()}},
-                "foxglove.Log")
-      .dump();
-}
-
-std::string cameraCalibration() {
-  return object({{"timestamp", time()},
-                 {"frame_id", text()},
-                 {"width", natural()},
-                 {"height", natural()},
-                 {"distortion_model", text()},
-                 {"D", listOf(number())},
-                 {"K", listOf(number())},
-                 {"R", listOf(number())},
-                 {"P", listOf(number())}},
-                "foxglove.CameraCalibration")
-      .dump();
-}
-
-std::string imageAnnotations() {
-  const Json circle = object({{"timestamp", time()},
-                              {"position", point2()},
-                              {"diameter", number()},
-                              {"thickness", number()},
-                              {"fill_color", colour()},
-                              {"outline_color", colour()},
-                              {"metadata", metadata()}});
-  const Json points = object({{"timestamp", time()},
-                              {"type", natural()},
-                              {"points", listOf(point2())},
-                              {"outline_color", colour()},
-                              {"outline_colors", listOf(colour())},
-                              {"fill_color", colour()},
-                              {"thickness", number()},
-                              {"metadata", metadata()}});
-  const Json label = object({{"timestamp", time()},
-                             {"position", point2()},
-                             {"text", text()},
-                             {"font_size", number()},
-                             {"text_color", colour()},
-                             {"background_color", colour()},
-                             {"metadata", metadata()}});
-  return object({{"timestamp", time()},
-                 {"circles", listOf(circle)},
-                 {"points", listOf(points)},
-                 {"texts", listOf(label)},
-                 {"metadata", metadata()}},
-                "foxglove.ImageAnnotations")
-      .dump();
-}
-
-std::string objects() {
-  return object({{"timestamp", time()},
-                 {"frame_id", text()},
-                 {"world", said(text(), "a new one, or a new epoch, is a new frame of reference")},
-                 {"epoch", natural()},
-                 {"sequence", natural()},
-                 {"latency_ms", said(number(), "from capture; below 0: not known")},
-                 {"body", said(listOf(number()), "pose: x y z, quaternion x y z w")},
-                 {"up", said(listOf(number()), "against gravity; yaws are about it")},
-                 {"objects", listOf(glance())}},
-                "perdure.Objects")
-      .dump();
-}
-
-std::string object() {
-  const Json belief = object({{"class", text()},
-                              {"p", number()},
-                              {"mean", said(listOf(number()), "x y z yaw log l, log w, log h")},
-                              {"covariance", said(listOf(listOf(number())), "7 x 7")}});
-  return object(
-             {{"found", boolean()},
-              {"object", glance()},
-              {"classes", listOf(belief)},
-              {"existence", said(Json{{"type", "object"}}, "evidence by kind, nats and counts")},
-              {"ledger", said(Json{{"type", "object"}}, "of each class: evidence by kind, nats")},
-              {"ousted", said(Json{{"type", "object"}}, "the class that was given up last")},
-              {"returns", said(Json{{"type", "object"}}, "when it should be seen again, s")},
-              {"history", said(listOf(listOf(number())), "time s, r, p, visible fraction")}},
-             "perdure.Object")
-      .dump();
-}
-
-std::string event() {
-  return object({{"timestamp", time()},
-                 {"world", said(text(), "which odom frame, with the epoch")},
-                 {"epoch", natural()},
-                 {"event", text()},
-                 {"object_id", natural()},
-                 {"other_id", natural()},
-                 {"class", text()},
-                 {"probability", number()},
-                 {"detail", text()},
-                 {"returns_in_s", said(listOf(number()), "expected, and a 90 % interval")},
-                 {"at", said(listOf(number()), "x y z in odom, where it is known")}},
-                "perdure.Event")
-      .dump();
-}
-
-std::string health() {
-  const Json service = object({{"process", text()},
-                               {"state", text()},
-                               {"message", text()},
-                               {"age_s", said(number(), "since it was heard")},
-                               {"frames_in", natural()},
-                               {"frames_out", natural()},
-                               {"dropped", natural()},
-                               {"rate_hz", number()},
-                               {"cpu", said(number(), "of one core; below 0: not known yet")},
-                               {"rss_mb", number()},
-                               {"reasons", Json{{"type", "object"}}},
-                               {"stood_in_for", said(boolean(), "another process does its work")}});
-  return object({{"vehicle", text()},
-                 {"services", listOf(service)},
-                 {"silent_s", said(object({{"objects", number()}, {"odometry", number()}}),
-                                   "since the last message; below 0: none came")}},
-                "perdure.Health")
-      .dump();
-}
-
-std::string detections() {
-  const Json one = object({{"box", said(listOf(number()), "x1 y1 x2 y2, px")},
-                           {"class", said(text(), "the likeliest against clutter")},
-                           {"nats", said(number(), "log-likelihood ratio against clutter")},
-                           {"primed", boolean()}});
-  return object({{"timestamp", time()},
-                 {"camera", text()},
-                 {"sequence", natural()},
-                 {"detections", listOf(one)}},
-                "perdure.Detections")
-      .dump();
-}
-
-std::string map() {
-  return object({{"timestamp", time()},
-                 {"frame_id", text()},
-                 {"all", said(natural(), "objects on the map")},
-                 {"elsewhere", said(natural(), "objects of maps whose place here is not known")},
-                 {"objects", said(listOf(glance()), "those nearest to the body")}},
-                "perdure.Map")
-      .dump();
-}
-
-std::string mapFrame() {
-  return object({{"timestamp", time()},
-                 {"world", text()},
-                 {"epoch", natural()},
-                 {"map", said(text(), "the world that the map began as")},
-                 {"map_epoch", natural()},
-                 {"T_MW", said(listOf(number()), "odom in map: x y z, quaternion x y z w")},
-                 {"body_sigma",
-                  said(listOf(number()), "of the body in map: x y z m, yaw rad; empty: not known")},
-                 {"revision", said(natural(), "changes of the graph")},
-                 {"sessions", said(natural(), "that hang together with this one, itself included")},
-                 {"loops", said(natural(), "that are believed")},
-                 {"anchors", natural()}},
-                "perdure.MapFrame")
-      .dump();
-}
-
-std::string mapGraph() {
-  const Json anchor =
-      object({{"id", natural()},
-              {"previous", said(natural(), "of the same session; 0: none")},
-              {"session", said(text(), "the odom frame of its way, world/epoch")},
-              {"at", said(listOf(number()), "x y z in map, m")},
-              {"yaw", number()},
-              {"sigma", said(listOf(number()), "x y z m, yaw rad, relative to the first anchor")},
-              {"objects", said(natural(), "that were last seen from there")}});
-  const Json loop = object(
-      {{"id", natural()},
-       {"a", said(natural(), "the anchor that was known")},
-       {"b", said(natural(), "the anchor where the vehicle was")},
-       {"kind", said(text(), "loop, or tie: by objects with their ids")},
-       {"state", said(text(), "tentative, confirmed, withdrawn")},
-       {"residual", said(listOf(number()),
-                         "measured less as it lies: x y z m, yaw rad, in "
-                         "axes of a")},
-       {"sigma", said(listOf(number()), "of the measurement; empty: not known")},
-       {"chi2", said(number(), "of the residual, 4 degrees of freedom")},
-       {"weight", said(number(), "by which it counts, 0 to 1")},
-       {"pairs", said(listOf(listOf(natural())), "ids that it found to be one: known, seen")},
-       {"landmarks", said(natural(), "that look alike")}});
-  return object({{"timestamp", time()},
-                 {"frame_id", text()},
-                 {"why_none", said(text(), "a sentence, where there is no graph")},
-                 {"all_anchors", said(natural(), "of the map")},
-                 {"all_loops", natural()},
-                 {"truncated", said(boolean(), "these are the nearest to the vehicle")},
-                 {"anchors", listOf(anchor)},
-                 {"loops", said(listOf(loop), "between these anchors")}},
-                "perdure.MapGraph")
-      .dump();
-}
-
-std::string model() {
-  return object({{"name", text()},
-                 {"hash", text()},
-                 {"classes", listOf(text())},
-                 {"input_width", natural()},
-                 {"input_height", natural()}},
-                "perdure.Model")
-      .dump();
-}
-
-std::string objectRequest() { return object({{"id", natural()}}, "perdure.ObjectRequest").dump(); }
-
-std::string mapRequest() {
-  return object({{"id", natural()},
-                 {"class", text()},
-                 {"near", said(listOf(number()), "x y z, m; with radius")},
-                 {"radius", number()},
-                 {"low", said(listOf(number()), "x y z, m: a box, with high")},
-                 {"high", listOf(number())},
-                 {"limit", natural()}},
-                "perdure.MapRequest")
-      .dump();
-}
-
-std::string mapReply() {
-  return object({{"truncated", boolean()}, {"objects", listOf(glance())}}, "perdure.MapReply")
-      .dump();
+std::string jsonSchema(std::string_view name) {
+  static const Types kKnown = readTypes();
+  return typeOf(name, kKnown).dump();
 }
 
 std::string compressedImageIdl() {
@@ -421,4 +282,4 @@ std::string compressedImageIdl() {
          "};\n";
 }
 
-}  // namespace perdure::gateway::schemas
+}  // namespace perdure::gateway

@@ -1,34 +1,15 @@
-// JSON schemas of the gateway's messages, as text: Foxglove's well-known schemas, from their public
-// field lists, and Perdure's own.
+// JSON schemas of the gateway's messages: Foxglove's well-known schemas, from their public field
+// lists, and Perdure's own.
 #pragma once
 
 #include <string>
+#include <string_view>
 
-namespace perdure::gateway::schemas {
+namespace perdure::gateway {
 
-std::string frameTransforms();
-std::string sceneUpdate();
-std::string poseInFrame();
-std::string posesInFrame();
-std::string pointCloud();
-std::string log();
-std::string cameraCalibration();
-std::string imageAnnotations();
-
-std::string objects();
-std::string object();
-std::string event();
-std::string health();
-std::string detections();
-std::string map();
-std::string mapFrame();
-std::string mapGraph();
-std::string model();
-std::string objectRequest();
-std::string mapRequest();
-std::string mapReply();
-
+/// Text of the schema of this name, for example "foxglove.Log", which must exist.
+std::string jsonSchema(std::string_view name);
 /// IDL of foxglove::CompressedImage, which is sent as CDR, because its bytes then need no base64.
 std::string compressedImageIdl();
 
-}  // namespace perdure::gateway::schemas
+}  // namespace perdure::gateway

@@ -67,31 +67,25 @@ void VitalSigns::setStandIns(std::map<std::string, std::string> sentences) {
 
 std::string VitalSigns::json(std::int64_t now_ns, const Silence& last) const {
   JsonWriter json(4096);
-  json.begin('{').key("vehicle").text(vehicle_).key("services").begin('[');
+  json.begin('{').with("vehicle", vehicle_).key("services").begin('[');
   for (const auto& [name, sentence] : stand_ins_) {
-    json.begin('{').key("process").text(name).key("state").text("ok");
-    json.key("stood_in_for").boolean(true).key("message").text(sentence).end('}');
+    json.begin('{').with("process", name).with("state", "ok").with("stood_in_for", true);
+    json.with("message", sentence).end('}');
   }
   for (const auto& [name, service] : services_) {
     if (stand_ins_.contains(name)) continue;
     const Health& h = service.health;
-    json.begin('{').key("process").text(name).key("state").text(wordOf(h.state));
-    json.key("message").text(h.message);
-    json.key("age_s").number(secondsSince(service.heard_ns, now_ns), 2);
-    json.key("frames_in").integer(h.frames_in).key("frames_out").integer(h.frames_out);
-    json.key("dropped").integer(h.dropped).key("rate_hz").number(h.rate_hz, 2);
-    json.key("cpu")
-        .number(service.cpu, 3)
-        .key("rss_mb")
-        .number(1e-6 * static_cast<double>(h.rss_bytes), 1);
+    json.begin('{').with("process", name).with("state", wordOf(h.state)).with("message", h.message);
+    json.with("age_s", secondsSince(service.heard_ns, now_ns), 2).with("frames_in", h.frames_in);
+    json.with("frames_out", h.frames_out).with("dropped", h.dropped).with("rate_hz", h.rate_hz, 2);
+    json.with("cpu", service.cpu, 3).with("rss_mb", 1e-6 * static_cast<double>(h.rss_bytes), 1);
     json.key("reasons").begin('{');
     for (const auto& [reason, n] : h.reasons) json.textKey(reason).integer(n);
     json.end('}').end('}');
   }
   json.end(']').key("silent_s").begin('{');
-  json.key("objects").number(secondsSince(last.objects_ns, now_ns), 2);
-  json.key("odometry").number(secondsSince(last.odometry_ns, now_ns), 2);
-  return json.end('}').end('}').take();
+  json.with("objects", secondsSince(last.objects_ns, now_ns), 2);
+  return json.with("odometry", secondsSince(last.odometry_ns, now_ns), 2).end('}').end('}').take();
 }
 
 std::string VitalSigns::healthz(std::int64_t now_ns) const {
@@ -109,7 +103,7 @@ std::string VitalSigns::healthz(std::int64_t now_ns) const {
   for (const auto& [name, sentence] : stand_ins_) services.textKey(name).text("stood_in_for");
   services.end('}');
   JsonWriter json;
-  json.begin('{').key("status").text(heard == 0 ? "silent" : status);
+  json.begin('{').with("status", heard == 0 ? "silent" : status);
   return json.key("services").raw(services.str()).end('}').take() + "\n";
 }
 

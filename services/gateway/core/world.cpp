@@ -16,19 +16,12 @@ constexpr std::chrono::seconds kBack{2};
 
 void putTransform(JsonWriter& json, TimePoint time, const std::string& parent,
                   const std::string& child, const RigidTransform& T) {
-  json.begin('{').key("timestamp");
-  putTime(json, time);
-  json.key("parent_frame_id").text(parent).key("child_frame_id").text(child).key("translation");
-  putVector(json, T.p);
-  json.key("rotation");
-  putQuaternion(json, T.q);
-  json.end('}');
+  json.begin('{').with("timestamp", time).with("parent_frame_id", parent);
+  json.with("child_frame_id", child).with("translation", T.p).with("rotation", T.q).end('}');
 }
 
 void putHeader(JsonWriter& json, TimePoint time, const std::string& frame) {
-  json.begin('{').key("timestamp");
-  putTime(json, time);
-  json.key("frame_id").text(frame);
+  json.begin('{').with("timestamp", time).with("frame_id", frame);
 }
 
 /// Little-endian CDR with alignment up to four bytes, which suffices for the image.
@@ -78,9 +71,7 @@ std::string frameTransforms(TimePoint time, const RigidTransform& T_MW, const Ri
 std::string poseInFrame(TimePoint time, const RigidTransform& T_WB) {
   JsonWriter json;
   putHeader(json, time, kOdomFrame);
-  json.key("pose");
-  putPose(json, T_WB);
-  return json.end('}').take();
+  return json.with("pose", T_WB).end('}').take();
 }
 
 std::string landmarksAsPoints(const Landmarks& landmarks) {
@@ -99,17 +90,13 @@ std::string landmarksAsPoints(const Landmarks& landmarks) {
   }
   JsonWriter json(512 + 2 * points.size());
   putHeader(json, landmarks.stamp.time, kOdomFrame);
-  json.key("pose");
-  putPose(json, {});
-  json.key("point_stride").integer(kStride).key("fields").begin('[');
+  json.with("pose", RigidTransform{}).with("point_stride", kStride).key("fields").begin('[');
   int offset = 0;
   for (const char* name : {"x", "y", "z", "sigma"}) {
-    json.begin('{').key("name").text(name).key("offset").integer(offset);
-    json.key("type").integer(kFloat32).end('}');
+    json.begin('{').with("name", name).with("offset", offset).with("type", kFloat32).end('}');
     offset += 4;
   }
-  json.end(']').key("data").raw('"' + base64(points) + '"');
-  return json.end('}').take();
+  return json.end(']').key("data").raw('"' + base64(points) + '"').end('}').take();
 }
 
 std::string cameraCalibration(const CameraCalibration& camera, TimePoint time) {
@@ -122,16 +109,9 @@ std::string cameraCalibration(const CameraCalibration& camera, TimePoint time) {
   if (!fisheye) D.resize(5, 0.0);  // plumb_bob has five coefficients
   JsonWriter json;
   putHeader(json, time, opticalFrame(camera.name));
-  json.key("width").integer(camera.width).key("height").integer(camera.height);
-  json.key("distortion_model").text(fisheye ? "kannala_brandt" : "plumb_bob").key("D");
-  putNumbers(json, D, 9);
-  json.key("K");
-  putNumbers(json, K, 6);
-  json.key("R");
-  putNumbers(json, R);
-  json.key("P");
-  putNumbers(json, P, 6);
-  return json.end('}').take();
+  json.with("width", camera.width).with("height", camera.height);
+  json.with("distortion_model", fisheye ? "kannala_brandt" : "plumb_bob").with("D", D, 9);
+  return json.with("K", K, 6).with("R", R).with("P", P, 6).end('}').take();
 }
 
 std::string compressedImage(const FrameStamp& stamp, const std::string& camera,
@@ -168,8 +148,8 @@ std::string Trajectory::posesInFrame() const {
   JsonWriter json(256 + 160 * poses_.size());
   putHeader(json, time_, kOdomFrame);
   json.key("poses").begin('[');
-  for (const RigidTransform& pose : poses_) putPose(json, pose);
-  if (!poses_.empty()) putPose(json, newest_);
+  for (const RigidTransform& pose : poses_) put(json, pose);
+  if (!poses_.empty()) put(json, newest_);
   return json.end(']').end('}').take();
 }
 

@@ -29,16 +29,15 @@ std::uint64_t nanoseconds(TimePoint time) {
 }
 
 void putChannel(JsonWriter& json, const ChannelInfo& channel) {
-  json.begin('{').key("id").integer(channel.id).key("topic").text(channel.topic);
-  json.key("encoding").text(channel.encoding).key("schemaName").text(channel.schema_name);
-  json.key("schemaEncoding").text(channel.schema_encoding);
-  json.key("schema").text(channel.schema).end('}');
+  json.begin('{').with("id", channel.id).with("topic", channel.topic);
+  json.with("encoding", channel.encoding).with("schemaName", channel.schema_name);
+  json.with("schemaEncoding", channel.schema_encoding).with("schema", channel.schema).end('}');
 }
 
 void putSide(JsonWriter& json, const char* side, const std::string& type,
              const std::string& schema) {
-  json.key(side).begin('{').key("encoding").text("json").key("schemaName").text(type);
-  json.key("schemaEncoding").text("jsonschema").key("schema").text(schema).end('}');
+  json.key(side).begin('{').with("encoding", "json").with("schemaName", type);
+  json.with("schemaEncoding", "jsonschema").with("schema", schema).end('}');
 }
 
 }  // namespace
@@ -60,35 +59,30 @@ std::string_view chooseSubprotocol(std::string_view offered) {
 std::string serverInfo(const std::string& name, const std::string& session,
                        const std::optional<TimeRange>& range) {
   JsonWriter json;
-  json.begin('{').key("op").text("serverInfo").key("name").text(name);
-  json.key("capabilities").begin('[').text("time").text("services");
+  json.begin('{').with("op", "serverInfo").with("name", name).key("capabilities").begin('[');
+  json.text("time").text("services");
   if (range)
     json.text("playbackControl").text("rangedPlayback");  // names in newer and in older SDKs
   json.end(']');
   if (range) {
-    json.key("dataStartTime");
-    putTime(json, range->first);
-    json.key("dataEndTime");
-    putTime(json, range->last);
+    json.with("dataStartTime", range->first).with("dataEndTime", range->last);
   }
-  json.key("supportedEncodings").begin('[').text("json").end(']');
-  json.key("metadata").begin('{').end('}').key("sessionId").text(session);
-  return json.end('}').take();
+  json.key("supportedEncodings").begin('[').text("json").end(']').key("metadata").begin('{');
+  return json.end('}').with("sessionId", session).end('}').take();
 }
 
 std::string advertise(const std::vector<ChannelInfo>& channels) {
   JsonWriter json(32768);
-  json.begin('{').key("op").text("advertise").key("channels").begin('[');
+  json.begin('{').with("op", "advertise").key("channels").begin('[');
   for (const ChannelInfo& channel : channels) putChannel(json, channel);
   return json.end(']').end('}').take();
 }
 
 std::string advertiseServices(const std::vector<ServiceInfo>& services) {
   JsonWriter json(8192);
-  json.begin('{').key("op").text("advertiseServices").key("services").begin('[');
+  json.begin('{').with("op", "advertiseServices").key("services").begin('[');
   for (const ServiceInfo& service : services) {
-    json.begin('{').key("id").integer(service.id).key("name").text(service.name);
-    json.key("type").text(service.type);
+    json.begin('{').with("id", service.id).with("name", service.name).with("type", service.type);
     putSide(json, "request", service.type + "Request", service.request_schema);
     putSide(json, "response", service.type + "Response", service.response_schema);
     json.end('}');
@@ -98,22 +92,21 @@ std::string advertiseServices(const std::vector<ServiceInfo>& services) {
 
 std::string status(StatusLevel level, std::string_view message) {
   JsonWriter json;
-  json.begin('{').key("op").text("status").key("level").integer(static_cast<int>(level));
-  return json.key("message").text(message).end('}').take();
+  json.begin('{').with("op", "status").with("level", static_cast<int>(level));
+  return json.with("message", message).end('}').take();
 }
 
 std::string noParameters(const std::string& id) {
   JsonWriter json;
-  json.begin('{').key("op").text("parameterValues").key("parameters").begin('[').end(']');
-  if (!id.empty()) json.key("id").text(id);
+  json.begin('{').with("op", "parameterValues").key("parameters").begin('[').end(']');
+  if (!id.empty()) json.with("id", id);
   return json.end('}').take();
 }
 
 std::string serviceFailure(std::uint32_t service, std::uint32_t call, std::string_view message) {
   JsonWriter json;
-  json.begin('{').key("op").text("serviceCallFailure").key("serviceId").integer(service);
-  json.key("callId").integer(call).key("message").text(message);
-  return json.end('}').take();
+  json.begin('{').with("op", "serviceCallFailure").with("serviceId", service).with("callId", call);
+  return json.with("message", message).end('}').take();
 }
 
 std::string time(TimePoint time) {

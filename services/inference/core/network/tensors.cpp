@@ -15,12 +15,6 @@ std::string textOf(const Shape& shape) {
   return text.empty() ? "nothing" : text;
 }
 
-bool isAnchored(Family family) {
-  return family == Family::kYoloFastest || family == Family::kYolov5;
-}
-
-bool hasDistances(Family family) { return family == Family::kYolov8 || family == Family::kNanoDet; }
-
 /// The other layout of a YOLOv5 head, (1,A,H,W,5+K); empty for all other networks.
 Shape otherLayout(const ModelDescription& model, const Shape& shape) {
   if (model.family != Family::kYolov5 || shape.size() != 4) return {};
@@ -58,46 +52,36 @@ void addWholeShapes(const ModelDescription& model, std::vector<Shape>& shapes) {
   }
 }
 
-void addLevelShapes(const ModelDescription& model, const Level& level, std::vector<Shape>& shapes) {
+}  // namespace
+
+std::vector<LevelTensor> levelTensors(const ModelDescription& model, const Level& level) {
   const int classes = static_cast<int>(model.classes.size());
-  const auto [columns, rows] = cellsOf(model, level);
-  const auto plane = [&, columns = columns, rows = rows](int channels) {
-    shapes.push_back({1, channels, rows, columns});
-  };
-  const int anchored = static_cast<int>(level.anchors.size()) * (5 + classes);
+  const int anchors = static_cast<int>(level.anchors.size());
+  std::vector<LevelTensor> tensors;
   switch (model.family) {
     case Family::kPerdure:
-      plane(4);
-      plane(1 + classes);
-      if (model.azimuth.bins > 0) plane(2 * model.azimuth.bins);
-      if (model.spread_scale > 0) plane(4);
-      break;
+      tensors = {{"box", &Level::box, 4}, {"logits", &Level::logits, 1 + classes}};
+      if (model.azimuth.bins > 0)
+        tensors.push_back({"azimuth", &Level::azimuth, 2 * model.azimuth.bins});
+      if (model.spread_scale > 0) tensors.push_back({"spread", &Level::spread, 4});
+      return tensors;
     case Family::kYoloFastest:
-      shapes.push_back({1, rows, columns, anchored});
-      break;
     case Family::kYolov5:
-      plane(anchored);
-      break;
+      return {{"tensor", &Level::tensor, anchors * (5 + classes)}};
     case Family::kYoloFastestV2:
-      plane(4 * static_cast<int>(level.anchors.size()));
-      plane(static_cast<int>(level.anchors.size()));
-      plane(classes);
-      break;
+      return {{"box", &Level::box, 4 * anchors},
+              {"objectness", &Level::objectness, anchors},
+              {"classes", &Level::classes, classes}};
     case Family::kYolov8:
     case Family::kNanoDet:
-      if (level.tensor.empty()) {
-        plane(4 * model.bins);
-        plane(classes);
-      } else {
-        plane(4 * model.bins + classes);
-      }
-      break;
+      if (!level.tensor.empty()) return {{"tensor", &Level::tensor, 4 * model.bins + classes}};
+      return {{"box", &Level::box, 4 * model.bins}, {"classes", &Level::classes, classes}};
     default:
-      for (const int channels : {4, 1, classes}) plane(channels);
+      return {{"box", &Level::box, 4},
+              {"objectness", &Level::objectness, 1},
+              {"classes", &Level::classes, classes}};
   }
 }
-
-}  // namespace
 
 std::vector<std::string> tensorNames(const ModelDescription& model) {
   const Outputs& whole = model.outputs;
@@ -105,16 +89,8 @@ std::vector<std::string> tensorNames(const ModelDescription& model) {
   if (!whole.boxes.empty()) return {whole.boxes, whole.scores};
   std::vector<std::string> names;
   for (const Level& level : model.levels) {
-    if (isAnchored(model.family) || (hasDistances(model.family) && !level.tensor.empty())) {
-      names.push_back(level.tensor);
-    } else if (model.family == Family::kPerdure) {
-      names.insert(names.end(), {level.box, level.logits});
-      if (model.azimuth.bins > 0) names.push_back(level.azimuth);
-      if (model.spread_scale > 0) names.push_back(level.spread);
-    } else if (hasDistances(model.family)) {
-      names.insert(names.end(), {level.box, level.classes});
-    } else {
-      names.insert(names.end(), {level.box, level.objectness, level.classes});
+    for (const LevelTensor& tensor : levelTensors(model, level)) {
+      names.push_back(level.*tensor.name);
     }
   }
   return names;
@@ -136,7 +112,13 @@ std::vector<Shape> expectedShapes(const ModelDescription& model) {
   if (model.outputs.any()) {
     addWholeShapes(model, shapes);
   } else {
-    for (const Level& level : model.levels) addLevelShapes(model, level, shapes);
+    for (const Level& level : model.levels) {
+      const auto [columns, rows] = cellsOf(model, level);
+      for (const auto& [key, name, channels] : levelTensors(model, level)) {
+        shapes.push_back(model.family == Family::kYoloFastest ? Shape{1, rows, columns, channels}
+                                                              : Shape{1, channels, rows, columns});
+      }
+    }
   }
   return shapes;
 }

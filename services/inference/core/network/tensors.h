@@ -20,6 +20,15 @@ struct Tensor {
 /// A length in expectedShapes() that the network chooses.
 inline constexpr int kAnyLength = -1;
 
+/// A tensor of one level of the heads.
+struct LevelTensor {
+  const char* key;           ///< key in model.json
+  std::string Level::*name;  ///< its name in the network
+  int channels;
+};
+/// Tensors of a level, in the order of tensorNames(). For YOLOv8 and NanoDet, `level.tensor` must
+/// be set if the level has it; the numbers of channels also depend on the anchors.
+std::vector<LevelTensor> levelTensors(const ModelDescription& model, const Level& level);
 /// Names of the tensors to request from the network, in the order of decode()'s argument.
 std::vector<std::string> tensorNames(const ModelDescription& model);
 

@@ -74,7 +74,7 @@ void Swap::rehearse(bool in_form, Time now) {
   judgeNow(now);
 }
 
-void Swap::ownFailure(const Reason& reason, Time) {
+void Swap::ownFailure(const Reason& reason) {
   good_ = 0;
   if (++failures_ < kFailures || role_ == Role::kPlain || role_ == Role::kGone) return;
   giveUp({"fails", reason.code + (reason.detail.empty() ? "" : ": " + reason.detail)}, true);
@@ -131,10 +131,10 @@ void Swap::takeOver(Time now) {
   again_at_ = now + options_.lease / 2;
   notify(SwapStep::kTookOver, follows_, {"", judge_.summary()});
   message_ = "is heard, on probation";
-  if (follows_ == 0) pass(now);
+  if (follows_ == 0) pass();
 }
 
-void Swap::pass(Time) {
+void Swap::pass() {
   role_ = Role::kPlain;
   notify(SwapStep::kPassed, follows_, {"", judge_.summary()});
   message_.clear();
@@ -181,14 +181,8 @@ void Swap::watch(const SwapNotice& notice, Time now) {
 void Swap::takeBack(const Reason& reason, Time now) {
   const Watch newcomer = *std::exchange(watch_, std::nullopt);
   actions_.lead = true;
-  SwapNotice notice;
-  notice.instance = options_.self;
-  notice.about = newcomer.newcomer;
-  notice.step = SwapStep::kRolledBack;
-  notice.model = newcomer.model;
-  notice.reason = reason.code;
-  notice.detail = reason.detail;
-  actions_.notices.push_back(notice);
+  notify(SwapStep::kRolledBack, newcomer.newcomer, reason);
+  actions_.notices.back().model = newcomer.model;
   message_ = newcomer.model + " was rolled back, " + reason.code + ": " + reason.detail;
   countRollBack(reason.code);
   sayAgain(own_.empty() ? now : own_.back().at, now);
@@ -229,7 +223,7 @@ void Swap::tick(Time now) {
     again_.clear();
   }
   const bool over = now - since_ >= durationFromSeconds(options_.probation_s);
-  if (role_ == Role::kProbation && over && now - self_at_ <= options_.lease) pass(now);
+  if (role_ == Role::kProbation && over && now - self_at_ <= options_.lease) pass();
   if (watch_ && now > watch_->until) {
     watch_.reset();
     message_ = "stands by";

@@ -48,7 +48,7 @@ class Swap {
   void learn(const ModelInfo& model) { judge_.learn(model); }
   /// `in_form`: whether the result is in time and the lease has not expired.
   void ownResult(const Detections& own, bool in_form, Time now);
-  void ownFailure(const Reason& reason, Time now);
+  void ownFailure(const Reason& reason);
   /// Takes each message of `detections` that readers receive, including own ones.
   void heard(const Detections& detections, Time now);
   void told(const SwapNotice& notice, Time now);
@@ -80,7 +80,7 @@ class Swap {
 
   void rehearse(bool in_form, Time now);
   void takeOver(Time now);
-  void pass(Time now);
+  void pass();
   void giveUp(const Reason& reason, bool tell);
   void watch(const SwapNotice& notice, Time now);
   void takeBack(const Reason& reason, Time now);

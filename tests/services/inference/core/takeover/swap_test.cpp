@@ -107,7 +107,7 @@ struct Bus {
         obey(id);
         if (!p.silent) deliver(**answer);
       } else {
-        p.swap.ownFailure(answer->error(), now);
+        p.swap.ownFailure(answer->error());
         obey(id);
       }
     }
