@@ -12,6 +12,7 @@
 #include "common/replay/read_ahead.h"
 #include "services/vio/core/state/saved_state.h"
 #include "services/vio/node.h"
+#include "tools/base/quantile.h"
 
 namespace perdure::calibrate {
 namespace {
@@ -240,10 +241,7 @@ bool isSurelyGood(const RigCheck& check) {
 double innovationRatio(const std::vector<vio::Innovation>& innovations) {
   std::vector<double> values;
   for (const auto& i : innovations) values.push_back(i.nis / chi2Quantile(0.5, i.rows));
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return tools::upperMedian(std::move(values));
 }
 
 RigCheck checkRig(const RigCheckOptions& options) {

@@ -16,6 +16,7 @@
 #include "common/replay/files/stamps.h"
 #include "common/replay/files/text_file.h"
 #include "common/replay/stamp_check.h"
+#include "tools/base/quantile.h"
 
 namespace perdure::tools {
 namespace {
@@ -98,9 +99,7 @@ std::size_t placesShort(const Table& table) {
     if (!replay::parseNanoseconds(row[0])) ++others;
   }
   if (values.empty() || 2 * others < values.size()) return 0;
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
-                   values.end());
-  const double middle = values[values.size() / 2];
+  const double middle = upperMedian(std::move(values));
   return middle >= 1e14 ? 3 : middle >= 1e11 ? 6 : 9;
 }
 
