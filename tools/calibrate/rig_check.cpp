@@ -69,15 +69,6 @@ class Watched {
   std::size_t samples_ = 0;
 };
 
-Grade gradeOf(double value, double good, double bad) {
-  return value <= good ? Grade::kGood : value <= bad ? Grade::kDoubtful : Grade::kBad;
-}
-
-Judgement judged(Grade grade, std::string text, const std::string& mend) {
-  if (grade != Grade::kGood) text += "; " + mend;
-  return {grade, std::move(text)};
-}
-
 /// Accepted innovations as corner residuals over the image.
 std::vector<CornerResidual> residualsOf(const std::vector<vio::Innovation>& innovations) {
   std::vector<CornerResidual> all;
