@@ -168,7 +168,6 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
       serve(PoseOdometry(*pose_file_, instanceOf(kVio), session_, accuracy));
     return openKnownPoses();
   }
-  uses_vio_ = true;
   if (!dataset_->calibration().imu) {
     throw StartupError(ExitCode::kUnavailable, options.data +
                                                    " has no inertial samples, which vio "
