@@ -2,12 +2,10 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <cstdlib>
 #include <map>
 #include <optional>
 
@@ -322,31 +320,19 @@ MendedText::MendedText(const fs::path& given) : drive_(given) {
     if (stamps || columns) changed.push_back(std::move(table));
   }
   if (changed.empty()) return;
-  std::string name = (fs::temp_directory_path() / "perdure-mended-XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr) {
+  temporary_.emplace(fs::temp_directory_path() / "perdure-mended-", [](const std::string& name) {
     throw StartupError(ExitCode::kUnavailable, name + " cannot be made; is the disk full?");
+  });
+  drive_ = temporary_->path() / "drive";
+  linkAll(mav0.parent_path(), drive_, mav0.filename());
+  linkAll(mav0, drive_ / "mav0", "");
+  for (const Table& table : changed) {
+    const fs::path sensor = table.file.parent_path();
+    const fs::path here = drive_ / "mav0" / sensor.filename();
+    fs::remove(here);
+    linkAll(sensor, here, "data.csv");
+    writeTable(table, here / "data.csv");
   }
-  temporary_ = name;
-  drive_ = temporary_ / "drive";
-  try {
-    linkAll(mav0.parent_path(), drive_, mav0.filename());
-    linkAll(mav0, drive_ / "mav0", "");
-    for (const Table& table : changed) {
-      const fs::path sensor = table.file.parent_path();
-      const fs::path here = drive_ / "mav0" / sensor.filename();
-      fs::remove(here);
-      linkAll(sensor, here, "data.csv");
-      writeTable(table, here / "data.csv");
-    }
-  } catch (...) {
-    fs::remove_all(temporary_, error);
-    throw;
-  }
-}
-
-MendedText::~MendedText() {
-  std::error_code error;
-  if (!temporary_.empty()) fs::remove_all(temporary_, error);
 }
 
 }  // namespace perdure::tools

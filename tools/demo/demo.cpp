@@ -17,6 +17,7 @@
 #include "common/base/ids.h"
 #include "common/base/subprocess.h"
 #include "common/replay/ros_topics.h"
+#include "tools/base/files.h"
 #include "tools/data_check/data_check.h"
 #include "tools/evaluate/object_report.h"
 #include "tools/evaluate/simulated_truth.h"
@@ -30,13 +31,6 @@ namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 
 constexpr std::int64_t kSecond = 1'000'000'000;
-
-std::string contentsOf(const fs::path& file) {
-  std::ifstream stream(file);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return text.str();
-}
 
 /// Locks a DDS domain that no other demo of this host uses, until this process ends.
 void leaseDomain() {
@@ -68,7 +62,7 @@ bus::Options busOptions(const fs::path& root) {
 
 /// The last line of a service's log that is not an info line.
 std::string lastWords(const std::string& log_file) {
-  std::istringstream lines(contentsOf(log_file));
+  std::istringstream lines(textOf(log_file));
   std::string last, line;
   while (std::getline(lines, line)) {
     if (!line.empty() && line.find(" info: ") == std::string::npos) last = line;
@@ -235,7 +229,7 @@ void Demo::checkServices() {
     return one.second.state != "BACKOFF" && one.second.state != "FATAL";
   });
   if (all_well) return;
-  auto exits = lastExits(contentsOf(folders_.run / "supervisord.log"));
+  auto exits = lastExits(textOf(folders_.run / "supervisord.log"));
   for (const ServicePlan& service : services_) {
     const auto found = states->find(service.name);
     const int status = exits[service.name];
@@ -301,7 +295,7 @@ void Demo::write() {
                                    {"frames", frames_},
                                    {"complete", !interrupted_ && options_.seconds == 0.0}};
   report.update(reporter_->report());
-  const auto spawns = countSpawns(contentsOf(folders_.run / "supervisord.log"));
+  const auto spawns = countSpawns(textOf(folders_.run / "supervisord.log"));
   for (const auto& [service, count] : spawns) {
     report["services"][service]["restarts"] = count - 1;
   }
