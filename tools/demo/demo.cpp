@@ -70,17 +70,6 @@ std::string lastWords(const std::string& log_file) {
   return last;
 }
 
-/// A short path, because the path of a Unix socket has at most 107 bytes.
-std::string socketFolder() {
-  std::string name = (fs::temp_directory_path() / "perdure-demo-XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr) {
-    throw StartupError(ExitCode::kUnavailable, "no folder can be made in " +
-                                                   fs::temp_directory_path().string() +
-                                                   "; set TMPDIR to one that can be written");
-  }
-  return name;
-}
-
 bool meansCannotStart(const ServiceState& state, int exit_status) {
   if (state.state == "FATAL") return true;
   const bool said_why = exit_status == static_cast<int>(ExitCode::kUsage) ||
@@ -106,10 +95,16 @@ Demo::Demo(const DemoOptions& options, const std::atomic<bool>& interrupted)
   loop_ = std::make_unique<bus::WaitLoop>(*participant_);
   reporter_ = std::make_unique<Reporter>(*participant_, *loop_, *outputs_, shapesFor(options_));
 
-  socket_ = socketFolder() + "/supervisor.sock";
+  // A short path, because the path of a Unix socket has at most 107 bytes.
+  const fs::path place = fs::temp_directory_path();
+  socket_folder_.emplace(place / "perdure-demo-", [&](const std::string&) {
+    throw StartupError(ExitCode::kUnavailable, "no folder can be made in " + place.string() +
+                                                   "; set TMPDIR to one that can be written");
+  });
+  const std::string socket = (socket_folder_->path() / "supervisor.sock").string();
   const fs::path config = folders_.run / "supervisord.conf";
-  std::ofstream(config) << supervisorConfig(services_, folders_, socket_, options_.root);
-  supervisor_ = std::make_unique<Supervisor>(config.string(), socket_,
+  std::ofstream(config) << supervisorConfig(services_, folders_, socket, options_.root);
+  supervisor_ = std::make_unique<Supervisor>(config.string(), socket,
                                              (folders_.run / "supervisord.out").string());
   std::cerr << fmt::format(
       "demo: {} frames, services on DDS domain {}; listen with: "
@@ -124,12 +119,6 @@ void Demo::addGateway() {
   if (!gateway) return;
   services_.push_back(*std::move(gateway));
   address_ = fmt::format("http://127.0.0.1:{}/", port);
-}
-
-Demo::~Demo() {
-  supervisor_.reset();
-  std::error_code ignored;
-  if (!socket_.empty()) fs::remove_all(fs::path(socket_).parent_path(), ignored);
 }
 
 replay::DatasetOptions Demo::dataOptions() const {
