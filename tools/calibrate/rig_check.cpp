@@ -12,6 +12,7 @@
 #include "common/replay/read_ahead.h"
 #include "services/vio/core/state/saved_state.h"
 #include "services/vio/node.h"
+#include "tools/base/quantile.h"
 
 namespace perdure::calibrate {
 namespace {
@@ -67,15 +68,6 @@ class Watched {
   std::unique_ptr<vio::Node> node_;
   std::size_t samples_ = 0;
 };
-
-Grade gradeOf(double value, double good, double bad) {
-  return value <= good ? Grade::kGood : value <= bad ? Grade::kDoubtful : Grade::kBad;
-}
-
-Judgement judged(Grade grade, std::string text, const std::string& mend) {
-  if (grade != Grade::kGood) text += "; " + mend;
-  return {grade, std::move(text)};
-}
 
 /// Accepted innovations as corner residuals over the image.
 std::vector<CornerResidual> residualsOf(const std::vector<vio::Innovation>& innovations) {
@@ -240,10 +232,7 @@ bool isSurelyGood(const RigCheck& check) {
 double innovationRatio(const std::vector<vio::Innovation>& innovations) {
   std::vector<double> values;
   for (const auto& i : innovations) values.push_back(i.nis / chi2Quantile(0.5, i.rows));
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return tools::upperMedian(std::move(values));
 }
 
 RigCheck checkRig(const RigCheckOptions& options) {

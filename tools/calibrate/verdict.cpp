@@ -15,16 +15,6 @@ namespace {
 constexpr double kDegrees = 180.0 / M_PI;
 constexpr std::size_t kEnoughInCell = 15;
 
-Grade gradeOf(double value, double good, double bad) {
-  return value <= good ? Grade::kGood : value <= bad ? Grade::kDoubtful : Grade::kBad;
-}
-
-/// Appends `mend` to the text unless the grade is good.
-Judgement judged(Grade grade, std::string text, const std::string& mend) {
-  if (grade != Grade::kGood) text += "; " + mend;
-  return {grade, std::move(text)};
-}
-
 std::string placeIn(int column, int row) {
   const char* vertical = row < kCellRows / 3 ? "upper" : row >= 2 * kCellRows / 3 ? "lower" : "";
   const char* horizontal = column < kCellColumns / 3        ? "left"
@@ -177,6 +167,15 @@ Judgement judgeNoise(const char* name, const char* key, const NoiseCheck& check)
 }
 
 }  // namespace
+
+Grade gradeOf(double value, double good, double bad) {
+  return value <= good ? Grade::kGood : value <= bad ? Grade::kDoubtful : Grade::kBad;
+}
+
+Judgement judged(Grade grade, std::string text, const std::string& mend) {
+  if (grade != Grade::kGood) text += "; " + mend;
+  return {grade, std::move(text)};
+}
 
 Grade worstOf(const Judgements& judgements) {
   Grade worst = Grade::kGood;

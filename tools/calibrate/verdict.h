@@ -17,6 +17,11 @@ struct Judgement {
 };
 using Judgements = std::vector<Judgement>;
 
+/// Good up to `good`, doubtful up to `bad`.
+Grade gradeOf(double value, double good, double bad);
+/// Appends `mend` to the text unless the grade is good.
+Judgement judged(Grade grade, std::string text, const std::string& mend);
+
 Grade worstOf(const Judgements& judgements);
 /// "good", "doubtful", "bad".
 const char* wordOf(Grade grade);

@@ -7,6 +7,8 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
+#include "tools/base/quantile.h"
+
 namespace perdure::tools {
 namespace {
 
@@ -16,12 +18,6 @@ Eigen::Matrix3d crossOf(const Eigen::Vector3d& v) {
   Eigen::Matrix3d m;
   m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
   return m;
-}
-
-double middleOf(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 constexpr double kLeastScale = 1e-5;
@@ -51,7 +47,7 @@ Motion withoutWay(const std::vector<Flow>& flow) {
     for (const Flow& one : flow) {
       errors.push_back((one.step - one.ray.cross(motion.rotation)).norm());
     }
-    motion.error = middleOf(std::move(errors));
+    motion.error = upperMedian(std::move(errors));
     scale = std::max(kLeastScale, motion.error);
   }
   return motion;
@@ -79,7 +75,7 @@ Motion withWay(const std::vector<Flow>& flow, const Motion& start) {
   for (int round = 0; round < 12; ++round) {
     std::vector<double> errors;
     for (const Flow& one : flow) errors.push_back(std::abs(offOf(one, motion).value));
-    motion.error = middleOf(std::move(errors));
+    motion.error = upperMedian(std::move(errors));
     const double scale = std::max(kLeastScale, 1.5 * motion.error);
     Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
     Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero(), row;

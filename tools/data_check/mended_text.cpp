@@ -2,12 +2,10 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <cstdlib>
 #include <map>
 #include <optional>
 
@@ -16,6 +14,7 @@
 #include "common/replay/files/stamps.h"
 #include "common/replay/files/text_file.h"
 #include "common/replay/stamp_check.h"
+#include "tools/base/quantile.h"
 
 namespace perdure::tools {
 namespace {
@@ -98,9 +97,7 @@ std::size_t placesShort(const Table& table) {
     if (!replay::parseNanoseconds(row[0])) ++others;
   }
   if (values.empty() || 2 * others < values.size()) return 0;
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
-                   values.end());
-  const double middle = values[values.size() / 2];
+  const double middle = upperMedian(std::move(values));
   return middle >= 1e14 ? 3 : middle >= 1e11 ? 6 : 9;
 }
 
@@ -323,31 +320,19 @@ MendedText::MendedText(const fs::path& given) : drive_(given) {
     if (stamps || columns) changed.push_back(std::move(table));
   }
   if (changed.empty()) return;
-  std::string name = (fs::temp_directory_path() / "perdure-mended-XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr) {
+  temporary_.emplace(fs::temp_directory_path() / "perdure-mended-", [](const std::string& name) {
     throw StartupError(ExitCode::kUnavailable, name + " cannot be made; is the disk full?");
+  });
+  drive_ = temporary_->path() / "drive";
+  linkAll(mav0.parent_path(), drive_, mav0.filename());
+  linkAll(mav0, drive_ / "mav0", "");
+  for (const Table& table : changed) {
+    const fs::path sensor = table.file.parent_path();
+    const fs::path here = drive_ / "mav0" / sensor.filename();
+    fs::remove(here);
+    linkAll(sensor, here, "data.csv");
+    writeTable(table, here / "data.csv");
   }
-  temporary_ = name;
-  drive_ = temporary_ / "drive";
-  try {
-    linkAll(mav0.parent_path(), drive_, mav0.filename());
-    linkAll(mav0, drive_ / "mav0", "");
-    for (const Table& table : changed) {
-      const fs::path sensor = table.file.parent_path();
-      const fs::path here = drive_ / "mav0" / sensor.filename();
-      fs::remove(here);
-      linkAll(sensor, here, "data.csv");
-      writeTable(table, here / "data.csv");
-    }
-  } catch (...) {
-    fs::remove_all(temporary_, error);
-    throw;
-  }
-}
-
-MendedText::~MendedText() {
-  std::error_code error;
-  if (!temporary_.empty()) fs::remove_all(temporary_, error);
 }
 
 }  // namespace perdure::tools

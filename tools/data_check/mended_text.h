@@ -4,8 +4,11 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "tools/base/files.h"
 
 namespace perdure::tools {
 
@@ -15,16 +18,14 @@ class MendedText {
   /// Writes nothing if no such fix is needed. Throws StartupError: kData if a fix is needed but
   /// uncertain, kUnavailable if the folder cannot be created.
   explicit MendedText(const std::filesystem::path& drive);
-  ~MendedText();
-  MendedText(const MendedText&) = delete;
-  MendedText& operator=(const MendedText&) = delete;
 
   /// The folder to read: `drive` itself if nothing was fixed.
   const std::filesystem::path& drive() const { return drive_; }
   const std::vector<std::string>& mends() const { return mends_; }  ///< one sentence for each fix
 
  private:
-  std::filesystem::path drive_, temporary_;
+  std::filesystem::path drive_;
+  std::optional<TemporaryFolder> temporary_;
   std::vector<std::string> mends_;
 };
 

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "common/replay/recording.h"
+#include "tools/base/quantile.h"
 
 namespace perdure::tools {
 namespace {
@@ -50,9 +51,7 @@ double apartOf(const std::vector<TimePoint>& first, const std::vector<TimePoint>
     }
     apart.push_back(least);
   }
-  const auto middle = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 2);
-  std::nth_element(apart.begin(), middle, apart.end());
-  return *middle;
+  return upperMedian(std::move(apart));
 }
 
 std::string lengthText(double seconds) {

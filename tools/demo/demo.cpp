@@ -17,6 +17,7 @@
 #include "common/base/ids.h"
 #include "common/base/subprocess.h"
 #include "common/replay/ros_topics.h"
+#include "tools/base/files.h"
 #include "tools/data_check/data_check.h"
 #include "tools/evaluate/object_report.h"
 #include "tools/evaluate/simulated_truth.h"
@@ -30,13 +31,6 @@ namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 
 constexpr std::int64_t kSecond = 1'000'000'000;
-
-std::string contentsOf(const fs::path& file) {
-  std::ifstream stream(file);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return text.str();
-}
 
 /// Locks a DDS domain that no other demo of this host uses, until this process ends.
 void leaseDomain() {
@@ -68,23 +62,12 @@ bus::Options busOptions(const fs::path& root) {
 
 /// The last line of a service's log that is not an info line.
 std::string lastWords(const std::string& log_file) {
-  std::istringstream lines(contentsOf(log_file));
+  std::istringstream lines(textOf(log_file));
   std::string last, line;
   while (std::getline(lines, line)) {
     if (!line.empty() && line.find(" info: ") == std::string::npos) last = line;
   }
   return last;
-}
-
-/// A short path, because the path of a Unix socket has at most 107 bytes.
-std::string socketFolder() {
-  std::string name = (fs::temp_directory_path() / "perdure-demo-XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr) {
-    throw StartupError(ExitCode::kUnavailable, "no folder can be made in " +
-                                                   fs::temp_directory_path().string() +
-                                                   "; set TMPDIR to one that can be written");
-  }
-  return name;
 }
 
 bool meansCannotStart(const ServiceState& state, int exit_status) {
@@ -112,10 +95,16 @@ Demo::Demo(const DemoOptions& options, const std::atomic<bool>& interrupted)
   loop_ = std::make_unique<bus::WaitLoop>(*participant_);
   reporter_ = std::make_unique<Reporter>(*participant_, *loop_, *outputs_, shapesFor(options_));
 
-  socket_ = socketFolder() + "/supervisor.sock";
+  // A short path, because the path of a Unix socket has at most 107 bytes.
+  const fs::path place = fs::temp_directory_path();
+  socket_folder_.emplace(place / "perdure-demo-", [&](const std::string&) {
+    throw StartupError(ExitCode::kUnavailable, "no folder can be made in " + place.string() +
+                                                   "; set TMPDIR to one that can be written");
+  });
+  const std::string socket = (socket_folder_->path() / "supervisor.sock").string();
   const fs::path config = folders_.run / "supervisord.conf";
-  std::ofstream(config) << supervisorConfig(services_, folders_, socket_, options_.root);
-  supervisor_ = std::make_unique<Supervisor>(config.string(), socket_,
+  std::ofstream(config) << supervisorConfig(services_, folders_, socket, options_.root);
+  supervisor_ = std::make_unique<Supervisor>(config.string(), socket,
                                              (folders_.run / "supervisord.out").string());
   std::cerr << fmt::format(
       "demo: {} frames, services on DDS domain {}; listen with: "
@@ -130,12 +119,6 @@ void Demo::addGateway() {
   if (!gateway) return;
   services_.push_back(*std::move(gateway));
   address_ = fmt::format("http://127.0.0.1:{}/", port);
-}
-
-Demo::~Demo() {
-  supervisor_.reset();
-  std::error_code ignored;
-  if (!socket_.empty()) fs::remove_all(fs::path(socket_).parent_path(), ignored);
 }
 
 replay::DatasetOptions Demo::dataOptions() const {
@@ -235,7 +218,7 @@ void Demo::checkServices() {
     return one.second.state != "BACKOFF" && one.second.state != "FATAL";
   });
   if (all_well) return;
-  auto exits = lastExits(contentsOf(folders_.run / "supervisord.log"));
+  auto exits = lastExits(textOf(folders_.run / "supervisord.log"));
   for (const ServicePlan& service : services_) {
     const auto found = states->find(service.name);
     const int status = exits[service.name];
@@ -301,7 +284,7 @@ void Demo::write() {
                                    {"frames", frames_},
                                    {"complete", !interrupted_ && options_.seconds == 0.0}};
   report.update(reporter_->report());
-  const auto spawns = countSpawns(contentsOf(folders_.run / "supervisord.log"));
+  const auto spawns = countSpawns(textOf(folders_.run / "supervisord.log"));
   for (const auto& [service, count] : spawns) {
     report["services"][service]["restarts"] = count - 1;
   }

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "common/replay/dataset.h"
+#include "tools/base/files.h"
 #include "tools/demo/plan.h"
 #include "tools/demo/reporter.h"
 #include "tools/demo/supervisor.h"
@@ -19,7 +20,6 @@ class Demo {
   /// Checks data, model and configuration, then starts everything. Throws StartupError with the
   /// fix.
   Demo(const DemoOptions& options, const std::atomic<bool>& interrupted);
-  ~Demo();
 
   /// Runs until the drive has ended and all data are processed, --seconds are over, or the demo is
   /// interrupted. Then it ends the services in order (unless --keep is given) and writes the
@@ -49,12 +49,13 @@ class Demo {
   std::vector<ServicePlan> services_;
   std::optional<TruthFiles> truth_;
   std::size_t frames_ = 0;
-  std::string configurations_, socket_, address_;
+  std::string configurations_, address_;
   std::unique_ptr<OutputWriter> outputs_;
   std::unique_ptr<bus::Domain> domain_;
   std::unique_ptr<bus::Participant> participant_;
   std::unique_ptr<bus::WaitLoop> loop_;
   std::unique_ptr<Reporter> reporter_;
+  std::optional<TemporaryFolder> socket_folder_;
   std::unique_ptr<Supervisor> supervisor_;
   std::int64_t shown_ns_ = 0, checked_ns_ = 0;
 };

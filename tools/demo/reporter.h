@@ -37,11 +37,9 @@ class Reporter {
   Reporter(const bus::Participant& participant, bus::WaitLoop& loop, OutputWriter& outputs,
            std::map<std::string, ShapePoints> shapes);
 
-  /// Numbers of frames received so far.
+  /// Number of frames received so far.
   std::size_t odometryFrames() const { return odometry_.size(); }
-  std::size_t objectFrames() const { return objects_.size(); }
-  /// Index and sensor time of the newest frame with odometry.
-  std::uint64_t newestFrame() const { return newest_frame_; }
+  /// Sensor time of the newest frame with odometry.
   double secondsOfDrive() const { return toSeconds(newest_time_ - first_time_); }
   /// Whether the drive has ended and every frame with odometry has objects.
   bool drained() const;

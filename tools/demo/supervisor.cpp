@@ -6,12 +6,12 @@
 
 #include <chrono>
 #include <cstring>
-#include <fstream>
 #include <regex>
 #include <sstream>
 #include <thread>
 
 #include "common/base/errors.h"
+#include "tools/base/files.h"
 
 namespace perdure::tools {
 namespace {
@@ -32,11 +32,6 @@ std::string member(const std::string& xml, const std::string& name) {
 
 [[noreturn]] void throwUnusable(const std::string& why) {
   throw StartupError(ExitCode::kUnavailable, why);
-}
-
-std::string textOf(const std::string& file) {
-  std::ifstream in(file);
-  return {std::istreambuf_iterator<char>(in), {}};
 }
 
 class Socket {

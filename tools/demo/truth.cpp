@@ -10,6 +10,7 @@
 #include "common/replay/files/kitti_calibration.h"
 #include "common/replay/files/kitti_labels.h"
 #include "common/replay/files/pose_file.h"
+#include "tools/base/quantile.h"
 #include "tools/evaluate/kitti_score.h"
 #include "tools/evaluate/object_report.h"
 
@@ -44,10 +45,7 @@ Eigen::Vector3d middleOf(const std::vector<replay::KittiLabel>& labels, std::int
   }
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < 3; ++i) {
-    auto& v = values[i];
-    if (v.empty()) continue;
-    std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2), v.end());
-    middle[static_cast<Eigen::Index>(i)] = v[v.size() / 2];
+    middle[static_cast<Eigen::Index>(i)] = upperMedian(std::move(values[i]));
   }
   return middle;
 }

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
@@ -67,18 +66,17 @@ nlohmann::ordered_json toJson(const Consistency& consistency) {
 }
 
 void print(const Anees& anees, const std::string& band) {
-  std::printf("%-26s %14.2f %16s %10.2f %14.3f\n", anees.what.c_str(), anees.mean(), band.c_str(),
-              anees.median(), anees.within3Sigma());
+  fmt::print("{:<26} {:14.2f} {:>16} {:10.2f} {:14.3f}\n", anees.what, anees.mean(), band,
+             anees.median(), anees.within3Sigma());
 }
 
 void print(const Consistency& consistency) {
   if (consistency.objects) {
-    std::printf("%llu objects of the map with a true one, %llu without\n",
-                static_cast<unsigned long long>(consistency.objects->objects),
-                static_cast<unsigned long long>(consistency.objects->left_out));
+    fmt::print("{} objects of the map with a true one, {} without\n", consistency.objects->objects,
+               consistency.objects->left_out);
   }
-  std::printf("%-26s %14s %16s %10s %14s\n", "", "NEES per dof", "95 % band", "median",
-              "within 3 sigma");
+  fmt::print("{:<26} {:>14} {:>16} {:>10} {:>14}\n", "", "NEES per dof", "95 % band", "median",
+             "within 3 sigma");
   if (const auto& score = consistency.objects) {
     for (const Anees* anees : {&score->position, &score->yaw, &score->half_yaw, &score->size}) {
       const auto [low, high] = anees->band();

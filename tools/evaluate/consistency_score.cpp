@@ -16,6 +16,7 @@
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
 #include "common/replay/files/text_file.h"
+#include "tools/base/quantile.h"
 
 namespace perdure::tools {
 namespace {
@@ -164,12 +165,7 @@ double Anees::mean() const {
   return nees.empty() ? 0.0 : sum / (static_cast<double>(nees.size()) * dof);
 }
 
-double Anees::median() const {
-  if (nees.empty()) return 0.0;
-  std::vector<double> sorted = nees;
-  std::sort(sorted.begin(), sorted.end());
-  return sorted[sorted.size() / 2];
-}
+double Anees::median() const { return upperMedian(nees); }
 
 double Anees::within3Sigma() const {
   constexpr double kShare = 0.9973;

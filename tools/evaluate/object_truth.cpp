@@ -2,23 +2,19 @@
 
 #include <algorithm>
 
+#include "tools/base/quantile.h"
+
 namespace perdure::tools {
 namespace {
 
 using Points = std::vector<Eigen::Vector3d>;
-
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
-}
 
 Eigen::Vector3d median(Points::const_iterator begin, Points::const_iterator end) {
   Eigen::Vector3d result;
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
     for (auto point = begin; point != end; ++point) values.push_back((*point)(axis));
-    result(axis) = median(std::move(values));
+    result(axis) = quantile(std::move(values), 0.5);
   }
   return result;
 }

@@ -1,8 +1,9 @@
 // `perdure evaluate objects`: the nine cells and the identities, as text or JSON, against a
 // simulated folder or KITTI tracking.
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
@@ -141,44 +142,39 @@ nlohmann::ordered_json toJson(const Evaluated& result) {
 
 void printMishaps(const ObjectScore& score) {
   for (const Mishap& m : score.mishaps) {
-    std::printf("frame %4llu %-11s %4lld at %6.1f %5.1f %6.1f m in the camera, nearest %s %.2f m\n",
-                static_cast<unsigned long long>(m.frame), m.miss ? "miss" : "false alarm",
-                static_cast<long long>(m.id), m.centre.x(), m.centre.y(), m.centre.z(),
-                m.miss ? "estimate" : "label", m.nearest_m);
+    fmt::print(
+        "frame {:4} {:<11} {:4} at {:6.1f} {:5.1f} {:6.1f} m in the camera, nearest {} {:.2f} m\n",
+        m.frame, m.miss ? "miss" : "false alarm", m.id, m.centre.x(), m.centre.y(), m.centre.z(),
+        m.miss ? "estimate" : "label", m.nearest_m);
   }
 }
 
 void print(const Evaluated& result, const ObjectsOptions& options) {
   const ObjectScore& s = result.score;
   const auto json = toJson(result);
-  std::printf("%s%s: precision / recall\n", result.of.c_str(),
-              options.score.strict ? ", strict" : "");
-  std::printf("          < 30 deg       < 45 deg       any\n");
+  fmt::print("{}{}: precision / recall\n", result.of, options.score.strict ? ", strict" : "");
+  fmt::print("          < 30 deg       < 45 deg       any\n");
   for (std::size_t d = 0; d < 3; ++d) {
-    std::printf("< %.1f m", kDistances_m[d]);
-    for (const Cell& c : s.cells[d]) std::printf("   %.3f / %.3f", c.precision(), c.recall());
-    std::printf("\n");
+    fmt::print("< {:.1f} m", kDistances_m[d]);
+    for (const Cell& c : s.cells[d]) fmt::print("   {:.3f} / {:.3f}", c.precision(), c.recall());
+    fmt::print("\n");
   }
   const Cell& wide = s.cells[2][2];
-  std::printf("at 1.5 m, any: %llu matched of %llu, %llu false alarms, %llu neutral\n",
-              static_cast<unsigned long long>(wide.matched),
-              static_cast<unsigned long long>(wide.truth),
-              static_cast<unsigned long long>(wide.false_alarms),
-              static_cast<unsigned long long>(s.neutral));
-  std::printf(
-      "true objects: %llu of %llu found, mean recall over objects %.3f, position error %.3f m\n",
-      static_cast<unsigned long long>(s.objects_found), static_cast<unsigned long long>(s.objects),
-      s.mean_object_recall, s.position_error_m);
-  std::printf(
-      "identities: %llu switches, %.2f ids a found object, %.2f duplicates an object, "
-      "%.2f interruptions a minute\n",
-      static_cast<unsigned long long>(s.id_switches), s.idsPerFound(),
-      json["duplicates_per_object"].get<double>(), json["flicker_per_minute"].get<double>());
+  fmt::print("at 1.5 m, any: {} matched of {}, {} false alarms, {} neutral\n", wide.matched,
+             wide.truth, wide.false_alarms, s.neutral);
+  fmt::print(
+      "true objects: {} of {} found, mean recall over objects {:.3f}, position error {:.3f} m\n",
+      s.objects_found, s.objects, s.mean_object_recall, s.position_error_m);
+  fmt::print(
+      "identities: {} switches, {:.2f} ids a found object, {:.2f} duplicates an object, "
+      "{:.2f} interruptions a minute\n",
+      s.id_switches, s.idsPerFound(), json["duplicates_per_object"].get<double>(),
+      json["flicker_per_minute"].get<double>());
   if (result.left_out > 0) {
-    std::printf("%zu frames do not count: the run was not over them (--every, --from, --seconds)\n",
-                result.left_out);
+    fmt::print("{} frames do not count: the run was not over them (--every, --from, --seconds)\n",
+               result.left_out);
   }
-  if (result.untold > 0) std::printf("%s\n", noteOfUntold(result.untold).c_str());
+  if (result.untold > 0) fmt::print("{}\n", noteOfUntold(result.untold));
 }
 
 }  // namespace

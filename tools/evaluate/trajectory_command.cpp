@@ -1,8 +1,9 @@
 // `perdure evaluate trajectory`: compares a TUM file with a pose file or the ground truth of a
 // dataset folder.
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -187,22 +188,22 @@ nlohmann::ordered_json toJson(const Compared& result) {
 
 void print(const Compared& result, const TrajectoryOptions& options) {
   const TrajectoryScore& s = result.score;
-  std::printf("poses %zu of %zu frames (coverage %.4f), %.1f m\n", s.poses, result.expected,
-              result.coverage, s.length_m);
+  fmt::print("poses {} of {} frames (coverage {:.4f}), {:.1f} m\n", s.poses, result.expected,
+             result.coverage, s.length_m);
   if (result.left_out > 0) {
-    std::printf(
-        "%zu frames are not expected: the run was not over them (--every, --from, "
+    fmt::print(
+        "{} frames are not expected: the run was not over them (--every, --from, "
         "--seconds)\n",
         result.left_out);
   }
-  if (result.untold > 0) std::printf("%s\n", noteOfUntold(result.untold).c_str());
-  std::printf("ATE (%s): RMSE %.4f m, max %.4f m, rotation %.3f deg\n",
-              nameOf(alignmentOf(options.align)), s.ate_rmse_m, s.ate_max_m, s.ate_rotation_deg);
-  std::printf("RPE over 1 s: %.4f m, %.3f deg; drift at the end %.4f m\n", s.rpe_m, s.rpe_deg,
-              s.end_drift_m);
-  std::printf("KITTI: t_err %.3f %%, r_err %.5f deg/m (%zu segments of %g to %g m)\n",
-              s.segments.t_err_percent, s.segments.r_err_deg_per_m, s.segments.segments,
-              s.segments.lengths_m.front(), s.segments.lengths_m.back());
+  if (result.untold > 0) fmt::print("{}\n", noteOfUntold(result.untold));
+  fmt::print("ATE ({}): RMSE {:.4f} m, max {:.4f} m, rotation {:.3f} deg\n",
+             nameOf(alignmentOf(options.align)), s.ate_rmse_m, s.ate_max_m, s.ate_rotation_deg);
+  fmt::print("RPE over 1 s: {:.4f} m, {:.3f} deg; drift at the end {:.4f} m\n", s.rpe_m, s.rpe_deg,
+             s.end_drift_m);
+  fmt::print("KITTI: t_err {:.3f} %, r_err {:.5f} deg/m ({} segments of {:g} to {:g} m)\n",
+             s.segments.t_err_percent, s.segments.r_err_deg_per_m, s.segments.segments,
+             s.segments.lengths_m.front(), s.segments.lengths_m.back());
 }
 
 }  // namespace

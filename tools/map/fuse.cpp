@@ -253,21 +253,9 @@ void fuse(const FuseCommand& command) {
 
 }  // namespace
 
-std::size_t FuseOutcome::objectsBefore() const {
+std::size_t FuseOutcome::sumOf(std::size_t mapping::FusionReport::*count) const {
   std::size_t sum = 0;
-  for (const FusedFile& file : files) sum += file.report.objects;
-  return sum;
-}
-
-std::size_t FuseOutcome::loops() const {
-  std::size_t sum = 0;
-  for (const FusedFile& file : files) sum += file.report.loops;
-  return sum;
-}
-
-std::size_t FuseOutcome::merges() const {
-  std::size_t sum = 0;
-  for (const FusedFile& file : files) sum += file.report.merges;
+  for (const FusedFile& file : files) sum += file.report.*count;
   return sum;
 }
 

@@ -36,7 +36,10 @@ struct FuseOutcome {
   std::vector<std::size_t> objects_of_part;
   std::size_t objects = 0;  ///< count after fusion, without history
 
-  std::size_t objectsBefore() const, loops() const, merges() const;
+  std::size_t sumOf(std::size_t mapping::FusionReport::*count) const;
+  std::size_t objectsBefore() const { return sumOf(&mapping::FusionReport::objects); }
+  std::size_t loops() const { return sumOf(&mapping::FusionReport::loops); }
+  std::size_t merges() const { return sumOf(&mapping::FusionReport::merges); }
   std::vector<mapping::Change> changes() const;
 };
 

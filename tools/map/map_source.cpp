@@ -144,11 +144,4 @@ Standing askStanding(const std::string& path, ObjectId id) {
                     std::move(*absorbed));
 }
 
-std::vector<map_store::PlacedBelief> beliefsOfMapFile(const std::string& path) {
-  const auto connection = map_store::openStoreForReading(path);
-  auto beliefs = map_store::MapReader(&connection).beliefs();
-  if (!beliefs) cannotRead(path, beliefs.error());
-  return std::move(*beliefs);
-}
-
 }  // namespace perdure::tools

@@ -34,7 +34,5 @@ MapReply askGraphOfFile(const std::string& path, const MapQuery& query);
 std::optional<GeoAnchor> earthAnchorOfMapFile(const std::string& path);
 /// The standing of an object in the file. Throws StartupError.
 Standing askStanding(const std::string& path, ObjectId id);
-/// All complete objects of a map's file. Throws StartupError.
-std::vector<map_store::PlacedBelief> beliefsOfMapFile(const std::string& path);
 
 }  // namespace perdure::tools

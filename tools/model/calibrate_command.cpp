@@ -3,13 +3,12 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <fstream>
 #include <memory>
-#include <sstream>
 
 #include "common/base/checked_file.h"
 #include "common/base/errors.h"
 #include "services/inference/model_file.h"
+#include "tools/base/files.h"
 #include "tools/model/calibrate.h"
 #include "tools/model/command.h"
 
@@ -43,13 +42,6 @@ struct CalibrateRequest {
   std::uint64_t every = 1;
   bool dry = false, quiet = false;
 };
-
-std::string textOf(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
 
 void print(const CalibrationResult& r) {
   const auto line = [](const char* what, const std::string& text) {

@@ -69,8 +69,8 @@ void compare(const fs::path& network, const fs::path& reference) {
 
 /// Runs the Python part and checks its network in OpenCV.
 void importTo(const fs::path& out, const Staging& staging, const ImportOptions& request) {
-  const TemporaryFolder reference(fs::temp_directory_path(), "perdure-model-",
-                                  "set TMPDIR to a folder that you may write");
+  const TemporaryFolder reference = temporaryFolder(fs::temp_directory_path(), "perdure-model-",
+                                                    "set TMPDIR to a folder that you may write");
   const fs::path made = staging.path() / out.filename();
   ImportRequest wanted{request.network, made, out,
                        request.unchecked ? fs::path() : reference.path(), request.arguments};

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdlib>
 #include <cstring>
 #include <system_error>
 
@@ -30,27 +29,21 @@ void throwUnplaced(const fs::path& file, const std::error_code& error) {
 
 }  // namespace
 
-TemporaryFolder::TemporaryFolder(const fs::path& parent, const std::string& prefix,
-                                 const std::string& mend) {
-  std::string name = (parent / (prefix + "XXXXXX")).string();
-  if (mkdtemp(name.data()) == nullptr) {
-    const int why = errno;
-    if (why == ENOSPC || why == EDQUOT) throwUnwritten(parent, std::strerror(why));
-    throw StartupError(ExitCode::kUnavailable, "nothing can be written into " + parent.string() +
-                                                   " (" + std::strerror(why) + "); " + mend);
-  }
-  path_ = name;
-}
-
-TemporaryFolder::~TemporaryFolder() {
-  std::error_code ignored;
-  fs::remove_all(path_, ignored);
+TemporaryFolder temporaryFolder(const fs::path& parent, const std::string& prefix,
+                                const std::string& mend) {
+  return {parent / prefix, [&](const std::string&) {
+            const int why = errno;
+            if (why == ENOSPC || why == EDQUOT) throwUnwritten(parent, std::strerror(why));
+            throw StartupError(ExitCode::kUnavailable, "nothing can be written into " +
+                                                           parent.string() + " (" +
+                                                           std::strerror(why) + "); " + mend);
+          }};
 }
 
 Staging::Staging(fs::path folder)
     : folder_(std::move(folder)),
-      waiting_(nearestThatExists((fs::current_path() / folder_).lexically_normal()),
-               ".perdure-import-", kElsewhere) {}
+      waiting_(temporaryFolder(nearestThatExists((fs::current_path() / folder_).lexically_normal()),
+                               ".perdure-import-", kElsewhere)) {}
 
 std::string Staging::said(std::string message) const {
   const std::string hidden = (path() / "").string(), shown = (folder_ / "").string();

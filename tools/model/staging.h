@@ -5,23 +5,14 @@
 #include <string>
 #include <vector>
 
+#include "tools/base/files.h"
+
 namespace perdure::tools {
 
-/// A folder that its destructor removes.
-class TemporaryFolder {
- public:
-  /// Creates it in `parent`. Throws StartupError: kInputOutput if the disk is full, otherwise
-  /// kUnavailable.
-  TemporaryFolder(const std::filesystem::path& parent, const std::string& prefix,
-                  const std::string& mend);
-  ~TemporaryFolder();
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
+/// A folder in `parent`. Throws StartupError: kInputOutput if the disk is full, otherwise
+/// kUnavailable.
+TemporaryFolder temporaryFolder(const std::filesystem::path& parent, const std::string& prefix,
+                                const std::string& mend);
 
 /// Holds files on the same disk until they are moved to a folder, which need not exist yet.
 class Staging {

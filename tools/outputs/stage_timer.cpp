@@ -2,8 +2,6 @@
 
 #include <time.h>
 
-#include <algorithm>
-#include <cmath>
 #include <numeric>
 
 namespace perdure::tools {
@@ -22,16 +20,6 @@ nlohmann::ordered_json summary(const std::vector<double>& values, double begun) 
 }
 
 }  // namespace
-
-double quantile(std::vector<double> values, double q) {
-  if (values.empty()) return 0.0;
-  std::sort(values.begin(), values.end());
-  const double at = q * static_cast<double>(values.size() - 1);
-  const auto low = static_cast<std::size_t>(std::floor(at));
-  const std::size_t high = std::min(low + 1, values.size() - 1);
-  const double part = at - static_cast<double>(low);
-  return (1.0 - part) * values[low] + part * values[high];
-}
 
 StageTimer::Span::Span(StageTimer& timer, const std::string& stage, bool whole)
     : timer_(timer),

@@ -6,10 +6,9 @@
 #include <string>
 #include <vector>
 
-namespace perdure::tools {
+#include "tools/base/quantile.h"
 
-/// Quantile of a sample by linear interpolation; q in [0, 1]; 0 for an empty sample.
-double quantile(std::vector<double> values, double q);
+namespace perdure::tools {
 
 /// Measures stages; the time of a nested stage does not count for the outer one.
 class StageTimer {

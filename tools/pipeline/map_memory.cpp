@@ -15,17 +15,6 @@ map_store::Config withFile(map_store::Config config, const std::filesystem::path
   return config;
 }
 
-map_store::Outputs outputsTo(MapMemory::Sinks sinks) {
-  map_store::Outputs outputs;
-  outputs.tile = outputs.emptied = [](const MapTile&) {};
-  outputs.header = [](const MapHeader&) {};
-  outputs.reply = std::move(sinks.replies);
-  outputs.near = std::move(sinks.near);
-  outputs.frame = std::move(sinks.frames);
-  outputs.event = std::move(sinks.events);
-  return outputs;
-}
-
 }  // namespace
 
 void MapMemory::clear(const std::filesystem::path& file) {
@@ -53,8 +42,8 @@ void MapMemory::copy(const std::filesystem::path& from, const std::filesystem::p
 }
 
 MapMemory::MapMemory(map_store::Config config, const std::filesystem::path& file,
-                     InstanceId instance, Sinks sinks)
-    : node_(withFile(std::move(config), file), instance, outputsTo(std::move(sinks))) {}
+                     InstanceId instance, map_store::Outputs outputs)
+    : node_(withFile(std::move(config), file), instance, std::move(outputs)) {}
 
 void MapMemory::giveIds(InstanceId filter, const WorldId& session) {
   MapQuery query;
@@ -65,25 +54,11 @@ void MapMemory::giveIds(InstanceId filter, const WorldId& session) {
   node_.onQuery(query);
 }
 
-void MapMemory::onCalibration(const Calibration& calibration) { node_.onCalibration(calibration); }
-
-void MapMemory::onOdometry(const Odometry& odometry) {
-  waiting_.push_back([this, odometry] { node_.onOdometry(odometry); });
-}
-
-void MapMemory::onLandmarks(const Landmarks& landmarks) {
-  waiting_.push_back([this, landmarks] { node_.onLandmarks(landmarks); });
-}
-
 void MapMemory::onObjects(const Objects& objects) {
   waiting_.push_back([this, objects] {
     node_.onObjects(objects);
     node_.tick(objects.stamp.time.time_since_epoch());
   });
-}
-
-void MapMemory::onQuery(const MapQuery& query) {
-  waiting_.push_back([this, query] { node_.onQuery(query); });
 }
 
 void MapMemory::work() {

@@ -19,23 +19,17 @@ class MapMemory {
   /// Creates `file` as a copy of a stored map. Throws StartupError.
   static void copy(const std::filesystem::path& from, const std::filesystem::path& file);
 
-  struct Sinks {
-    Sink<MapNear> near;  ///< for the filter
-    Sink<Event> events;  ///< events of the map's graph
-    Sink<MapFrame> frames;
-    Sink<MapReply> replies;
-  };
   /// Opens the map, or creates an empty one. Throws StartupError.
   MapMemory(map_store::Config config, const std::filesystem::path& file, InstanceId instance,
-            Sinks sinks);
+            map_store::Outputs outputs);
 
   /// Sends the ids in use to a filter.
   void giveIds(InstanceId filter, const WorldId& session);
-  void onCalibration(const Calibration& calibration);
-  void onOdometry(const Odometry& odometry);
-  void onLandmarks(const Landmarks& landmarks);
+  void onCalibration(const Calibration& calibration) { node_.onCalibration(calibration); }
+  void onOdometry(const Odometry& odometry) { post(&map_store::Node::onOdometry, odometry); }
+  void onLandmarks(const Landmarks& landmarks) { post(&map_store::Node::onLandmarks, landmarks); }
   void onObjects(const Objects& objects);
-  void onQuery(const MapQuery& query);
+  void onQuery(const MapQuery& query) { post(&map_store::Node::onQuery, query); }
   /// Processes pending messages in order. Must not be called during a step of the filter, because
   /// answers go to it.
   void work();
@@ -46,6 +40,11 @@ class MapMemory {
   const mapping::Mapper& mapper() const { return node_.mapper(); }
 
  private:
+  template <class T>
+  void post(void (map_store::Node::*handler)(const T&), const T& message) {
+    waiting_.push_back([this, handler, message] { (node_.*handler)(message); });
+  }
+
   map_store::Node node_;
   std::deque<std::function<void()>> waiting_;
 };

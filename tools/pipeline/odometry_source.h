@@ -9,7 +9,8 @@
 
 namespace perdure::tools {
 
-/// Declared accuracy of poses that have none of their own.
+/// Declared accuracy of poses that have none of their own. The default is for a pose file: 2 mrad,
+/// 2 cm, 0.2 m/s.
 struct PoseAccuracy {
   double sigma_rotation = 2e-3, sigma_position = 0.02, sigma_velocity = 0.2;
   /// The error neither grows nor decays from frame to frame (truth). If false, no increment is
@@ -19,8 +20,6 @@ struct PoseAccuracy {
   /// poses so far, because a vehicle is upright on average.
   bool z_up = false;
 };
-/// For a pose file: 2 mrad, 2 cm, 0.2 m/s.
-inline PoseAccuracy ofPoseFile() { return {}; }
 /// For measured truth (EuRoC's motion capture, KITTI's OXTS): the same, but bounded.
 inline PoseAccuracy ofMeasuredTruth() { return {.bounded = true, .z_up = true}; }
 /// For the states of a simulated folder, which are exact. The values are not zero, because

@@ -30,8 +30,7 @@ namespace perdure::tools {
 
 /// Counts of processed data, for report.json and the progress line.
 struct PipelineCounts {
-  std::uint64_t frames = 0, frames_unreadable = 0, odometry = 0, inferred = 0, detections = 0,
-                objects = 0;
+  std::uint64_t frames = 0, odometry = 0, inferred = 0, detections = 0, objects = 0;
   std::vector<double> latency_ms;  ///< wall time from a decoded frame to its `objects`
 };
 
@@ -70,7 +69,6 @@ class Pipeline {
   /// For recorded odometry and detections: the sequence numbers, in the recording, of the frames
   /// that the filter received.
   const std::optional<std::set<std::uint64_t>>& recordedFrames() const { return heard_frames_; }
-  bool usesVio() const { return uses_vio_; }
   bool usesModel() const { return inference_ != nullptr; }
   /// A sentence if the given poses contradict the images; else empty.
   std::string doubtOfPoses() const;
@@ -149,8 +147,7 @@ class Pipeline {
   std::unique_ptr<semantic_filter::Node> filter_;
   std::unique_ptr<MapMemory> map_;
   std::optional<MapFollower> in_map_;  ///< only if the map has a graph
-  bool uses_vio_ = false;
-  bool recorded_ = false;    // odometry and detections come from the recording
+  bool recorded_ = false;              // odometry and detections come from the recording
   bus::Once odometry_once_;  // detects repeated messages in the recording, as the service does
   std::uint64_t model_hash_ = 0;
   std::optional<TimePoint> first_frame_;

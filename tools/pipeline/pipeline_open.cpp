@@ -99,19 +99,18 @@ void Pipeline::openFilter() {
                                                     instanceOf(kFilter), std::move(sinks));
   const auto file = outputs_->folder() / "map.sqlite";
   options_.map.empty() ? MapMemory::clear(file) : MapMemory::copy(options_.map, file);
-  map_ = std::make_unique<MapMemory>(
-      configs_.map_store, file, instanceOf(kMapStore),
-      MapMemory::Sinks{.near = [this](const MapNear& m) { filter_->onNear(m); },
-                       .events =
-                           [this](const Event& event) {
-                             keep("events", event, event.stamp.time);
-                             outputs_->onEvent(event);
-                           },
-                       .frames = [this](const MapFrame& frame) { keepMap(frame); },
-                       .replies =
-                           [this](const MapReply& reply) {
-                             keep("map/reply", reply, fromNanoseconds(run_ns_));
-                           }});
+  map_store::Outputs map;
+  map.tile = map.emptied = [](const MapTile&) {};
+  map.header = [](const MapHeader&) {};
+  map.reply = [this](const MapReply& m) { keep("map/reply", m, fromNanoseconds(run_ns_)); };
+  map.near = [this](const MapNear& m) { filter_->onNear(m); };
+  map.frame = [this](const MapFrame& frame) { keepMap(frame); };
+  map.event = [this](const Event& event) {
+    keep("events", event, event.stamp.time);
+    outputs_->onEvent(event);
+  };
+  map_ =
+      std::make_unique<MapMemory>(configs_.map_store, file, instanceOf(kMapStore), std::move(map));
   if (configs_.map_store.graph) in_map_.emplace(session_);
   if (!options_.map.empty()) map_->giveIds(instanceOf(kFilter), session_);
 }
@@ -168,7 +167,6 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
       serve(PoseOdometry(*pose_file_, instanceOf(kVio), session_, accuracy));
     return openKnownPoses();
   }
-  uses_vio_ = true;
   if (!dataset_->calibration().imu) {
     throw StartupError(ExitCode::kUnavailable, options.data +
                                                    " has no inertial samples, which vio "

@@ -51,16 +51,12 @@ class DumpSignal {
 };
 
 void printSummary(const StoreReport& stored, std::uint64_t messages, const std::string& out) {
-  std::printf("%llu messages came, %llu are in %llu files (%.1f MB) in %s",
-              static_cast<unsigned long long>(messages),
-              static_cast<unsigned long long>(stored.messages),
-              static_cast<unsigned long long>(stored.files),
-              1e-6 * static_cast<double>(stored.bytes), out.c_str());
+  fmt::print("{} messages came, {} are in {} files ({:.1f} MB) in {}", messages, stored.messages,
+             stored.files, 1e-6 * static_cast<double>(stored.bytes), out);
   if (stored.overrun > 0) {
-    std::printf("; %llu chunks were lost to a slow disk",
-                static_cast<unsigned long long>(stored.overrun));
+    fmt::print("; {} chunks were lost to a slow disk", stored.overrun);
   }
-  std::printf("\n");
+  fmt::print("\n");
   std::fflush(stdout);
 }
 

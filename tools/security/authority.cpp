@@ -4,13 +4,12 @@
 #include <sys/stat.h>
 
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <regex>
-#include <sstream>
 
 #include "common/base/errors.h"
 #include "common/bus/security/identity.h"
+#include "tools/base/files.h"
 #include "tools/security/private_file.h"
 
 namespace perdure::tools {
@@ -66,13 +65,6 @@ void requireTopics(const std::vector<std::string>& topics) {
   }
 }
 
-std::string contentsOf(const fs::path& file) {
-  std::ifstream stream(file);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return text.str();
-}
-
 /// The owner of an existing file or folder.
 std::optional<Owner> ownerOf(const fs::path& path) {
   struct stat status {};
@@ -113,7 +105,7 @@ Authority::Authority(const fs::path& folder) : folder_(folder) {
   key_ = bus::readKey(own / kKey);
   certificate_ = bus::readCertificate(own / kCa);
   revoked_ = bus::readRevokedList(own / kRevoked);
-  const auto json = nlohmann::json::parse(contentsOf(own / kRegister), nullptr, false);
+  const auto json = nlohmann::json::parse(textOf(own / kRegister), nullptr, false);
   if (!key_ || !certificate_ || !revoked_ || !json.is_object()) {
     throw StartupError(ExitCode::kUnavailable,
                        own.string() +
@@ -177,10 +169,10 @@ void Authority::write(const std::string& name, const Known& known, const Validit
   };
   // Recorded first, so that every issued certificate can be revoked.
   const fs::path record = own / kIssued / (name + ".pem");
-  writePrivate(record, contentsOf(record) + pem, kForOwner);
+  writePrivate(record, textOf(record) + pem, kForOwner);
   put(kCa, toPem(certificate_.get()));
   put(kRevoked, toPem(revoked_.get()));
-  put(kGovernance, contentsOf(own / kGovernance));
+  put(kGovernance, textOf(own / kGovernance));
   put(kPermissions,
       signedDocument(signer(), permissionsXml(subject, vehicle_, permissions, validity)));
   put(kKey, toPem(key.get()));

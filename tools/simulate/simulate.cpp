@@ -3,14 +3,13 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <sstream>
 
 #include "common/base/errors.h"
 #include "common/sim/truth_files.h"
+#include "tools/base/files.h"
 #include "tools/simulate/journal.h"
 #include "tools/simulate/render/counter_noise.h"
 #include "tools/simulate/render/outline.h"
@@ -47,13 +46,6 @@ nlohmann::json descriptionOf(const SimulateOptions& options, const sim::Scene& s
             {"look_set", w.look_set},
             {"images", options.images},
             {"encoding", options.format == ImageFormat::kPng ? "png" : "jpeg"}}}};
-}
-
-std::string textOf(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return text.str();
 }
 
 /// Refuses a folder with other content than this run.

@@ -1,8 +1,6 @@
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 
@@ -10,6 +8,7 @@
 #include "common/base/subprocess.h"
 #include "common/vision/jpeg.h"
 #include "common/wire/json.h"
+#include "tools/base/files.h"
 #include "tools/bus_tools/common.h"
 #include "tools/bus_tools/doctor/doctor.h"
 #include "tools/bus_tools/status/status_watch.h"
@@ -18,30 +17,6 @@ namespace perdure::tools {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Temporary folder; its destructor removes it.
-class Workshop {
- public:
-  Workshop() {
-    std::string name = (fs::temp_directory_path() / "perdure-report-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) {
-      throw StartupError(ExitCode::kUnavailable, "no folder can be made in " +
-                                                     fs::temp_directory_path().string() +
-                                                     "; set TMPDIR to one that can be written");
-    }
-    path_ = name;
-  }
-  ~Workshop() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  Workshop(const Workshop&) = delete;
-  Workshop& operator=(const Workshop&) = delete;
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 /// Appends the output of each command under its own heading; a missing command leaves its error
 /// message. Some commands are shell lines with patterns and pipes.
@@ -131,7 +106,11 @@ StatusSeen writeBus(const ReportOptions& options, const fs::path& folder) {
 }  // namespace
 
 void writeReport(const ReportOptions& options, const Findings& findings) {
-  const Workshop workshop;
+  const fs::path place = fs::temp_directory_path();
+  const TemporaryFolder workshop(place / "perdure-report-", [&](const std::string&) {
+    throw StartupError(ExitCode::kUnavailable, "no folder can be made in " + place.string() +
+                                                   "; set TMPDIR to one that can be written");
+  });
   const fs::path folder = workshop.path() / "perdure-report";
   fs::create_directories(folder);
   std::ofstream(folder / "doctor.txt") << toText(findings);

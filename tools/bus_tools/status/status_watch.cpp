@@ -6,6 +6,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "tools/base/quantile.h"
 #include "tools/bus_tools/common.h"
 
 namespace perdure::tools {
@@ -39,12 +40,6 @@ std::optional<double> upSeconds(std::uint32_t pid) {
   double ticks = 0.0;
   if (!(fields >> ticks)) return std::nullopt;
   return now - ticks / static_cast<double>(sysconf(_SC_CLK_TCK));
-}
-
-double median(std::deque<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 }  // namespace
@@ -128,7 +123,7 @@ StatusSeen StatusWatch::seen() {
     topic.messages = rate.messages;
     topic.rate_hz = rate.rate_hz;
     if (heard.last_s > 0) topic.age_s = at - heard.last_s;
-    if (!heard.latency_ms.empty()) topic.latency_ms = median(heard.latency_ms);
+    if (!heard.latency_ms.empty()) topic.latency_ms = upperMedian(heard.latency_ms);
   }
   const std::string prefix = participant_.wireName("");
   for (const bus::RemoteEndpoint& endpoint : discovery_.endpoints()) {

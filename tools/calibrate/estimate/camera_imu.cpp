@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "common/math/so3.h"
+#include "tools/base/quantile.h"
 #include "tools/calibrate/estimate/camera_imu_problem.h"
 
 namespace perdure::calibrate {
@@ -237,10 +238,8 @@ class CameraImuRun {
   void weigh() {
     std::vector<double> sizes;
     for (const auto& r : problem_.cornerResiduals()) sizes.push_back(r.residual.norm());
-    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-    std::nth_element(sizes.begin(), middle, sizes.end());
     constexpr double kRayleighMedian = 1.1774;
-    const double typical = std::max(kLeastPx, *middle / kRayleighMedian);
+    const double typical = std::max(kLeastPx, tools::upperMedian(sizes) / kRayleighMedian);
     problem_.gateCorners(std::max(kGateSigma * typical, 10.0 * kLeastPx));
     problem_.sigma.px = std::max(kLeastPx, cornerRms());
     const auto left = problem_.imuResiduals();

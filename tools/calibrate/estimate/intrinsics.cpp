@@ -9,6 +9,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 
+#include "tools/base/quantile.h"
 #include "tools/calibrate/estimate/lens.h"
 
 namespace perdure::calibrate {
@@ -163,10 +164,9 @@ class Bundle {
     std::vector<double> sizes;
     for (const auto& r : residuals()) sizes.push_back(r.residual.norm());
     if (sizes.empty()) return;
-    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-    std::nth_element(sizes.begin(), middle, sizes.end());
     constexpr double kRayleighMedian = 1.1774;  // median length of a 2-D vector with unit variances
-    const double limit = std::max(kLeastOutlier, kOutlierSigma * *middle / kRayleighMedian);
+    const double limit =
+        std::max(kLeastOutlier, kOutlierSigma * tools::upperMedian(sizes) / kRayleighMedian);
     for (ViewState& state : states_) {
       for (std::size_t i = 0; i < state.good.size(); ++i) {
         state.good[i] = residualOf(state, i).norm() < limit;

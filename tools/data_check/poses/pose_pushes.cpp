@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tools/base/quantile.h"
+
 namespace perdure::tools {
 namespace {
 
@@ -57,9 +59,8 @@ bool measuresGravity(const std::vector<ImuSample>& samples) {
   if (samples.size() < 2) return false;
   std::vector<double> forces;
   for (const ImuSample& sample : samples) forces.push_back(sample.accel.norm());
-  const auto middle = forces.begin() + static_cast<std::ptrdiff_t>(forces.size() / 2);
-  std::nth_element(forces.begin(), middle, forces.end());
-  return *middle > kLeast && *middle < kMost;
+  const double median = upperMedian(std::move(forces));
+  return median > kLeast && median < kMost;
 }
 
 std::vector<Push> pushesOf(const std::vector<StampedPose>& poses,

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "tools/base/quantile.h"
 #include "tools/data_check/poses/pose_check.h"
 #include "tools/data_check/poses/pose_pushes.h"
 
@@ -61,14 +62,13 @@ DataFindings judgeSpeed(const std::vector<StampedPose>& poses) {
                      toSeconds(poses[j].time - poses[i].time));
   }
   if (speeds.size() < 4) return {};
-  const auto middle = speeds.begin() + static_cast<std::ptrdiff_t>(speeds.size() / 2);
-  std::nth_element(speeds.begin(), middle, speeds.end());
-  if (*middle < kFastest) return {};
+  const double median = upperMedian(speeds);
+  if (median < kFastest) return {};
   return {
       {Grade::kWarning, "poses_too_fast",
        fmt::format("the poses move at {:.3g} m/s (median of {} steps), faster than what carries "
                    "a camera: see whether they are in metres and their times in seconds",
-                   *middle, speeds.size())}};
+                   median, speeds.size())}};
 }
 
 }  // namespace

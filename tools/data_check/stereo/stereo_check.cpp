@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "common/math/so3.h"
+#include "tools/base/quantile.h"
 #include "tools/data_check/pair_check.h"
 #include "tools/data_check/stereo/stereo_matches.h"
 #include "tools/data_check/stereo/stereo_time.h"
@@ -26,13 +27,6 @@ constexpr std::size_t kFewestMatches = 60;
 constexpr double kMostMatch = 0.5;  // least share of cam0's corners that a correct rig matches
 constexpr double kFewMatch = 0.25;  // largest share that two unrelated images match
 constexpr double kDegreesOfTurn = 180.0 / M_PI;
-
-double medianOf(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Unit normal of the epipolar plane of a ray of C0, in C1; empty near the baseline.
 std::optional<Vector3d> planeOf(const StereoMatch& match, const RigidTransform& T_C1C0) {
@@ -64,7 +58,7 @@ Fit fitOf(const std::vector<StereoMatch>& matches, const RigidTransform& T_C1C0,
     ++(parallax > 0.0 ? fit.before : fit.behind);
   }
   fit.count = off_px.size();
-  fit.off_px = medianOf(off_px);
+  fit.off_px = upperMedian(off_px);
   return fit;
 }
 
@@ -91,7 +85,7 @@ Turned turnOf(const std::vector<StereoMatch>& matches, const RigidTransform& T_C
       rows.emplace_back(normal->dot(match.second), normal->cross(match.second));
       sizes.push_back(std::abs(rows.back().first));
     }
-    const double scale = std::max(kFinest, 1.5 * medianOf(sizes));
+    const double scale = std::max(kFinest, 1.5 * upperMedian(sizes));
     Matrix3d A = 1e-9 * Matrix3d::Identity();
     Vector3d b = Vector3d::Zero();
     for (const auto& [error, slope] : rows) {

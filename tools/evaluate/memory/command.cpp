@@ -2,8 +2,9 @@
 // run with drift, and a run that starts with the map of another one.
 #include "tools/evaluate/command.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -171,65 +172,56 @@ Json toJson(const MemoryResult& result) {
   return json;
 }
 
-using Count = unsigned long long;
-
 void print(const char* name, const TrajectoryErrors& errors) {
-  std::printf("%s: ATE %.3f m from the start, %.3f m aligned in position and yaw, over %.0f m\n",
-              name, errors.from_start.ate_rmse_m, errors.aligned.ate_rmse_m,
-              errors.aligned.length_m);
+  fmt::print(
+      "{}: ATE {:.3f} m from the start, {:.3f} m aligned in position and yaw, over {:.0f} m\n",
+      name, errors.from_start.ate_rmse_m, errors.aligned.ate_rmse_m, errors.aligned.length_m);
 }
 
 void print(const ReturnScore& s) {
-  std::printf("map of the run before: %llu ids; %llu of its objects are seen here\n",
-              static_cast<Count>(s.ids), static_cast<Count>(s.known));
+  fmt::print("map of the run before: {} ids; {} of its objects are seen here\n", s.ids, s.known);
   if (!s.first) {
-    std::printf("no id of it appears\n");
+    fmt::print("no id of it appears\n");
     return;
   }
-  std::printf("first id of it after %.1f s, %.1f m and %llu objects in view\n", s.first->seconds,
-              s.first->way_m, static_cast<Count>(s.first->objects));
-  std::printf(
-      "from then on: %llu seen, %llu reported, %llu with their id (%.3f of all), %llu with "
+  fmt::print("first id of it after {:.1f} s, {:.1f} m and {} objects in view\n", s.first->seconds,
+             s.first->way_m, s.first->objects);
+  fmt::print(
+      "from then on: {} seen, {} reported, {} with their id ({:.3f} of all), {} with "
       "another object's\n",
-      static_cast<Count>(s.seen), static_cast<Count>(s.reported), static_cast<Count>(s.kept),
-      s.keptShare(), static_cast<Count>(s.wrong));
+      s.seen, s.reported, s.kept, s.keptShare(), s.wrong);
 }
 
 void print(const LoopScore& score) {
   const LoopJudgement& judgement = score.judgement;
-  std::printf("loops: %zu, of these wrong %llu; believed: %llu, of these wrong %llu\n",
-              judgement.loops.size(), static_cast<Count>(judgement.wrong()),
-              static_cast<Count>(judgement.believed()),
-              static_cast<Count>(judgement.wrongBelieved()));
-  if (judgement.unjudged > 0)
-    std::printf("loops without a true pose: %llu\n", static_cast<Count>(judgement.unjudged));
+  fmt::print("loops: {}, of these wrong {}; believed: {}, of these wrong {}\n",
+             judgement.loops.size(), judgement.wrong(), judgement.believed(),
+             judgement.wrongBelieved());
+  if (judgement.unjudged > 0) fmt::print("loops without a true pose: {}\n", judgement.unjudged);
   for (const JudgedLoop& loop : judgement.loops) {
     if (!loop.wrong) continue;
-    std::printf("wrong: edge %llu, off by %.2f m (deviation %.2f m) and %.1f°, weight %.2f%s\n",
-                static_cast<Count>(loop.id), loop.off_m, loop.sigma_m,
-                loop.off_rad * 180.0 / std::numbers::pi, loop.weight,
-                loop.believed ? "" : ", not believed");
+    fmt::print(
+        "wrong: edge {}, off by {:.2f} m (deviation {:.2f} m) and {:.1f}°, weight {:.2f}{}\n",
+        loop.id, loop.off_m, loop.sigma_m, loop.off_rad * 180.0 / std::numbers::pi, loop.weight,
+        loop.believed ? "" : ", not believed");
   }
-  std::printf("returns: %zu, without a loop %llu", score.returns.size(),
-              static_cast<Count>(score.missed()));
   const auto way = score.wayToClose();
-  std::printf(way ? "; a loop after %.1f m (median)\n" : "\n", way.value_or(0.0));
-  std::printf("%llu anchors: ATE %.3f m by odometry, %.3f m in the map\n",
-              static_cast<Count>(score.anchors.anchors), score.anchors.odometry_m,
-              score.anchors.map_m);
+  fmt::print("returns: {}, without a loop {}{}\n", score.returns.size(), score.missed(),
+             way ? fmt::format("; a loop after {:.1f} m (median)", *way) : "");
+  fmt::print("{} anchors: ATE {:.3f} m by odometry, {:.3f} m in the map\n", score.anchors.anchors,
+             score.anchors.odometry_m, score.anchors.map_m);
 }
 
 void print(const MemoryResult& result) {
   const MemoryScore& s = result.memory;
-  std::printf("%llu frames, %llu objects; %llu seen twice, %llu reported twice\n",
-              static_cast<Count>(s.frames), static_cast<Count>(s.objects),
-              static_cast<Count>(s.seen_twice), static_cast<Count>(s.reported_twice));
-  std::printf("ids kept: %.3f of %llu; the frame drifted by %.2f m between visits (median)\n",
-              s.keptShare(), static_cast<Count>(s.reported_twice), s.drift_m);
-  std::printf("recall within 25 m: %.3f of %llu; in the second half %.3f\n", s.recall(),
-              static_cast<Count>(s.sightings), s.lateRecall());
-  std::printf("ids per reported object: %.3f; %llu of %llu have more than one\n", s.idsPerObject(),
-              static_cast<Count>(s.with_more_ids), static_cast<Count>(s.objects_matched));
+  fmt::print("{} frames, {} objects; {} seen twice, {} reported twice\n", s.frames, s.objects,
+             s.seen_twice, s.reported_twice);
+  fmt::print("ids kept: {:.3f} of {}; the frame drifted by {:.2f} m between visits (median)\n",
+             s.keptShare(), s.reported_twice, s.drift_m);
+  fmt::print("recall within 25 m: {:.3f} of {}; in the second half {:.3f}\n", s.recall(),
+             s.sightings, s.lateRecall());
+  fmt::print("ids per reported object: {:.3f}; {} of {} have more than one\n", s.idsPerObject(),
+             s.with_more_ids, s.objects_matched);
   print("trajectory", result.trajectory);
   if (result.map_trajectory) print("trajectory in the map", *result.map_trajectory);
   if (result.loops) print(*result.loops);

@@ -6,6 +6,7 @@
 #include <set>
 #include <tuple>
 
+#include "tools/base/quantile.h"
 #include "tools/evaluate/trajectory_score.h"
 
 namespace perdure::tools {
@@ -206,9 +207,7 @@ std::optional<double> LoopScore::wayToClose() const {
     if (visit.closed_after_m) ways.push_back(*visit.closed_after_m);
   }
   if (ways.empty()) return std::nullopt;
-  std::sort(ways.begin(), ways.end());
-  const std::size_t n = ways.size();
-  return n % 2 == 1 ? ways[n / 2] : 0.5 * (ways[n / 2 - 1] + ways[n / 2]);
+  return quantile(std::move(ways), 0.5);
 }
 
 LoopScore scoreLoops(const SavedMap& map, const replay::PoseFile& truth,

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "tools/base/quantile.h"
+
 namespace perdure::tools {
 namespace {
 
@@ -89,13 +91,6 @@ std::vector<Sighting> matched(const std::vector<SeenObject>& visible,
 /// Converts a point from the ground truth's W to the run's W by the poses of a frame.
 Eigen::Vector3d inFrameOf(const MemoryFrame& frame, const Eigen::Vector3d& point_W) {
   return frame.T_WB * (frame.true_T_WB.inverse() * point_W);
-}
-
-double medianOf(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
 }
 
 void scoreSightings(const std::vector<MemoryFrame>& frames, MemoryScore& score) {
@@ -250,7 +245,7 @@ MemoryScore scoreMemory(const SimulatedTruth& truth, const std::vector<MemoryFra
                       inFrameOf(frames[first[first.size() / 2]], centre_W))
                          .norm());
   }
-  score.drift_m = medianOf(std::move(drifts));
+  score.drift_m = quantile(std::move(drifts), 0.5);
   return score;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "tools/base/quantile.h"
 #include "tools/outputs/pictures/chart.h"
 #include "tools/outputs/pictures/drawing.h"
 
@@ -70,9 +71,7 @@ std::optional<double> medianDistance(const Candidate& one, const TruthTrack& tra
     if (key) distances.push_back((key->centre_W - seen.p_W).norm());
   }
   if (distances.empty() || 2 * distances.size() < one.seen.size()) return std::nullopt;
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
+  return upperMedian(std::move(distances));
 }
 
 /// Pairs with the smallest distance first; each object and each track is in at most one pair.
@@ -156,9 +155,7 @@ double topOf(const Evolution& evolution) {
     if (point.error) values.push_back(*point.error);
   }
   if (values.empty()) return 1.0;
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(0.95 * (values.size() - 1.0));
-  std::nth_element(values.begin(), at, values.end());
-  return std::max(0.1, 1.15 * *at);
+  return std::max(0.1, 1.15 * sampleAt(std::move(values), 0.95));
 }
 
 void drawRow(cv::Mat& picture, int top, const Evolution& evolution, const Chart::Range& frames,

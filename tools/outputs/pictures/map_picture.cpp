@@ -10,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "common/math/so3.h"
+#include "tools/base/quantile.h"
 #include "tools/outputs/pictures/chart.h"
 #include "tools/outputs/pictures/drawing.h"
 #include "tools/outputs/pictures/map_legend.h"
@@ -38,9 +39,7 @@ double usualDistance(const MapContent& content) {
     distances.push_back(distanceToWay(content.path, object.p_W));
   }
   if (distances.empty()) return kNearTheWay;
-  const auto at = distances.begin() + static_cast<std::ptrdiff_t>(0.8 * (distances.size() - 1.0));
-  std::nth_element(distances.begin(), at, distances.end());
-  return std::clamp(3.0 * *at, kLeastExtent, kNearTheWay);
+  return std::clamp(3.0 * sampleAt(std::move(distances), 0.8), kLeastExtent, kNearTheWay);
 }
 
 Polyline footprint(const MapView& view, const Eigen::Vector3d& centre, double yaw,

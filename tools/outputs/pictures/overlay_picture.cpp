@@ -8,6 +8,7 @@
 
 #include "common/math/so3.h"
 #include "common/types/cuboid.h"
+#include "tools/base/quantile.h"
 #include "tools/outputs/pictures/drawing.h"
 
 namespace perdure::tools {
@@ -261,9 +262,7 @@ double usualReach(const DriveLog& log) {
     }
   }
   if (distances.empty()) return 30.0;
-  const auto at = distances.begin() + static_cast<std::ptrdiff_t>(0.9 * (distances.size() - 1.0));
-  std::nth_element(distances.begin(), at, distances.end());
-  return std::clamp(1.15 * *at, 4.0, 60.0);
+  return std::clamp(1.15 * sampleAt(std::move(distances), 0.9), 4.0, 60.0);
 }
 
 }  // namespace perdure::tools

@@ -32,16 +32,4 @@ PictureTruth turned(const RigidTransform& T_AB, PictureTruth truth) {
   return truth;
 }
 
-const TruthTrack* nearestTruth(const PictureTruth& truth, const Eigen::Vector3d& p_W,
-                               TimePoint time, double within) {
-  const TruthTrack* nearest = nullptr;
-  for (const TruthTrack& track : truth.objects) {
-    const auto key = track.at(time);
-    if (!key || (key->centre_W - p_W).norm() >= within) continue;
-    within = (key->centre_W - p_W).norm();
-    nearest = &track;
-  }
-  return nearest;
-}
-
 }  // namespace perdure::tools

@@ -39,8 +39,4 @@ struct PictureTruth {
 /// Transforms from frame B to frame A; both are gravity-levelled.
 PictureTruth turned(const RigidTransform& T_AB, PictureTruth truth);
 
-/// The track of `truth` nearest to `p_W` at a time, within `within` metres.
-const TruthTrack* nearestTruth(const PictureTruth& truth, const Eigen::Vector3d& p_W,
-                               TimePoint time, double within);
-
 }  // namespace perdure::tools

@@ -6,6 +6,7 @@
 #include "common/base/errors.h"
 #include "common/math/so3.h"
 #include "common/replay/files/kitti_calibration.h"
+#include "tools/base/quantile.h"
 #include "tools/evaluate/object_truth.h"
 
 namespace perdure::tools {
@@ -34,19 +35,13 @@ std::string classOf(const std::string& type) {
   return name;
 }
 
-double middle(std::vector<double> values) {
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
-
 /// One key at the median of all, separately for each axis; yaw from the mean direction.
 TruthTrack::Key middleOf(const std::vector<TruthTrack::Key>& keys) {
   TruthTrack::Key result = keys.front();
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
     for (const auto& key : keys) values.push_back(key.centre_W[axis]);
-    result.centre_W[axis] = middle(std::move(values));
+    result.centre_W[axis] = upperMedian(std::move(values));
   }
   double x = 0.0, y = 0.0;
   for (const auto& key : keys) x += std::cos(key.yaw), y += std::sin(key.yaw);

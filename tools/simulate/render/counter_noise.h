@@ -4,14 +4,11 @@
 
 #include <cstdint>
 
+#include "common/sim/dice.h"
+
 namespace perdure::tools {
 
-constexpr std::uint64_t mixBits(std::uint64_t x) {
-  x += 0x9e3779b97f4a7c15ULL;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebULL;
-  return x ^ (x >> 31);
-}
+using sim::mixBits;
 constexpr std::uint64_t mixBits(std::uint64_t a, std::uint64_t b) {
   return mixBits(mixBits(a) ^ b);
 }

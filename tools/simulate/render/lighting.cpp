@@ -4,18 +4,16 @@
 #include <cmath>
 
 #include "tools/simulate/render/counter_noise.h"
+#include "tools/simulate/shapes/patterns/pattern.h"
 
 namespace perdure::tools {
 namespace {
 
+using shapes::smoothStep;
+
 constexpr float kCell = 4.0F, kReach = 1.0F;
 constexpr std::size_t kCells = 4096;
 constexpr float kHazeDistance = 900.0F;
-
-float smoothStep(float low, float high, float x) {
-  const float t = std::clamp((x - low) / (high - low), 0.0F, 1.0F);
-  return t * t * (3.0F - 2.0F * t);
-}
 
 }  // namespace
 

@@ -1,5 +1,6 @@
 #include "tools/simulate/shapes/mesh.h"
 
+#include <array>
 #include <stdexcept>
 #include <string>
 
@@ -23,28 +24,11 @@ Mesh makeObjectMesh(const sim::SceneObject& object) {
 }
 
 Mesh makePropMesh(const sim::Prop& prop) {
-  const shapes::Order order{prop.size, "", prop.look_seed};
-  switch (prop.kind) {
-    case sim::PropKind::kFacade:
-      return shapes::makeFacade(order);
-    case sim::PropKind::kTree:
-      return shapes::makeTree(order);
-    case sim::PropKind::kPole:
-      return shapes::makePole(order);
-    case sim::PropKind::kHedge:
-      return shapes::makeHedge(order);
-    case sim::PropKind::kWall:
-      return shapes::makeWall(order);
-    case sim::PropKind::kKerb:
-      return shapes::makeKerb(order);
-    case sim::PropKind::kFloor:
-      return shapes::makeFloor(order);
-    case sim::PropKind::kCrate:
-      return shapes::makeCrate(order);
-    case sim::PropKind::kShelf:
-      return shapes::makeShelf(order);
-  }
-  throw std::invalid_argument("no shape is known for this kind of scenery");
+  using namespace shapes;
+  // In the order of PropKind.
+  constexpr std::array kGenerators{makeFacade, makeTree,  makePole,  makeHedge, makeWall,
+                                   makeKerb,   makeFloor, makeCrate, makeShelf};
+  return kGenerators.at(static_cast<std::size_t>(prop.kind))({prop.size, "", prop.look_seed});
 }
 
 namespace shapes {

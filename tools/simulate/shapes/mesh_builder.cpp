@@ -3,8 +3,6 @@
 #include <cmath>
 #include <utility>
 
-#include "tools/simulate/shapes/mesh_finish.h"
-
 namespace perdure::tools::shapes {
 namespace {
 
@@ -40,7 +38,8 @@ int MeshBuilder::material(const Material& material, float repeat_m) {
 }
 
 void MeshBuilder::begin(float crease_deg) {
-  creases_.push_back(crease_deg);
+  ++part_;
+  crease_deg_ = crease_deg;
   part_start_ = faces_.size();
 }
 
@@ -60,7 +59,7 @@ void MeshBuilder::closed() {
   }
 }
 
-void MeshBuilder::add(Face face) {
+void MeshBuilder::add(LooseFace face) {
   for (Vec3& corner : face.corners) corner = placing * corner;
   if (placing.linear().determinant() < 0.0F) {
     std::swap(face.corners[1], face.corners[2]);
@@ -68,16 +67,16 @@ void MeshBuilder::add(Face face) {
   }
   const auto& c = face.corners;
   if ((c[1] - c[0]).cross(c[2] - c[0]).norm() < kLeastArea) return;
-  face.part = static_cast<std::uint32_t>(creases_.size() - 1);
+  face.part = part_;
+  face.repeat_m = repeats_[face.material];
+  face.crease_deg = crease_deg_;
   faces_.push_back(face);
 }
 
 void MeshBuilder::triangle(const Vec3& a, const Vec3& b, const Vec3& c, int material) {
-  add({{a, b, c},
-       {Vec2::Zero(), Vec2::Zero(), Vec2::Zero()},
-       false,
-       static_cast<std::uint16_t>(material),
-       0});
+  add({.corners = {a, b, c},
+       .uvs = {Vec2::Zero(), Vec2::Zero(), Vec2::Zero()},
+       .material = static_cast<std::uint16_t>(material)});
 }
 
 void MeshBuilder::quad(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d, int material) {
@@ -89,8 +88,8 @@ void MeshBuilder::picture(const Vec3& a, const Vec3& b, const Vec3& c, const Vec
                           const Vec2& repeats) {
   const Vec2 right(repeats.x(), 0.0F), up(0.0F, repeats.y());
   const auto m = static_cast<std::uint16_t>(material);
-  add({{a, b, c}, {Vec2::Zero(), right, repeats}, true, m, 0});
-  add({{a, c, d}, {Vec2::Zero(), repeats, up}, true, m, 0});
+  add({{a, b, c}, {Vec2::Zero(), right, repeats}, true, m});
+  add({{a, c, d}, {Vec2::Zero(), repeats, up}, true, m});
 }
 
 void MeshBuilder::box(const Vec3& low, const Vec3& high, int material) {
@@ -127,8 +126,7 @@ void MeshBuilder::pipe(const std::vector<Vec3>& points, const std::vector<float>
     }
     rings.push_back(std::move(ring));
   }
-  loft(
-      rings, [material](std::size_t, std::size_t) { return material; }, material, material, 50.0F);
+  loft(rings, material, 50.0F);
 }
 
 void MeshBuilder::ellipsoid(const Vec3& centre, const Vec3& radii, int sides, int stacks,
@@ -200,13 +198,13 @@ void MeshBuilder::loft(const std::vector<Ring>& rings, const MaterialOf& materia
   closed();
 }
 
+void MeshBuilder::loft(const std::vector<Ring>& rings, int material, float crease_deg) {
+  loft(
+      rings, [material](auto, auto) { return material; }, material, material, crease_deg);
+}
+
 Mesh MeshBuilder::finish(const std::optional<Eigen::Vector3d>& size) const {
-  std::vector<LooseFace> loose;
-  loose.reserve(faces_.size());
-  for (const Face& face : faces_) {
-    loose.push_back({face.corners, face.uvs, face.has_uvs, face.material, face.part,
-                     repeats_[face.material], creases_[face.part]});
-  }
+  std::vector<LooseFace> loose = faces_;
   if (size) fitTo(*size, loose);
   return joinFaces(loose, materials_);
 }

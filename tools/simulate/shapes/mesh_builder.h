@@ -4,14 +4,12 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <array>
-#include <cstdint>
 #include <functional>
 #include <numbers>
 #include <optional>
 #include <vector>
 
-#include "tools/simulate/shapes/mesh.h"
+#include "tools/simulate/shapes/mesh_finish.h"
 
 namespace perdure::tools::shapes {
 
@@ -22,8 +20,6 @@ inline constexpr float kPi = std::numbers::pi_v<float>;
 
 class MeshBuilder {
  public:
-  MeshBuilder() { begin(); }
-
   /// `repeat_m` is the width of one texture repeat for faces without texture coordinates. These use
   /// the two coordinates across the face's main direction.
   int material(const Material& material, float repeat_m = 1.0F);
@@ -59,29 +55,24 @@ class MeshBuilder {
   /// A closed part: a skin with fans at its ends (open without a material for them).
   void loft(const std::vector<Ring>& rings, const MaterialOf& material_of,
             std::optional<int> first_cap, std::optional<int> last_cap, float crease_deg = 40.0F);
+  /// The same of one material, with both ends.
+  void loft(const std::vector<Ring>& rings, int material, float crease_deg);
 
   /// Transform of all faces that are added while it is set. A mirror reverses the order of corners.
   Eigen::Affine3f placing = Eigen::Affine3f::Identity();
 
-  std::size_t triangleCount() const { return faces_.size(); }
   /// Scales the bounding box to exactly `size`, centred; without a size, nothing is moved.
   Mesh finish(const std::optional<Eigen::Vector3d>& size) const;
 
  private:
-  struct Face {
-    std::array<Vec3, 3> corners;
-    std::array<Vec2, 3> uvs;
-    bool has_uvs = false;
-    std::uint16_t material = 0;
-    std::uint32_t part = 0;
-  };
-  void add(Face face);
+  void add(LooseFace face);
   void fan(const Ring& ring, int material, bool turned);
 
-  std::vector<Face> faces_;
+  std::vector<LooseFace> faces_;
   std::vector<Material> materials_;
   std::vector<float> repeats_;
-  std::vector<float> creases_;
+  std::uint32_t part_ = 0;
+  float crease_deg_ = 40.0F;
   std::size_t part_start_ = 0;
 };
 

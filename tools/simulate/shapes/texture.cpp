@@ -9,7 +9,7 @@
 #include <tuple>
 #include <utility>
 
-#include "tools/simulate/shapes/patterns/patterns.h"
+#include "tools/simulate/shapes/patterns/pattern.h"
 
 namespace perdure::tools {
 namespace {
@@ -18,6 +18,34 @@ using Eigen::Vector3f;
 
 constexpr float kWidest = 1e6F;  // texels; wider footprints also give the mean
 constexpr float kBlend = 1e-3F;  // distance to a level at which only that level is read
+
+/// The patterns in the order of TextureKind.
+constexpr std::array kPatterns{
+    &shapes::asphaltPattern, &shapes::pavingPattern,   &shapes::grassPattern,
+    &shapes::brickPattern,   &shapes::plasterPattern,  &shapes::windowsPattern,
+    &shapes::barkPattern,    &shapes::leavesPattern,   &shapes::woodPattern,
+    &shapes::fabricPattern,  &shapes::metalPattern,    &shapes::carPaintPattern,
+    &shapes::screenPattern,  &shapes::skinPattern,     &shapes::markingsPattern,
+    &shapes::tilesPattern,   &shapes::earthPattern,    &shapes::booksPattern,
+    &shapes::timberPattern,  &shapes::paintingPattern, &shapes::signPattern,
+};
+
+/// Texels row by row, size × size, that tile.
+std::vector<Vector3f> paintPattern(TextureKind kind, std::uint64_t seed, int size) {
+  shapes::Dice dice(seed ^ (static_cast<std::uint64_t>(kind) << 40U));
+  const shapes::Pattern pattern = kPatterns.at(static_cast<std::size_t>(kind))(dice);
+  std::vector<Vector3f> texels;
+  texels.reserve(static_cast<std::size_t>(size) * static_cast<std::size_t>(size));
+  const float step = 1.0F / static_cast<float>(size);
+  for (int y = 0; y < size; ++y) {
+    for (int x = 0; x < size; ++x) {
+      const Vector3f colour =
+          pattern((static_cast<float>(x) + 0.5F) * step, (static_cast<float>(y) + 0.5F) * step);
+      texels.push_back(colour.cwiseMax(0.0F).cwiseMin(1.0F));
+    }
+  }
+  return texels;
+}
 
 const std::array<float, 256>& decoding() {
   static const std::array<float, 256> table = [] {
@@ -71,7 +99,7 @@ Texture::Texture(TextureKind kind, std::uint64_t seed, int size) {
   if (size < 1 || size > 4096 || (size & (size - 1)) != 0) {
     throw std::invalid_argument("a texture's size is a power of two from 1 to 4096");
   }
-  std::vector<Vector3f> texels = shapes::paintPattern(kind, seed, size);
+  std::vector<Vector3f> texels = paintPattern(kind, seed, size);
   for (;; size /= 2) {
     Level level{size, {}};
     level.texels.reserve(texels.size());

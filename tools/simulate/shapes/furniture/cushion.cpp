@@ -26,8 +26,7 @@ void addCushion(MeshBuilder& b, const Vec3& low, const Vec3& high, float round, 
     }
     rings.push_back(std::move(ring));
   }
-  b.loft(
-      rings, [material](std::size_t, std::size_t) { return material; }, material, material, 60.0F);
+  b.loft(rings, material, 60.0F);
 }
 
 }  // namespace perdure::tools::shapes

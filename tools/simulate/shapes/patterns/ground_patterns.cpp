@@ -1,9 +1,8 @@
-#include "tools/simulate/shapes/patterns/ground_patterns.h"
-
 #include <cmath>
 #include <cstdint>
 
 #include "tools/simulate/shapes/patterns/noise.h"
+#include "tools/simulate/shapes/patterns/pattern.h"
 
 namespace perdure::tools::shapes {
 namespace {

@@ -1,10 +1,9 @@
-#include "tools/simulate/shapes/patterns/surface_patterns.h"
-
 #include <cmath>
 #include <cstdint>
 #include <vector>
 
 #include "tools/simulate/shapes/patterns/noise.h"
+#include "tools/simulate/shapes/patterns/pattern.h"
 
 namespace perdure::tools::shapes {
 namespace {

@@ -35,8 +35,7 @@ void addLump(MeshBuilder& b, const Vec3& centre, const Vec3& radii, int material
     for (Vec3& p : ring) p = centre + dice.uniform(0.75F, 1.1F) * p.cwiseProduct(radii);
     rings.push_back(std::move(ring));
   }
-  b.loft(
-      rings, [material](std::size_t, std::size_t) { return material; }, material, material, 80.0F);
+  b.loft(rings, material, 80.0F);
 }
 
 /// Leaves at the surface of a cluster: small sheets with random rotations.

@@ -8,11 +8,8 @@
 
 namespace perdure::tools::shapes {
 
-BodyMaterials vehicleMaterials(MeshBuilder& builder, const Order& order, const Vec3& paint,
-                               Dice& dice);
 /// Adds body, wheels, mirrors, handles, and optional roof rails.
 void addVehicle(MeshBuilder& builder, const BodyProfile& profile, const Order& order, Dice& dice,
                 bool roof_rails);
-void addWheels(MeshBuilder& builder, const BodyProfile& profile, const Vec3& size, Dice& dice);
 
 }  // namespace perdure::tools::shapes

@@ -1,0 +1,43 @@
+// Files and folders of a tool.
+#pragma once
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <system_error>
+
+namespace perdure::tools {
+
+/// The content of a file; empty if it cannot be read.
+inline std::string textOf(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+/// A folder that its destructor removes with its content.
+class TemporaryFolder {
+ public:
+  /// Its path starts with `start`. If it cannot be made, fail(its name) throws; errno says why.
+  template <class Fail>
+  TemporaryFolder(const std::filesystem::path& start, Fail&& fail) {
+    std::string name = start.string() + "XXXXXX";
+    if (mkdtemp(name.data()) == nullptr) fail(name);
+    path_ = name;
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace perdure::tools

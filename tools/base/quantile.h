@@ -1,0 +1,37 @@
+// Medians and other quantiles of samples.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace perdure::tools {
+
+/// The sample below which a share of the others lies; the lower one of two. `values` is not empty.
+inline double sampleAt(std::vector<double> values, double share) {
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * (values.size() - 1.0));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+/// The median, the upper one of two; 0 for an empty sample.
+template <class Values>
+double upperMedian(Values values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Quantile of a sample by linear interpolation; q in [0, 1]; 0 for an empty sample.
+inline double quantile(std::vector<double> values, double q) {
+  if (values.empty()) return 0.0;
+  std::sort(values.begin(), values.end());
+  const double at = q * static_cast<double>(values.size() - 1);
+  const auto low = static_cast<std::size_t>(std::floor(at));
+  const std::size_t high = std::min(low + 1, values.size() - 1);
+  const double part = at - static_cast<double>(low);
+  return (1.0 - part) * values[low] + part * values[high];
+}
+
+}  // namespace perdure::tools
