@@ -26,18 +26,12 @@ std::uint64_t digestOf(std::span<const std::uint8_t> bytes, const WorldId& world
   return digest(text) ^ (world.world * 31 + world.epoch);
 }
 
-Result<void> failed(const Reason& reason) { return tl::unexpected<Reason>(reason); }
-
 /// A statement for many rows of one commit. It is prepared with the first row, because preparing
 /// takes longer than writing a row.
-Result<void> runAgain(const Connection& connection, std::optional<Statement>& statement,
-                      std::string_view sql, const auto&... parameters) {
-  if (!statement) {
-    auto prepared = connection.prepare(sql);
-    if (!prepared) return failed(prepared.error());
-    statement.emplace(std::move(*prepared));
-  }
-  return statement->bindAll(parameters...).run();
+void runAgain(const Connection& connection, std::optional<Statement>& statement,
+              std::string_view sql, const auto&... parameters) {
+  if (!statement) statement.emplace(need(connection.prepare(sql)));
+  need(statement->bindAll(parameters...).run());
 }
 
 }  // namespace
@@ -66,9 +60,11 @@ MapDatabase::MapDatabase(OpenedStore opened, const StoreOptions& options)
     : connection_(std::move(opened.connection)),
       notice_(std::move(opened.notice)),
       tile_size_m_(options.tile_size_m) {
-  auto ready = keepTileSize();
-  if (ready) ready = rememberWorking();
-  if (ready) ready = options.outbox ? openOutbox(connection_) : dropOutbox(connection_);
+  const auto ready = attempt([&] {
+    keepTileSize();
+    rememberWorking();
+    need(options.outbox ? openOutbox(connection_) : dropOutbox(connection_));
+  });
   if (!ready) {
     throw StartupError(ExitCode::kUnavailable,
                        "The map " + options.path + " cannot be read (" + ready.error().detail +
@@ -77,50 +73,34 @@ MapDatabase::MapDatabase(OpenedStore opened, const StoreOptions& options)
 }
 
 /// Updates the columns tile_x and tile_y to the configured tile size.
-Result<void> MapDatabase::keepTileSize() {
+void MapDatabase::keepTileSize() {
   const std::string size = std::to_string(tile_size_m_);
-  const auto same = connection_.first(
+  const auto same = need(connection_.first(
       "SELECT value FROM meta WHERE key = 'tile_size_m' AND value = ?1",
-      [](const Statement& row) { return row.text(0); }, size);
-  if (!same) return failed(same.error());
-  if (*same) return {};
-  auto transaction = Transaction::begin(connection_);
-  if (!transaction) return failed(transaction.error());
-  auto done = retile();
-  if (done) done = connection_.run("REPLACE INTO meta VALUES('tile_size_m', ?1)", size);
-  return done ? transaction->commit() : done;
+      [](const Statement& row) { return row.text(0); }, size));
+  if (same) return;
+  auto transaction = need(Transaction::begin(connection_));
+  retile();
+  need(connection_.run("REPLACE INTO meta VALUES('tile_size_m', ?1)", size));
+  need(transaction.commit());
 }
 
-Result<void> MapDatabase::retile() {
-  auto rows = connection_.prepare("SELECT id, x, y FROM objects");
-  auto update = connection_.prepare("UPDATE objects SET tile_x = ?2, tile_y = ?3 WHERE id = ?1");
-  if (!rows) return failed(rows.error());
-  if (!update) return failed(update.error());
-  for (;;) {
-    const auto row = rows->step();
-    if (!row) return failed(row.error());
-    if (!*row) return {};
-    const auto square = squareOf({rows->real(1), rows->real(2), 0.0}, tile_size_m_);
-    if (!square) continue;
-    const auto done = update->bindAll(rows->integer(0), square->x, square->y).run();
-    if (!done) return done;
-  }
+void MapDatabase::retile() {
+  auto update =
+      need(connection_.prepare("UPDATE objects SET tile_x = ?2, tile_y = ?3 WHERE id = ?1"));
+  need(connection_.forRows("SELECT id, x, y FROM objects", [&](const Statement& row) {
+    const auto square = squareOf({row.real(1), row.real(2), 0.0}, tile_size_m_);
+    if (square) need(update.bindAll(row.integer(0), square->x, square->y).run());
+  }));
 }
 
-Result<void> MapDatabase::rememberWorking() {
-  auto rows = connection_.prepare("SELECT id FROM working WHERE belief IS NULL");
-  if (!rows) return failed(rows.error());
-  for (;;) {
-    const auto row = rows->step();
-    if (!row) return failed(row.error());
-    if (!*row) return {};
-    auto known = rowOf(rows->id(0));
-    if (!known) return failed(known.error());
-    committed_[rows->id(0)] = *known;
-  }
+void MapDatabase::rememberWorking() {
+  need(
+      connection_.forRows("SELECT id FROM working WHERE belief IS NULL",
+                          [&](const Statement& row) { committed_[row.id(0)] = rowOf(row.id(0)); }));
 }
 
-Result<MapDatabase::Row> MapDatabase::rowOf(ObjectId id) const {
+MapDatabase::Row MapDatabase::rowOf(ObjectId id) const {
   Row row;
   const auto take = [&](const Statement& stored) {
     row.stored = true;
@@ -129,123 +109,101 @@ Result<MapDatabase::Row> MapDatabase::rowOf(ObjectId id) const {
     // A track that had left the working set is written again even if its belief is the same.
     if (stored.integer(2) == 0) row.digest = digestOf(stored.blob(5), world);
   };
-  return connection_
-      .forRows("SELECT gone, gone_ns, memory, world, epoch, belief FROM objects WHERE id = ?1",
-               take, id)
-      .map([&] { return row; });
+  need(connection_.forRows(
+      "SELECT gone, gone_ns, memory, world, epoch, belief FROM objects WHERE id = ?1", take, id));
+  return row;
 }
 
-Result<MapDatabase::Row> MapDatabase::rowOfTrack(TrackId id, const Batch& batch) const {
+MapDatabase::Row MapDatabase::rowOfTrack(TrackId id, const Batch& batch) const {
   const auto known = committed_.find(id);
   if (known != committed_.end()) return known->second;
   if (!isShared(id, batch)) return rowOf(id);
   const auto track = readTrack(connection_, id);
-  if (!track) return tl::unexpected<Reason>(track.error());
-  Row row;
-  if (!*track) return row;
-  row.stored = true;
-  row.gone = (*track)->gone;
-  return row;
+  return track ? Row{0, true, track->gone} : Row{};
 }
 
-Result<void> MapDatabase::insert(const PlacedBelief& placed, const Square& square,
-                                 const Bytes& bytes, Change& change) {
+void MapDatabase::insert(const PlacedBelief& placed, const Square& square, const Bytes& bytes,
+                         Change& change) {
   const MapObject o = mapObjectOf(placed.belief, placed.world);
   const Vector7d& m = o.mean;
-  const auto done =
-      runAgain(connection_, change.put_object, kPutObject, o.id, o.world.world, o.world.epoch,
-               o.class_name, o.class_probability, o.existence, m[0], m[1], m[2], m[3],
-               std::exp(m[4]), std::exp(m[5]), std::exp(m[6]), o.first_seen, o.last_seen, o.hits,
-               o.visibility, o.memory, square.x, square.y, bytes);
-  if (!done) return done;
-  return runAgain(connection_, change.put_place,
-                  "REPLACE INTO positions VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7)", o.id, m[0], m[0],
-                  m[1], m[1], m[2], m[2]);
+  runAgain(connection_, change.put_object, kPutObject, o.id, o.world.world, o.world.epoch,
+           o.class_name, o.class_probability, o.existence, m[0], m[1], m[2], m[3], std::exp(m[4]),
+           std::exp(m[5]), std::exp(m[6]), o.first_seen, o.last_seen, o.hits, o.visibility,
+           o.memory, square.x, square.y, bytes);
+  runAgain(connection_, change.put_place,
+           "REPLACE INTO positions VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7)", o.id, m[0], m[0], m[1],
+           m[1], m[2], m[2]);
 }
 
-Result<void> MapDatabase::put(const PlacedBelief& placed, const Batch& batch, Change& change) {
+void MapDatabase::put(const PlacedBelief& placed, const Batch& batch, Change& change) {
   const TrackId id = placed.belief.id;
   const auto square = squareOf(placed.belief.best().mean.head<3>(), tile_size_m_);
-  if (!square) return fail("object_invalid", "an object's centre is not a place on the map");
-  const auto before = rowOfTrack(id, batch);
-  if (!before) return failed(before.error());
-  if (before->gone && *before->gone >= batch.working->stamp.time) {
+  if (!square) throw Failed{{"object_invalid", "an object's centre is not a place on the map"}};
+  const Row before = rowOfTrack(id, batch);
+  if (before.gone && *before.gone >= batch.working->stamp.time) {
     change.shut_out.insert(id);
-    return {};
+    return;
   }
   const Bytes bytes = encodeBelief(placed.belief);
   const Row after{digestOf(bytes, placed.world), true, std::nullopt};
   change.rows[id] = after;
-  if (after.digest == before->digest) return {};
+  if (after.digest == before.digest) return;
   if (isShared(id, batch)) {
     change.to_derive.insert(batch.identity->objectOf(id));
     return writeTrack(connection_, {id, placed, change.revision, std::nullopt});
   }
   change.objects.insert(id);
-  return insert(placed, *square, bytes, change);
+  insert(placed, *square, bytes, change);
 }
 
-Result<void> MapDatabase::putObjects(const Batch& batch, Change& change) {
-  for (const auto& [id, placed] : batch.left) {
-    const auto done = put(placed, batch, change);
-    if (!done) return done;
-  }
+void MapDatabase::putObjects(const Batch& batch, Change& change) {
+  for (const auto& [id, placed] : batch.left) put(placed, batch, change);
   for (const auto& belief : batch.working->objects) {
     if (!belief.confirmed || batch.placed.contains(belief.id)) continue;
-    const auto done = put({batch.working->world, belief}, batch, change);
-    if (!done) return done;
+    put({batch.working->world, belief}, batch, change);
   }
-  return {};
 }
 
 /// Moves the rows of tracks that begin or cease to share an object.
-Result<void> MapDatabase::regroup(const Batch& batch, Change& change) {
+void MapDatabase::regroup(const Batch& batch, Change& change) {
   for (const TrackId id : batch.regrouped) {
     committed_.erase(id);
     if (isShared(id, batch)) {
       change.to_derive.insert(batch.identity->objectOf(id));
-      const auto done = shareTrack(connection_, id);
-      if (!done) return done;
+      shareTrack(connection_, id);
       continue;
     }
     const auto track = readTrack(connection_, id);
-    if (!track) return failed(track.error());
-    if (!*track) continue;
-    auto done = deleteTrack(connection_, id);
-    const PlacedBelief& placed = (*track)->placed;
+    if (!track) continue;
+    deleteTrack(connection_, id);
+    const PlacedBelief& placed = track->placed;
     const auto square = squareOf(placed.belief.best().mean.head<3>(), tile_size_m_);
-    if (done && square) done = insert(placed, *square, encodeBelief(placed.belief), change);
+    if (square) insert(placed, *square, encodeBelief(placed.belief), change);
     change.objects.insert(id);
-    if (done && (*track)->gone) done = remove(id, {EventKind::kGone, *(*track)->gone, 0}, change);
-    if (done && !change.alive.contains(id)) done = markLeft(id, change);
-    if (!done) return done;
+    if (track->gone) remove(id, {EventKind::kGone, *track->gone, 0}, change);
+    if (!change.alive.contains(id)) markLeft(id, change);
   }
-  return {};
 }
 
 /// If a track does not have its object's id, its row is history: the detections of that track.
-Result<void> MapDatabase::hide(const StoredTrack* track, TrackId id, ObjectId object,
-                               TimePoint time, Change& change) {
-  const auto row = rowOf(id);
-  if (!row) return failed(row.error());
-  if (row->gone) {
-    return connection_.run(
-        "UPDATE objects SET merged_into = ?2 WHERE id = ?1 AND merged_into <> ?2", id, object);
+void MapDatabase::hide(const StoredTrack* track, TrackId id, ObjectId object, TimePoint time,
+                       Change& change) {
+  const Row row = rowOf(id);
+  if (row.gone) {
+    return need(connection_.run(
+        "UPDATE objects SET merged_into = ?2 WHERE id = ?1 AND merged_into <> ?2", id, object));
   }
-  if (row->stored && track != nullptr) {
+  if (row.stored && track != nullptr) {
     const PlacedBelief& placed = track->placed;
     const auto square = squareOf(placed.belief.best().mean.head<3>(), tile_size_m_);
-    if (square) {
-      const auto done = insert(placed, *square, encodeBelief(placed.belief), change);
-      if (!done) return done;
-    }
+    if (square) insert(placed, *square, encodeBelief(placed.belief), change);
   }
-  return remove(id, {EventKind::kMerged, time, object}, change);
+  remove(id, {EventKind::kMerged, time, object}, change);
 }
 
 /// An object has the row of its newest track: one of the working set, else the one of this W that
 /// was detected last, else the one that was written last. If that track is gone, so is the object.
-Result<void> MapDatabase::derive(ObjectId object, const Batch& batch, Change& change) {
+void MapDatabase::derive(ObjectId object, const Batch& batch, Change& change) {
   std::optional<StoredTrack> newest;
   const auto rank = [&](const StoredTrack& track) {
     const bool here = track.placed.world == batch.working->world;
@@ -254,108 +212,84 @@ Result<void> MapDatabase::derive(ObjectId object, const Batch& batch, Change& ch
   };
   for (const TrackId id : batch.identity->tracksOf(object)) {
     auto track = readTrack(connection_, id);
-    if (!track) return failed(track.error());
     if (id != object) {
-      const auto done =
-          hide(*track ? &**track : nullptr, id, object, batch.working->stamp.time, change);
-      if (!done) return done;
+      hide(track ? &*track : nullptr, id, object, batch.working->stamp.time, change);
     }
-    if (*track && (!newest || rank(**track) > rank(*newest))) newest = *std::move(*track);
+    if (track && (!newest || rank(*track) > rank(*newest))) newest = std::move(track);
   }
-  if (!newest) return {};
+  if (!newest) return;
   if (newest->gone) return remove(object, {EventKind::kGone, *newest->gone, 0}, change);
   newest->placed.belief.id = object;
   const auto square = squareOf(newest->placed.belief.best().mean.head<3>(), tile_size_m_);
-  if (!square) return {};
+  if (!square) return;
   change.objects.insert(object);
-  const auto done = insert(newest->placed, *square, encodeBelief(newest->placed.belief), change);
-  if (!done || change.alive.contains(newest->id)) return done;
-  return markLeft(object, change);
+  insert(newest->placed, *square, encodeBelief(newest->placed.belief), change);
+  if (!change.alive.contains(newest->id)) markLeft(object, change);
 }
 
-Result<void> MapDatabase::end(TrackId id, const Removal& removal, const Batch& batch,
-                              Change& change) {
+void MapDatabase::end(TrackId id, const Removal& removal, const Batch& batch, Change& change) {
   if (!isShared(id, batch)) return remove(id, removal, change);
   change.rows.erase(id);
   change.to_derive.insert(batch.identity->objectOf(id));
   // The surviving track holds the information of a merged track.
   if (removal.kind == EventKind::kMerged) return deleteTrack(connection_, id);
-  return endTrack(connection_, id, removal.time);
+  endTrack(connection_, id, removal.time);
 }
 
 /// Adds the tracks of the last working set that are on the map but were not confirmed any more.
-Result<void> MapDatabase::addDoubtful(std::set<ObjectId>& ids) const {
-  return connection_.forRows("SELECT id FROM working WHERE belief IS NOT NULL",
-                             [&](const Statement& row) { ids.insert(row.id(0)); });
+void MapDatabase::addDoubtful(std::set<ObjectId>& ids) const {
+  need(connection_.forRows("SELECT id FROM working WHERE belief IS NOT NULL",
+                           [&](const Statement& row) { ids.insert(row.id(0)); }));
 }
 
-Result<void> MapDatabase::markLeft(ObjectId id, Change& change) {
-  const auto row = rowOf(id);
-  if (!row) return failed(row.error());
-  if (!row->stored || row->gone) return {};
+void MapDatabase::markLeft(ObjectId id, Change& change) {
+  const Row row = rowOf(id);
+  if (!row.stored || row.gone) return;
   change.objects.insert(id);
-  return connection_.run("UPDATE objects SET visibility = ?2, memory = ?3 WHERE id = ?1", id,
-                         Visibility::kOutOfView, Memory::kLongTerm);
+  need(connection_.run("UPDATE objects SET visibility = ?2, memory = ?3 WHERE id = ?1", id,
+                       Visibility::kOutOfView, Memory::kLongTerm));
 }
 
-Result<void> MapDatabase::remove(ObjectId id, const Removal& removal, Change& change) {
-  const auto row = rowOf(id);
-  if (!row) return failed(row.error());
-  if (!row->stored || row->gone) return {};  // never confirmed, or gone before
+void MapDatabase::remove(ObjectId id, const Removal& removal, Change& change) {
+  const Row row = rowOf(id);
+  if (!row.stored || row.gone) return;  // never confirmed, or gone before
   change.objects.insert(id);
   change.rows.erase(id);
-  const auto done = connection_.run(
+  need(connection_.run(
       "UPDATE objects SET gone = ?2, gone_ns = ?3, merged_into = nullif(?4, 0) WHERE id = ?1", id,
-      1 + static_cast<std::int64_t>(removal.kind), removal.time, removal.merged_into);
-  if (!done) return done;
-  for (const char* sql :
-       {"DELETE FROM positions WHERE id = ?1", "DELETE FROM sightings WHERE id = ?1"}) {
-    const auto deleted = connection_.run(sql, id);
-    if (!deleted) return deleted;
-  }
-  return {};
+      1 + static_cast<std::int64_t>(removal.kind), removal.time, removal.merged_into));
+  need(connection_.run("DELETE FROM positions WHERE id = ?1", id));
+  need(connection_.run("DELETE FROM sightings WHERE id = ?1", id));
 }
 
-Result<void> MapDatabase::putWorking(const Objects& working, const Change& change) {
-  auto done = connection_.run("REPLACE INTO meta VALUES('working', ?1)", encodeHeader(working));
-  if (done) done = connection_.execute("DELETE FROM working");
-  if (!done) return done;
-  auto insert = connection_.prepare("INSERT INTO working VALUES(?1, ?2, ?3)");
-  if (!insert) return failed(insert.error());
+void MapDatabase::putWorking(const Objects& working, const Change& change) {
+  need(connection_.run("REPLACE INTO meta VALUES('working', ?1)", encodeHeader(working)));
+  need(connection_.execute("DELETE FROM working"));
+  auto insert = need(connection_.prepare("INSERT INTO working VALUES(?1, ?2, ?3)"));
   std::int64_t position = 0;
   for (const auto& belief : working.objects) {
     if (change.shut_out.contains(belief.id)) continue;
-    insert->bindAll(position++, belief.id);  // no belief: it is in the row of the track
-    if (!change.rows.contains(belief.id)) insert->bind(3, encodeBelief(belief));
-    done = insert->run();
-    if (!done) return done;
+    insert.bindAll(position++, belief.id);  // no belief: it is in the row of the track
+    if (!change.rows.contains(belief.id)) insert.bind(3, encodeBelief(belief));
+    need(insert.run());
   }
-  return {};
 }
 
 Result<Written> MapDatabase::write(const Batch& batch) {
   check(batch.working != nullptr, "a batch has a working set");
-  auto transaction = Transaction::begin(connection_);
-  if (!transaction) return tl::unexpected<Reason>(transaction.error());
-  if (batch.graph != nullptr && !graph_is_whole_) {  // must precede the reuse of ids
-    const auto swept = sweepGraph(connection_);
-    if (!swept) return tl::unexpected<Reason>(swept.error());
-  }
-  Change change;
-  auto written = putAll(batch, change);
-  if (!written) return written;
-  if (batch.graph != nullptr) {
-    const auto unsound = writeGraph(connection_, *batch.graph);
-    if (!unsound) return tl::unexpected<Reason>(unsound.error());
-    written->unsound = *unsound;
-  }
-  auto done = Result<void>();
-  if (batch.acknowledged > 0) done = acknowledge(connection_, batch.acknowledged);
-  if (done) done = transaction->commit();
-  if (!done) return tl::unexpected<Reason>(done.error());
-  remember(*batch.working, change);
-  graph_is_whole_ = graph_is_whole_ || batch.graph != nullptr;
-  return written;
+  return attempt([&] {
+    auto transaction = need(Transaction::begin(connection_));
+    // The sweep must precede the reuse of ids.
+    if (batch.graph != nullptr && !graph_is_whole_) need(sweepGraph(connection_));
+    Change change;
+    Written written = putAll(batch, change);
+    if (batch.graph != nullptr) written.unsound = need(writeGraph(connection_, *batch.graph));
+    if (batch.acknowledged > 0) need(acknowledge(connection_, batch.acknowledged));
+    need(transaction.commit());
+    remember(*batch.working, change);
+    graph_is_whole_ = graph_is_whole_ || batch.graph != nullptr;
+    return written;
+  });
 }
 
 Result<SavedGraph> MapDatabase::takeGraph() {
@@ -364,50 +298,44 @@ Result<SavedGraph> MapDatabase::takeGraph() {
   return graph;
 }
 
-Result<Written> MapDatabase::putAll(const Batch& batch, Change& change) {
-  const auto revision = reader().revision();
-  if (!revision) return tl::unexpected<Reason>(revision.error());
-  change.revision = *revision + 1;
+Written MapDatabase::putAll(const Batch& batch, Change& change) {
+  change.revision = need(reader().revision()) + 1;
   for (const auto& belief : batch.working->objects) change.alive.insert(belief.id);
-  auto done = regroup(batch, change);
-  if (done) done = putObjects(batch, change);
+  regroup(batch, change);
+  putObjects(batch, change);
   std::set<TrackId> away;
   for (const auto& [id, row] : committed_) away.insert(id);
   for (const auto& [id, placed] : batch.left) away.insert(id);
-  if (done) done = addDoubtful(away);
+  addDoubtful(away);
   for (const ObjectId id : away) {
-    if (!done || change.alive.contains(id)) continue;
+    if (change.alive.contains(id)) continue;
     if (isShared(id, batch)) {
       change.to_derive.insert(batch.identity->objectOf(id));
     } else {
-      done = markLeft(id, change);
+      markLeft(id, change);
     }
   }
   for (const auto& [id, removal] : batch.removed) {
     if (removal.time < batch.working->stamp.time && change.alive.contains(id)) continue;
-    if (done) done = end(id, removal, batch, change);
+    end(id, removal, batch, change);
     change.shut_out.insert(id);
   }
-  for (const ObjectId object : change.to_derive) {
-    if (done) done = derive(object, batch, change);
+  for (const ObjectId object : change.to_derive) derive(object, batch, change);
+  if (batch.facts != nullptr) need(writeFacts(connection_, *batch.facts));
+  putWorking(*batch.working, change);
+  if (!batch.earth_anchor.empty()) {
+    need(connection_.run("REPLACE INTO meta VALUES('earth_anchor', ?1)", batch.earth_anchor));
   }
-  if (done && batch.facts != nullptr) done = writeFacts(connection_, *batch.facts);
-  if (done) done = putWorking(*batch.working, change);
-  if (done && !batch.earth_anchor.empty()) {
-    done = connection_.run("REPLACE INTO meta VALUES('earth_anchor', ?1)", batch.earth_anchor);
-  }
-  if (!done) return tl::unexpected<Reason>(done.error());
   return nextRevision(change);
 }
 
-Result<Written> MapDatabase::nextRevision(const Change& change) {
+Written MapDatabase::nextRevision(const Change& change) {
   Written written{{change.objects.begin(), change.objects.end()}, change.revision};
   if (change.objects.empty()) {
     --written.revision;
     return written;
   }
-  const auto done = connection_.run("REPLACE INTO meta VALUES('revision', ?1)", written.revision);
-  if (!done) return tl::unexpected<Reason>(done.error());
+  need(connection_.run("REPLACE INTO meta VALUES('revision', ?1)", written.revision));
   return written;
 }
 

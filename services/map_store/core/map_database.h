@@ -150,26 +150,25 @@ class MapDatabase {
   struct Change;  ///< changes of one write
 
   MapDatabase(OpenedStore opened, const StoreOptions& options);
-  Result<void> keepTileSize();
-  Result<void> retile();
-  Result<void> rememberWorking();
-  Result<Row> rowOf(ObjectId id) const;
-  Result<Row> rowOfTrack(TrackId id, const Batch& batch) const;
-  Result<void> put(const PlacedBelief& placed, const Batch& batch, Change& change);
-  Result<void> insert(const PlacedBelief& placed, const Square& square, const Bytes& bytes,
-                      Change& change);
-  Result<void> putObjects(const Batch& batch, Change& change);
-  Result<void> regroup(const Batch& batch, Change& change);
-  Result<void> hide(const StoredTrack* track, TrackId id, ObjectId object, TimePoint time,
-                    Change& change);
-  Result<void> derive(ObjectId object, const Batch& batch, Change& change);
-  Result<void> addDoubtful(std::set<ObjectId>& ids) const;
-  Result<void> markLeft(ObjectId id, Change& change);
-  Result<void> remove(ObjectId id, const Removal& removal, Change& change);
-  Result<void> end(TrackId id, const Removal& removal, const Batch& batch, Change& change);
-  Result<void> putWorking(const Objects& working, const Change& change);
-  Result<Written> putAll(const Batch& batch, Change& change);
-  Result<Written> nextRevision(const Change& change);
+  // These throw Failed; the public functions return its reason.
+  void keepTileSize();
+  void retile();
+  void rememberWorking();
+  Row rowOf(ObjectId id) const;
+  Row rowOfTrack(TrackId id, const Batch& batch) const;
+  void put(const PlacedBelief& placed, const Batch& batch, Change& change);
+  void insert(const PlacedBelief& placed, const Square& square, const Bytes& bytes, Change& change);
+  void putObjects(const Batch& batch, Change& change);
+  void regroup(const Batch& batch, Change& change);
+  void hide(const StoredTrack* track, TrackId id, ObjectId object, TimePoint time, Change& change);
+  void derive(ObjectId object, const Batch& batch, Change& change);
+  void addDoubtful(std::set<ObjectId>& ids) const;
+  void markLeft(ObjectId id, Change& change);
+  void remove(ObjectId id, const Removal& removal, Change& change);
+  void end(TrackId id, const Removal& removal, const Batch& batch, Change& change);
+  void putWorking(const Objects& working, const Change& change);
+  Written putAll(const Batch& batch, Change& change);
+  Written nextRevision(const Change& change);
   void remember(const Objects& working, const Change& change);
 
   Connection connection_;

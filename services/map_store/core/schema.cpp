@@ -121,10 +121,9 @@ Result<void> adopt(const Connection& connection, const Identity& identity) {
   const auto version = connection.integer("PRAGMA user_version");
   if (!version) return tl::unexpected<Reason>(version.error());
   if (*version == kSchemaVersion) return {};  // another process has upgraded the file already
-  const auto made =
-      connection.execute(std::string(*version < kFirstSchemaWithGraph ? kGraphSchema : "") +
-                         kAddedSchema + "PRAGMA user_version=" + std::to_string(kSchemaVersion) +
-                         ";");
+  const auto made = connection.execute(
+      std::string(*version < kFirstSchemaWithGraph ? kGraphSchema : "") + kAddedSchema +
+      "PRAGMA user_version=" + std::to_string(kSchemaVersion) + ";");
   if (!made) return made;
   return transaction->commit();
 }
@@ -167,12 +166,11 @@ Result<Identity> identityOf(const Connection& connection) {
 }
 
 Result<void> wholeFileIsSound(const Connection& connection) {
-  auto statement = connection.prepare("PRAGMA quick_check(1)");
-  if (!statement) return tl::unexpected<Reason>(statement.error());
-  const auto row = statement->step();
-  if (!row) return tl::unexpected<Reason>(row.error());
-  if (*row && statement->text(0) == "ok") return {};
-  return fail("corrupt", *row ? statement->text(0) : "no answer to the check");
+  const auto answer =
+      connection.first("PRAGMA quick_check(1)", [](const Statement& row) { return row.text(0); });
+  if (!answer) return tl::unexpected<Reason>(answer.error());
+  if (*answer == "ok") return {};
+  return fail("corrupt", answer->value_or("no answer to the check"));
 }
 
 OpenedStore openStore(const StoreOptions& options) {

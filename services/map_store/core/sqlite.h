@@ -24,6 +24,33 @@ namespace perdure::map_store {
 /// SQLite's sentence.
 Reason reasonOf(int code, std::string_view detail);
 
+/// A failure on its way through the functions of one module. Only need() and attempt() use it.
+struct Failed {
+  Reason reason;
+};
+
+/// Returns the value. Throws Failed if there is none.
+template <class T>
+T need(Result<T> result) {
+  if (!result) throw Failed{std::move(result).error()};
+  if constexpr (!std::is_void_v<T>) return *std::move(result);
+}
+
+/// Calls `run` at the module's edge. Returns what it returns, or the reason of Failed.
+template <class Run>
+Result<std::invoke_result_t<Run>> attempt(Run run) {
+  try {
+    if constexpr (std::is_void_v<std::invoke_result_t<Run>>) {
+      run();
+      return {};
+    } else {
+      return run();
+    }
+  } catch (Failed& failed) {
+    return tl::unexpected<Reason>(std::move(failed.reason));
+  }
+}
+
 /// One prepared statement. Parameters count from 1, columns from 0. Valid for the lifetime of its
 /// connection.
 class Statement {

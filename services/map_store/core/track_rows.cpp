@@ -19,33 +19,32 @@ std::optional<StoredTrack> trackFrom(TrackId id, const Statement& row) {
 
 }  // namespace
 
-Result<std::optional<StoredTrack>> readTrack(const Connection& connection, TrackId id) {
-  return connection
-      .first(
-          "SELECT world, epoch, written, gone, gone_ns, belief FROM tracks WHERE id = ?1",
-          [&](const Statement& row) { return trackFrom(id, row); }, id)
-      .map([](auto track) { return std::move(track).value_or(std::nullopt); });
+std::optional<StoredTrack> readTrack(const Connection& connection, TrackId id) {
+  return need(connection.first(
+                  "SELECT world, epoch, written, gone, gone_ns, belief FROM tracks WHERE id = ?1",
+                  [&](const Statement& row) { return trackFrom(id, row); }, id))
+      .value_or(std::nullopt);
 }
 
-Result<void> writeTrack(const Connection& connection, const StoredTrack& track) {
+void writeTrack(const Connection& connection, const StoredTrack& track) {
   const WorldId& world = track.placed.world;
-  return connection.run("REPLACE INTO tracks VALUES(?1, ?2, ?3, ?4, 0, NULL, ?5)", track.id,
-                        world.world, world.epoch, track.written, encodeBelief(track.placed.belief));
+  need(connection.run("REPLACE INTO tracks VALUES(?1, ?2, ?3, ?4, 0, NULL, ?5)", track.id,
+                      world.world, world.epoch, track.written, encodeBelief(track.placed.belief)));
 }
 
-Result<void> shareTrack(const Connection& connection, TrackId id) {
-  return connection.run(
+void shareTrack(const Connection& connection, TrackId id) {
+  need(connection.run(
       "INSERT OR IGNORE INTO tracks SELECT id, world, epoch, 0, gone, gone_ns, belief "
       "FROM objects WHERE id = ?1 AND merged_into IS NULL",
-      id);
+      id));
 }
 
-Result<void> endTrack(const Connection& connection, TrackId id, TimePoint time) {
-  return connection.run("UPDATE tracks SET gone = 1, gone_ns = ?2 WHERE id = ?1", id, time);
+void endTrack(const Connection& connection, TrackId id, TimePoint time) {
+  need(connection.run("UPDATE tracks SET gone = 1, gone_ns = ?2 WHERE id = ?1", id, time));
 }
 
-Result<void> deleteTrack(const Connection& connection, TrackId id) {
-  return connection.run("DELETE FROM tracks WHERE id = ?1", id);
+void deleteTrack(const Connection& connection, TrackId id) {
+  need(connection.run("DELETE FROM tracks WHERE id = ?1", id));
 }
 
 }  // namespace perdure::map_store

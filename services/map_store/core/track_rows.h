@@ -3,7 +3,6 @@
 
 #include <optional>
 
-#include "common/base/result.h"
 #include "services/map_store/core/map_database.h"
 
 namespace perdure::map_store {
@@ -15,14 +14,14 @@ struct StoredTrack {
   std::optional<TimePoint> gone;
 };
 
-// All functions run within the caller's transaction.
+// All functions run within the caller's transaction and throw Failed.
 
-Result<std::optional<StoredTrack>> readTrack(const Connection& connection, TrackId id);
-Result<void> writeTrack(const Connection& connection, const StoredTrack& track);
+std::optional<StoredTrack> readTrack(const Connection& connection, TrackId id);
+void writeTrack(const Connection& connection, const StoredTrack& track);
 /// The track shares its object from now on. Copies the object's row unless the track already has
 /// one.
-Result<void> shareTrack(const Connection& connection, TrackId id);
-Result<void> endTrack(const Connection& connection, TrackId id, TimePoint time);
-Result<void> deleteTrack(const Connection& connection, TrackId id);
+void shareTrack(const Connection& connection, TrackId id);
+void endTrack(const Connection& connection, TrackId id, TimePoint time);
+void deleteTrack(const Connection& connection, TrackId id);
 
 }  // namespace perdure::map_store

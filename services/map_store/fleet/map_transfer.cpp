@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/base/errors.h"
+#include "services/map_store/core/draft_file.h"
 #include "services/map_store/core/map_copy.h"
 #include "services/map_store/core/schema.h"
 #include "services/map_store/fleet/pusher.h"
@@ -151,25 +152,6 @@ void pullInto(Link& link, const std::string& name, bool unfinished, const std::s
   orGiveUp(link.run("COMMIT"), kUnread);
 }
 
-/// A temporary file beside the destination; removed at the end.
-class Draft {
- public:
-  explicit Draft(std::string path) : path_(std::move(path)) { remove(); }
-  ~Draft() { remove(); }
-  Draft(const Draft&) = delete;
-  Draft& operator=(const Draft&) = delete;
-  const std::string& path() const { return path_; }
-
- private:
-  void remove() const {
-    std::error_code ignored;
-    for (const char* suffix : {"", "-wal", "-shm", "-journal"}) {
-      fs::remove(path_ + suffix, ignored);
-    }
-  }
-  std::string path_;
-};
-
 void refuseNameOfVehicle(Link& link, const std::string& name) {
   const auto others = orGiveUp(
       link.ask("SELECT 1 FROM perdure.maps WHERE vehicle = $1::text AND file <> $2::text LIMIT 1",
@@ -212,7 +194,7 @@ void pullMap(const std::string& url, const std::string& name, const std::string&
   const Stop stop;
   Link link = connect(url, stop);
   refuseWithoutMaps(link);
-  const Draft draft(to + ".pulled");
+  const DraftFile draft(to + ".pulled");  // copyMap uses the draft of `to`
   pullInto(link, name, unfinished, draft.path());
   copyMap(draft.path(), to);
 }

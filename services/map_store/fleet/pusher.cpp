@@ -144,8 +144,7 @@ Result<void> Pusher::replaceAll(Link& link, const std::string& file) {
 Result<bool> Pusher::hasMore() const {
   if (at_.next_table < kOutboxTables) return true;
   const auto newest = connection_->integer("SELECT coalesce(max(number), 0) FROM outbox");
-  if (!newest) return tl::unexpected<Reason>(newest.error());
-  return *newest > at_.sent;
+  return newest.map([&](std::int64_t number) { return number > at_.sent; });
 }
 
 Result<Portion> Pusher::push(Link& link, std::int64_t most_rows) {
@@ -192,15 +191,11 @@ Result<void> Pusher::readChanges(Link& link, Draft& draft) const {
 Result<void> Pusher::queueRow(Link& link, OutboxTable table, std::int64_t id) const {
   if (table == OutboxTable::kWorking) return queueWorking(link);
   const Table& t = tableOf(table);
-  auto row = connection_->prepare(selectionOf(t) + " WHERE " + t.columns.front().name + " = ?1");
+  const auto row = connection_->first(
+      selectionOf(t) + " WHERE " + t.columns.front().name + " = ?1",
+      [&](const Statement& stored) { return valuesOf(t, map_, stored); }, id);
   if (!row) return tl::unexpected<Reason>(row.error());
-  const auto there = row->bind(1, id).step();
-  if (!there) return tl::unexpected<Reason>(there.error());
-  if (*there) {
-    link.queue(nameOf("put", table), valuesOf(t, map_, *row));
-  } else {
-    link.queue(nameOf("delete", table), Values().put(map_).put(id));
-  }
+  link.queue(nameOf(*row ? "put" : "delete", table), row->value_or(Values().put(map_).put(id)));
   return {};
 }
 
@@ -225,14 +220,9 @@ Result<void> Pusher::queueWorking(Link& link) const {
   }
   link.queue("set_working", values);
   link.queue("clear_working", Values().put(map_));
-  auto rows = connection_->prepare(selectionOf(workingTable()));
-  if (!rows) return tl::unexpected<Reason>(rows.error());
-  for (;;) {
-    const auto row = rows->step();
-    if (!row) return tl::unexpected<Reason>(row.error());
-    if (!*row) return {};
-    link.queue("put_working", valuesOf(workingTable(), map_, *rows));
-  }
+  return connection_->forRows(selectionOf(workingTable()), [&](const Statement& row) {
+    link.queue("put_working", valuesOf(workingTable(), map_, row));
+  });
 }
 
 /// Reads the tables row by row. Then the entries follow that the outbox received meanwhile.

@@ -1,79 +1,40 @@
 #include "services/map_store/fleet/tables.h"
 
 #include <array>
+#include <sstream>
+#include <string_view>
 
 #include "common/base/check.h"
 
 namespace perdure::map_store::fleet {
 namespace {
 
-constexpr Kind kInteger = Kind::kInteger, kReal = Kind::kReal, kText = Kind::kText,
-               kBlob = Kind::kBlob;
+/// Each column is "TYPE:NAME"; the type is i (integer), r (real), t (text) or b (blob).
+Table tableFrom(const std::string& name, const std::string& columns, bool has_nulls = false) {
+  constexpr std::string_view kTypes = "irtb";  // in the order of Kind
+  Table table{name, {}, has_nulls};
+  std::istringstream words(columns);
+  for (std::string word; words >> word;) {
+    table.columns.push_back({word.substr(2), static_cast<Kind>(kTypes.find(word[0]))});
+  }
+  return table;
+}
 
 std::array<Table, static_cast<std::size_t>(kOutboxTables) - 1> makeTables() {
-  return {Table{"graph_classes", {{"number", kInteger}, {"name", kText}}},
-          Table{"anchors",
-                {{"id", kInteger},
-                 {"previous", kInteger},
-                 {"world", kInteger},
-                 {"epoch", kInteger},
-                 {"source", kInteger},
-                 {"sequence", kInteger},
-                 {"time_ns", kInteger},
-                 {"way_m", kReal},
-                 {"anchor", kBlob}}},
-          Table{"anchor_poses",
-                {{"id", kInteger},
-                 {"x", kReal},
-                 {"y", kReal},
-                 {"z", kReal},
-                 {"yaw", kReal},
-                 {"held_fast", kInteger}}},
-          Table{"edges",
-                {{"id", kInteger},
-                 {"a", kInteger},
-                 {"b", kInteger},
-                 {"kind", kInteger},
-                 {"weight", kReal},
-                 {"edge", kBlob}}},
-          Table{"objects",
-                {{"id", kInteger},
-                 {"world", kInteger},
-                 {"epoch", kInteger},
-                 {"class", kText},
-                 {"class_probability", kReal},
-                 {"existence", kReal},
-                 {"x", kReal},
-                 {"y", kReal},
-                 {"z", kReal},
-                 {"yaw", kReal},
-                 {"length", kReal},
-                 {"width", kReal},
-                 {"height", kReal},
-                 {"first_seen_ns", kInteger},
-                 {"last_seen_ns", kInteger},
-                 {"hits", kInteger},
-                 {"visibility", kInteger},
-                 {"memory", kInteger},
-                 {"tile_x", kInteger},
-                 {"tile_y", kInteger},
-                 {"gone", kInteger},
-                 {"gone_ns", kInteger},
-                 {"merged_into", kInteger},
-                 {"belief", kBlob}},
-                true},
-          Table{"sightings",
-                {{"id", kInteger},
-                 {"anchor", kInteger},
-                 {"world", kInteger},
-                 {"epoch", kInteger},
-                 {"last_seen_ns", kInteger},
-                 {"x", kReal},
-                 {"y", kReal},
-                 {"z", kReal},
-                 {"yaw", kReal},
-                 {"record", kBlob}}},
-          Table{"views", {{"anchor", kInteger}, {"points", kBlob}}}};
+  return {
+      tableFrom("graph_classes", "i:number t:name"),
+      tableFrom("anchors",
+                "i:id i:previous i:world i:epoch i:source i:sequence i:time_ns r:way_m b:anchor"),
+      tableFrom("anchor_poses", "i:id r:x r:y r:z r:yaw i:held_fast"),
+      tableFrom("edges", "i:id i:a i:b i:kind r:weight b:edge"),
+      tableFrom("objects",
+                "i:id i:world i:epoch t:class r:class_probability r:existence r:x r:y r:z r:yaw "
+                "r:length r:width r:height i:first_seen_ns i:last_seen_ns i:hits i:visibility "
+                "i:memory i:tile_x i:tile_y i:gone i:gone_ns i:merged_into b:belief",
+                true),
+      tableFrom("sightings",
+                "i:id i:anchor i:world i:epoch i:last_seen_ns r:x r:y r:z r:yaw b:record"),
+      tableFrom("views", "i:anchor b:points")};
 }
 
 const char* typeOf(Kind kind) {
@@ -108,8 +69,7 @@ const Table& tableOf(OutboxTable table) {
 }
 
 const Table& workingTable() {
-  static const Table table{
-      "working", {{"position", kInteger}, {"id", kInteger}, {"belief", kBlob}}, true};
+  static const Table table = tableFrom("working", "i:position i:id b:belief", true);
   return table;
 }
 

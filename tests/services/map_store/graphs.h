@@ -141,9 +141,9 @@ class RandomGraph {
 };
 
 inline void putBits(ByteWriter& out, const mapping::SavedAnchor& saved) {
-  out.put(saved.T_MA.p);
-  out.put(saved.T_MA.yaw);
-  out.put(saved.held_fast);
+  out(saved.T_MA.p);
+  out(saved.T_MA.yaw);
+  out(saved.held_fast);
 }
 
 /// All bits of a map, in an order that depends only on its contents.
@@ -151,35 +151,35 @@ inline std::string bitsOf(const mapping::SavedMap& map) {
   ByteWriter out;
   std::string bits;
   const auto add = [&](const Bytes& bytes) { bits.append(bytes.begin(), bytes.end()); };
-  for (const auto& name : map.classes) out.put(name);
+  for (const auto& name : map.classes) out(name);
   for (const auto& [id, saved] : map.anchors) {
-    out.put(id);
+    out(id);
     putBits(out, saved);
     add(encodeAnchor(saved.anchor));
   }
   for (const auto& [id, saved] : map.edges) {
-    out.put(id);
-    out.put(saved.weight);
+    out(id);
+    out(saved.weight);
     add(encodeEdge(saved.edge));
   }
   for (const auto& [id, record] : map.records) {
-    out.put(id);
-    out.put(record.confirmed);
+    out(id);
+    out(record.confirmed);
     add(encodeRecord(record));
   }
   for (const auto& [id, record] : map.tracks) {
-    out.put(id);
-    out.put(record.confirmed);
-    out.put(record.gone);
+    out(id);
+    out(record.confirmed);
+    out(record.gone);
     add(encodeRecord(record));
   }
   for (const mapping::SameObject& fact : map.facts) {
-    out.put(fact.loop);
-    out.put(fact.a);
-    out.put(fact.b);
+    out(fact.loop);
+    out(fact.a);
+    out(fact.b);
   }
   for (const auto& [anchor, view] : map.views) {
-    out.put(anchor);
+    out(anchor);
     add(encodeView(view));
   }
   add(out.take());

@@ -1,7 +1,6 @@
 #include "services/map_store/core/graph/graph_codec.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <string>
 
@@ -18,96 +17,43 @@ using mapping::Sighting;
 
 constexpr std::size_t kMostShares = 4096;
 
-void put(ByteWriter& out, const LevelPose& pose) {
-  out.put(pose.p);
-  out.put(pose.yaw);
-}
+constexpr auto gaussianFields = [](auto& io, auto& gaussian) {
+  io(gaussian.mean.p, gaussian.mean.yaw, gaussian.covariance);
+};
 
-void take(ByteReader& in, LevelPose& pose) {
-  in.takeInto(pose.p);
-  pose.yaw = in.takeReal();
-}
+constexpr auto anchorFields = [](auto& io, auto& anchor) {
+  auto& stamp = anchor.stamp;
+  io(anchor.id, anchor.previous, anchor.session.world, anchor.session.epoch, stamp.source,
+     stamp.sequence, stamp.time, stamp.captured_ns, anchor.T_WA.q.coeffs(), anchor.T_WA.p);
+  gaussianFields(io, anchor.from_previous);
+  io(anchor.way_m, anchor.scale2);
+};
 
-void put(ByteWriter& out, const LevelGaussian& gaussian) {
-  put(out, gaussian.mean);
-  out.put(gaussian.covariance);
-}
+constexpr auto edgeFields = [](auto& io, auto& edge) {
+  io(edge.a, edge.b);
+  io.enumeration(edge.kind, mapping::EdgeKind::kTracking);
+  gaussianFields(io, edge.T_ab);
+};
 
-void take(ByteReader& in, LevelGaussian& gaussian) {
-  take(in, gaussian.mean);
-  in.takeInto(gaussian.covariance);
-}
+constexpr auto sightingFields = [](auto& io, auto& sighting) {
+  auto& object = sighting.in_anchor;
+  io(sighting.anchor, object.id, object.p, object.yaw, object.covariance);
+  io.list(object.pmf, kMostShares,
+          [](auto& to, auto& share) { to(share.name, share.probability); });
+};
 
-void put(ByteWriter& out, const WorldId& world) {
-  out.put(world.world);
-  out.put(world.epoch);
-}
+constexpr auto recordFields = [](auto& io, auto& record) {
+  io(record.session.world, record.session.epoch, record.way_m, record.last_seen, record.pose_error);
+  sightingFields(io, record.sighting);
+  io.optional(record.earlier, sightingFields);
+};
 
-void take(ByteReader& in, WorldId& world) {
-  world.world = in.take<std::uint64_t>();
-  world.epoch = in.take<std::uint32_t>();
-}
-
-void put(ByteWriter& out, const FrameStamp& stamp) {
-  out.put(stamp.source);
-  out.put(stamp.sequence);
-  out.put(stamp.time);
-  out.put(stamp.captured_ns);
-}
-
-void take(ByteReader& in, FrameStamp& stamp) {
-  stamp.source = in.take<std::uint64_t>();
-  stamp.sequence = in.take<std::uint64_t>();
-  stamp.time = in.takeTime();
-  stamp.captured_ns = in.takeNanoseconds();
-}
-
-void put(ByteWriter& out, const Sighting& sighting) {
-  const PlacedObject& object = sighting.in_anchor;
-  out.put(sighting.anchor);
-  out.put(object.id);
-  out.put(object.p);
-  out.put(object.yaw);
-  out.put(object.covariance);
-  out.put(static_cast<std::uint32_t>(object.pmf.size()));
-  for (const auto& share : object.pmf) {
-    out.put(share.name);
-    out.put(share.probability);
-  }
-}
-
-void take(ByteReader& in, Sighting& sighting) {
-  PlacedObject& object = sighting.in_anchor;
-  sighting.anchor = in.take<std::uint64_t>();
-  object.id = in.take<std::uint64_t>();
-  in.takeInto(object.p);
-  object.yaw = in.takeReal();
-  in.takeInto(object.covariance);
-  object.pmf.resize(in.takeCount(kMostShares));
-  for (auto& share : object.pmf) {
-    share.name = in.take<std::uint32_t>();
-    share.probability = in.takeReal();
-  }
-}
-
-void put(ByteWriter& out, const ObjectRecord& record) {
-  put(out, record.session);
-  out.put(record.way_m);
-  out.put(record.last_seen);
-  out.put(record.pose_error);
-  put(out, record.sighting);
-  out.put(record.earlier.has_value());
-  if (record.earlier) put(out, *record.earlier);
-}
-
-void take(ByteReader& in, ObjectRecord& record) {
-  take(in, record.session);
-  record.way_m = in.takeReal();
-  record.last_seen = in.takeTime();
-  in.takeInto(record.pose_error);
-  take(in, record.sighting);
-  if (in.takeFlag()) take(in, record.earlier.emplace());
-}
+constexpr auto viewFields = [](auto& io, auto& view) {
+  io.list(view, mapping::kMostPoints, [](auto& to, auto& point) {
+    to(point.p, point.sigma);
+    for (auto& byte : point.descriptor) to(byte);
+  });
+};
 
 bool isSoundGaussian(const LevelGaussian& gaussian) {
   return isSound(gaussian.mean) && gaussian.covariance.allFinite();
@@ -128,16 +74,17 @@ tl::unexpected<Reason> malformed(const std::string& what, const ByteReader& in) 
 }
 
 /// Checks the version first, then that all bytes are read and the value is sound.
-template <class T, class TakeAll>
-Result<T> decode(const std::string& what, std::span<const std::uint8_t> bytes, TakeAll takeAll) {
+template <class T>
+Result<T> decode(const std::string& what, std::span<const std::uint8_t> bytes, auto fields) {
   ByteReader in(bytes);
-  const auto version = in.take<std::uint16_t>();
+  std::uint16_t version = 0;
+  in(version);
   if (version != kGraphFormat) {
     return fail("graph_malformed",
                 what + ": format " + std::to_string(version) + " is not known here");
   }
   T value;
-  takeAll(in, value);
+  fields(in, value);
   if (!in.finished() || !isSound(value)) return malformed(what, in);
   return value;
 }
@@ -170,89 +117,32 @@ bool isSound(const mapping::View& view) {
          });
 }
 
-Bytes encodeAnchor(const Anchor& anchor) {
-  ByteWriter out;
-  out.put(kGraphFormat);
-  out.put(anchor.id);
-  out.put(anchor.previous);
-  put(out, anchor.session);
-  put(out, anchor.stamp);
-  out.put(anchor.T_WA.q.coeffs());
-  out.put(anchor.T_WA.p);
-  put(out, anchor.from_previous);
-  out.put(anchor.way_m);
-  out.put(anchor.scale2);
-  return out.take();
-}
+Bytes encodeAnchor(const Anchor& anchor) { return encode(kGraphFormat, anchor, anchorFields); }
 
 Result<Anchor> decodeAnchor(std::span<const std::uint8_t> bytes) {
-  return decode<Anchor>("anchor", bytes, [](ByteReader& in, Anchor& anchor) {
-    anchor.id = in.take<std::uint64_t>();
-    anchor.previous = in.take<std::uint64_t>();
-    take(in, anchor.session);
-    take(in, anchor.stamp);
-    in.takeInto(anchor.T_WA.q.coeffs());
-    in.takeInto(anchor.T_WA.p);
-    take(in, anchor.from_previous);
-    anchor.way_m = in.takeReal();
-    anchor.scale2 = in.takeReal();
-  });
+  return decode<Anchor>("anchor", bytes, anchorFields);
 }
 
-Bytes encodeEdge(const Edge& edge) {
-  ByteWriter out;
-  out.put(kGraphFormat);
-  out.put(edge.a);
-  out.put(edge.b);
-  out.put(static_cast<std::uint8_t>(edge.kind));
-  put(out, edge.T_ab);
-  return out.take();
-}
+Bytes encodeEdge(const Edge& edge) { return encode(kGraphFormat, edge, edgeFields); }
 
 Result<Edge> decodeEdge(std::span<const std::uint8_t> bytes) {
-  return decode<Edge>("edge", bytes, [](ByteReader& in, Edge& edge) {
-    edge.a = in.take<std::uint64_t>();
-    edge.b = in.take<std::uint64_t>();
-    edge.kind = in.takeEnum(mapping::EdgeKind::kTracking);
-    take(in, edge.T_ab);
-  });
+  return decode<Edge>("edge", bytes, edgeFields);
 }
 
 Bytes encodeRecord(const ObjectRecord& record) {
-  ByteWriter out;
-  out.put(kGraphFormat);
-  put(out, record);
-  return out.take();
+  return encode(kGraphFormat, record, recordFields);
 }
 
 Result<ObjectRecord> decodeRecord(std::span<const std::uint8_t> bytes) {
-  return decode<ObjectRecord>("sighting", bytes, [](ByteReader& in, ObjectRecord& record) {
-    take(in, record);
-    record.confirmed = true;
-  });
+  auto record = decode<ObjectRecord>("sighting", bytes, recordFields);
+  if (record) record->confirmed = true;
+  return record;
 }
 
-Bytes encodeView(const mapping::View& view) {
-  ByteWriter out;
-  out.put(kGraphFormat);
-  out.put(static_cast<std::uint32_t>(view.size()));
-  for (const mapping::SeenPoint& point : view) {
-    for (int i = 0; i < 3; ++i) out.put(std::bit_cast<std::uint32_t>(point.p[i]));
-    out.put(std::bit_cast<std::uint32_t>(point.sigma));
-    for (const std::uint8_t byte : point.descriptor) out.put(byte);
-  }
-  return out.take();
-}
+Bytes encodeView(const mapping::View& view) { return encode(kGraphFormat, view, viewFields); }
 
 Result<mapping::View> decodeView(std::span<const std::uint8_t> bytes) {
-  return decode<mapping::View>("view", bytes, [](ByteReader& in, mapping::View& view) {
-    view.resize(in.takeCount(mapping::kMostPoints));
-    for (mapping::SeenPoint& point : view) {
-      for (int i = 0; i < 3; ++i) point.p[i] = std::bit_cast<float>(in.take<std::uint32_t>());
-      point.sigma = std::bit_cast<float>(in.take<std::uint32_t>());
-      for (std::uint8_t& byte : point.descriptor) byte = in.take<std::uint8_t>();
-    }
-  });
+  return decode<mapping::View>("view", bytes, viewFields);
 }
 
 }  // namespace perdure::map_store

@@ -32,11 +32,11 @@ inline std::vector<std::string> rowsOf(const std::string& path, const std::strin
     ByteWriter row;
     for (int i = 0; i < columns; ++i) {
       const auto blob = rows.blob(i);
-      row.put(rows.isNull(i));
+      row(rows.isNull(i));
       // The bits of a number; for other values the bytes that SQLite returns.
-      row.put(rows.isNumber(i) ? rows.real(i) : 0.0);
-      row.put(rows.isNumber(i) ? rows.integer(i) : std::int64_t{0});
-      row.put(rows.isNumber(i) ? std::string() : std::string(blob.begin(), blob.end()));
+      row(rows.isNumber(i) ? rows.real(i) : 0.0);
+      row(rows.isNumber(i) ? rows.integer(i) : std::int64_t{0});
+      row(rows.isNumber(i) ? std::string() : std::string(blob.begin(), blob.end()));
     }
     const Bytes bytes = row.take();
     all.emplace_back(bytes.begin(), bytes.end());

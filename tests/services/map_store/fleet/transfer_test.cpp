@@ -65,7 +65,7 @@ TEST(FleetTransfer, AMapThatIsPushedAndPulledIsTheSame) {
     const MapDatabase opened({.path = to});
     EXPECT_EQ(test::bitsOf(opened.reader().graph()->map),
               test::bitsOf(test::RandomGraph(seed).map({.shared = 0})));
-    EXPECT_FALSE(std::filesystem::exists(to + ".pulled"));
+    EXPECT_FALSE(std::filesystem::exists(to + ".pulled.part"));
   }
   const auto maps = fleet::listMaps(url);
   ASSERT_EQ(maps.size(), 1u);
