@@ -136,21 +136,13 @@ bool Publisher::waitForAcknowledgement(double seconds) {
 }
 
 void bindBus(py::module_& module) {
+  using Text = std::optional<std::string>;
   py::class_<BusSettings>(module, "BusSettings")
-      .def(py::init([](std::optional<std::string> interface, std::optional<std::int64_t> domain,
-                       std::optional<std::string> vehicle, std::optional<std::string> security,
-                       std::optional<std::string> identity,
-                       std::optional<std::vector<std::string>> peers) {
-             return BusSettings{std::move(interface),
-                                std::move(vehicle),
-                                std::move(security),
-                                std::move(identity),
-                                domain,
-                                std::move(peers)};
-           }),
-           py::kw_only(), py::arg("interface") = py::none(), py::arg("domain") = py::none(),
-           py::arg("vehicle") = py::none(), py::arg("security") = py::none(),
-           py::arg("identity") = py::none(), py::arg("peers") = py::none());
+      .def(py::init<Text, Text, Text, Text, std::optional<std::int64_t>,
+                    std::optional<std::vector<std::string>>>(),
+           py::kw_only(), py::arg("interface") = py::none(), py::arg("vehicle") = py::none(),
+           py::arg("security") = py::none(), py::arg("identity") = py::none(),
+           py::arg("domain") = py::none(), py::arg("peers") = py::none());
   py::class_<Bus, std::shared_ptr<Bus>>(module, "Bus")
       .def(py::init<const BusSettings&, const std::string&>(), py::arg("settings"),
            py::arg("process"), py::call_guard<py::gil_scoped_release>())
@@ -158,10 +150,13 @@ void bindBus(py::module_& module) {
   py::class_<Publisher>(module, "Publisher")
       .def(py::init<std::shared_ptr<Bus>, const std::string&, std::int32_t, double>(),
            py::arg("bus"), py::arg("topic"), py::arg("strength"), py::arg("lease_s"))
-      .def("write", &Publisher::write)
-      .def("dispose", &Publisher::dispose)
-      .def("acknowledged", &Publisher::waitForAcknowledgement)
-      .def_property_readonly("matched", &Publisher::matched);
+      .def("write", &Publisher::write, py::arg("message"),
+           "Raises Refused with the field and the reason if readers would reject the message.")
+      .def("dispose", &Publisher::dispose, py::arg("message"),
+           "Disposes of the instance with this message's key, for keyed topics.")
+      .def("acknowledged", &Publisher::waitForAcknowledgement, py::arg("seconds"),
+           "Waits until every reader has received all messages; False after ``seconds``.")
+      .def_property_readonly("matched", &Publisher::matched, "The current number of readers.");
   module.def("known_topics", &tools::knownTopics);
 }
 

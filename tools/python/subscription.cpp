@@ -120,10 +120,13 @@ void bindSubscription(py::module_& module) {
       .def(py::init<std::shared_ptr<Bus>, std::vector<std::string>, bool>(), py::arg("bus"),
            py::arg("topics"), py::arg("gone"))
       .def("next", &Subscription::next, py::arg("seconds"))
-      .def("close", &Subscription::close)
+      .def("close", &Subscription::close, "Ends the subscription; a waiting ``next`` returns None.")
       .def_property_readonly("closed", &Subscription::closed)
-      .def_property_readonly("matched", &Subscription::matched)
-      .def_property_readonly("counts", [](const Subscription& self) { return self.counts().all(); })
+      .def_property_readonly("matched", &Subscription::matched, "The current number of writers.")
+      .def_property_readonly(
+          "counts", [](const Subscription& self) { return self.counts().all(); },
+          "Lost or unreadable messages since the start, by reason (as in Health):\n"
+          "\"objects_malformed_bad_covariance\", \"frame_cam0_sample_lost\", …")
       .def("why_silent", &Subscription::whySilent, py::call_guard<py::gil_scoped_release>());
 }
 
