@@ -1,11 +1,10 @@
-#include "tools/python/messages/from_python.h"
-
 #include <pybind11/numpy.h>
 
 #include <limits>
 #include <map>
 
 #include "tools/python/messages/choices.h"
+#include "tools/python/messages/convert.h"
 #include "tools/python/messages/fields.h"
 #include "tools/python/messages/message_class.h"
 #include "tools/python/messages/raise.h"

@@ -1,8 +1,7 @@
-#include "tools/python/messages/schema.h"
-
 #include <pybind11/stl.h>
 
 #include "tools/python/messages/choices.h"
+#include "tools/python/messages/convert.h"
 #include "tools/python/messages/fields.h"
 #include "tools/python/messages/message_class.h"
 

@@ -1,11 +1,10 @@
-#include "tools/python/messages/to_python.h"
-
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
 #include <map>
 
 #include "tools/python/messages/choices.h"
+#include "tools/python/messages/convert.h"
 #include "tools/python/messages/fields.h"
 #include "tools/python/messages/message_class.h"
 
@@ -20,8 +19,7 @@ py::object objectOf(const X& value) {
 }
 py::object objectOf(const TimePoint& time) { return py::int_(toNanoseconds(time)); }
 template <class M>
-  requires(M::RowsAtCompileTime > 0)
-py::object objectOf(const M& m) {
+requires(M::RowsAtCompileTime > 0) py::object objectOf(const M& m) {
   constexpr int kRows = M::RowsAtCompileTime, kCols = M::ColsAtCompileTime;
   using RowMajor =
       Eigen::Matrix<double, kRows, kCols, kCols == 1 ? int{Eigen::ColMajor} : int{Eigen::RowMajor}>;

@@ -76,9 +76,8 @@ Json geometryOf(const tools::Mesh& mesh) {
       colours.insert(colours.end(), 3, shade[mesh.material_of[i]]);
     }
   }
-  const Json attributes = {{"position", vectors(positions)},
-                           {"normal", vectors(normals)},
-                           {"color", vectors(colours)}};
+  const Json attributes = {
+      {"position", vectors(positions)}, {"normal", vectors(normals)}, {"color", vectors(colours)}};
   return {{"data",
            {{"attributes", attributes}, {"index", {{"type", "Uint32Array"}, {"array", indices}}}}}};
 }
