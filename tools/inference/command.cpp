@@ -5,12 +5,13 @@
 #include <atomic>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 
 #include "common/base/errors.h"
+#include "common/base/subprocess.h"
 #include "common/service/signals.h"
 #include "tools/bus_tools/common.h"
-#include "tools/inference/newcomer.h"
 #include "tools/perdure/commands.h"
 
 namespace perdure::tools {
@@ -125,8 +126,18 @@ class Report {
   End end_ = End::kNone;
 };
 
+/// The last line of a log, which explains why the process ended.
+std::string lastLineOf(const std::string& log) {
+  std::ifstream file(log);
+  std::string last;
+  for (std::string line; std::getline(file, line);) {
+    if (!line.empty()) last = line;
+  }
+  return last;
+}
+
 /// Runs the loop until the swap has succeeded or failed. Returns the error, or an empty text.
-std::string follow(bus::WaitLoop& loop, const SwapRequest& request, Newcomer& newcomer,
+std::string follow(bus::WaitLoop& loop, const SwapRequest& request, Subprocess& newcomer,
                    const Report& report) {
   using Clock = std::chrono::steady_clock;
   const auto after = [](double seconds) { return Clock::now() + durationFromSeconds(seconds); };
@@ -137,7 +148,7 @@ std::string follow(bus::WaitLoop& loop, const SwapRequest& request, Newcomer& ne
     const auto now = Clock::now();
     if (report.end() != Report::End::kNone) return loop.stop();
     if (newcomer.ended()) {
-      problem = newcomer.lastLine();
+      problem = lastLineOf(request.log);
       return loop.stop();
     }
     if (!report.tookOver() && now > latest) {
@@ -171,7 +182,8 @@ void runSwap(SwapRequest request) {
   bus::Reader<SwapNotice> notices(participant, bus::kTopic<SwapNotice>);
   bus::Reader<Health> health(participant, bus::kTopic<Health>);
   bus::WaitLoop loop(participant);
-  Newcomer newcomer(commandOf(request), request.log);
+  Subprocess newcomer({.command = commandOf(request), .log = request.log, .own_session = true});
+  newcomer.leaveAlone();  // continues after this command
   std::printf("%-12spid %d, log %s\n", "started", newcomer.pid(), request.log.c_str());
   std::fflush(stdout);
   Report report(newcomer.pid());
@@ -193,7 +205,7 @@ void runSwap(SwapRequest request) {
         ExitCode::kFailure,
         fmt::format("the new one serves, but {} does not retire; end it by hand", report.elder()));
   }
-  newcomer.stop();
+  newcomer.stop(std::chrono::seconds(5));
   throw StartupError(ExitCode::kFailure, interrupted ? "interrupted, rolled back"
                                                      : "rolled back" +
                                                            (problem.empty() ? "" : ": " + problem) +

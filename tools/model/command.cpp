@@ -9,7 +9,6 @@
 
 #include "common/base/errors.h"
 #include "tools/model/check.h"
-#include "tools/model/import_run.h"
 #include "tools/model/importer.h"
 #include "tools/model/look.h"
 #include "tools/model/staging.h"

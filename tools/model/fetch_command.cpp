@@ -14,7 +14,6 @@
 #include "common/base/subprocess.h"
 #include "services/inference/model_file.h"
 #include "tools/model/command.h"
-#include "tools/model/import_run.h"
 #include "tools/model/importer.h"
 #include "tools/model/known.h"
 

@@ -24,4 +24,16 @@ std::filesystem::path importedPath(const std::filesystem::path& network,
 /// StartupError (69) if Python or the Python part is missing.
 int importNetwork(const ImportRequest& request);
 
+struct ImportOptions {
+  std::filesystem::path network, out, image;  ///< out: a folder; empty: the network's
+  double threshold = 0.25;
+  bool unchecked = false;
+  std::vector<std::string> arguments{};  ///< options of the Python part
+};
+
+/// The complete `perdure model import`: import, comparison, test picture, output files. Prints the
+/// results. Throws StartupError, or CLI::RuntimeError with the status of the Python part, which has
+/// reported the error. Then no file is written.
+void importAndLook(const ImportOptions& options);
+
 }  // namespace perdure::tools

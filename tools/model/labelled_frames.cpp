@@ -8,7 +8,6 @@
 #include "common/math/so3.h"
 #include "common/replay/files/kitti_labels.h"
 #include "tools/evaluate/simulated_truth.h"
-#include "tools/model/map_labels.h"
 
 namespace perdure::tools {
 namespace {

@@ -1,5 +1,5 @@
 // Frames with true boxes for calibration: simulated folders, KITTI with its labels, and any frames
-// with the objects of a run over them (map_labels.h).
+// with the objects of a run over them.
 #pragma once
 
 #include <filesystem>
@@ -56,5 +56,19 @@ std::optional<Box> boxAround(const Eigen::Vector3d& centre_W, double yaw,
 /// missing file and the fix.
 LabelledData readLabelled(const LabelRequest& request, const replay::ClassAliases& aliases,
                           double least_px);
+
+/// Uses the objects of a run as labels, for calibration without manual labels.
+///
+/// `request.labels` is OUT of `perdure pipeline` over the same frames. Objects of its final map
+/// (objects_final.csv) are expected in each frame in which they are not occluded.
+///
+/// Boxes of objects that are uncertain, truncated, largely occluded or small are ignored. Boxes
+/// beside an object are ignored too, because sizes of the map have errors. Only classes with at
+/// least twenty views are judged. Boxes of moving objects, and of objects missing from the map,
+/// count as clutter.
+///
+/// Throws StartupError (69) with the fix if there are too few data.
+LabelledData readMapLabels(const LabelRequest& request, std::unique_ptr<replay::Dataset> dataset,
+                           const replay::ClassAliases& aliases, double least_px);
 
 }  // namespace perdure::tools

@@ -1,5 +1,3 @@
-#include "tools/model/map_labels.h"
-
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -7,6 +5,7 @@
 #include "common/base/errors.h"
 #include "common/replay/files/pose_file.h"
 #include "tools/evaluate/object_rows.h"
+#include "tools/model/labelled_frames.h"
 
 namespace perdure::tools {
 namespace {

@@ -7,7 +7,8 @@
 
 #include "common/bus/discovery.h"
 #include "tools/bus_tools/settings.h"
-#include "tools/python/messages/from_python.h"
+#include "tools/python/bindings.h"
+#include "tools/python/messages/convert.h"
 #include "tools/python/messages/raise.h"
 
 namespace perdure::python {
@@ -44,13 +45,15 @@ void requireSame(const bus::Options& open, const bus::Options& wanted) {
   }
 }
 
-}  // namespace
-
+/// Options of a subscriber, as for the commands: without shared memory, and with the default
+/// identity "subscriber".
 bus::Options optionsOf(const BusSettings& settings) {
   bus::Options options = applied(settings, tools::listenersOptions());
   if (options.identity.empty()) options.identity = "subscriber";
   return options;
 }
+
+}  // namespace
 
 bus::Options serviceOptionsOf(const BusSettings& settings, const std::string& process) {
   bus::Options options = applied(settings, tools::servicesOptions());
@@ -99,58 +102,65 @@ void refuseTopic(const std::string& topic) {
   raise("UnknownTopic", "there is no topic " + topic + "; the topics are " + tools::knownTopics());
 }
 
-Publisher::Publisher(std::shared_ptr<Bus> bus, const std::string& topic, std::int32_t strength,
-                     double lease_s)
-    : bus_(std::move(bus)) {
-  const auto make = [&]<class T>(const bus::Topic<T>& typed) {
-    auto writer = std::make_unique<bus::Writer<T>>(
-        bus_->participant(), typed, bus::WriterOptions{.strength = strength, .lease_s = lease_s});
-    auto& to = *writer;
-    writer_ = std::move(writer);
-    const auto orRaise = [name = typed.name](const Result<void>& done) {
-      if (done) return;
-      raise("Refused", name + " was not written: " + done.error().code +
-                           (done.error().detail.empty() ? "" : " of " + done.error().detail));
+namespace {
+
+/// A writer of any topic, selected by name.
+class Publisher {
+ public:
+  /// Raises UnknownTopic.
+  Publisher(std::shared_ptr<Bus> bus, const std::string& topic, std::int32_t strength,
+            double lease_s)
+      : bus_(std::move(bus)) {
+    const auto make = [&]<class T>(const bus::Topic<T>& typed) {
+      auto writer = std::make_unique<bus::Writer<T>>(
+          bus_->participant(), typed, bus::WriterOptions{.strength = strength, .lease_s = lease_s});
+      auto& to = *writer;
+      writer_ = std::move(writer);
+      const auto orRaise = [name = typed.name](const Result<void>& done) {
+        if (done) return;
+        raise("Refused", name + " was not written: " + done.error().code +
+                             (done.error().detail.empty() ? "" : " of " + done.error().detail));
+      };
+      write_ = [&to, orRaise](py::handle message) {
+        const T value = fromPython<T>(message);
+        Result<void> done;
+        {
+          const py::gil_scoped_release waits;
+          done = to.write(value);
+        }
+        orRaise(done);
+      };
+      dispose_ = [&to, orRaise](py::handle message) {
+        orRaise(to.dispose(fromPython<T>(message)));
+      };
     };
-    write_ = [&to, orRaise](py::handle message) {
-      const T value = fromPython<T>(message);
-      Result<void> done;
-      {
-        const py::gil_scoped_release waits;
-        done = to.write(value);
-      }
-      orRaise(done);
-    };
-    dispose_ = [&to, orRaise](py::handle message) { orRaise(to.dispose(fromPython<T>(message))); };
-  };
-  if (!bus::withTopic(topic, make)) refuseTopic(topic);
-}
+    if (!bus::withTopic(topic, make)) refuseTopic(topic);
+  }
 
-void Publisher::write(py::handle message) { write_(message); }
+  void write(py::handle message) { write_(message); }
+  void dispose(py::handle message) { dispose_(message); }
+  std::size_t matched() const { return writer_->matched(); }
+  bool waitForAcknowledgement(double seconds) {
+    const py::gil_scoped_release waits;
+    return writer_->waitForAcknowledgement(seconds);
+  }
 
-void Publisher::dispose(py::handle message) { dispose_(message); }
+ private:
+  const std::shared_ptr<Bus> bus_;
+  std::unique_ptr<bus::RawWriter> writer_;
+  std::function<void(py::handle)> write_, dispose_;
+};
 
-bool Publisher::waitForAcknowledgement(double seconds) {
-  const py::gil_scoped_release waits;
-  return writer_->waitForAcknowledgement(seconds);
-}
+}  // namespace
 
 void bindBus(py::module_& module) {
+  using Text = std::optional<std::string>;
   py::class_<BusSettings>(module, "BusSettings")
-      .def(py::init([](std::optional<std::string> interface, std::optional<std::int64_t> domain,
-                       std::optional<std::string> vehicle, std::optional<std::string> security,
-                       std::optional<std::string> identity,
-                       std::optional<std::vector<std::string>> peers) {
-             return BusSettings{std::move(interface),
-                                std::move(vehicle),
-                                std::move(security),
-                                std::move(identity),
-                                domain,
-                                std::move(peers)};
-           }),
-           py::kw_only(), py::arg("interface") = py::none(), py::arg("domain") = py::none(),
-           py::arg("vehicle") = py::none(), py::arg("security") = py::none(),
-           py::arg("identity") = py::none(), py::arg("peers") = py::none());
+      .def(py::init<Text, Text, Text, Text, std::optional<std::int64_t>,
+                    std::optional<std::vector<std::string>>>(),
+           py::kw_only(), py::arg("interface") = py::none(), py::arg("vehicle") = py::none(),
+           py::arg("security") = py::none(), py::arg("identity") = py::none(),
+           py::arg("domain") = py::none(), py::arg("peers") = py::none());
   py::class_<Bus, std::shared_ptr<Bus>>(module, "Bus")
       .def(py::init<const BusSettings&, const std::string&>(), py::arg("settings"),
            py::arg("process"), py::call_guard<py::gil_scoped_release>())
@@ -158,10 +168,13 @@ void bindBus(py::module_& module) {
   py::class_<Publisher>(module, "Publisher")
       .def(py::init<std::shared_ptr<Bus>, const std::string&, std::int32_t, double>(),
            py::arg("bus"), py::arg("topic"), py::arg("strength"), py::arg("lease_s"))
-      .def("write", &Publisher::write)
-      .def("dispose", &Publisher::dispose)
-      .def("acknowledged", &Publisher::waitForAcknowledgement)
-      .def_property_readonly("matched", &Publisher::matched);
+      .def("write", &Publisher::write, py::arg("message"),
+           "Raises Refused with the field and the reason if readers would reject the message.")
+      .def("dispose", &Publisher::dispose, py::arg("message"),
+           "Disposes of the instance with this message's key, for late joiners too.")
+      .def("acknowledged", &Publisher::waitForAcknowledgement, py::arg("seconds"),
+           "Waits until every reader has received all messages; False after ``seconds``.")
+      .def_property_readonly("matched", &Publisher::matched, "The current number of readers.");
   module.def("known_topics", &tools::knownTopics);
 }
 

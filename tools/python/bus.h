@@ -18,10 +18,8 @@ struct BusSettings {
   std::optional<std::int64_t> domain = {};
   std::optional<std::vector<std::string>> peers = {};
 };
-/// Options of a subscriber, as for the commands: without shared memory, and with the default
-/// identity "subscriber". Throws StartupError.
-bus::Options optionsOf(const BusSettings& settings);
-/// The same for a service: with shared memory, and with the identity of its name.
+/// Options of a service: with shared memory, and with the identity of its name. Throws
+/// StartupError.
 bus::Options serviceOptionsOf(const BusSettings& settings, const std::string& process);
 
 /// The domain of these options. DDS opens a domain once in each process and restricts all
@@ -45,28 +43,7 @@ class Bus {
   bus::Participant participant_;
 };
 
-/// A writer of any topic, selected by name.
-class Publisher {
- public:
-  /// Raises UnknownTopic.
-  Publisher(std::shared_ptr<Bus> bus, const std::string& topic, std::int32_t strength,
-            double lease_s);
-  /// Raises Refused with the field and the reason.
-  void write(pybind11::handle message);
-  /// Disposes of the instance with the message's key, for late joiners too.
-  void dispose(pybind11::handle message);
-  std::size_t matched() const { return writer_->matched(); }
-  bool waitForAcknowledgement(double seconds);
-
- private:
-  const std::shared_ptr<Bus> bus_;
-  std::unique_ptr<bus::RawWriter> writer_;
-  std::function<void(pybind11::handle)> write_, dispose_;
-};
-
 /// Raises UnknownTopic with the existing names.
 [[noreturn]] void refuseTopic(const std::string& topic);
-
-void bindBus(pybind11::module_& module);
 
 }  // namespace perdure::python

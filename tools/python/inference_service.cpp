@@ -1,5 +1,3 @@
-#include "tools/python/inference_service.h"
-
 #include <pybind11/stl.h>
 #include <spdlog/sinks/stdout_sinks.h>
 
@@ -9,10 +7,10 @@
 
 #include "common/bus/gaps.h"
 #include "common/service/service.h"
+#include "tools/python/bindings.h"
 #include "tools/python/bus.h"
-#include "tools/python/messages/from_python.h"
+#include "tools/python/messages/convert.h"
 #include "tools/python/messages/raise.h"
-#include "tools/python/messages/to_python.h"
 
 namespace perdure::python {
 namespace {

@@ -3,10 +3,9 @@
 #include <pybind11/stl.h>
 
 #include "tools/map/map_source.h"
-#include "tools/python/messages/from_python.h"
+#include "tools/python/messages/convert.h"
 #include "tools/python/messages/message_class.h"
 #include "tools/python/messages/raise.h"
-#include "tools/python/messages/to_python.h"
 
 namespace {
 

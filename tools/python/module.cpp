@@ -3,15 +3,10 @@
 #include <pybind11/stl.h>
 
 #include "common/vision/jpeg.h"
-#include "tools/python/bus.h"
-#include "tools/python/inference_service.h"
-#include "tools/python/messages/from_python.h"
+#include "tools/python/bindings.h"
+#include "tools/python/messages/convert.h"
 #include "tools/python/messages/message_class.h"
 #include "tools/python/messages/raise.h"
-#include "tools/python/messages/schema.h"
-#include "tools/python/messages/to_python.h"
-#include "tools/python/recording.h"
-#include "tools/python/subscription.h"
 
 namespace {
 

@@ -1,13 +1,12 @@
-#include "tools/python/recording.h"
-
 #include <pybind11/stl.h>
 
 #include <set>
 
 #include "common/bus/topics.h"
 #include "common/replay/recordings/recorded_messages.h"
+#include "tools/python/bindings.h"
+#include "tools/python/messages/convert.h"
 #include "tools/python/messages/raise.h"
-#include "tools/python/messages/to_python.h"
 
 namespace perdure::python {
 namespace {

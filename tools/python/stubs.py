@@ -13,6 +13,13 @@ from perdure import bus, messages  # noqa: E402
 
 FOLDER = pathlib.Path(__file__).parent / "perdure"
 HEAD = "# Made by tools/python/stubs.py of the topics' description; do not edit.\n"
+REST = HEAD.replace("Made", "The rest is made")
+
+
+def by_hand(name):
+    """The part of a file that is not generated."""
+    text = (FOLDER / name).read_text(encoding="utf-8")
+    return text[: text.index(REST)] + REST
 
 
 def member(name, value):
@@ -48,72 +55,11 @@ def class_text(name, fields):
     return "\n".join(lines) + "\n"
 
 
-MESSAGES = '''from typing import Any, Dict, Iterator, List, Literal, Optional
-
-import numpy as np
-import numpy.typing as npt
-
-Array = npt.NDArray[np.float64]
-
-SCHEMA: Dict[str, Any]
-TOPIC_TYPES: Dict[str, str]
-CLASSES: Dict[str, type]
-
-def register(module: Any) -> None: ...
-
-class Message:
-    _fields: Any
-    def __init__(self, **values: Any) -> None: ...
-    def to_dict(self) -> Dict[str, Any]: ...
-
-'''
-
-BUS = '''from typing import Any, Dict, Generic, Iterator, Literal, Optional, Tuple, TypeVar, overload
-
-from . import messages
-
-M = TypeVar("M")
-
-def topics() -> Dict[str, str]: ...
-
-class Gone:
-    message: Any
-    def __init__(self, message: Any) -> None: ...
-
-class Subscription(Generic[M]):
-    def __init__(self, names: Tuple[str, ...], *, timeout: Optional[float] = ..., count: Optional[int] = ..., gone: bool = ..., **settings: Any) -> None: ...
-    def next(self, seconds: Optional[float] = ...) -> Optional[M]: ...
-    def __iter__(self) -> Iterator[M]: ...
-    def __next__(self) -> M: ...
-    def wait_for_writer(self, seconds: Optional[float] = ...) -> bool: ...
-    @property
-    def matched(self) -> int: ...
-    @property
-    def counts(self) -> Dict[str, int]: ...
-    @property
-    def closed(self) -> bool: ...
-    def close(self) -> None: ...
-    def __enter__(self) -> Subscription[M]: ...
-    def __exit__(self, *_: Any) -> None: ...
-
-class Publisher:
-    def __init__(self, topic: str, *, strength: int = ..., lease_s: float = ..., **settings: Any) -> None: ...
-    def write(self, message: messages.Message) -> None: ...
-    def dispose(self, message: messages.Message) -> None: ...
-    def acknowledged(self, seconds: float) -> bool: ...
-    @property
-    def matched(self) -> int: ...
-    def wait_for_reader(self, seconds: Optional[float] = ...) -> bool: ...
-
-def publisher(topic: str, *, strength: int = ..., lease_s: float = ..., **settings: Any) -> Publisher: ...
-
-'''
-
 OPTIONS = "*, timeout: Optional[float] = ..., count: Optional[int] = ..., gone: bool = ..., **settings: Any"
 
 
 def bus_text():
-    lines = [HEAD + BUS]
+    lines = [by_hand("bus.pyi")]
     for topic, name in bus.topics().items():
         if topic.endswith("/"):
             continue  # an unknown name, covered by the overload for str
@@ -130,7 +76,7 @@ def bus_text():
 
 
 def messages_text():
-    return HEAD + MESSAGES + "\n".join(class_text(n, f) for n, f in messages.SCHEMA.items())
+    return by_hand("messages.pyi") + "\n".join(class_text(n, f) for n, f in messages.SCHEMA.items())
 
 
 def package_text():

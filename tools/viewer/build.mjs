@@ -18,7 +18,7 @@ function pack(folder) {
   for (const name of readdirSync(folder)) {
     const path = join(folder, name);
     if (statSync(path).isDirectory()) pack(path);
-    else if (['.js', '.css', '.html', '.svg', '.glb'].includes(extname(name))) writeFileSync(`${path}.gz`, gzipSync(readFileSync(path), { level: 9 }));
+    else if (['.js', '.css', '.html', '.svg', '.json'].includes(extname(name))) writeFileSync(`${path}.gz`, gzipSync(readFileSync(path), { level: 9 }));
   }
 }
 pack(out);

@@ -20,7 +20,6 @@ std::string typeOf(const fs::path& file) {
       {".json", "application/json"},
       {".svg", "image/svg+xml"},
       {".png", "image/png"},
-      {".glb", "model/gltf-binary"},
       {".txt", "text/plain; charset=utf-8"}};
   const auto found = kTypes.find(file.extension().string());
   return found == kTypes.end() ? "application/octet-stream" : found->second;

@@ -1,11 +1,10 @@
 // Tests the labels that a run's map gives to the frames of the run.
-#include "tools/model/map_labels.h"
-
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "tests/common/replay/tiny_datasets.h"
+#include "tools/model/labelled_frames.h"
 
 namespace perdure::tools {
 namespace {

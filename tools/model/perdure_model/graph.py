@@ -140,12 +140,14 @@ class Graph:
         node = next((n for n in self.nodes if name in n.outputs), None)
         return " ".join([name, *(node.inputs[1:] if node else [])])
 
-    def ancestors(self, names):
-        """The nodes that the tensors depend on, in the graph's order."""
+    def ancestors(self, names, stops=()):
+        """The nodes that the tensors depend on, in the graph's order, without those behind the
+        tensors `stops`."""
         producers, wanted, todo = self.producers(), set(), list(names)
         while todo:
-            node = producers.get(todo.pop())
-            if node is not None and id(node) not in wanted:
+            name = todo.pop()
+            node = producers.get(name)
+            if node is not None and name not in stops and id(node) not in wanted:
                 wanted.add(id(node))
                 todo += [i for i in node.inputs if i]
         return [n for n in self.nodes if id(n) in wanted]

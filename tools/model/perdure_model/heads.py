@@ -110,13 +110,4 @@ def choosing_operators(graph):
 
 def decoding_nodes(graph, heads):
     """The nodes between the heads and the outputs."""
-    producers = graph.producers()
-    inside, todo, stops = set(), list(graph.outputs), {h.name for h in heads}
-    while todo:
-        name = todo.pop()
-        node = producers.get(name)
-        if name in stops or node is None or id(node) in inside:
-            continue
-        inside.add(id(node))
-        todo += [i for i in node.inputs if i]
-    return [n for n in graph.nodes if id(n) in inside]
+    return graph.ancestors(graph.outputs, {h.name for h in heads})

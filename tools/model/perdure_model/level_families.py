@@ -182,6 +182,19 @@ def nanodet(levels):
     return levels.finish(found, [decoding.nanodet([level[0] for level in random[0]], found.classes)], random)
 
 
+def usual_anchors(found, anchors):
+    found.notes.append(f"its anchors are not in the file: those of {found.family} for COCO were taken; give --anchors "
+                       "if it was trained with others")
+    return anchors
+
+
+def set_anchors(found, keys, anchors):
+    if len(anchors) != len(keys):
+        raise Fault(f"the network has {len(keys)} levels and its anchors are not known; say --anchors "
+                    "W,H,W,H,…/W,H,…, a group for each level")
+    found.keys["levels"] = [{**key, "anchors": pairs} for key, pairs in zip(keys, anchors)]
+
+
 def yolo_fastestv2(levels):
     """Boxes of all anchors, their objectness, and one soft-max of classes for all of them."""
     request = levels.request
@@ -191,16 +204,8 @@ def yolo_fastestv2(levels):
     if channels[:2] != [4 * count, count] or channels[2] is None:
         return None
     names, keys = levels.cuts(["box", "objectness", "classes"])
-    found = Finding("yolo-fastestv2", channels[2], names, {"activation": {"class": "softmax"}, "levels": keys})
-    anchors = given or decoding.YOLO_FASTESTV2_ANCHORS
-    if len(anchors) != len(keys):
-        raise Fault(f"the network has {len(keys)} levels and its anchors are not known; say --anchors "
-                    "W,H,W,H,…/W,H,…, a group for each level")
-    if not given:
-        found.notes.append("its anchors are not in the file: those of yolo-fastestv2 for COCO were taken; give "
-                           "--anchors if it was trained with others")
-    for key, pairs in zip(keys, anchors):
-        key["anchors"] = pairs
+    found = Finding("yolo-fastestv2", channels[2], names, {"activation": {"class": "softmax"}})
+    set_anchors(found, keys, given or usual_anchors(found, decoding.YOLO_FASTESTV2_ANCHORS))
     random = levels.random()
     return levels.finish(found, [decoding.yolo_fastestv2([level]) for level in random[0]], random)
 
@@ -237,17 +242,10 @@ def yolov5(levels):
     found = Finding(family, classes, names, {"activation": {"class": "sigmoid"}})
     anchors = given or anchors_of(levels, count, classes)
     if not anchors and len(keys) == 3:
-        anchors = decoding.YOLOV7_ANCHORS if family == "yolov7" else decoding.YOLOV5_ANCHORS
-        found.notes.append(f"its anchors are not in the file: those of {family} for COCO were taken; give --anchors if "
-                           "it was trained with others")
-    if len(anchors) != len(keys):
-        if request.family not in ("yolov5", "yolov7"):
-            return None
-        raise Fault(f"the network has {len(keys)} levels and its anchors are not known; say --anchors "
-                    "W,H,W,H,…/W,H,…, a group for each level")
-    for key, pairs in zip(keys, anchors):
-        key["anchors"] = pairs
-    found.keys["levels"] = keys
+        anchors = usual_anchors(found, decoding.YOLOV7_ANCHORS if family == "yolov7" else decoding.YOLOV5_ANCHORS)
+    if len(anchors) != len(keys) and request.family not in ("yolov5", "yolov7"):
+        return None
+    set_anchors(found, keys, anchors)
     random = levels.random()
     return levels.finish(found, [decoding.yolov5([level[0] for level in random[0]], levels.strides, anchors)], random)
 

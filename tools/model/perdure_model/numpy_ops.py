@@ -1,24 +1,38 @@
 """ONNX operators in numpy. They fold constants, evaluate a file's own decoding, and provide
-reference outputs for OpenCV. Each takes the inputs (None if omitted), the attributes and the opset,
-and returns a list of outputs."""
+reference outputs for OpenCV. OPS[kind] takes the inputs (None if omitted), the attributes and the
+opset, and returns a list of outputs."""
 
 import functools
+import inspect
 import math
 
 import numpy as np
+import onnx
 
 OPS = {}
 
 
+def register(name, function):
+    """The parameters of our functions have the names of ONNX, so that attributes that became inputs
+    in newer opsets need no rule. Attributes without a parameter are ignored."""
+    own = getattr(function, "__module__", "") == __name__
+    spec = inspect.getfullargspec(function if own else lambda: None)
+
+    def run(x, a, v):
+        given = {**a, "opset": v}
+        known = given if spec.varkw else [*spec.args[len(x):], *spec.kwonlyargs]
+        found = function(*x, **{key: given[key] for key in known if key in given})
+        return found if isinstance(found, list) else [found]
+
+    OPS[name] = run
+
+
 def op(*names):
-    def register(function):
-        OPS.update({name: function for name in names})
+    def registered(function):
+        for name in names:
+            register(name, function)
         return function
-    return register
-
-
-def elementwise(name, function):
-    OPS[name] = lambda x, a, v: [function(*x)]
+    return registered
 
 
 def sigmoid(x):
@@ -48,229 +62,141 @@ for _name, _function in {
         "Equal": np.equal, "Greater": np.greater, "Less": np.less, "Not": np.logical_not,
         "And": np.logical_and, "Or": np.logical_or, "GreaterOrEqual": np.greater_equal, "Where": np.where,
         "Mod": np.mod, "MatMul": np.matmul, "Shape": lambda x: np.array(x.shape, np.int64),
-        "Range": lambda a, b, c: np.arange(a, b, c, dtype=a.dtype)}.items():
-    elementwise(_name, _function)
-for _name, _function in {"Max": np.maximum, "Min": np.minimum}.items():
-    OPS[_name] = lambda x, a, v, f=_function: [functools.reduce(f, x)]
+        "Range": lambda a, b, c: np.arange(a, b, c, dtype=a.dtype),
+        "Max": lambda *x: functools.reduce(np.maximum, x), "Min": lambda *x: functools.reduce(np.minimum, x),
+        "Dropout": lambda x, *_: x,
+        "LeakyRelu": lambda x, alpha=0.01: np.where(x < 0, x * np.float32(alpha), x),
+        "Elu": lambda x, alpha=1.0: np.where(x < 0, np.float32(alpha) * (np.exp(np.minimum(x, 0)) - 1),
+                                             x).astype(x.dtype),
+        "HardSigmoid": lambda x, alpha=0.2, beta=0.5: np.clip(x * np.float32(alpha) + np.float32(beta), 0, 1),
+        "Cast": lambda x, to: x.astype(onnx.mapping.TENSOR_TYPE_TO_NP_TYPE[to]),
+        "Squeeze": lambda x, axes=None: np.squeeze(x, axes_of(axes)),
+        "Transpose": lambda x, perm=None: np.ascontiguousarray(np.transpose(x, perm)),
+        "Concat": lambda *x, axis: np.concatenate(x, axis),
+        "Split": lambda x, split, *, axis=0: np.split(x, np.cumsum(split)[:-1], axis),
+        "Gather": lambda x, indices, axis=0: np.take(x, indices, axis=axis),
+        "GatherElements": lambda x, indices, axis=0: np.take_along_axis(x, indices, axis),
+        "Expand": lambda x, shape: x * np.ones(tuple(int(i) for i in shape), x.dtype),
+        "Tile": np.tile,
+        "ArgMax": lambda x, axis=0, keepdims=1: np.expand_dims(x.argmax(axis), axis) if keepdims else x.argmax(axis),
+        "MaxPool": lambda x, **window: pooling(x, -np.inf, **window).max((4, 5)),
+        "GlobalAveragePool": lambda x: x.mean(tuple(range(2, x.ndim)), keepdims=True)}.items():
+    register(_name, _function)
+for _name, _function in {"Mean": np.mean, "Sum": np.sum, "Max": np.max, "Min": np.min}.items():
+    register(f"Reduce{_name}", lambda x, axes=None, *, keepdims=1, f=_function:
+             f(x, axis=axes_of(axes), keepdims=bool(keepdims)).astype(x.dtype))
 
 
-def axes_of(x, a, where=1):
-    """Axes from the attribute, or from an input in newer opsets."""
-    if len(x) > where and x[where] is not None:
-        return tuple(int(i) for i in np.atleast_1d(x[where]))
-    return tuple(a["axes"]) if "axes" in a else None
-
-
-def reduce(x, a, v, name):
-    function = {"Mean": np.mean, "Sum": np.sum, "Max": np.max, "Min": np.min}[name[6:]]
-    return [function(x[0], axis=axes_of(x, a), keepdims=bool(a.get("keepdims", 1))).astype(x[0].dtype)]
-
-
-for _name in ("ReduceMean", "ReduceSum", "ReduceMax", "ReduceMin"):
-    OPS[_name] = lambda x, a, v, n=_name: reduce(x, a, v, n)
+def axes_of(axes):
+    return None if axes is None else tuple(int(i) for i in np.atleast_1d(axes))
 
 
 @op("Softmax")
-def softmax_op(x, a, v):
-    if v >= 13:
-        return [softmax(x[0], a.get("axis", -1)).astype(x[0].dtype)]
-    axis = a.get("axis", 1) % x[0].ndim
-    flat = x[0].reshape(int(np.prod(x[0].shape[:axis])), -1)
-    return [softmax(flat, 1).reshape(x[0].shape).astype(x[0].dtype)]
-
-
-@op("LeakyRelu")
-def leaky(x, a, v):
-    return [np.where(x[0] < 0, x[0] * np.float32(a.get("alpha", 0.01)), x[0])]
-
-
-@op("Elu")
-def elu(x, a, v):
-    return [np.where(x[0] < 0, np.float32(a.get("alpha", 1.0)) * (np.exp(np.minimum(x[0], 0)) - 1),
-                     x[0]).astype(x[0].dtype)]
-
-
-@op("HardSigmoid")
-def hard_sigmoid(x, a, v):
-    return [np.clip(x[0] * np.float32(a.get("alpha", 0.2)) + np.float32(a.get("beta", 0.5)), 0, 1)]
+def softmax_op(x, *, axis=None, opset):
+    if opset >= 13:
+        return softmax(x, -1 if axis is None else axis).astype(x.dtype)
+    return softmax(flatten(x, (1 if axis is None else axis) % x.ndim), 1).reshape(x.shape).astype(x.dtype)
 
 
 @op("Clip")
-def clip(x, a, v):
-    low = x[1] if len(x) > 1 and x[1] is not None else a.get("min", -np.inf)
-    high = x[2] if len(x) > 2 and x[2] is not None else a.get("max", np.inf)
-    return [np.clip(x[0], low, high).astype(x[0].dtype)]
-
-
-@op("Cast")
-def cast(x, a, v):
-    import onnx
-    return [x[0].astype(onnx.mapping.TENSOR_TYPE_TO_NP_TYPE[a["to"]])]
-
-
-@op("Dropout")
-def dropout(x, a, v):
-    return [x[0]]
+def clip(x, min=None, max=None):
+    return np.clip(x, -np.inf if min is None else min, np.inf if max is None else max).astype(x.dtype)
 
 
 @op("Constant")
-def constant(x, a, v):
-    for key, kind in (("value", None), ("value_float", np.float32), ("value_floats", np.float32),
-                      ("value_int", np.int64), ("value_ints", np.int64)):
-        if key in a:
-            return [np.asarray(a[key], kind)]
-    raise KeyError("Constant without a value")
+def constant(value=None, value_float=None, value_floats=None, value_int=None, value_ints=None):
+    if value is not None:
+        return np.asarray(value)
+    reals = value_floats if value_float is None else value_float
+    if reals is not None:
+        return np.asarray(reals, np.float32)
+    return np.asarray(value_ints if value_int is None else value_int, np.int64)
 
 
 @op("ConstantOfShape")
-def constant_of_shape(x, a, v):
-    value = np.asarray(a.get("value", np.zeros(1, np.float32)))
-    return [np.full(tuple(int(i) for i in x[0]), value.ravel()[0], value.dtype)]
+def constant_of_shape(shape, value=np.zeros(1, np.float32)):
+    value = np.asarray(value)
+    return np.full(tuple(int(i) for i in shape), value.ravel()[0], value.dtype)
 
 
 @op("Reshape")
-def reshape(x, a, v):
-    shape = [x[0].shape[i] if n == 0 and not a.get("allowzero", 0) else int(n) for i, n in enumerate(x[1])]
-    return [x[0].reshape(shape)]
+def reshape(x, shape, *, allowzero=0):
+    return x.reshape([x.shape[i] if n == 0 and not allowzero else int(n) for i, n in enumerate(shape)])
 
 
 @op("Flatten")
-def flatten(x, a, v):
-    axis = a.get("axis", 1)
-    return [x[0].reshape(int(np.prod(x[0].shape[:axis])), -1)]
-
-
-@op("Squeeze")
-def squeeze(x, a, v):
-    return [np.squeeze(x[0], axes_of(x, a))]
+def flatten(x, axis=1):
+    return x.reshape(int(np.prod(x.shape[:axis])), -1)
 
 
 @op("Unsqueeze")
-def unsqueeze(x, a, v):
-    axes = axes_of(x, a)
-    rank = x[0].ndim + len(axes)
-    y = x[0]
-    for axis in sorted(i % rank for i in axes):
-        y = np.expand_dims(y, axis)
-    return [y]
-
-
-@op("Transpose")
-def transpose(x, a, v):
-    return [np.ascontiguousarray(np.transpose(x[0], a.get("perm")))]
-
-
-@op("Concat")
-def concat(x, a, v):
-    return [np.concatenate(x, a["axis"])]
-
-
-@op("Split")
-def split(x, a, v):
-    axis = a.get("axis", 0)
-    sizes = x[1] if len(x) > 1 and x[1] is not None else a.get("split")
-    if sizes is None:
-        raise KeyError("Split without sizes")
-    return np.split(x[0], np.cumsum(sizes)[:-1], axis)
+def unsqueeze(x, axes):
+    axes = axes_of(axes)
+    for axis in sorted(i % (x.ndim + len(axes)) for i in axes):
+        x = np.expand_dims(x, axis)
+    return x
 
 
 @op("Slice")
-def slice_op(x, a, v):
-    if len(x) == 1:
-        starts, ends, axes, steps = a["starts"], a["ends"], a.get("axes"), None
-    else:
-        starts, ends = x[1], x[2]
-        axes = x[3] if len(x) > 3 else None
-        steps = x[4] if len(x) > 4 else None
+def slice_op(x, starts, ends, axes=None, steps=None):
     axes = range(len(starts)) if axes is None else axes
     steps = [1] * len(starts) if steps is None else steps
-    index = [slice(None)] * x[0].ndim
+    index = [slice(None)] * x.ndim
     for start, end, axis, step in zip(starts, ends, axes, steps):
         start, end, step = int(start), int(end), int(step)
-        if step < 0 and end <= -x[0].shape[axis] - 1:
+        if step < 0 and end <= -x.shape[axis] - 1:
             end = None
         index[axis] = slice(start, end, step)
-    return [x[0][tuple(index)]]
-
-
-@op("Gather")
-def gather(x, a, v):
-    return [np.take(x[0], x[1], axis=a.get("axis", 0))]
-
-
-@op("GatherElements")
-def gather_elements(x, a, v):
-    return [np.take_along_axis(x[0], x[1], a.get("axis", 0))]
+    return x[tuple(index)]
 
 
 @op("ScatterND")
-def scatter_nd(x, a, v):
-    y = x[0].copy()
-    y[tuple(np.moveaxis(x[1], -1, 0))] = x[2]
-    return [y]
-
-
-@op("Expand")
-def expand(x, a, v):
-    return [x[0] * np.ones(tuple(int(i) for i in x[1]), x[0].dtype)]
-
-
-@op("Tile")
-def tile(x, a, v):
-    return [np.tile(x[0], x[1])]
-
-
-@op("ArgMax")
-def argmax(x, a, v):
-    y = x[0].argmax(a.get("axis", 0))
-    return [np.expand_dims(y, a.get("axis", 0)) if a.get("keepdims", 1) else y]
+def scatter_nd(x, indices, updates):
+    y = x.copy()
+    y[tuple(np.moveaxis(indices, -1, 0))] = updates
+    return y
 
 
 @op("Gemm")
-def gemm(x, a, v):
-    left = x[0].T if a.get("transA", 0) else x[0]
-    right = x[1].T if a.get("transB", 0) else x[1]
-    y = np.float32(a.get("alpha", 1.0)) * (left @ right)
-    return [y + np.float32(a.get("beta", 1.0)) * x[2] if len(x) > 2 and x[2] is not None else y]
+def gemm(a, b, c=None, *, alpha=1.0, beta=1.0, transA=0, transB=0):
+    y = np.float32(alpha) * ((a.T if transA else a) @ (b.T if transB else b))
+    return y if c is None else y + np.float32(beta) * c
 
 
 @op("BatchNormalization")
-def batch_norm(x, a, v):
-    shape = (1, -1) + (1,) * (x[0].ndim - 2)
-    data, scale, bias, mean, var = x[0], *(p.reshape(shape) for p in x[1:5])
-    return [((data - mean) / np.sqrt(var + np.float32(a.get("epsilon", 1e-5))) * scale + bias).astype(data.dtype)]
+def batch_norm(x, scale, bias, mean, var, *, epsilon=1e-5):
+    shape = (1, -1) + (1,) * (x.ndim - 2)
+    scale, bias, mean, var = (p.reshape(shape) for p in (scale, bias, mean, var))
+    return ((x - mean) / np.sqrt(var + np.float32(epsilon)) * scale + bias).astype(x.dtype)
+
+
+def normalised(x, axes, epsilon):
+    return (x - x.mean(axes, keepdims=True)) / np.sqrt(x.var(axes, keepdims=True) + np.float32(epsilon))
 
 
 @op("InstanceNormalization")
-def instance_norm(x, a, v):
-    axes = tuple(range(2, x[0].ndim))
-    shape = (1, -1) + (1,) * (x[0].ndim - 2)
-    mean, var = x[0].mean(axes, keepdims=True), x[0].var(axes, keepdims=True)
-    y = (x[0] - mean) / np.sqrt(var + np.float32(a.get("epsilon", 1e-5)))
-    return [(y * x[1].reshape(shape) + x[2].reshape(shape)).astype(x[0].dtype)]
+def instance_norm(x, scale, bias, *, epsilon=1e-5):
+    shape = (1, -1) + (1,) * (x.ndim - 2)
+    y = normalised(x, tuple(range(2, x.ndim)), epsilon)
+    return (y * scale.reshape(shape) + bias.reshape(shape)).astype(x.dtype)
 
 
 @op("LayerNormalization")
-def layer_norm(x, a, v):
-    axis = a.get("axis", -1) % x[0].ndim
-    axes = tuple(range(axis, x[0].ndim))
-    mean, var = x[0].mean(axes, keepdims=True), x[0].var(axes, keepdims=True)
-    y = (x[0] - mean) / np.sqrt(var + np.float32(a.get("epsilon", 1e-5))) * x[1]
-    return [(y + x[2] if len(x) > 2 and x[2] is not None else y).astype(x[0].dtype)]
+def layer_norm(x, scale, bias=None, *, axis=-1, epsilon=1e-5):
+    y = normalised(x, tuple(range(axis % x.ndim, x.ndim)), epsilon) * scale
+    return (y if bias is None else y + bias).astype(x.dtype)
 
 
-def spatial_pads(a, sizes, kernel, strides, dilations):
+def spatial_pads(sizes, kernel, strides, dilations, auto_pad, pads):
     """[(before, after)] of each spatial axis."""
-    how = a.get("auto_pad", "NOTSET")
-    n = len(sizes)
-    if how in ("NOTSET", "VALID"):
-        pads = a.get("pads", [0] * 2 * n) if how == "NOTSET" else [0] * 2 * n
-        return [(pads[i], pads[i + n]) for i in range(n)]
+    if auto_pad in ("NOTSET", "VALID"):
+        n = len(sizes)
+        return [(pads[i], pads[i + n]) if auto_pad == "NOTSET" else (0, 0) for i in range(n)]
     found = []
     for size, k, s, d in zip(sizes, kernel, strides, dilations):
         total = max((-(-size // s) - 1) * s + (k - 1) * d + 1 - size, 0)
         small, large = total // 2, total - total // 2
-        found.append((small, large) if how == "SAME_UPPER" else (large, small))
+        found.append((small, large) if auto_pad == "SAME_UPPER" else (large, small))
     return found
 
 
@@ -286,86 +212,66 @@ def windows(x, kernel, strides, dilations, pads, fill, ceil=False):
 
 
 @op("Conv")
-def conv(x, a, v):
-    data, weight = x[0], x[1]
+def conv(data, weight, bias=None, *, strides=(1, 1), dilations=(1, 1), auto_pad="NOTSET", pads=(0,) * 4, group=1):
     kernel = weight.shape[2:]
-    strides, dilations = a.get("strides", [1, 1]), a.get("dilations", [1, 1])
-    pads = spatial_pads(a, data.shape[2:], kernel, strides, dilations)
+    pads = spatial_pads(data.shape[2:], kernel, strides, dilations, auto_pad, pads)
     view = windows(data, kernel, strides, dilations, pads, 0)
-    groups = a.get("group", 1)
     n, channels, rows, columns = view.shape[:4]
     taps = kernel[0] * kernel[1]
-    if groups == channels == weight.shape[0]:
+    if group == channels == weight.shape[0]:
         y = np.zeros((n, channels, rows, columns), np.float32)
         for i in range(kernel[0]):
             for j in range(kernel[1]):
                 y += view[..., i, j] * weight[None, :, 0, i, j, None, None]
     else:
         parts = []
-        for g in range(groups):
-            c, o = channels // groups, weight.shape[0] // groups
+        for g in range(group):
+            c, o = channels // group, weight.shape[0] // group
             block = view[:, g * c:(g + 1) * c].transpose(0, 1, 4, 5, 2, 3).reshape(n, c * taps, rows * columns)
             parts.append(np.matmul(weight[g * o:(g + 1) * o].reshape(o, -1), block))
         y = np.concatenate(parts, 1).reshape(n, -1, rows, columns)
-    return [y + x[2].reshape(1, -1, 1, 1) if len(x) > 2 and x[2] is not None else y]
+    return y if bias is None else y + bias.reshape(1, -1, 1, 1)
 
 
-def pooling(x, a, fill):
-    kernel = a["kernel_shape"]
-    strides, dilations = a.get("strides", [1, 1]), a.get("dilations", [1, 1])
-    pads = spatial_pads(a, x[0].shape[2:], kernel, strides, dilations)
-    return windows(x[0], kernel, strides, dilations, pads, fill, bool(a.get("ceil_mode", 0)))
-
-
-@op("MaxPool")
-def max_pool(x, a, v):
-    return [pooling(x, a, -np.inf).max((4, 5))]
+def pooling(x, fill, *, kernel_shape, strides=(1, 1), dilations=(1, 1), auto_pad="NOTSET", pads=(0,) * 4, ceil_mode=0,
+            **_):
+    pads = spatial_pads(x.shape[2:], kernel_shape, strides, dilations, auto_pad, pads)
+    return windows(x, kernel_shape, strides, dilations, pads, fill, bool(ceil_mode))
 
 
 @op("AveragePool")
-def average_pool(x, a, v):
-    total = pooling(x, a, 0).sum((4, 5))
-    inside = pooling([np.ones_like(x[0])], a, 1 if a.get("count_include_pad", 0) else 0).sum((4, 5))
-    return [(total / inside).astype(np.float32)]
-
-
-@op("GlobalAveragePool")
-def global_average_pool(x, a, v):
-    return [x[0].mean(tuple(range(2, x[0].ndim)), keepdims=True)]
+def average_pool(x, *, count_include_pad=0, **window):
+    inside = pooling(np.ones_like(x), 1 if count_include_pad else 0, **window).sum((4, 5))
+    return (pooling(x, 0, **window).sum((4, 5)) / inside).astype(np.float32)
 
 
 @op("Pad")
-def pad(x, a, v):
-    mode = a.get("mode", "constant")
-    pads = x[1] if len(x) > 1 else a["pads"]
-    n = x[0].ndim
-    around = [(int(pads[i]), int(pads[i + n])) for i in range(n)]
+def pad(x, pads, value=None, *, mode="constant"):
+    around = [(int(pads[i]), int(pads[i + x.ndim])) for i in range(x.ndim)]
     if mode != "constant":
-        return [np.pad(x[0], around, mode=mode)]
-    value = x[2] if len(x) > 2 and x[2] is not None else a.get("value", 0)
-    return [np.pad(x[0], around, constant_values=value)]
+        return np.pad(x, around, mode=mode)
+    return np.pad(x, around, constant_values=0 if value is None else value)
 
 
 @op("DepthToSpace")
-def depth_to_space(x, a, v):
-    n, c, h, w = x[0].shape
-    b = a["blocksize"]
-    if a.get("mode", "DCR") == "DCR":
-        y = x[0].reshape(n, b, b, c // b ** 2, h, w).transpose(0, 3, 4, 1, 5, 2)
+def depth_to_space(x, *, blocksize, mode="DCR"):
+    (n, c, h, w), b = x.shape, blocksize
+    if mode == "DCR":
+        y = x.reshape(n, b, b, c // b ** 2, h, w).transpose(0, 3, 4, 1, 5, 2)
     else:
-        y = x[0].reshape(n, c // b ** 2, b, b, h, w).transpose(0, 1, 4, 2, 5, 3)
-    return [y.reshape(n, c // b ** 2, h * b, w * b)]
+        y = x.reshape(n, c // b ** 2, b, b, h, w).transpose(0, 1, 4, 2, 5, 3)
+    return y.reshape(n, c // b ** 2, h * b, w * b)
 
 
 @op("Resize", "Upsample")
-def resize(x, a, v):
-    """Nearest and linear resizing of the last two axes, in the three usual conventions."""
-    data = x[0]
-    scales = x[1] if len(x) == 2 else (x[2] if len(x) > 2 else None)
-    sizes = x[3] if len(x) > 3 else None
+def resize(x, *more, mode="nearest", coordinate_transformation_mode=None, nearest_mode=None):
+    """Nearest and linear resizing of the last two axes, in the three usual conventions. `more`: the
+    scales, or a region that is not used, the scales and the sizes."""
+    older, data = len(more) == 1, x
+    scales, sizes = (more[0], None) if older else (*more, None, None, None)[1:3]
     out = [int(i) for i in sizes] if sizes is not None else \
         [int(math.floor(n * float(s))) for n, s in zip(data.shape, scales)]
-    ways = a.get("coordinate_transformation_mode", "asymmetric" if len(x) == 2 else "half_pixel")
+    ways = coordinate_transformation_mode or ("asymmetric" if older else "half_pixel")
     for axis in (2, 3):
         scale = out[axis] / data.shape[axis] if scales is None or not np.size(scales) else float(scales[axis])
         if ways == "asymmetric":
@@ -377,17 +283,17 @@ def resize(x, a, v):
         else:
             raise KeyError(ways)
         last = data.shape[axis] - 1
-        if a.get("mode", "nearest") == "nearest":
-            rounding = a.get("nearest_mode", "floor" if len(x) == 2 else "round_prefer_floor")
+        if mode == "nearest":
+            rounding = nearest_mode or ("floor" if older else "round_prefer_floor")
             near = {"floor": np.floor, "ceil": np.ceil, "round_prefer_ceil": lambda t: np.floor(t + 0.5),
                     "round_prefer_floor": lambda t: np.ceil(t - 0.5)}[rounding](at)
             data = np.take(data, np.clip(near, 0, last).astype(int), axis)
-        elif a["mode"] == "linear":
+        elif mode == "linear":
             at = np.clip(at, 0, last)
             low = np.floor(at).astype(int)
             share = (at - low).astype(np.float32).reshape((-1, 1) if axis == 2 else (-1,))
             high = np.minimum(low + 1, last)
             data = np.take(data, low, axis) * (1 - share) + np.take(data, high, axis) * share
         else:
-            raise KeyError(a["mode"])
-    return [data.astype(x[0].dtype)]
+            raise KeyError(mode)
+    return data.astype(x.dtype)

@@ -15,6 +15,7 @@ class Repair:
     def __init__(self, graph):
         self.graph, self.done, self.count = graph, {}, 0
         self.nodes = []
+        self.shape, self.constant = graph.shape, graph.constant
 
     def run(self):
         for node in self.graph.nodes:
@@ -50,12 +51,6 @@ class Repair:
         outputs = outputs or [self.fresh()]
         self.nodes.append(Node(kind, names, outputs, attributes))
         return outputs[0]
-
-    def shape(self, name):
-        return self.graph.shape(name)
-
-    def constant(self, name):
-        return self.graph.constants.get(name)
 
     # -- one method for each operator; True: it was replaced ----------------------------------------
 

@@ -1,12 +1,11 @@
-#include "tools/python/messages/from_python.h"
-
 #include <pybind11/numpy.h>
 
 #include <limits>
 #include <map>
 
-#include "common/wire/topics.h"
 #include "tools/python/messages/choices.h"
+#include "tools/python/messages/convert.h"
+#include "tools/python/messages/fields.h"
 #include "tools/python/messages/message_class.h"
 #include "tools/python/messages/raise.h"
 
@@ -30,7 +29,7 @@ std::shared_ptr<const void> keeperOf(py::array array) {
           }};
 }
 
-class Taker {
+class Taker : public EachField<Taker> {
  public:
   Taker(py::handle from, std::string path) : from_(from), path_(std::move(path)) {}
 
@@ -44,29 +43,7 @@ class Taker {
     wire::describe(taker, d, w);
   }
 
-  template <class X, class W>
-  void value(const char* name, X& d, W&) {
-    const py::object object = get(name);
-    if constexpr (std::same_as<X, bool>) {
-      const int is = PyObject_IsTrue(object.ptr());
-      if (is < 0) throw py::error_already_set();
-      d = is != 0;
-    } else {
-      d = whole<X>(name, object);
-    }
-  }
-  template <class W>
-  void time(const char* name, TimePoint& d, W&) {
-    d = fromNanoseconds(whole<std::int64_t>(name, get(name)));
-  }
-  template <class W>
-  void number(const char* name, double& d, W&, const wire::Limits&) {
-    d = real(name, get(name));
-  }
-  template <class W>
-  void probability(const char* name, double& d, W&) {
-    d = real(name, get(name));
-  }
+  void field(const char* name, auto& d, const auto&) { set(name, get(name), d); }
   template <class E, class W>
   void choice(const char* name, E& d, W&, E last) {
     const py::object object = get(name);
@@ -85,40 +62,6 @@ class Taker {
     }
     refuse(name, "must be one of " + words);
   }
-  template <class W>
-  void text(const char* name, std::string& d, W&, std::size_t) {
-    d = word(name, get(name));
-  }
-  template <class W>
-  void name(const char* field, std::string& d, W&) {
-    d = word(field, get(field));
-  }
-  template <class M, class W>
-  void matrix(const char* name, M& d, W&, const wire::Limits&) {
-    takeMatrix(name, get(name), d);
-  }
-  template <class M, class W>
-  void symmetric(const char* name, M& d, W&) {
-    takeMatrix(name, get(name), d);
-  }
-  template <class M, class W>
-  void covariance(const char* name, M& d, W&) {
-    takeMatrix(name, get(name), d);
-  }
-  template <class W>
-  void unit(const char* name, Eigen::Vector3d& d, W&) {
-    takeMatrix(name, get(name), d);
-  }
-  template <class W>
-  void pose(const char* name, RigidTransform& d, W&) {
-    const py::object pose = get(name);
-    if (!messageClass("Pose").isOne(pose)) refuse(name, "must be a perdure.Pose");
-    Taker inner(pose, path_ + name + ".");
-    Eigen::Vector4d q;
-    inner.takeMatrix("q_xyzw", inner.get("q_xyzw"), q);
-    inner.takeMatrix("p", inner.get("p"), d.p);
-    d.q.coeffs() = q;
-  }
   template <class D, class W>
   void object(const char* name, D& d, W& w) {
     take(get(name), path_ + name + ".", d, w);
@@ -127,11 +70,6 @@ class Taker {
   void optional(const char* name, std::optional<D>& d, bool, W& w) {
     const py::object object = get(name);
     if (!object.is_none()) take(object, path_ + name + ".", d.emplace(), w);
-  }
-  template <class W>
-  void optionalNumber(const char* name, std::optional<double>& d, bool, W&, const wire::Limits&) {
-    const py::object object = get(name);
-    if (!object.is_none()) d = real(name, object);
   }
   template <class D, class S>
   void list(const char* name, std::vector<D>& d, S&, std::size_t) {
@@ -144,36 +82,6 @@ class Taker {
       const py::object item = items[py::int_(i)];
       take(item, path_ + name + "[" + std::to_string(i) + "].", d[i], unused);
     }
-  }
-  template <class X, class S>
-  void numbers(const char* name, std::vector<X>& d, S&, const wire::Limits&, std::size_t) {
-    const auto array = arrayAs<X>(name, get(name));
-    if (array.ndim() != 1) refuse(name, "must have shape (n,), not " + shapeText(array));
-    d.assign(array.data(), array.data() + array.size());
-  }
-  template <class S>
-  void names(const char* field, std::vector<std::string>& d, S&, std::size_t) {
-    const py::object items = get(field);
-    if (!PySequence_Check(items.ptr()) || py::isinstance<py::str>(items)) {
-      refuse(field, "must be a list of str");
-    }
-    for (const auto& item : items) d.push_back(word(field, item));
-  }
-  template <class Counts, class S>
-  void counts(const char* field, Counts& d, S&, std::size_t) {
-    const py::object items = get(field);
-    if (!py::isinstance<py::dict>(items)) refuse(field, "must be a dict of str to int");
-    for (const auto& [key, n] : py::reinterpret_borrow<py::dict>(items)) {
-      d[word(field, key)] = whole<std::uint64_t>(field, n);
-    }
-  }
-  template <std::size_t N, class W>
-  void bytes(const char* name, std::array<std::uint8_t, N>& d, W&) {
-    const auto array = arrayAs<std::uint8_t>(name, get(name));
-    if (array.size() != static_cast<py::ssize_t>(N)) {
-      refuse(name, "must have shape (" + std::to_string(N) + ",), not " + shapeText(array));
-    }
-    std::copy(array.data(), array.data() + N, d.begin());
   }
   void pixels(const char* name, Frame& d, perdure_msg_Frame&) {
     const auto array = arrayAs<std::uint8_t>(name, get(name));
@@ -188,10 +96,6 @@ class Taker {
     const std::span<const std::uint8_t> bytes(array.data(), static_cast<std::size_t>(array.size()));
     d.data = {keeperOf(array), bytes};
   }
-  template <class Predicate>
-  void ensure(const char*, const char*, Predicate) {}
-  template <class Predicate>
-  void ensureWire(const char*, const char*, Predicate) {}
 
  private:
   [[noreturn]] void refuse(const char* name, const std::string& what) const {
@@ -237,8 +141,59 @@ class Taker {
     }
     return array;
   }
+  template <std::integral X>
+  void set(const char* name, py::handle object, X& d) const {
+    d = whole<X>(name, object);
+  }
+  void set(const char*, py::handle object, bool& d) const {
+    const int is = PyObject_IsTrue(object.ptr());
+    if (is < 0) throw py::error_already_set();
+    d = is != 0;
+  }
+  void set(const char* name, py::handle object, TimePoint& d) const {
+    d = fromNanoseconds(whole<std::int64_t>(name, object));
+  }
+  void set(const char* name, py::handle object, double& d) const { d = real(name, object); }
+  void set(const char* name, py::handle object, std::optional<double>& d) const {
+    if (!object.is_none()) d = real(name, object);
+  }
+  void set(const char* name, py::handle object, std::string& d) const { d = word(name, object); }
+  void set(const char* name, py::handle pose, RigidTransform& d) const {
+    if (!messageClass("Pose").isOne(pose)) refuse(name, "must be a perdure.Pose");
+    const Taker inner(pose, path_ + name + ".");
+    Eigen::Vector4d q;
+    inner.set("q_xyzw", inner.get("q_xyzw"), q);
+    inner.set("p", inner.get("p"), d.p);
+    d.q.coeffs() = q;
+  }
+  template <std::floating_point X>
+  void set(const char* name, py::handle object, std::vector<X>& d) const {
+    const auto array = arrayAs<X>(name, object);
+    if (array.ndim() != 1) refuse(name, "must have shape (n,), not " + shapeText(array));
+    d.assign(array.data(), array.data() + array.size());
+  }
+  void set(const char* name, py::handle items, std::vector<std::string>& d) const {
+    if (!PySequence_Check(items.ptr()) || py::isinstance<py::str>(items)) {
+      refuse(name, "must be a list of str");
+    }
+    for (const auto& item : items) d.push_back(word(name, item));
+  }
+  void set(const char* name, py::handle items, std::map<std::string, std::uint64_t>& d) const {
+    if (!py::isinstance<py::dict>(items)) refuse(name, "must be a dict of str to int");
+    for (const auto& [key, n] : py::reinterpret_borrow<py::dict>(items)) {
+      d[word(name, key)] = whole<std::uint64_t>(name, n);
+    }
+  }
+  template <std::size_t N>
+  void set(const char* name, py::handle object, std::array<std::uint8_t, N>& d) const {
+    const auto array = arrayAs<std::uint8_t>(name, object);
+    if (array.size() != static_cast<py::ssize_t>(N)) {
+      refuse(name, "must have shape (" + std::to_string(N) + ",), not " + shapeText(array));
+    }
+    std::copy(array.data(), array.data() + N, d.begin());
+  }
   template <class M>
-  void takeMatrix(const char* name, py::handle object, M& d) const {
+  void set(const char* name, py::handle object, Eigen::MatrixBase<M>& d) const {
     constexpr int kRows = M::RowsAtCompileTime, kCols = M::ColsAtCompileTime;
     const auto array = arrayAs<double>(name, object);
     const bool fits = kCols == 1
@@ -263,10 +218,11 @@ using Take = void (*)(py::handle from, void* message);
 const std::map<std::type_index, Take>& takes() {
   static const auto all = [] {
     std::map<std::type_index, Take> found;
-    forEachTopic([&]<class T>(const bus::Topic<T>&) {
-      found[typeid(T)] = [](py::handle from, void* message) {
-        typename wire::Type<T>::Wire unused{};
-        Taker::take(from, "", *static_cast<T*>(message), unused);
+    wire::forEachTopic([&]<class Row>(const Row&) {
+      using Message = typename Row::Message;
+      found[typeid(Message)] = [](py::handle from, void* message) {
+        typename Row::Wire unused{};
+        Taker::take(from, "", *static_cast<Message*>(message), unused);
       };
     });
     return found;

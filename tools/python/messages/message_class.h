@@ -11,8 +11,6 @@
 #include <typeinfo>
 #include <vector>
 
-#include "common/bus/topics.h"
-
 namespace perdure::python {
 
 struct MessageClass {
@@ -47,15 +45,6 @@ template <class D>
 MessageClass& messageClass() {
   static MessageClass& it = messageClass(nameOfType<D>());
   return it;
-}
-
-/// Calls visit(Topic<T>) for the type of every topic.
-template <class Visit>
-void forEachTopic(Visit visit) {
-  for (const bus::TopicInfo& info : bus::topicTable()) {
-    const std::string name(info.name);
-    bus::withTopic(name.ends_with('/') ? name + "cam0" : name, visit);
-  }
 }
 
 }  // namespace perdure::python

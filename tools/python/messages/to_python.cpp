@@ -1,12 +1,11 @@
-#include "tools/python/messages/to_python.h"
-
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
 #include <map>
 
-#include "common/wire/topics.h"
 #include "tools/python/messages/choices.h"
+#include "tools/python/messages/convert.h"
+#include "tools/python/messages/fields.h"
 #include "tools/python/messages/message_class.h"
 
 namespace perdure::python {
@@ -14,8 +13,13 @@ namespace {
 
 namespace py = pybind11;
 
+template <class X>
+py::object objectOf(const X& value) {
+  return py::cast(value);
+}
+py::object objectOf(const TimePoint& time) { return py::int_(toNanoseconds(time)); }
 template <class M>
-py::object arrayOf(const M& m) {
+requires(M::RowsAtCompileTime > 0) py::object objectOf(const M& m) {
   constexpr int kRows = M::RowsAtCompileTime, kCols = M::ColsAtCompileTime;
   using RowMajor =
       Eigen::Matrix<double, kRows, kCols, kCols == 1 ? int{Eigen::ColMajor} : int{Eigen::RowMajor}>;
@@ -24,10 +28,13 @@ py::object arrayOf(const M& m) {
   Eigen::Map<RowMajor>(array.mutable_data()) = m;
   return array;
 }
-
-template <class X>
-py::object arrayOf(const std::vector<X>& numbers) {
+template <std::floating_point X>
+py::object objectOf(const std::vector<X>& numbers) {
   return py::array_t<X>(static_cast<py::ssize_t>(numbers.size()), numbers.data());
+}
+template <std::size_t N>
+py::object objectOf(const std::array<std::uint8_t, N>& bytes) {
+  return py::array_t<std::uint8_t>(static_cast<py::ssize_t>(N), bytes.data());
 }
 
 /// A read-only array over the existing bytes, which live as long as the array.
@@ -46,68 +53,24 @@ py::object pixelsOf(const Frame& frame) {
   return array;
 }
 
-class Giver {
+class Giver : public EachField<Giver> {
  public:
   Giver(const MessageClass& type, py::handle self) : type_(type), self_(self) {}
 
-  template <class X, class W>
-  void value(const char*, const X& d, W&) {
-    if constexpr (std::same_as<X, bool>) {
-      set(py::bool_(d));
-    } else {
-      set(py::int_(d));
-    }
-  }
-  template <class W>
-  void time(const char*, const TimePoint& d, W&) {
-    set(py::int_(toNanoseconds(d)));
-  }
-  template <class W>
-  void number(const char*, const double& d, W&, const wire::Limits&) {
-    set(py::float_(d));
-  }
-  template <class W>
-  void probability(const char*, const double& d, W&) {
-    set(py::float_(d));
+  void field(const char*, const auto& d, const auto&) { set(objectOf(d)); }
+  void field(const char*, const RigidTransform& d, const auto&) {
+    static const MessageClass* const type = &messageClass("Pose");
+    py::object pose = type->make();
+    Giver giver(*type, pose);
+    giver.set(objectOf(Eigen::Vector4d(d.q.coeffs())));
+    giver.set(objectOf(d.p));
+    set(std::move(pose));
   }
   template <class E, class W>
   void choice(const char*, const E& d, W&, E) {
     const auto word = wordOf(d);
     if (word.empty()) return set(py::int_(static_cast<int>(d)));
     set(py::str(word.data(), word.size()));
-  }
-  template <class W>
-  void text(const char*, const std::string& d, W&, std::size_t) {
-    set(py::str(d));
-  }
-  template <class W>
-  void name(const char*, const std::string& d, W&) {
-    set(py::str(d));
-  }
-  template <class M, class W>
-  void matrix(const char*, const M& d, W&, const wire::Limits&) {
-    set(arrayOf(d));
-  }
-  template <class M, class W>
-  void symmetric(const char*, const M& d, W&) {
-    set(arrayOf(d));
-  }
-  template <class M, class W>
-  void covariance(const char*, const M& d, W&) {
-    set(arrayOf(d));
-  }
-  template <class W>
-  void unit(const char*, const Eigen::Vector3d& d, W&) {
-    set(arrayOf(d));
-  }
-  template <class W>
-  void pose(const char*, const RigidTransform& d, W&) {
-    static const MessageClass* const type = &messageClass("Pose");
-    py::object pose = type->make();
-    Giver giver(*type, pose);
-    giver.set(arrayOf(Eigen::Vector4d(d.q.coeffs())));
-    giver.set(arrayOf(d.p));
-    set(std::move(pose));
   }
   template <class D, class W>
   void object(const char*, const D& d, W& w) {
@@ -116,10 +79,6 @@ class Giver {
   template <class D, class W>
   void optional(const char*, const std::optional<D>& d, bool, W& w) {
     set(d ? nested(*d, w) : py::object(py::none()));
-  }
-  template <class W>
-  void optionalNumber(const char*, const std::optional<double>& d, bool, W&, const wire::Limits&) {
-    set(d ? py::object(py::float_(*d)) : py::object(py::none()));
   }
   template <class D, class S>
   void list(const char*, const std::vector<D>& d, S&, std::size_t) {
@@ -131,27 +90,7 @@ class Giver {
     }
     set(std::move(items));
   }
-  template <class X, class S>
-  void numbers(const char*, const std::vector<X>& d, S&, const wire::Limits&, std::size_t) {
-    set(arrayOf(d));
-  }
-  template <class S>
-  void names(const char*, const std::vector<std::string>& d, S&, std::size_t) {
-    set(py::cast(d));
-  }
-  template <class Counts, class S>
-  void counts(const char*, const Counts& d, S&, std::size_t) {
-    set(py::cast(d));
-  }
-  template <class Bytes, class W>
-  void bytes(const char*, const Bytes& d, W&) {
-    set(py::array_t<std::uint8_t>(static_cast<py::ssize_t>(d.size()), d.data()));
-  }
   void pixels(const char*, const Frame& d, perdure_msg_Frame&) { set(pixelsOf(d)); }
-  template <class Predicate>
-  void ensure(const char*, const char*, Predicate) {}
-  template <class Predicate>
-  void ensureWire(const char*, const char*, Predicate) {}
 
   template <class D, class W>
   static py::object nested(const D& d, W& w) {
@@ -182,74 +121,23 @@ struct Conversion {
 };
 using Conversions = std::map<std::type_index, Conversion>;
 
-template <class D, class W>
-Conversion conversionOf() {
-  return {nameOfType<D>(),
-          [](const void* message) {
-            W unused{};
-            return Giver::nested(*static_cast<const D*>(message), unused);
-          },
-          [](py::handle instance) {
-            const D fresh{};
-            W unused{};
-            Giver giver(messageClass<D>(), instance);
-            wire::describe(giver, fresh, unused);
-          }};
-}
-
-/// Searches descriptions for the structs that they contain.
-class Finder {
- public:
-  template <class D, class W>
-  void add() {
-    if (!found.emplace(typeid(D), conversionOf<D, W>()).second) return;
-    D d{};
-    W w{};
-    wire::describe(*this, d, w);
-  }
-
-  template <class D, class W>
-  void object(const char*, D&, W&) {
-    add<D, W>();
-  }
-  template <class D, class W>
-  void optional(const char*, std::optional<D>&, bool, W&) {
-    add<D, W>();
-  }
-  template <class D, class S>
-  void list(const char*, std::vector<D>&, S&, std::size_t) {
-    add<D, std::remove_pointer_t<decltype(S::_buffer)>>();
-  }
-  void value(auto&&...) {}
-  void time(auto&&...) {}
-  void number(auto&&...) {}
-  void probability(auto&&...) {}
-  void choice(auto&&...) {}
-  void text(auto&&...) {}
-  void name(auto&&...) {}
-  void matrix(auto&&...) {}
-  void symmetric(auto&&...) {}
-  void covariance(auto&&...) {}
-  void unit(auto&&...) {}
-  void pose(auto&&...) {}
-  void optionalNumber(auto&&...) {}
-  void numbers(auto&&...) {}
-  void names(auto&&...) {}
-  void counts(auto&&...) {}
-  void bytes(auto&&...) {}
-  void pixels(auto&&...) {}
-  void ensure(auto&&...) {}
-  void ensureWire(auto&&...) {}
-
-  Conversions found;
-};
-
 const Conversions& conversions() {
   static const Conversions all = [] {
-    Finder finder;
-    forEachTopic(
-        [&]<class T>(const bus::Topic<T>&) { finder.add<T, typename wire::Type<T>::Wire>(); });
-    return std::move(finder.found);
+    Conversions found;
+    forEachStruct([&]<class D, class W>() {
+      found[typeid(D)] = {nameOfType<D>(),
+                          [](const void* message) {
+                            W unused{};
+                            return Giver::nested(*static_cast<const D*>(message), unused);
+                          },
+                          [](py::handle instance) {
+                            const D fresh{};
+                            W unused{};
+                            Giver giver(messageClass<D>(), instance);
+                            wire::describe(giver, fresh, unused);
+                          }};
+    });
+    return found;
   }();
   return all;
 }

@@ -47,6 +47,15 @@ def topics():
     return dict(TOPIC_TYPES)
 
 
+def _wait_for_match(endpoint, seconds):
+    end = None if seconds is None else time.monotonic() + seconds
+    while not endpoint.matched:
+        if getattr(endpoint, "closed", False) or (end is not None and time.monotonic() >= end):
+            return False
+        time.sleep(0.02)
+    return True
+
+
 class Gone:
     """A disposed instance of a keyed topic. Only the key of ``message`` is valid (the id of an
     ObjectState, the square of a MapTile)."""
@@ -58,7 +67,7 @@ class Gone:
         return f"Gone({self.message!r})"
 
 
-class Subscription:
+class Subscription(_perdure.Subscription):
     """Messages in the order of arrival: iterate, or call ``next``. Created by ``subscribe``.
 
     It waits without the GIL, and Ctrl-C ends the wait within 0.2 s. Between calls, it stores the
@@ -70,11 +79,11 @@ class Subscription:
         self._names = names
         self._timeout = timeout
         self._left = count
-        self._inner = _perdure.Subscription(_bus(**settings), list(names), gone)
+        super().__init__(_bus(**settings), list(names), gone)
 
     def next(self, seconds=None):
         """The next message, or None after ``seconds`` (None: no limit) or after ``close``."""
-        found = self._inner.next(seconds)
+        found = super().next(seconds)
         if found is None:
             return None
         topic, message, gone = found
@@ -92,38 +101,14 @@ class Subscription:
         if message is None:
             if self.closed:
                 raise StopIteration
-            raise Silence(f"nothing came for {self._timeout} s: {self._inner.why_silent()}")
+            raise Silence(f"nothing came for {self._timeout} s: {self.why_silent()}")
         if self._left is not None:
             self._left -= 1
         return message
 
     def wait_for_writer(self, seconds=None):
         """True when one of the topics has a writer; False after ``seconds``."""
-        end = None if seconds is None else time.monotonic() + seconds
-        while not self.matched:
-            if self.closed or (end is not None and time.monotonic() >= end):
-                return False
-            time.sleep(0.02)
-        return True
-
-    @property
-    def matched(self):
-        """The current number of writers."""
-        return self._inner.matched
-
-    @property
-    def counts(self):
-        """Lost or unreadable messages since the start, by reason (as in Health):
-        "objects_malformed_bad_covariance", "frame_cam0_sample_lost", …"""
-        return self._inner.counts
-
-    @property
-    def closed(self):
-        return self._inner.closed
-
-    def close(self):
-        """Ends the subscription; a waiting ``next`` returns None."""
-        self._inner.close()
+        return _wait_for_match(self, seconds)
 
     def __enter__(self):
         return self
@@ -153,37 +138,15 @@ def subscribe(*names, timeout=None, count=None, gone=False, **settings):
     return Subscription(names, timeout=timeout, count=count, gone=gone, **settings)
 
 
-class Publisher:
+class Publisher(_perdure.Publisher):
     """Writes one topic, with its quality of service and its bounds. Created by ``publisher``."""
 
     def __init__(self, topic, *, strength=0, lease_s=0.0, **settings):
-        self._inner = _perdure.Publisher(_bus(**settings), topic, strength, lease_s)
-
-    def write(self, message):
-        """Raises Refused with the field and the reason if readers would reject the message."""
-        self._inner.write(message)
-
-    def dispose(self, message):
-        """Disposes of the instance with this message's key, for keyed topics."""
-        self._inner.dispose(message)
-
-    def acknowledged(self, seconds):
-        """Waits until every reader has received all messages; False after ``seconds``."""
-        return self._inner.acknowledged(seconds)
-
-    @property
-    def matched(self):
-        """The current number of readers."""
-        return self._inner.matched
+        super().__init__(_bus(**settings), topic, strength, lease_s)
 
     def wait_for_reader(self, seconds=None):
         """True when the topic has a reader; False after ``seconds``."""
-        end = None if seconds is None else time.monotonic() + seconds
-        while not self.matched:
-            if end is not None and time.monotonic() >= end:
-                return False
-            time.sleep(0.02)
-        return True
+        return _wait_for_match(self, seconds)
 
 
 def publisher(topic, *, strength=0, lease_s=0.0, **settings):

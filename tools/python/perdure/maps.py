@@ -140,6 +140,6 @@ class Map:
                 raise Unavailable(reply.error)
             return reply
         raise Unavailable(
-            f"no map store answers within {self._patience_s} s: {answers._inner.why_silent()}; "
+            f"no map store answers within {self._patience_s} s: {answers.why_silent()}; "
             'or read its file: perdure.Map("map.sqlite")'
         )

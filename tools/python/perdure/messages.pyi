@@ -1,4 +1,3 @@
-# Made by tools/python/stubs.py of the topics' description; do not edit.
 from typing import Any, Dict, Iterator, List, Literal, Optional
 
 import numpy as np
@@ -17,6 +16,7 @@ class Message:
     def __init__(self, **values: Any) -> None: ...
     def to_dict(self) -> Dict[str, Any]: ...
 
+# The rest is made by tools/python/stubs.py of the topics' description; do not edit.
 class Pose(Message):
     q_xyzw: npt.NDArray[np.float64]  # (4,), unit quaternion, w last
     p: npt.NDArray[np.float64]  # (3,), m

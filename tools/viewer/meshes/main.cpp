@@ -1,17 +1,86 @@
-// Writes the shapes of the classes for the page: FOLDER/car.glb, …; run once by the build.
+// Writes the shapes of the classes for the page, once in the build: FOLDER/car.json and others, for
+// BufferGeometryLoader of three.js.
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <vector>
 
-#include "tools/viewer/meshes/glb.h"
+#include "tools/simulate/shapes/mesh.h"
 
 namespace {
+
+using namespace perdure;
+using Json = nlohmann::ordered_json;
 
 struct Shape {
   const char *file, *class_name;
   Eigen::Vector3d size;  ///< m, a typical size, for the proportions of the parts
   std::uint64_t look;
 };
+
+float brightness(const tools::Material& material) {
+  return 0.2126F * material.colour.x() + 0.7152F * material.colour.y() +
+         0.0722F * material.colour.z();
+}
+
+/// Shade of each material, relative to the one with the largest area.
+std::vector<float> shades(const tools::Mesh& mesh) {
+  std::vector<float> area(mesh.materials.size(), 0.0F);
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const auto& [a, b, c] = mesh.triangles[i];
+    const Eigen::Vector3f ab = mesh.positions[b] - mesh.positions[a];
+    area[mesh.material_of[i]] += ab.cross(mesh.positions[c] - mesh.positions[a]).norm();
+  }
+  const auto body = std::max_element(area.begin(), area.end()) - area.begin();
+  std::vector<float> result;
+  for (std::size_t i = 0; i < mesh.materials.size(); ++i) {
+    constexpr float kBrightest = 0.75F, kDarkest = 0.12F;
+    // Square root converts linear light to perceived brightness.
+    const float shade = std::clamp(std::sqrt(brightness(mesh.materials[i])), kDarkest, kBrightest);
+    result.push_back(static_cast<std::ptrdiff_t>(i) == body ? 1.0F : shade);
+  }
+  return result;
+}
+
+/// Rounds to five decimals, a tenth of a millimetre of a large object.
+Json vectors(const std::vector<float>& values) {
+  Json array = Json::array();
+  for (const float value : values) array.push_back(std::round(1e5 * double{value}) / 1e5);
+  return {{"itemSize", 3}, {"type", "Float32Array"}, {"array", std::move(array)}};
+}
+
+/// In a box of 1 × 1 × 1 about the origin. The colour is the brightness of each part, relative to
+/// the one with the largest area, which is 1. The page multiplies it by the colour of the class.
+Json geometryOf(const tools::Mesh& mesh) {
+  Eigen::Vector3f low = mesh.positions.front(), high = low;
+  for (const auto& p : mesh.positions) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  const Eigen::Vector3f middle = (low + high) / 2, size = high - low;
+  const auto shade = shades(mesh);
+  std::map<std::pair<std::uint32_t, std::uint16_t>, std::uint32_t> index;
+  std::vector<float> positions, normals, colours;
+  std::vector<std::uint32_t> indices;
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    for (const std::uint32_t corner : mesh.triangles[i]) {
+      const auto [at, is_new] = index.try_emplace({corner, mesh.material_of[i]}, index.size());
+      indices.push_back(at->second);
+      if (!is_new) continue;
+      const Eigen::Vector3f p = (mesh.positions[corner] - middle).cwiseQuotient(size);
+      // The page scales the mesh back; a normal needs the inverse scale.
+      const Eigen::Vector3f n = mesh.normals[corner].cwiseProduct(size).normalized();
+      positions.insert(positions.end(), {p.x(), p.y(), p.z()});
+      normals.insert(normals.end(), {n.x(), n.y(), n.z()});
+      colours.insert(colours.end(), 3, shade[mesh.material_of[i]]);
+    }
+  }
+  const Json attributes = {
+      {"position", vectors(positions)}, {"normal", vectors(normals)}, {"color", vectors(colours)}};
+  return {{"data",
+           {{"attributes", attributes}, {"index", {{"type", "Uint32Array"}, {"array", indices}}}}}};
+}
 
 }  // namespace
 
@@ -28,14 +97,14 @@ int main(int argc, char** argv) {
   const std::filesystem::path folder = argv[1];
   std::filesystem::create_directories(folder);
   for (const Shape& shape : shapes) {
-    perdure::sim::SceneObject object;
+    sim::SceneObject object;
     object.class_name = shape.class_name;
     object.size = shape.size;
     object.look_seed = shape.look;
-    std::ofstream file(folder / (std::string(shape.file) + ".glb"), std::ios::binary);
-    file << perdure::tools::viewer::glbOf(perdure::tools::makeObjectMesh(object));
+    std::ofstream file(folder / (std::string(shape.file) + ".json"));
+    file << geometryOf(tools::makeObjectMesh(object));
     if (!file) {
-      std::cerr << folder / shape.file << ".glb cannot be written\n";
+      std::cerr << folder / shape.file << ".json cannot be written\n";
       return 69;
     }
   }
