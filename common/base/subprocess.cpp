@@ -14,8 +14,8 @@
 #include <thread>
 
 #include "common/base/check.h"
-#include "common/base/descriptor.h"
 #include "common/base/errors.h"
+#include "common/base/process/descriptor.h"
 
 namespace perdure {
 namespace {

@@ -8,14 +8,14 @@
 #include <cmath>
 #include <optional>
 
+#include "common/base/algorithms/folder.h"
 #include "common/base/errors.h"
-#include "common/base/folder.h"
 #include "common/replay/files/image_folder.h"
 #include "common/replay/files/rig_file.h"
 #include "common/replay/files/sensor_file.h"
-#include "common/replay/files/sensor_table.h"
 #include "common/replay/files/text_file.h"
 #include "common/replay/recording.h"
+#include "common/replay/sensor_table.h"
 
 namespace perdure::replay {
 namespace {

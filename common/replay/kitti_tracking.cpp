@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
+#include "common/base/algorithms/folder.h"
 #include "common/base/errors.h"
-#include "common/base/folder.h"
 #include "common/replay/files/kitti_calibration.h"
 #include "common/replay/files/kitti_labels.h"
 #include "common/replay/files/text_file.h"

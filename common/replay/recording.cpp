@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <tuple>
 
-#include "common/base/folder.h"
+#include "common/base/algorithms/folder.h"
 #include "common/replay/files/stamps.h"
 #include "common/vision/decode.h"
 

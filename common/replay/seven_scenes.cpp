@@ -11,8 +11,8 @@
 #include <map>
 #include <string>
 
+#include "common/base/algorithms/folder.h"
 #include "common/base/errors.h"
-#include "common/base/folder.h"
 #include "common/math/so3.h"
 #include "common/replay/files/rig_file.h"
 #include "common/replay/files/sensor_file.h"

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/descriptor.h"
 #include "common/base/errors.h"
+#include "common/base/process/descriptor.h"
 #include "common/base/result.h"
 #include "common/replay/recordings/mcap_format.h"
 

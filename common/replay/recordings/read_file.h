@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "common/base/descriptor.h"
+#include "common/base/process/descriptor.h"
 #include "common/base/result.h"
 
 namespace perdure::replay {

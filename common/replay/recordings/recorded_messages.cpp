@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <tuple>
 
+#include "common/base/algorithms/folder.h"
 #include "common/base/errors.h"
-#include "common/base/folder.h"
 #include "common/base/ids.h"
 
 namespace perdure::replay {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "common/base/folder.h"
+#include "common/base/algorithms/folder.h"
 #include "common/replay/recordings/recorded_messages.h"
 #include "common/replay/recordings/unpack.h"
 #include "common/ros/definition.h"

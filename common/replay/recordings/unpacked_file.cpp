@@ -14,8 +14,8 @@
 #include <span>
 #include <vector>
 
+#include "common/base/algorithms/folder.h"
 #include "common/base/errors.h"
-#include "common/base/folder.h"
 
 namespace perdure::replay {
 namespace {

@@ -1,4 +1,4 @@
-#include "common/replay/files/sensor_table.h"
+#include "common/replay/sensor_table.h"
 
 #include <fmt/format.h>
 
