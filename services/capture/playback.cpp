@@ -1,29 +1,18 @@
 #include "services/capture/playback.h"
 
-#include <time.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 
+#include "services/capture/live/clocks.h"
 #include "services/capture/run_file.h"
 
 namespace perdure::capture {
 namespace {
 
-std::int64_t monotonicNs() {
-  timespec t{};
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
-}
-
 Duration periodOf(const Calibration& calibration) {
   const double rate = calibration.cameras.empty() ? 0.0 : calibration.cameras.front().rate_hz;
   return durationFromSeconds(rate > 0 ? 1.0 / rate : 0.1);
-}
-
-std::string listOf(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
 }
 
 }  // namespace
@@ -115,7 +104,7 @@ void Playback::pump() {
   constexpr int kMost = 256;  // limit per call, so that Health and signals are served
   for (int i = 0; i < kMost && !context_.stopping(); ++i) {
     if (loader_) feed();
-    if (node_->tick(monotonicNs()) > Duration{0}) break;
+    if (node_->tick(HostClock::monotonicNs()) > Duration{0}) break;
     saveState();
   }
   if (node_->finished()) finish();
@@ -152,7 +141,8 @@ void Playback::updateHealth() {
   if (finished_) {
     health.state(HealthState::kOk, "end of drive");
   } else if (!node_) {
-    health.state(HealthState::kStarting, "waits for readers: " + listOf(gate_.missing()));
+    health.state(HealthState::kStarting,
+                 fmt::format("waits for readers: {}", fmt::join(gate_.missing(), ", ")));
   } else {
     const std::string problem = loader_ ? loader_->lastProblem() : std::string();
     health.state(problem.empty() ? HealthState::kOk : HealthState::kDegraded, problem);

@@ -9,7 +9,7 @@
 namespace perdure::gateway {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Schema = nlohmann::ordered_json;
 
 /// A type begins with its name at the start of a line; with "!", the schema has the name as its
 /// title. Its members follow, separated by semicolons: name, type, and after a colon the
@@ -210,7 +210,7 @@ perdure.MapReply!
  truncated boolean; objects object_summary[]
 )";
 
-using Types = std::map<std::string, Json, std::less<>>;
+using Types = std::map<std::string, Schema, std::less<>>;
 
 /// Text before the separator, which is removed from `rest` with this text.
 std::string_view cut(std::string_view& rest, std::string_view separator) {
@@ -220,7 +220,7 @@ std::string_view cut(std::string_view& rest, std::string_view separator) {
   return part;
 }
 
-Json typeOf(std::string_view name, const Types& known) {
+Schema typeOf(std::string_view name, const Types& known) {
   if (name.ends_with("[]")) {
     return {{"type", "array"}, {"items", typeOf(name.substr(0, name.size() - 2), known)}};
   }
@@ -229,7 +229,7 @@ Json typeOf(std::string_view name, const Types& known) {
   return found->second;
 }
 
-void addMembers(std::string_view line, const Types& known, Json& properties) {
+void addMembers(std::string_view line, const Types& known, Schema& properties) {
   while (!line.empty()) {
     const bool described = line.find(": ") < line.find("; ");
     std::string_view member = cut(line, described ? ": " : "; ");
@@ -247,7 +247,7 @@ Types readTypes() {
                  {"boolean", {{"type", "boolean"}}},
                  {"bytes", {{"type", "string"}, {"contentEncoding", "base64"}}},
                  {"object", {{"type", "object"}}}};
-  Json* type = nullptr;
+  Schema* type = nullptr;
   for (std::string_view rest = kTypes.substr(1); !rest.empty();) {
     const std::string_view line = cut(rest, "\n");
     if (line.starts_with(' ')) {

@@ -1,5 +1,7 @@
 #include "services/gateway/web/guard.h"
 
+#include <arpa/inet.h>
+
 #include <algorithm>
 
 namespace perdure::gateway::web {
@@ -37,33 +39,13 @@ std::string_view tokenIn(std::string_view target) {
   return {};
 }
 
-bool isNumber(std::string_view text, int most) {
-  if (text.empty() || text.size() > 3) return false;
-  int value = 0;
-  for (const char c : text) {
-    if (c < '0' || c > '9') return false;
-    value = 10 * value + (c - '0');
-  }
-  return value <= most;
-}
-
-/// True for four numbers of which the first is 127; "127.0.0.1.evil.example" is not one.
-bool isLoopback4(std::string_view address) {
-  if (!address.starts_with("127.")) return false;
-  int parts = 0;
-  while (true) {
-    const std::size_t dot = std::min(address.find('.'), address.size());
-    if (!isNumber(address.substr(0, dot), 255)) return false;
-    ++parts;
-    if (dot == address.size()) return parts == 4;
-    address.remove_prefix(dot + 1);
-  }
-}
-
 }  // namespace
 
 bool isLoopback(std::string_view address) {
-  return address == "localhost" || address == "::1" || isLoopback4(address);
+  in_addr parsed{};
+  const bool numbers = inet_pton(AF_INET, std::string(address).c_str(), &parsed) == 1;
+  return address == "localhost" || address == "::1" ||
+         (numbers && ntohl(parsed.s_addr) >> 24U == 127);
 }
 
 std::string hostName(std::string_view header) {

@@ -13,8 +13,10 @@ namespace perdure::inference {
 namespace {
 
 /// YOLOX: centre (gx + x)·s, size exp(w)·s. FastestDet: centre (gx + tanh x)·s, size σ(w)·input.
-Box boxOf(const ModelDescription& model, const Level& level, int gx, int gy, const float* raw,
-          std::size_t step) {
+/// YOLO-FastestV2: as YOLOv5, with anchor `a`.
+Box boxOf(const ModelDescription& model, const Level& level, std::size_t a, int gx, int gy,
+          const float* raw, std::size_t step) {
+  if (model.family == Family::kYoloFastestV2) return anchoredBox(level, a, gx, gy, raw, step);
   const double x = raw[0], y = raw[step], w = raw[2 * step], h = raw[3 * step];
   const double s = level.stride;
   if (model.family == Family::kYolox) {
@@ -24,18 +26,22 @@ Box boxOf(const ModelDescription& model, const Level& level, int gx, int gy, con
                  sigmoid(h) * model.input.height);
 }
 
-/// YOLOX and FastestDet: planes box (4), objectness (1), classes (K) of H×W cells.
+/// YOLOX, FastestDet, and YOLO-FastestV2 with A anchors: planes box (4·A), objectness (A), and
+/// classes (K), which all anchors share, of H×W cells.
 void decodePlanes(const ModelDescription& model, const DecodeOptions& options, const Level& level,
                   const Tensor* tensors, std::vector<Candidate>& out) {
   const int columns = model.input.width / level.stride, rows = model.input.height / level.stride;
   const auto cells = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
-  for (std::size_t i = 0; i < cells; ++i) {
-    Candidate candidate;
-    const RawScores raw{tensors[1].values[i], tensors[2].values.data() + i, cells};
-    if (!weigh(model, options, raw, candidate)) continue;
-    const int gx = static_cast<int>(i) % columns, gy = static_cast<int>(i) / columns;
-    candidate.box = boxOf(model, level, gx, gy, tensors[0].values.data() + i, cells);
-    out.push_back(std::move(candidate));
+  for (std::size_t a = 0; a < std::max<std::size_t>(1, level.anchors.size()); ++a) {
+    for (std::size_t i = 0; i < cells; ++i) {
+      Candidate candidate;
+      const RawScores raw{tensors[1].values[a * cells + i], tensors[2].values.data() + i, cells};
+      if (!weigh(model, options, raw, candidate)) continue;
+      const int gx = static_cast<int>(i) % columns, gy = static_cast<int>(i) / columns;
+      const float* box = tensors[0].values.data() + 4 * a * cells + i;
+      candidate.box = boxOf(model, level, a, gx, gy, box, cells);
+      out.push_back(std::move(candidate));
+    }
   }
 }
 
@@ -70,8 +76,6 @@ void decodeLevels(const ModelDescription& model, const DecodeOptions& options,
       decodeAnchors(model, options, level, *first, out);
     } else if (model.family == Family::kYolov5) {
       decodeYolov5(model, options, level, *first, out);
-    } else if (model.family == Family::kYoloFastestV2) {
-      decodeYoloFastestV2(model, options, level, first, out);
     } else if (model.family == Family::kPerdure) {
       decodePerdure(model, options, level, {first, per_level}, out);
     } else {

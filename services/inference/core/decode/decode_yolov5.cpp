@@ -8,7 +8,8 @@ namespace {
 
 double square(double x) { return x * x; }
 
-/// Box of anchor `a` in cell (gx, gy): `raw` holds x, y, w and h, `step` apart.
+}  // namespace
+
 Box anchoredBox(const Level& level, std::size_t a, int gx, int gy, const float* raw,
                 std::size_t step) {
   const double s = level.stride;
@@ -16,8 +17,6 @@ Box anchoredBox(const Level& level, std::size_t a, int gx, int gy, const float* 
                  level.anchors[a].first * square(2 * sigmoid(raw[2 * step])),
                  level.anchors[a].second * square(2 * sigmoid(raw[3 * step])));
 }
-
-}  // namespace
 
 void decodeYolov5(const ModelDescription& model, const DecodeOptions& options, const Level& level,
                   const Tensor& tensor, std::vector<Candidate>& out) {
@@ -33,23 +32,6 @@ void decodeYolov5(const ModelDescription& model, const DecodeOptions& options, c
       if (!weigh(model, options, {raw[4 * step], raw + 5 * step, step}, candidate)) continue;
       const int gx = static_cast<int>(i) % columns, gy = static_cast<int>(i) / columns;
       candidate.box = anchoredBox(level, a, gx, gy, raw, step);
-      out.push_back(std::move(candidate));
-    }
-  }
-}
-
-void decodeYoloFastestV2(const ModelDescription& model, const DecodeOptions& options,
-                         const Level& level, const Tensor* tensors, std::vector<Candidate>& out) {
-  const auto [columns, rows] = cellsOf(model, level);
-  const auto cells = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
-  for (std::size_t a = 0; a < level.anchors.size(); ++a) {
-    for (std::size_t i = 0; i < cells; ++i) {
-      Candidate candidate;
-      const RawScores raw{tensors[1].values[a * cells + i], tensors[2].values.data() + i, cells};
-      if (!weigh(model, options, raw, candidate)) continue;
-      const int gx = static_cast<int>(i) % columns, gy = static_cast<int>(i) / columns;
-      candidate.box =
-          anchoredBox(level, a, gx, gy, tensors[0].values.data() + 4 * a * cells + i, cells);
       out.push_back(std::move(candidate));
     }
   }

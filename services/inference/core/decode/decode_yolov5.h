@@ -12,10 +12,8 @@ namespace perdure::inference {
 ///   centre (g − ½ + 2σ(t))·s, size anchor·(2σ(t))²
 void decodeYolov5(const ModelDescription& model, const DecodeOptions& options, const Level& level,
                   const Tensor& tensor, std::vector<Candidate>& out);
-
-/// `tensors`: (1,4·A,H,W), (1,A,H,W) and (1,K,H,W) of one level, with checked shapes. They are the
-/// boxes as above, the objectness, and the classes of a cell, which all its anchors share.
-void decodeYoloFastestV2(const ModelDescription& model, const DecodeOptions& options,
-                         const Level& level, const Tensor* tensors, std::vector<Candidate>& out);
+/// Box of anchor `a` in cell (gx, gy): `raw` holds x, y, w and h, `step` apart.
+Box anchoredBox(const Level& level, std::size_t a, int gx, int gy, const float* raw,
+                std::size_t step);
 
 }  // namespace perdure::inference
