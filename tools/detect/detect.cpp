@@ -6,6 +6,7 @@
 #include <ostream>
 #include <vector>
 
+#include "common/base/algorithms/median.h"
 #include "common/base/checked_file.h"
 #include "common/replay/dataset.h"
 #include "services/inference/node.h"
@@ -14,13 +15,6 @@ namespace perdure::tools {
 namespace {
 
 double cpuMs() { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
-
-double medianOf(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 }  // namespace
 

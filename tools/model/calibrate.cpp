@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "common/base/algorithms/median.h"
 #include "common/base/errors.h"
 #include "services/inference/core/decode/evidence.h"
 #include "services/inference/core/decode/prime.h"

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/algorithms/median.h"
+
 namespace perdure::tools {
 namespace {
 
@@ -172,13 +174,6 @@ std::optional<inference::PrimedCalibration> fitPrimed(const std::vector<PrimedOu
                                   std::log((nothing_elsewhere + 0.5) / (elsewhere + 1.0)),
                               -20.0, 0.0);
   return primed;
-}
-
-double medianOf(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 double robustSigma(std::vector<double> values) {

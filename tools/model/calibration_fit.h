@@ -61,6 +61,5 @@ std::optional<inference::PrimedCalibration> fitPrimed(const std::vector<PrimedOu
 
 /// Standard deviation from the median of the absolute values (× 1.4826).
 double robustSigma(std::vector<double> values);
-double medianOf(std::vector<double> values);
 
 }  // namespace perdure::tools

@@ -163,8 +163,7 @@ void bindBus(py::module_& module) {
            py::arg("domain") = py::none(), py::arg("peers") = py::none());
   py::class_<Bus, std::shared_ptr<Bus>>(module, "Bus")
       .def(py::init<const BusSettings&, const std::string&>(), py::arg("settings"),
-           py::arg("process"), py::call_guard<py::gil_scoped_release>())
-      .def_property_readonly("place", &Bus::place);
+           py::arg("process"), py::call_guard<py::gil_scoped_release>());
   py::class_<Publisher>(module, "Publisher")
       .def(py::init<std::shared_ptr<Bus>, const std::string&, std::int32_t, double>(),
            py::arg("bus"), py::arg("topic"), py::arg("strength"), py::arg("lease_s"))
@@ -175,7 +174,6 @@ void bindBus(py::module_& module) {
       .def("acknowledged", &Publisher::waitForAcknowledgement, py::arg("seconds"),
            "Waits until every reader has received all messages; False after ``seconds``.")
       .def_property_readonly("matched", &Publisher::matched, "The current number of readers.");
-  module.def("known_topics", &tools::knownTopics);
 }
 
 }  // namespace perdure::python

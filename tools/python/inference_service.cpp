@@ -108,7 +108,6 @@ class InferenceService {
   }
 
   bool ended() const { return ended_; }
-  std::uint64_t framesIn() { return context_.health().framesIn(); }
   std::uint64_t framesOut() { return context_.health().framesOut(); }
 
   static std::string sentenceOf(const std::string& what, const Reason& reason) {
@@ -249,7 +248,6 @@ void bindInferenceService(py::module_& module) {
       .def("failed", &InferenceService::failed)
       .def("close", &InferenceService::close, py::call_guard<py::gil_scoped_release>())
       .def_property_readonly("ended", &InferenceService::ended)
-      .def_property_readonly("frames_in", &InferenceService::framesIn)
       .def_property_readonly("frames_out", &InferenceService::framesOut);
   module.def("digest", [](const std::string& text) { return digest(text); });
 }

@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "common/types/health.h"
-#include "common/types/map.h"
+#include "common/types/map_graph.h"
 #include "common/types/objects.h"
 #include "common/types/odometry.h"
 #include "common/types/sensors.h"
@@ -35,9 +35,6 @@ inline constexpr std::array<std::string_view, 8> kWords<MapQueryKind>{
     "by_id", "by_class", "by_radius", "by_box", "all", "restore", "recall", "graph"};
 template <>
 inline constexpr std::array<std::string_view, 2> kWords<MapLoopKind>{"loop", "tie"};
-template <>
-inline constexpr std::array<std::string_view, 3> kWords<MapLoopState>{"tentative", "confirmed",
-                                                                      "withdrawn"};
 
 /// For example "visible"; empty if the value has no word.
 template <class E>

@@ -1,5 +1,6 @@
 """An inference service for a user's network: ``publish``."""
 
+import contextlib
 import copy
 import signal
 import sys
@@ -172,21 +173,17 @@ def _answers_of(said, asked, k: int) -> List["messages.Detection"]:
     return answers
 
 
-class _EndBySignal:
+@contextlib.contextmanager
+def _ended_by_signal():
     """SIGTERM ends ``publish`` in order, like Ctrl-C."""
-
-    def __enter__(self):
-        self._before = None
-        if threading.current_thread() is threading.main_thread():
-            self._before = signal.signal(signal.SIGTERM, self._end)
-
-    @staticmethod
-    def _end(*_):
-        raise SystemExit(0)
-
-    def __exit__(self, *_):
-        if self._before is not None:
-            signal.signal(signal.SIGTERM, self._before)
+    before = None
+    if threading.current_thread() is threading.main_thread():
+        before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    try:
+        yield
+    finally:
+        if before is not None:
+            signal.signal(signal.SIGTERM, before)
 
 
 def publish(
@@ -242,7 +239,7 @@ def publish(
 
     done = 0
     try:
-        with _EndBySignal():
+        with _ended_by_signal():
             while (frames is None or done < frames) and not service.ended:
                 frame = service.next(0.5)
                 if frame is None:
