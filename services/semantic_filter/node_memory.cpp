@@ -97,8 +97,7 @@ void Node::noteMerge(TrackId survivor, TrackId absorbed) {
   if (object != survivor) members_[survivor] = object;
 }
 
-/// Assigns object ids to tracks that have another id. Of two tracks of one object, the one with its
-/// id is named, or else the first.
+/// Assigns object ids to tracks. Of two tracks of one object, its own or else the first has it.
 void Node::nameObjects() {
   object_of_.clear();
   track_of_.clear();

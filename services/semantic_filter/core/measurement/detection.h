@@ -91,9 +91,8 @@ std::string classSeenIn(const BoxDetection& detection, const Model& model);
 /// such objects. `lookalike_nats`: the nats by which its observations resembled a known class.
 double lookalikeProbability(double prior, double lookalike_nats);
 
-/// Returns log g_k. A class that the model does not know is scored as *other*. `lookalike_nats`:
-/// the nats by which earlier observations of an *other* object resembled a known class. (A toy car
-/// resembles a car in every observation.)
+/// Returns log g_k; a class that the model does not know is scored as *other*. `lookalike_nats`:
+/// the nats by which an *other* object resembled a known class before, as a toy car does.
 double logRatio(const BoxDetection& detection, const Model& model, const std::string& class_name,
                 double lookalike_nats = 0.0);
 

@@ -93,8 +93,7 @@ class Damping {
   double value_ = 1e-4;
 };
 
-/// Takes one step and returns its predicted gain, squared deviations. Returns false if no damping
-/// gives a step that lowers the cost.
+/// Takes one step and returns its predicted gain, squared deviations; false if none helps.
 bool descend(const BatchProblem& model, Fit& fit, Damping& damping, double& predicted_gain) {
   const Quadratic q = model.quadratic(fit.x, gramOf(fit.whitened));
   const double cost = fit.squaredResidual() + model.priorCost(fit.x);
@@ -266,8 +265,7 @@ std::size_t MapFit::sides() const {
 }
 
 ResidualRatio MapFit::residualRatio() const {
-  // Robust weights leave this share of a squared Gaussian residual of four dimensions, because an
-  // inflation is never less than one.
+  // Robust weights, at most one, leave this share of a squared four-dimensional residual.
   constexpr double kShareAfterWeights = 0.83;
   const double free = static_cast<double>(sides()) - modelOf().dim();
   if (free <= 0.0) return {};

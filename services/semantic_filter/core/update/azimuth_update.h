@@ -22,8 +22,7 @@ AzimuthMatch matchAzimuth(double azimuth, const State& x, const View& view, doub
 /// Returns what one such azimuth adds to the log-odds of the heading, nats.
 double headingOdds(const AzimuthMatch& match);
 
-/// Returns the deviation of an azimuth, rad, as assumed before learning. `told`: what the network
-/// says, rad.
+/// Returns the deviation of an azimuth before learning. `told`: by the network; rad.
 double azimuthSigma(double told, const ClassPrior& prior);
 
 /// Updates the yaw (modulo 180°) by an EKF and the heading by its log-odds. `azimuth`, `sigma`:

@@ -22,9 +22,8 @@ SizePrior sizePriorOf(const ClassPrior& prior, bool upper_part);
 /// is higher and too short is hidden at a side.
 bool lessThanHalf(const Hypothesis& h, const ClassPrior& prior);
 
-/// Returns the belief of the whole object: the top stays, and height and length are what the class
-/// says of an object that is at least as large as what is seen. A hypothesis of the whole object
-/// stays as it is. Objects are taken for upright along z of W, which is level to some degrees.
+/// Returns the belief of the whole object: the top stays; height and length follow from the class,
+/// given what is seen. Objects are upright along z of W, which is level to some degrees.
 Hypothesis wholeOf(const Hypothesis& h, const ClassPrior& prior);
 
 }  // namespace perdure::semantic_filter
