@@ -12,8 +12,7 @@ bool isMalformed(const ObjectBelief& belief) { return belief.classes.empty() || 
 
 }  // namespace
 
-/// A track that leaves was not detected in any frame that may be stepped again. It leaves those
-/// frames too, so a late detection cannot bring it back.
+/// A track leaves all frames that may be stepped again, so late detections cannot bring it back.
 void Node::letGo(const Frame& frame) {
   const TimePoint now = frame.input.stamp.time, oldest = history_.oldestTime();
   const auto leaving =

@@ -22,8 +22,7 @@ void stop(Hypothesis& h);
 void stopSlowHypotheses(Track& track, double min_speed);
 /// Returns x after `dt` seconds: static hypotheses stay, moving ones go on at constant velocity.
 State stateAt(const Hypothesis& h, double dt);
-/// Returns the track as its motion alone predicts it for `time`; as_of stays. It is for publishing
-/// between two observations and is not stored, so that the belief depends on observations only.
+/// Returns the track as its motion predicts it for `time`; as_of stays. For publishing only.
 Track extrapolated(Track track, TimePoint time, const MotionParameters& parameters);
 
 /// Returns a moving copy of a hypothesis at rest, for an object that may just be starting to move.

@@ -29,8 +29,7 @@ struct ProjectedOutline {
   Polygon points;         ///< px; corners and cuts by the near plane, in no order
 };
 
-/// Projects `shape` within the cuboid, or the whole cuboid if it reaches the near plane (0.2 m).
-/// Returns nothing if no part is before the near plane. `heading`: as in Shape::corner.
+/// Projects `shape`, or the whole cuboid if it reaches the near plane (0.2 m); nothing behind it.
 std::optional<ProjectedBox> projectCuboid(const State& x, const Projector& from,
                                           const Shape& shape = cuboidShape(), double heading = 0.0);
 std::optional<ProjectedOutline> projectOutline(const State& x, const Projector& from,

@@ -30,8 +30,7 @@ namespace {
 
 using Fit = MapFit::Fit;
 
-/// Sets the inflation of each keyframe (t distribution) and whether the keyframe contradicts x.
-/// Returns whether an inflation changed enough to matter.
+/// Sets inflation and contradiction of each keyframe. Returns whether an inflation changed much.
 bool inflateKeyframes(Fit& fit, double tail) {
   constexpr double kMatters = 0.1;
   const PerSide residual = fit.covariance->withoutPose(

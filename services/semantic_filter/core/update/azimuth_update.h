@@ -31,8 +31,7 @@ double azimuthSigma(double told, const ClassPrior& prior);
 double updateWithAzimuth(Hypothesis& h, double azimuth, double sigma, double weight,
                          const FrameContext& frame);
 
-/// Updates all hypotheses by the azimuths of the boxes that may be the track's. Errors of azimuths
-/// are less correlated between observations than those of boxes. So their exponent is √`tempering`.
+/// Updates all hypotheses by the azimuths of possible boxes, with the exponent √`tempering`.
 void updateAzimuths(Track& track, const AllShares& shares, double tempering,
                     const ScratchVector<std::size_t>& gated, const std::vector<BoxDetection>& boxes,
                     const FrameContext& frame);

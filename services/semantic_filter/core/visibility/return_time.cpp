@@ -155,8 +155,7 @@ ScratchVector<State> deviationsOf(const Standing& thing, const Eigen::Vector3d& 
   return deviations;
 }
 
-/// Squared distances of the two ends of the interval from the expected time. The ends differ: a
-/// body that slows down may not come round at all.
+/// Squared distances of the ends of the interval from the expected time; they differ.
 struct Spread {
   Spread(double expected_s, double frame_s)
       : expected(expected_s), early(frame_s * frame_s), late(early) {}
