@@ -136,12 +136,9 @@ EventTracker::Changes EventTracker::update(const Objects& objects,
     compare(o, known, events, blank);
   }
   std::sort(present.begin(), present.end());
-  for (auto it = known_.begin(); it != known_.end();) {
-    const auto& [track, known] = *it;
-    if (std::binary_search(present.begin(), present.end(), track)) {
-      ++it;
-      continue;
-    }
+  std::erase_if(known_, [&](const auto& entry) {
+    const auto& [track, known] = entry;
+    if (std::binary_search(present.begin(), present.end(), track)) return false;
     if (const bool kept = archived_.contains(track); kept || known.ever_confirmed) {
       Event e = blank;
       e.kind = kept ? EventKind::kArchived : EventKind::kGone;
@@ -150,8 +147,8 @@ EventTracker::Changes EventTracker::update(const Objects& objects,
       events.push_back(e);
       if (!kept) changes.ended.push_back({track, 0, objects.stamp.time});
     }
-    it = known_.erase(it);
-  }
+    return true;
+  });
   archived_.clear();
   return changes;
 }

@@ -12,8 +12,7 @@ bool isMalformed(const ObjectBelief& belief) { return belief.classes.empty() || 
 
 }  // namespace
 
-/// A track that leaves was not detected in any frame that may be stepped again. It leaves those
-/// frames too, so a late detection cannot bring it back.
+/// A track leaves all frames that may be stepped again, so late detections cannot bring it back.
 void Node::letGo(const Frame& frame) {
   const TimePoint now = frame.input.stamp.time, oldest = history_.oldestTime();
   const auto leaving =
@@ -97,8 +96,7 @@ void Node::noteMerge(TrackId survivor, TrackId absorbed) {
   if (object != survivor) members_[survivor] = object;
 }
 
-/// Assigns object ids to tracks that have another id. Of two tracks of one object, the one with its
-/// id is named, or else the first.
+/// Assigns object ids to tracks. Of two tracks of one object, its own or else the first has it.
 void Node::nameObjects() {
   object_of_.clear();
   track_of_.clear();

@@ -55,8 +55,7 @@ void Node::reportModelChange(const FrameStamp& stamp, const std::string& detail)
   if (outputs_.events) outputs_.events(event);
 }
 
-/// Whether detections of a new process are delayed: until it detects an expected object again, or
-/// the old process would have decided.
+/// Whether to delay detections of a new process, until it detects an expected object again.
 bool Node::isInDoubt(const Frame& frame, const Detections& detections) {
   if (!probation_.isOf(detections.instance)) return false;
   const auto model = models_.find(detections.model_hash);

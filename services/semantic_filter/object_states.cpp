@@ -18,19 +18,12 @@ ObjectStates::Changes ObjectStates::update(const Objects& objects) {
     sent = {o.as_of, o.visibility, o.confirmed};
     changes.written.push_back({objects.stamp, objects.instance, objects.world, o});
   }
-  for (auto it = sent_.begin(); it != sent_.end();) {
-    if (present.contains(it->first)) {
-      ++it;
-      continue;
-    }
-    ObjectState state;
-    state.stamp = objects.stamp;
-    state.instance = objects.instance;
-    state.world = objects.world;
-    state.object.id = it->first;
-    changes.gone.push_back(state);
-    it = sent_.erase(it);
-  }
+  std::erase_if(sent_, [&](const auto& entry) {
+    if (present.contains(entry.first)) return false;
+    changes.gone.push_back({objects.stamp, objects.instance, objects.world, {}});
+    changes.gone.back().object.id = entry.first;
+    return true;
+  });
   return changes;
 }
 

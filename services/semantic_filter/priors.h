@@ -12,8 +12,7 @@ namespace perdure::semantic_filter {
 
 /// Loads the file that the configuration names. Throws StartupError as loadClassPriors does.
 ClassPriors loadPriors(const Config& config);
-/// Throws StartupError: kUnavailable if the file cannot be read, kConfiguration with all its errors
-/// as file:line:col.
+/// Throws StartupError: kUnavailable without a file, kConfiguration with all file:line:col.
 ClassPriors loadClassPriors(const std::string& path);
 /// Returns, for each class, the points that span its shape, in halves of the cuboid's sides.
 std::map<std::string, std::vector<Eigen::Vector3d>> shapePoints(const ClassPriors& priors);

@@ -37,8 +37,7 @@ void ReappearanceMonitor::addKeyframe(const FrameInput& now, const Way& way) {
   }
 }
 
-/// The largest random walk of the velocity over several lags. A swaying body drifts less in a
-/// second than its single steps suggest; an accelerating body drifts more.
+/// The largest random walk of the velocity over several lags: a swaying body drifts less.
 double ReappearanceMonitor::speedWalk() const {
   double most = 0.0;
   for (const double lag : {0.1, 0.5, 1.0, 2.0, 4.0}) {

@@ -35,8 +35,7 @@ std::size_t Node::framesIn(double seconds) const {
   return static_cast<std::size_t>(std::max(2L, std::lround(seconds * rate) - 1));
 }
 
-/// If the IMU is at rest, one camera cannot observe a speed, so the start also needs a background
-/// at rest. If the background has been at rest only briefly, the start waits.
+/// With an IMU at rest, one camera cannot observe a speed: the background must rest long enough.
 Result<Start> Node::startWithoutSpeed(TimePoint now) {
   const Options& options = cameras_->estimator.options();
   const StartOptions& o = options.start;

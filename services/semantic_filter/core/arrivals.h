@@ -14,8 +14,7 @@ namespace perdure::semantic_filter {
 struct Arrivals {
   /// Placed relative to the body: C = A P_g follows from the pose error of the frame.
   std::vector<ObjectBelief> placed;
-  /// A belief as this process published it, with the product of pose error transitions of that
-  /// time.
+  /// A belief as this process published it, with the product of transitions of that time.
   struct Published {
     ObjectBelief belief;
     Matrix6d product = Matrix6d::Identity();

@@ -22,9 +22,8 @@ class SemanticFilter {
 
   /// Replaces the belief before a frame by the belief after it.
   StepReport step(Belief& belief, const FrameInput& heard, IdBook& ids) const;
-  /// Fuses two tracks of one object as of that frame. The older track gives the mixture, because
-  /// more is known of it; `id` names the result. Returns false and does nothing if their classes
-  /// exclude each other. Both must exist.
+  /// Fuses two tracks of one object. The older one gives the mixture; `id` names the result.
+  /// Returns false and does nothing if their classes exclude each other. Both must exist.
   bool join(Belief& belief, TrackId id, TrackId absorbed, const FrameInput& input) const;
 
  private:

@@ -93,8 +93,7 @@ bool Estimator::velocityMayBeZero() const {
   return passesGate(state_->nav.v_WB, S, 0.99);
 }
 
-/// Part of the image moves, but the body may stand still. A distant background also appears at rest
-/// for a slowly moving body, so the IMU must agree.
+/// Part of the image moves. A distant background seems at rest too, so the IMU must agree.
 bool Estimator::standsInTraffic(const ImuBuffer& imu, bool background_rests) {
   const bool knew = standstill_.known();
   const bool held = standstill_.holds(imu, state_->time, options_.imu);

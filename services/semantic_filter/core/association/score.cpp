@@ -182,8 +182,7 @@ void applyTopDown(TrackScore& score, const Track& track, const std::vector<doubl
                   const FrameContext& frame) {
   const auto k = frame.model->index.find(track.best().class_name);
   if (k == frame.model->index.end() || k->second >= log_ratio.size()) return;
-  // Observations from one viewpoint share the mistakes of the network, so an answer in favour of
-  // the track is tempered. An answer against it is limited by the unmapped occluder, as a miss is.
+  // Correlated mistakes temper an answer in favour; the unmapped occluder limits one against.
   double nats = log_ratio[k->second];
   if (nats > 0.0) {
     nats *= temperingExponent(score.hypotheses.front().correlated_observations,

@@ -34,8 +34,7 @@ struct Explanation {
   double log_ratio = 0.0;  ///< of the likelihoods of the box, sides and class, to clutter, nats
   BoxScore sides;
 };
-/// Returns nothing outside the gate. `hidden`: sides that a nearer object hides. `class_name`,
-/// `lookalike_nats`: as for logRatio.
+/// Returns nothing outside the gate. `hidden`: by a nearer object. Last two: as for logRatio.
 std::optional<Explanation> explain(const BoxDetection& detection, const PredictedBox& predicted,
                                    const std::array<bool, 4>& hidden, const std::string& class_name,
                                    double lookalike_nats, const Judge& judge);
@@ -72,26 +71,18 @@ TrackScore scoreTrack(const Track& track, const TrackVisibility& visibility,
 std::array<bool, 4> hiddenSides(const TrackScore& score, std::size_t box,
                                 const BoxDetection& detection);
 
-/// Returns ψ: "the track made this box" against "it made none, or does not exist". `box`: index
-/// into TrackScore::boxes.
+/// Returns ψ: "it made this box" against "none, or does not exist". `box`: in TrackScore::boxes.
 double associationWeight(const Track& track, const TrackScore& score, std::size_t box);
 
-/// Returns the tempering exponent τ: how much one more observation counts if its errors are
-/// correlated with earlier ones, because observations from one viewpoint share the errors of the
-/// network. It is the information of one more observation after n correlated ones, in units of the
-/// first: I(n) = n / (ρ n + 1 - ρ), τ = I(n+1) - I(n). Derivation:
-/// tools/docs/maths/class_and_existence_update.md.
+/// Returns the tempering exponent τ, because observations from one viewpoint share the errors of
+/// the network: the information of one more after n correlated ones, I(n+1) - I(n) with I(n) = n /
+/// (ρ n + 1 - ρ). Derivation: tools/docs/maths/class_and_existence_update.md.
 double temperingExponent(double observations, double correlation);
 
-/// Applies a top-down likelihood: what the network says at a predicted measurement where it
-/// reported no box (paper, eq. 7; services/inference/README.md, "Top-down"). Derivation:
-/// tools/docs/maths/joint_association.md, "Top-down likelihood".
-///
-/// An answer is evidence of existence only: its box was chosen near the prediction and says little
-/// of the place.
-///
-/// `log_ratio`: by class of the model; that of the track's best class counts. If the model does not
-/// know that class, nothing changes.
+/// Applies what the network says at a predicted measurement without a box (paper, eq. 7;
+/// services/inference/README.md, "Top-down"), as evidence of existence only. Derivation:
+/// tools/docs/maths/joint_association.md, "Top-down likelihood". `log_ratio`: by class of the
+/// model; if the model does not know the track's best class, nothing changes.
 void applyTopDown(TrackScore& score, const Track& track, const std::vector<double>& log_ratio,
                   const FrameContext& frame);
 

@@ -23,8 +23,7 @@ class DetectionRate {
   /// each other, because the object may have gone.
   void beginVisit(const ViewScales& scales);
   /// Returns the factor on P_D at this viewpoint: the mean of a beta prior of `prior` observations,
-  /// updated by what earlier visits found from similar viewpoints. It is 1 without earlier visits.
-  /// The place in the image does not count.
+  /// updated by earlier visits from similar viewpoints; 1 without any.
   double factor(const ViewRay& from, double prior, const ViewScales& scales) const;
   /// Adds the counts of a track that proved to be the same object.
   void join(const DetectionRate& other, const ViewScales& scales);

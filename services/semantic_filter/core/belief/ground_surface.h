@@ -56,9 +56,8 @@ class GroundSurface {
 
   /// Lets `roughness_scale` learn from the ground contact of the track.
   void updateRoughness(GroundRoughness& roughness_scale, const Track& track, double share) const;
-  /// Returns the height of the ground below `place`, without the contribution of track `except`.
-  /// Returns nothing if fewer than three objects contribute and the height of the body is not
-  /// known.
+  /// Returns the height of the ground below `place` without track `except`; nothing if fewer than
+  /// three objects contribute and the height of the body is not known.
   std::optional<GroundHeight> below(const Eigen::Vector3d& place, ObjectId except) const;
 
  private:

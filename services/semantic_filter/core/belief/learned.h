@@ -25,8 +25,7 @@ class NoiseScales {
   /// Remembers at most `remembered` residuals, because a network has other errors on another road.
   explicit NoiseScales(double remembered) : remembered_(remembered) {}
 
-  /// Returns true over assumed variance. The assumption weighs as much as `assumed` residuals; with
-  /// 0 it is never changed.
+  /// Returns true over assumed variance. The assumption weighs `assumed` residuals; 0: fixed.
   double ratio(std::uint64_t model, double assumed) const;
   /// `over` is relative to the first assumption, not to the present ratio.
   void learn(std::uint64_t model, const ResidualRatio& over);

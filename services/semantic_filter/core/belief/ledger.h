@@ -55,8 +55,7 @@ class ClassAccount {
   ClassAccount() = default;
   ClassAccount(const std::vector<ClassLedger>& known, const std::vector<OustedClass>& ousted);
 
-  /// `pmf` sums to 1. Classes that it no longer has leave the account. The one of them that came
-  /// closest to the best class is kept as ousted.
+  /// `pmf` sums to 1. Of classes that leave, the one that came closest to the best is the ousted.
   void book(const ClassNumbers& pmf, ClassEvidence why, TimePoint at);
   /// Moves a part of entry `from` to entry `to`, for each class.
   void shift(ClassEvidence from, ClassEvidence to, const ClassNumbers& nats);

@@ -17,14 +17,12 @@ void predictHypothesis(Hypothesis& h, double dt, const MotionParameters& m);
 
 /// Conditions the hypothesis on v = 0, with the error of position that looked like motion.
 void stop(Hypothesis& h);
-/// Is called when the track leaves the view. Splits each moving hypothesis that is probably slower
-/// than `min_speed` (m/s) by its speed: the slow share stops and stays where it was, the fast share
-/// moves on.
+/// Called when the track leaves the view. Splits moving hypotheses that are probably slower than
+/// `min_speed` (m/s): the slow share stops where it was, the fast share moves on.
 void stopSlowHypotheses(Track& track, double min_speed);
 /// Returns x after `dt` seconds: static hypotheses stay, moving ones go on at constant velocity.
 State stateAt(const Hypothesis& h, double dt);
-/// Returns the track as its motion alone predicts it for `time`; as_of stays. It is for publishing
-/// between two observations and is not stored, so that the belief depends on observations only.
+/// Returns the track as its motion predicts it for `time`; as_of stays. For publishing only.
 Track extrapolated(Track track, TimePoint time, const MotionParameters& parameters);
 
 /// Returns a moving copy of a hypothesis at rest, for an object that may just be starting to move.

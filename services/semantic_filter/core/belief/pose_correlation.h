@@ -8,15 +8,13 @@
 
 namespace perdure::semantic_filter {
 
-/// Returns the transition of the pose error between two products of transitions. The updates of vio
-/// make the products small. Where the inverse is then not usable, it returns nothing.
+/// Returns the transition of the pose error between two products; nothing without a usable inverse.
 std::optional<Matrix6d> transitionBetween(const Matrix6d& earlier, const Matrix6d& later);
 
 /// Whether [P C; Cᵀ P_pose] is a covariance.
 bool isJointCovariance(const Hypothesis& h, const Matrix6d& P_pose);
 
-/// Scales C down where the pose would explain more of P than there is, so that [P C; Cᵀ P_pose]
-/// stays a covariance. `L_pose`: Cholesky factor of P_pose, if it has one.
+/// Scales C down until [P C; Cᵀ P_pose] is a covariance. `L_pose`: Cholesky factor of P_pose.
 void keepConsistent(Hypothesis& h, const Matrix6d& P_pose, const std::optional<Matrix6d>& L_pose);
 
 /// Adds the error of the body's pose to what is known relative to the body: δp = p - R_WB [p_B]x θ,

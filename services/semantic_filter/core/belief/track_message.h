@@ -7,9 +7,8 @@
 
 namespace perdure::semantic_filter {
 
-/// Publishes one Gaussian for each class: the mean of its heaviest hypothesis, and the second
-/// moments of the others about it. `min_speed`: m/s, above which a track counts as moving.
-/// Of a hypothesis that is an upper part the whole object is published.
+/// Publishes for each class the mean of its heaviest hypothesis with the second moments of the
+/// others about it, and of an upper part the whole object. `min_speed`: m/s.
 ObjectBelief toBelief(const Track& track, const ClassPriors& priors, double min_speed);
 /// The same into `belief`, whose memory it uses again.
 void toBelief(const Track& track, const ClassPriors& priors, double min_speed,

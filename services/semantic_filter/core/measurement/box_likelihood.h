@@ -55,8 +55,7 @@ BoxMeasurement measure(const Box& box, double width, double height, const BoxPar
 Eigen::Vector4d biasSigma(const SideError& lasting, double width_px, double height_px);
 
 /// Returns the log of the clutter measure of the box: expected false boxes, times the density
-/// (measured sides) or probability (censored sides) that one of them is this box. `ignored` sides
-/// may lie anywhere.
+/// (measured sides) or probability (censored sides) of this box without `ignored` sides.
 double logClutter(const BoxMeasurement& z, double width, double height,
                   const ClutterParameters& parameters, const std::array<bool, 4>& ignored = {});
 

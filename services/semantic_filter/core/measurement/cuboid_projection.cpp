@@ -47,8 +47,7 @@ std::optional<double> crossing(const Segment& segment, const Corners& corners,
   return s;
 }
 
-/// The point where a line between corners crosses the border. As the body moves, the point slides
-/// along the border. Returns nothing where that is not defined.
+/// The point where a line between corners crosses the border, along which it slides, if defined.
 std::optional<SidePoint> crossingPoint(const Segment& segment, double s, const Corners& corners,
                                        const CameraModel& camera, int axis) {
   const Eigen::Vector3d a = corners.p_C(segment.a), way = corners.p_C(segment.b) - a;
@@ -126,8 +125,7 @@ class EndsWithin {
   std::optional<End> least_, most_;
 };
 
-/// Where the border cuts the object, moves the other two sides of its box to the part inside, which
-/// is what a detector sees. A side beyond the border stays where it is.
+/// Where the border cuts the object, moves the other sides of its box to the part inside.
 void endWithinImage(ProjectedBox& box, const Corners& corners, const ImagePoints& points,
                     const Projector& from) {
   const Eigen::Vector4d whole = box.sides;

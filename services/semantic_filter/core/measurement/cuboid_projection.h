@@ -29,8 +29,7 @@ struct ProjectedOutline {
   Polygon points;         ///< px; corners and cuts by the near plane, in no order
 };
 
-/// Projects `shape` within the cuboid, or the whole cuboid if it reaches the near plane (0.2 m).
-/// Returns nothing if no part is before the near plane. `heading`: as in Shape::corner.
+/// Projects `shape`, or the whole cuboid if it reaches the near plane (0.2 m); nothing behind it.
 std::optional<ProjectedBox> projectCuboid(const State& x, const Projector& from,
                                           const Shape& shape = cuboidShape(), double heading = 0.0);
 std::optional<ProjectedOutline> projectOutline(const State& x, const Projector& from,
@@ -43,10 +42,9 @@ struct BoxStyle {
   Shape shape = cuboidShape();  ///< the part of the cuboid that the box encloses
 };
 
-/// Returns the box that the network should report: the box of the shape, with b of the hypothesis
-/// and the offset of the style added to its sides. A detector sees what is in the image: where the
-/// border cuts the shape, the other two sides are those of the part inside. A side beyond the
-/// border stays where it is.
+/// Returns the box that the network should report: that of the shape, with b of the hypothesis and
+/// the offset of the style. Where the border cuts the shape, the other two sides are those of the
+/// part inside. A side beyond the border stays where it is.
 std::optional<ProjectedBox> projectObserved(const State& x, const Projector& from,
                                             const BoxStyle& style, double heading = 0.0);
 

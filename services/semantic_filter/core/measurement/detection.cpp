@@ -46,8 +46,7 @@ bool sameEdge(const BoxMeasurement& a, int side_a, const BoxMeasurement& b, int 
          d * d < gates::kSameEdge * (variance(a, side_a) + variance(b, side_b));
 }
 
-/// Whether `a` stands lower in the image than `b`. `slope` (dy/dx): of a level line. What of the
-/// lower side stands on the ground is not known where the camera leans.
+/// Whether `a` stands lower in the image than `b`. `slope` (dy/dx): of a level line.
 bool reachesLower(const BoxMeasurement& a, const BoxMeasurement& b, double slope) {
   const double apart = 0.5 * (a.sides[0] + a.sides[2] - b.sides[0] - b.sides[2]);
   const double lower =

@@ -61,8 +61,7 @@ struct BoxDetection {
   std::array<bool, 4> beside_nearer{};
 };
 
-/// Marks `beside_nearer` of all boxes of an image. Of two things on one level ground the nearer one
-/// stands lower in the image, seen along gravity.
+/// Marks `beside_nearer` of all boxes. On level ground, nearer things stand lower in the image.
 void markSidesBesideNearer(std::vector<BoxDetection>& boxes, const View& view);
 /// Returns `hidden` and the sides beside nearer boxes.
 std::array<bool, 4> withSidesBesideNearer(std::array<bool, 4> hidden, const BoxDetection& box);
@@ -87,13 +86,11 @@ std::optional<std::vector<double>> topDownRatios(const Detection& detection, con
 /// Returns the class that the network prefers; "" if clutter is more likely than every class.
 std::string classSeenIn(const BoxDetection& detection, const Model& model);
 
-/// Returns the probability that an *other* object resembles a known class. `prior`: the share of
-/// such objects. `lookalike_nats`: the nats by which its observations resembled a known class.
+/// Returns the probability that an *other* object resembles a class, from `prior` and earlier nats.
 double lookalikeProbability(double prior, double lookalike_nats);
 
-/// Returns log g_k. A class that the model does not know is scored as *other*. `lookalike_nats`:
-/// the nats by which earlier observations of an *other* object resembled a known class. (A toy car
-/// resembles a car in every observation.)
+/// Returns log g_k; a class that the model does not know is scored as *other*. `lookalike_nats`:
+/// the nats by which an *other* object resembled a known class before, as a toy car does.
 double logRatio(const BoxDetection& detection, const Model& model, const std::string& class_name,
                 double lookalike_nats = 0.0);
 

@@ -21,9 +21,8 @@ struct PoseError {
   Matrix6d covariance = Matrix6d::Zero();
   /// Product of the transitions of all frames. A track of product A has C (B A⁻¹)ᵀ at product B.
   Matrix6d product = Matrix6d::Identity();
-  /// The covariance is what odometry reports. Its corrections shrink it, so that it and a
-  /// cross-covariance are no longer of one covariance (belief/pose_correlation.h). A walk only
-  /// grows.
+  /// The covariance is what odometry reports. Its corrections shrink it below what a
+  /// cross-covariance may belong to (belief/pose_correlation.h). A walk only grows.
   bool reported = false;
 };
 

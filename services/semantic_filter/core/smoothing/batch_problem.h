@@ -67,8 +67,7 @@ using SideRows =
 
 /// The measurement, linearised at one state: four rows for each keyframe.
 struct Stack {
-  /// [J r]: derivatives by geometry (and velocity), and z - h(x), px; 0 for a side that does not
-  /// count.
+  /// [J r]: derivatives by geometry (and velocity), and z - h(x), px; 0 for sides without a count.
   SideRows rows;
   ScratchVector<PoseJacobian> J_pose;
   ScratchVector<std::array<bool, 4>> counts;
@@ -87,11 +86,9 @@ struct SideCovariance {
   SideMatrix own;   ///< of noise, b and acceleration
   SideMatrix pose;  ///< of the pose errors; empty where poses are exact
 
-  /// Factorises the sum R, with `own` widened by the inflations of the keyframes. `pose` is not
-  /// widened: a common pose error that every keyframe scales differently would seem observed.
+  /// Factorises R with `own` widened by the inflations, but not `pose`: it would seem observed.
   void factorise(const PerKeyframe& inflations, Cholesky<SideMatrix>& R) const;
-  /// Returns the residuals r without the pose errors that are estimated from them. So a common pose
-  /// error contradicts nothing. `explained`: R⁻¹ r.
+  /// Returns the residuals r without the pose errors estimated from them. `explained`: R⁻¹ r.
   PerSide withoutPose(const PerSide& residual, const PerSide& explained) const;
   /// Returns the squared Mahalanobis distance of the residuals of one keyframe, given `own`.
   double deviation(const PerSide& residual, Eigen::Index keyframe) const;
@@ -108,8 +105,7 @@ struct Quadratic {
 /// Every x has b = 0. `inflations`: one for each keyframe, >= 1; widens all its sides.
 class BatchProblem {
  public:
-  /// The problem of hypotheses like `kind`: of its class, at rest or moving, whole or an upper
-  /// part. `start` is the mean of the yaw prior; the heading is what the azimuths say at `start`.
+  /// The problem of hypotheses like `kind`. `start`: mean of the yaw prior, and for the heading.
   BatchProblem(const KeyframeBatch& batch, const Hypothesis& kind, const State& start,
                const FrameContext& frame);
 
@@ -136,8 +132,7 @@ class BatchProblem {
   double logSpeedPrior() const;
   /// Returns log |Λ| of the size prior.
   double logSizePrior() const;
-  /// Returns the part of log |R| that belongs to no density: a cut side has a probability (that it
-  /// lies beyond the cut), and whether it counts depends on the state.
+  /// Returns the part of log |R| that belongs to no density: of cut sides and whether they count.
   double logVolumeOfCuts(const Stack& s, const PerKeyframe& inflations) const;
   /// Returns the covariance of all rows with the present b of deviations `sigma` (widths, heights).
   SideColumns<4> biasNow(const State& x, const Stack& s, const Eigen::Vector4d& sigma,

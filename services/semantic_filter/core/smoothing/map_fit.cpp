@@ -30,8 +30,7 @@ namespace {
 
 using Fit = MapFit::Fit;
 
-/// Sets the inflation of each keyframe (t distribution) and whether the keyframe contradicts x.
-/// Returns whether an inflation changed enough to matter.
+/// Sets inflation and contradiction of each keyframe. Returns whether an inflation changed much.
 bool inflateKeyframes(Fit& fit, double tail) {
   constexpr double kMatters = 0.1;
   const PerSide residual = fit.covariance->withoutPose(
@@ -93,8 +92,7 @@ class Damping {
   double value_ = 1e-4;
 };
 
-/// Takes one step and returns its predicted gain, squared deviations. Returns false if no damping
-/// gives a step that lowers the cost.
+/// Takes one step and returns its predicted gain, squared deviations; false if none helps.
 bool descend(const BatchProblem& model, Fit& fit, Damping& damping, double& predicted_gain) {
   const Quadratic q = model.quadratic(fit.x, gramOf(fit.whitened));
   const double cost = fit.squaredResidual() + model.priorCost(fit.x);
@@ -266,8 +264,7 @@ std::size_t MapFit::sides() const {
 }
 
 ResidualRatio MapFit::residualRatio() const {
-  // Robust weights leave this share of a squared Gaussian residual of four dimensions, because an
-  // inflation is never less than one.
+  // Robust weights, at most one, leave this share of a squared four-dimensional residual.
   constexpr double kShareAfterWeights = 0.83;
   const double free = static_cast<double>(sides()) - modelOf().dim();
   if (free <= 0.0) return {};

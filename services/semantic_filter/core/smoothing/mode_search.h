@@ -32,14 +32,12 @@ Hypothesis atRest(const Hypothesis& moving, const Keyframes& keyframes);
 /// Divides the weight of one class between rest and motion, by all keyframes and the ground.
 void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Fitted& at_rest,
                  const Fitted& in_motion, const FrameContext& frame);
-/// Divides the weight of the fitted hypotheses among them, by all keyframes and the ground. A mode
-/// that was reached twice counts once. A mode below `least` of the best gets the weight 0.
+/// Divides the weight of the fitted hypotheses by keyframes and ground. Modes below `least`: 0.
 void weighModes(std::vector<Hypothesis>& hs, const Fits& fits, double least);
 std::optional<Fitted> heaviest(const std::vector<Hypothesis>& hs, Fits&& fits);
 /// Fits from other starts of yaw and size, and adds the new modes to the track and to `fits`.
 void searchModes(Track& track, const KeyframeBatch& batch, const FrameContext& frame, Fits& fits);
-/// If the ground contradicts rest, fits a moving hypothesis, which the filter has given up: the
-/// object may move on the ground elsewhere. Returns nothing if there is no such fit.
+/// If the ground contradicts rest, fits a moving hypothesis, which the filter has given up.
 std::optional<Fitted> tryMoving(Track& track, const Fitted& at_rest, const KeyframeBatch& batch,
                                 const FrameContext& frame);
 /// Fits an *other* track as the class that it resembles, and adds what fits: the shape of an

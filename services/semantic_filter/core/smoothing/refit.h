@@ -10,18 +10,15 @@ namespace perdure::semantic_filter {
 /// Keeps the assigned box as a keyframe if its view is new. Returns whether to fit the track.
 bool considerKeyframe(Track& track, const BoxDetection& box, const std::array<bool, 4>& hidden,
                       const FrameContext& frame);
-/// Returns the number of new keyframes over the number that is awaited; from 1 on the track should
-/// be fitted. `fresh`: the share of new keyframes that is awaited.
+/// Returns the number of new keyframes over the awaited `fresh` share; from 1 on a fit is due.
 double refitNeed(const Track& track, double fresh);
 struct ResidualRatios {
   ResidualRatio sides, azimuths;
 };
-/// Fits the hypotheses of the track and weighs rest against motion in each class. Returns the
-/// residuals of the new keyframes, if the track may inform the noise scale.
+/// Fits the hypotheses and weighs rest against motion. Returns residuals for the noise scale.
 std::optional<ResidualRatios> refit(Track& track, const FrameContext& frame);
 
-/// Fits the tracks with the largest refitNeed, at most SmoothingParameters::per_frame, and learns
-/// noise scales and ground from them. The others wait.
+/// Fits the tracks with the largest refitNeed, and learns noise scales and ground from them.
 void refitNeediest(ScratchVector<Track*>& tracks, Belief& belief, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

@@ -89,8 +89,7 @@ double logShapeRatio(const CuboidFit& fit, const ClassPrior& prior, double yaw_s
   return -fit.cost - 0.5 * std::log(2.0 * M_PI * variance) + std::log(range);
 }
 
-/// Returns how much better the underside fits the ground than that of clutter, whose boxes are
-/// uniform in the image; 1 if nothing is known of the ground.
+/// Returns how much better the underside fits the ground than clutter; 1 for unknown ground.
 double groundRatio(Hypothesis& h, const FrameContext& frame) {
   const double log_ratio = updateWithGround(h, 0, frame);
   if (log_ratio == 0.0) return 1.0;
@@ -171,8 +170,7 @@ BoxDetection censoredBesideNearer(BoxDetection detection) {
   return detection;
 }
 
-/// Sets existence from the weights, normalises them, and enters the reasons of both in the ledger:
-/// the prior, the activations and, for the PMF, the geometry of the fits.
+/// Sets existence from the weights, normalises them, and enters the reasons of both in the ledger.
 void bookInitiation(Track& track, const ScratchVector<Candidate>& kept,
                     const BoxDetection& detection, const FrameContext& frame) {
   const double odds = frame.parameters->initiation.odds;

@@ -10,8 +10,7 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// Whether a track was detected only a few times, was never confirmed, and has been occluded or out
-/// of view for tentative_s. Most such tracks are false, so they are not kept.
+/// Whether a track has few hits, was never confirmed, and has been invisible for tentative_s.
 bool forgettable(const Track& o, const TrackParameters& parameters) {
   if (o.life.once_confirmed || o.life.hits > static_cast<std::uint32_t>(parameters.confirm_hits))
     return false;

@@ -37,8 +37,7 @@ bool hasEnoughHits(const Track& known, const Track& other) {
   return known.life.once_confirmed || kFewer * known.life.hits >= other.life.hits;
 }
 
-/// Whether two beliefs contradict each other. Then their mean would be wrong and more certain than
-/// either. The mean of two cuboids that are turned against each other has the shape of neither.
+/// Whether two beliefs contradict each other, so that their mean would be wrong and too certain.
 bool contradict(const Hypothesis& a, const Hypothesis& b) {
   constexpr double kTurned = 0.35;  // rad
   if (a.moving) return false;
@@ -102,8 +101,7 @@ void absorb(Track& a, Track& b, const FrameContext& frame) {
   mergeBatches(a, b, biasScales(frame.parameters->box), frame.parameters->smoothing);
 }
 
-/// Whether the images of two cuboids overlap as those of one object do. Objects side by side in the
-/// image are two, however close their estimated depths are.
+/// Whether two cuboids overlap in the image, as one object does and objects side by side do not.
 bool sameInImage(const State& a, const State& b, const Projector& from) {
   const auto box_a = projectCuboid(a, from), box_b = projectCuboid(b, from);
   if (!box_a || !box_b) return true;

@@ -26,8 +26,7 @@ void settleSlowHypotheses(Track& track, double min_speed) {
   }
 }
 
-/// Objects that move seldom creep: the Gaussian prior of their velocity gets a hole around zero.
-/// Without it, a parked car of unusual size passes for a creeping car of usual size.
+/// The Gaussian speed prior gets a hole around zero: moving objects seldom creep.
 void applySpeedPrior(Track& track, const ClassPriors& priors, const MotionParameters& motion) {
   if (!hasMoving(track)) return;
   for (auto& h : track.hypotheses) {
@@ -67,8 +66,7 @@ bool scaleIsUnknown(const Track& track, const TrackParameters& parameters) {
   return std::sqrt(variance) > parameters.scale_resolved * distance;
 }
 
-/// Removes hypotheses of implausible size: a car half as high as cars are is no car. Existence is
-/// multiplied by the share of the others, so that they are as likely as before.
+/// Removes hypotheses of implausible size. Existence is multiplied by the share of the others.
 void pruneMisshapen(Track& track, const ClassPriors& priors, double size_gate) {
   double lost = 0.0;
   std::erase_if(track.hypotheses.write(), [&](const Hypothesis& h) {

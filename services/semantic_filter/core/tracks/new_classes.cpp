@@ -84,8 +84,7 @@ double frequencyOf(const Track& track, const ClassPriors& priors) {
   return sum;
 }
 
-/// Returns the hypotheses of a class that enters: one for each mode and motion of the best class.
-/// Their weights sum to 1.
+/// Returns the entering hypotheses, one for each mode and motion of the best class; sum 1.
 std::vector<Hypothesis> recastAll(const Track& track, const ClassPrior& prior,
                                   const FrameContext& frame) {
   std::vector<Hypothesis> all;

@@ -26,8 +26,7 @@ struct Missing {
 
 bool isMissing(const Track& o) { return o.life.once_confirmed && o.existence < kMissing; }
 
-/// Whether most keyframes of the missing track had the new one's place in the image, empty: then
-/// the new track was carried there.
+/// Whether most keyframes of the missing track had the new one's place in the image, empty.
 bool wasInView(const Eigen::Vector3d& place, const Track& missing) {
   const auto& keyframes = missing.batch.keyframes;
   const auto count = std::count_if(keyframes.begin(), keyframes.end(), [&](const auto& k) {

@@ -22,8 +22,7 @@ AzimuthMatch matchAzimuth(double azimuth, const State& x, const View& view, doub
 /// Returns what one such azimuth adds to the log-odds of the heading, nats.
 double headingOdds(const AzimuthMatch& match);
 
-/// Returns the deviation of an azimuth, rad, as assumed before learning. `told`: what the network
-/// says, rad.
+/// Returns the deviation of an azimuth before learning. `told`: by the network; rad.
 double azimuthSigma(double told, const ClassPrior& prior);
 
 /// Updates the yaw (modulo 180°) by an EKF and the heading by its log-odds. `azimuth`, `sigma`:
@@ -32,8 +31,7 @@ double azimuthSigma(double told, const ClassPrior& prior);
 double updateWithAzimuth(Hypothesis& h, double azimuth, double sigma, double weight,
                          const FrameContext& frame);
 
-/// Updates all hypotheses by the azimuths of the boxes that may be the track's. Errors of azimuths
-/// are less correlated between observations than those of boxes. So their exponent is √`tempering`.
+/// Updates all hypotheses by the azimuths of possible boxes, with the exponent √`tempering`.
 void updateAzimuths(Track& track, const AllShares& shares, double tempering,
                     const ScratchVector<std::size_t>& gated, const std::vector<BoxDetection>& boxes,
                     const FrameContext& frame);

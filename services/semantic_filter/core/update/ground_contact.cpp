@@ -32,8 +32,7 @@ Eigen::Matrix<double, 1, 6> heightByPose(const Eigen::Vector3d& place, const Vie
   return a;
 }
 
-/// Returns what the boxes alone say of the underside, given the pose. It is nothing if parallax has
-/// not placed the object: sizes of one class have common errors.
+/// Returns what the boxes alone say of the underside, given the pose; nothing without parallax.
 GroundContact groundContactOf(const Hypothesis& h, const FrameContext& frame) {
   const Matrix6d& P_pose = frame.pose_error.covariance;
   const double distance = (h.x.head<3>() - frame.view.T_WC().p).norm();

@@ -23,8 +23,7 @@ Eigen::Vector4d stationaryBias(const State& x, const RigidTransform& T_WC, const
   return biasSigma(walk.lasting, width, std::max(scale * size.z(), 1.0));
 }
 
-/// b is an Ornstein-Uhlenbeck process along the view change. A pixel is a smaller share of the box
-/// when the object is nearer.
+/// b is an Ornstein-Uhlenbeck process along the view change, relative to the box's size.
 void predictBias(Hypothesis& h, const std::optional<RigidTransform>& last, const ViewWalk& walk) {
   const Eigen::Vector4d sigma = stationaryBias(h.x, walk.T_WC, walk);
   Eigen::Vector4d keep = Eigen::Vector4d::Zero();

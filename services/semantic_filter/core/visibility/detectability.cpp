@@ -65,8 +65,7 @@ void predictDetectability(Track& track, const ViewWalk& walk) {
   const double stationary = stationaryOccluder(track, place, walk);
   track.detectability.unmapped_occluder =
       stationary + keep * (track.detectability.unmapped_occluder - stationary);
-  // A moving track that is not detected is lost rather than hard to detect: it would take the boxes
-  // of objects that stand where it was lost.
+  // A moving undetected track is lost rather than hard to detect: it would take other boxes.
   track.detectability.hard_to_detect =
       track.best().moving
           ? 0.0

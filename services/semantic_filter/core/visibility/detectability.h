@@ -14,8 +14,7 @@ double detectableShare(const Track& track, double hard_detection_share);
 /// Returns P_D of a class for a fully visible object. `size_px`: root of its box's area.
 double detectionProbability(const ClassPrior& prior, double size_px, const FrameContext& frame);
 
-/// Returns P_D of a hypothesis. *Other* is detected as often as the class that it resembles, as far
-/// as it resembles it.
+/// Returns P_D of a hypothesis. *Other* is detected as far as it resembles a class.
 double detectionProbabilityOf(const Hypothesis& hypothesis, const Track& track, double size_px,
                               const FrameContext& frame);
 /// Returns the factor on P_D by earlier visits at this viewpoint; 1 for a moving track.

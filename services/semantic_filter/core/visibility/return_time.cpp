@@ -108,8 +108,7 @@ double shareToBeFound(const ScratchVector<Standing>& things, const View& now,
   return shareInSight(things, now, parameters) < least ? least : sure;
 }
 
-/// Returns the first frame after the present one in which the first of `things` has the visible
-/// fraction `share`.
+/// Returns the first later frame with the visible fraction `share` of the first of `things`.
 std::optional<std::size_t> firstInSight(const ScratchVector<Standing>& things, const Walk& walk,
                                         double share, double frame_s,
                                         const VisibilityParameters& parameters) {
@@ -126,8 +125,7 @@ std::optional<std::size_t> firstInSight(const ScratchVector<Standing>& things, c
   return std::nullopt;
 }
 
-/// Returns the frames after `first` until it is almost surely detected. An object of which little
-/// is visible is detected late.
+/// Returns the frames after `first` until it is almost surely detected.
 std::size_t framesToFind(const ScratchVector<Standing>& things, const Walk& walk, std::size_t first,
                          const VisibilityParameters& parameters) {
   constexpr double kMissed = 0.05;
@@ -139,8 +137,7 @@ std::size_t framesToFind(const ScratchVector<Standing>& things, const Walk& walk
   return n - first;
 }
 
-/// Returns deviations of state, one standard deviation each, that move the edges which hide the
-/// object.
+/// Returns deviations of state, one sigma each, that move the edges which hide the object.
 ScratchVector<State> deviationsOf(const Standing& thing, const Eigen::Vector3d& eye) {
   const StateCovariance& P = thing.track->best().P;
   const Eigen::Vector3d ray = (thing.x.head<3>() - eye).normalized();
@@ -158,8 +155,7 @@ ScratchVector<State> deviationsOf(const Standing& thing, const Eigen::Vector3d& 
   return deviations;
 }
 
-/// Squared distances of the two ends of the interval from the expected time. The ends differ: a
-/// body that slows down may not come round at all.
+/// Squared distances of the ends of the interval from the expected time; they differ.
 struct Spread {
   Spread(double expected_s, double frame_s)
       : expected(expected_s), early(frame_s * frame_s), late(early) {}

@@ -104,14 +104,13 @@ std::optional<Duration> ImuBuffer::period() const {
   return steps[steps.size() / 2];
 }
 
-void ImuBuffer::dropBefore(Values& values, TimePoint time) {
-  while (values.size() > 2 && values[1].time < time) values.pop_front();
-}
-
 void ImuBuffer::dropBefore(TimePoint time) {
-  while (raw_.size() > 2 && raw_[1].time < time) raw_.pop_front();
-  dropBefore(rates_, time);
-  dropBefore(forces_, time);
+  const auto drop = [time](auto& items) {
+    while (items.size() > 2 && items[1].time < time) items.pop_front();
+  };
+  drop(raw_);
+  drop(rates_);
+  drop(forces_);
 }
 
 }  // namespace perdure::vio

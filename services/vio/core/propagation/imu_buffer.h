@@ -51,7 +51,6 @@ class ImuBuffer {
   static Eigen::Vector3d at(const Values& values, TimePoint time);
   static double spanAt(const Values& values, TimePoint time);
   ImuReading reading(TimePoint time) const;
-  static void dropBefore(Values& values, TimePoint time);
 
   std::deque<ImuReading> raw_;  ///< samples as received
   Values rates_, forces_;       ///< values without the saturated ones

@@ -28,8 +28,7 @@ constexpr double kMostLinearPx = 3.0;    // residual of the linear solution
 constexpr double kFewestParallaxPx = 2.0;
 constexpr double kMostAcceleration = 5.0;  // m/s², mean over a window
 
-/// Bearing of the point at the camera's attitude at the middle row. turn_C: rotation of the camera
-/// from the first to the last row.
+/// Bearing at the attitude of the middle row. turn_C: rotation of C from first to last row.
 Vector3d bearing(const ImagePoint& seen, const Vector3d& turn_C) {
   const Vector3d ray = seen.normalised.homogeneous().normalized();
   return turn_C.isZero(0.0) ? ray : Vector3d(expQuaternion(seen.row * turn_C) * ray);
@@ -78,8 +77,7 @@ double coplanarity(const BearingPair& pair, const Matrix3d& R_C0_C1) {
   return Eigen::SelfAdjointEigenSolver<Matrix3d>(M, Eigen::EigenvaluesOnly).eigenvalues()[0];
 }
 
-/// Gyro bias for which the epipolar normals of each pair are closest to coplanar (Kneip & Lynen,
-/// ICCV 2013; He et al., CVPR 2023).
+/// Gyro bias of coplanar epipolar normals (Kneip & Lynen, ICCV 2013; He et al., CVPR 2023).
 Vector3d gyroBiasFromPairs(const std::vector<BearingPair>& pairs, const Matrix3d& R_BC) {
   const auto residuals = [&](const Vector3d& bias) {
     Eigen::VectorXd r(static_cast<Eigen::Index>(pairs.size()));

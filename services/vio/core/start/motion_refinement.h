@@ -32,8 +32,7 @@ struct WindowPose {
   Eigen::Vector3d p_B0 = Eigen::Vector3d::Zero(), v_B0 = Eigen::Vector3d::Zero();
 };
 
-/// Estimated quantities. Rotation and position of the first pose are fixed, because it is the frame
-/// of reference.
+/// Estimated quantities. The first pose is the frame of reference: its R and p are fixed.
 struct MotionWindow {
   std::vector<WindowPose> poses;
   std::vector<WindowPoint> points;
@@ -45,8 +44,7 @@ struct MotionWindow {
 /// Error of the newest pose and of the window's parameters: [θ, v (B0), gravity (2), b_g, b_a].
 inline constexpr int kWindowError = 14;
 using WindowCovariance = Eigen::Matrix<double, kWindowError, kWindowError>;
-/// Two directions perpendicular to gravity, scaled by its length. The product with gravity's two
-/// error components is its error in B0.
+/// Two directions across gravity of its length: times two error components, the error in B0.
 Eigen::Matrix<double, 3, 2> acrossGravity(const Eigen::Vector3d& gravity_B0);
 
 struct RefinedWindow {

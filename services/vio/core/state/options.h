@@ -18,8 +18,7 @@ struct ImuNoise {
   double interpolation_from_s = 0.02;
   double interpolation_gyro = 0.005;  ///< rad/s per sample, lower limit of that error
   double interpolation_accel = 0.1;   ///< m/s² per sample, lower limit of that error
-  /// A longer time without samples is a gap. Noise is added for the motion of the body during the
-  /// gap.
+  /// A longer time without samples is a gap, in which noise is added for the body's motion.
   double gap_from_s = 0.2;
   double gap_gyro = 0.3;   ///< rad/s
   double gap_accel = 1.5;  ///< m/s²

@@ -13,8 +13,7 @@ constexpr double kTurnRate = 0.3, kAcceleration = 1.5;
 // Factor for the lost correlations with the window.
 constexpr double kInflation = 1.5;
 
-/// Calls `each` for every number of the state in the order of the text. T_BC, readout_s and
-/// covariance have their sizes.
+/// Calls `each` for every number of the state in the order of the text; sizes are set.
 template <class State, class Each>
 void forNumbers(State& s, Each each) {
   const auto all = [&](auto&& m) {

@@ -51,8 +51,7 @@ class Tracker {
                      const Eigen::Vector3d& turn_of_readout = Eigen::Vector3d::Zero());
   /// Quantile of the points' image motion, px, over the last `frames`. Empty for too few points.
   std::optional<double> motionSince(std::size_t frames, double quantile = 0.5) const;
-  /// Share of the points that have stayed within half a pixel for the last `frames` images. 0 if
-  /// these points are few or close together, because they are then no background.
+  /// Share of points still within half a pixel for `frames` images; 0 if few or close together.
   double stillShare(std::size_t frames) const;
   /// Clears all tracks. Ids continue.
   void reset();

@@ -18,8 +18,7 @@ struct UpdateCounts {
   int behind = 0;  ///< not triangulated because the rays do not meet in front of the cameras
 };
 
-/// Triangulates and gates each track, and updates the state once with all tracks that pass.
-/// Failures are counted under their reasons. Fails only if the update fails.
+/// Triangulates and gates each track, counts failures, and updates once. Fails with the update.
 Result<UpdateCounts> updateMsckf(State& state, const std::vector<const Track*>& tracks,
                                  const VisionOptions& options, ReasonCounts& reasons);
 

@@ -47,8 +47,7 @@ class Standstill {
   std::optional<TimePoint> confirmed_;    ///< when the images last confirmed the standstill
   std::optional<TimePoint> interrupted_;  ///< time since which the IMU contradicts it
   TimePoint begun_;                       ///< when the images first confirmed it
-  /// Expectation with its time. The filter attributes a slow acceleration to a bias, so the
-  /// expectation must be older than the acceleration.
+  /// Expectation with its time, older than a slow acceleration, which the filter takes for a bias.
   struct Reference {
     TimePoint time;
     RestExpectation expected;

@@ -35,8 +35,7 @@ Result<Triangulated> triangulate(const std::vector<Ray>& rays, const VisionOptio
 /// Rays of a track from the clones that saw it.
 std::vector<Ray> raysOf(const Track& track, const State& state, double sigma_px);
 
-/// Cross-covariance with the pose [θ, p] of a point that moves rigidly with T_WB: δp_W = −R [p_B]×
-/// θ + δp + R δp_B.
+/// Cross-covariance with the pose [θ, p] of a point rigid with T_WB: −R [p_B]× θ + δp + R δp_B.
 Eigen::Matrix<double, 3, 6> crossOfRigid(const Eigen::Vector3d& p_W, const RigidTransform& T_WB,
                                          const Matrix6d& pose_covariance);
 

@@ -18,13 +18,11 @@ struct SizePrior {
 /// of the height up to a half, and the width of the object.
 SizePrior sizePriorOf(const ClassPrior& prior, bool upper_part);
 
-/// Whether it has less than half of the usual height. Only such a cuboid is of an upper part: what
-/// is higher and too short is hidden at a side.
+/// Whether it has less than half of the usual height, as only the cuboid of an upper part has.
 bool lessThanHalf(const Hypothesis& h, const ClassPrior& prior);
 
-/// Returns the belief of the whole object: the top stays, and height and length are what the class
-/// says of an object that is at least as large as what is seen. A hypothesis of the whole object
-/// stays as it is. Objects are taken for upright along z of W, which is level to some degrees.
+/// Returns the belief of the whole object: the top stays; height and length follow from the class,
+/// given what is seen. Objects are upright along z of W, which is level to some degrees.
 Hypothesis wholeOf(const Hypothesis& h, const ClassPrior& prior);
 
 }  // namespace perdure::semantic_filter
