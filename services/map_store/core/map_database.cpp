@@ -63,7 +63,7 @@ MapDatabase::MapDatabase(OpenedStore opened, const StoreOptions& options)
   const auto ready = attempt([&] {
     keepTileSize();
     rememberWorking();
-    need(options.outbox ? openOutbox(connection_) : dropOutbox(connection_));
+    options.outbox ? openOutbox(connection_) : dropOutbox(connection_);
   });
   if (!ready) {
     throw StartupError(ExitCode::kUnavailable,
@@ -284,7 +284,7 @@ Result<Written> MapDatabase::write(const Batch& batch) {
     Change change;
     Written written = putAll(batch, change);
     if (batch.graph != nullptr) written.unsound = writeGraph(connection_, *batch.graph);
-    if (batch.acknowledged > 0) need(acknowledge(connection_, batch.acknowledged));
+    if (batch.acknowledged > 0) acknowledge(connection_, batch.acknowledged);
     need(transaction.commit());
     remember(*batch.working, change);
     graph_is_whole_ = graph_is_whole_ || batch.graph != nullptr;
