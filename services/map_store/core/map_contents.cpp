@@ -57,16 +57,16 @@ void takeObject(const Statement& row, WholeMap& map) {
   map.contents.objects.insert_or_assign(id, std::move(object));
 }
 
-Result<void> readObjects(const Connection& connection, WholeMap& map) {
-  return connection.forRows(
-      "SELECT world, epoch, gone, belief, gone_ns, "
-      "coalesce(merged_into, 0) FROM objects ORDER BY id",
-      [&](const Statement& row) { takeObject(row, map); });
+void readObjects(const Connection& connection, WholeMap& map) {
+  need(
+      connection.forRows("SELECT world, epoch, gone, belief, gone_ns, "
+                         "coalesce(merged_into, 0) FROM objects ORDER BY id",
+                         [&](const Statement& row) { takeObject(row, map); }));
 }
 
-Result<void> readProvenance(const Connection& connection, MapContents& map) {
-  if (!connection.has("provenance").value_or(false)) return {};
-  return connection.forRows(
+void readProvenance(const Connection& connection, MapContents& map) {
+  if (!connection.has("provenance").value_or(false)) return;
+  need(connection.forRows(
       "SELECT map_first, map_second, old_id, id, first_seen_ns, last_seen_ns FROM "
       "provenance ORDER BY rowid",
       [&](const Statement& row) {
@@ -75,12 +75,12 @@ Result<void> readProvenance(const Connection& connection, MapContents& map) {
                                row.id(3),
                                fromNanoseconds(row.integer(4)),
                                fromNanoseconds(row.integer(5))});
-      });
+      }));
 }
 
-Result<void> readChanges(const Connection& connection, MapContents& map) {
-  if (!connection.has("changes").value_or(false)) return {};
-  return connection.forRows(
+void readChanges(const Connection& connection, MapContents& map) {
+  if (!connection.has("changes").value_or(false)) return;
+  need(connection.forRows(
       "SELECT map_world, map_epoch, by_world, by_epoch, id, kind, class, x, y, z, "
       "last_seen_ns, since_ns FROM changes ORDER BY rowid",
       [&](const Statement& row) {
@@ -94,25 +94,23 @@ Result<void> readChanges(const Connection& connection, MapContents& map) {
         change.last_seen = fromNanoseconds(row.integer(10));
         change.since = fromNanoseconds(row.integer(11));
         map.changes.push_back(std::move(change));
-      });
+      }));
 }
 
-Result<void> readMeta(const Connection& connection, WholeMap& map) {
-  return connection.forRows("SELECT key, value FROM meta", [&](const Statement& row) {
+void readMeta(const Connection& connection, WholeMap& map) {
+  need(connection.forRows("SELECT key, value FROM meta", [&](const Statement& row) {
     if (row.text(0) == "revision") map.revision = row.id(1);
     if (row.text(0) == "tile_size_m" && row.real(1) > 0.0) map.tile_size_m = row.real(1);
     if (row.text(0) == "earth_anchor") map.earth_anchor = row.text(1);
-  });
+  }));
 }
 
-Result<void> readWhole(const Connection& connection, WholeMap& map) {
-  const auto version = connection.integer("PRAGMA user_version");
-  if (!version) return tl::unexpected<Reason>(version.error());
-  map.schema = *version;
-  auto graph = readGraph(connection);
-  if (!graph) return tl::unexpected<Reason>(graph.error());
-  map.malformed += graph->malformed;
-  map.contents.graph = std::move(graph->map);
+WholeMap readWhole(const Connection& connection) {
+  WholeMap map;
+  map.schema = need(connection.integer("PRAGMA user_version"));
+  auto graph = need(readGraph(connection));
+  map.malformed += graph.malformed;
+  map.contents.graph = std::move(graph.map);
   // A united map cannot be divided again: each object becomes one track.
   map.contents.graph.tracks.clear();
   map.contents.graph.facts.clear();
@@ -120,16 +118,16 @@ Result<void> readWhole(const Connection& connection, WholeMap& map) {
     record.sighting.in_anchor.id = id;
     if (record.earlier) record.earlier->in_anchor.id = id;
   }
-  auto done = readObjects(connection, map);
-  if (done) done = readProvenance(connection, map.contents);
-  if (done) done = readChanges(connection, map.contents);
-  if (done) done = readMeta(connection, map);
+  readObjects(connection, map);
+  readProvenance(connection, map.contents);
+  readChanges(connection, map.contents);
+  readMeta(connection, map);
   // Records of objects without a row in the map, or with a row of history only.
   std::erase_if(map.contents.graph.records, [&](const auto& each) {
     const auto object = map.contents.objects.find(each.first);
     return object == map.contents.objects.end() || object->second.ended.has_value();
   });
-  return done;
+  return map;
 }
 
 Batch wholeBatch(const WholeMap& map, const Objects& working, const mapping::Unsaved& graph) {
@@ -160,47 +158,36 @@ Objects emptyWorkingSet(const WholeMap& map) {
   return working;
 }
 
-Result<void> writeProvenance(const Connection& connection, const MapContents& map) {
-  auto insert = connection.prepare("INSERT INTO provenance VALUES(?1, ?2, ?3, ?4, ?5, ?6)");
-  if (!insert) return tl::unexpected<Reason>(insert.error());
+void writeProvenance(const Connection& connection, const MapContents& map) {
+  auto insert = need(connection.prepare("INSERT INTO provenance VALUES(?1, ?2, ?3, ?4, ?5, ?6)"));
   for (const Origin& origin : map.origins) {
-    const auto done = insert
-                          ->bindAll(origin.map.first, origin.map.second, origin.id, origin.now,
-                                    origin.first_seen, origin.last_seen)
-                          .run();
-    if (!done) return done;
+    insert.bindAll(origin.map.first, origin.map.second, origin.id, origin.now, origin.first_seen,
+                   origin.last_seen);
+    need(insert.run());
   }
-  return {};
 }
 
-Result<void> writeChanges(const Connection& connection, const MapContents& map) {
-  auto insert = connection.prepare(
-      "INSERT INTO changes VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)");
-  if (!insert) return tl::unexpected<Reason>(insert.error());
+void writeChanges(const Connection& connection, const MapContents& map) {
+  auto insert = need(connection.prepare(
+      "INSERT INTO changes VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)"));
   for (const Change& change : map.changes) {
-    insert->bindAll(change.id, change.kind, change.class_name, change.map.world, change.map.epoch,
-                    change.p_M.x(), change.p_M.y(), change.p_M.z(), change.last_seen, change.since,
-                    change.by.world, change.by.epoch);
-    const auto done = insert->run();
-    if (!done) return done;
+    insert.bindAll(change.id, change.kind, change.class_name, change.map.world, change.map.epoch,
+                   change.p_M.x(), change.p_M.y(), change.p_M.z(), change.last_seen, change.since,
+                   change.by.world, change.by.epoch);
+    need(insert.run());
   }
-  return {};
 }
 
 /// Adds the tables that MapDatabase does not write, and puts all data into one file.
-Result<void> completeFile(const WholeMap& map, const std::string& path) {
-  auto connection = Connection::open(path, Connection::Mode::kReadWriteCreate);
-  if (!connection) return tl::unexpected<Reason>(connection.error());
-  auto transaction = Transaction::begin(*connection);
-  if (!transaction) return tl::unexpected<Reason>(transaction.error());
-  auto done =
-      connection->execute(std::string(kFusionSchema) + "REPLACE INTO meta VALUES('revision', " +
-                          std::to_string(static_cast<std::int64_t>(map.revision)) + ");");
-  if (done) done = writeProvenance(*connection, map.contents);
-  if (done) done = writeChanges(*connection, map.contents);
-  if (done) done = transaction->commit();
-  if (done) done = connection->execute("PRAGMA journal_mode=DELETE");
-  return done;
+void completeFile(const WholeMap& map, const std::string& path) {
+  const auto connection = need(Connection::open(path, Connection::Mode::kReadWriteCreate));
+  auto transaction = need(Transaction::begin(connection));
+  need(connection.execute(std::string(kFusionSchema) + "REPLACE INTO meta VALUES('revision', " +
+                          std::to_string(static_cast<std::int64_t>(map.revision)) + ");"));
+  writeProvenance(connection, map.contents);
+  writeChanges(connection, map.contents);
+  need(transaction.commit());
+  need(connection.execute("PRAGMA journal_mode=DELETE"));
 }
 
 [[noreturn]] void cannotWriteWhole(const std::string& path, const Reason& reason) {
@@ -217,26 +204,18 @@ void writeWholeDraft(const WholeMap& map, const std::string& path, const std::st
   const Objects working = emptyWorkingSet(map);
   mapping::Unsaved graph;
   graph.changed = map.contents.graph;
-  {
-    MapDatabase database({draft, map.tile_size_m, max_size_mb, false});
-    const auto written = database.write(wholeBatch(map, working, graph));
-    if (!written) cannotWriteWhole(path, written.error());
-  }
-  const auto done = completeFile(map, draft);
+  const auto done = attempt([&] {
+    need(MapDatabase({draft, map.tile_size_m, max_size_mb, false})
+             .write(wholeBatch(map, working, graph)));
+    completeFile(map, draft);
+  });
   if (!done) cannotWriteWhole(path, done.error());
 }
 
 }  // namespace
 
 Result<WholeMap> readWholeMap(const Connection& connection) {
-  auto done = connection.execute("SAVEPOINT whole_map");
-  if (!done) return tl::unexpected<Reason>(done.error());
-  WholeMap map;
-  done = readWhole(connection, map);
-  const auto released = connection.execute("RELEASE whole_map");
-  if (!done) return tl::unexpected<Reason>(done.error());
-  if (!released) return tl::unexpected<Reason>(released.error());
-  return map;
+  return inOneState(connection, [&] { return readWhole(connection); });
 }
 
 void checkNewFile(const std::string& path, bool replace) {

@@ -63,7 +63,7 @@ MapDatabase::MapDatabase(OpenedStore opened, const StoreOptions& options)
   const auto ready = attempt([&] {
     keepTileSize();
     rememberWorking();
-    need(options.outbox ? openOutbox(connection_) : dropOutbox(connection_));
+    options.outbox ? openOutbox(connection_) : dropOutbox(connection_);
   });
   if (!ready) {
     throw StartupError(ExitCode::kUnavailable,
@@ -280,11 +280,11 @@ Result<Written> MapDatabase::write(const Batch& batch) {
   return attempt([&] {
     auto transaction = need(Transaction::begin(connection_));
     // The sweep must precede the reuse of ids.
-    if (batch.graph != nullptr && !graph_is_whole_) need(sweepGraph(connection_));
+    if (batch.graph != nullptr && !graph_is_whole_) sweepGraph(connection_);
     Change change;
     Written written = putAll(batch, change);
-    if (batch.graph != nullptr) written.unsound = need(writeGraph(connection_, *batch.graph));
-    if (batch.acknowledged > 0) need(acknowledge(connection_, batch.acknowledged));
+    if (batch.graph != nullptr) written.unsound = writeGraph(connection_, *batch.graph);
+    if (batch.acknowledged > 0) acknowledge(connection_, batch.acknowledged);
     need(transaction.commit());
     remember(*batch.working, change);
     graph_is_whole_ = graph_is_whole_ || batch.graph != nullptr;
@@ -321,7 +321,7 @@ Written MapDatabase::putAll(const Batch& batch, Change& change) {
     change.shut_out.insert(id);
   }
   for (const ObjectId object : change.to_derive) derive(object, batch, change);
-  if (batch.facts != nullptr) need(writeFacts(connection_, *batch.facts));
+  if (batch.facts != nullptr) writeFacts(connection_, *batch.facts);
   putWorking(*batch.working, change);
   if (!batch.earth_anchor.empty()) {
     need(connection_.run("REPLACE INTO meta VALUES('earth_anchor', ?1)", batch.earth_anchor));

@@ -112,20 +112,19 @@ Result<Statement> statementFor(const Connection& connection, const MapQuery& que
 }
 
 /// Returns the beliefs of the working set. Confirmed ones are in `tracks` or `objects`.
-Result<std::vector<ObjectBelief>> workingBeliefs(const Connection& connection) {
-  const auto has_tracks = connection.has("tracks");  // older maps have no such table
-  if (!has_tracks) return tl::unexpected<Reason>(has_tracks.error());
+std::vector<ObjectBelief> workingBeliefs(const Connection& connection) {
+  const bool has_tracks = need(connection.has("tracks"));  // older maps have no such table
   std::vector<ObjectBelief> beliefs;
-  const auto read = connection.forRows(
-      *has_tracks ? "SELECT coalesce(w.belief, t.belief, o.belief) FROM working w "
-                    "LEFT JOIN tracks t ON t.id = w.id LEFT JOIN objects o ON o.id = w.id "
-                    "ORDER BY w.position"
-                  : "SELECT coalesce(w.belief, o.belief) FROM working w "
-                    "LEFT JOIN objects o ON o.id = w.id ORDER BY w.position",
+  need(connection.forRows(
+      has_tracks ? "SELECT coalesce(w.belief, t.belief, o.belief) FROM working w "
+                   "LEFT JOIN tracks t ON t.id = w.id LEFT JOIN objects o ON o.id = w.id "
+                   "ORDER BY w.position"
+                 : "SELECT coalesce(w.belief, o.belief) FROM working w "
+                   "LEFT JOIN objects o ON o.id = w.id ORDER BY w.position",
       [&](const Statement& row) {
         if (auto belief = decodeBelief(row.blob(0))) beliefs.push_back(std::move(*belief));
-      });
-  return read.map([&] { return std::move(beliefs); });
+      }));
+  return beliefs;
 }
 
 }  // namespace
@@ -159,9 +158,9 @@ MapObject mapObjectOf(const ObjectBelief& belief, const WorldId& world) {
 Result<Found> MapReader::find(const MapQuery& query, const WorldId& newest,
                               std::uint32_t limit) const {
   const WorldId world = query.world.world != 0 ? query.world : newest;
-  auto statement = statementFor(*connection_, query, world);
-  if (!statement) return tl::unexpected<Reason>(statement.error());
-  return collect(*statement, limit, query.kind == MapQueryKind::kById);
+  return statementFor(*connection_, query, world).and_then([&](Statement statement) {
+    return collect(statement, limit, query.kind == MapQueryKind::kById);
+  });
 }
 
 Result<std::vector<PlacedBelief>> MapReader::beliefs() const {
@@ -180,20 +179,19 @@ Result<Found> MapReader::inFullNear(const Eigen::Vector3d& centre, double radius
   MapQuery query;
   query.low = centre;
   query.radius = radius;
-  auto statement = byRadius(*connection_, query, world);
-  if (!statement) return tl::unexpected<Reason>(statement.error());
-  return collect(*statement, limit, true);
+  return byRadius(*connection_, query, world).and_then([&](Statement statement) {
+    return collect(statement, limit, true);
+  });
 }
 
 Result<std::optional<PlacedBelief>> MapReader::beliefOf(TrackId track) const {
-  const auto placed = connection_->first(
-      "SELECT world, epoch, 0, 0, belief FROM tracks WHERE id = ?1 AND gone = 0 UNION ALL "
-      "SELECT world, epoch, visibility, memory, belief FROM objects WHERE id = ?1 AND gone = 0 "
-      "AND NOT EXISTS (SELECT 1 FROM tracks WHERE id = ?1) LIMIT 1",
-      beliefFrom, track);
-  if (!placed) return tl::unexpected<Reason>(placed.error());
-  if (!*placed) return std::optional<PlacedBelief>();
-  return (*placed)->map([](const PlacedBelief& belief) { return std::optional(belief); });
+  return attempt([&] {
+    return need(connection_->first(
+        "SELECT world, epoch, 0, 0, belief FROM tracks WHERE id = ?1 AND gone = 0 UNION ALL "
+        "SELECT world, epoch, visibility, memory, belief FROM objects WHERE id = ?1 AND gone = 0 "
+        "AND NOT EXISTS (SELECT 1 FROM tracks WHERE id = ?1) LIMIT 1",
+        [](const Statement& row) { return need(beliefFrom(row)); }, track));
+  });
 }
 
 Result<Found> MapReader::byIds(const std::vector<ObjectId>& ids, std::size_t limit) const {
@@ -236,30 +234,25 @@ Result<std::vector<ObjectId>> MapReader::mergedInto(ObjectId id) const {
 }
 
 Result<std::optional<Objects>> MapReader::working() const {
-  auto header = connection_->first("SELECT value FROM meta WHERE key = 'working'",
-                                   [](const Statement& row) { return decodeHeader(row.blob(0)); });
-  if (!header) return tl::unexpected<Reason>(header.error());
-  if (!*header) return std::optional<Objects>();
-  Result<Objects>& working = **header;
-  if (!working) return tl::unexpected<Reason>(working.error());
-  auto beliefs = workingBeliefs(*connection_);
-  if (!beliefs) return tl::unexpected<Reason>(beliefs.error());
-  working->objects = std::move(*beliefs);
-  return std::optional<Objects>(std::move(*working));
+  return attempt([&] {
+    auto working = need(
+        connection_->first("SELECT value FROM meta WHERE key = 'working'",
+                           [](const Statement& row) { return need(decodeHeader(row.blob(0))); }));
+    if (working) working->objects = workingBeliefs(*connection_);
+    return working;
+  });
 }
 
 Result<std::set<std::uint64_t>> MapReader::worlds() const {
-  const auto has_graph = connection_->has("anchors");
-  if (!has_graph) return tl::unexpected<Reason>(has_graph.error());
-  std::set<std::uint64_t> worlds;
-  const auto read = connection_->forRows(std::string("SELECT DISTINCT world FROM objects") +
-                                             (*has_graph ? " UNION SELECT world FROM anchors" : ""),
-                                         [&](const Statement& row) { worlds.insert(row.id(0)); });
-  if (!read) return tl::unexpected<Reason>(read.error());
-  const auto last = working();
-  if (!last) return tl::unexpected<Reason>(last.error());
-  if (*last) worlds.insert((*last)->world.world);
-  return worlds;
+  return attempt([&] {
+    const bool has_graph = need(connection_->has("anchors"));
+    std::set<std::uint64_t> worlds;
+    need(connection_->forRows(std::string("SELECT DISTINCT world FROM objects") +
+                                  (has_graph ? " UNION SELECT world FROM anchors" : ""),
+                              [&](const Statement& row) { worlds.insert(row.id(0)); }));
+    if (const auto last = need(working())) worlds.insert(last->world.world);
+    return worlds;
+  });
 }
 
 Result<std::string> MapReader::earthAnchor() const {

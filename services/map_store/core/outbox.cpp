@@ -66,59 +66,46 @@ std::string removal() {
   return sql;
 }
 
-Result<std::string> text(const Connection& connection, std::string_view sql) {
-  return connection.first(sql, [](const Statement& row) { return row.text(0); }).map([](auto text) {
-    return std::move(text).value_or("");
-  });
+std::string text(const Connection& connection, std::string_view sql) {
+  return need(connection.first(sql, [](const Statement& row) { return row.text(0); })).value_or("");
 }
 
 }  // namespace
 
-Result<void> openOutbox(const Connection& connection) {
-  auto transaction = Transaction::begin(connection);
-  if (!transaction) return tl::unexpected<Reason>(transaction.error());
-  const auto follows_all = connection.has("outbox_views_INSERT");
-  if (!follows_all) return tl::unexpected<Reason>(follows_all.error());
-  if (*follows_all) return {};
-  const auto made = connection.execute(removal() + schema());
-  return made ? transaction->commit() : made;
+void openOutbox(const Connection& connection) {
+  auto transaction = need(Transaction::begin(connection));
+  if (need(connection.has("outbox_views_INSERT"))) return;  // it follows all tables
+  need(connection.execute(removal() + schema()));
+  need(transaction.commit());
 }
 
-Result<void> dropOutbox(const Connection& connection) {
-  const auto there = connection.has("outbox");
-  if (!there) return tl::unexpected<Reason>(there.error());
-  if (!*there) return {};
-  auto transaction = Transaction::begin(connection);
-  if (!transaction) return tl::unexpected<Reason>(transaction.error());
-  const auto dropped = connection.execute(removal());
-  return dropped ? transaction->commit() : dropped;
+void dropOutbox(const Connection& connection) {
+  if (!need(connection.has("outbox"))) return;
+  auto transaction = need(Transaction::begin(connection));
+  need(connection.execute(removal()));
+  need(transaction.commit());
 }
 
-Result<void> acknowledge(const Connection& connection, std::int64_t number) {
+void acknowledge(const Connection& connection, std::int64_t number) {
   for (const char* sql :
        {"DELETE FROM outbox WHERE number <= ?1",
         "UPDATE meta SET value = ?1 WHERE key = 'outbox_acknowledged' AND value < ?1"}) {
-    const auto done = connection.run(sql, number);
-    if (!done) return done;
+    need(connection.run(sql, number));
   }
-  return {};
 }
 
 Result<OutboxMark> outboxMark(const Connection& connection) {
-  const auto there = connection.has("outbox");
-  if (!there) return tl::unexpected<Reason>(there.error());
-  if (!*there) return fail("no_outbox", "the map's file has no outbox");
-  const auto file = text(connection, "SELECT value FROM meta WHERE key = 'file'");
-  const auto outbox = text(connection, "SELECT value FROM meta WHERE key = 'outbox'");
-  const auto acknowledged =
-      connection.integer("SELECT value FROM meta WHERE key = 'outbox_acknowledged'");
-  const auto last =
-      connection.integer("SELECT coalesce(max(seq), 0) FROM sqlite_sequence WHERE name = 'outbox'");
-  if (!file) return tl::unexpected<Reason>(file.error());
-  if (!outbox) return tl::unexpected<Reason>(outbox.error());
-  if (!acknowledged) return tl::unexpected<Reason>(acknowledged.error());
-  if (!last) return tl::unexpected<Reason>(last.error());
-  return OutboxMark{*file, *outbox, *acknowledged, *last};
+  return attempt([&] {
+    if (!need(connection.has("outbox"))) {
+      throw Failed{{"no_outbox", "the map's file has no outbox"}};
+    }
+    return OutboxMark{
+        text(connection, "SELECT value FROM meta WHERE key = 'file'"),
+        text(connection, "SELECT value FROM meta WHERE key = 'outbox'"),
+        need(connection.integer("SELECT value FROM meta WHERE key = 'outbox_acknowledged'")),
+        need(connection.integer(
+            "SELECT coalesce(max(seq), 0) FROM sqlite_sequence WHERE name = 'outbox'"))};
+  });
 }
 
 }  // namespace perdure::map_store

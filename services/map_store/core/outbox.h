@@ -33,12 +33,14 @@ struct OutboxMark {
   std::int64_t last = 0;          ///< number of the newest change
 };
 
+// These throw Failed (sqlite.h).
+
 /// Creates the outbox if there is none, or again if it does not follow every table. All or nothing.
-Result<void> openOutbox(const Connection& connection);
+void openOutbox(const Connection& connection);
 /// Removes the outbox: without a server it would only grow.
-Result<void> dropOutbox(const Connection& connection);
+void dropOutbox(const Connection& connection);
 /// Removes the entries up to `number`, within the caller's transaction.
-Result<void> acknowledge(const Connection& connection, std::int64_t number);
+void acknowledge(const Connection& connection, std::int64_t number);
 /// Reason of failure: "no_outbox" if the file has none.
 Result<OutboxMark> outboxMark(const Connection& connection);
 

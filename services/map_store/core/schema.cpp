@@ -89,61 +89,49 @@ void refuseForeign(const std::string& path, const Identity& identity) {
   }
 }
 
-Result<void> prepareForWriting(const Connection& connection, const StoreOptions& options) {
+void prepareForWriting(const Connection& connection, const StoreOptions& options) {
   // FULL: a commit is on disk when it returns, even if the power fails.
-  auto done = connection.execute(
+  need(connection.execute(
       "PRAGMA busy_timeout=250; PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL;"
-      "PRAGMA journal_size_limit=16777216;");
-  if (!done || options.max_size_mb == 0) return done;
-  const auto page = connection.integer("PRAGMA page_size");
-  if (!page) return tl::unexpected<Reason>(page.error());
-  const std::int64_t pages = options.max_size_mb * (1 << 20) / *page;
-  return connection.execute("PRAGMA max_page_count=" + std::to_string(pages));
+      "PRAGMA journal_size_limit=16777216;"));
+  if (options.max_size_mb == 0) return;
+  const std::int64_t page = need(connection.integer("PRAGMA page_size"));
+  const std::int64_t pages = options.max_size_mb * (1 << 20) / page;
+  need(connection.execute("PRAGMA max_page_count=" + std::to_string(pages)));
 }
 
-Result<void> create(const Connection& connection) {
-  auto transaction = Transaction::begin(connection);
-  if (!transaction) return tl::unexpected<Reason>(transaction.error());
-  const auto made =
-      connection.execute(std::string(kSchema) + kGraphSchema + kAddedSchema +
-                         "PRAGMA application_id=" + std::to_string(kApplicationId) +
-                         "; PRAGMA user_version=" + std::to_string(kSchemaVersion) + ";");
-  if (!made) return made;
-  return transaction->commit();
+void create(const Connection& connection) {
+  auto transaction = need(Transaction::begin(connection));
+  need(connection.execute(std::string(kSchema) + kGraphSchema + kAddedSchema +
+                          "PRAGMA application_id=" + std::to_string(kApplicationId) +
+                          "; PRAGMA user_version=" + std::to_string(kSchemaVersion) + ";"));
+  need(transaction.commit());
 }
 
 /// Upgrades a file of an older version. Its tables and beliefs stay valid; some tables are new. All
 /// or nothing.
-Result<void> adopt(const Connection& connection, const Identity& identity) {
-  if (identity.version == kSchemaVersion) return connection.execute(kAddedSchema);
-  auto transaction = Transaction::begin(connection);
-  if (!transaction) return tl::unexpected<Reason>(transaction.error());
-  const auto version = connection.integer("PRAGMA user_version");
-  if (!version) return tl::unexpected<Reason>(version.error());
-  if (*version == kSchemaVersion) return {};  // another process has upgraded the file already
-  const auto made = connection.execute(
-      std::string(*version < kFirstSchemaWithGraph ? kGraphSchema : "") + kAddedSchema +
-      "PRAGMA user_version=" + std::to_string(kSchemaVersion) + ";");
-  if (!made) return made;
-  return transaction->commit();
+void adopt(const Connection& connection, const Identity& identity) {
+  if (identity.version == kSchemaVersion) return need(connection.execute(kAddedSchema));
+  auto transaction = need(Transaction::begin(connection));
+  const std::int64_t version = need(connection.integer("PRAGMA user_version"));
+  if (version == kSchemaVersion) return;  // another process has upgraded the file already
+  need(connection.execute(std::string(version < kFirstSchemaWithGraph ? kGraphSchema : "") +
+                          kAddedSchema + "PRAGMA user_version=" + std::to_string(kSchemaVersion) +
+                          ";"));
+  need(transaction.commit());
 }
 
 /// Returns a reason if the file is damaged. Throws StartupError if it is not a map of ours.
 Result<Connection> tryOpen(const StoreOptions& options) {
-  auto connection = Connection::open(options.path, Connection::Mode::kReadWriteCreate);
-  if (!connection) return connection;
-  const auto identity = identityOf(*connection);
-  if (!identity) return tl::unexpected<Reason>(identity.error());
-  if (!identity->empty()) refuseForeign(options.path, *identity);
-  if (options.check_at_start) {
-    const auto sound = wholeFileIsSound(*connection);
-    if (!sound) return tl::unexpected<Reason>(sound.error());
-  }
-  const auto prepared = prepareForWriting(*connection, options);
-  if (!prepared) return tl::unexpected<Reason>(prepared.error());
-  const auto ready = identity->empty() ? create(*connection) : adopt(*connection, *identity);
-  if (!ready) return tl::unexpected<Reason>(ready.error());
-  return connection;
+  return attempt([&] {
+    auto connection = need(Connection::open(options.path, Connection::Mode::kReadWriteCreate));
+    const Identity identity = need(identityOf(connection));
+    if (!identity.empty()) refuseForeign(options.path, identity);
+    if (options.check_at_start) need(wholeFileIsSound(connection));
+    prepareForWriting(connection, options);
+    identity.empty() ? create(connection) : adopt(connection, identity);
+    return connection;
+  });
 }
 
 void makeFolderOf(const std::string& path) {
@@ -156,13 +144,11 @@ void makeFolderOf(const std::string& path) {
 }  // namespace
 
 Result<Identity> identityOf(const Connection& connection) {
-  const auto application = connection.integer("PRAGMA application_id");
-  const auto version = connection.integer("PRAGMA user_version");
-  const auto tables = connection.integer("SELECT count(*) FROM sqlite_master");
-  for (const auto* value : {&application, &version, &tables}) {
-    if (!*value) return tl::unexpected<Reason>(value->error());
-  }
-  return Identity{*application, *version, *tables};
+  return attempt([&] {
+    return Identity{need(connection.integer("PRAGMA application_id")),
+                    need(connection.integer("PRAGMA user_version")),
+                    need(connection.integer("SELECT count(*) FROM sqlite_master"))};
+  });
 }
 
 Result<void> wholeFileIsSound(const Connection& connection) {

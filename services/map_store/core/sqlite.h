@@ -152,6 +152,19 @@ class Connection {
   std::unique_ptr<sqlite3, Close> connection_;
 };
 
+/// Calls `read` as attempt() does, and all its queries see one state of the file. Outside a
+/// transaction a savepoint acts as one.
+template <class Read>
+Result<std::invoke_result_t<Read>> inOneState(const Connection& connection, Read read) {
+  if (auto begun = connection.execute("SAVEPOINT state"); !begun) {
+    return tl::unexpected<Reason>(std::move(begun).error());
+  }
+  auto value = attempt(read);
+  auto released = connection.execute("RELEASE state");
+  if (value && !released) return tl::unexpected<Reason>(std::move(released).error());
+  return value;
+}
+
 /// Rolls back at the end of its scope unless committed.
 class Transaction {
  public:

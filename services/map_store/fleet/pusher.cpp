@@ -32,39 +32,32 @@ std::string nameOf(const std::string& what, OutboxTable table) {
 
 OutboxTable tableAt(std::int64_t number) { return static_cast<OutboxTable>(number); }
 
-Result<void> prepareStatements(Link& link) {
-  auto done = link.prepare("advance", kAdvance);
-  for (std::int64_t number = 0; done && number + 1 < kOutboxTables; ++number) {
+void prepareStatements(Link& link) {
+  need(link.prepare("advance", kAdvance));
+  for (std::int64_t number = 0; number + 1 < kOutboxTables; ++number) {
     const Table& table = tableOf(tableAt(number));
-    done = link.prepare(nameOf("put", tableAt(number)), upsertOf(table));
-    if (!done) break;
-    done = link.prepare(nameOf("delete", tableAt(number)),
-                        "DELETE FROM perdure." + table.name + " WHERE map = $1 AND " +
-                            table.columns.front().name + " = $2");
+    need(link.prepare(nameOf("put", tableAt(number)), upsertOf(table)));
+    need(link.prepare(nameOf("delete", tableAt(number)), "DELETE FROM perdure." + table.name +
+                                                             " WHERE map = $1 AND " +
+                                                             table.columns.front().name + " = $2"));
   }
-  if (done) done = link.prepare("set_working", kSetWorking);
-  if (done) done = link.prepare("clear_working", "DELETE FROM perdure.working WHERE map = $1");
-  if (done) done = link.prepare("put_working", upsertOf(workingTable()));
-  return done;
+  need(link.prepare("set_working", kSetWorking));
+  need(link.prepare("clear_working", "DELETE FROM perdure.working WHERE map = $1"));
+  need(link.prepare("put_working", upsertOf(workingTable())));
 }
 
 /// A reading transaction: one state of the file.
 class Snapshot {
  public:
-  static Result<Snapshot> begin(const Connection& connection) {
-    const auto begun = connection.execute("BEGIN");
-    if (!begun) return tl::unexpected<Reason>(begun.error());
-    return Snapshot(&connection);
+  explicit Snapshot(const Connection& connection) : connection_(connection) {
+    need(connection.execute("BEGIN"));
   }
-  ~Snapshot() {
-    if (connection_ != nullptr) (void)connection_->execute("ROLLBACK");
-  }
-  Snapshot(Snapshot&& other) noexcept : connection_(std::exchange(other.connection_, nullptr)) {}
-  Snapshot& operator=(Snapshot&&) = delete;
+  ~Snapshot() { (void)connection_.execute("ROLLBACK"); }
+  Snapshot(const Snapshot&) = delete;
+  Snapshot& operator=(const Snapshot&) = delete;
 
  private:
-  explicit Snapshot(const Connection* connection) : connection_(connection) {}
-  const Connection* connection_;
+  const Connection& connection_;
 };
 
 /// The position in the map's file; empty if it has none.
@@ -86,27 +79,25 @@ Pusher::Pusher(std::string file, std::string vehicle, std::vector<double> earth_
       vehicle_(std::move(vehicle)),
       earth_anchor_(std::move(earth_anchor)) {}
 
-Result<void> Pusher::openFile(bool with_outbox) {
+void Pusher::openFile(bool with_outbox) {
   connection_.reset();
-  auto connection = Connection::open(file_, Connection::Mode::kReadOnly);
-  if (!connection) return tl::unexpected<Reason>(connection.error());
-  (void)connection->execute("PRAGMA busy_timeout=1000");
-  const auto mark = with_outbox ? outboxMark(*connection) : Result<OutboxMark>(OutboxMark());
-  if (!mark) return tl::unexpected<Reason>(mark.error());
-  mark_ = *mark;
+  auto connection = need(Connection::open(file_, Connection::Mode::kReadOnly));
+  (void)connection.execute("PRAGMA busy_timeout=1000");
+  mark_ = with_outbox ? need(outboxMark(connection)) : OutboxMark();
   has_outbox_ = with_outbox;
-  connection_ = std::move(*connection);
-  return {};
+  connection_ = std::move(connection);
 }
 
 Result<void> Pusher::attach(Link& link) {
-  const auto opened = openFile(true);
-  return opened ? introduce(link) : opened;
+  return attempt([&] {
+    openFile(true);
+    introduce(link);
+  });
 }
 
 /// Finds or creates the server's row of this map. If the row is new, or belongs to another outbox,
 /// the map on the server is empty afterwards.
-Result<void> Pusher::introduce(Link& link) {
+void Pusher::introduce(Link& link) {
   Values values;
   values.put(std::string_view(vehicle_)).put(std::string_view(mark_.file));
   values.put(std::string_view(mark_.outbox)).put(mark_.acknowledged).put(mark_.last);
@@ -114,31 +105,23 @@ Result<void> Pusher::introduce(Link& link) {
   for (std::size_t i = 0; i < 4; ++i) {
     told_earth_.size() == 4 ? values.put(told_earth_[i]) : values.null();
   }
-  const auto row = link.ask(kAttach, values);
-  if (!row) return tl::unexpected<Reason>(row.error());
-  map_ = row->integer(0, 0);
-  at_ = {row->integer(0, 1), row->integer(0, 2), row->integer(0, 3)};
-  const auto known = link.ask("SELECT 1 FROM pg_prepared_statements WHERE name = 'advance'");
-  if (!known) return tl::unexpected<Reason>(known.error());
-  return known->rows() > 0 ? Result<void>() : prepareStatements(link);
+  const auto row = need(link.ask(kAttach, values));
+  map_ = row.integer(0, 0);
+  at_ = {row.integer(0, 1), row.integer(0, 2), row.integer(0, 3)};
+  const auto known = need(link.ask("SELECT 1 FROM pg_prepared_statements WHERE name = 'advance'"));
+  if (known.rows() == 0) prepareStatements(link);
 }
 
 Result<void> Pusher::replaceAll(Link& link, const std::string& file) {
-  auto done = openFile(false);
-  if (!done) return done;
-  const auto unique = link.ask("SELECT gen_random_uuid()::text");
-  if (!unique) return tl::unexpected<Reason>(unique.error());
-  mark_ = {file, unique->text(0, 0), 0, 0};
-  done = link.run("BEGIN");
-  if (done) done = introduce(link);
-  if (!done) return done;
-  const auto snapshot = Snapshot::begin(*connection_);
-  if (!snapshot) return tl::unexpected<Reason>(snapshot.error());
-  while (at_.next_table < kOutboxTables) {
-    const auto portion = pushPortion(link, kRowsOfAPortion, false);
-    if (!portion) return tl::unexpected<Reason>(portion.error());
-  }
-  return link.run("COMMIT");
+  return attempt([&] {
+    openFile(false);
+    mark_ = {file, need(link.ask("SELECT gen_random_uuid()::text")).text(0, 0), 0, 0};
+    need(link.run("BEGIN"));
+    introduce(link);
+    const Snapshot snapshot(*connection_);
+    while (at_.next_table < kOutboxTables) (void)pushPortion(link, kRowsOfAPortion, false);
+    need(link.run("COMMIT"));
+  });
 }
 
 Result<bool> Pusher::hasMore() const {
@@ -148,70 +131,60 @@ Result<bool> Pusher::hasMore() const {
 }
 
 Result<Portion> Pusher::push(Link& link, std::int64_t most_rows) {
-  if (earth_anchor_.empty() && earthAnchorOf(*connection_) != told_earth_) {
-    const auto told = attach(link);
-    if (!told) return tl::unexpected<Reason>(told.error());
-  }
-  const auto snapshot = Snapshot::begin(*connection_);
-  if (!snapshot) return tl::unexpected<Reason>(snapshot.error());
-  return pushPortion(link, most_rows, true);
+  return attempt([&] {
+    if (earth_anchor_.empty() && earthAnchorOf(*connection_) != told_earth_) need(attach(link));
+    const Snapshot snapshot(*connection_);
+    return pushPortion(link, most_rows, true);
+  });
 }
 
-Result<Portion> Pusher::pushPortion(Link& link, std::int64_t most_rows, bool as_transaction) {
+Portion Pusher::pushPortion(Link& link, std::int64_t most_rows, bool as_transaction) {
   Draft draft{most_rows, 0, at_, false};
   link.beginBatch(as_transaction);
-  const auto read =
-      at_.next_table < kOutboxTables ? readWhole(link, draft) : readChanges(link, draft);
+  const auto read = attempt(
+      [&] { at_.next_table < kOutboxTables ? readWhole(link, draft) : readChanges(link, draft); });
   // If the file could not be read to the end, the server refuses the portion and stores none of it.
   queueAdvance(link, draft, read.has_value() ? mark_.outbox : "");
   const auto done = link.endBatch();
-  if (!read) return tl::unexpected<Reason>(read.error());
-  if (!done) return tl::unexpected<Reason>(done.error());
+  need(read);
+  need(done);
   at_ = draft.next;
-  return Portion{draft.rows, at_.sent, draft.whole};
+  return {draft.rows, at_.sent, draft.whole};
 }
 
-Result<void> Pusher::readChanges(Link& link, Draft& draft) const {
-  auto entries = connection_->prepare(
-      "SELECT number, tbl, id FROM outbox WHERE number > ?1 ORDER BY number LIMIT ?2");
-  if (!entries) return tl::unexpected<Reason>(entries.error());
-  entries->bind(1, at_.sent).bind(2, draft.most + 1);
+void Pusher::readChanges(Link& link, Draft& draft) const {
+  auto entries = need(connection_->prepare(
+      "SELECT number, tbl, id FROM outbox WHERE number > ?1 ORDER BY number LIMIT ?2"));
+  entries.bind(1, at_.sent).bind(2, draft.most + 1);
   for (;;) {
-    const auto row = entries->step();
-    if (!row) return tl::unexpected<Reason>(row.error());
-    draft.whole = !*row;
-    if (!*row || draft.rows == static_cast<std::uint64_t>(draft.most)) return {};
-    const auto queued = queueRow(link, tableAt(entries->integer(1)), entries->integer(2));
-    if (!queued) return queued;
-    draft.next.sent = entries->integer(0);
+    draft.whole = !need(entries.step());
+    if (draft.whole || draft.rows == static_cast<std::uint64_t>(draft.most)) return;
+    queueRow(link, tableAt(entries.integer(1)), entries.integer(2));
+    draft.next.sent = entries.integer(0);
     ++draft.rows;
   }
 }
 
-Result<void> Pusher::queueRow(Link& link, OutboxTable table, std::int64_t id) const {
+void Pusher::queueRow(Link& link, OutboxTable table, std::int64_t id) const {
   if (table == OutboxTable::kWorking) return queueWorking(link);
   const Table& t = tableOf(table);
-  const auto row = connection_->first(
+  const auto row = need(connection_->first(
       selectionOf(t) + " WHERE " + t.columns.front().name + " = ?1",
-      [&](const Statement& stored) { return valuesOf(t, map_, stored); }, id);
-  if (!row) return tl::unexpected<Reason>(row.error());
-  link.queue(nameOf(*row ? "put" : "delete", table), row->value_or(Values().put(map_).put(id)));
-  return {};
+      [&](const Statement& stored) { return valuesOf(t, map_, stored); }, id));
+  link.queue(nameOf(row ? "put" : "delete", table), row.value_or(Values().put(map_).put(id)));
 }
 
-Result<void> Pusher::queueWorking(Link& link) const {
-  auto meta = connection_->prepare(
-      "SELECT (SELECT value FROM meta WHERE key = 'revision'), "
-      "(SELECT value FROM meta WHERE key = 'tile_size_m'), "
-      "(SELECT value FROM meta WHERE key = 'working')");
-  if (!meta) return tl::unexpected<Reason>(meta.error());
-  const auto there = meta->step();
-  if (!there) return tl::unexpected<Reason>(there.error());
+void Pusher::queueWorking(Link& link) const {
+  auto meta =
+      need(connection_->prepare("SELECT (SELECT value FROM meta WHERE key = 'revision'), "
+                                "(SELECT value FROM meta WHERE key = 'tile_size_m'), "
+                                "(SELECT value FROM meta WHERE key = 'working')"));
+  (void)need(meta.step());
   Values values;
-  values.put(map_).put(meta->integer(0)).put(std::string_view(meta->text(1)));
+  values.put(map_).put(meta.integer(0)).put(std::string_view(meta.text(1)));
   const auto header =
-      meta->isNull(2) ? Result<Objects>(fail("belief_malformed")) : decodeHeader(meta->blob(2));
-  meta->isNull(2) ? values.null() : values.put(meta->blob(2));
+      meta.isNull(2) ? Result<Objects>(fail("belief_malformed")) : decodeHeader(meta.blob(2));
+  meta.isNull(2) ? values.null() : values.put(meta.blob(2));
   if (header) {
     values.put(static_cast<std::int64_t>(header->world.world));
     values.put(static_cast<std::int64_t>(header->world.epoch));
@@ -220,53 +193,45 @@ Result<void> Pusher::queueWorking(Link& link) const {
   }
   link.queue("set_working", values);
   link.queue("clear_working", Values().put(map_));
-  return connection_->forRows(selectionOf(workingTable()), [&](const Statement& row) {
+  need(connection_->forRows(selectionOf(workingTable()), [&](const Statement& row) {
     link.queue("put_working", valuesOf(workingTable(), map_, row));
-  });
+  }));
 }
 
 /// Reads the tables row by row. Then the entries follow that the outbox received meanwhile.
-Result<void> Pusher::readWhole(Link& link, Draft& draft) const {
+void Pusher::readWhole(Link& link, Draft& draft) const {
   while (draft.next.next_table + 1 < kOutboxTables &&
          draft.rows < static_cast<std::uint64_t>(draft.most)) {
-    const auto queued = queueRows(link, tableAt(draft.next.next_table), draft);
-    if (!queued) return queued;
+    queueRows(link, tableAt(draft.next.next_table), draft);
   }
-  if (draft.next.next_table + 1 < kOutboxTables) return {};
-  const auto queued = queueWorking(link);
-  if (!queued) return queued;
+  if (draft.next.next_table + 1 < kOutboxTables) return;
+  queueWorking(link);
   draft.next.next_table = kOutboxTables;
-  draft.whole = !has_outbox_;
-  if (!has_outbox_) return {};
-  const auto newest = connection_->integer("SELECT coalesce(max(number), 0) FROM outbox");
-  if (!newest) return tl::unexpected<Reason>(newest.error());
-  draft.whole = *newest <= draft.next.sent;
-  return {};
+  draft.whole =
+      !has_outbox_ ||
+      need(connection_->integer("SELECT coalesce(max(number), 0) FROM outbox")) <= draft.next.sent;
 }
 
-Result<void> Pusher::queueRows(Link& link, OutboxTable table, Draft& draft) const {
+void Pusher::queueRows(Link& link, OutboxTable table, Draft& draft) const {
   const Table& t = tableOf(table);
   const std::string& key = t.columns.front().name;
-  auto rows = connection_->prepare(selectionOf(t) + " WHERE " + key + " >= ?1 ORDER BY " + key +
-                                   " LIMIT ?2");
-  if (!rows) return tl::unexpected<Reason>(rows.error());
+  auto rows = need(connection_->prepare(selectionOf(t) + " WHERE " + key + " >= ?1 ORDER BY " +
+                                        key + " LIMIT ?2"));
   const auto most = draft.most - static_cast<std::int64_t>(draft.rows);
-  rows->bind(1, draft.next.next_id).bind(2, most);
+  rows.bind(1, draft.next.next_id).bind(2, most);
   for (std::int64_t count = 0;; ++count) {
-    const auto row = rows->step();
-    if (!row) return tl::unexpected<Reason>(row.error());
-    if (*row) {
-      link.queue(nameOf("put", table), valuesOf(t, map_, *rows));
+    if (need(rows.step())) {
+      link.queue(nameOf("put", table), valuesOf(t, map_, rows));
       ++draft.rows;
-      const std::int64_t id = rows->integer(0);
+      const std::int64_t id = rows.integer(0);
       draft.next.next_id = id == kLargest ? id : id + 1;
       if (id != kLargest) continue;
     } else if (count == most) {
-      return {};
+      return;
     }
     ++draft.next.next_table;
     draft.next.next_id = kSmallest;
-    return {};
+    return;
   }
 }
 

@@ -47,14 +47,15 @@ class Pusher {
     std::int64_t sent = 0, next_table = kOutboxTables, next_id = 0;
   };
   struct Draft;  ///< a portion under construction
-  Result<void> openFile(bool with_outbox);
-  Result<void> introduce(Link& link);
-  Result<void> readChanges(Link& link, Draft& draft) const;
-  Result<void> readWhole(Link& link, Draft& draft) const;
-  Result<void> queueRow(Link& link, OutboxTable table, std::int64_t id) const;
-  Result<void> queueWorking(Link& link) const;
-  Result<void> queueRows(Link& link, OutboxTable table, Draft& draft) const;
-  Result<Portion> pushPortion(Link& link, std::int64_t most_rows, bool as_transaction);
+  // These throw Failed; the public functions return its reason.
+  void openFile(bool with_outbox);
+  void introduce(Link& link);
+  void readChanges(Link& link, Draft& draft) const;
+  void readWhole(Link& link, Draft& draft) const;
+  void queueRow(Link& link, OutboxTable table, std::int64_t id) const;
+  void queueWorking(Link& link) const;
+  void queueRows(Link& link, OutboxTable table, Draft& draft) const;
+  Portion pushPortion(Link& link, std::int64_t most_rows, bool as_transaction);
   void queueAdvance(Link& link, const Draft& draft, const std::string& outbox) const;
 
   const std::string file_, vehicle_;

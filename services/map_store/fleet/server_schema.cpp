@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "services/map_store/core/sqlite.h"
 #include "services/map_store/fleet/tables.h"
 
 namespace perdure::map_store::fleet {
@@ -175,78 +176,66 @@ std::string wholeSchema() {
 }
 
 /// Uses the catalogue, because to_regclass may give an answer from before another process's commit.
-Result<bool> exists(Link& link, std::string_view name) {
-  const auto answer = link.ask(
-      "SELECT EXISTS(SELECT 1 FROM pg_catalog.pg_class c JOIN pg_catalog.pg_namespace n ON n.oid = "
-      "c.relnamespace WHERE n.nspname = 'perdure' AND c.relname = $1::text)",
-      Values().put(name));
-  if (!answer) return tl::unexpected<Reason>(answer.error());
-  return answer->boolean(0, 0);
+bool exists(Link& link, std::string_view name) {
+  return need(link.ask("SELECT EXISTS(SELECT 1 FROM pg_catalog.pg_class c JOIN "
+                       "pg_catalog.pg_namespace n ON n.oid = c.relnamespace "
+                       "WHERE n.nspname = 'perdure' AND c.relname = $1::text)",
+                       Values().put(name)))
+      .boolean(0, 0);
 }
 
 /// Runs `sql` unless schema perdure has `name`; one process at a time.
-Result<void> makeOnce(Link& link, std::string_view name, const std::string& sql) {
-  const auto before = exists(link, name);
-  if (!before) return tl::unexpected<Reason>(before.error());
-  if (*before) return {};
-  auto done = link.run("BEGIN");
-  if (done) done = link.run(kLock);
-  const auto still = done ? exists(link, name) : Result<bool>(false);
-  if (done && !still) done = tl::unexpected<Reason>(still.error());
-  if (done && !*still) done = link.run(sql);
-  if (done) return link.run("COMMIT");
+void makeOnce(Link& link, std::string_view name, const std::string& sql) {
+  if (exists(link, name)) return;
+  const auto done = attempt([&] {
+    need(link.run("BEGIN"));
+    need(link.run(kLock));
+    if (!exists(link, name)) need(link.run(sql));
+  });
+  if (done) return need(link.run("COMMIT"));
   (void)link.run("ROLLBACK");
-  return done;
+  need(done);
 }
 
 /// The schema of PostGIS; empty if it is not installed.
-Result<std::string> schemaOfPostgis(Link& link) {
-  const auto answer = link.ask(
-      "SELECT quote_ident(n.nspname) FROM pg_extension e JOIN pg_namespace n "
-      "ON n.oid = e.extnamespace WHERE e.extname = 'postgis'");
-  if (!answer) return tl::unexpected<Reason>(answer.error());
-  return answer->rows() == 0 ? std::string() : answer->text(0, 0);
+std::string schemaOfPostgis(Link& link) {
+  const auto answer =
+      need(link.ask("SELECT quote_ident(n.nspname) FROM pg_extension e JOIN pg_namespace n "
+                    "ON n.oid = e.extnamespace WHERE e.extname = 'postgis'"));
+  return answer.rows() == 0 ? std::string() : answer.text(0, 0);
 }
 
-Result<void> checkVersion(Link& link) {
-  const auto encoding = link.ask("SELECT current_setting('server_encoding')");
-  if (!encoding) return tl::unexpected<Reason>(encoding.error());
-  if (encoding->text(0, 0) != "UTF8") {
-    return fail("server_schema",
-                "the database's encoding is " + encoding->text(0, 0) + ", not UTF8");
+void checkVersion(Link& link) {
+  const auto encoding = need(link.ask("SELECT current_setting('server_encoding')")).text(0, 0);
+  if (encoding != "UTF8") {
+    throw Failed{{"server_schema", "the database's encoding is " + encoding + ", not UTF8"}};
   }
-  const auto version = link.ask("SELECT max(version) FROM perdure.about");
-  if (!version) return tl::unexpected<Reason>(version.error());
-  if (version->integer(0, 0) == kServerSchema) return {};
-  return fail("server_schema", "the maps there have schema " +
-                                   std::to_string(version->integer(0, 0)) +
-                                   ", this program knows " + std::to_string(kServerSchema) +
-                                   ". Vehicles send all again where schema perdure is dropped "
-                                   "there");
+  const auto version = need(link.ask("SELECT max(version) FROM perdure.about")).integer(0, 0);
+  if (version == kServerSchema) return;
+  throw Failed{{"server_schema", "the maps there have schema " + std::to_string(version) +
+                                     ", this program knows " + std::to_string(kServerSchema) +
+                                     ". Vehicles send all again where schema perdure is dropped "
+                                     "there"}};
 }
 
 }  // namespace
 
 Result<bool> prepareServer(Link& link) {
-  auto done = makeOnce(link, "about", wholeSchema());
-  if (done) done = checkVersion(link);
-  if (!done) return tl::unexpected<Reason>(done.error());
-  auto postgis = schemaOfPostgis(link);
-  if (!postgis) return tl::unexpected<Reason>(postgis.error());
-  if (postgis->empty()) {
-    const auto made = link.run("CREATE EXTENSION IF NOT EXISTS postgis");
-    if (!made && made.error().code == "server_unreachable") {
-      return tl::unexpected<Reason>(made.error());
+  return attempt([&] {
+    makeOnce(link, "about", wholeSchema());
+    checkVersion(link);
+    std::string postgis = schemaOfPostgis(link);
+    if (postgis.empty()) {
+      const auto made = link.run("CREATE EXTENSION IF NOT EXISTS postgis");
+      if (!made && made.error().code == "server_unreachable") need(made);
+      if (made) postgis = schemaOfPostgis(link);
+      if (postgis.empty()) return false;
     }
-    if (made) postgis = schemaOfPostgis(link);
-    if (!postgis) return tl::unexpected<Reason>(postgis.error());
-    if (postgis->empty()) return false;
-  }
-  done = makeOnce(link, "loops_wgs84",
-                  replaced(kOnEarth, "@", *postgis + ".") + geometryIn(*postgis, false) +
-                      geometryIn(*postgis, true));
-  if (!done) return tl::unexpected<Reason>(done.error());
-  return true;
+    makeOnce(link, "loops_wgs84",
+             replaced(kOnEarth, "@", postgis + ".") + geometryIn(postgis, false) +
+                 geometryIn(postgis, true));
+    return true;
+  });
 }
 
 }  // namespace perdure::map_store::fleet

@@ -17,22 +17,22 @@ using mapping::SavedMap;
 
 /// Calls `take` for each row. If it returns false, the row is malformed.
 template <class Take>
-Result<void> takeRows(const Connection& connection, std::string_view sql, std::uint64_t& malformed,
-                      Take take) {
-  return connection.forRows(sql, [&](const Statement& row) { malformed += take(row) ? 0 : 1; });
+void takeRows(const Connection& connection, std::string_view sql, std::uint64_t& malformed,
+              Take take) {
+  need(connection.forRows(sql, [&](const Statement& row) { malformed += take(row) ? 0 : 1; }));
 }
 
 /// Reads class names by their numbers, from 0. Names after a gap cannot be assigned and are left
 /// out.
-Result<void> readClasses(const Connection& connection, SavedGraph& graph) {
+void readClasses(const Connection& connection, SavedGraph& graph) {
   auto& classes = graph.map.classes;
-  return takeRows(connection, "SELECT number, name FROM graph_classes ORDER BY number",
-                  graph.malformed, [&](const Statement& row) {
-                    const auto name = row.blob(1);
-                    const bool next = row.id(0) == classes.size() && name.size() <= kLongestText;
-                    if (next) classes.emplace_back(name.begin(), name.end());
-                    return next;
-                  });
+  takeRows(connection, "SELECT number, name FROM graph_classes ORDER BY number", graph.malformed,
+           [&](const Statement& row) {
+             const auto name = row.blob(1);
+             const bool next = row.id(0) == classes.size() && name.size() <= kLongestText;
+             if (next) classes.emplace_back(name.begin(), name.end());
+             return next;
+           });
 }
 
 /// Returns a NaN if the column has no number, so that the pose is not finite.
@@ -40,76 +40,71 @@ double numberAt(const Statement& row, int column) {
   return row.isNumber(column) ? row.real(column) : std::nan("");
 }
 
-Result<void> readAnchors(const Connection& connection, SavedGraph& graph) {
-  return takeRows(connection,
-                  "SELECT a.id, a.anchor, p.x, p.y, p.z, p.yaw, p.held_fast FROM anchors a "
-                  "LEFT JOIN anchor_poses p ON p.id = a.id ORDER BY a.id",
-                  graph.malformed, [&](const Statement& row) {
-                    auto anchor = decodeAnchor(row.blob(1));
-                    if (!anchor || anchor->id != row.id(0)) return false;
-                    mapping::SavedAnchor saved;
-                    saved.anchor = *std::move(anchor);
-                    saved.T_MA.p = {numberAt(row, 2), numberAt(row, 3), numberAt(row, 4)};
-                    saved.T_MA.yaw = numberAt(row, 5);
-                    saved.held_fast = row.integer(6) != 0;
-                    if (!isSound(saved.T_MA)) return false;
-                    graph.map.anchors.emplace_hint(graph.map.anchors.end(), row.id(0),
-                                                   std::move(saved));
-                    return true;
-                  });
+void readAnchors(const Connection& connection, SavedGraph& graph) {
+  takeRows(connection,
+           "SELECT a.id, a.anchor, p.x, p.y, p.z, p.yaw, p.held_fast FROM anchors a "
+           "LEFT JOIN anchor_poses p ON p.id = a.id ORDER BY a.id",
+           graph.malformed, [&](const Statement& row) {
+             auto anchor = decodeAnchor(row.blob(1));
+             if (!anchor || anchor->id != row.id(0)) return false;
+             mapping::SavedAnchor saved;
+             saved.anchor = *std::move(anchor);
+             saved.T_MA.p = {numberAt(row, 2), numberAt(row, 3), numberAt(row, 4)};
+             saved.T_MA.yaw = numberAt(row, 5);
+             saved.held_fast = row.integer(6) != 0;
+             if (!isSound(saved.T_MA)) return false;
+             graph.map.anchors.emplace_hint(graph.map.anchors.end(), row.id(0), std::move(saved));
+             return true;
+           });
 }
 
-Result<void> readEdges(const Connection& connection, SavedGraph& graph) {
-  return takeRows(connection, "SELECT id, edge, weight FROM edges ORDER BY id", graph.malformed,
-                  [&](const Statement& row) {
-                    auto edge = decodeEdge(row.blob(1));
-                    const double weight = numberAt(row, 2);
-                    if (!edge || row.id(0) == 0 || !std::isfinite(weight)) return false;
-                    graph.map.edges.emplace_hint(graph.map.edges.end(), row.id(0),
-                                                 mapping::SavedEdge{*std::move(edge), weight});
-                    return true;
-                  });
+void readEdges(const Connection& connection, SavedGraph& graph) {
+  takeRows(connection, "SELECT id, edge, weight FROM edges ORDER BY id", graph.malformed,
+           [&](const Statement& row) {
+             auto edge = decodeEdge(row.blob(1));
+             const double weight = numberAt(row, 2);
+             if (!edge || row.id(0) == 0 || !std::isfinite(weight)) return false;
+             graph.map.edges.emplace_hint(graph.map.edges.end(), row.id(0),
+                                          mapping::SavedEdge{*std::move(edge), weight});
+             return true;
+           });
 }
 
-Result<void> readRecords(const Connection& connection, SavedGraph& graph) {
+void readRecords(const Connection& connection, SavedGraph& graph) {
   auto& records = graph.map.records;
-  return takeRows(connection, "SELECT id, record FROM sightings ORDER BY id", graph.malformed,
-                  [&](const Statement& row) {
-                    auto record = decodeRecord(row.blob(1));
-                    if (!record || row.id(0) == 0) return false;
-                    records.emplace_hint(records.end(), row.id(0), *std::move(record));
-                    return true;
-                  });
+  takeRows(connection, "SELECT id, record FROM sightings ORDER BY id", graph.malformed,
+           [&](const Statement& row) {
+             auto record = decodeRecord(row.blob(1));
+             if (!record || row.id(0) == 0) return false;
+             records.emplace_hint(records.end(), row.id(0), *std::move(record));
+             return true;
+           });
 }
 
-Result<void> readTracks(const Connection& connection, SavedGraph& graph) {
-  const auto there = connection.has("track_sightings");
-  if (!there) return tl::unexpected<Reason>(there.error());
-  if (!*there) return {};
+void readTracks(const Connection& connection, SavedGraph& graph) {
+  if (!need(connection.has("track_sightings"))) return;
   auto& tracks = graph.map.tracks;
-  return takeRows(connection, "SELECT id, confirmed, gone, record FROM track_sightings ORDER BY id",
-                  graph.malformed, [&](const Statement& row) {
-                    auto record = decodeRecord(row.blob(3));
-                    if (!record || row.id(0) == 0) return false;
-                    record->confirmed = row.integer(1) != 0;
-                    record->gone = row.integer(2) != 0;
-                    tracks.emplace_hint(tracks.end(), row.id(0), *std::move(record));
-                    return true;
-                  });
+  takeRows(connection, "SELECT id, confirmed, gone, record FROM track_sightings ORDER BY id",
+           graph.malformed, [&](const Statement& row) {
+             auto record = decodeRecord(row.blob(3));
+             if (!record || row.id(0) == 0) return false;
+             record->confirmed = row.integer(1) != 0;
+             record->gone = row.integer(2) != 0;
+             tracks.emplace_hint(tracks.end(), row.id(0), *std::move(record));
+             return true;
+           });
 }
 
-Result<void> readViews(const Connection& connection, SavedGraph& graph) {
-  const auto there = connection.has("views");
-  if (!there) return tl::unexpected<Reason>(there.error());
-  if (!*there) return {};
+void readViews(const Connection& connection, SavedGraph& graph) {
+  if (!need(connection.has("views"))) return;
   auto& views = graph.map.views;
-  return takeRows(connection, "SELECT anchor, points FROM views ORDER BY anchor", graph.malformed,
-                  [&](const Statement& row) {
-                    auto view = decodeView(row.blob(1));
-                    if (!view || row.id(0) == 0) return false;
-                    views.emplace_hint(views.end(), row.id(0), *std::move(view));
-                    return true;
-                  });
+  takeRows(connection, "SELECT anchor, points FROM views ORDER BY anchor", graph.malformed,
+           [&](const Statement& row) {
+             auto view = decodeView(row.blob(1));
+             if (!view || row.id(0) == 0) return false;
+             views.emplace_hint(views.end(), row.id(0), *std::move(view));
+             return true;
+           });
 }
 
 /// Anchors come after their predecessors, so anchors that follow one that was left out are left out
@@ -210,54 +205,41 @@ void holdEachComponent(SavedMap& map) {
   }
 }
 
-Result<void> readAll(const Connection& connection, SavedGraph& graph) {
-  const auto version = connection.integer("PRAGMA user_version");
-  if (!version) return tl::unexpected<Reason>(version.error());
-  if (*version < kFirstSchemaWithGraph) return {};
-  auto done = readClasses(connection, graph);
-  if (done) done = readAnchors(connection, graph);
-  if (done) done = readEdges(connection, graph);
-  if (done) done = readRecords(connection, graph);
-  if (done) done = readTracks(connection, graph);
-  if (done) done = readViews(connection, graph);
-  return done;
+void readAll(const Connection& connection, SavedGraph& graph) {
+  if (need(connection.integer("PRAGMA user_version")) < kFirstSchemaWithGraph) return;
+  readClasses(connection, graph);
+  readAnchors(connection, graph);
+  readEdges(connection, graph);
+  readRecords(connection, graph);
+  readTracks(connection, graph);
+  readViews(connection, graph);
 }
 
 }  // namespace
 
 Result<std::set<mapping::SameObject>> readFacts(const Connection& connection) {
-  std::set<mapping::SameObject> facts;
-  const auto there = connection.has("same");
-  if (!there) return tl::unexpected<Reason>(there.error());
-  if (!*there) return facts;
-  std::uint64_t ignored = 0;
-  const auto done =
-      takeRows(connection, "SELECT loop, a, b FROM same", ignored, [&](const Statement& row) {
-        const mapping::SameObject fact{row.id(0), row.id(1), row.id(2)};
-        if (fact.a == 0 || fact.b == 0 || fact.a == fact.b) return false;
-        facts.insert(fact);
-        return true;
-      });
-  if (!done) return tl::unexpected<Reason>(done.error());
-  return facts;
+  return attempt([&] {
+    std::set<mapping::SameObject> facts;
+    if (!need(connection.has("same"))) return facts;
+    need(connection.forRows("SELECT loop, a, b FROM same", [&](const Statement& row) {
+      const mapping::SameObject fact{row.id(0), row.id(1), row.id(2)};
+      if (fact.a != 0 && fact.b != 0 && fact.a != fact.b) facts.insert(fact);
+    }));
+    return facts;
+  });
 }
 
 Result<SavedGraph> readGraph(const Connection& connection) {
-  // Outside a transaction a savepoint acts as one. The tables must be read in one state.
-  auto done = connection.execute("SAVEPOINT graph");
-  if (!done) return tl::unexpected<Reason>(done.error());
-  SavedGraph graph;
-  done = readAll(connection, graph);
-  const auto facts = readFacts(connection);
-  const auto released = connection.execute("RELEASE graph");
-  if (!done) return tl::unexpected<Reason>(done.error());
-  if (!facts) return tl::unexpected<Reason>(facts.error());
-  if (!released) return tl::unexpected<Reason>(released.error());
-  leaveOutBrokenChains(graph);
-  leaveOutDangling(graph);
-  holdEachComponent(graph.map);
-  takeFacts(graph, *facts);
-  return graph;
+  return inOneState(connection, [&] {
+    SavedGraph graph;
+    readAll(connection, graph);
+    const auto facts = need(readFacts(connection));
+    leaveOutBrokenChains(graph);
+    leaveOutDangling(graph);
+    holdEachComponent(graph.map);
+    takeFacts(graph, facts);
+    return graph;
+  });
 }
 
 }  // namespace perdure::map_store

@@ -69,17 +69,13 @@ constexpr char kPutClass[] =
 
 /// Runs `sql` for each element, bound by `bind`.
 template <class All, class Bind>
-Result<void> runForEach(const Connection& connection, std::string_view sql, const All& all,
-                        Bind bind) {
-  if (all.empty()) return {};
-  auto statement = connection.prepare(sql);
-  if (!statement) return tl::unexpected<Reason>(statement.error());
+void runForEach(const Connection& connection, std::string_view sql, const All& all, Bind bind) {
+  if (all.empty()) return;
+  auto statement = need(connection.prepare(sql));
   for (const auto& each : all) {
-    bind(*statement, each);
-    const auto done = statement->run();
-    if (!done) return done;
+    bind(statement, each);
+    need(statement.run());
   }
-  return {};
 }
 
 using AnchorRow = std::pair<const mapping::AnchorId, mapping::SavedAnchor>;
@@ -138,32 +134,32 @@ std::vector<std::reference_wrapper<const typename All::value_type>> soundOnes(
   return sound;
 }
 
-Result<void> putClasses(const Connection& connection, const std::vector<std::string>& classes) {
+void putClasses(const Connection& connection, const std::vector<std::string>& classes) {
   std::int64_t number = 0;
-  return runForEach(connection, kPutClass, classes,
-                    [&](Statement& to, const std::string& name) { to.bindAll(number++, name); });
+  runForEach(connection, kPutClass, classes,
+             [&](Statement& to, const std::string& name) { to.bindAll(number++, name); });
 }
 
-Result<void> deleteFrom(const Connection& connection, const std::string& table,
-                        const std::set<std::uint64_t>& ids, const std::string& key = "id") {
-  return runForEach(connection, "DELETE FROM " + table + " WHERE " + key + " = ?1", ids,
-                    [](Statement& to, std::uint64_t id) { to.bind(1, id); });
+void deleteFrom(const Connection& connection, const std::string& table,
+                const std::set<std::uint64_t>& ids, const std::string& key = "id") {
+  runForEach(connection, "DELETE FROM " + table + " WHERE " + key + " = ?1", ids,
+             [](Statement& to, std::uint64_t id) { to.bind(1, id); });
 }
 
-/// Returns the ids of a table's rows that are not in `known`.
+/// Deletes the rows of a table whose ids are not in `known`.
 template <class Known>
-Result<void> deleteOthers(const Connection& connection, const std::string& table,
-                          const Known& known, const std::string& key = "id") {
+void deleteOthers(const Connection& connection, const std::string& table, const Known& known,
+                  const std::string& key = "id") {
   std::set<std::uint64_t> others;
-  const auto read = connection.forRows("SELECT " + key + " FROM " + table, [&](const auto& row) {
+  need(connection.forRows("SELECT " + key + " FROM " + table, [&](const auto& row) {
     if (!known.contains(row.id(0))) others.insert(row.id(0));
-  });
-  return read ? deleteFrom(connection, table, others, key) : read;
+  }));
+  deleteFrom(connection, table, others, key);
 }
 
 }  // namespace
 
-Result<std::uint64_t> writeGraph(const Connection& connection, const mapping::Unsaved& unsaved) {
+std::uint64_t writeGraph(const Connection& connection, const mapping::Unsaved& unsaved) {
   const mapping::SavedMap& changed = unsaved.changed;
   std::uint64_t refused = 0;
   const auto anchors = soundOnes(changed.anchors, refused, [](const mapping::SavedAnchor& saved) {
@@ -181,49 +177,43 @@ Result<std::uint64_t> writeGraph(const Connection& connection, const mapping::Un
       changed.tracks, refused, [](const mapping::ObjectRecord& record) { return isSound(record); });
   const auto views =
       soundOnes(changed.views, refused, [](const mapping::View& view) { return isSound(view); });
-  auto done = putClasses(connection, changed.classes);
-  if (done) done = deleteFrom(connection, "edges", unsaved.edges_gone);
-  if (done) done = deleteFrom(connection, "sightings", unsaved.records_gone);
-  if (done) done = runForEach(connection, kPutAnchor, anchors, bindAnchor);
-  if (done) done = runForEach(connection, kPutPose, anchors, bindPose);
-  if (done) done = runForEach(connection, kPutEdge, edges, bindEdge);
-  if (done) done = runForEach(connection, kPutSighting, records, bindSighting);
-  if (done) done = deleteFrom(connection, "track_sightings", unsaved.tracks_gone);
-  if (done) done = runForEach(connection, kPutTrack, tracks, bindTrack);
-  if (done) done = runForEach(connection, kPutView, views, bindView);
-  if (!done) return tl::unexpected<Reason>(done.error());
+  putClasses(connection, changed.classes);
+  deleteFrom(connection, "edges", unsaved.edges_gone);
+  deleteFrom(connection, "sightings", unsaved.records_gone);
+  runForEach(connection, kPutAnchor, anchors, bindAnchor);
+  runForEach(connection, kPutPose, anchors, bindPose);
+  runForEach(connection, kPutEdge, edges, bindEdge);
+  runForEach(connection, kPutSighting, records, bindSighting);
+  deleteFrom(connection, "track_sightings", unsaved.tracks_gone);
+  runForEach(connection, kPutTrack, tracks, bindTrack);
+  runForEach(connection, kPutView, views, bindView);
   return refused - unconfirmed;
 }
 
-Result<void> writeFacts(const Connection& connection, const mapping::Unsaved& unsaved) {
-  auto done = runForEach(connection, kDeleteFact, unsaved.facts_gone, bindFact);
-  if (done) done = runForEach(connection, kPutFact, unsaved.changed.facts, bindFact);
-  return done;
+void writeFacts(const Connection& connection, const mapping::Unsaved& unsaved) {
+  runForEach(connection, kDeleteFact, unsaved.facts_gone, bindFact);
+  runForEach(connection, kPutFact, unsaved.changed.facts, bindFact);
 }
 
-Result<void> sweepGraph(const Connection& connection) {
-  const auto whole = readGraph(connection);
-  if (!whole) return tl::unexpected<Reason>(whole.error());
-  if (whole->malformed == 0) return {};
-  const mapping::SavedMap& map = whole->map;
+void sweepGraph(const Connection& connection) {
+  const SavedGraph whole = need(readGraph(connection));
+  if (whole.malformed == 0) return;
+  const mapping::SavedMap& map = whole.map;
   mapping::Unsaved shortened;
-  for (const ObjectId id : whole->shortened) shortened.changed.records[id] = map.records.at(id);
+  for (const ObjectId id : whole.shortened) shortened.changed.records[id] = map.records.at(id);
   shortened.changed.tracks = map.tracks;
   shortened.changed.facts = map.facts;
-  auto done = connection.execute("DELETE FROM graph_classes WHERE number < 0 OR number >= " +
-                                 std::to_string(map.classes.size()));
-  if (done) done = deleteOthers(connection, "anchors", map.anchors);
-  if (done) done = deleteOthers(connection, "anchor_poses", map.anchors);
-  if (done) done = deleteOthers(connection, "edges", map.edges);
-  if (done) done = deleteOthers(connection, "sightings", map.records);
-  if (done) done = deleteOthers(connection, "track_sightings", map.tracks);
-  if (done) done = deleteOthers(connection, "views", map.views, "anchor");
-  if (done) done = connection.execute("DELETE FROM same");
-  if (done) done = writeFacts(connection, shortened);
-  if (!done) return done;
-  const auto written = writeGraph(connection, shortened);
-  if (!written) return tl::unexpected<Reason>(written.error());
-  return {};
+  need(connection.execute("DELETE FROM graph_classes WHERE number < 0 OR number >= " +
+                          std::to_string(map.classes.size())));
+  deleteOthers(connection, "anchors", map.anchors);
+  deleteOthers(connection, "anchor_poses", map.anchors);
+  deleteOthers(connection, "edges", map.edges);
+  deleteOthers(connection, "sightings", map.records);
+  deleteOthers(connection, "track_sightings", map.tracks);
+  deleteOthers(connection, "views", map.views, "anchor");
+  need(connection.execute("DELETE FROM same"));
+  writeFacts(connection, shortened);
+  (void)writeGraph(connection, shortened);
 }
 
 }  // namespace perdure::map_store

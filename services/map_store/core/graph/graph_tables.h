@@ -33,17 +33,18 @@ struct SavedGraph {
 /// maps of older versions.
 Result<SavedGraph> readGraph(const Connection& connection);
 
-/// Writes within the caller's transaction. Unsound parts (graph_codec.h) stay as they are stored;
-/// returns their number. Records of objects that were not confirmed are not written.
-Result<std::uint64_t> writeGraph(const Connection& connection, const mapping::Unsaved& unsaved);
+// The functions that write do so within the caller's transaction and throw Failed.
+
+/// Unsound parts (graph_codec.h) stay as they are stored; returns their number. Records of objects
+/// that were not confirmed are not written.
+std::uint64_t writeGraph(const Connection& connection, const mapping::Unsaved& unsaved);
 
 /// Returns which tracks are one object; empty for maps of older versions.
 Result<std::set<mapping::SameObject>> readFacts(const Connection& connection);
-/// Writes within the caller's transaction.
-Result<void> writeFacts(const Connection& connection, const mapping::Unsaved& unsaved);
+void writeFacts(const Connection& connection, const mapping::Unsaved& unsaved);
 
-/// Deletes, within the caller's transaction, the rows that readGraph leaves out, because a mapper
-/// that starts from the graph reuses their ids.
-Result<void> sweepGraph(const Connection& connection);
+/// Deletes the rows that readGraph leaves out, because a mapper that starts from the graph reuses
+/// their ids.
+void sweepGraph(const Connection& connection);
 
 }  // namespace perdure::map_store
