@@ -20,7 +20,7 @@ struct PlaceParameters {
                                                   ///< pair
   double gate_sigmas = 4.0;                       ///< gate, in standard deviations of the prior
   double known_share = 0.5;      ///< probability that an object near the trajectory is on the map
-  double known_within_m = 20.0;  ///< distance from the trajectory that lowers it to .6
+  double known_within_m = 20.0;  ///< σ of its Gaussian decay with distance from the trajectory
 };
 
 struct GraphParameters {

@@ -36,7 +36,7 @@ struct ObjectRecord {
   std::optional<Sighting> earlier;         ///< on the visit before, if it was detected again
   bool confirmed = false;                  ///< ever confirmed, so it is on the map; others are not
                                            ///< saved
-  bool gone = false;                       ///< for a track only: its object has ended
+  bool gone = false;  ///< the filter deleted this track; only of tracks that share an object
 };
 
 struct SavedAnchor {
@@ -52,7 +52,7 @@ struct SavedEdge {
 
 /// The whole state, or changes that replace the stored rows of the same ids.
 struct SavedMap {
-  std::vector<std::string> classes;  ///< names by the numbers in ClassShare; never only a part
+  std::vector<std::string> classes;  ///< all class names, indexed by ClassShare::name
   std::map<AnchorId, SavedAnchor> anchors;
   std::map<EdgeId, SavedEdge> edges;
   std::map<ObjectId, ObjectRecord> records;     ///< records by object

@@ -43,9 +43,7 @@ class Dice {
     const double radius = std::sqrt(-2.0 * std::log(1.0 - unit()));
     return radius * std::cos(6.283185307179586 * unit());
   }
-  const auto& pick(const auto& list) {
-    return list[below(list.size())];
-  }
+  const auto& pick(const auto& list) { return list[below(list.size())]; }
 
  private:
   std::mt19937_64 engine_;

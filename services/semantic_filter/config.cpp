@@ -227,8 +227,8 @@ void describeFormer(Fields& fields) {
   for (const auto& [old, value] : fixed) {
     fields.formerly(old, std::string("is fixed at ") + value + "; leave it out");
   }
-  for (const char* old : {"alignment.nats", "alignment.margin_nats", "alignment.pairs",
-                          "alignment.known_share"}) {
+  for (const char* old :
+       {"alignment.nats", "alignment.margin_nats", "alignment.pairs", "alignment.known_share"}) {
     fields.formerly(old, "is gone: the map store alone searches for earlier maps; leave it out");
   }
   for (const char* old : {"drift.position", "drift.rotation", "drift.things", "drift.within_m"}) {

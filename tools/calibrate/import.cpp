@@ -107,9 +107,7 @@ class Import {
     noteKeys(file);
   }
 
-  void noteKeys(const SensorFile& file) {
-    file.noteUnknownKeys(result_.ignored);
-  }
+  void noteKeys(const SensorFile& file) { file.noteUnknownKeys(result_.ignored); }
 
   std::vector<RigidTransform> places_;
   std::size_t given_ = 0;

@@ -26,10 +26,9 @@ int refuse(ExitCode code, const std::string& why) {
 
 int flushed() {
   if (std::fflush(stdout) == 0) return static_cast<int>(ExitCode::kOk);
-  return refuse(
-      ExitCode::kInputOutput,
-      std::string("perdure: standard output could not be written: ") + std::strerror(errno) +
-          "; free space on its disk, or send it to another place");
+  return refuse(ExitCode::kInputOutput,
+                std::string("perdure: standard output could not be written: ") +
+                    std::strerror(errno) + "; free space on its disk, or send it to another place");
 }
 
 int printVersion() {
@@ -58,8 +57,8 @@ int refuseUnknown(const std::string& word) {
   for (const auto& command : perdure::tools::commands()) names.emplace_back(command.name);
   const bool option = word.starts_with('-');
   const std::string nearest = option ? "" : perdure::nearestWord(word, names);
-  return refuse(ExitCode::kUsage, "'" + word + "' is not " + (option ? "an option" : "a subcommand") +
-                                      " of perdure" +
+  return refuse(ExitCode::kUsage, "'" + word + "' is not " +
+                                      (option ? "an option" : "a subcommand") + " of perdure" +
                                       (nearest.empty() ? "" : "; did you mean " + nearest + "?") +
                                       "\nRun with --help for more information.");
 }

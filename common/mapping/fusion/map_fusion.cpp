@@ -19,7 +19,7 @@ void apply(SavedMap& map, Unsaved&& unsaved) {
   for (auto& [id, saved] : unsaved.changed.anchors) map.anchors[id] = std::move(saved);
   for (auto& [id, saved] : unsaved.changed.edges) map.edges[id] = saved;
   for (auto& [id, record] : unsaved.changed.records) {
-    // What is united is not parted: each object goes on as one track.
+    // Merges are final: each fused object continues as one track.
     record.sighting.in_anchor.id = id;
     if (record.earlier) record.earlier->in_anchor.id = id;
     map.records[id] = std::move(record);
@@ -43,7 +43,7 @@ class Replays {
     }
   }
 
-  /// Merges what stands in one place.
+  /// Merges objects that overlap.
   void settle(const MapContents& map) {
     SavedMap aligned = map.graph;
     apply(aligned, mapper_.unsaved());
@@ -95,8 +95,7 @@ void align(MapContents& map, const std::vector<WorldId>& sessions, const Paramet
   replays.settle(map);
   const std::map<ObjectId, ObjectRecord> records = map.graph.records;
   apply(map.graph, replays.mapper().unsaved());
-  report.merges =
-      mergeObjects(map, records, replays.mapper().identity(), replays.mapper().graph());
+  report.merges = mergeObjects(map, records, replays.mapper().identity(), replays.mapper().graph());
   const std::size_t after = loopsOf(map.graph);
   report.loops = after > before ? after - before : 0;
 }

@@ -14,8 +14,8 @@ namespace perdure::mapping {
 /// on what other maps have seen the two are fused. Says what stands elsewhere now, or is gone.
 std::vector<Change> renew(MapContents& map, const Addition& addition);
 
-/// Fuses the beliefs of objects that `identity` holds to be one. `before`: the records as they were.
-/// Absorbed objects become history. Returns their number.
+/// Fuses the beliefs of objects that `identity` lists as the same object. `before`: the records as
+/// they were. Absorbed objects become history. Returns their number.
 std::size_t mergeObjects(MapContents& map, const std::map<ObjectId, ObjectRecord>& before,
                          const Identity& identity, const PoseGraph& graph);
 

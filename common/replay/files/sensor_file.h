@@ -75,7 +75,7 @@ ImuCalibration readImuCalibration(const SensorFile& file);
 std::string cameraKeys(const CameraCalibration& camera);
 std::string imuKeys(const ImuCalibration& imu);
 std::string transformKey(const RigidTransform& T_BS);
-/// A complete sensor.yaml. The IMU is the body.
+/// A complete sensor.yaml. The body frame is the IMU frame.
 std::string cameraYaml(const CameraCalibration& camera, const std::string& comment);
 std::string imuYaml(const ImuCalibration& imu, const std::string& comment);
 

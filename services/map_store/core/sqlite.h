@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <exception>
 #include <memory>
 #include <optional>
 #include <span>
@@ -25,14 +26,16 @@ namespace perdure::map_store {
 Reason reasonOf(int code, std::string_view detail);
 
 /// A failure on its way through the functions of one module. Only need() and attempt() use it.
-struct Failed {
+struct Failed : std::exception {
+  explicit Failed(Reason why) : reason(std::move(why)) {}
+  const char* what() const noexcept override { return reason.detail.c_str(); }
   Reason reason;
 };
 
 /// Returns the value. Throws Failed if there is none.
 template <class T>
 T need(Result<T> result) {
-  if (!result) throw Failed{std::move(result).error()};
+  if (!result) throw Failed(std::move(result).error());
   if constexpr (!std::is_void_v<T>) return *std::move(result);
 }
 

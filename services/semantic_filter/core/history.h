@@ -11,8 +11,8 @@
 
 #include "common/base/result.h"
 #include "common/types/odometry.h"
-#include "services/semantic_filter/core/filter.h"
 #include "services/semantic_filter/core/arrivals.h"
+#include "services/semantic_filter/core/filter.h"
 #include "services/semantic_filter/core/visibility/predicted_box.h"
 
 namespace perdure::semantic_filter {

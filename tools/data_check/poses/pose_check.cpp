@@ -117,7 +117,7 @@ struct Wrong {
   DataFinding finding;
 };
 
-/// The readings that explain the rotations if the poses as written do not.
+/// The pose conventions that agree with the gyroscope, if the poses as written do not.
 std::optional<Wrong> wrongReading(const std::vector<Step>& steps, const Quaternion& q_BC,
                                   const Limits& limits, const Sensor& sensor) {
   if (steps.size() < limits.fewest) return std::nullopt;

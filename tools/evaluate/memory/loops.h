@@ -23,7 +23,8 @@ struct LoopOptions {
   /// the least number of such objects.
   double gap_m = 30.0;
   std::uint64_t objects = 4;
-  /// Largest distance of an anchor behind the body that closes the loop.
+  /// Margin before and after a return visit, m of travel. A loop whose later anchor lies within it
+  /// closes the visit.
   double anchor_m = 14.0;
 };
 

@@ -39,7 +39,7 @@ class MeshBuilder {
 
   /// Closed parts, each of which calls begin.
   void box(const Vec3& low, const Vec3& high, int material);
-  /// A tube around the line from a to b, with the radius at both ends.
+  /// A tube from a to b, with radius_a at a and radius_b at b.
   void tube(const Vec3& a, const Vec3& b, float radius_a, float radius_b, int sides, int material);
   /// A tube through the points, with round cross-sections of the given radii (one for each point).
   void pipe(const std::vector<Vec3>& points, const std::vector<float>& radii, int sides,

@@ -39,7 +39,8 @@ class ViewFinder {
   std::vector<std::pair<std::string, std::vector<std::size_t>>> by_class_;
 };
 
-/// Views one second apart, each with its own velocity. The motion between them is arbitrary.
+/// Returns a trajectory that passes one view a second, each with its own velocity. The motion
+/// between views is arbitrary.
 Trajectory throughViews(const std::vector<View>& views);
 
 }  // namespace perdure::sim

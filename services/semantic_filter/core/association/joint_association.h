@@ -17,7 +17,7 @@ struct Association {
 };
 
 /// `psi`(j, z) >= 0: weight of "track j made box z" against "track j made none, or does not exist".
-/// `fresh`(z) > 0: weight of "no track made box z"; clutter counts 1, and a new track adds its own.
+/// `fresh`(z) > 0: weight of "no track made box z"; 1 for clutter, plus the weight of a new track.
 Association associate(const Eigen::MatrixXd& psi, const Eigen::VectorXd& fresh);
 
 }  // namespace perdure::semantic_filter

@@ -14,7 +14,8 @@
 
 namespace perdure::semantic_filter {
 
-/// What was learned about networks and streets. It survives a change of the world.
+/// Learned noise scales, ground roughness and shares of movers. They are kept when a new `world`
+/// begins.
 struct Learned {
   NoiseScales sides{4000.0};    ///< scales of the variances of box sides
   NoiseScales azimuths{200.0};  ///< scales of the variances of azimuths

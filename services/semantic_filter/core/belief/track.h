@@ -24,11 +24,11 @@ namespace perdure::semantic_filter {
 /// Out of the image for longer than this: what comes next is another visit.
 inline constexpr double kAnotherVisit_s = 1.0;
 
-/// What the rest of the system was told of the track, and since when.
+/// Published lifecycle of the track: confirmation, times and counts of detections.
 struct Lifecycle {
   bool confirmed = false;
   bool once_confirmed = false;  ///< it was confirmed at some time, so that the map knows it
-  bool recalled = false;        ///< it came back from the map and was not detected since
+  bool recalled = false;        ///< recalled from the map and not detected since
   bool detected_on_revisit = false;
   TimePoint first_seen, last_seen;
   TimePoint visit_began;  ///< when it last came back into the image
@@ -80,7 +80,7 @@ struct Detectability {
   DetectionRate rate;           ///< how often earlier visits detected it, by view
 };
 
-/// A thing of no known class that the network takes for one.
+/// Evidence that the network reports an object of no known class as a known class.
 struct Lookalike {
   double nats = 0.0;       ///< evidence for "it resembles a known class", if it is of none
   std::string class_name;  ///< the class that the network last saw in it; empty: none
@@ -136,7 +136,7 @@ struct Track {
   const Hypothesis& best() const { return hypotheses.front(); }
 };
 
-/// Existence is never believed above it, so that misses still count.
+/// Upper limit of the existence probability, so that later misses can lower it.
 double existenceCeiling(const Track& track, const TrackParameters& parameters);
 
 }  // namespace perdure::semantic_filter

@@ -31,7 +31,7 @@ struct BoxNoise {
   double relative = 0.0;             ///< deviation of a side of a large box, in widths or heights
   double pixel = 0.0;                ///< a pixel of the network's input, in image pixels
   std::array<double, 4> sides{};     ///< deviations of this box's sides, in image pixels
-  double clutter_probability = 0.0;  ///< a network places doubtful boxes worse
+  double clutter_probability = 0.0;  ///< boxes with a high clutter probability have larger errors
 };
 
 struct SideError {

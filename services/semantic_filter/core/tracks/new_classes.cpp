@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "common/math/gaussian.h"
-#include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/belief/classes/upper_part.h"
+#include "services/semantic_filter/core/belief/mixture_ops.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -146,7 +146,7 @@ bool admitNewClasses(Track& track, const TrackScore& score, const std::vector<Bo
   const auto& known = frame.model->names;
   if (track.classes_considered == known) return false;
   if (!track.classes_considered ||
-      *track.classes_considered == *known) {  // a recalled track is not asked again
+      *track.classes_considered == *known) {  // recalled tracks are skipped
     track.classes_considered = known;
     return false;
   }

@@ -6,8 +6,8 @@
 #include "common/math/gaussian.h"
 #include "common/math/small_cholesky.h"
 #include "common/math/so3.h"
-#include "services/semantic_filter/core/belief/pose_correlation.h"
 #include "services/semantic_filter/core/belief/classes/upper_part.h"
+#include "services/semantic_filter/core/belief/pose_correlation.h"
 
 namespace perdure::semantic_filter {
 

@@ -1,11 +1,10 @@
-#include "services/vio/core/start/motion_refinement.h"
-
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <utility>
 
 #include "common/base/algorithms/stable_sort.h"
+#include "services/vio/core/start/motion_refinement.h"
 
 namespace perdure::vio {
 namespace {

@@ -9,11 +9,11 @@
 #include <optional>
 
 #include "common/base/errors.h"
+#include "common/earth/geodesy.h"
 #include "services/map_store/fleet/map_transfer.h"
 #include "services/map_store/fleet/server_schema.h"
 #include "tests/services/map_store/fleet/files.h"
 #include "tests/services/map_store/fleet/postgres_server.h"
-#include "common/earth/geodesy.h"
 
 namespace perdure::map_store {
 namespace {

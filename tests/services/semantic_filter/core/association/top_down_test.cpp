@@ -1,11 +1,10 @@
 // Top-down answers: the effects that they may have on a track, and those that they must not have.
-#include "services/semantic_filter/core/association/score.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
+#include "services/semantic_filter/core/association/score.h"
 #include "services/semantic_filter/core/tracks/lifecycle.h"
 #include "services/semantic_filter/core/update/track_update.h"
 #include "services/semantic_filter/core/visibility/predicted_box.h"

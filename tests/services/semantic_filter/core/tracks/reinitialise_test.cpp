@@ -1,5 +1,3 @@
-#include "services/semantic_filter/core/tracks/initiation.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,6 +5,7 @@
 #include "services/semantic_filter/core/belief/mixture_ops.h"
 #include "services/semantic_filter/core/belief/pose_correlation.h"
 #include "services/semantic_filter/core/filter.h"
+#include "services/semantic_filter/core/tracks/initiation.h"
 #include "services/semantic_filter/core/tracks/mixture_reduction.h"
 #include "tests/services/semantic_filter/scene.h"
 
