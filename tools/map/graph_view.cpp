@@ -154,7 +154,7 @@ std::string toGraphText(const MapReply& graph) {
   const Figures figures = figuresOf(graph);
   const WorldId& map = graph.anchors.front().map;
   std::string text = fmt::format(
-      "map          world {}, epoch {}\nanchors      {} of {}, {:.0f} m of way\n", map.world,
+      "map          world {}, epoch {}\nanchors      {} of {}, {:.0f} m travelled\n", map.world,
       map.epoch, graph.anchors.size(), counted(figures.sessions.size(), "session"), figures.way_m);
   if (graph.truncated) {
     text += fmt::format("told         the nearest of {} anchors and {} loops and ties\n",

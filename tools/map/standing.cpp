@@ -42,7 +42,7 @@ std::string oftenOf(std::uint32_t n) { return n == 1 ? "once" : fmt::format("{} 
 
 std::string line(const Station& station, const char* what) {
   return fmt::format(
-      "  {} from anchor {}, where the body was at {:.3f} s after {:.0f} m of way ({})\n", what,
+      "  {} from anchor {}, where the body was at {:.3f} s after {:.0f} m travelled ({})\n", what,
       station.anchor, toSeconds(station.time), station.way_m, wordsOf(station.session));
 }
 

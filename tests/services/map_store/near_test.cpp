@@ -98,7 +98,7 @@ TEST_F(Near, IsSentAfterACommitAndOnTheWayAndNotWhenTheStampAloneHasChanged) {
   node->tick(200ms);
   EXPECT_EQ(nears_.size(), 2u);
   node->onObjects(setAt({7, 0, 0}, 4, {}));
-  ASSERT_EQ(nears_.size(), 3u) << "6.7 m of way";
+  ASSERT_EQ(nears_.size(), 3u) << "6.7 m travelled";
   EXPECT_THAT(published(), ElementsAre(3u));
   node->onObjects(setAt({14, 0, 0}, 5, {}));
   EXPECT_EQ(nears_.size(), 3u) << "nothing but the stamp has changed";

@@ -17,7 +17,7 @@ const WorldId kMap{70, 1};
 TEST(GraphView, TellsAnchorsWayLoopsAndTheWorstSigma) {
   const std::string text = toGraphText(gateway::test::graphFor({}, kMap));
   EXPECT_THAT(text, HasSubstr("world 70, epoch 1"));
-  EXPECT_THAT(text, HasSubstr("3 of 1 session, 20 m of way"));
+  EXPECT_THAT(text, HasSubstr("3 of 1 session, 20 m travelled"));
   EXPECT_THAT(text, HasSubstr("worst at anchor 2: sigma 0.20 0.10 0.05 m, 0.57 deg"));
   EXPECT_THAT(text, HasSubstr("of 1 anchor not known")) << "the third, which is not the first of M";
   EXPECT_THAT(text, HasSubstr("1 confirmed, 1 tentative, 1 withdrawn; ties 1"));
