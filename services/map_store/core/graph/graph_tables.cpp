@@ -135,9 +135,9 @@ std::vector<std::reference_wrapper<const typename All::value_type>> soundOnes(
 }
 
 void putClasses(const Connection& connection, const std::vector<std::string>& classes) {
-  std::int64_t number = 0;
+  std::int64_t next = 0;
   runForEach(connection, kPutClass, classes,
-             [&](Statement& to, const std::string& name) { to.bindAll(number++, name); });
+             [&](Statement& to, const std::string& name) { to.bindAll(next++, name); });
 }
 
 void deleteFrom(const Connection& connection, const std::string& table,
