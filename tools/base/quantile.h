@@ -1,4 +1,4 @@
-// Medians and other quantiles of samples.
+// Quantiles of samples.
 #pragma once
 
 #include <algorithm>
@@ -12,15 +12,6 @@ inline double sampleAt(std::vector<double> values, double share) {
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * (values.size() - 1.0));
   std::nth_element(values.begin(), at, values.end());
   return *at;
-}
-
-/// The median, the upper one of two; 0 for an empty sample.
-template <class Values>
-double upperMedian(Values values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// Quantile of a sample by linear interpolation; q in [0, 1]; 0 for an empty sample.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/algorithms/median.h"
 #include "common/base/errors.h"
 #include "common/math/chi2.h"
 #include "common/math/so3.h"
@@ -12,7 +13,6 @@
 #include "common/replay/read_ahead.h"
 #include "services/vio/core/state/saved_state.h"
 #include "services/vio/node.h"
-#include "tools/base/quantile.h"
 
 namespace perdure::calibrate {
 namespace {
@@ -232,7 +232,7 @@ bool isSurelyGood(const RigCheck& check) {
 double innovationRatio(const std::vector<vio::Innovation>& innovations) {
   std::vector<double> values;
   for (const auto& i : innovations) values.push_back(i.nis / chi2Quantile(0.5, i.rows));
-  return tools::upperMedian(std::move(values));
+  return medianOf(std::move(values));
 }
 
 RigCheck checkRig(const RigCheckOptions& options) {

@@ -7,7 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
-#include "tools/base/quantile.h"
+#include "common/base/algorithms/median.h"
 
 namespace perdure::tools {
 namespace {
@@ -47,7 +47,7 @@ Motion withoutWay(const std::vector<Flow>& flow) {
     for (const Flow& one : flow) {
       errors.push_back((one.step - one.ray.cross(motion.rotation)).norm());
     }
-    motion.error = upperMedian(std::move(errors));
+    motion.error = medianOf(std::move(errors));
     scale = std::max(kLeastScale, motion.error);
   }
   return motion;
@@ -75,7 +75,7 @@ Motion withWay(const std::vector<Flow>& flow, const Motion& start) {
   for (int round = 0; round < 12; ++round) {
     std::vector<double> errors;
     for (const Flow& one : flow) errors.push_back(std::abs(offOf(one, motion).value));
-    motion.error = upperMedian(std::move(errors));
+    motion.error = medianOf(std::move(errors));
     const double scale = std::max(kLeastScale, 1.5 * motion.error);
     Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
     Eigen::Matrix<double, 6, 1> b = Eigen::Matrix<double, 6, 1>::Zero(), row;

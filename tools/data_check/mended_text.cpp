@@ -9,12 +9,12 @@
 #include <map>
 #include <optional>
 
+#include "common/base/algorithms/median.h"
 #include "common/base/checked_file.h"
 #include "common/base/errors.h"
 #include "common/replay/files/stamps.h"
 #include "common/replay/files/text_file.h"
 #include "common/replay/stamp_check.h"
-#include "tools/base/quantile.h"
 
 namespace perdure::tools {
 namespace {
@@ -97,7 +97,7 @@ std::size_t placesShort(const Table& table) {
     if (!replay::parseNanoseconds(row[0])) ++others;
   }
   if (values.empty() || 2 * others < values.size()) return 0;
-  const double middle = upperMedian(std::move(values));
+  const double middle = medianOf(std::move(values));
   return middle >= 1e14 ? 3 : middle >= 1e11 ? 6 : 9;
 }
 

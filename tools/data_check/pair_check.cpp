@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <set>
 
+#include "common/base/algorithms/median.h"
 #include "common/replay/recording.h"
-#include "tools/base/quantile.h"
 
 namespace perdure::tools {
 namespace {
@@ -51,7 +51,7 @@ double apartOf(const std::vector<TimePoint>& first, const std::vector<TimePoint>
     }
     apart.push_back(least);
   }
-  return upperMedian(std::move(apart));
+  return medianOf(std::move(apart));
 }
 
 std::string lengthText(double seconds) {

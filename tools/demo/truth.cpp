@@ -6,11 +6,11 @@
 #include <map>
 #include <vector>
 
+#include "common/base/algorithms/median.h"
 #include "common/base/errors.h"
 #include "common/replay/files/kitti_calibration.h"
 #include "common/replay/files/kitti_labels.h"
 #include "common/replay/files/pose_file.h"
-#include "tools/base/quantile.h"
 #include "tools/evaluate/kitti_score.h"
 #include "tools/evaluate/object_report.h"
 
@@ -45,7 +45,7 @@ Eigen::Vector3d middleOf(const std::vector<replay::KittiLabel>& labels, std::int
   }
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < 3; ++i) {
-    middle[static_cast<Eigen::Index>(i)] = upperMedian(std::move(values[i]));
+    middle[static_cast<Eigen::Index>(i)] = medianOf(std::move(values[i]));
   }
   return middle;
 }

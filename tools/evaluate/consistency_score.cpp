@@ -11,12 +11,12 @@
 #include <numbers>
 #include <optional>
 
+#include "common/base/algorithms/median.h"
 #include "common/base/errors.h"
 #include "common/math/chi2.h"
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
 #include "common/replay/files/text_file.h"
-#include "tools/base/quantile.h"
 
 namespace perdure::tools {
 namespace {
@@ -165,7 +165,7 @@ double Anees::mean() const {
   return nees.empty() ? 0.0 : sum / (static_cast<double>(nees.size()) * dof);
 }
 
-double Anees::median() const { return upperMedian(nees); }
+double Anees::median() const { return medianOf(nees); }
 
 double Anees::within3Sigma() const {
   constexpr double kShare = 0.9973;

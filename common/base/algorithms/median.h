@@ -3,14 +3,13 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <vector>
 
 namespace perdure {
 
 /// The middle value, or the upper one of the two in the middle. Returns 0 if there are no values.
-template <class T>
-T medianOf(std::vector<T> values) {
-  if (values.empty()) return T{};
+template <class Values>
+typename Values::value_type medianOf(Values values) {
+  if (values.empty()) return {};
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "tools/base/quantile.h"
+#include "common/base/algorithms/median.h"
 #include "tools/bus_tools/common.h"
 
 namespace perdure::tools {
@@ -123,7 +123,7 @@ StatusSeen StatusWatch::seen() {
     topic.messages = rate.messages;
     topic.rate_hz = rate.rate_hz;
     if (heard.last_s > 0) topic.age_s = at - heard.last_s;
-    if (!heard.latency_ms.empty()) topic.latency_ms = upperMedian(heard.latency_ms);
+    if (!heard.latency_ms.empty()) topic.latency_ms = medianOf(heard.latency_ms);
   }
   const std::string prefix = participant_.wireName("");
   for (const bus::RemoteEndpoint& endpoint : discovery_.endpoints()) {

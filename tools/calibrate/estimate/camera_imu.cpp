@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/algorithms/median.h"
 #include "common/math/so3.h"
-#include "tools/base/quantile.h"
 #include "tools/calibrate/estimate/camera_imu_problem.h"
 
 namespace perdure::calibrate {
@@ -239,7 +239,7 @@ class CameraImuRun {
     std::vector<double> sizes;
     for (const auto& r : problem_.cornerResiduals()) sizes.push_back(r.residual.norm());
     constexpr double kRayleighMedian = 1.1774;
-    const double typical = std::max(kLeastPx, tools::upperMedian(sizes) / kRayleighMedian);
+    const double typical = std::max(kLeastPx, medianOf(sizes) / kRayleighMedian);
     problem_.gateCorners(std::max(kGateSigma * typical, 10.0 * kLeastPx));
     problem_.sigma.px = std::max(kLeastPx, cornerRms());
     const auto left = problem_.imuResiduals();

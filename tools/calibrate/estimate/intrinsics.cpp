@@ -9,7 +9,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 
-#include "tools/base/quantile.h"
+#include "common/base/algorithms/median.h"
 #include "tools/calibrate/estimate/lens.h"
 
 namespace perdure::calibrate {
@@ -165,8 +165,7 @@ class Bundle {
     for (const auto& r : residuals()) sizes.push_back(r.residual.norm());
     if (sizes.empty()) return;
     constexpr double kRayleighMedian = 1.1774;  // median length of a 2-D vector with unit variances
-    const double limit =
-        std::max(kLeastOutlier, kOutlierSigma * tools::upperMedian(sizes) / kRayleighMedian);
+    const double limit = std::max(kLeastOutlier, kOutlierSigma * medianOf(sizes) / kRayleighMedian);
     for (ViewState& state : states_) {
       for (std::size_t i = 0; i < state.good.size(); ++i) {
         state.good[i] = residualOf(state, i).norm() < limit;

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tools/base/quantile.h"
+#include "common/base/algorithms/median.h"
 
 namespace perdure::tools {
 namespace {
@@ -59,7 +59,7 @@ bool measuresGravity(const std::vector<ImuSample>& samples) {
   if (samples.size() < 2) return false;
   std::vector<double> forces;
   for (const ImuSample& sample : samples) forces.push_back(sample.accel.norm());
-  const double median = upperMedian(std::move(forces));
+  const double median = medianOf(std::move(forces));
   return median > kLeast && median < kMost;
 }
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <string_view>
 
-#include "tools/base/quantile.h"
+#include "common/base/algorithms/median.h"
 #include "tools/data_check/poses/pose_check.h"
 #include "tools/data_check/poses/pose_pushes.h"
 
@@ -62,7 +62,7 @@ DataFindings judgeSpeed(const std::vector<StampedPose>& poses) {
                      toSeconds(poses[j].time - poses[i].time));
   }
   if (speeds.size() < 4) return {};
-  const double median = upperMedian(speeds);
+  const double median = medianOf(speeds);
   if (median < kFastest) return {};
   return {
       {Grade::kWarning, "poses_too_fast",

@@ -8,8 +8,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "common/base/algorithms/median.h"
 #include "common/math/so3.h"
-#include "tools/base/quantile.h"
 #include "tools/data_check/pair_check.h"
 #include "tools/data_check/stereo/stereo_matches.h"
 #include "tools/data_check/stereo/stereo_time.h"
@@ -58,7 +58,7 @@ Fit fitOf(const std::vector<StereoMatch>& matches, const RigidTransform& T_C1C0,
     ++(parallax > 0.0 ? fit.before : fit.behind);
   }
   fit.count = off_px.size();
-  fit.off_px = upperMedian(off_px);
+  fit.off_px = medianOf(off_px);
   return fit;
 }
 
@@ -85,7 +85,7 @@ Turned turnOf(const std::vector<StereoMatch>& matches, const RigidTransform& T_C
       rows.emplace_back(normal->dot(match.second), normal->cross(match.second));
       sizes.push_back(std::abs(rows.back().first));
     }
-    const double scale = std::max(kFinest, 1.5 * upperMedian(sizes));
+    const double scale = std::max(kFinest, 1.5 * medianOf(sizes));
     Matrix3d A = 1e-9 * Matrix3d::Identity();
     Vector3d b = Vector3d::Zero();
     for (const auto& [error, slope] : rows) {

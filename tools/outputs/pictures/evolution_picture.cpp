@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "common/base/algorithms/median.h"
 #include "tools/base/quantile.h"
 #include "tools/outputs/pictures/chart.h"
 #include "tools/outputs/pictures/drawing.h"
@@ -71,7 +72,7 @@ std::optional<double> medianDistance(const Candidate& one, const TruthTrack& tra
     if (key) distances.push_back((key->centre_W - seen.p_W).norm());
   }
   if (distances.empty() || 2 * distances.size() < one.seen.size()) return std::nullopt;
-  return upperMedian(std::move(distances));
+  return medianOf(std::move(distances));
 }
 
 /// Pairs with the smallest distance first; each object and each track is in at most one pair.

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/algorithms/median.h"
 #include "common/base/errors.h"
 #include "common/math/so3.h"
 #include "common/replay/files/kitti_calibration.h"
-#include "tools/base/quantile.h"
 #include "tools/evaluate/object_truth.h"
 
 namespace perdure::tools {
@@ -41,7 +41,7 @@ TruthTrack::Key middleOf(const std::vector<TruthTrack::Key>& keys) {
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
     for (const auto& key : keys) values.push_back(key.centre_W[axis]);
-    result.centre_W[axis] = upperMedian(std::move(values));
+    result.centre_W[axis] = medianOf(std::move(values));
   }
   double x = 0.0, y = 0.0;
   for (const auto& key : keys) x += std::cos(key.yaw), y += std::sin(key.yaw);
