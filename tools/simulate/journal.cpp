@@ -12,7 +12,7 @@
 namespace perdure::tools {
 namespace {
 
-std::string textOf(const Box& box) {
+std::string sidesOf(const Box& box) {
   return fmt::format(" {:a} {:a} {:a} {:a}", box.x1, box.y1, box.x2, box.y2);
 }
 
@@ -23,8 +23,8 @@ std::string lineOf(const JournalEntry& entry) {
   }
   line += fmt::format("{}", entry.views.size());
   for (const auto& view : entry.views) {
-    line += fmt::format(" {} {:a}", view.object_id, view.visible_fraction) + textOf(view.box);
-    line += view.inside ? " in" + textOf(*view.inside) : " whole";
+    line += fmt::format(" {} {:a}", view.object_id, view.visible_fraction) + sidesOf(view.box);
+    line += view.inside ? " in" + sidesOf(*view.inside) : " whole";
   }
   return line + " .";
 }

@@ -70,14 +70,14 @@ class FileMaker {
   Buffer make() {
     Put(file_).bytes(kMagic);
     Buffer header;
-    Put(header).text("");
-    Put(header).text("");
+    Put{header}("");
+    Put{header}("");
     record(file_, Op::kHeader, header);
     if (content_.messages > 0) messages();
     if (content_.attachment) attachment();
     if (content_.metadata) metadata();
     Buffer end;
-    Put(end).number(std::uint32_t{0});
+    Put{end}(std::uint32_t{0});
     record(file_, Op::kDataEnd, end);
     summary();
     return std::move(file_);
@@ -99,20 +99,20 @@ class FileMaker {
     if (!content_.schema) return;
     Buffer bytes;
     Put put(bytes);
-    put.number(std::uint16_t{1});
-    for (const char* text : {"Example", "c", ""}) put.text(text);
+    put(std::uint16_t{1});
+    for (const char* text : {"Example", "c", ""}) put(text);
     record(to, Op::kSchema, bytes);
   }
   void channel(Buffer& to) const {
     Buffer bytes;
     Put put(bytes);
-    put.number(std::uint16_t{1});
-    put.number(std::uint16_t{content_.schema ? std::uint16_t{1} : std::uint16_t{0}});
-    for (const char* text : {"example", "a"}) put.text(text);
+    put(std::uint16_t{1});
+    put(std::uint16_t{content_.schema ? std::uint16_t{1} : std::uint16_t{0}});
+    for (const char* text : {"example", "a"}) put(text);
     Buffer pairs;
-    Put(pairs).text("foo");
-    Put(pairs).text("bar");
-    put.number(static_cast<std::uint32_t>(pairs.size()));
+    Put{pairs}("foo");
+    Put{pairs}("bar");
+    put(static_cast<std::uint32_t>(pairs.size()));
     put.bytes(pairs);
     record(to, Op::kChannel, bytes);
   }
@@ -120,10 +120,10 @@ class FileMaker {
     const Buffer data{1, 2, static_cast<std::uint8_t>(i)};
     Buffer bytes;
     Put put(bytes);
-    put.number(std::uint16_t{1});
-    put.number(static_cast<std::uint32_t>(10 + i));
-    put.number(static_cast<std::uint64_t>(2 + i));
-    put.number(static_cast<std::uint64_t>(1 + i));
+    put(std::uint16_t{1});
+    put(static_cast<std::uint32_t>(10 + i));
+    put(static_cast<std::uint64_t>(2 + i));
+    put(static_cast<std::uint64_t>(1 + i));
     put.bytes(data);
     record(to, Op::kMessage, bytes);
   }
@@ -143,12 +143,12 @@ class FileMaker {
              const std::vector<std::pair<std::uint64_t, std::uint64_t>>& places) {
     Buffer bytes;
     Put put(bytes);
-    put.number(places.front().first);
-    put.number(places.back().first);
-    put.number(static_cast<std::uint64_t>(records.size()));
-    put.number(crc(records));
-    put.text("");
-    put.number(static_cast<std::uint64_t>(records.size()));
+    put(places.front().first);
+    put(places.back().first);
+    put(static_cast<std::uint64_t>(records.size()));
+    put(crc(records));
+    put("");
+    put(static_cast<std::uint64_t>(records.size()));
     put.bytes(records);
     chunk_.start_ns = places.front().first;
     chunk_.end_ns = places.back().first;
@@ -159,11 +159,11 @@ class FileMaker {
     if (!(f_ & kMx)) return;
     Buffer index;
     Put in_index(index);
-    in_index.number(std::uint16_t{1});
-    in_index.number(static_cast<std::uint32_t>(16 * places.size()));
+    in_index(std::uint16_t{1});
+    in_index(static_cast<std::uint32_t>(16 * places.size()));
     for (const auto& [log_ns, offset] : places) {
-      in_index.number(log_ns);
-      in_index.number(offset);
+      in_index(log_ns);
+      in_index(offset);
     }
     chunk_.index_offsets[1] = file_.size();
     record(file_, Op::kMessageIndex, index);
@@ -172,24 +172,24 @@ class FileMaker {
   void attachment() {
     Buffer bytes;
     Put put(bytes);
-    put.number(std::uint64_t{2});
-    put.number(std::uint64_t{1});
-    put.text("myFile");
-    put.text("application/octet-stream");
-    put.number(std::uint64_t{3});
+    put(std::uint64_t{2});
+    put(std::uint64_t{1});
+    put("myFile");
+    put("application/octet-stream");
+    put(std::uint64_t{3});
     put.bytes(Buffer{1, 2, 3});
-    put.number(crc(bytes));
+    put(crc(bytes));
     at_ = file_.size();
     record(file_, kAttachment, bytes);
     length_ = file_.size() - at_;
   }
   void metadata() {
     Buffer bytes, pairs;
-    Put(pairs).text("test");
-    Put(pairs).text("testValue");
+    Put{pairs}("test");
+    Put{pairs}("testValue");
     Put put(bytes);
-    put.text("myMetadata");
-    put.number(static_cast<std::uint32_t>(pairs.size()));
+    put("myMetadata");
+    put(static_cast<std::uint32_t>(pairs.size()));
     put.bytes(pairs);
     at_ = file_.size();
     record(file_, kMetadata, bytes);
@@ -203,46 +203,46 @@ class FileMaker {
     add();
     Buffer bytes;
     Put put(bytes);
-    put.number(static_cast<std::uint8_t>(op));
-    put.number(static_cast<std::uint64_t>(from));
-    put.number(static_cast<std::uint64_t>(file_.size() - from));
+    put(static_cast<std::uint8_t>(op));
+    put(static_cast<std::uint64_t>(from));
+    put(static_cast<std::uint64_t>(file_.size() - from));
     record(offsets_, Op::kSummaryOffset, bytes);
   }
   void statistics() {
     Buffer bytes;
     Put put(bytes);
-    put.number(static_cast<std::uint64_t>(content_.messages));
+    put(static_cast<std::uint64_t>(content_.messages));
     const bool any = content_.messages > 0;
-    put.number(static_cast<std::uint16_t>(any && content_.schema ? 1 : 0));
-    put.number(std::uint32_t{any ? 1u : 0u});
-    put.number(std::uint32_t{content_.attachment ? 1u : 0u});
-    put.number(std::uint32_t{content_.metadata ? 1u : 0u});
-    put.number(std::uint32_t{f_ & kCh ? 1u : 0u});
-    put.number(std::uint64_t{any ? 2u : 0u});
-    put.number(static_cast<std::uint64_t>(any ? 1 + content_.messages : 0));
+    put(static_cast<std::uint16_t>(any && content_.schema ? 1 : 0));
+    put(std::uint32_t{any ? 1u : 0u});
+    put(std::uint32_t{content_.attachment ? 1u : 0u});
+    put(std::uint32_t{content_.metadata ? 1u : 0u});
+    put(std::uint32_t{f_ & kCh ? 1u : 0u});
+    put(std::uint64_t{any ? 2u : 0u});
+    put(static_cast<std::uint64_t>(any ? 1 + content_.messages : 0));
     std::map<std::uint16_t, std::uint64_t> by_channel;
     if (any) by_channel[1] = static_cast<std::uint64_t>(content_.messages);
-    put.counts(by_channel);
+    put(by_channel);
     record(file_, Op::kStatistics, bytes);
   }
   void chunkIndex() {
     Buffer whole;
-    putChunkIndex(whole, chunk_);
+    putRecord(whole, chunk_);
     record(file_, Op::kChunkIndex, {whole.begin() + kRecordHead, whole.end()});
   }
   void placeIndex(Op op) {
     Buffer bytes;
     Put put(bytes);
-    put.number(static_cast<std::uint64_t>(at_));
-    put.number(static_cast<std::uint64_t>(length_));
+    put(static_cast<std::uint64_t>(at_));
+    put(static_cast<std::uint64_t>(length_));
     if (op == kAttachmentIndex) {
-      put.number(std::uint64_t{2});
-      put.number(std::uint64_t{1});
-      put.number(std::uint64_t{3});
-      put.text("myFile");
-      put.text("application/octet-stream");
+      put(std::uint64_t{2});
+      put(std::uint64_t{1});
+      put(std::uint64_t{3});
+      put("myFile");
+      put("application/octet-stream");
     } else {
-      put.text("myMetadata");
+      put("myMetadata");
     }
     record(file_, op, bytes);
   }
@@ -259,9 +259,9 @@ class FileMaker {
     if (sum) Put(file_).bytes(offsets_);
     Buffer footer;
     Put put(footer);
-    put.number(any ? from : std::uint64_t{0});
-    put.number(sum ? offsets_at : std::uint64_t{0});
-    put.number(std::uint32_t{0});
+    put(any ? from : std::uint64_t{0});
+    put(sum ? offsets_at : std::uint64_t{0});
+    put(std::uint32_t{0});
     record(file_, Op::kFooter, footer);
     Put(file_).bytes(kMagic);
   }
@@ -348,7 +348,7 @@ TEST_P(McapConformance, EveryVariantThatIsCutIsNotWhole) {
 TEST_P(McapConformance, RecordsOfUnknownKindsArePassedOver) {
   auto bytes = FileMaker(GetParam(), 0).make();
   Buffer unknown;
-  Put(unknown).record(Op{0x7F}, {1, 2, 3, 4});
+  Put(unknown).record(Op{0x7F}, Buffer{1, 2, 3, 4});
   Put(unknown).record(Op{0x81}, {});
   const std::ptrdiff_t behind_header = 8 + 9 + 8;
   bytes.insert(bytes.begin() + behind_header, unknown.begin(), unknown.end());
@@ -369,12 +369,12 @@ TEST(McapOfOthers, AChunkThatCannotBeReadSaysWhy) {
   const fs::path file = fs::path(testing::TempDir()) / "conformance-packed.mcap";
   Buffer bytes(kMagic.begin(), kMagic.end()), chunk;
   Put put(chunk);
-  put.number(std::uint64_t{1});
-  put.number(std::uint64_t{1});
-  put.number(std::uint64_t{3});
-  put.number(std::uint32_t{0});
-  put.text("xz");
-  put.number(std::uint64_t{2});
+  put(std::uint64_t{1});
+  put(std::uint64_t{1});
+  put(std::uint64_t{3});
+  put(std::uint32_t{0});
+  put("xz");
+  put(std::uint64_t{2});
   put.bytes(Buffer{1, 2});
   Put(bytes).record(Op::kChunk, chunk);
   std::ofstream(file, std::ios::binary)
