@@ -127,11 +127,11 @@ TEST(SpeedHistory, InterpolatesAndIsLessSureFurtherAway) {
   const auto ms = [](std::int64_t t) { return fromNanoseconds(t * kMs); };
   SpeedHistory speeds(0.15);
   EXPECT_FALSE(speeds.at(ms(0)));
-  EXPECT_EQ(codeOf(speeds.add({ms(100), 4.0, 0.1})), "");
-  EXPECT_EQ(codeOf(speeds.add({ms(200), 6.0, 0.2})), "");
-  EXPECT_EQ(codeOf(speeds.add({ms(200), 6.0, 0.2})), "speed_out_of_order");
-  EXPECT_EQ(codeOf(speeds.add({ms(300), NAN, 0.2})), "speed_not_finite");
-  EXPECT_EQ(codeOf(speeds.add({ms(300), 1.0, 0.0})), "speed_not_finite");
+  EXPECT_EQ(codeOf(speeds.add({0, 0, ms(100), 4.0, 0.1})), "");
+  EXPECT_EQ(codeOf(speeds.add({0, 0, ms(200), 6.0, 0.2})), "");
+  EXPECT_EQ(codeOf(speeds.add({0, 0, ms(200), 6.0, 0.2})), "speed_out_of_order");
+  EXPECT_EQ(codeOf(speeds.add({0, 0, ms(300), NAN, 0.2})), "speed_not_finite");
+  EXPECT_EQ(codeOf(speeds.add({0, 0, ms(300), 1.0, 0.0})), "speed_not_finite");
   ASSERT_TRUE(speeds.at(ms(125)));
   EXPECT_NEAR(speeds.at(ms(125))->speed, 4.5, 1e-9);
   EXPECT_NEAR(speeds.at(ms(125))->sigma, 0.2, 1e-9);

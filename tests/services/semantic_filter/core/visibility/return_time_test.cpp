@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include "services/semantic_filter/core/visibility/occlusion.h"
 #include "services/semantic_filter/return_events.h"
 #include "tests/services/semantic_filter/scene.h"
 
