@@ -32,7 +32,8 @@ void decodePlanes(const ModelDescription& model, const DecodeOptions& options, c
                   const Tensor* tensors, std::vector<Candidate>& out) {
   const int columns = model.input.width / level.stride, rows = model.input.height / level.stride;
   const auto cells = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
-  for (std::size_t a = 0; a < std::max<std::size_t>(1, level.anchors.size()); ++a) {
+  const std::size_t anchors = model.family == Family::kYoloFastestV2 ? level.anchors.size() : 1;
+  for (std::size_t a = 0; a < anchors; ++a) {
     for (std::size_t i = 0; i < cells; ++i) {
       Candidate candidate;
       const RawScores raw{tensors[1].values[a * cells + i], tensors[2].values.data() + i, cells};
