@@ -34,7 +34,8 @@ class WaitingFrames {
   std::size_t size() const { return pairs_.size(); }
   const FramePair& front() const { return pairs_.front(); }
   FramePair take();
-  /// Whether the oldest frame may still receive a partner: no later frame, nor many without one.
+  /// Whether the oldest frame has no partner and may still receive one. False if a later frame of
+  /// either camera has arrived. Also false after many frames without a partner, until one arrives.
   bool frontMayBePaired() const;
   /// One sentence with the fix if several frames in a row found no partner; otherwise empty.
   std::string whyAlone() const;

@@ -107,21 +107,21 @@ constexpr Bars kTurned{0.4 / kDegrees, 1.0 / kDegrees}, kShifted_m{0.015, 0.04},
 
 /// Judges how far vio moved a quantity, compared with the standard deviation of vio.
 Judgement judgeMove(const char* what, double moved, double sigma, const Bars& bars,
-                    const std::string& shown, const std::string& mend) {
+                    const std::string& shown, const std::string& remedy) {
   // A move is ignored if vio is not certain of it, or if the true value may be within the good
   // range.
   const bool sure = moved > 3.0 * sigma && moved - sigma > bars.good;
   return judged(sure ? gradeOf(moved, bars.good, bars.bad) : Grade::kGood,
-                fmt::format("vio sees the {} {} off the rig", what, shown), mend);
+                fmt::format("vio sees the {} {} off the rig", what, shown), remedy);
 }
 
-constexpr char kNoMend[] = "no mend before what is said above is excluded";
+constexpr char kNoRemedy[] = "correct nothing before the causes above are excluded";
 
 /// Judges the camera's pose and time offset; `sole`: nothing else explains their deviation.
 Judgements judgePlaceOf(const RigCheck& check, bool lens_fits, bool sole) {
   Judgements all;
   const char* again =
-      !sole       ? kNoMend
+      !sole       ? kNoRemedy
       : lens_fits ? "calibrate again (perdure calibrate), or see whether the camera has moved"
                   : "the lens, which does not fit either, may be why: calibrate both (perdure "
                     "calibrate)";
@@ -139,7 +139,7 @@ Judgements judgePlaceOf(const RigCheck& check, bool lens_fits, bool sole) {
                 fmt::format("{:.2f} ms (± {:.2f})", 1e3 * check.later_s, 1e3 * check.sigma[6]),
                 sole ? fmt::format("set time_offset_s to {:.4f}, or calibrate again",
                                    check.camera.time_offset_s + check.later_s)
-                     : kNoMend));
+                     : kNoRemedy));
   return all;
 }
 
@@ -287,12 +287,13 @@ Judgements judgeRig(const RigCheck& check) {
   if (against > kFewAgainst) {
     all.push_back(
         {many_against ? Grade::kBad : Grade::kDoubtful,
-         fmt::format(
-             "images contradict the IMU in {:.0f} % of the drive; see T_BS (is it the "
-             "inverse?), the IMU's axes, signs and units (radians per second), the focal "
-             "length and time_offset_s, or whether what moves fills the picture{}",
-             100.0 * against,
-             many_against ? "; numbers that follow are no mend before these are excluded" : "")});
+         fmt::format("images contradict the IMU in {:.0f} % of the drive; see T_BS (is it the "
+                     "inverse?), the IMU's axes, signs and units (radians per second), the focal "
+                     "length and time_offset_s, or whether what moves fills the picture{}",
+                     100.0 * against,
+                     many_against
+                         ? "; correct nothing by the numbers below before these are excluded"
+                         : "")});
     if (check.innovations.size() < kFewest) return all;
   }
   const Judgements belief = judgeBelief(check);

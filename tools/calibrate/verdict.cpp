@@ -156,14 +156,14 @@ Judgement judgeNoise(const char* name, const char* key, const NoiseCheck& check)
   const bool coloured = check.correlation > 0.4;
   const Grade grade = coloured ? std::max(Grade::kDoubtful, gradeOf(check.ratio, 1.3, 4.0))
                                : gradeOf(check.ratio, 1.3, 4.0);
-  const std::string mend =
+  const std::string remedy =
       coloured ? "what is left is no white noise: the body vibrates, the board moved, or samples "
                  "are stamped unevenly"
                : fmt::format("set {} to {:.1f} times what it is, if the IMU was not vibrating", key,
                              check.ratio);
   return judged(grade,
                 fmt::format("the {}'s noise is {:.2f} times the declared one", name, check.ratio),
-                mend);
+                remedy);
 }
 
 }  // namespace
@@ -172,8 +172,8 @@ Grade gradeOf(double value, double good, double bad) {
   return value <= good ? Grade::kGood : value <= bad ? Grade::kDoubtful : Grade::kBad;
 }
 
-Judgement judged(Grade grade, std::string text, const std::string& mend) {
-  if (grade != Grade::kGood) text += "; " + mend;
+Judgement judged(Grade grade, std::string text, const std::string& remedy) {
+  if (grade != Grade::kGood) text += "; " + remedy;
   return {grade, std::move(text)};
 }
 
@@ -202,7 +202,7 @@ std::string summaryOf(const Judgements& judgements) {
     case Grade::kDoubtful:
       return "usable, but record again as the doubtful lines say if you can";
     case Grade::kBad:
-      return "do not use it: mend what the bad lines say and record again";
+      return "do not use it: correct what the bad lines name and record again";
   }
   return {};
 }

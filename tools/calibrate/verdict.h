@@ -19,8 +19,8 @@ using Judgements = std::vector<Judgement>;
 
 /// Good up to `good`, doubtful up to `bad`.
 Grade gradeOf(double value, double good, double bad);
-/// Appends `mend` to the text unless the grade is good.
-Judgement judged(Grade grade, std::string text, const std::string& mend);
+/// Appends the remedy to the text unless the grade is good.
+Judgement judged(Grade grade, std::string text, const std::string& remedy);
 
 Grade worstOf(const Judgements& judgements);
 /// "good", "doubtful", "bad".

@@ -6,6 +6,7 @@
 #include <exception>
 #include <iostream>
 #include <string>
+#include <system_error>
 
 #include "common/base/check.h"
 #include "common/base/errors.h"
@@ -14,16 +15,20 @@
 namespace perdure::tools {
 namespace {
 
+int refuseOutput(const std::string& why) {
+  std::cerr << "perdure: standard output could not be written whole"
+            << (why.empty() ? "" : " (" + why + ")") << "; free space, or send it elsewhere"
+            << std::endl;
+  return static_cast<int>(ExitCode::kInputOutput);
+}
+
 /// Checks that all output was written. A full disk or a closed file is an error.
 int checkedOutput(int status) {
   errno = 0;
   std::cout.flush();
   const bool written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good();
   if (written || status != static_cast<int>(ExitCode::kOk)) return status;
-  std::cerr << "perdure: standard output could not be written whole"
-            << (errno != 0 ? std::string(" (") + std::strerror(errno) + ")" : std::string())
-            << "; free space, or send it elsewhere" << std::endl;
-  return static_cast<int>(ExitCode::kInputOutput);
+  return refuseOutput(errno != 0 ? std::strerror(errno) : "");
 }
 
 int run(CLI::App& app, int argc, char** argv) {
@@ -37,6 +42,10 @@ int run(CLI::App& app, int argc, char** argv) {
   } catch (const StartupError& error) {
     std::cerr << "perdure: " << error.what() << std::endl;
     return static_cast<int>(error.code());
+  } catch (const std::system_error& error) {
+    if (std::ferror(stdout) != 0) return refuseOutput(error.code().message());  // by fmt::print
+    std::cerr << "perdure: " << error.what() << std::endl;
+    return static_cast<int>(ExitCode::kFailure);
   } catch (const std::exception& error) {
     std::cerr << "perdure: " << error.what() << std::endl;
     return static_cast<int>(ExitCode::kFailure);

@@ -51,12 +51,13 @@ class DumpSignal {
 };
 
 void printSummary(const StoreReport& stored, std::uint64_t messages, const std::string& out) {
-  fmt::print("{} messages came, {} are in {} files ({:.1f} MB) in {}", messages, stored.messages,
-             stored.files, 1e-6 * static_cast<double>(stored.bytes), out);
+  std::string text =
+      fmt::format("{} messages came, {} are in {} files ({:.1f} MB) in {}", messages,
+                  stored.messages, stored.files, 1e-6 * static_cast<double>(stored.bytes), out);
   if (stored.overrun > 0) {
-    fmt::print("; {} chunks were lost to a slow disk", stored.overrun);
+    text += fmt::format("; {} chunks were lost to a slow disk", stored.overrun);
   }
-  fmt::print("\n");
+  std::puts(text.c_str());  // does not throw, so that lost messages are reported in any case
   std::fflush(stdout);
 }
 

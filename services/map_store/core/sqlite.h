@@ -25,7 +25,7 @@ namespace perdure::map_store {
 /// SQLite's sentence.
 Reason reasonOf(int code, std::string_view detail);
 
-/// A failure on its way through the functions of one module. Only need() and attempt() use it.
+/// A failure on its way through the functions of one module, up to attempt().
 struct Failed : std::exception {
   explicit Failed(Reason why) : reason(std::move(why)) {}
   const char* what() const noexcept override { return reason.detail.c_str(); }

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 
+#include "common/mapping/map_state.h"
 #include "services/map_store/core/map_database.h"
 #include "tests/services/map_store/beliefs.h"
 #include "tests/services/map_store/graphs.h"
@@ -283,6 +284,17 @@ TEST_F(GraphTables, LeaveOutObjectsOfClassesWhoseNameIsMissing) {
   }
   EXPECT_GT(graph.map.records.size(), 0u);
   EXPECT_LT(graph.map.records.size(), map.records.size());
+}
+
+TEST_F(GraphTables, AClassWhoseNameIsThatOfAnotherIsLeftOut) {
+  writeSome();
+  change("UPDATE graph_classes SET name = 'car'");
+  const auto graph = read();
+  EXPECT_EQ(graph.map.classes, std::vector<std::string>{"car"});
+  EXPECT_GE(graph.malformed, 1u);
+  expectConsistent(graph);
+  const mapping::MapState state({}, graph.map);
+  EXPECT_EQ(state.unsaved().changed.classes, graph.map.classes);
 }
 
 TEST_F(GraphTables, AClassOfANumberBelowZeroIsLeftOutAndSwept) {

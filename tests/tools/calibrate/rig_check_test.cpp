@@ -102,7 +102,7 @@ TEST(RigCheck, WhereMuchContradictsNumbersAreNoMend) {
   RigCheck check = goodCheck();
   check.contradicted = 150;
   check.turned = {0.0, 0.085, 0.0};
-  EXPECT_THAT(worst(check).text, HasSubstr("are no mend before"));
+  EXPECT_THAT(worst(check).text, HasSubstr("correct nothing by the numbers below before"));
   for (const auto& one : judgeRig(check)) {
     EXPECT_THAT(one.text, testing::Not(HasSubstr("calibrate again")));
   }

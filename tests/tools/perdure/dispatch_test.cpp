@@ -6,6 +6,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <thread>
 
 #include "common/base/errors.h"
@@ -63,6 +64,23 @@ TEST_F(Dispatch, ExitStatusesAreThoseOfTheSubcommand) {
   EXPECT_EQ(answerTo({"map"}).status, kUsage);
   EXPECT_EQ(answerTo({"map", "list", "--db", "/nonexistent/map.sqlite"}).status,
             static_cast<int>(ExitCode::kUnavailable));
+}
+
+/// Whether the output is buffered until the end, or written (and refused) line by line.
+TEST_F(Dispatch, OutputThatCannotBeWrittenIsRefusedWithItsReasonAndTheFix) {
+  const std::string poses = (fs::path(testing::TempDir()) / "dispatch.tum").string();
+  std::ofstream file(poses);
+  for (int i = 0; i < 30; ++i) file << i << ".0 " << i << " 0 0 0 0 0 1\n";
+  file.close();
+  for (const std::string buffer : {"-oL", "-o100000"}) {
+    const ProgramAnswer answer =
+        runProgram({.command = {"sh", "-c",
+                                "stdbuf " + buffer + " '" + perdure_ + "' evaluate trajectory '" +
+                                    poses + "' --truth '" + poses + "' > /dev/full"}});
+    EXPECT_EQ(answer.status, static_cast<int>(ExitCode::kInputOutput)) << buffer;
+    EXPECT_THAT(answer.output, AllOf(HasSubstr("No space left on device"),
+                                     HasSubstr("free space, or send it elsewhere")));
+  }
 }
 
 TEST_F(Dispatch, TheSubcommandTakesThePlaceOfTheProcessAndGetsItsSignals) {

@@ -117,7 +117,7 @@ Findings fixRecording(const Drive& given, const std::string& folder) {
     if (addFindings(drive.left, findings)) {
       findings.push_back({Verdict::kOk, "there is nothing to mend; no copy is written"});
     } else {
-      findings.push_back({Verdict::kWarn, "no mend of this is sure; no copy is written"});
+      findings.push_back({Verdict::kWarn, "no correction of this is certain; no copy is written"});
     }
     return findings;
   }

@@ -246,7 +246,9 @@ def average_pool(x, *, count_include_pad=0, **window):
 
 
 @op("Pad")
-def pad(x, pads, value=None, *, mode="constant"):
+def pad(x, pads, value=None, axes=None, *, mode="constant"):
+    if axes is not None:
+        raise NotImplementedError("Pad with axes")
     around = [(int(pads[i]), int(pads[i + x.ndim])) for i in range(x.ndim)]
     if mode != "constant":
         return np.pad(x, around, mode=mode)

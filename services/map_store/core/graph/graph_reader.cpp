@@ -22,16 +22,18 @@ void takeRows(const Connection& connection, std::string_view sql, std::uint64_t&
   need(connection.forRows(sql, [&](const Statement& row) { malformed += take(row) ? 0 : 1; }));
 }
 
-/// Reads class names by their numbers, from 0. Names after a gap cannot be assigned and are left
-/// out.
+/// Reads class names by their numbers, from 0. Names after a gap or a repeated name cannot be
+/// assigned and are left out.
 void readClasses(const Connection& connection, SavedGraph& graph) {
   auto& classes = graph.map.classes;
   takeRows(connection, "SELECT number, name FROM graph_classes ORDER BY number", graph.malformed,
            [&](const Statement& row) {
-             const auto name = row.blob(1);
-             const bool next = row.id(0) == classes.size() && name.size() <= kLongestText;
-             if (next) classes.emplace_back(name.begin(), name.end());
-             return next;
+             const auto bytes = row.blob(1);
+             const bool next = row.id(0) == classes.size() && bytes.size() <= kLongestText;
+             const std::string name(bytes.begin(), next ? bytes.end() : bytes.begin());
+             const bool known = std::find(classes.begin(), classes.end(), name) != classes.end();
+             if (next && !known) classes.push_back(name);
+             return next && !known;
            });
 }
 

@@ -1,4 +1,4 @@
-// What is learned while driving: noise scales of networks and shares of movers.
+// Parameters that the filter learns during a drive: noise scales of networks and shares of movers.
 #pragma once
 
 #include <cstdint>

@@ -67,7 +67,8 @@ using SideRows =
 
 /// The measurement, linearised at one state: four rows for each keyframe.
 struct Stack {
-  /// [J r]: derivatives by geometry (and velocity), and z - h(x), px; 0 for sides without a count.
+  /// [J r]: derivatives by geometry (and velocity), and z - h(x), px; 0 for a side that does not
+  /// count.
   SideRows rows;
   ScratchVector<PoseJacobian> J_pose;
   ScratchVector<std::array<bool, 4>> counts;

@@ -32,7 +32,8 @@ Hypothesis atRest(const Hypothesis& moving, const Keyframes& keyframes);
 /// Divides the weight of one class between rest and motion, by all keyframes and the ground.
 void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Fitted& at_rest,
                  const Fitted& in_motion, const FrameContext& frame);
-/// Divides the weight of the fitted hypotheses by keyframes and ground. Modes below `least`: 0.
+/// Divides the weight of the fitted hypotheses among them, by all keyframes and the ground. A mode
+/// that was reached twice counts once. A mode below `least` of the best gets the weight 0.
 void weighModes(std::vector<Hypothesis>& hs, const Fits& fits, double least);
 std::optional<Fitted> heaviest(const std::vector<Hypothesis>& hs, Fits&& fits);
 /// Fits from other starts of yaw and size, and adds the new modes to the track and to `fits`.

@@ -43,7 +43,8 @@ double excusedByOccluder(const Track& track, const ClassNumbers& pmf, const AllS
   return std::isfinite(nats) ? std::max(nats, 0.0) : 0.0;
 }
 
-/// Returns log(A / A without g_k) of a class, by a network that cannot tell it from clutter.
+/// Returns log(A / A without g_k) of a class. "Without g_k": the same boxes from a network that
+/// cannot tell classes from clutter.
 double activationNats(const Track& track, const AllShares& shares, const std::string& class_name,
                       const ScratchVector<std::size_t>& gated,
                       const std::vector<BoxDetection>& boxes, const FrameContext& frame) {

@@ -61,7 +61,8 @@ double probabilityDetected(const Track& track, const AllShares& shares) {
   return total > 0.0 ? detected / total : 0.0;
 }
 
-/// Returns the assigned box, an index into TrackScore::boxes with a share of kAssigned.
+/// Returns the assigned box, an index into TrackScore::boxes with a share of at
+/// least kAssigned.
 std::optional<std::size_t> assignedBox(const Track& track, const AllShares& shares) {
   constexpr double kAssigned = 0.8;
   double total = 0.0;

@@ -25,8 +25,8 @@ struct Span {
   double x, y;
 };
 
-/// A grid of cells that is reused for every painting. A stamp tells whether a cell belongs to the
-/// present painting, because most cells stay blank.
+/// A grid of cells that is reused for every painting. A stamp marks the cells of
+/// the present painting, because most cells stay blank.
 class DepthBuffer {
  public:
   void begin(double width, double height, double cell_px) {
