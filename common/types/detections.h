@@ -60,6 +60,7 @@ struct Detections {
 enum class BoxExtent : std::uint8_t {
   kCuboid = 0,  ///< the image of the cuboid, as in networks trained on such labels (KITTI)
   kOutline,     ///< the object's own outline, which is rounder, as in hand-drawn labels (COCO)
+  kUnknown,     ///< one of both; the filter estimates which
 };
 
 /// Describes the meaning of the activations. Latched on the topic `model`, keyed by hash.
@@ -74,7 +75,7 @@ struct ModelInfo {
   /// Four numbers per class, or empty. They are the mean distances by which the sides (x1, y1, x2,
   /// y2) lie inside the extent given by `boxes`, in widths and heights of that extent.
   std::vector<double> side_insets;
-  BoxExtent boxes = BoxExtent::kCuboid;
+  BoxExtent boxes = BoxExtent::kCuboid;  ///< with `side_insets`, kUnknown means kCuboid
 };
 
 /// The steps by which one inference process replaces another without a gap in the frames
@@ -149,7 +150,7 @@ void describe(auto& a, Is<ModelInfo> auto& d, auto& w) {
   a.numbers("side_insets", d.side_insets, w.side_insets, kInset, 4 * kClasses);
   a.ensure("side_insets", "size_mismatch",
            [&] { return d.side_insets.empty() || d.side_insets.size() == 4 * d.classes.size(); });
-  a.choice("boxes", d.boxes, w.boxes, BoxExtent::kOutline);
+  a.choice("boxes", d.boxes, w.boxes, BoxExtent::kUnknown);
 }
 
 void describe(auto& a, Is<SwapNotice> auto& d, auto& w) {

@@ -132,7 +132,9 @@ void readAll(JsonReader& reader, const std::string& file, ModelDescription& mode
                       false);
   reader.number("box_sigma", model.box_sigma, 0, 1);
   reader.choice<BoxExtent>("box_extent", model.boxes,
-                           {{"cuboid", BoxExtent::kCuboid}, {"outline", BoxExtent::kOutline}},
+                           {{"cuboid", BoxExtent::kCuboid},
+                            {"outline", BoxExtent::kOutline},
+                            {"unknown", BoxExtent::kUnknown}},
                            false);
   if (const Json* insets = reader.find("side_insets")) readInsets(*insets, reader, model);
   if (const Json* calibration = reader.find("calibration")) {

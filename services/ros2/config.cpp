@@ -51,8 +51,9 @@ void describeIn(Config& c, config::Fields& fields) {
       "in.detections.classes", d.classes,
       {"the detector's classes, with the names of class_priors.yaml; a class_id is a name, "
        "or an index in this list"});
-  fields.choice("in.detections.boxes", d.boxes, {"outline", "cuboid"},
-                {"boxes enclose the visible outline (COCO), or the projected cuboid (KITTI)"});
+  fields.choice("in.detections.boxes", d.boxes, {"outline", "cuboid", "unknown"},
+                {"boxes enclose the visible outline (COCO), or the projected cuboid (KITTI); "
+                 "unknown: estimated"});
   fields.text("in.rig", c.rig,
               {"file with cameras or IMU, written by `perdure calibrate`; overrides CameraInfo and "
                "/tf_static"});

@@ -34,7 +34,9 @@ ModelInfo modelOf(const DetectionsInput& d, InstanceId instance) {
     model.classes.push_back(name);
   }
   model.box_sigma = d.box_sigma;
-  model.boxes = d.boxes == "cuboid" ? BoxExtent::kCuboid : BoxExtent::kOutline;
+  model.boxes = d.boxes == "cuboid"    ? BoxExtent::kCuboid
+                : d.boxes == "outline" ? BoxExtent::kOutline
+                                       : BoxExtent::kUnknown;
   std::string all = model.name + fmt::format("\n{} {} {}", d.boxes, d.box_sigma, d.other_share);
   for (const std::string& name : model.classes) all += "\n" + name;
   model.hash = digest(all);

@@ -277,6 +277,10 @@ std::string Node::note() const {
     if (!note.empty()) note += "; ";
     note += fmt::format("{} err {:.2f} times as far as was assumed", what, times);
   };
+  if (const auto model = models_.find(models_.used());
+      model && model->outline_styles && history_.belief().learned.extents.outlines(model->hash)) {
+    note = "boxes enclose the outlines of objects";
+  }
   say("boxes", history_.belief().learned.sides.ratio(models_.used(), assumed.prior_sides));
   say("azimuths", history_.belief().learned.azimuths.ratio(models_.used(), assumed.prior_azimuths));
   return note;

@@ -42,8 +42,11 @@ void addOptions(CLI::App& app, PipelineOptions& options) {
   app.add_option("--box-origin", options.box_origin,
                  "First pixel's coordinate in the CSV; RRC counts from 1")
       ->capture_default_str();
-  app.add_flag("--outline-boxes", options.outline_boxes,
-               "The CSV's boxes enclose what is seen of a thing (COCO), not its cuboid's image");
+  auto* outline = app.add_flag("--outline-boxes", options.outline_boxes,
+                               "The CSV's boxes enclose what is seen of a thing (COCO)");
+  app.add_flag("--cuboid-boxes", options.cuboid_boxes,
+               "They enclose the image of its cuboid (KITTI); without either it is estimated")
+      ->excludes(outline);
   app.add_option("--image-size", options.image_size, "Width and height, KITTI tracking only")
       ->expected(2)
       ->check(CLI::Range(1, 65535));

@@ -238,6 +238,7 @@ void Pipeline::openDetections(const PipelineOptions& options) {
     file.class_name = options.class_name;
     file.box_origin = options.box_origin;
     if (options.outline_boxes) file.boxes = BoxExtent::kOutline;
+    if (options.cuboid_boxes) file.boxes = BoxExtent::kCuboid;
     detection_file_ = replay::DetectionFile::read(file, aliases);
     return checkDetectionFile();
   }

@@ -25,7 +25,7 @@ struct PipelineOptions {
   std::vector<std::uint32_t> image_size;
   std::vector<std::string> topics;  ///< topics of a ROS recording: "cam0=/left/image_raw"
   double box_origin = 0.0;
-  bool outline_boxes = false;
+  bool outline_boxes = false, cuboid_boxes = false;
   bool landmarks = false;  ///< with given poses: also compute landmarks from the images
   std::size_t every = 1;   ///< use every N-th frame only
   double from = 0.0;       ///< start, seconds after the first frame

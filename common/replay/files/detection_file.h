@@ -27,7 +27,7 @@ struct DetectionFileOptions {
   /// score of 1.0 is not certainty.
   double score_floor = 0.01;
   double azimuth_sigma = 0.35;  ///< radians
-  BoxExtent boxes = BoxExtent::kCuboid;
+  BoxExtent boxes = BoxExtent::kUnknown;
 };
 
 /// Activations of a row: clutter is 0. Other classes have the values of the `logit:` columns, if

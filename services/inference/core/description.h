@@ -132,7 +132,7 @@ struct ModelDescription {
   double spread_scale = 0.0;  ///< perdure: factor from spread to standard deviation; 0: the network
                               ///< has no spread
   double box_sigma = 0.0;  ///< standard deviation of a side relative to the box's size; 0: unknown
-  BoxExtent boxes = BoxExtent::kCuboid;
+  BoxExtent boxes = BoxExtent::kUnknown;
   std::map<std::string, std::array<double, 4>> side_insets;  ///< by class; see ModelInfo
   Calibration calibration;
 };

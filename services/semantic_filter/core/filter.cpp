@@ -46,12 +46,14 @@ FrameContext contextOf(const Belief& belief, const FrameInput& input, const Para
           &priors,
           &parameters,
           std::make_shared<const FrameView>(input.view, input.pose_error, input.stamp.time,
-                                            input.model->styles, noise_scale),
+                                            input.styles(), noise_scale),
           noise_scale,
           std::make_shared<const GroundSurface>(belief.tracks, belief.path,
                                                 belief.learned.roughness_scale, input.view.up_W,
                                                 priors, parameters.ground),
-          &belief.learned.movers};
+          &belief.learned.movers,
+          input.styles().get(),
+          input.model->outline_styles && !belief.learned.extents.decided(input.model->hash)};
 }
 
 /// Sets the visibility of all tracks and returns it in the order of the tracks.

@@ -70,6 +70,9 @@ void History::step(HistoryFrame& frame) {
   frame.before = belief_;
   frame.merges.clear();
   if (frame.arrivals) frame.merges = takeIn(*frame.arrivals, belief_, frame.input, filter_);
+  const Model& model = *frame.input.model;
+  frame.input.estimated_styles =
+      belief_.learned.extents.outlines(model.hash) ? model.outline_styles : nullptr;
   const StepReport report = filter_.step(belief_, frame.input, ids_);
   frame.merges.insert(frame.merges.end(), report.merges.begin(), report.merges.end());
   if (report.broken > 0) reasons_.add("object_numbers_bad", report.broken);

@@ -228,10 +228,12 @@ void World::changeView(std::size_t thing, const State& x, const RigidTransform& 
   e.box.draw(dice_, keep({p.box.bias_angle, p.box.bias_log_distance, p.box.bias_image_angle}));
   e.noise_stays *= keep({p.box.noise_view, p.box.noise_view, 0.5 * p.box.noise_view});
   e.looks.draw(dice_, keep({p.tempering.angle, p.tempering.log_distance, p.tempering.image_angle}));
+  if (!dice_.chance(keep({p.visibility.occluder_angle, kNever, kNever}))) {
+    e.unmapped_occluder = dice_.chance(p.visibility.unmapped_occluder);
+  }
   const double stays =
       keep({p.visibility.detectability_angle, p.visibility.detectability_log_distance, kNever});
-  if (!dice_.chance(stays)) {
-    e.unmapped_occluder = dice_.chance(p.visibility.unmapped_occluder);
+  if (!elusive_dice_.chance(stays)) {
     e.hard_to_detect = elusive_dice_.chance(p.visibility.hard_to_detect);
   }
   e.last_T_WC = T_WC;

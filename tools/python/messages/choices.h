@@ -27,7 +27,7 @@ template <>
 inline constexpr std::array<std::string_view, 4> kWords<DistortionModel>{
     "none", "radial_tangential", "equidistant", "rational"};
 template <>
-inline constexpr std::array<std::string_view, 2> kWords<BoxExtent>{"cuboid", "outline"};
+inline constexpr std::array<std::string_view, 3> kWords<BoxExtent>{"cuboid", "outline", "unknown"};
 template <>
 inline constexpr std::array<std::string_view, 2> kWords<Memory>{"working", "long_term"};
 template <>

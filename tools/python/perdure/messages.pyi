@@ -164,7 +164,7 @@ class ModelInfo(Message):
     input_height: int  # int
     box_sigma: float  # of a box's side over its size; 0: not known
     side_insets: npt.NDArray[np.float64]  # (n,)
-    boxes: Literal["cuboid", "outline"]  # cuboid | outline, what a box encloses: the image of its cuboid, or its own outline
+    boxes: Literal["cuboid", "outline", "unknown"]  # cuboid | outline | unknown, what a box encloses: the image of its cuboid, or its own outline
 
 class SwapNotice(Message):
     instance: int  # int

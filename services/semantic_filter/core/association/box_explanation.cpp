@@ -22,8 +22,7 @@ std::optional<double> BoxExplanations::fit(std::size_t j, const std::array<bool,
   const Hypothesis& best = track.best();
   if (!at_[j]) {
     const State x = stateAt(best, toSeconds(input_.stamp.time - track.as_of));
-    at_[j] =
-        predictBox(best, x, from_, input_.model->styles->of(best.class_name), input_.pose_error);
+    at_[j] = predictBox(best, x, from_, input_.styles()->of(best.class_name), input_.pose_error);
   }
   if (!*at_[j]) return std::nullopt;
   const auto why = explain(box, **at_[j], hidden, best.class_name, track.lookalike.nats, judge_);

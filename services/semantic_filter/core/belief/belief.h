@@ -21,6 +21,7 @@ struct Learned {
   NoiseScales azimuths{200.0};  ///< scales of the variances of azimuths
   GroundRoughness roughness_scale = {};
   MoverShares movers = {};
+  BoxExtents extents = {};
 };
 
 struct Belief {

@@ -7,6 +7,18 @@
 
 namespace perdure::semantic_filter {
 
+namespace {
+
+/// Returns the value of a network in a list, which is added if it is missing.
+template <class T>
+T& entryOf(std::vector<std::pair<std::uint64_t, T>>& list, std::uint64_t model) {
+  const auto it = std::find_if(list.begin(), list.end(),
+                               [model](const auto& entry) { return entry.first == model; });
+  return it == list.end() ? list.emplace_back(model, T()).second : it->second;
+}
+
+}  // namespace
+
 constexpr double kLeastRatio = 0.04, kMostRatio = 9.0;
 
 double NoiseScales::ratio(std::uint64_t model, double assumed) const {
@@ -21,15 +33,32 @@ double NoiseScales::ratio(std::uint64_t model, double assumed) const {
 
 void NoiseScales::learn(std::uint64_t model, const ResidualRatio& over) {
   if (!std::isfinite(over.ratio) || !(over.count > 0.0)) return;
-  auto it = std::find_if(sums_.begin(), sums_.end(),
-                         [model](const auto& entry) { return entry.first == model; });
-  if (it == sums_.end()) it = sums_.insert(sums_.end(), {model, {}});
-  Sums& heard = it->second;
+  Sums& heard = entryOf(sums_, model);
   heard.squares += over.count * std::min(over.ratio, kMostRatio);
   heard.count += over.count;
   if (heard.count <= remembered_) return;
   heard.squares *= remembered_ / heard.count;
   heard.count = remembered_;
+}
+
+BoxExtents::Odds BoxExtents::of(std::uint64_t model) const {
+  for (const auto& [of, odds] : odds_) {
+    if (of == model) return odds;
+  }
+  return {};
+}
+
+bool BoxExtents::decided(std::uint64_t model) const {
+  constexpr double kEnough = 30.0;  // nats
+  return std::abs(of(model).nats) > kEnough;
+}
+
+void BoxExtents::learn(std::uint64_t model, double nats) {
+  // A change moves all objects, so that odds about zero must not cause several.
+  constexpr double kClear = 6.0;  // nats
+  Odds& odds = entryOf(odds_, model);
+  odds.nats += nats;
+  if (std::abs(odds.nats) > kClear) odds.outlines = odds.nats > 0.0;
 }
 
 void MoverShares::learn(const Track& track, double min_speed) {
@@ -44,7 +73,8 @@ void MoverShares::learn(const Track& track, double min_speed) {
 }
 
 double MoverShares::of(const ClassPrior& prior) const {
-  constexpr double kPriorObjects = 5.0;
+  // Streets in which all cars stand and streets in which all move are both frequent.
+  constexpr double kPriorObjects = 1.0;
   if (!counts_ || prior.moving <= 0.0) return prior.moving;
   const auto found = counts_->find(prior.name);
   if (found == counts_->end()) return prior.moving;

@@ -38,6 +38,26 @@ class NoiseScales {
   std::vector<std::pair<std::uint64_t, Sums>> sums_;  ///< a list, because networks are few
 };
 
+/// Whether the boxes of a network that does not say it enclose outlines or images of cuboids. Until
+/// objects at rest speak clearly for outlines they count as images of cuboids. Derivation:
+/// tools/docs/maths/box_extent.md.
+class BoxExtents {
+ public:
+  bool outlines(std::uint64_t model) const { return of(model).outlines; }
+  /// The evidence is so large that more of it is not needed.
+  bool decided(std::uint64_t model) const;
+  /// Adds nats for outlines.
+  void learn(std::uint64_t model, double nats);
+
+ private:
+  struct Odds {
+    double nats = 0.0;
+    bool outlines = false;
+  };
+  Odds of(std::uint64_t model) const;
+  std::vector<std::pair<std::uint64_t, Odds>> odds_;  ///< a list, because networks are few
+};
+
 /// Share of the instances of a class that move, learned from the objects of this drive beside the
 /// prior, each once and when it can be judged. Derivation: tools/docs/maths/state_and_mixture.md.
 class MoverShares {

@@ -97,6 +97,7 @@ struct BatchState {
   std::uint32_t seen = 0;             ///< keyframes since there were enough for a fit
   std::uint32_t mode_search_due = 0;  ///< modes are searched when `seen` reaches it
   std::uint32_t patience = 1;         ///< fits are this much rarer while they change little
+  double outline_nats = 0.0;          ///< what BoxExtents has counted of this track
 };
 
 struct PublishedVisibility {

@@ -7,9 +7,9 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-BoxStyles stylesOf(const ModelInfo& info, const ClassPriors& priors) {
+BoxStyles stylesOf(const ModelInfo& info, const ClassPriors& priors, BoxExtent boxes) {
   BoxStyles styles;
-  if (info.boxes == BoxExtent::kOutline) {
+  if (boxes == BoxExtent::kOutline) {
     for (const ClassPrior& prior : priors.classes) styles.by_class[prior.name].shape = prior.shape;
   }
   if (info.side_insets.size() != 4 * info.classes.size() || info.classes.empty()) return styles;
@@ -75,7 +75,13 @@ Model makeModel(const ModelInfo& info, const ClassPriors& priors) {
   for (std::size_t k = 0; k < info.classes.size(); ++k) model.index.emplace(info.classes[k], k);
   model.input_width = info.input_width;
   model.box_sigma = info.box_sigma;
-  model.styles = std::make_shared<const BoxStyles>(stylesOf(info, priors));
+  const auto styles = [&](BoxExtent boxes) {
+    return std::make_shared<const BoxStyles>(stylesOf(info, priors, boxes));
+  };
+  model.styles = styles(info.boxes);
+  if (info.boxes == BoxExtent::kUnknown && info.side_insets.empty()) {
+    model.outline_styles = styles(BoxExtent::kOutline);
+  }
   return model;
 }
 

@@ -40,6 +40,8 @@ struct Model {
   double input_width = 0.0;                  ///< of the network's input, px; 0: unknown
   double box_sigma = 0.0;
   std::shared_ptr<const BoxStyles> styles = std::make_shared<const BoxStyles>();
+  /// If the model does not say what its boxes enclose: `styles` of cuboids, and these of outlines.
+  std::shared_ptr<const BoxStyles> outline_styles = nullptr;
 };
 /// Shapes come from the priors if the model says that its boxes enclose outlines.
 Model makeModel(const ModelInfo& info, const ClassPriors& priors = {});

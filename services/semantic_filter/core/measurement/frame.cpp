@@ -27,6 +27,7 @@ ViewWalk viewWalkOf(const FrameContext& frame) {
   walk.lasting = lastingError(box, noise) * std::sqrt(frame.noise_scale.lasting());
   walk.bias = biasScales(box);
   walk.unmapped_occluder = visibility.unmapped_occluder;
+  walk.occluder = {visibility.occluder_angle, kNever, kNever};
   walk.hard_to_detect = visibility.hard_to_detect;
   walk.detectability = detectabilityScales(visibility);
   return walk;

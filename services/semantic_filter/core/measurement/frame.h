@@ -49,6 +49,12 @@ struct FrameInput {
   TopDownAnswers top_down = {};  ///< for predictions that no box met
   /// the classes of the boxes refer to it; never null
   std::shared_ptr<const Model> model = std::make_shared<const Model>();
+  /// of the model, by the extent that is estimated; null: `model->styles`
+  std::shared_ptr<const BoxStyles> estimated_styles = nullptr;
+
+  const std::shared_ptr<const BoxStyles>& styles() const {
+    return estimated_styles ? estimated_styles : model->styles;
+  }
 };
 
 /// Noise scales of the boxes and azimuths of one network.
@@ -110,6 +116,9 @@ struct FrameContext {
   NoiseScale noise_scale = {};
   std::shared_ptr<const GroundSurface> ground = {};  ///< before this frame; null: nothing is known
   const MoverShares* movers = nullptr;               ///< null: the shares of the class priors
+  /// of the present network, also for its earlier keyframes; null: none is known
+  const BoxStyles* styles = nullptr;
+  bool asks_extent = false;  ///< what the boxes of the network enclose is to be estimated
 
   Projector projector() const;
   /// Returns the prior probability that an instance of the class moves.
@@ -119,7 +128,7 @@ struct FrameContext {
   /// Returns how the network draws boxes around objects of a class, for projectObserved.
   const BoxStyle& styleOf(const std::string& class_name) const {
     static const BoxStyle plain;
-    return model ? model->styles->of(class_name) : plain;
+    return styles ? styles->of(class_name) : plain;
   }
 };
 
@@ -130,7 +139,8 @@ struct ViewWalk {
   SideError lasting;    ///< stationary deviation of b
   ViewScales bias{1, 1, 1};
   double unmapped_occluder = 0.0;  ///< stationary probability that one hides it
-  double hard_to_detect = 0.0;     ///< the same, that the view makes it so
+  ViewScales occluder{1, 1, 1};
+  double hard_to_detect = 0.0;  ///< the same, that the view makes it so
   ViewScales detectability{1, 1, 1};
 };
 

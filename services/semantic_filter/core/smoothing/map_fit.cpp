@@ -251,8 +251,6 @@ std::optional<MapFit> MapFit::make(const Hypothesis& start, const KeyframeBatch&
 
 BatchProblem MapFit::modelOf() const { return {*batch_, hypothesis_, start_, *frame_}; }
 
-const PerKeyframe& MapFit::inflations() const { return fit_->inflations; }
-
 const KeyframeCounts& MapFit::contradictions() const { return fit_->contradicted; }
 
 std::size_t MapFit::sides() const {
@@ -277,8 +275,9 @@ ResidualRatio MapFit::azimuthResidualRatio() const {
 
 double MapFit::logHeading() const { return modelOf().logHeading(fit_->x); }
 
-double MapFit::logEvidence(const PerKeyframe& inflations, bool of_yaw) const {
+double MapFit::logEvidence(bool of_yaw) const {
   constexpr double kImpossible = -1e6;
+  const PerKeyframe& inflations = fit_->inflations;
   const BatchProblem model = modelOf();
   const Stack& stack = fit_->stack;
   // R is computed at exactly this state: its determinant of a hundred dimensions depends on it.
@@ -297,7 +296,10 @@ double MapFit::logEvidence(const PerKeyframe& inflations, bool of_yaw) const {
   const double yaw = of_yaw ? model.logAzimuths(fit_->x) + 0.5 * model.yawPriorCost(fit_->x) : 0.0;
   const double volume = R.logDeterminant() - model.logVolumeOfCuts(stack, inflations);
   const double priors = model.logSpeedPrior() + model.logSizePrior();
-  return yaw + 0.5 * (free + priors - cost - volume - G.logDeterminant());
+  // A t distribution is a Gaussian whose inflation has an inverse gamma distribution.
+  const double tail = frame_->parameters->box.tail *
+                      (inflations.array().log() + inflations.array().inverse() - 1.0).sum();
+  return yaw + 0.5 * (free + priors - cost - tail - volume - G.logDeterminant());
 }
 
 }  // namespace perdure::semantic_filter

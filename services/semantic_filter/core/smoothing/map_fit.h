@@ -26,8 +26,6 @@ class MapFit {
                                     const ScratchVector<const Hypothesis*>& found = {});
 
   const Hypothesis& hypothesis() const { return hypothesis_; }
-  /// Returns the inflation of each keyframe, d >= 1 (t distribution).
-  const PerKeyframe& inflations() const;
   /// Returns the share of keyframes that contradict the fit.
   double contradicted() const { return contradictions().cast<double>().mean(); }
   /// Returns the residuals of the sides, by the first assumption; their count: degrees of freedom.
@@ -38,10 +36,10 @@ class MapFit {
   std::size_t sides() const;
   /// Returns 1 for each keyframe that contradicts the fit, 0 for the others.
   const KeyframeCounts& contradictions() const;
-  /// Returns the log marginal likelihood, log p(boxes | class, motion), by Laplace's method. Two
-  /// fits are compared with the same inflations. `of_yaw`: for modes of yaw; with the azimuths and
-  /// without the yaw prior around the start.
-  double logEvidence(const PerKeyframe& inflations, bool of_yaw = false) const;
+  /// Returns the log marginal likelihood, log p(boxes | class, motion), by Laplace's method, with
+  /// the t distribution of each keyframe, without a constant. `of_yaw`: for modes of yaw; with the
+  /// azimuths and without the yaw prior around the start.
+  double logEvidence(bool of_yaw = false) const;
   /// Returns the log-odds, by the azimuths, that its yaw is not turned by 180°.
   double logHeading() const;
 

@@ -100,14 +100,13 @@ void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Fit
   const ClassPrior& prior = frame.priors->of(name);
   const double share = frame.moverShare(prior);
   const auto& motion = frame.parameters->motion;
-  const PerKeyframe inflations = static_fit.inflations().cwiseMin(moving_fit.inflations());
   const double speed_prior_ratio =
       motion.creeping + (1.0 - motion.creeping) * fasterThan(moving_fit.hypothesis(),
                                                              motion.slow_share * prior.speed_sigma);
-  const double log_odds = std::clamp(
-      static_fit.logEvidence(inflations) - moving_fit.logEvidence(inflations) + at_rest.beside -
-          in_motion.beside + std::log((1.0 - share) / share / speed_prior_ratio),
-      -kMaxLogOdds, kMaxLogOdds);
+  const double log_odds =
+      std::clamp(static_fit.logEvidence() - moving_fit.logEvidence() + at_rest.beside -
+                     in_motion.beside + std::log((1.0 - share) / share / speed_prior_ratio),
+                 -kMaxLogOdds, kMaxLogOdds);
   const double p_rest = 1.0 / (1.0 + std::exp(-log_odds));
   double weight[2] = {0.0, 0.0};
   for (const auto& h : hs) {
@@ -123,8 +122,6 @@ void weighMotion(std::vector<Hypothesis>& hs, const std::string& name, const Fit
 
 void weighModes(std::vector<Hypothesis>& hs, const Fits& fits, double least) {
   if (fits.size() < 2) return;
-  PerKeyframe inflations = fits.front().map_fit.inflations();
-  for (const auto& f : fits) inflations = inflations.cwiseMin(f.map_fit.inflations());
   constexpr double kNone = -1e9;
   ScratchVector<double> log_evidence;
   double largest = kNone, all = 0.0, sum = 0.0;
@@ -132,8 +129,7 @@ void weighModes(std::vector<Hypothesis>& hs, const Fits& fits, double least) {
     all += hs[f->index].weight;
     const bool duplicate = std::any_of(
         fits.begin(), f, [&](const Fitted& g) { return sameMode(hs[g.index], hs[f->index]); });
-    log_evidence.push_back(duplicate ? kNone
-                                     : f->map_fit.logEvidence(inflations, true) + f->beside);
+    log_evidence.push_back(duplicate ? kNone : f->map_fit.logEvidence(true) + f->beside);
     largest = std::max(largest, log_evidence.back());
   }
   for (auto& e : log_evidence) {
@@ -211,15 +207,13 @@ void tryLookalikeClass(Track& track, const KeyframeBatch& batch, const FrameCont
       fits.push_back(std::move(one));
   }
   if (fits.empty()) return;
-  PerKeyframe inflations = as_other->inflations();
-  for (const MapFit& one : fits) inflations = inflations.cwiseMin(one.inflations());
-  const double other_evidence = as_other->logEvidence(inflations);
+  const double other_evidence = as_other->logEvidence();
   const double initial_log_odds = std::log((1.0 - p.clutter.other_prior) / p.clutter.other_prior) -
                                   std::log(std::max(p.clutter.other_lookalike, 1e-3));
   for (const MapFit& one : fits) {
     Hypothesis h = one.hypothesis();
     const double beside = besideKeyframes(h, track.id, frame);
-    const double odds = one.logEvidence(inflations) - other_evidence + initial_log_odds + beside;
+    const double odds = one.logEvidence() - other_evidence + initial_log_odds + beside;
     if (odds < kLeastOdds) continue;
     track.hypotheses.push_back(h);
     track.hypotheses.back().weight = other.weight * std::exp(std::min(odds, kMaxLogOdds));

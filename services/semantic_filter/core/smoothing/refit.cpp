@@ -32,10 +32,23 @@ void dropContradicted(Track& track, const ContradictionCounts& contradictions, s
   if (kept.size() >= least) track.batch.keyframes = std::move(kept);
 }
 
-/// Fits the hypotheses of one class. Returns the residuals of its best fit at rest.
-std::optional<ResidualRatios> refitClass(Track& track, const std::string& name,
-                                         const KeyframeBatch& batch, const FrameContext& frame,
-                                         bool search, ContradictionCounts& contradictions) {
+/// Returns the nats by which the boxes of an object at rest enclose its outline, not its cuboid.
+double outlineNats(const MapFit& at_rest, const KeyframeBatch& batch, const FrameContext& frame) {
+  constexpr double kMost = 3.0;  // nats; an object of an unusual shape must not decide alone
+  const BoxStyles* outlines = frame.model->outline_styles.get();
+  const bool as_outlines = frame.styles == outlines;
+  FrameContext other = frame;
+  other.styles = as_outlines ? frame.model->styles.get() : outlines;
+  const auto as_other = fit(at_rest.hypothesis(), batch, other);
+  if (!as_other) return 0.0;
+  const double nats = as_other->logEvidence() - at_rest.logEvidence();
+  return std::clamp(as_outlines ? -nats : nats, -kMost, kMost);
+}
+
+/// Fits the hypotheses of one class. Returns what its best fit at rest tells about the network.
+std::optional<NetworkEvidence> refitClass(Track& track, const std::string& name,
+                                          const KeyframeBatch& batch, const FrameContext& frame,
+                                          bool search, ContradictionCounts& contradictions) {
   const auto& p = frame.parameters->smoothing;
   Fits static_fits, moving_fits;
   for (std::size_t i = 0; i < track.hypotheses.size(); ++i) {
@@ -56,29 +69,30 @@ std::optional<ResidualRatios> refitClass(Track& track, const std::string& name,
   weighModes(track.hypotheses.write(), static_fits, p.least_weight);
   weighModes(track.hypotheses.write(), moving_fits, p.least_weight);
   auto at_rest = heaviest(track.hypotheses.read(), std::move(static_fits));
-  std::optional<ResidualRatios> residuals;
+  std::optional<NetworkEvidence> evidence;
   if (at_rest) {
-    residuals =
-        ResidualRatios{at_rest->map_fit.residualRatio(), at_rest->map_fit.azimuthResidualRatio()};
+    evidence = {at_rest->map_fit.residualRatio(), at_rest->map_fit.azimuthResidualRatio()};
+    if (frame.asks_extent && name == track.best().class_name)
+      evidence->outline_nats = outlineNats(at_rest->map_fit, batch, frame);
   }
   auto in_motion = heaviest(track.hypotheses.read(), std::move(moving_fits));
   if (!in_motion && at_rest) in_motion = tryMoving(track, *at_rest, batch, frame);
-  if (!in_motion) return residuals;
+  if (!in_motion) return evidence;
   if (!at_rest) {
     const Hypothesis& mover = in_motion->map_fit.hypothesis();
     auto map_fit = fit(atRest(mover, track.batch.keyframes.read()), batch, frame);
-    if (!map_fit) return residuals;
+    if (!map_fit) return evidence;
     Hypothesis h = map_fit->hypothesis();
     h.weight = 1e-3 * mover.weight;
     at_rest.emplace(adopt(track, std::move(h), std::move(*map_fit), frame));
   }
   weighMotion(track.hypotheses.write(), name, *at_rest, *in_motion, frame);
-  return residuals;
+  return evidence;
 }
 
-/// Whether the residuals of the track may inform the noise scale: it surely exists and stands, its
+/// Whether the track may inform about its network: it surely exists and stands, its
 /// class is known, and all its keyframes are of the present network.
-bool informsNoiseScale(const Track& track, const FrameContext& frame) {
+bool informsAboutNetwork(const Track& track, const FrameContext& frame) {
   constexpr double kSure = 0.9;
   const Hypothesis& best = track.best();
   return !best.moving && best.class_name != kOtherClass && track.existence > kSure &&
@@ -107,7 +121,7 @@ double refitNeed(const Track& track, double fresh) {
          (fresh * static_cast<double>(track.batch.keyframes.size()) * track.batch.patience);
 }
 
-std::optional<ResidualRatios> refit(Track& track, const FrameContext& frame) {
+std::optional<NetworkEvidence> refit(Track& track, const FrameContext& frame) {
   const ScratchScope scope;
   const auto most_patience = static_cast<std::uint32_t>(frame.parameters->smoothing.patience);
   const auto& p = *frame.parameters;
@@ -123,10 +137,10 @@ std::optional<ResidualRatios> refit(Track& track, const FrameContext& frame) {
   const bool search = track.batch.seen >= track.batch.mode_search_due;
   if (search) track.batch.mode_search_due = 2 * track.batch.seen;
   ContradictionCounts contradictions;
-  ScratchMap<std::string, ResidualRatios> residuals;
+  ScratchMap<std::string, NetworkEvidence> evidence;
   for (const auto& name : names) {
-    const auto residual = refitClass(track, name, batch, frame, search, contradictions);
-    if (residual) residuals[name] = *residual;
+    const auto of_class = refitClass(track, name, batch, frame, search, contradictions);
+    if (of_class) evidence[name] = *of_class;
   }
   std::erase_if(track.hypotheses.write(), [](const Hypothesis& h) { return h.weight <= 0.0; });
   normalise(track, ClassEvidence::kMotion);
@@ -136,9 +150,9 @@ std::optional<ResidualRatios> refit(Track& track, const FrameContext& frame) {
       before.class_name == track.best().class_name && before.moving == track.best().moving;
   const bool settled = same && distance2(before, track.best()) < gates::kUnchanged;
   track.batch.patience = settled ? std::min(2 * track.batch.patience, most_patience) : 1;
-  const auto of_best = residuals.find(track.best().class_name);
-  if (of_best == residuals.end() || !informsNoiseScale(track, frame)) return std::nullopt;
-  ResidualRatios result = of_best->second;
+  const auto of_best = evidence.find(track.best().class_name);
+  if (of_best == evidence.end() || !informsAboutNetwork(track, frame)) return std::nullopt;
+  NetworkEvidence result = of_best->second;
   for (ResidualRatio* one : {&result.sides, &result.azimuths}) one->count *= std::min(fresh, 1.0);
   return result;
 }
@@ -152,9 +166,14 @@ void refitNeediest(ScratchVector<Track*>& tracks, Belief& belief, const FrameCon
   if (tracks.size() > most) tracks.resize(most);
   for (Track* track : tracks) {
     const double share = track->batch.fresh / static_cast<double>(track->batch.keyframes.size());
-    if (const auto residuals = refit(*track, frame)) {
-      belief.learned.sides.learn(frame.noise_scale.model, residuals->sides);
-      belief.learned.azimuths.learn(frame.noise_scale.model, residuals->azimuths);
+    if (const auto evidence = refit(*track, frame)) {
+      const std::uint64_t model = frame.noise_scale.model;
+      belief.learned.sides.learn(model, evidence->sides);
+      belief.learned.azimuths.learn(model, evidence->azimuths);
+      if (evidence->outline_nats) {
+        belief.learned.extents.learn(model, *evidence->outline_nats - track->batch.outline_nats);
+        track->batch.outline_nats = *evidence->outline_nats;
+      }
     }
     frame.ground->updateRoughness(belief.learned.roughness_scale, *track, share);
   }

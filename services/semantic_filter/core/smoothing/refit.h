@@ -12,11 +12,14 @@ bool considerKeyframe(Track& track, const BoxDetection& box, const std::array<bo
                       const FrameContext& frame);
 /// Returns the number of new keyframes over the awaited `fresh` share; from 1 on a fit is due.
 double refitNeed(const Track& track, double fresh);
-struct ResidualRatios {
-  ResidualRatio sides, azimuths;
+/// What one track tells about the boxes of its network.
+struct NetworkEvidence {
+  ResidualRatio sides, azimuths;  ///< of keyframes that no earlier fit counted
+  /// Nats for boxes that enclose outlines, not cuboids, by all keyframes; if the frame asks for it.
+  std::optional<double> outline_nats = {};
 };
-/// Fits the hypotheses and weighs rest against motion. Returns residuals for the noise scale.
-std::optional<ResidualRatios> refit(Track& track, const FrameContext& frame);
+/// Fits the hypotheses and weighs rest against motion. Returns what the track tells, if it may.
+std::optional<NetworkEvidence> refit(Track& track, const FrameContext& frame);
 
 /// Fits the tracks with the largest refitNeed, and learns noise scales and ground from them.
 void refitNeediest(ScratchVector<Track*>& tracks, Belief& belief, const FrameContext& frame);

@@ -15,7 +15,7 @@ double stationaryOccluder(const Track& track, const Eigen::Vector3d& place, cons
   double unmapped_occluder = walk.unmapped_occluder;
   for (const auto& k : track.batch.keyframes.read()) {
     if (k->from->time >= track.life.visit_began) break;  // keyframes are in order of time
-    unmapped_occluder *= 1.0 - viewCorrelation(place, k->from->T_WC, walk.T_WC, walk.detectability);
+    unmapped_occluder *= 1.0 - viewCorrelation(place, k->from->T_WC, walk.T_WC, walk.occluder);
   }
   return unmapped_occluder;
 }
@@ -58,13 +58,14 @@ double detectionRateFactor(const Track& track, const FrameContext& frame) {
 
 void predictDetectability(Track& track, const ViewWalk& walk) {
   const Eigen::Vector3d place = track.best().x.head<3>();
-  const double keep =
-      track.views.predicted_from
-          ? viewCorrelation(place, *track.views.predicted_from, walk.T_WC, walk.detectability)
-          : 0.0;
+  const auto keepWith = [&](const ViewScales& scales) {
+    const auto& before = track.views.predicted_from;
+    return before ? viewCorrelation(place, *before, walk.T_WC, scales) : 0.0;
+  };
   const double stationary = stationaryOccluder(track, place, walk);
   track.detectability.unmapped_occluder =
-      stationary + keep * (track.detectability.unmapped_occluder - stationary);
+      stationary + keepWith(walk.occluder) * (track.detectability.unmapped_occluder - stationary);
+  const double keep = keepWith(walk.detectability);
   // A moving undetected track is lost rather than hard to detect: it would take other boxes.
   track.detectability.hard_to_detect =
       track.best().moving

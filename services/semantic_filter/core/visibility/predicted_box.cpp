@@ -20,7 +20,7 @@ std::optional<Prediction> predictionOf(const Track& track, const FrameInput& now
       track.existence * classProbability(track, best.class_name) * track.visibility.fraction;
   if (probability < kPredictionFloor) return std::nullopt;
   const double since = toSeconds(now.stamp.time - track.as_of);
-  const BoxStyle& style = now.model->styles->of(best.class_name);
+  const BoxStyle& style = now.styles()->of(best.class_name);
   const auto box = projectObserved(stateAt(best, since), now.view, style, best.heading());
   if (!box || !(box->sides.cwiseAbs().maxCoeff() < kFarthest)) return std::nullopt;
   if (box->sides[0] >= box->sides[2] || box->sides[1] >= box->sides[3]) return std::nullopt;

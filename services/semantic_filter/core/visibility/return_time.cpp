@@ -39,7 +39,7 @@ struct Standing {
 };
 
 const Shape& shapeOf(const Track& track, const FrameInput& now) {
-  return now.model->styles->of(track.best().class_name).shape;
+  return now.styles()->of(track.best().class_name).shape;
 }
 
 /// Returns the tracks that may hide it along the path: solid, nearer, and next to it in the image.

@@ -31,9 +31,9 @@ TEST(MoverShares, AreThoseOfTheClassPriorsBeforeTheFirstObject) {
 
 TEST(MoverShares, FallWithEachObjectAtRestAndRiseWithEachMover) {
   MoverShares shares;
-  for (int i = 0; i < 45; ++i) shares.learn(judged(0.0), kMinSpeed);
+  for (int i = 0; i < 9; ++i) shares.learn(judged(0.0), kMinSpeed);
   EXPECT_NEAR(shares.of(carPrior(0.2)), 0.02, 1e-9);
-  for (int i = 0; i < 50; ++i) shares.learn(judged(8.0), kMinSpeed);
+  for (int i = 0; i < 10; ++i) shares.learn(judged(8.0), kMinSpeed);
   EXPECT_NEAR(shares.of(carPrior(0.2)), 0.51, 1e-3);
 }
 

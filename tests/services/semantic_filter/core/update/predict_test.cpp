@@ -87,7 +87,7 @@ TEST(PredictBias, ADetectorWithoutLastingErrorHasNoBias) {
 TEST(Predict, KeyframesOfAnEarlierVisitExcludeAnUnmappedOccluder) {
   ViewWalk walk = walkWith({});
   walk.unmapped_occluder = 0.2;
-  walk.detectability = {0.15, 0.3, 1e9};
+  walk.occluder = {0.15, 1e9, 1e9};
   const CameraModel camera{testing::makeCamera()};
   View view;
   view.camera = &camera;
@@ -108,6 +108,24 @@ TEST(Predict, KeyframesOfAnEarlierVisitExcludeAnUnmappedOccluder) {
   EXPECT_LT(occludedAt(0.0), 1e-6);
   EXPECT_LT(occludedAt(0.5), 0.01);
   EXPECT_GT(occludedAt(40.0), 0.19);
+}
+
+/// A hedge that hides an object hides it from a whole side, at any distance.
+TEST(Predict, AnUnmappedOccluderStaysWhileTheDirectionStays) {
+  ViewWalk walk = walkWith({});
+  walk.unmapped_occluder = 0.2;
+  walk.occluder = {1.0, 1e9, 1e9};
+  walk.detectability = {0.15, 0.3, 1e9};
+  const auto after = [&](const Eigen::Vector3d& step) {
+    Track object = biasedCar(walk);
+    object.detectability.unmapped_occluder = 1.0;
+    ViewWalk moved = walk;
+    moved.T_WC.p += step;
+    predict(object, object.as_of + std::chrono::seconds(1), PoseError{}, MotionParameters{}, moved);
+    return object.detectability.unmapped_occluder;
+  };
+  EXPECT_GT(after({0, 0, 30}), 0.99) << "from 40 m to 10 m, in one direction";
+  EXPECT_NEAR(after({40, 0, 40}), 0.2 + 0.8 * std::exp(-std::sqrt(2.0)), 1e-6) << "from the side";
 }
 
 /// Its detection rate from here gives little information about other viewpoints.
