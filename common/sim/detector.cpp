@@ -145,6 +145,9 @@ SimulatedDetector::SimulatedDetector(DetectorModel model, Truth truth,
       width_(camera.width),
       height_(camera.height) {
   checkModel(model_);
+  if (model_.coast_s > 0.0 && !(camera.rate_hz > 0.0)) {
+    refuse("coast needs the camera's rate; give rate_hz in its sensor.yaml");
+  }
   means_ = classDirections(model_);
   info_.name = "simulated";
   info_.classes = model_.classes;

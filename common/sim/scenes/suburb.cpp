@@ -14,7 +14,7 @@
 namespace perdure::sim {
 namespace {
 
-constexpr double kSuburbSeconds = 400.0;
+constexpr double kSuburbSeconds = 305.0;
 constexpr int kSuburbColumns = 4, kSuburbRows = 4;
 constexpr double kShareMoving = 0.02;  ///< of vehicles; drive 00 of KITTI: 7 of 440
 constexpr double kPassing_s = 4.0;     ///< an oncoming car is present for so long before and after
@@ -84,10 +84,11 @@ void addOncoming(SceneBuilder& builder, std::size_t count, double seconds) {
 
 Furnishing furnishingOfSuburb() {
   Furnishing furnishing = furnishingOfGrid();
-  furnishing.free_share = 0.6;
+  furnishing.free_share = 0.5;
   furnishing.hedge_share = 0.0;  // those of the gardens
   furnishing.pavement = 1.8;
   furnishing.garden = 6.5;
+  furnishing.island_share = 0.4;
   return furnishing;
 }
 

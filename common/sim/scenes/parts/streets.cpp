@@ -109,13 +109,26 @@ void Streets::build(const Road& road, int side) {
 void Streets::plots(const Road& road, int side) {
   for (double along = 0.0; along < lengthOf(road) - 13.0;) {
     const double length = builder_.dice().uniform(13.0, 19.0);
-    along += plot(road, side, along, length) ? length : 2.0;
+    if (plot(road, side, along, length)) {
+      along += length;
+    } else {  // beside the last plot of a crossing road
+      fence(road, placeAt(road, side, along + 1.0, 0.5 * road.width_m + 1.5, M_PI), 1.98);
+      along += 2.0;
+    }
   }
 }
 
-/// The driveway is at one end of the plot. A hedge or a wall follows the pavement along the rest of
-/// the plot, and another one may separate the driveway from the neighbour. A car in the driveway is
-/// therefore visible from both directions, from one or from none.
+/// A hedge or a wall along the x of `place`.
+void Streets::fence(const Road& road, const Place& place, double length) {
+  Dice& dice = builder_.dice();
+  const bool hedge = dice.chance(0.6);
+  put(road, hedge ? PropKind::kHedge : PropKind::kWall,
+      {length, hedge ? 0.6 : 0.2, dice.uniform(1.0, 1.8)}, place);
+}
+
+/// The driveway is at one end of the plot. A hedge or a wall may follow the pavement along the rest
+/// of the plot, and another one may separate the driveway from the neighbour. A car in the driveway
+/// is therefore visible from both directions, from one or from none.
 bool Streets::plot(const Road& road, int side, double from, double length) {
   constexpr double kDriveway = 3.2, kHouseDepth = 7.0, kParkingStrip = 2.2;
   Dice& dice = builder_.dice();
@@ -130,19 +143,16 @@ bool Streets::plot(const Road& road, int side, double from, double length) {
       !builder_.put(PropKind::kFacade, house, at)) {
     return false;
   }
-  const auto fence = [&](double share, double long_side, const Place& place) {
-    if (!dice.chance(share)) return;
-    const bool hedge = dice.chance(0.6);
-    const Eigen::Vector3d size(long_side, hedge ? 0.6 : 0.2, dice.uniform(1.0, 1.8));
-    put(road, hedge ? PropKind::kHedge : PropKind::kWall, size, place);
-  };
-  fence(0.75, rest - 0.2, placeAt(road, side, middle, line + 0.3, M_PI));
+  const double enclosed = dice.unit();  // of the two fences: the first, the second, both or none
+  if (enclosed < 0.6) fence(road, placeAt(road, side, middle, line + 0.3, M_PI), rest - 0.2);
   const double border = drive_first ? from + 0.2 : from + length - 0.2;
-  fence(0.5, furnishing_.garden - 0.8,
-        placeAt(road, side, border, line + 0.7 + 0.5 * furnishing_.garden, M_PI_2));
+  if (enclosed > 0.4 && enclosed < 0.9) {
+    const double across = line + 0.7 + 0.5 * furnishing_.garden;
+    fence(road, placeAt(road, side, border, across, M_PI_2), furnishing_.garden - 0.8);
+  }
   if (dice.chance(0.75)) {
     SceneObject car = builder_.draw(dice.chance(furnishing_.van_share) ? "van" : "car");
-    const double across = line + 0.6 + 0.5 * car.size.x() + dice.uniform(0.0, 1.0);
+    const double across = line + 0.6 + 0.5 * car.size.x() + dice.uniform(0.0, 1.5);
     builder_.put(std::move(car),
                  placeAt(road, side, drive_at, across, (dice.chance(0.5) ? M_PI_2 : -M_PI_2)));
   }
@@ -183,6 +193,12 @@ void Streets::park(const Road& road, int side) {
     // Many gaps are small, and few are large.
     const double gap = 0.6 - (furnishing_.mean_gap - 0.6) * std::log(1.0 - dice.unit());
     along += stands ? length + std::min(gap, 6.0) : 1.0;
+    if (stands && furnishing_.island_share > 0.0 && dice.chance(furnishing_.island_share)) {
+      const Eigen::Vector3d size(dice.uniform(1.2, 2.5), 1.8, dice.uniform(1.5, 1.8));
+      put(road, PropKind::kHedge, size,
+          placeAt(road, side, along + 0.5 * size.x(), 0.5 * road.width_m - 1.1, M_PI));
+      along += size.x() + 0.6;
+    }
   }
 }
 
