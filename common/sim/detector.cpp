@@ -236,7 +236,7 @@ std::vector<SimulatedDetector::Sight> SimulatedDetector::sights(std::uint64_t fr
     const auto like = std::find(model_.classes.begin(), model_.classes.end(), object->looks_like);
     Sight sight;
     sight.view = view;
-    sight.time_s = toSeconds(time.time_since_epoch());
+    sight.time_s = toSeconds(time);
     sight.looks_like = static_cast<std::size_t>(like - model_.classes.begin());
     if (view.boxInside(width_, height_).area() <= 0.0) continue;
     sight.visible = visibleShare(view);

@@ -1,9 +1,9 @@
 // Streets with front gardens. Hedges and walls hide the cars in the driveways from one direction or
 // from both, and streets are driven twice, in the same direction and in the opposite one.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "common/math/so3.h"
@@ -22,25 +22,10 @@ constexpr double kPassing_s = 4.0;     ///< an oncoming car is present for so lo
 /// Rows 0 and 3 are driven twice in one direction; rows 0 and 2 and the outer columns also in the
 /// opposite one.
 std::vector<Eigen::Vector2d> turnsInSuburb() {
+  constexpr std::array kRoute{0, 30, 32, 2, 0, 30, 33, 3, 1, 31, 30, 0, 2, 32, 33, 3};
   std::vector<Eigen::Vector2d> points;
-  for (const auto& [column, row] : std::vector<std::pair<int, int>>{{0, 0},
-                                                                    {3, 0},
-                                                                    {3, 2},
-                                                                    {0, 2},
-                                                                    {0, 0},
-                                                                    {3, 0},
-                                                                    {3, 3},
-                                                                    {0, 3},
-                                                                    {0, 1},
-                                                                    {3, 1},
-                                                                    {3, 0},
-                                                                    {0, 0},
-                                                                    {0, 2},
-                                                                    {3, 2},
-                                                                    {3, 3},
-                                                                    {0, 3}}) {
-    points.emplace_back(kGridX * column, kGridY * row);
-  }
+  for (const int crossing : kRoute)  // ten times the column, plus the row
+    points.emplace_back(kGridX * (crossing / 10), kGridY * (crossing % 10));
   return points;
 }
 
