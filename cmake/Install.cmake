@@ -78,7 +78,7 @@ get_property(commands GLOBAL PROPERTY PERDURE_COMMANDS)
 install(TARGETS ${commands} DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/perdure COMPONENT tools)
 install(DIRECTORY tools/model/perdure_model DESTINATION ${share} COMPONENT tools
   FILES_MATCHING PATTERN "*.py")
-install(FILES config/simulated_detector.yaml DESTINATION ${etc} COMPONENT tools)
+install(FILES config/simulated_detector.yaml config/simulated_tracker.yaml DESTINATION ${etc} COMPONENT tools)
 
 install(DIRECTORY models/ DESTINATION ${share}/models COMPONENT models PATTERN README.md EXCLUDE)
 

@@ -36,7 +36,8 @@ void checkModel(const DetectorModel& m) {
   const auto share = [](double value) { return value >= 0.0 && value <= 1.0; };
   if (m.classes.empty()) refuse("classes are none; name at least one");
   if (!share(m.found) || !share(m.flip_share) || !share(m.persistent_share) ||
-      !share(m.least_separation) || !share(m.side_correlation) || !share(m.shrink_below)) {
+      !share(m.least_separation) || !share(m.side_correlation) || !share(m.shrink_below) ||
+      !share(m.tail_share)) {
     refuse("shares are not within 0 and 1; mend the one that is not");
   }
   if (!(m.half_size_px > 0 && m.size_octaves > 0 && m.visible_softness > 0 &&
@@ -46,6 +47,9 @@ void checkModel(const DetectorModel& m) {
   if (!(m.box_share >= 0 && m.box_floor_px >= 0 && m.false_per_frame >= 0 &&
         m.false_per_frame <= 100 && m.latency_s >= 0)) {
     refuse("box errors, latency or false alarms are below 0 (or over 100 a frame); mend the one");
+  }
+  if (!(m.tail_scale >= 1 && m.error_time_s >= 0 && m.coast_s >= 0)) {
+    refuse("tail_scale is below 1, or error_time or coast below 0; change the one that is");
   }
 }
 
@@ -76,9 +80,10 @@ Eigen::MatrixXd classDirections(const DetectorModel& model) {
 /// An object in the image, according to the truth.
 struct SimulatedDetector::Sight {
   TruthView view;
+  double time_s = 0.0;
   std::size_t looks_like = 0;
-  Box inside;            ///< the outline within the image
-  double visible = 0.0;  ///< visible fraction of `inside`
+  Box inside;            ///< what boxes enclose, within the image
+  double visible = 0.0;  ///< visible fraction of the outline in the image
   Eigen::Vector3d centre_W = Eigen::Vector3d::Zero();
   double distance = 0.0, alpha = 0.0;
   double bearing = 0.0;  ///< direction of the camera, as seen from the object
@@ -89,29 +94,46 @@ struct SimulatedDetector::Sight {
 /// the viewpoint changes.
 class SimulatedDetector::Errors {
  public:
+  /// `time` is in units of the time constant of sides; none: they are drawn for each frame.
   Errors(std::uint64_t seed, std::uint64_t frame, std::uint64_t object, double persistent,
-         double bearing, double log_distance)
+         double bearing, double log_distance, std::optional<double> time = {})
       : fresh_(seedOf("look", {seed, frame, object})),
         own_(seedOf("object", {seed, object})),
-        persistent_(persistent) {
+        persistent_(persistent),
+        time_(time) {
     constexpr std::array kTurns{2.0, 6.0, 12.0, 19.0};
     for (std::size_t i = 0; i < kTurns.size(); ++i) {
       const double phase = kTurns[i] * (bearing + log_distance);
       waves_[i] = {std::cos(phase), std::sin(phase)};
     }
   }
-  double normal() {
+  double normal() { return withPersistent(fresh_.normal()); }
+  /// A number for a side of the box: the drawn part changes with the time constant.
+  double side() {
+    if (!time_) return normal();
+    double lasting = 0.0;
+    for (std::size_t i = 0; i < waves_.size(); ++i) {
+      // Cauchy-distributed frequencies have the correlation exp(−|Δt| / time constant).
+      const double phase = *time_ * std::tan(M_PI * (own_.unit() - 0.5));
+      const double a = own_.normal(), b = own_.normal();
+      lasting += 0.5 * (std::cos(phase) * a + std::sin(phase) * b);
+    }
+    return withPersistent(lasting);
+  }
+
+ private:
+  double withPersistent(double drawn) {
     double own = 0.0;
     for (const auto& wave : waves_) {
       const double a = own_.normal(), b = own_.normal();
       own += 0.5 * (wave[0] * a + wave[1] * b);  // four waves with a total variance of one
     }
-    return std::sqrt(1.0 - persistent_) * fresh_.normal() + std::sqrt(persistent_) * own;
+    return std::sqrt(1.0 - persistent_) * drawn + std::sqrt(persistent_) * own;
   }
 
- private:
   Dice fresh_, own_;
   double persistent_;
+  std::optional<double> time_;
   std::array<std::array<double, 2>, 4> waves_{};
 };
 
@@ -119,17 +141,20 @@ SimulatedDetector::SimulatedDetector(DetectorModel model, Truth truth,
                                      const CameraCalibration& camera)
     : model_(std::move(model)),
       truth_(std::move(truth)),
+      camera_(camera),
       width_(camera.width),
-      height_(camera.height),
-      T_BC_(camera.T_BC) {
+      height_(camera.height) {
   checkModel(model_);
+  if (model_.coast_s > 0.0 && !(camera.rate_hz > 0.0)) {
+    refuse("coast needs the camera's rate; give rate_hz in its sensor.yaml");
+  }
   means_ = classDirections(model_);
   info_.name = "simulated";
   info_.classes = model_.classes;
   info_.input_width = camera.width;
   info_.input_height = camera.height;
   info_.box_sigma = model_.box_share;
-  info_.boxes = BoxExtent::kOutline;
+  if (model_.declare_boxes) info_.boxes = model_.boxes;
   std::string all;
   for (const std::string& name : model_.classes) all += name + ",";
   info_.hash = digest(all + std::to_string(model_.seed));
@@ -139,6 +164,63 @@ double SimulatedDetector::foundProbability(double size_px, double visible) const
   if (visible < model_.least_visible || size_px <= 0.0) return 0.0;
   return model_.found * logistic(std::log2(size_px / model_.half_size_px) / model_.size_octaves) *
          logistic((visible - model_.half_visible) / model_.visible_softness);
+}
+
+/// The box of what the detector encloses, within the image. A cuboid that the camera model cannot
+/// project as a whole has the box of the outline.
+Box SimulatedDetector::extentOf(const TruthView& view, const TruthObject& object,
+                                const TruthKey& key, const RigidTransform& T_WC) const {
+  const Box outline = view.boxInside(width_, height_);
+  if (model_.boxes == BoxExtent::kOutline) return outline;
+  const RigidTransform T_CO =
+      T_WC.inverse() * RigidTransform(expQuaternion({0, 0, key.yaw}), key.centre_W);
+  Box box{1e9, 1e9, -1e9, -1e9};
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::Vector3d corner(i & 1 ? 0.5 : -0.5, i & 2 ? 0.5 : -0.5, i & 4 ? 0.5 : -0.5);
+    const auto pixel = camera_.project(T_CO * corner.cwiseProduct(object.size));
+    if (!pixel) return outline;
+    box.x1 = std::min(box.x1, pixel->x()), box.x2 = std::max(box.x2, pixel->x());
+    box.y1 = std::min(box.y1, pixel->y()), box.y2 = std::max(box.y2, pixel->y());
+  }
+  return clipped(box, width_, height_);
+}
+
+const TruthView* SimulatedDetector::viewOf(std::uint64_t frame, std::uint64_t object) const {
+  const auto views = truth_.views.find(frame);
+  if (views == truth_.views.end()) return nullptr;
+  const auto view = std::find_if(views->second.begin(), views->second.end(),
+                                 [&](const TruthView& one) { return one.object_id == object; });
+  return view == views->second.end() ? nullptr : &*view;
+}
+
+double SimulatedDetector::visibleShare(const TruthView& view) const {
+  const double inside = view.boxInside(width_, height_).area() / view.box.area();
+  return inside > 0.0 ? std::min(1.0, view.visible_fraction / inside) : 0.0;
+}
+
+/// Gives a hidden object the visibility of the last frame in which it was visible, and moves its
+/// box to where that frame and the one before it predict it.
+void SimulatedDetector::coast(Sight& sight, std::uint64_t frame) const {
+  const std::uint64_t id = sight.view.object_id;
+  const double most =
+      std::min(model_.coast_s * camera_.calibration().rate_hz + 1e-9, static_cast<double>(frame));
+  for (std::uint64_t age = 1; static_cast<double>(age) <= most; ++age) {
+    const TruthView* last = viewOf(frame - age, id);
+    if (!last) return;
+    if (visibleShare(*last) < model_.half_visible) continue;
+    const TruthView* before = age < frame ? viewOf(frame - age - 1, id) : nullptr;
+    const Box outline = sight.view.boxInside(width_, height_);
+    const auto predicted = [&](double Box::*side) {
+      const double speed = before ? last->box.*side - before->box.*side : 0.0;
+      const double beyond_outline = sight.inside.*side - outline.*side;
+      return last->box.*side + static_cast<double>(age) * speed + beyond_outline;
+    };
+    sight.visible = visibleShare(*last);
+    sight.inside = clipped(
+        {predicted(&Box::x1), predicted(&Box::y1), predicted(&Box::x2), predicted(&Box::y2)},
+        width_, height_);
+    return;
+  }
 }
 
 std::vector<SimulatedDetector::Sight> SimulatedDetector::sights(std::uint64_t frame, TimePoint time,
@@ -154,12 +236,13 @@ std::vector<SimulatedDetector::Sight> SimulatedDetector::sights(std::uint64_t fr
     const auto like = std::find(model_.classes.begin(), model_.classes.end(), object->looks_like);
     Sight sight;
     sight.view = view;
+    sight.time_s = toSeconds(time);
     sight.looks_like = static_cast<std::size_t>(like - model_.classes.begin());
-    sight.inside = view.boxInside(width_, height_);
-    const double share_inside = sight.inside.area() / view.box.area();
-    if (share_inside <= 0.0) continue;
-    sight.visible = std::min(1.0, view.visible_fraction / share_inside);
+    if (view.boxInside(width_, height_).area() <= 0.0) continue;
+    sight.visible = visibleShare(view);
     const TruthKey key = object->at(time);
+    sight.inside = extentOf(view, *object, key, T_WC);
+    if (sight.visible < model_.half_visible) coast(sight, frame);
     const Eigen::Vector3d back = T_WC.p - key.centre_W;
     sight.centre_W = key.centre_W;
     sight.distance = back.norm();
@@ -177,7 +260,7 @@ Detections SimulatedDetector::detect(std::uint64_t frame, const FrameStamp& stam
   found.camera = "cam0";
   found.instance = info_.instance;
   found.model_hash = info_.hash;
-  const std::vector<Sight> all = sights(frame, stamp.time, T_WB * T_BC_);
+  const std::vector<Sight> all = sights(frame, stamp.time, T_WB * camera_.T_BC());
   for (const Sight& sight : all) {
     if (sight.looks_like == model_.classes.size()) continue;  // not a class of the detector
     if (auto detection = look(sight, all, frame)) found.detections.push_back(std::move(*detection));
@@ -197,8 +280,10 @@ Detections SimulatedDetector::detect(std::uint64_t frame, const FrameStamp& stam
 
 std::optional<Detection> SimulatedDetector::look(const Sight& sight, const std::vector<Sight>& all,
                                                  std::uint64_t frame) const {
-  Errors errors(model_.seed, frame, sight.view.object_id, model_.persistent_share, sight.bearing,
-                std::log(std::max(sight.distance, 0.1)));
+  Errors errors(
+      model_.seed, frame, sight.view.object_id, model_.persistent_share, sight.bearing,
+      std::log(std::max(sight.distance, 0.1)),
+      model_.error_time_s > 0.0 ? std::optional(sight.time_s / model_.error_time_s) : std::nullopt);
   const double size = sizeOf(sight.inside);
   const bool is_found = normalCdf(errors.normal()) < foundProbability(size, sight.visible);
   Detection detection;
@@ -247,9 +332,11 @@ std::optional<Box> SimulatedDetector::withErrors(const Box& box, Errors& errors)
   const double own = std::sqrt(1.0 - model_.side_correlation);
   const double sigma_x = std::hypot(model_.box_share * box.width(), model_.box_floor_px);
   const double sigma_y = std::hypot(model_.box_share * box.height(), model_.box_floor_px);
-  const double shift_x = common * errors.normal(), shift_y = common * errors.normal();
+  const double shift_x = common * errors.side(), shift_y = common * errors.side();
   const auto side = [&](double at, double shift, double sigma, double limit) {
-    const double error = sigma * (shift + own * errors.normal());
+    double error = sigma * (shift + own * errors.side());
+    if (model_.tail_share > 0.0 && normalCdf(errors.side()) < model_.tail_share)
+      error *= model_.tail_scale;
     // A side cut by the image border stays at the border.
     if (at <= 0.0 || at >= limit) return at;
     return std::clamp(at + error, 0.0, limit);

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "common/camera/camera_model.h"
 #include "common/sim/dice.h"
 #include "common/sim/truth.h"
 #include "common/types/detections.h"
@@ -43,6 +44,15 @@ struct DetectorModel {
   double box_floor_px = 0.8;      ///< additional σ of a side in pixels, added in quadrature
   double side_correlation = 0.3;  ///< correlation of the errors of opposite sides
   double shrink_below = 0.6;      ///< fraction below which boxes enclose the visible part only
+  /// Share of sides whose deviation is tail_scale times larger.
+  double tail_share = 0.0, tail_scale = 5.0;
+  /// Time constant of the sides' errors, apart from their persistent share; 0: each frame anew.
+  double error_time_s = 0.0;
+  /// A tracker continues the box of an object that becomes hidden for so long, at constant velocity
+  /// in the image.
+  double coast_s = 0.0;
+  BoxExtent boxes = BoxExtent::kOutline;
+  bool declare_boxes = true;  ///< false: ModelInfo has its default, whatever the boxes enclose
 
   double false_per_frame = 0.5, false_smallest_px = 8.0;  ///< sizes are log-uniform up to the image
 
@@ -83,6 +93,11 @@ class SimulatedDetector {
   std::vector<Sight> sights(std::uint64_t frame, TimePoint time, const RigidTransform& T_WC) const;
   std::optional<Detection> look(const Sight& sight, const std::vector<Sight>& all,
                                 std::uint64_t frame) const;
+  Box extentOf(const TruthView& view, const TruthObject& object, const TruthKey& key,
+               const RigidTransform& T_WC) const;
+  const TruthView* viewOf(std::uint64_t frame, std::uint64_t object) const;
+  double visibleShare(const TruthView& view) const;
+  void coast(Sight& sight, std::uint64_t frame) const;
   Box visiblePart(const Sight& sight, const std::vector<Sight>& all) const;
   std::optional<Box> withErrors(const Box& box, Errors& errors) const;
   /// `truth` is the index of the class, or classes.size() for clutter.
@@ -92,8 +107,8 @@ class SimulatedDetector {
 
   DetectorModel model_;
   Truth truth_;
+  CameraModel camera_;
   double width_, height_;
-  RigidTransform T_BC_;
   ModelInfo info_;
   Eigen::MatrixXd means_;  ///< one row per class, of unit length
 };

@@ -61,6 +61,10 @@ const std::vector<Entry>& entries() {
         "The cost of a frame depends on what is in view, not on the 500 vehicles of a map of four "
         "kilometres of streets."},
        makeTown},
+      {{"suburb",
+        "A car that a hedge hides from one direction stays on the map while it is passed from "
+        "there, and standing cars stand, though boxes err for many frames alike."},
+       makeSuburb},
       {{"blocks",
         "In a town whose blocks are equal but for a few things, a body that comes back is known to "
         "be where it is, and never one block off."},

@@ -112,8 +112,8 @@ struct SceneOptions {
 struct SceneName {
   std::string name, proves;
 };
-/// street, room, toy, occlusion, vanish, row, roll, still, straight, traffic, town, blocks, lap,
-/// and `random`, single views for training.
+/// street, room, toy, occlusion, vanish, row, roll, still, straight, traffic, town, suburb, blocks,
+/// kilometre, lap, and `random`, single views for training.
 const std::vector<SceneName>& sceneNames();
 /// Throws StartupError(kUsage) with the known names if `name` is unknown.
 Scene makeScene(const std::string& name, std::uint64_t seed, const SceneOptions& options);

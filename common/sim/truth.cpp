@@ -91,10 +91,13 @@ TruthKey TruthObject::at(TimePoint t) const {
           wrapAngle(before.yaw + s * wrapAngle(after->yaw - before.yaw))};
 }
 
-Box TruthView::boxInside(double width, double height) const {
-  const Box& b = inside ? *inside : box;
+Box clipped(const Box& b, double width, double height) {
   return {std::clamp(b.x1, 0.0, width), std::clamp(b.y1, 0.0, height), std::clamp(b.x2, 0.0, width),
           std::clamp(b.y2, 0.0, height)};
+}
+
+Box TruthView::boxInside(double width, double height) const {
+  return clipped(inside ? *inside : box, width, height);
 }
 
 std::vector<TruthObject> truthOf(const Scene& scene, TimePoint epoch) {

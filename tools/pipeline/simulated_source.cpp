@@ -56,6 +56,15 @@ void describe(DetectorConfig& config, config::Fields& fields) {
                 {"of opposite sides' errors"});
   fields.number("shrink_below", m.shrink_below, between(0, 1),
                 {"boxes of things seen less than this are of the visible part"});
+  fields.number("tail_share", m.tail_share, between(0, 1), {"of sides with heavy errors"});
+  fields.number("tail_scale", m.tail_scale, atLeast(1), {"of their deviation"});
+  fields.number("error_time", m.error_time_s, atLeast(0),
+                {"time constant of the sides' errors; 0: independent in each frame", "s"});
+  fields.number("coast", m.coast_s, between(0, 10),
+                {"the box of an object that becomes hidden is continued for so long", "s"});
+  fields.choice("boxes", config.boxes, {"cuboid", "outline"}, {"what the boxes enclose"});
+  fields.boolean("declare_boxes", m.declare_boxes,
+                 {"false: the model's information does not contain `boxes`"});
   fields.number("false_per_frame", m.false_per_frame, between(0, 100), {"mean of false alarms"});
   fields.number("false_smallest", m.false_smallest_px, positive(),
                 {"side of the smallest false alarm", "px"});
@@ -76,6 +85,7 @@ void describe(DetectorConfig& config, config::Fields& fields) {
 sim::DetectorModel modelOf(const DetectorConfig& config) {
   sim::DetectorModel model = config.model;
   model.seed = static_cast<std::uint64_t>(config.seed);
+  model.boxes = config.boxes == "cuboid" ? BoxExtent::kCuboid : BoxExtent::kOutline;
   model.confusion.clear();
   for (const std::string& text : config.confusion) model.confusion.push_back(pairOf(text));
   return model;

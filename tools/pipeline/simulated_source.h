@@ -18,6 +18,7 @@ namespace perdure::tools {
 struct DetectorConfig {
   sim::DetectorModel model;
   std::int64_t seed = 1;
+  std::string boxes = "outline";
   std::vector<std::string> confusion{"car/van=0.08", "chair/couch=0.05"};
 };
 void describe(DetectorConfig& config, config::Fields& fields);

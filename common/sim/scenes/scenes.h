@@ -19,6 +19,7 @@ Scene makeStill(std::uint64_t seed, const SceneOptions& options);
 Scene makeStraight(std::uint64_t seed, const SceneOptions& options);
 Scene makeTraffic(std::uint64_t seed, const SceneOptions& options);
 Scene makeTown(std::uint64_t seed, const SceneOptions& options);
+Scene makeSuburb(std::uint64_t seed, const SceneOptions& options);
 Scene makeBlocks(std::uint64_t seed, const SceneOptions& options);
 Scene makeKilometre(std::uint64_t seed, const SceneOptions& options);
 Scene makeRandom(std::uint64_t seed, const SceneOptions& options);

@@ -30,10 +30,11 @@ TruthObject thing(std::uint64_t id, const std::string& class_name, const Eigen::
 }
 
 /// Returns a truth with the same view of one object in every frame.
-Truth sameView(const Box& box, double visible, const std::string& class_name = "car") {
+Truth sameView(const Box& box, double visible, const std::string& class_name = "car",
+               std::uint64_t frames = kFrames) {
   Truth truth;
   truth.objects = {thing(1, class_name, {10, 2, 0}, 0.7)};
-  for (std::uint64_t frame = 0; frame < kFrames; ++frame) truth.views[frame] = {{1, visible, box}};
+  for (std::uint64_t frame = 0; frame < frames; ++frame) truth.views[frame] = {{1, visible, box}};
   return truth;
 }
 
@@ -269,6 +270,94 @@ TEST(SimulatedDetector, LooksFromTheSamePlaceErrAlikeAndFromElsewhereDoNot) {
   EXPECT_NEAR(correlation(aside), 0.0, 0.2);
 }
 
+TEST(SimulatedDetector, AShareOfItsSidesHasHeavyErrors) {
+  DetectorModel model = independent();
+  model.tail_share = 0.2;
+  model.tail_scale = 4.0;
+  const SimulatedDetector detector(model, sameView(kLarge, 1.0), camera());
+  const double sigma = std::hypot(100 * model.box_share, model.box_floor_px);
+  const auto found = collect(detector);
+  double beyond = 0;
+  for (const Detection& d : found) beyond += std::abs(d.box.x1 - kLarge.x1) > 3.0 * sigma;
+  const double expected = 0.8 * std::erfc(3.0 / M_SQRT2) + 0.2 * std::erfc(0.75 / M_SQRT2);
+  EXPECT_NEAR(beyond / static_cast<double>(found.size()), expected, 0.006);
+}
+
+TEST(SimulatedDetector, ErrorsOfSidesLastForTheirTimeConstant) {
+  DetectorModel model = independent();
+  model.found = 1.0;
+  model.half_size_px = 2.0;
+  model.error_time_s = 0.3;
+  constexpr std::uint64_t kRuns = 6000;
+  std::array<double, 20> product{};  // with the first frame, by frames of 50 ms
+  const Truth truth = sameView(kLarge, 1.0, "car", product.size());
+  for (model.seed = 1; model.seed <= kRuns; ++model.seed) {
+    const auto found = collect(SimulatedDetector(model, truth, camera()), product.size());
+    if (found.size() < product.size()) continue;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      product[i] += (found[0].box.x1 - kLarge.x1) * (found[i].box.x1 - kLarge.x1);
+    }
+  }
+  for (const std::size_t frames : {2, 6, 12, 19}) {
+    const double correlation = product[frames] / product[0];
+    EXPECT_NEAR(correlation, std::exp(-0.05 * static_cast<double>(frames) / 0.3), 0.04) << frames;
+  }
+}
+
+/// A car that drifts by 4 px in a frame and is hidden from frame 20 on.
+Truth carThatBecomesHidden() {
+  Truth truth = sameView(kLarge, 1.0);
+  for (std::uint64_t frame = 0; frame < 40; ++frame) {
+    const double x = 4.0 * static_cast<double>(frame);
+    truth.views[frame] = {{1, frame < 20 ? 1.0 : 0.0, {200 + x, 150, 300 + x, 230}}};
+  }
+  return truth;
+}
+
+TEST(SimulatedDetector, ContinuesTheBoxOfWhatBecomesHidden) {
+  DetectorModel model = independent();
+  model.found = 1.0;
+  model.box_share = model.box_floor_px = 0.0;
+  CameraCalibration at_20_hz = camera();
+  at_20_hz.rate_hz = 20.0;
+  Truth truth = carThatBecomesHidden();
+  truth.views[22][0].box = kLarge;  // the continued box does not depend on the hidden truth
+  const SimulatedDetector sharp(model, truth, at_20_hz);
+  EXPECT_TRUE(sharp.detect(20, stamp(20), {}).detections.empty());
+  model.coast_s = 0.2;
+  const SimulatedDetector tracker(model, truth, at_20_hz);
+  for (std::uint64_t frame = 20; frame < 30; ++frame) {
+    const auto found = tracker.detect(frame, stamp(frame), {}).detections;
+    ASSERT_EQ(found.size(), frame < 24 ? 1u : 0u) << frame;
+    if (found.empty()) continue;
+    EXPECT_NEAR(found[0].box.x1, 200 + 4.0 * static_cast<double>(frame), 1e-9) << frame;
+    EXPECT_NEAR(found[0].box.x2, 300 + 4.0 * static_cast<double>(frame), 1e-9) << frame;
+  }
+}
+
+TEST(SimulatedDetector, EnclosesTheImageOfTheCuboidAndDeclaresItOrNot) {
+  DetectorModel model = independent();
+  model.found = 1.0;
+  model.box_share = model.box_floor_px = 0.0;
+  model.boxes = BoxExtent::kCuboid;
+  Truth truth = sameView({230, 220, 270, 250}, 1.0);  // an outline within the cuboid
+  truth.objects[0].keys[0].yaw = 0.0;
+  const SimulatedDetector detector(model, truth, camera());
+  const auto found = collect(detector, 1);
+  ASSERT_EQ(found.size(), 1u);
+  // The cuboid of 4 × 1.8 × 1.5 m at (10, 2, 0) is 8 to 12 m ahead; the focal length is 380 px.
+  EXPECT_NEAR(found[0].box.x1, 320 - 380 * 2.9 / 8, 1e-6);
+  EXPECT_NEAR(found[0].box.x2, 320 - 380 * 1.1 / 12, 1e-6);
+  EXPECT_NEAR(found[0].box.y1, 240 - 380 * 0.75 / 8, 1e-6);
+  EXPECT_NEAR(found[0].box.y2, 240 + 380 * 0.75 / 8, 1e-6);
+  EXPECT_EQ(detector.info().boxes, BoxExtent::kCuboid);
+  model.boxes = BoxExtent::kOutline;
+  EXPECT_EQ(SimulatedDetector(model, truth, camera()).info().boxes, BoxExtent::kOutline);
+  EXPECT_EQ(collect(SimulatedDetector(model, truth, camera()), 1)[0].box.x1, 230.0);
+  model.declare_boxes = false;
+  EXPECT_EQ(SimulatedDetector(model, truth, camera()).info().boxes, ModelInfo().boxes);
+}
+
 bool same(const Detection& a, const Detection& b) {
   return a.box.x1 == b.box.x1 && a.box.y2 == b.box.y2 && a.activations == b.activations &&
          a.azimuth == b.azimuth;
@@ -327,6 +416,8 @@ TEST(SimulatedDetector, RefusesNumbersThatMakeNoSense) {
   EXPECT_THAT(complaint([](DetectorModel& m) { m.classes.clear(); }), HasSubstr("at least one"));
   EXPECT_THAT(complaint([](DetectorModel& m) { m.azimuth_sigma = 0; }), HasSubstr("not above 0"));
   EXPECT_THAT(complaint([](DetectorModel& m) { m.box_share = -1; }), HasSubstr("below 0"));
+  EXPECT_THAT(complaint([](DetectorModel& m) { m.tail_scale = 0.5; }), HasSubstr("below 1"));
+  EXPECT_THAT(complaint([](DetectorModel& m) { m.coast_s = 1; }), HasSubstr("rate_hz"));
   EXPECT_THAT(complaint([](DetectorModel& m) {
                 m.confusion = {{"car", "ship", 0.1}};
               }),

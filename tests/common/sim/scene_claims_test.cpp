@@ -313,6 +313,54 @@ TEST(Town, HasFourKilometresAndFiveHundredVehicles) {
   EXPECT_GT(driven, 4000.0);
 }
 
+/// Smallest and largest visible share of a standing car, over the body's poses from which its
+/// centre is 6 to 25 m away and within 35° of the optical axis.
+std::pair<double, double> sharesSeen(const Scene& scene, const SceneObject& car) {
+  double least = 1.0, most = 0.0;
+  for (double t = 0.0; t < scene.seconds; t += 1.0) {
+    const double away = (car.motion.poseAt(t).p - cameraPose(scene, t).p).norm();
+    if (away < 6.0 || away > 25.0 || offAxis(scene, car, t) > 0.6) continue;
+    const double share = shareSeen(scene, car, t);
+    least = std::min(least, share), most = std::max(most, share);
+  }
+  return {least, most};
+}
+
+TEST(Suburb, HidesACarFromOneDirectionAndShowsItFromAnother) {
+  for (const std::uint64_t seed : {1, 7}) {
+    const Scene scene = makeScene("suburb", seed, {});
+    Scene scenery = scene;
+    scenery.objects.clear();
+    int seen = 0, one_sided = 0;
+    for (const SceneObject* car : ofClass(scene, "car")) {
+      if (car->moves) continue;
+      const auto [least, most] = sharesSeen(scenery, *car);
+      seen += most > 0.8;
+      one_sided += least < 0.25 && most > 0.8;
+    }
+    EXPECT_GT(one_sided, seen / 12) << seed;
+  }
+}
+
+TEST(Suburb, HasAFewOncomingCarsAmongStandingOnes) {
+  for (const auto seed : kSeeds) {
+    const Scene scene = makeScene("suburb", seed, {});
+    double moving = 0, vehicles = 0, nearest = 1e9;
+    for (const SceneObject& object : scene.objects) {
+      vehicles += object.class_name == "car" || object.class_name == "van";
+      if (!object.moves) continue;
+      ++moving;
+      nearest = 1e9;
+      for (double t = object.present_from_s; t < object.present_until_s; t += 0.05) {
+        nearest = std::min(nearest, (object.motion.poseAt(t).p - cameraPose(scene, t).p).norm());
+      }
+      EXPECT_LT(nearest, 4.0) << "the car and the body pass each other";
+    }
+    EXPECT_NEAR(moving / vehicles, 0.02, 0.006) << seed;
+    EXPECT_GT(vehicles, 180) << seed;
+  }
+}
+
 /// The contents of one block of the scene of blocks, relative to its south-west crossing.
 struct BlockContents {
   std::vector<const SceneObject*> objects;

@@ -120,5 +120,20 @@ TEST(SimulatedDetections, TheShippedFileHoldsTheDefaults) {
   EXPECT_EQ(modelOf(own).confusion[0].share, sim::DetectorModel().confusion[0].share);
 }
 
+TEST(SimulatedDetections, TheTrackersFileIsReadAndItsBoxesAreNotDeclared) {
+  DetectorConfig tracker;
+  config::Fields fields;
+  describe(tracker, fields);
+  config::refuse(config::readFile(fields, (configFolder() / "simulated_tracker.yaml").string()));
+  const sim::DetectorModel model = modelOf(tracker);
+  EXPECT_GT(model.tail_share, 0.0);
+  EXPECT_GT(model.error_time_s, 0.0);
+  EXPECT_GT(model.coast_s, 0.0);
+  EXPECT_EQ(model.boxes, BoxExtent::kOutline);
+  EXPECT_FALSE(model.declare_boxes);
+  tracker.boxes = "cuboid";
+  EXPECT_EQ(modelOf(tracker).boxes, BoxExtent::kCuboid);
+}
+
 }  // namespace
 }  // namespace perdure::tools

@@ -73,7 +73,7 @@ void Streets::put(const Road& road, PropKind kind, const Eigen::Vector3d& size,
 void Streets::furnish() {
   // Houses first, because they are the largest; other objects use the remaining space.
   for (const Road& road : roads_) {
-    for (const int side : {-1, 1}) build(road, side);
+    for (const int side : {-1, 1}) furnishing_.garden > 0.0 ? plots(road, side) : build(road, side);
     if (furnishing_.ends) closeEnds(road);
   }
   for (const Road& road : roads_) {
@@ -104,6 +104,61 @@ void Streets::build(const Road& road, int side) {
     }
     if (!built) along += 2.0;
   }
+}
+
+void Streets::plots(const Road& road, int side) {
+  for (double along = 0.0; along < lengthOf(road) - 13.0;) {
+    const double length = builder_.dice().uniform(13.0, 19.0);
+    if (plot(road, side, along, length)) {
+      along += length;
+    } else {  // beside the last plot of a crossing road
+      fence(road, placeAt(road, side, along + 1.0, 0.5 * road.width_m + 1.5, M_PI), 1.98);
+      along += 2.0;
+    }
+  }
+}
+
+/// A hedge or a wall along the x of `place`.
+void Streets::fence(const Road& road, const Place& place, double length) {
+  Dice& dice = builder_.dice();
+  const bool hedge = dice.chance(0.6);
+  put(road, hedge ? PropKind::kHedge : PropKind::kWall,
+      {length, hedge ? 0.6 : 0.2, dice.uniform(1.0, 1.8)}, place);
+}
+
+/// The driveway is at one end of the plot. A hedge or a wall may follow the pavement along the rest
+/// of the plot, and another one may separate the driveway from the neighbour. A car in the driveway
+/// is therefore visible from both directions, from one or from none.
+bool Streets::plot(const Road& road, int side, double from, double length) {
+  constexpr double kDriveway = 3.2, kHouseDepth = 7.0, kParkingStrip = 2.2;
+  Dice& dice = builder_.dice();
+  const double kerb = 0.5 * road.width_m, line = kerb + dice.uniform(1.0, 2.0);
+  const bool drive_first = dice.chance(0.5);
+  const double rest = length - kDriveway,
+               middle = from + 0.5 * (drive_first ? length + kDriveway : rest);
+  const double drive_at = drive_first ? from + 0.5 * kDriveway : from + length - 0.5 * kDriveway;
+  const Eigen::Vector3d house(rest - 0.4, kHouseDepth, dice.uniform(5.5, 10.0));
+  const Place at = placeAt(road, side, middle, line + furnishing_.garden + 0.5 * kHouseDepth, M_PI);
+  if (onAnotherRoad(road, solidAt(at, house), furnishing_.pavement + 1.0) ||
+      !builder_.put(PropKind::kFacade, house, at)) {
+    return false;
+  }
+  const double enclosed = dice.unit();  // of the two fences: the first, the second, both or none
+  if (enclosed < 0.6) fence(road, placeAt(road, side, middle, line + 0.3, M_PI), rest - 0.2);
+  const double border = drive_first ? from + 0.2 : from + length - 0.2;
+  if (enclosed > 0.4 && enclosed < 0.9) {
+    const double across = line + 0.7 + 0.5 * furnishing_.garden;
+    fence(road, placeAt(road, side, border, across, M_PI_2), furnishing_.garden - 0.8);
+  }
+  if (dice.chance(0.75)) {
+    SceneObject car = builder_.draw(dice.chance(furnishing_.van_share) ? "van" : "car");
+    const double across = line + 0.6 + 0.5 * car.size.x() + dice.uniform(0.0, 1.5);
+    builder_.put(std::move(car),
+                 placeAt(road, side, drive_at, across, (dice.chance(0.5) ? M_PI_2 : -M_PI_2)));
+  }
+  builder_.reserve(solidAt(placeAt(road, side, drive_at, 0.5 * (kerb + line - kParkingStrip), 0.0),
+                           {kDriveway, line - kerb + kParkingStrip, 2.0}));
+  return true;
 }
 
 void Streets::closeEnds(const Road& road) {
@@ -138,6 +193,12 @@ void Streets::park(const Road& road, int side) {
     // Many gaps are small, and few are large.
     const double gap = 0.6 - (furnishing_.mean_gap - 0.6) * std::log(1.0 - dice.unit());
     along += stands ? length + std::min(gap, 6.0) : 1.0;
+    if (stands && furnishing_.island_share > 0.0 && dice.chance(furnishing_.island_share)) {
+      const Eigen::Vector3d size(dice.uniform(1.2, 2.5), 1.8, dice.uniform(1.5, 1.8));
+      put(road, PropKind::kHedge, size,
+          placeAt(road, side, along + 0.5 * size.x(), 0.5 * road.width_m - 1.1, M_PI));
+      along += size.x() + 0.6;
+    }
   }
 }
 

@@ -18,7 +18,9 @@ struct Furnishing {
   double person_every = 26.0, bicycle_every = 24.0;  ///< spacing along the pavement
   double hedge_share = 0.3;                          ///< share of houses with a hedge in front
   double pavement = 3.2;                             ///< width
-  bool ends = true;                                  ///< a house stands at each road's end
+  double island_share = 0.0;  ///< share of parked vehicles followed by a hedge in the row of cars
+  double garden = 0.0;        ///< depth of front gardens; 0: none
+  bool ends = true;           ///< a house stands at each road's end
 };
 
 inline constexpr double kRoadWidth = 10.0;  ///< two lanes and two rows of parked cars
@@ -41,10 +43,14 @@ class Streets {
   /// Places vehicles only, on one side (+1 left of the road's direction, -1 right) of one road.
   void park(const Road& road, int side);
   void build(const Road& road, int side);
+  /// Plots with a house, a front garden and a driveway, instead of build().
+  void plots(const Road& road, int side);
   void plant(const Road& road, int side);
   void people(const Road& road, int side);
 
  private:
+  bool plot(const Road& road, int side, double from, double length);
+  void fence(const Road& road, const Place& place, double length);
   Place placeAt(const Road& road, int side, double along, double across, double yaw) const;
   bool onAnotherRoad(const Road& road, const Solid& solid, double margin) const;
   /// Places scenery that does not stand on another road.

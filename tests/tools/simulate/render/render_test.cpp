@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "common/math/so3.h"
 #include "tests/tools/simulate/render/small_world.h"
 #include "tools/simulate/render/outline.h"
 #include "tools/simulate/render/renderer.h"
@@ -92,6 +93,22 @@ TEST(Outline, KeepsARowForWhatIsWhollyHiddenAndNoneForWhatIsElsewhere) {
   ASSERT_EQ(drawn.views().size(), 1U);
   EXPECT_EQ(drawn.views()[0].object_id, 1U);
   EXPECT_EQ(drawn.views()[0].visible_fraction, 0.0);
+}
+
+TEST(Outline, AHedgeHidesACarFromOneSideAndNotFromTheOther) {
+  for (const sim::PropKind kind : {sim::PropKind::kHedge, sim::PropKind::kWall}) {
+    sim::Scene scene = emptyWorld();
+    scene.objects = {thing(1, "car", {4.2, 1.7, 1.4}, {10.0, 0.0, 0.7})};
+    scene.props = {wall({0.6, 8.0, 1.8}, {5.0, 0.0, 0.9})};
+    scene.props[0].kind = kind;
+    Drawn before(scene);
+    ASSERT_EQ(before.views().size(), 1U);
+    EXPECT_EQ(before.views()[0].visible_fraction, 0.0);
+    scene.body = sim::Trajectory(RigidTransform(expQuaternion({0, 0, M_PI}), {20.0, 0.0, 1.2}));
+    Drawn behind(scene);
+    ASSERT_EQ(behind.views().size(), 1U);
+    EXPECT_GT(behind.views()[0].visible_fraction, 0.95);
+  }
 }
 
 TEST(Outline, CountsThePartBeyondTheImagesBorder) {
