@@ -154,7 +154,7 @@ SimulatedDetector::SimulatedDetector(DetectorModel model, Truth truth,
   info_.input_width = camera.width;
   info_.input_height = camera.height;
   info_.box_sigma = model_.box_share;
-  if (model_.declare_boxes) info_.boxes = model_.boxes;
+  info_.boxes = model_.declare_boxes ? model_.boxes : BoxExtent::kUnknown;
   std::string all;
   for (const std::string& name : model_.classes) all += name + ",";
   info_.hash = digest(all + std::to_string(model_.seed));

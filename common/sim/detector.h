@@ -52,7 +52,7 @@ struct DetectorModel {
   /// in the image.
   double coast_s = 0.0;
   BoxExtent boxes = BoxExtent::kOutline;
-  bool declare_boxes = true;  ///< false: ModelInfo has its default, whatever the boxes enclose
+  bool declare_boxes = true;  ///< false: ModelInfo says that it is unknown
 
   double false_per_frame = 0.5, false_smallest_px = 8.0;  ///< sizes are log-uniform up to the image
 

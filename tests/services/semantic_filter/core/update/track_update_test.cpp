@@ -283,7 +283,7 @@ TEST_F(TrackUpdate, BetweenRestAndMotionABoxCountsByTheTimeSinceTheLastOne) {
   const Track before = object;
   for (const auto& [seconds, exponent] : {std::pair{0.1, 0.271}, std::pair{5.0, 1.0}}) {
     object = before;
-    object.life.last_seen = object.as_of - fromSeconds(seconds);
+    object.life.last_seen = object.as_of - std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
     update(object, l, Eigen::VectorXd::Ones(1), boxes, frame);
     double still = 0.0, moving = 0.0;
     for (const auto& h : object.hypotheses) {
