@@ -7,7 +7,9 @@
 #include <cstdlib>
 
 #include "common/base/errors.h"
+#include "common/math/chi2.h"
 #include "common/types/objects.h"
+#include "services/semantic_filter/core/parameters.h"
 
 namespace perdure::semantic_filter {
 namespace {
@@ -54,6 +56,31 @@ TEST(ClassPriors, NamesEveryMistakeWithItsPlace) {
     EXPECT_NE(text.find("priors.yaml:4:15: size: write three numbers"), std::string::npos) << text;
     EXPECT_NE(text.find("priors.yaml:5:9: siz: unknown"), std::string::npos) << text;
     EXPECT_NE(text.find("detection: is not a number from 0.01 to 0.99"), std::string::npos) << text;
+  }
+}
+
+TEST(ClassPriors, EveryKindOfTrafficSignIsPlausibleAndNoneStandsOnTheGround) {
+  // Width and height of German signs, VwV-StVO, in three sizes of which the second is that of
+  // towns.
+  const double kinds[][3][2] = {{{0.42, 0.42}, {0.60, 0.60}, {0.75, 0.75}},     // round
+                                {{0.63, 0.55}, {0.90, 0.78}, {1.26, 1.09}},     // triangles
+                                {{0.42, 0.42}, {0.60, 0.60}, {0.84, 0.84}},     // squares
+                                {{0.42, 0.63}, {0.60, 0.90}, {0.84, 1.26}},     // rectangles
+                                {{0.42, 0.231}, {0.60, 0.33}, {0.75, 0.412}}};  // plates
+  const ClassPriors priors = loadClassPriors(sourceFolder() + "/config/class_priors.yaml");
+  const ClassPrior& sign = priors.of("traffic sign");
+  ASSERT_EQ(sign.name, "traffic sign");
+  EXPECT_EQ(sign.stands, 0.0);
+  EXPECT_EQ(sign.moving, 0.0);
+  const Eigen::Matrix2d information = sign.log_size_covariance.bottomRightCorner<2, 2>().inverse();
+  for (const auto& kind : kinds) {
+    for (int size = 0; size < 3; ++size) {
+      const Eigen::Vector2d extent(kind[size][0], kind[size][1]);
+      const Eigen::Vector2d away = extent.array().log().matrix() - sign.log_size.tail<2>();
+      const double gate = TrackParameters{}.size_gate;
+      EXPECT_LT(away.dot(information * away), size == 1 ? chi2Quantile(0.95, 2) : gate * gate)
+          << extent.transpose();
+    }
   }
 }
 

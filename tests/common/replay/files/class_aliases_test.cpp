@@ -24,6 +24,7 @@ TEST(ClassAliases, TheShippedFileKnowsCommonNamesInAnyCase) {
   EXPECT_EQ(aliases.canonical("Car"), "car");
   EXPECT_EQ(aliases.canonical("Automobile"), "car");
   EXPECT_EQ(aliases.canonical("Pedestrian"), "person");
+  EXPECT_EQ(aliases.canonical("Traffic_Sign"), "traffic sign");
   EXPECT_EQ(aliases.canonical(" Giraffe "), "giraffe");
 }
 
