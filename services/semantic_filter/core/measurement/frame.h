@@ -116,7 +116,7 @@ struct FrameContext {
   NoiseScale noise_scale = {};
   std::shared_ptr<const GroundSurface> ground = {};  ///< before this frame; null: nothing is known
   const MoverShares* movers = nullptr;               ///< null: the shares of the class priors
-  /// of the present network, also for its earlier keyframes; null: none is known
+  /// of the present network, also for its earlier keyframes; null: those that it declares
   const BoxStyles* styles = nullptr;
   bool asks_extent = false;  ///< what the boxes of the network enclose is to be estimated
 
@@ -128,7 +128,8 @@ struct FrameContext {
   /// Returns how the network draws boxes around objects of a class, for projectObserved.
   const BoxStyle& styleOf(const std::string& class_name) const {
     static const BoxStyle plain;
-    return styles ? styles->of(class_name) : plain;
+    if (styles) return styles->of(class_name);
+    return model ? model->styles->of(class_name) : plain;
   }
 };
 
