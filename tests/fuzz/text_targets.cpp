@@ -10,6 +10,7 @@
 #include "common/replay/files/rig_file.h"
 #include "tests/fuzz/scratch.h"
 #include "tests/fuzz/target.h"
+#include "tools/evaluate/memory/places.h"
 #include "tools/evaluate/object_rows.h"
 
 namespace perdure::fuzz {
@@ -20,6 +21,11 @@ constexpr char kTum[] =
 constexpr char kKitti12[] = "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0.5 0 1 0 0 0 0 1 0\n";
 constexpr char kKitti16[] = "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n";
 
+constexpr char kSteps[] =
+    "# t x y z qx qy qz qw step_x_x step_y_y step_z_z step_rx_rx step_ry_ry step_rz_rz step_x_rz\n"
+    "1.5 0 0 0 0 0 0 1 1e-4 1e-4 1e-4 1e-6 1e-6 1e-6 1e-5\n"
+    "1.75 1 2 3 0 0 0.6 0.8 1e-4 1e-4 1e-4 1e-6 1e-6 1e-6 -1e-5\n";
+
 bool takePoses(View bytes) {
   return unlessRefused([&] {
     const auto file = replay::PoseFile::read(asFile("poses.txt", bytes));
@@ -29,6 +35,11 @@ bool takePoses(View bytes) {
     }
     (void)file.at(1, fromNanoseconds(1'600'000'000));
     if (!file.poses().empty()) (void)file.at(0, file.poses().back().time);
+    if (!file.hasSteps()) return;
+    FrameStamp first, last;
+    first.time = file.poses().front().time, last.time = file.poses().back().time;
+    last.sequence = file.poses().size() - 1;
+    (void)file.errorOfSteps(first, last);
   });
 }
 
@@ -105,6 +116,18 @@ bool takeRows(View bytes) {
   });
 }
 
+constexpr char kPlaces[] = "place,visit,x,y,z,frames\n0,0,-4,1,25.5,8 9 10\n0,1,-4.25,1,25,90 91\n";
+
+bool takePlaces(View bytes) {
+  return unlessRefused([&] {
+    for (const auto& [place, visits] : tools::readPlaces(asFile("places.csv", bytes))) {
+      for (const auto& [number, visit] : visits) {
+        require(!visit.frames.empty() && visit.position.allFinite(), "a visit has frames");
+      }
+    }
+  });
+}
+
 constexpr char kRig[] =
     "cam0:\n  T_BS: {cols: 4, rows: 4, data: [0, 0, 1, 0.1, -1, 0, 0, 0.2, 0, -1, 0, 0.3, "
     "0, 0, 0, 1]}\n  rate_hz: 20\n  resolution: [32, 24]\n  camera_model: pinhole\n"
@@ -168,11 +191,12 @@ std::vector<Target> textTargets() {
     }
     return seeds;
   };
-  return {{"poses", 9000, alone({kTum, kKitti12, kKitti16}), takePoses},
+  return {{"poses", 9000, alone({kTum, kKitti12, kKitti16, kSteps}), takePoses},
           {"detections", 9000, detections, takeDetections},
           {"kitti_labels", 6000, alone({kLabels}), takeLabels},
           {"kitti_calibration", 6000, alone({kCalibration}), takeCalibration},
           {"object_rows", 6000, alone({kRows}), takeRows},
+          {"places", 6000, alone({kPlaces}), takePlaces},
           {"rig", 4200, alone({kRig, kCamchain, kEucm}), takeRig},
           {"class_aliases", 6000, alone({kAliases}), takeAliases}};
 }

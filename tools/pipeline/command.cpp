@@ -33,6 +33,9 @@ void addOptions(CLI::App& app, PipelineOptions& options) {
                  "vio, truth, drifting (truth with a drift, --set drifting.KEY=VALUE), a pose file "
                  "(TUM or KITTI lines), or recorded")
       ->required();
+  app.add_option("--odometry-walk", options.odometry_walk,
+                 "Accuracy of a pose file: random walk POSITION,YAW over the distance, m/√m and "
+                 "rad/√m; .03,.0005 if not given");
   app.add_flag("--landmarks", options.landmarks,
                "Where the poses are given: points from the images too, as vio has them");
   app.add_option("--detections", options.detections, "model, none, simulated, a CSV, or recorded")

@@ -9,9 +9,6 @@
 namespace perdure::tools {
 namespace {
 
-/// Added in each frame, so that the increments of a body at rest have a covariance.
-constexpr double kLeastYaw = 1e-7, kLeastPosition = 1e-6;
-
 double declaredScale(const DriftConfig& config) {
   return config.scale_sigma > 0.0 ? config.scale_sigma : std::abs(config.scale);
 }
@@ -66,8 +63,8 @@ void DriftCovariance::advance(const Eigen::Vector3d& step_W, double sigma_yaw) {
   Eigen::Matrix4d A = Eigen::Matrix4d::Identity();
   A.bottomLeftCorner<3, 1>() = turned(step_W);
   Eigen::Vector4d b(0.0, step_W.x(), step_W.y(), step_W.z());
-  Eigen::Vector4d least = Eigen::Vector4d::Constant(kLeastPosition * kLeastPosition);
-  least(0) = kLeastYaw * kLeastYaw + sigma_yaw * sigma_yaw;
+  Eigen::Vector4d least = Eigen::Vector4d::Constant(kLeastStepPosition * kLeastStepPosition);
+  least(0) = kLeastStepRotation * kLeastStepRotation + sigma_yaw * sigma_yaw;
 
   // The estimate of the scale given the error so far, and its remaining variance.
   const Eigen::Matrix4d P = joint_.topLeftCorner<4, 4>();

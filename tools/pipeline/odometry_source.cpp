@@ -1,5 +1,7 @@
 #include "tools/pipeline/odometry_source.h"
 
+#include "common/math/so3.h"
+
 namespace perdure::tools {
 namespace {
 
@@ -9,6 +11,13 @@ Matrix9d declaredCovariance(const PoseAccuracy& accuracy) {
       Eigen::Vector3d::Constant(accuracy.sigma_position),
       Eigen::Vector3d::Constant(accuracy.sigma_velocity);
   return sigma.cwiseAbs2().asDiagonal();
+}
+
+Eigen::Matrix<double, 6, 1> leastStep() {
+  Eigen::Matrix<double, 6, 1> sigma;
+  sigma << Eigen::Vector3d::Constant(kLeastStepRotation),
+      Eigen::Vector3d::Constant(kLeastStepPosition);
+  return sigma.cwiseAbs2();
 }
 
 }  // namespace
@@ -33,17 +42,26 @@ std::optional<Odometry> PoseOdometry::at(const FrameStamp& stamp) {
   if (last_ && stamp.time > last_->stamp.time) {
     odometry.v_WB = (T_WB->p - last_->T_WB.p) / toSeconds(stamp.time - last_->stamp.time);
   }
-  if (accuracy_.bounded && last_) addIncrement(odometry);
+  if (last_ && (accuracy_.bounded || poses_.hasSteps())) addIncrement(odometry);
   last_ = odometry;
   return odometry;
 }
 
-/// The error is constant in W. The rotation error is in body axes, so it rotates relative to W.
+/// The error of truth is constant in W; the rotation error is in body axes, so it rotates relative
+/// to W. The error of odometry turns the step that follows it, and the step adds its own.
 void PoseOdometry::addIncrement(Odometry& odometry) const {
+  const RigidTransform& before = last_->T_WB;
   odometry.has_increment = true;
   odometry.increment_from = last_->stamp.sequence;
   odometry.transition.topLeftCorner<3, 3>() =
-      (odometry.T_WB.q.conjugate() * last_->T_WB.q).toRotationMatrix();
+      (odometry.T_WB.q.conjugate() * before.q).toRotationMatrix();
+  if (accuracy_.bounded) return;
+  odometry.transition.bottomLeftCorner<3, 3>() = -skew(odometry.T_WB.p - before.p) * before.R();
+  odometry.increment_covariance = poses_.errorOfSteps(last_->stamp, odometry.stamp);
+  odometry.increment_covariance.diagonal() += leastStep();
+  const Matrix6d& F = odometry.transition;
+  odometry.covariance.topLeftCorner<6, 6>() =
+      F * last_->covariance.topLeftCorner<6, 6>() * F.transpose() + odometry.increment_covariance;
 }
 
 }  // namespace perdure::tools

@@ -13,13 +13,16 @@ namespace perdure::tools {
 /// 2 cm, 0.2 m/s.
 struct PoseAccuracy {
   double sigma_rotation = 2e-3, sigma_position = 0.02, sigma_velocity = 0.2;
-  /// The error neither grows nor decays from frame to frame (truth). If false, no increment is
-  /// given and the filter lets the error walk.
+  /// The error neither grows nor decays from frame to frame (truth). If false, increments come of
+  /// the file's steps. Without them none is given, and filter and graph let the error walk.
   bool bounded = false;
   /// W's z axis is opposite to gravity. If false, `up_W` is the mean of the body's z axis over the
   /// poses so far, because a vehicle is upright on average.
   bool z_up = false;
 };
+/// Deviations added in each frame, so that the increments of a body at rest have a covariance. An
+/// increment without one means an exact pose.
+inline constexpr double kLeastStepRotation = 1e-7, kLeastStepPosition = 1e-6;
 /// For measured truth (EuRoC's motion capture, KITTI's OXTS): the same, but bounded.
 inline PoseAccuracy ofMeasuredTruth() { return {.bounded = true, .z_up = true}; }
 /// For the states of a simulated folder, which are exact. The values are not zero, because

@@ -80,6 +80,7 @@ class Pipeline {
  private:
   // These are in pipeline_open.cpp.
   void openOdometry(const PipelineOptions& options);
+  void checkWalk() const;
   void checkLandmarks() const;
   void openKnownPoses();
   void openDetections(const PipelineOptions& options);

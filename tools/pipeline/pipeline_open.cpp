@@ -50,6 +50,7 @@ Pipeline::Pipeline(const PipelineOptions& options)
   if (!of_data && !recorded_) {
     pose_file_ = replay::PoseFile::read(options.odometry);
   }
+  checkWalk();
   if (!options.map.empty()) session_.world = MapMemory::newWorld(options.map);
   openData();
   openOdometry(options);
@@ -189,6 +190,19 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
   vio_ = std::make_unique<vio::Node>(configs_.vio, instanceOf(kVio), std::move(sinks));
   vio_->setWorld(session_);
   vio_->onCalibration(dataset_->calibration());
+}
+
+void Pipeline::checkWalk() const {
+  if (options_.odometry_walk.empty() || (pose_file_ && !pose_file_->hasSteps())) return;
+  const std::string accuracy = pose_file_                        ? "has the covariance of each step"
+                               : options_.odometry == "vio"      ? "computes its covariance"
+                               : options_.odometry == "drifting" ? "declares its own drift"
+                               : options_.odometry == "truth"    ? "is exact"
+                                                                 : "has its recorded covariance";
+  throw StartupError(ExitCode::kUsage,
+                     "--odometry-walk declares the accuracy of a pose file without one, and "
+                     "--odometry " +
+                         options_.odometry + " " + accuracy + ": leave --odometry-walk away");
 }
 
 void Pipeline::checkLandmarks() const {

@@ -64,6 +64,27 @@ void readFiles(std::vector<Service>& services, const PipelineOptions& options,
   }
 }
 
+/// The declared walk is the graph's. The filter's own walk stays, because it also represents errors
+/// that boxes share (decision 0030).
+void declareWalk(const std::string& walk, config::Fields& map_store) {
+  const auto comma = walk.find(',');
+  if (comma == walk.npos) {
+    throw StartupError(ExitCode::kUsage, "--odometry-walk " + walk +
+                                             ": write POSITION,YAW in m/√m and rad/√m, for "
+                                             "example .03,.0005");
+  }
+  std::vector<config::Problem> problems;
+  for (const auto& [key, value] :
+       {std::pair{"position", walk.substr(0, comma)}, std::pair{"yaw", walk.substr(comma + 1)}}) {
+    for (auto& problem :
+         config::assign(map_store, std::string("graph.walk_") + key + "=" + value)) {
+      problem.file = "--odometry-walk";
+      problems.push_back(std::move(problem));
+    }
+  }
+  config::refuse(problems);
+}
+
 }  // namespace
 
 fs::path configFolder() {
@@ -102,6 +123,7 @@ ServiceConfigs readServiceConfigs(const PipelineOptions& options) {
   }
   if (options.seed) configs.detector.seed = configs.drifting.seed = *options.seed;
   config::refuse(problems);
+  if (!options.odometry_walk.empty()) declareWalk(options.odometry_walk, services[3].fields);
   auto& priors = configs.semantic_filter.class_priors;
   if (!fs::exists(priors)) priors = (configFolder() / fs::path(priors).filename()).string();
   std::string values;

@@ -18,9 +18,10 @@ namespace perdure::tools {
 
 struct PipelineOptions {
   std::string data, sequence, rig, out;
-  std::string map;         ///< a stored map to start from; empty: start with an empty map
-  std::string odometry;    ///< vio, truth, drifting, recorded, or a pose file
-  std::string detections;  ///< model, simulated, recorded, none, or a CSV
+  std::string map;            ///< a stored map to start from; empty: start with an empty map
+  std::string odometry;       ///< vio, truth, drifting, recorded, or a pose file
+  std::string odometry_walk;  ///< of a pose file: "m/√m,rad/√m"; empty: the map store's keys
+  std::string detections;     ///< model, simulated, recorded, none, or a CSV
   std::string model, class_name;
   std::vector<std::uint32_t> image_size;
   std::vector<std::string> topics;  ///< topics of a ROS recording: "cam0=/left/image_raw"
@@ -49,9 +50,9 @@ struct ServiceConfigs {
   std::uint64_t digest = 0;     ///< digest of all values
 };
 
-/// Throws StartupError: kConfiguration with all errors, kUsage for an unknown service. Files:
-/// config/SERVICE.yaml of the configuration folder, if it exists, or --config. The file of the
-/// simulated detector is simulated_detector.yaml.
+/// Throws StartupError: kConfiguration with all errors, kUsage for an unknown service or a walk out
+/// of range. Files: config/SERVICE.yaml of the configuration folder, if it exists, or --config. The
+/// file of the simulated detector is simulated_detector.yaml.
 ServiceConfigs readServiceConfigs(const PipelineOptions& options);
 
 /// The folder `config`: $PERDURE_CONFIG_DIR, or else that of the working directory, or of the

@@ -5,9 +5,11 @@
 #include <string>
 #include <utility>
 
+#include "common/base/check.h"
 #include "common/base/errors.h"
 #include "common/math/so3.h"
 #include "common/replay/files/pose_columns.h"
+#include "common/replay/files/pose_steps.h"
 #include "common/replay/files/stamps.h"
 #include "common/replay/files/text_file.h"
 
@@ -105,13 +107,16 @@ void addKitti(const TextLine& line, const std::vector<std::string_view>& fields,
 
 }  // namespace
 
-PoseFile::PoseFile(PoseFormat format, std::vector<StampedPose> poses)
-    : format_(format), poses_(std::move(poses)) {}
+PoseFile::PoseFile(PoseFormat format, std::vector<StampedPose> poses, std::vector<Matrix6d> steps)
+    : format_(format), poses_(std::move(poses)), steps_(std::move(steps)) {
+  check(steps_.empty() || steps_.size() == poses_.size(), "each pose has a step, or none has");
+}
 
 PoseFile PoseFile::read(const std::filesystem::path& file, std::string_view mend) {
   const auto lines = readLines(file, mend);
   Complaints wrong(file);
   std::vector<StampedPose> poses;
+  PoseSteps steps;
   std::size_t columns = 0, last_line = 0, angles = 0;
   bool w_first = false, headed = false;
   std::optional<PoseColumns> named;
@@ -123,7 +128,8 @@ PoseFile PoseFile::read(const std::filesystem::path& file, std::string_view mend
                 "the line is empty, and poses are counted by lines; write the frame's pose");
     }
     const bool comment = line.text.starts_with('#');
-    const auto fields = fieldsOf(std::string_view(line.text).substr(comment ? 1 : 0));
+    auto fields = fieldsOf(std::string_view(line.text).substr(comment ? 1 : 0));
+    if (!steps.take(line, comment, fields, wrong)) continue;
     if (columns == 0) {
       if (const auto other = otherKindOfPoses(line.text, fields); !other.empty()) {
         wrong.add(line.number, other);
@@ -156,7 +162,8 @@ PoseFile PoseFile::read(const std::filesystem::path& file, std::string_view mend
     } else if (!known || fields.size() != columns) {
       wrong.add(line.number, std::to_string(fields.size()) +
                                  " numbers; write 8 (TUM: t x y z qx qy qz qw) or 12 or 16 (KITTI: "
-                                 "a row-major pose) in every line");
+                                 "a row-major pose) in every line, and name columns for "
+                                 "the covariance of each step (step_x_x …) in a header");
     } else if (columns == 8) {
       addTum(line, fields, w_first, false, poses, wrong);
     } else {
@@ -167,28 +174,60 @@ PoseFile PoseFile::read(const std::filesystem::path& file, std::string_view mend
   if (poses.empty()) {
     throw StartupError(ExitCode::kData, file.string() + ": holds no poses");
   }
-  return PoseFile(columns == 8 || named ? PoseFormat::kTum : PoseFormat::kKitti, std::move(poses));
+  return PoseFile(columns == 8 || named ? PoseFormat::kTum : PoseFormat::kKitti, std::move(poses),
+                  std::move(steps.covariances));
 }
 
 std::optional<RigidTransform> PoseFile::at(std::uint64_t frame, TimePoint time,
                                            Duration max_gap) const {
-  if (format_ == PoseFormat::kTum) return atTime(time, max_gap);
-  if (frame >= poses_.size()) return std::nullopt;
-  return poses_[frame].T_WB;
+  const auto place = placeOf(frame, time, max_gap);
+  if (!place) return std::nullopt;
+  const RigidTransform& before = poses_[place->index].T_WB;
+  if (place->share == 0.0) return before;
+  return interpolate(before, poses_[place->index + 1].T_WB, place->share);
 }
 
-std::optional<RigidTransform> PoseFile::atTime(TimePoint time, Duration max_gap) const {
+std::optional<PoseFile::Place> PoseFile::placeOf(std::uint64_t frame, TimePoint time,
+                                                 Duration max_gap) const {
+  if (format_ == PoseFormat::kTum) return placeAtTime(time, max_gap);
+  if (frame >= poses_.size()) return std::nullopt;
+  return Place{frame};
+}
+
+std::optional<PoseFile::Place> PoseFile::placeAtTime(TimePoint time, Duration max_gap) const {
   constexpr Duration kSame = std::chrono::milliseconds(1);
   const auto after = std::lower_bound(poses_.begin(), poses_.end(), time,
                                       [](const StampedPose& p, TimePoint t) { return p.time < t; });
-  if (after != poses_.end() && between(after->time, time) <= kSame) return after->T_WB;
+  const auto index = static_cast<std::size_t>(after - poses_.begin());
+  if (after != poses_.end() && between(after->time, time) <= kSame) return Place{index};
   if (after == poses_.begin()) return std::nullopt;
   const auto before = after - 1;
-  if (between(time, before->time) <= kSame) return before->T_WB;
+  if (between(time, before->time) <= kSame) return Place{index - 1};
   if (after == poses_.end() || between(after->time, before->time) > max_gap) return std::nullopt;
   const double s =
       toSeconds(between(time, before->time)) / toSeconds(between(after->time, before->time));
-  return interpolate(before->T_WB, after->T_WB, s);
+  return Place{index - 1, s};
+}
+
+/// The error of step k displaces the body at `now` as the end of a lever from pose k. A step that
+/// is used in part counts by its share.
+Matrix6d PoseFile::errorOfSteps(const FrameStamp& before, const FrameStamp& now) const {
+  const auto a = placeOf(before.sequence, before.time), b = placeOf(now.sequence, now.time);
+  check(!steps_.empty() && a && b, "both frames have a pose, and the file has steps");
+  const RigidTransform T_WB = *at(now.sequence, now.time);
+  const double from = static_cast<double>(a->index) + a->share;
+  const double to = static_cast<double>(b->index) + b->share;
+  Matrix6d error = Matrix6d::Zero();
+  for (std::size_t k = a->index + 1; k <= b->index + (b->share > 0.0 ? 1 : 0); ++k) {
+    const double end = static_cast<double>(k);
+    const RigidTransform& T_WK = poses_[k].T_WB;
+    Matrix6d J = Matrix6d::Zero();
+    J.topLeftCorner<3, 3>() = T_WB.R().transpose() * T_WK.R();
+    J.bottomLeftCorner<3, 3>() = -skew(T_WB.p - T_WK.p) * T_WK.R();
+    J.bottomRightCorner<3, 3>() = T_WK.R();
+    error += (std::min(end, to) - std::max(end - 1.0, from)) * J * steps_[k] * J.transpose();
+  }
+  return error;
 }
 
 }  // namespace perdure::replay

@@ -7,8 +7,10 @@
 #include <string_view>
 #include <vector>
 
+#include "common/base/ids.h"
 #include "common/base/time.h"
 #include "common/math/rigid_transform.h"
+#include "common/types/odometry.h"
 
 namespace perdure::replay {
 
@@ -20,15 +22,19 @@ struct StampedPose {
 };
 
 class PoseFile {
+  static constexpr Duration kMaxGap = std::chrono::milliseconds(500);
+
  public:
   /// Throws StartupError(kData) that names each wrong line. Errors are a wrong count of numbers, a
   /// quaternion whose norm is not 1 (to 1e-2), a rotation matrix that is not orthonormal (to 1e-2),
   /// and times that do not increase.
   /// Lines that begin with '#' are comments, and a first line without numbers is a header. Either
-  /// may give another column order, or eight columns of a larger number (poseColumnsOf). Names of
-  /// angles are refused. `mend`: the fix if the file cannot be read.
+  /// may give another column order, or eight columns of a larger number (poseColumnsOf), or columns
+  /// with the covariances of the steps (files/pose_steps.h). Names of angles are refused. `mend`:
+  /// the fix if the file cannot be read.
   static PoseFile read(const std::filesystem::path& file, std::string_view mend = kMend);
-  PoseFile(PoseFormat format, std::vector<StampedPose> poses);
+  /// `steps`: for each pose, or none, the covariance of the step to it (files/pose_steps.h).
+  PoseFile(PoseFormat format, std::vector<StampedPose> poses, std::vector<Matrix6d> steps = {});
 
   PoseFormat format() const { return format_; }
   /// The time of KITTI poses is 0, because they have none.
@@ -37,13 +43,25 @@ class PoseFile {
   /// TUM: by time, interpolated between neighbours at most `max_gap` apart; a pose within 1 ms is
   /// used as it is. KITTI: by the frame's index. Returns nothing outside the trajectory.
   std::optional<RigidTransform> at(std::uint64_t frame, TimePoint time,
-                                   Duration max_gap = std::chrono::milliseconds(500)) const;
+                                   Duration max_gap = kMaxGap) const;
+  bool hasSteps() const { return !steps_.empty(); }
+  /// Covariance of the error [θ, p] (Odometry) that the steps between two frames add. Both frames
+  /// must have a pose, and the file steps.
+  Matrix6d errorOfSteps(const FrameStamp& before, const FrameStamp& now) const;
 
  private:
-  std::optional<RigidTransform> atTime(TimePoint time, Duration max_gap) const;
+  /// A place on the trajectory: a pose, or a share of the step after it.
+  struct Place {
+    std::size_t index = 0;
+    double share = 0.0;
+  };
+  std::optional<Place> placeOf(std::uint64_t frame, TimePoint time,
+                               Duration max_gap = kMaxGap) const;
+  std::optional<Place> placeAtTime(TimePoint time, Duration max_gap) const;
   static constexpr std::string_view kMend = "--odometry takes `vio`, `truth` or a file of poses";
   PoseFormat format_;
   std::vector<StampedPose> poses_;
+  std::vector<Matrix6d> steps_;
 };
 
 }  // namespace perdure::replay

@@ -236,11 +236,15 @@ void addEvaluateMemory(CLI::App& evaluate_app) {
       "memory", "Whether objects keep their ids from one visit to the next, and after a restart");
   app->add_option("run", options->run, "Folder of a run: objects_inst.csv, trajectory.tum")
       ->required();
-  app->add_option("--truth", options->truth, "Simulated folder")->required();
+  app->add_option("--truth", options->truth, "Simulated folder; with --places the true poses")
+      ->required();
+  const PlacesJudge judgedPlaces = addPlacesOptions(*app);
   app->add_option("--map-run", options->map_run,
-                  "Folder of the run, over the same simulated folder, with whose map RUN began");
+                  "Folder of the run, over the same simulated folder, with whose map RUN began")
+      ->excludes("--places");
   app->add_flag("--json", options->json, "Print JSON");
-  app->callback([options] {
+  app->callback([options, judgedPlaces] {
+    if (judgedPlaces(options->run, options->truth, options->json)) return;
     const MemoryResult result = evaluateMemory(*options);
     if (options->json)
       std::cout << toJson(result).dump(2) << std::endl;

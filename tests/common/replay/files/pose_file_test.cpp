@@ -179,5 +179,108 @@ TEST(PoseFile, EveryWrongLineIsLocated) {
   EXPECT_THAT(startupErrorOf([] { PoseFile::read("/nowhere.txt"); }), HasSubstr("--odometry"));
 }
 
+FrameStamp frameAt(std::uint64_t frame, double seconds = 0.0) {
+  FrameStamp stamp;
+  stamp.sequence = frame;
+  stamp.time = at(seconds);
+  return stamp;
+}
+
+constexpr char kVariances[] = "step_x_x step_y_y step_z_z step_rx_rx step_ry_ry step_rz_rz";
+
+TEST(PoseFile, CovariancesOfStepsAreReadByTheNamesOfTheirColumns) {
+  const std::string names = kVariances, values = " 4 5 6 1 2 3 ";
+  const Matrix6d expected =
+      (Eigen::Matrix<double, 6, 1>() << 1, 2, 3, 4, 5, 6).finished().asDiagonal();
+  for (const std::string& text :
+       {"# t x y z qx qy qz qw " + names + "\n0 0 0 0 0 0 0 1" + values + "\n1 0 0 0 0 0 0 1" +
+            values + "\n",
+        names + " t x y z qx qy qz qw\n" + values + "0 0 0 0 0 0 0 1\n" + values +
+            "1 0 0 0 0 0 0 1\n",
+        "# R11 R12 R13 x R21 R22 R23 y R31 R32 R33 z " + names + "\n1 0 0 0 0 1 0 0 0 0 1 0" +
+            values + "\n1 0 0 0 0 1 0 0 0 0 1 0" + values + "\n"}) {
+    const auto poses = readPoses(text);
+    ASSERT_TRUE(poses.hasSteps()) << text;
+    EXPECT_EQ(poses.errorOfSteps(frameAt(0, 0), frameAt(1, 1)), expected) << text;
+  }
+  const auto poses = readPoses("# t x y z qx qy qz qw step_rz_x " + names + "\n0 0 0 0 0 0 0 1 0" +
+                               values + "\n1 0 0 0 0 0 0 1 -1.5" + values + "\n");
+  EXPECT_EQ(poses.errorOfSteps(frameAt(0, 0), frameAt(1, 1))(2, 3), -1.5);
+  EXPECT_EQ(poses.errorOfSteps(frameAt(0, 0), frameAt(1, 1))(3, 2), -1.5);
+  EXPECT_FALSE(readPoses("# covariance left out\n0 0 0 0 0 0 0 1\n").hasSteps());
+}
+
+TEST(PoseFile, WrongCovariancesOfStepsAreLocated) {
+  const std::string pose = "t x y z qx qy qz qw ", names = kVariances, line = "0 0 0 0 0 0 0 1 ";
+  EXPECT_THAT(errorOfPoses("# " + pose + names + "\n" + line + "1 1 1 1 1\n"),
+              HasSubstr("poses.txt:2: 13 columns, but the header names 14"));
+  EXPECT_THAT(
+      errorOfPoses("# " + pose + names + "\n" + line + "1 1 1 1 1 -0.5\n"),
+      HasSubstr(":2: the step's covariance is not positive semi-definite (least variance -0.5"));
+  EXPECT_THAT(errorOfPoses("# " + pose + names + "\n" + line + "1 1 1 1 1 x\n"),
+              HasSubstr(":2: x: an entry of the step's covariance is not a number"));
+  EXPECT_THAT(errorOfPoses("# " + pose + names + " step_x_rz\n" + line + "1 1 1 1 1 4 2\n"), "");
+  EXPECT_THAT(errorOfPoses("# " + pose + names + " step_x_rz\n" + line + "1 1 1 1 1 4 2.1\n"),
+              HasSubstr(":2: the step's covariance is not positive semi-definite"));
+  EXPECT_THAT(errorOfPoses("# " + pose + names + " step_x_yaw\n" + line + "1 1 1 1 1 4 0\n"),
+              HasSubstr(":1: step_x_yaw: write step_A_B"));
+  EXPECT_THAT(
+      errorOfPoses("# " + pose + names + " step_x_y step_y_x\n" + line + "1 1 1 1 1 4 0 0\n"),
+      HasSubstr(":1: step_y_x: this entry of the symmetric covariance is named twice"));
+  EXPECT_THAT(errorOfPoses("# " + pose + "step_x_x\n" + line + "1\n"),
+              HasSubstr(":1: the step's covariance needs the six variances"));
+  EXPECT_THAT(errorOfPoses(line + "1 1 1 1 1 1\n"), HasSubstr("in a header"));
+}
+
+/// Error [θ, p] of the last pose if the step to pose k has the error `step`, by composition.
+Eigen::Matrix<double, 6, 1> errorAfter(const std::vector<StampedPose>& poses, std::size_t k,
+                                       const Eigen::Matrix<double, 6, 1>& step) {
+  const RigidTransform& last = poses.back().T_WB;
+  const RigidTransform error(expQuaternion(step.head<3>()), Eigen::Vector3d(step.tail<3>()));
+  const RigidTransform moved = poses[k].T_WB * error * (poses[k].T_WB.inverse() * last);
+  Eigen::Matrix<double, 6, 1> result;
+  result << logSo3(Eigen::Quaterniond(last.q.conjugate() * moved.q)), moved.p - last.p;
+  return result;
+}
+
+TEST(PoseFile, TheErrorOfSeveralStepsIsThatOfTheirComposition) {
+  std::vector<StampedPose> poses(4);
+  std::vector<Matrix6d> steps(4);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const double k = static_cast<double>(i);
+    poses[i].T_WB = RigidTransform(expQuaternion({0.1 * k, -0.2, 0.4 * k}),
+                                   Eigen::Vector3d(5.0 * k, 0.3 * k * k, -0.2 * k));
+    const Matrix6d A = Matrix6d::Identity() + 0.05 * k * Matrix6d::Ones();
+    steps[i] = 1e-4 * A * A.transpose();
+  }
+  Matrix6d expected = Matrix6d::Zero();
+  for (std::size_t k = 1; k < poses.size(); ++k) {
+    Matrix6d J;
+    constexpr double kStep = 1e-6;
+    for (int i = 0; i < 6; ++i) {
+      const Eigen::Matrix<double, 6, 1> d = kStep * Matrix6d::Identity().col(i);
+      J.col(i) = (errorAfter(poses, k, d) - errorAfter(poses, k, -d)) / (2.0 * kStep);
+    }
+    expected += J * steps[k] * J.transpose();
+  }
+  const PoseFile file(PoseFormat::kKitti, poses, steps);
+  EXPECT_TRUE(file.errorOfSteps(frameAt(0), frameAt(3)).isApprox(expected, 1e-7));
+}
+
+TEST(PoseFile, AFrameBetweenTwoPosesHasItsShareOfTheStep) {
+  std::vector<StampedPose> poses(3);
+  for (std::size_t i = 0; i < poses.size(); ++i) poses[i].time = at(0.1 * static_cast<double>(i));
+  const std::vector<Matrix6d> steps{Matrix6d::Identity(), 2.0 * Matrix6d::Identity(),
+                                    5.0 * Matrix6d::Identity()};
+  const PoseFile file(PoseFormat::kTum, poses, steps);
+  const auto between = [&](double a, double b) {
+    return file.errorOfSteps(frameAt(0, a), frameAt(0, b))(0, 0);
+  };
+  EXPECT_NEAR(between(0.0, 0.05), 1.0, 1e-9);
+  EXPECT_NEAR(between(0.025, 0.05), 0.5, 1e-9);
+  EXPECT_NEAR(between(0.05, 0.12), 1.0 + 1.0, 1e-9);
+  EXPECT_NEAR(between(0.0, 0.2), 7.0, 1e-9);
+}
+
 }  // namespace
 }  // namespace perdure::replay

@@ -1,0 +1,34 @@
+// Reads the covariances of the steps between poses: columns step_A_B beside the pose, by the names
+// in a header.
+#pragma once
+
+#include <optional>
+#include <utility>
+
+#include "common/replay/files/text_file.h"
+#include "common/types/odometry.h"
+
+namespace perdure::replay {
+
+/// A step is the motion from the pose of the line before. Its error is δ in T = T̂ (Exp(r), x): x y
+/// z in metres and rx ry rz in radians, along the axes of the body at the line's pose. A and B are
+/// two of these six; entries that have no column are 0.
+class PoseSteps {
+ public:
+  /// Takes the columns of a step out of a header or of a line below it. Returns false if it adds an
+  /// error to `wrong`: a name of another form, an entry that is given twice, a missing variance, a
+  /// line with another number of columns, and a matrix that is not positive semi-definite.
+  bool take(const TextLine& line, bool comment, std::vector<std::string_view>& fields,
+            Complaints& wrong);
+
+  /// Covariances [θ, p] of all lines so far; empty if no header names a step.
+  std::vector<Matrix6d> covariances;
+
+ private:
+  using Entry = std::optional<std::pair<int, int>>;  ///< row and column; empty: of the pose
+  std::string entriesOf(const std::vector<std::string_view>& names);
+  std::string addCovariance(const std::vector<std::string_view>& fields);
+  std::vector<Entry> entries_;  ///< by columns of the file
+};
+
+}  // namespace perdure::replay
