@@ -164,33 +164,29 @@ struct Exponents {
 };
 
 /// π ∝ π A. A counts in full among hypotheses that differ by geometry only, with the exponents
-/// between classes (and for existence) and between rest and motion of a class. Returns the prior
-/// means of A.
+/// between classes (and for existence) and between rest and motion. Returns the prior means of A.
 MeanA updateWeights(Track& track, const AllShares& shares, const Exponents& tempering) {
-  struct Class {
-    Group all, motion[2];
-  };
-  ScratchMap<std::string_view, Class> classes;
+  ScratchMap<std::string_view, Group> classes;
+  Group motion[2];
   for (std::size_t i = 0; i < shares.size(); ++i) {
     const Hypothesis& h = track.hypotheses.read()[i];
-    Class& c = classes[h.class_name];
-    c.all.add(h.weight, shares[i].A);
-    c.motion[h.moving].add(h.weight, shares[i].A);
+    classes[h.class_name].add(h.weight, shares[i].A);
+    motion[h.moving].add(h.weight, shares[i].A);
   }
   MeanA mean;
   for (const auto& [name, c] : classes) {
-    mean.full += c.all.sum;
-    mean.tempered += c.all.weight * std::pow(c.all.A(), tempering.classes);
+    mean.full += c.sum;
+    mean.tempered += c.weight * std::pow(c.A(), tempering.classes);
+  }
+  double factor[2], tempered = 0.0;
+  for (int m = 0; m < 2; ++m) {
+    factor[m] = motion[m].temper(tempering.motion);
+    tempered += factor[m] * motion[m].sum;
   }
   for (std::size_t i = 0; i < shares.size(); ++i) {
     Hypothesis& h = track.hypotheses[i];
-    const Class& c = classes[h.class_name];
-    const auto shareOf = [&](bool moving) {
-      return c.motion[moving].sum * c.motion[moving].temper(tempering.motion);
-    };
-    const double same = c.all.sum > 0.0 ? c.all.sum / (shareOf(false) + shareOf(true)) : 0.0;
-    h.weight *= shares[i].A * c.motion[h.moving].temper(tempering.motion) * same *
-                c.all.temper(tempering.classes);
+    h.weight *= shares[i].A * classes[h.class_name].temper(tempering.classes);
+    if (tempered > 0.0) h.weight *= factor[h.moving] * mean.full / tempered;
   }
   return mean;
 }
