@@ -112,7 +112,7 @@ TEST(TrafficSign, IsPlacedWithoutGroundContactWhateverItsKind) {
 
 /// Mean squared error per degree of freedom of signs that are observed from wandering poses.
 double meanSquaredError(double assumed_walk) {
-  constexpr double kWalk = 0.03;  // m/√m, as measured on KITTI (tools/evaluate/README.md)
+  constexpr double kWalk = 0.03;  // m/√m, that of KITTI's poses (tools/evaluate/README.md)
   constexpr std::uint32_t kRuns = 30;
   double sum = 0.0;
   for (std::uint32_t seed = 1; seed <= kRuns; ++seed) {
