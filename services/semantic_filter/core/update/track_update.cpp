@@ -164,29 +164,34 @@ struct Exponents {
 };
 
 /// π ∝ π A. A counts in full among hypotheses that differ by geometry only, with the exponents
-/// between classes (and for existence) and between rest and motion. Returns the prior means of A.
+/// between rest and motion of a class and between classes (there also for existence). Returns the
+/// prior means of A.
 MeanA updateWeights(Track& track, const AllShares& shares, const Exponents& tempering) {
-  ScratchMap<std::string_view, Group> classes;
-  Group motion[2];
+  struct Class {
+    Group all, motion[2];
+  };
+  ScratchMap<std::string_view, Class> classes;
   for (std::size_t i = 0; i < shares.size(); ++i) {
     const Hypothesis& h = track.hypotheses.read()[i];
-    classes[h.class_name].add(h.weight, shares[i].A);
-    motion[h.moving].add(h.weight, shares[i].A);
+    Class& c = classes[h.class_name];
+    c.all.add(h.weight, shares[i].A);
+    c.motion[h.moving].add(h.weight, shares[i].A);
   }
   MeanA mean;
   for (const auto& [name, c] : classes) {
-    mean.full += c.sum;
-    mean.tempered += c.weight * std::pow(c.A(), tempering.classes);
-  }
-  double factor[2], tempered = 0.0;
-  for (int m = 0; m < 2; ++m) {
-    factor[m] = motion[m].temper(tempering.motion);
-    tempered += factor[m] * motion[m].sum;
+    mean.full += c.all.sum;
+    mean.tempered += c.all.weight * std::pow(c.all.A(), tempering.classes);
   }
   for (std::size_t i = 0; i < shares.size(); ++i) {
     Hypothesis& h = track.hypotheses[i];
-    h.weight *= shares[i].A * classes[h.class_name].temper(tempering.classes);
-    if (tempered > 0.0) h.weight *= factor[h.moving] * mean.full / tempered;
+    const Class& c = classes[h.class_name];
+    // w_c Ā_c^e = Σ w_m A_m^e over rest and motion
+    double sum = 0.0;
+    for (const Group& m : c.motion) sum += m.sum * m.temper(tempering.motion);
+    const double of_class = c.all.weight > 0.0 ? sum / c.all.weight : 0.0;
+    h.weight *=
+        shares[i].A * c.motion[h.moving].temper(tempering.motion) *
+        (of_class > 0.0 ? std::pow(of_class, tempering.classes / tempering.motion - 1.0) : 0.0);
   }
   return mean;
 }

@@ -169,10 +169,10 @@ TEST(DecodePerdure, RefusesADescriptionThatDoesNotFitItself) {
   }
 }
 
-TEST(DecodePerdure, BoxesEncloseCuboidsUnlessItIsSaidOtherwise) {
+TEST(DecodePerdure, WhatBoxesEncloseIsUnknownUnlessItIsSaid) {
   testing::TinyOnnx tiny;
   const std::string plain = tiny.azimuth_json;
-  EXPECT_EQ(parseModelDescription(tiny.json(), "m.json").boxes, BoxExtent::kCuboid);
+  EXPECT_EQ(parseModelDescription(tiny.json(), "m.json").boxes, BoxExtent::kUnknown);
   tiny.azimuth_json = R"("box_extent": "outline",)" + plain;
   EXPECT_EQ(parseModelDescription(tiny.json(), "m.json").boxes, BoxExtent::kOutline);
   tiny.azimuth_json = R"("box_extent": "hull",)" + plain;
