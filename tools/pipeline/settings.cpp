@@ -123,7 +123,15 @@ ServiceConfigs readServiceConfigs(const PipelineOptions& options) {
   }
   if (options.seed) configs.detector.seed = configs.drifting.seed = *options.seed;
   config::refuse(problems);
-  if (!options.odometry_walk.empty()) declareWalk(options.odometry_walk, services[3].fields);
+  if (!options.odometry_walk.empty()) {
+    for (const auto& assignment : options.assignments) {
+      if (!assignment.starts_with("map_store.graph.walk_")) continue;
+      throw StartupError(ExitCode::kUsage, "--odometry-walk and --set " + assignment +
+                                               " both say how the poses walk: give one of them");
+    }
+    declareWalk(options.odometry_walk,
+                serviceOf(services, "map_store.graph", '.', "--odometry-walk").fields);
+  }
   auto& priors = configs.semantic_filter.class_priors;
   if (!fs::exists(priors)) priors = (configFolder() / fs::path(priors).filename()).string();
   std::string values;

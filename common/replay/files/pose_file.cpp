@@ -129,7 +129,7 @@ PoseFile PoseFile::read(const std::filesystem::path& file, std::string_view mend
     }
     const bool comment = line.text.starts_with('#');
     auto fields = fieldsOf(std::string_view(line.text).substr(comment ? 1 : 0));
-    if (!steps.take(line, comment, fields, wrong)) continue;
+    if (!steps.take(line, comment, !poses.empty(), fields, wrong)) continue;
     if (columns == 0) {
       if (const auto other = otherKindOfPoses(line.text, fields); !other.empty()) {
         wrong.add(line.number, other);

@@ -14,6 +14,7 @@ constexpr std::string_view kStep = "step_";
 
 /// Row and column of "step_A_B" in the order [θ, p], the lower one first.
 std::optional<std::pair<int, int>> entryOf(std::string_view name) {
+  if (!name.starts_with(kStep)) return std::nullopt;
   constexpr std::string_view kAxes[] = {"rx", "ry", "rz", "x", "y", "z"};
   for (int a = 0; a < 6; ++a) {
     for (int b = 0; b < 6; ++b) {
@@ -25,12 +26,14 @@ std::optional<std::pair<int, int>> entryOf(std::string_view name) {
 
 }  // namespace
 
-bool PoseSteps::take(const TextLine& line, bool comment, std::vector<std::string_view>& fields,
-                     Complaints& wrong) {
+bool PoseSteps::take(const TextLine& line, bool comment, bool after_poses,
+                     std::vector<std::string_view>& fields, Complaints& wrong) {
   std::string error;
   if (entries_.empty()) {
-    if (std::none_of(fields.begin(), fields.end(), entryOf)) return true;
-    error = entriesOf(fields);
+    const auto isStep = [](std::string_view name) { return name.starts_with(kStep); };
+    if (std::none_of(fields.begin(), fields.end(), isStep)) return true;
+    error =
+        after_poses ? "a header with step_A_B must stand before the first pose" : entriesOf(fields);
   } else if (comment) {
     return true;
   } else if (fields.size() != entries_.size()) {

@@ -18,8 +18,9 @@ class PoseSteps {
   /// Takes the columns of a step out of a header or of a line below it. Returns false if it adds an
   /// error to `wrong`: a name of another form, an entry that is given twice, a missing variance, a
   /// line with another number of columns, and a matrix that is not positive semi-definite.
-  bool take(const TextLine& line, bool comment, std::vector<std::string_view>& fields,
-            Complaints& wrong);
+  /// A header below the first pose is an error, too.
+  bool take(const TextLine& line, bool comment, bool after_poses,
+            std::vector<std::string_view>& fields, Complaints& wrong);
 
   /// Covariances [θ, p] of all lines so far; empty if no header names a step.
   std::vector<Matrix6d> covariances;

@@ -64,15 +64,15 @@ void History::step() {
 }
 
 void History::step(HistoryFrame& frame) {
+  const Model& model = *frame.input.model;
+  frame.input.estimated_styles =
+      belief_.learned.extents.outlines(model.hash) ? model.outline_styles : nullptr;
   if (frame.before.tracks.empty()) frame.before = std::exchange(spare_, {});
   const std::size_t n = belief_.tracks.size();
   if (frame.before.tracks.capacity() < n) frame.before.tracks.reserve(n + n / 4);
   frame.before = belief_;
   frame.merges.clear();
   if (frame.arrivals) frame.merges = takeIn(*frame.arrivals, belief_, frame.input, filter_);
-  const Model& model = *frame.input.model;
-  frame.input.estimated_styles =
-      belief_.learned.extents.outlines(model.hash) ? model.outline_styles : nullptr;
   const StepReport report = filter_.step(belief_, frame.input, ids_);
   frame.merges.insert(frame.merges.end(), report.merges.begin(), report.merges.end());
   if (report.broken > 0) reasons_.add("object_numbers_bad", report.broken);

@@ -146,7 +146,9 @@ class Examples {
          below(999),
          uniform(0, 1),
          {},
-         coin() ? BoxExtent::kOutline : BoxExtent::kCuboid};
+         coin()   ? BoxExtent::kOutline
+         : coin() ? BoxExtent::kCuboid
+                  : BoxExtent::kUnknown};
     for (std::size_t i = 0; i < 4 * m.classes.size(); ++i) {
       m.side_insets.push_back(uniform(-0.4, 0.4));
     }

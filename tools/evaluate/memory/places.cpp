@@ -1,5 +1,6 @@
 #include "tools/evaluate/memory/places.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -21,12 +22,19 @@ std::string addRow(const std::string& text, Places& places) {
     return "place and visit are whole numbers from 0";
   }
   const auto p = replay::parseNumbers({fields.begin() + 2, fields.begin() + 5});
-  if (!p) return "x, y and z are finite numbers, with decimal points";
+  constexpr double kFar_m = 1e7;
+  const bool near =
+      p && std::all_of(p->begin(), p->end(), [](double x) { return std::abs(x) < kFar_m; });
+  if (!near) return "x, y and z are numbers within 1e7 m, with decimal points";
   PlaceVisit row{Eigen::Vector3d(p->data()), {}};
   for (const auto field : replay::split(fields[5], ' ')) {
     const auto frame = replay::parseInteger(field);
     if (!frame || *frame < 0) return "frames are whole numbers from 0 with blanks between them";
-    row.frames.push_back(static_cast<std::uint64_t>(*frame));
+    const auto number = static_cast<std::uint64_t>(*frame);
+    if (std::find(row.frames.begin(), row.frames.end(), number) != row.frames.end()) {
+      return "frame " + std::to_string(number) + " is named twice";
+    }
+    row.frames.push_back(number);
   }
   if (row.frames.empty()) return "the visit has no frames; leave the line out";
   auto& visits = places[static_cast<std::uint64_t>(*place)];
@@ -54,7 +62,7 @@ std::optional<ObjectAtPlace> objectAt(const Eigen::Vector2d& place_W, const Plac
     const Eigen::Vector2d d = row->centre_W.head<2>() - place_W;
     const double along = ray.dot(d), across = ray.x() * d.y() - ray.y() * d.x();
     const double a = (along - middle) / half, b = across / options.across_m;
-    if (std::abs(a) >= 1.0 || std::abs(b) >= 1.0) continue;
+    if (ray.isZero() || std::abs(a) >= 1.0 || std::abs(b) >= 1.0) continue;
     if (best && a * a + b * b >= least) continue;
     best = {row->id, along, across};
     least = a * a + b * b;

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -34,14 +35,22 @@ struct PlacesTruth {
 /// The frames and the camera are those of the run's data, which its report names.
 PlacesTruth readTruth(const fs::path& run, const std::string& poses_file,
                       const PlacesCommand& command) {
+  if (!fs::is_directory(run)) {
+    throw StartupError(ExitCode::kUnavailable,
+                       run.string() + " is not a folder; name one that `perdure pipeline` wrote");
+  }
   const auto poses = replay::PoseFile::read(
       poses_file, "with --places, --truth takes a file of the true poses of the camera");
   std::ifstream in(run / "report.json");
-  const Json report = Json::parse(in, nullptr, false);
-  const bool reported = report.is_object();
+  Json report = Json::parse(in, nullptr, false);
+  if (!report.is_object()) report = Json::object();
+  const auto reported = [&report](const char* name) -> std::string {
+    const auto found = report.find(name);
+    return found != report.end() && found->is_string() ? found->get<std::string>() : "";
+  };
   replay::DatasetOptions data;
-  data.path = command.data.empty() && reported ? report.value("data", "") : command.data;
-  data.sequence = reported ? report.value("sequence", "") : "";
+  data.path = command.data.empty() ? reported("data") : command.data;
+  data.sequence = reported("sequence");
   data.decode = false;
   if (poses.format() == replay::PoseFormat::kKitti) data.frame_count = poses.poses().size();
   if (data.path.empty()) {
@@ -127,8 +136,8 @@ Json judge(const fs::path& run, const std::string& poses, const PlacesCommand& c
           {"recall", share(s.first_found + s.later_found, asked)},
           {"recall_first_visit", share(s.first_found, s.first_asked)},
           {"recall_later_visits", share(s.later_found, s.later_asked)},
-          {"along_m", quantile(s.along_m, 0.5)},
-          {"across_m", quantile(s.across_m, 0.5)},
+          {"along_m", s.along_m.empty() ? Json() : Json(quantile(s.along_m, 0.5))},
+          {"across_m", s.across_m.empty() ? Json() : Json(quantile(s.across_m, 0.5))},
           {"loops", events.counts["loop_closed"]},
           {"gone", events.counts["gone"]},
           {"moved", events.counts["moved"]},
@@ -137,9 +146,10 @@ Json judge(const fs::path& run, const std::string& poses, const PlacesCommand& c
 }
 
 void refuseLimits(const char* name, const std::vector<double>& limits) {
-  if (limits[0] < limits[1]) return;
-  throw StartupError(ExitCode::kUsage, fmt::format("{} {:g} {:g}: the second limit must be larger",
-                                                   name, limits[0], limits[1]));
+  if (limits[0] < limits[1] && std::isfinite(limits[0] - limits[1])) return;
+  throw StartupError(ExitCode::kUsage,
+                     fmt::format("{} {:g} {:g}: give two numbers, the second one larger", name,
+                                 limits[0], limits[1]));
 }
 
 }  // namespace
@@ -159,8 +169,9 @@ PlacesJudge addPlacesOptions(CLI::App& memory) {
         memory.add_option("--along", options.along_m,
                           "Limits of an object behind its place, along the ray from the body, m"),
         memory.add_option("--across", options.across_m, "Its largest distance from the ray, m")
-            ->check(CLI::PositiveNumber),
-        memory.add_option("--least-frames", options.least_frames, "Shorter visits keep no id")}) {
+            ->check(CLI::Range(1e-3, 1e6)),
+        memory.add_option("--least-frames", options.least_frames, "Shorter visits keep no id")
+            ->check(CLI::Range(1, 1000000))}) {
     option->needs(places)->capture_default_str();
   }
   for (const char* pair : {"--range", "--along"}) memory.get_option(pair)->expected(2);

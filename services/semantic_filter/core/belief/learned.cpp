@@ -54,7 +54,7 @@ bool BoxExtents::decided(std::uint64_t model) const {
 }
 
 void BoxExtents::learn(std::uint64_t model, double nats) {
-  // A change moves all objects, so that odds about zero must not cause several.
+  // Each change moves all objects. The threshold prevents repeated changes near zero.
   constexpr double kClear = 6.0;  // nats
   Odds& odds = entryOf(odds_, model);
   odds.nats += nats;

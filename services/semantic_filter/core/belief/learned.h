@@ -38,8 +38,8 @@ class NoiseScales {
   std::vector<std::pair<std::uint64_t, Sums>> sums_;  ///< a list, because networks are few
 };
 
-/// Whether the boxes of a network that does not say it enclose outlines or images of cuboids. Until
-/// objects at rest speak clearly for outlines they count as images of cuboids. Derivation:
+/// Whether the boxes of a network that does not say it enclose outlines or images of cuboids. Boxes
+/// count as images of cuboids until the evidence of objects at rest exceeds 6 nats. Derivation:
 /// tools/docs/maths/box_extent.md.
 class BoxExtents {
  public:

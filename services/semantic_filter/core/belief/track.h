@@ -89,6 +89,12 @@ struct Lookalike {
 /// One observation that is kept for the batch; smoothing knows what it holds.
 struct Keyframe;
 
+/// What BoxExtents has counted of a track.
+struct CountedExtent {
+  std::uint64_t model = 0;
+  double nats = 0.0;  ///< for outlines
+};
+
 struct BatchState {
   SharedVector<std::shared_ptr<const Keyframe>> keyframes;  ///< in order of time
   /// False for a track that came back: a batch of later keyframes would lose what it knew before.
@@ -97,7 +103,7 @@ struct BatchState {
   std::uint32_t seen = 0;             ///< keyframes since there were enough for a fit
   std::uint32_t mode_search_due = 0;  ///< modes are searched when `seen` reaches it
   std::uint32_t patience = 1;         ///< fits are this much rarer while they change little
-  double outline_nats = 0.0;          ///< what BoxExtents has counted of this track
+  CountedExtent extent;
 };
 
 struct PublishedVisibility {

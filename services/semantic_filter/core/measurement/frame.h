@@ -116,9 +116,9 @@ struct FrameContext {
   NoiseScale noise_scale = {};
   std::shared_ptr<const GroundSurface> ground = {};  ///< before this frame; null: nothing is known
   const MoverShares* movers = nullptr;               ///< null: the shares of the class priors
-  /// of the present network, also for its earlier keyframes; null: those that it declares
+  /// Box styles of the present network, also used for its earlier keyframes. Null: as declared.
   const BoxStyles* styles = nullptr;
-  bool asks_extent = false;  ///< what the boxes of the network enclose is to be estimated
+  bool estimates_extent = false;  ///< true while the extent of the boxes is estimated
 
   Projector projector() const;
   /// Returns the prior probability that an instance of the class moves.

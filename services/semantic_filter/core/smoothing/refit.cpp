@@ -32,15 +32,17 @@ void dropContradicted(Track& track, const ContradictionCounts& contradictions, s
   if (kept.size() >= least) track.batch.keyframes = std::move(kept);
 }
 
-/// Returns the nats by which the boxes of an object at rest enclose its outline, not its cuboid.
-double outlineNats(const MapFit& at_rest, const KeyframeBatch& batch, const FrameContext& frame) {
+/// Returns the nats by which the boxes of an object at rest enclose its outline, not its cuboid;
+/// nothing without a fit of the other extent.
+std::optional<double> outlineNats(const MapFit& at_rest, const KeyframeBatch& batch,
+                                  const FrameContext& frame) {
   constexpr double kMost = 3.0;  // nats; an object of an unusual shape must not decide alone
   const BoxStyles* outlines = frame.model->outline_styles.get();
   const bool as_outlines = frame.styles == outlines;
   FrameContext other = frame;
   other.styles = as_outlines ? frame.model->styles.get() : outlines;
-  const auto as_other = fit(at_rest.hypothesis(), batch, other);
-  if (!as_other) return 0.0;
+  const auto as_other = MapFit::make(at_rest.hypothesis(), batch, other);
+  if (!as_other) return std::nullopt;
   const double nats = as_other->logEvidence() - at_rest.logEvidence();
   return std::clamp(as_outlines ? -nats : nats, -kMost, kMost);
 }
@@ -72,7 +74,7 @@ std::optional<NetworkEvidence> refitClass(Track& track, const std::string& name,
   std::optional<NetworkEvidence> evidence;
   if (at_rest) {
     evidence = {at_rest->map_fit.residualRatio(), at_rest->map_fit.azimuthResidualRatio()};
-    if (frame.asks_extent && name == track.best().class_name)
+    if (frame.estimates_extent && name == track.best().class_name)
       evidence->outline_nats = outlineNats(at_rest->map_fit, batch, frame);
   }
   auto in_motion = heaviest(track.hypotheses.read(), std::move(moving_fits));
@@ -90,8 +92,8 @@ std::optional<NetworkEvidence> refitClass(Track& track, const std::string& name,
   return evidence;
 }
 
-/// Whether the track may inform about its network: it surely exists and stands, its
-/// class is known, and all its keyframes are of the present network.
+/// Returns whether the track is reliable enough to learn about its network: it surely exists and
+/// stands, its class is known, and all its keyframes are of the present network.
 bool informsAboutNetwork(const Track& track, const FrameContext& frame) {
   constexpr double kSure = 0.9;
   const Hypothesis& best = track.best();
@@ -171,8 +173,10 @@ void refitNeediest(ScratchVector<Track*>& tracks, Belief& belief, const FrameCon
       belief.learned.sides.learn(model, evidence->sides);
       belief.learned.azimuths.learn(model, evidence->azimuths);
       if (evidence->outline_nats) {
-        belief.learned.extents.learn(model, *evidence->outline_nats - track->batch.outline_nats);
-        track->batch.outline_nats = *evidence->outline_nats;
+        CountedExtent& counted = track->batch.extent;
+        if (counted.model != model) counted = {model, 0.0};
+        belief.learned.extents.learn(model, *evidence->outline_nats - counted.nats);
+        counted.nats = *evidence->outline_nats;
       }
     }
     frame.ground->updateRoughness(belief.learned.roughness_scale, *track, share);

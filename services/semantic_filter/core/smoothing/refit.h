@@ -12,13 +12,14 @@ bool considerKeyframe(Track& track, const BoxDetection& box, const std::array<bo
                       const FrameContext& frame);
 /// Returns the number of new keyframes over the awaited `fresh` share; from 1 on a fit is due.
 double refitNeed(const Track& track, double fresh);
-/// What one track tells about the boxes of its network.
+/// Evidence of one track about the boxes of its network.
 struct NetworkEvidence {
   ResidualRatio sides, azimuths;  ///< of keyframes that no earlier fit counted
   /// Nats for boxes that enclose outlines, not cuboids, by all keyframes; if the frame asks for it.
   std::optional<double> outline_nats = {};
 };
-/// Fits the hypotheses and weighs rest against motion. Returns what the track tells, if it may.
+/// Fits the hypotheses and weighs rest against motion. Returns its evidence
+/// about the network, if it is reliable enough.
 std::optional<NetworkEvidence> refit(Track& track, const FrameContext& frame);
 
 /// Fits the tracks with the largest refitNeed, and learns noise scales and ground from them.

@@ -119,7 +119,7 @@ double noiseRepetition(const Track& track, const FrameContext& frame) {
 }
 
 /// Returns the share of an observation that counts between rest and motion, `seconds` after the
-/// last one: the errors of a side last for a while, and a motion explains what changes slowly.
+/// last one: errors of consecutive boxes are correlated, and a velocity can fit them.
 double motionExponent(double seconds) {
   // Boxes of a tracker on KITTI: .6, .44, .3 and .13 after .1, .2, .3 and .5 s.
   constexpr double kCorrelation = 0.8, kSeconds = 0.3;
@@ -185,13 +185,11 @@ MeanA updateWeights(Track& track, const AllShares& shares, const Exponents& temp
   for (std::size_t i = 0; i < shares.size(); ++i) {
     Hypothesis& h = track.hypotheses[i];
     const Class& c = classes[h.class_name];
-    // w_c Ā_c^e = Σ w_m A_m^e over rest and motion
-    double sum = 0.0;
-    for (const Group& m : c.motion) sum += m.sum * m.temper(tempering.motion);
-    const double of_class = c.all.weight > 0.0 ? sum / c.all.weight : 0.0;
-    h.weight *=
-        shares[i].A * c.motion[h.moving].temper(tempering.motion) *
-        (of_class > 0.0 ? std::pow(of_class, tempering.classes / tempering.motion - 1.0) : 0.0);
+    double tempered = 0.0;  // keeps the sum of the class, w_c Ā_c^τ
+    for (const Group& m : c.motion) tempered += m.sum * m.temper(tempering.motion);
+    const double same = tempered > 0.0 ? c.all.sum / tempered : 0.0;
+    h.weight *= shares[i].A * c.motion[h.moving].temper(tempering.motion) * same *
+                c.all.temper(tempering.classes);
   }
   return mean;
 }

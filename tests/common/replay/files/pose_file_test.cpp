@@ -227,6 +227,11 @@ TEST(PoseFile, WrongCovariancesOfStepsAreLocated) {
   EXPECT_THAT(
       errorOfPoses("# " + pose + names + " step_x_y step_y_x\n" + line + "1 1 1 1 1 4 0 0\n"),
       HasSubstr(":1: step_y_x: this entry of the symmetric covariance is named twice"));
+  EXPECT_THAT(errorOfPoses("# " + pose + "step_xx step_yy\n" + line + "1 1\n"),
+              HasSubstr(":1: step_xx: write step_A_B"));
+  EXPECT_THAT(
+      errorOfPoses("0 " + line.substr(2) + "\n# " + pose + names + "\n" + line + "1 1 1 1 1 1\n"),
+      HasSubstr(":2: a header with step_A_B must stand before the first pose"));
   EXPECT_THAT(errorOfPoses("# " + pose + "step_x_x\n" + line + "1\n"),
               HasSubstr(":1: the step's covariance needs the six variances"));
   EXPECT_THAT(errorOfPoses(line + "1 1 1 1 1 1\n"), HasSubstr("in a header"));

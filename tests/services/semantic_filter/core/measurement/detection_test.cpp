@@ -49,6 +49,21 @@ TEST(BoxStyles, TakeTheShapesOfThePriorsIfTheBoxesEncloseOutlines) {
   EXPECT_TRUE(model.styles->of(kOtherClass).shape.is_cuboid);
 }
 
+TEST(BoxStyles, AreThoseOfBothExtentsIfTheModelDoesNotSayIt) {
+  ClassPriors priors;
+  priors.classes = {ClassPrior{.name = "car"}};
+  priors.classes[0].shape = shapeOf({{-1, 0.5, 0.5, 1}, {1, 1, 1, 0.5}});
+  ModelInfo info = testing::makeModelInfo();
+  EXPECT_FALSE(makeModel(info, priors).outline_styles);
+  info.boxes = BoxExtent::kUnknown;
+  const Model model = makeModel(info, priors);
+  EXPECT_TRUE(model.styles->of("car").shape.is_cuboid);
+  ASSERT_TRUE(model.outline_styles);
+  EXPECT_EQ(model.outline_styles->of("car").shape.corners(), 12);
+  info.side_insets.assign(4 * info.classes.size(), 0.02);
+  EXPECT_FALSE(makeModel(info, priors).outline_styles) << "the insets are those of cuboids";
+}
+
 using Sides = std::array<bool, 4>;
 
 constexpr Sides kNone{};
