@@ -12,12 +12,12 @@ namespace {
 /// Returns the stationary probability, at this view, that an unmapped static object hides the
 /// track. Keyframes of earlier visits lower it near their views.
 double stationaryOccluder(const Track& track, const Eigen::Vector3d& place, const ViewWalk& walk) {
-  double nearest = 0.0;  // correlation with the most similar view; views of one side are not new
+  double unmapped_occluder = walk.unmapped_occluder;
   for (const auto& k : track.batch.keyframes.read()) {
     if (k->from->time >= track.life.visit_began) break;  // keyframes are in order of time
-    nearest = std::max(nearest, viewCorrelation(place, k->from->T_WC, walk.T_WC, walk.occluder));
+    unmapped_occluder *= 1.0 - viewCorrelation(place, k->from->T_WC, walk.T_WC, walk.occluder);
   }
-  return walk.unmapped_occluder * (1.0 - nearest);
+  return unmapped_occluder;
 }
 
 }  // namespace
