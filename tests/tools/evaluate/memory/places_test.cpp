@@ -121,7 +121,10 @@ TEST(Places, WrongLinesAreLocated) {
   EXPECT_THAT(errorOfPlaces("place,x,y\n"), HasSubstr("places.csv:1: the header is place,visit,"));
   EXPECT_THAT(errorOfPlaces(header + "0,0,1,2,3\n"), HasSubstr(":2: 5 columns; a row is place"));
   EXPECT_THAT(errorOfPlaces(header + "0,-1,1,2,3,4\n"), HasSubstr(":2: place and visit"));
-  EXPECT_THAT(errorOfPlaces(header + "0,0,1,nan,3,4\n"), HasSubstr(":2: x, y and z are finite"));
+  EXPECT_THAT(errorOfPlaces(header + "0,0,1e160,2,3,4\n"), HasSubstr("within 1e7 m"));
+  EXPECT_THAT(errorOfPlaces(header + "0,0,1,2,3,4 5 4\n"), HasSubstr(":2: frame 4 is named twice"));
+  EXPECT_THAT(errorOfPlaces(header + "0,0,1,nan,3,4\n"),
+              HasSubstr(":2: x, y and z are numbers within 1e7 m"));
   EXPECT_THAT(errorOfPlaces(header + "0,0,1,2,3,4;5\n"), HasSubstr(":2: frames are whole"));
   EXPECT_THAT(errorOfPlaces(header + "0,0,1,2,3,\n"), HasSubstr(":2: the visit has no frames"));
   EXPECT_THAT(errorOfPlaces(header + "0,0,1,2,3,4\n0,0,1,2,3,5\n"),
@@ -215,7 +218,7 @@ TEST(PlacesCommand, WhatIsMissingOrContradictsIsNamed) {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return startupErrorOf([&] { callMemory(arguments); });
   };
-  EXPECT_THAT(error({"--range", "25", "5"}), HasSubstr("--range 25 5: the second limit"));
+  EXPECT_THAT(error({"--range", "25", "5"}), HasSubstr("--range 25 5: give two numbers"));
   EXPECT_THAT(error({"--range", "50", "60"}), HasSubstr("no place is within --range"));
   EXPECT_THROW(callMemory({tiny.run, "--truth", tiny.truth, "--across", "2"}), CLI::RequiresError);
   EXPECT_THROW(error({"--map-run", tiny.run}), CLI::ExcludesError);
