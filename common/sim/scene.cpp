@@ -63,7 +63,7 @@ const std::vector<Entry>& entries() {
        makeTown},
       {{"suburb",
         "A car that a hedge hides from one direction stays on the map while it is passed from "
-        "there, and standing cars stand, though boxes err for many frames alike."},
+        "there, and parked cars are not reported as moving, although errors of boxes last."},
        makeSuburb},
       {{"blocks",
         "In a town whose blocks are equal but for a few things, a body that comes back is known to "

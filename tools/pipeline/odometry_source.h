@@ -13,8 +13,8 @@ namespace perdure::tools {
 /// 2 cm, 0.2 m/s.
 struct PoseAccuracy {
   double sigma_rotation = 2e-3, sigma_position = 0.02, sigma_velocity = 0.2;
-  /// The error neither grows nor decays from frame to frame (truth). If false, increments come of
-  /// the file's steps. Without them none is given, and filter and graph let the error walk.
+  /// The error neither grows nor decays from frame to frame (truth). If false, increments have the
+  /// covariances of the file's steps; without these, filter and graph assume a random walk.
   bool bounded = false;
   /// W's z axis is opposite to gravity. If false, `up_W` is the mean of the body's z axis over the
   /// poses so far, because a vehicle is upright on average.

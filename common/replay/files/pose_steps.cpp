@@ -11,6 +11,7 @@ namespace perdure::replay {
 namespace {
 
 constexpr std::string_view kStep = "step_";
+constexpr double kMost = 1e4;  // of an entry: 100 m or 100 rad in a step
 
 /// Row and column of "step_A_B" in the order [θ, p], the lower one first.
 std::optional<std::pair<int, int>> entryOf(std::string_view name) {
@@ -24,16 +25,34 @@ std::optional<std::pair<int, int>> entryOf(std::string_view name) {
   return std::nullopt;
 }
 
+/// Also true for a misspelt name, as STEP_X_X.
+bool namesStep(std::string_view name) {
+  return name.size() >= kStep.size() &&
+         std::equal(kStep.begin(), kStep.end(), name.begin(), [](char a, char b) {
+           return a == std::tolower(static_cast<unsigned char>(b));
+         });
+}
+
+/// Whether an entry without a variance has a covariance with another one.
+bool correlatesWithoutVariance(const Matrix6d& C) {
+  for (int i = 0; i < 6; ++i) {
+    if (C(i, i) == 0.0 && !C.row(i).isZero(0.0)) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 bool PoseSteps::take(const TextLine& line, bool comment, bool after_poses,
                      std::vector<std::string_view>& fields, Complaints& wrong) {
   std::string error;
   if (entries_.empty()) {
-    const auto isStep = [](std::string_view name) { return name.starts_with(kStep); };
-    if (std::none_of(fields.begin(), fields.end(), isStep)) return true;
+    if (std::none_of(fields.begin(), fields.end(), namesStep)) return true;
     error =
         after_poses ? "a header with step_A_B must stand before the first pose" : entriesOf(fields);
+    if (error.empty()) return withoutSteps(fields);
+    wrong.add(line.number, error);
+    wrong.throwIfAny();  // without the header the lines below it cannot be judged
   } else if (comment) {
     return true;
   } else if (fields.size() != entries_.size()) {
@@ -45,18 +64,19 @@ bool PoseSteps::take(const TextLine& line, bool comment, bool after_poses,
     wrong.add(line.number, error);
     return false;
   }
-  std::vector<std::string_view> pose;
-  for (std::size_t i = 0; i < fields.size(); ++i) {
-    if (!entries_[i]) pose.push_back(fields[i]);
-  }
-  fields = std::move(pose);
+  return withoutSteps(fields);
+}
+
+bool PoseSteps::withoutSteps(std::vector<std::string_view>& fields) const {
+  std::size_t i = 0;
+  std::erase_if(fields, [&](std::string_view) { return entries_[i++].has_value(); });
   return true;
 }
 
 std::string PoseSteps::entriesOf(const std::vector<std::string_view>& names) {
   for (const auto name : names) {
     const Entry entry = entryOf(name);
-    if (!entry && name.starts_with(kStep)) {
+    if (!entry && namesStep(name)) {
       return fmt::format("{}: write step_A_B, A and B of x y z rx ry rz", name);
     }
     if (entry && std::count(entries_.begin(), entries_.end(), entry) > 0) {
@@ -77,9 +97,9 @@ std::string PoseSteps::addCovariance(const std::vector<std::string_view>& fields
   for (std::size_t i = 0; i < fields.size(); ++i) {
     if (!entries_[i]) continue;
     const auto value = parseNumber(fields[i]);
-    if (!value || std::abs(*value) > wire::kMatrixEntry.high) {
+    if (!value || std::abs(*value) > kMost) {
       return fmt::format(
-          "{}: an entry of the step's covariance is not a number up to 1e12; with a "
+          "{}: an entry of the step's covariance is not a number up to 1e4, with a "
           "decimal point",
           fields[i]);
     }
@@ -91,7 +111,7 @@ std::string PoseSteps::addCovariance(const std::vector<std::string_view>& fields
   const Matrix6d correlations = C.cwiseQuotient(sigma * sigma.transpose());
   constexpr double kRounding = 1e-4;  // entries with four digits
   const double variance = C.diagonal().minCoeff(), least = eigenvalues(correlations)(0);
-  if (variance < 0.0 || least < -kRounding) {
+  if (variance < 0.0 || least < -kRounding || correlatesWithoutVariance(C)) {
     return fmt::format(
         "the step's covariance is not positive semi-definite (least variance {:g}, "
         "least eigenvalue of the correlations {:.3g}); check the order and the signs "

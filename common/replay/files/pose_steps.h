@@ -28,6 +28,7 @@ class PoseSteps {
  private:
   using Entry = std::optional<std::pair<int, int>>;  ///< row and column; empty: of the pose
   std::string entriesOf(const std::vector<std::string_view>& names);
+  bool withoutSteps(std::vector<std::string_view>& fields) const;  ///< leaves the pose; true
   std::string addCovariance(const std::vector<std::string_view>& fields);
   std::vector<Entry> entries_;  ///< by columns of the file
 };

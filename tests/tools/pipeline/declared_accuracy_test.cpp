@@ -99,6 +99,9 @@ TEST(DeclaredAccuracy, AWalkIsForPosesWithoutAnAccuracyOnly) {
                                                     HasSubstr("0.1 rad/√m")),
                                               78));
   options.odometry_walk = ".001,.00001";
+  options.assignments = {"map_store.graph.walk_yaw=0.001"};
+  EXPECT_THAT(startOf(options), testing::Pair(HasSubstr("give one of them"), 64));
+  options.assignments.clear();
   writeText(options.odometry,
             "# t x y z qx qy qz qw step_x_x step_y_y step_z_z step_rx_rx step_ry_ry step_rz_rz\n"
             "1 0 0 0 0 0 0 1 1 1 1 1 1 1\n");

@@ -62,7 +62,7 @@ std::optional<ObjectAtPlace> objectAt(const Eigen::Vector2d& place_W, const Plac
     const Eigen::Vector2d d = row->centre_W.head<2>() - place_W;
     const double along = ray.dot(d), across = ray.x() * d.y() - ray.y() * d.x();
     const double a = (along - middle) / half, b = across / options.across_m;
-    if (ray.isZero() || std::abs(a) >= 1.0 || std::abs(b) >= 1.0) continue;
+    if (ray.isZero() || !(std::abs(a) < 1.0) || !(std::abs(b) < 1.0)) continue;
     if (best && a * a + b * b >= least) continue;
     best = {row->id, along, across};
     least = a * a + b * b;

@@ -148,8 +148,9 @@ Json judge(const fs::path& run, const std::string& poses, const PlacesCommand& c
 void refuseLimits(const char* name, const std::vector<double>& limits) {
   if (limits[0] < limits[1] && std::isfinite(limits[0] - limits[1])) return;
   throw StartupError(ExitCode::kUsage,
-                     fmt::format("{} {:g} {:g}: give two numbers, the second one larger", name,
-                                 limits[0], limits[1]));
+                     fmt::format("{}: the limits are {:g} and {:g}; the second must be larger, and "
+                                 "both finite",
+                                 name, limits[0], limits[1]));
 }
 
 }  // namespace
@@ -168,8 +169,7 @@ PlacesJudge addPlacesOptions(CLI::App& memory) {
         memory.add_option("--range", options.range_m, "Distances from the body for the recall, m"),
         memory.add_option("--along", options.along_m,
                           "Limits of an object behind its place, along the ray from the body, m"),
-        memory.add_option("--across", options.across_m, "Its largest distance from the ray, m")
-            ->check(CLI::Range(1e-3, 1e6)),
+        memory.add_option("--across", options.across_m, "Its largest distance from the ray, m"),
         memory.add_option("--least-frames", options.least_frames, "Shorter visits keep no id")
             ->check(CLI::Range(1, 1000000))}) {
     option->needs(places)->capture_default_str();
@@ -179,6 +179,7 @@ PlacesJudge addPlacesOptions(CLI::App& memory) {
     if (command->places.empty()) return false;
     refuseLimits("--range", command->options.range_m);
     refuseLimits("--along", command->options.along_m);
+    refuseLimits("--across", {0.0, command->options.across_m});
     const Json result = judge(run, truth, *command);
     if (as_json) std::cout << result.dump(2) << std::endl;
     for (const auto& [name, value] : result.items()) {

@@ -125,6 +125,11 @@ struct FrameContext {
   double moverShare(const ClassPrior& prior) const {
     return movers ? movers->of(prior) : prior.moving;
   }
+  /// Returns the styles of the boxes of an earlier frame: the present ones if its network is the
+  /// same, because the extent of the boxes is estimated.
+  const BoxStyles& stylesOf(const FrameView& from) const {
+    return styles && from.noise_scale.model == noise_scale.model ? *styles : *from.styles;
+  }
   /// Returns how the network draws boxes around objects of a class, for projectObserved.
   const BoxStyle& styleOf(const std::string& class_name) const {
     static const BoxStyle plain;

@@ -133,15 +133,11 @@ std::optional<Stack> BatchProblem::linearise(const State& x) const {
   s.counts.assign(batch_.size(), {});
   const BoxStyles* styles = nullptr;
   const BoxStyle* style = nullptr;
-  const auto stylesOf = [this](const FrameView& from) {
-    const bool present = frame_.styles && from.noise_scale.model == frame_.noise_scale.model;
-    return present ? frame_.styles : from.styles.get();
-  };
   for (std::size_t i = 0; i < batch_.size(); ++i) {
     const Keyframe& k = *batch_.keyframes()[i];
     State then = x;
     then.head<3>() -= age(i) * x.tail<3>();
-    const BoxStyles* own = stylesOf(*k.from);
+    const BoxStyles* own = &frame_.stylesOf(*k.from);
     if (own != styles) {  // adjacent keyframes mostly have the same network
       styles = own;
       style = &styles->of(class_name_);

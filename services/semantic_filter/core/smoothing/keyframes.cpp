@@ -77,18 +77,18 @@ bool addKeyframe(Track& track, Keyframe keyframe, const ViewScales& scales,
   return true;
 }
 
-bool explains(const Hypothesis& h, const Keyframe& keyframe, const BoxParameters& parameters) {
+bool explains(const Hypothesis& h, const Keyframe& keyframe, const FrameContext& frame) {
   const FrameView& from = *keyframe.from;
   State cuboid = h.x;
   cuboid.segment<4>(kBias).setZero();
   const auto box =
-      projectObserved(cuboid, from.projector, from.styles->of(h.class_name), h.heading());
+      projectObserved(cuboid, from.projector, frame.stylesOf(from).of(h.class_name), h.heading());
   if (!box) return false;
   const auto H = box->H.leftCols<kGeometry>();
   Eigen::Matrix4d S = H * h.P.topLeftCorner<kGeometry, kGeometry>() * H.transpose() +
                       box->H_pose * from.error.covariance * box->H_pose.transpose();
   S.diagonal() += keyframe.z.lasting;
-  const auto score = scoreBox(keyframe.z, *box, S, keyframe.hidden, parameters);
+  const auto score = scoreBox(keyframe.z, *box, S, keyframe.hidden, frame.parameters->box);
   return score && score->nis < gates::kForeignBox;
 }
 

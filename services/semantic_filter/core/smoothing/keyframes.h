@@ -13,7 +13,7 @@ bool addKeyframe(Track& track, Keyframe keyframe, const ViewScales& scales,
                  const SmoothingParameters& parameters);
 
 /// Whether the box of the keyframe fits the hypothesis.
-bool explains(const Hypothesis& h, const Keyframe& keyframe, const BoxParameters& parameters);
+bool explains(const Hypothesis& h, const Keyframe& keyframe, const FrameContext& frame);
 
 /// Adds the keyframes of b to those of a. Both tracks are one object.
 void mergeBatches(Track& a, const Track& b, const ViewScales& scales,

@@ -47,7 +47,8 @@ std::optional<double> outlineNats(const MapFit& at_rest, const KeyframeBatch& ba
   return std::clamp(as_outlines ? -nats : nats, -kMost, kMost);
 }
 
-/// Fits the hypotheses of one class. Returns what its best fit at rest tells about the network.
+/// Fits the hypotheses of one class. Returns the evidence of its best fit at rest
+/// about the network.
 std::optional<NetworkEvidence> refitClass(Track& track, const std::string& name,
                                           const KeyframeBatch& batch, const FrameContext& frame,
                                           bool search, ContradictionCounts& contradictions) {

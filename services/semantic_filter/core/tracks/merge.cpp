@@ -62,14 +62,14 @@ void keepBoth(Track& a, const Track& b) {
 }
 
 /// Removes keyframes of a seldom detected track that the other does not explain.
-void forgetForeignKeyframes(Track& a, Track& b, const BoxParameters& parameters) {
+void forgetForeignKeyframes(Track& a, Track& b, const FrameContext& frame) {
   constexpr double kSeldomDetected = 0.2;  // share of late observations
   Track& seldom_detected = a.history.recent_share < b.history.recent_share ? a : b;
   const Hypothesis& often_detected =
       (a.history.recent_share < b.history.recent_share ? b : a).best();
   if (seldom_detected.history.recent_share >= kSeldomDetected) return;
   std::erase_if(seldom_detected.batch.keyframes.write(),
-                [&](const auto& k) { return !explains(often_detected, *k, parameters); });
+                [&](const auto& k) { return !explains(often_detected, *k, frame); });
 }
 
 void absorb(Track& a, Track& b, const FrameContext& frame) {
@@ -79,7 +79,7 @@ void absorb(Track& a, Track& b, const FrameContext& frame) {
       a.classes = b.classes;
     }
   } else if (contradict(a.best(), b.best())) {
-    forgetForeignKeyframes(a, b, frame.parameters->box);
+    forgetForeignKeyframes(a, b, frame);
     keepBoth(a, b);
   } else {
     const ClassPrior& prior = frame.priors->of(a.best().class_name);

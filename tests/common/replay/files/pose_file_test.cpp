@@ -227,6 +227,10 @@ TEST(PoseFile, WrongCovariancesOfStepsAreLocated) {
   EXPECT_THAT(
       errorOfPoses("# " + pose + names + " step_x_y step_y_x\n" + line + "1 1 1 1 1 4 0 0\n"),
       HasSubstr(":1: step_y_x: this entry of the symmetric covariance is named twice"));
+  EXPECT_THAT(errorOfPoses("# " + pose + names + " step_x_y\n" + line + "0 1 1 1 1 1 0.1\n"),
+              HasSubstr(":2: the step's covariance is not positive semi-definite"));
+  EXPECT_THAT(errorOfPoses("# " + pose + "STEP_X_X\n" + line + "1\n"),
+              HasSubstr(":1: STEP_X_X: write step_A_B"));
   EXPECT_THAT(errorOfPoses("# " + pose + "step_xx step_yy\n" + line + "1 1\n"),
               HasSubstr(":1: step_xx: write step_A_B"));
   EXPECT_THAT(

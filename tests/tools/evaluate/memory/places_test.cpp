@@ -218,7 +218,10 @@ TEST(PlacesCommand, WhatIsMissingOrContradictsIsNamed) {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return startupErrorOf([&] { callMemory(arguments); });
   };
-  EXPECT_THAT(error({"--range", "25", "5"}), HasSubstr("--range 25 5: give two numbers"));
+  EXPECT_THAT(error({"--range", "25", "5"}), HasSubstr("--range: the limits are 25 and 5"));
+  for (const char* across : {"nan", "-1", "inf"}) {
+    EXPECT_THAT(error({"--across", across}), HasSubstr("--across: the limits are 0 and "));
+  }
   EXPECT_THAT(error({"--range", "50", "60"}), HasSubstr("no place is within --range"));
   EXPECT_THROW(callMemory({tiny.run, "--truth", tiny.truth, "--across", "2"}), CLI::RequiresError);
   EXPECT_THROW(error({"--map-run", tiny.run}), CLI::ExcludesError);
