@@ -15,6 +15,7 @@
 #include "tests/scenario/scene_cache.h"
 #include "tools/evaluate/object_rows.h"
 #include "tools/pipeline/pipeline.h"
+#include "tools/simulate/simulate.h"
 
 namespace perdure::tools {
 namespace {
@@ -137,10 +138,16 @@ TEST(StoredMap, OfAnOlderVersionIsTakenOverInTheCopyAlone) {
 class StreetAgain : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    const fs::path street = test::cachedScene({.scene = "street"});
+    SimulateOptions simulation;  // the scene of the golden run, which is taken if it is there
+    simulation.scene = "street";
+    simulation.images = false;
+    simulation.format = ImageFormat::kJpeg;
+    simulation.world.rate_hz = 10.0;
+    simulation.out = test::cachedScene({.scene = "street"});
+    simulate(simulation, {});
     folder() = replay::freshFolder("street_again");
     PipelineOptions options;
-    options.data = street.string();
+    options.data = simulation.out.string();
     options.odometry = "truth";
     options.detections = "simulated";
     options.quiet = true;
