@@ -29,7 +29,7 @@ MapState::MapState(const Parameters& parameters, SavedMap saved)
     const Anchor& anchor = saved_anchor.anchor;
     add(anchor);
     graph_.setPose(id, saved_anchor.T_MA);
-    saved_anchors_[id] = {saved_anchor.T_MA, anchor.scale2};
+    saved_anchors_[id] = {saved_anchor.T_MA, anchor.scale};
   }
   graph_.holdFirstAnchors();
   for (const auto& [id, record] : records_) index(id, record);
@@ -61,12 +61,12 @@ void MapState::removeLoop(EdgeId id) {
   endFactsOf(id);
 }
 
-void MapState::scaleOdometry(double factor, const WorldId& session) {
+void MapState::scaleOdometry(const DriftVariance& factor, const WorldId& session) {
   std::set<AnchorId> of_session;
   for (auto& [id, anchor] : anchors_) {
     if (anchor.session != session) continue;
-    anchor.from_previous.covariance *= factor;
-    anchor.scale2 *= factor;
+    anchor.from_previous.covariance = factor.of(anchor.from_previous.covariance);
+    anchor.scale = {anchor.scale.plane * factor.plane, anchor.scale.height * factor.height};
     of_session.insert(id);
   }
   graph_.scaleOdometry(factor, of_session);
@@ -178,9 +178,8 @@ std::optional<ObjectRecord> MapState::combined(ObjectId object) const {
     const auto at = tracks_.find(track);
     if (at == tracks_.end()) continue;
     confirmed = confirmed || at->second.confirmed;
-    const auto older =
-        std::find_if(records.begin(), records.end(),
-                     [&](const ObjectRecord* r) { return isNewer(at->second, *r); });
+    const auto older = std::find_if(records.begin(), records.end(),
+                                    [&](const ObjectRecord* r) { return isNewer(at->second, *r); });
     records.insert(older, &at->second);
   }
   if (records.empty() || records.front()->gone) return std::nullopt;
@@ -265,7 +264,7 @@ bool MapState::isSaved(AnchorId id) const {
   if (at == saved_anchors_.end()) return false;
   const LevelPose& now = graph_.pose(id);
   return at->second.T_MA.p == now.p && at->second.T_MA.yaw == now.yaw &&
-         at->second.scale2 == anchors_.at(id).scale2;
+         at->second.scale == anchors_.at(id).scale;
 }
 
 Unsaved MapState::unsaved() const {
@@ -311,7 +310,7 @@ void MapState::markSaved() {
   saved_facts_ = identity_.facts();
   views_touched_.clear();
   for (const auto& [id, anchor] : anchors_) {
-    saved_anchors_[id] = {graph_.pose(id), anchor.scale2};
+    saved_anchors_[id] = {graph_.pose(id), anchor.scale};
   }
   saved_edges_.clear();
   for (const auto& [id, edge] : graph_.edges()) {

@@ -31,7 +31,7 @@ class MapState {
   EdgeId addLoop(const Edge& edge) { return graph_.add(edge); }
   /// Also ends the facts that depend on it.
   void removeLoop(EdgeId id);
-  void scaleOdometry(double factor, const WorldId& session);
+  void scaleOdometry(const DriftVariance& factor, const WorldId& session);
   void optimise() { (void)graph_.optimise(); }
   /// Moves a component as a whole: T_MA = T_MN T_NA.
   void move(const std::set<AnchorId>& anchors, const LevelPose& T_MN);
@@ -71,7 +71,7 @@ class MapState {
   /// The state at the last save.
   struct Kept {
     LevelPose T_MA;
-    double scale2 = 1.0;
+    DriftVariance scale;
   };
   void index(ObjectId id, const ObjectRecord& record);
   void unindex(ObjectId id, const ObjectRecord& record);

@@ -82,7 +82,7 @@ void Mapper::dropTentativeLoops() {
 void Mapper::learnAnew(const WorldId& session) {
   drift_scale_ = DriftScale(parameters_.drift_scale);
   const auto last = state_.newestOf(session);
-  odometry_variance_ = last ? last->scale2 : 1.0;
+  odometry_variance_ = last ? last->scale : DriftVariance();
   learned_at_m_ = last ? -std::numeric_limits<double>::infinity() : 0.0;
 }
 
@@ -129,8 +129,8 @@ void Mapper::onOdometry(const Odometry& odometry) {
                    view_builder_.viewFrom(before->T_WA, builder_.way_m(),
                                           builder_.way_m() - before->way_m + kOverlap_m));
   }
-  anchor->from_previous.covariance *= odometry_variance_;
-  anchor->scale2 = odometry_variance_;
+  anchor->from_previous.covariance = odometry_variance_.of(anchor->from_previous.covariance);
+  anchor->scale = odometry_variance_;
   state_.add(*anchor);
   if (ended_ && ended_->begins == 0) ended_->begins = anchor->id;
   marginals_.reset();
@@ -205,8 +205,8 @@ void Mapper::onObjects(const Objects& objects) {
     if (belief.moving > 0.5 || belief.classes.empty() || belief.recalled) continue;
     if (!belief.confirmed && (belief.existence < 0.5 || belief.hits < 2)) continue;
     const ObjectRecord* known = state_.recordOfTrack(belief.id);
-    const bool seen_now = known == nullptr || belief.last_seen > known->last_seen ||
-                          known->session != *session_;
+    const bool seen_now =
+        known == nullptr || belief.last_seen > known->last_seen || known->session != *session_;
     if (seen_now) see(belief, objects);
   }
   // A body that lost its position and does not move can be located by additional objects.

@@ -188,7 +188,7 @@ class Mapper {
   TrackedTies tracked_ties_;
   LoopBook loop_book_;
   DriftScale drift_scale_;
-  double odometry_variance_ = 1.0;  ///< factor on the covariances of the session's odometry edges
+  DriftVariance odometry_variance_;  ///< factor on the covariances of the session's odometry edges
   std::optional<WorldId> session_;
   std::unique_ptr<Marginals> marginals_;  ///< relative to the newest anchor
   MapChange change_;

@@ -138,9 +138,9 @@ void Mapper::learnDrift(const PlaceMatch& match, const LevelGaussian& prior) {
   Eigen::Matrix4d measured = match.T_MB.covariance;
   addFloor(measured, parameters_.loop.floor_m, parameters_.loop.floor_rad);
   drift_scale_.add(difference(match.T_MB.mean, prior.mean), measured,
-                   prior.covariance / odometry_variance_);
-  const double variance = drift_scale_.variance();
-  state_.scaleOdometry(variance / odometry_variance_, *session_);
+                   DriftVariance().over(odometry_variance_).of(prior.covariance));
+  const DriftVariance variance = drift_scale_.variance();
+  state_.scaleOdometry(variance.over(odometry_variance_), *session_);
   odometry_variance_ = variance;
 }
 

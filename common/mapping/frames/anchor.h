@@ -2,6 +2,8 @@
 // are stored relative to an anchor. When the graph moves anchors, objects move with them.
 #pragma once
 
+#include <Eigen/Core>
+#include <cmath>
 #include <cstdint>
 
 #include "common/base/ids.h"
@@ -11,6 +13,20 @@ namespace perdure::mapping {
 
 using AnchorId = std::uint64_t;  ///< 0: none; ids increase with time within a session
 
+/// Factors on covariances of the odometry: of place and yaw, and of height.
+struct DriftVariance {
+  double plane = 1.0, height = 1.0;
+  Eigen::Matrix4d of(const Eigen::Matrix4d& covariance) const {
+    const double p = std::sqrt(plane);
+    const Eigen::Vector4d s(p, p, std::sqrt(height), p);
+    return s.asDiagonal() * covariance * s.asDiagonal();
+  }
+  DriftVariance over(const DriftVariance& other) const {
+    return {plane / other.plane, height / other.height};
+  }
+  bool operator==(const DriftVariance&) const = default;
+};
+
 struct Anchor {
   AnchorId id = 0;
   AnchorId previous = 0;  ///< previous anchor of the same session; 0: the first one
@@ -19,7 +35,7 @@ struct Anchor {
   RigidTransform T_WA;          ///< z against gravity; constant
   LevelGaussian from_previous;  ///< T_previous,A by odometry
   double way_m = 0.0;           ///< distance travelled in the session so far
-  double scale2 = 1.0;          ///< factor by which loops have scaled the increment's covariance
+  DriftVariance scale;          ///< factors by which loops have scaled the increment's covariance
 };
 
 }  // namespace perdure::mapping

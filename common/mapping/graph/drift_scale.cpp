@@ -18,24 +18,31 @@ DriftScale::DriftScale(const DriftScaleParameters& parameters) : quantile_(param
     const double log_scale = std::log(kLeast) + (std::log(kMost) - std::log(kLeast)) * i / kSteps;
     const double d = log_scale / parameters.prior_sigma;
     log_scales_.push_back(log_scale);
-    log_posterior_.push_back(-0.5 * d * d);
+    plane_.push_back(-0.5 * d * d);
   }
+  height_ = plane_;
 }
 
 void DriftScale::add(const Eigen::Vector4d& error, const Eigen::Matrix4d& measured,
                      const Eigen::Matrix4d& odometry) {
+  const Eigen::Vector3i plane(0, 1, 3);
   for (std::size_t i = 0; i < log_scales_.size(); ++i) {
-    log_posterior_[i] += logGaussian(error, measured + std::exp(2.0 * log_scales_[i]) * odometry);
+    const Eigen::Matrix4d covariance = measured + std::exp(2.0 * log_scales_[i]) * odometry;
+    plane_[i] +=
+        logGaussian(Eigen::Vector3d(error(plane)), Eigen::Matrix3d(covariance(plane, plane)));
+    height_[i] += logGaussian(error.segment<1>(2), covariance.block<1, 1>(2, 2));
   }
 }
 
-double DriftScale::variance() const {
-  const double peak = *std::max_element(log_posterior_.begin(), log_posterior_.end());
+DriftVariance DriftScale::variance() const { return {varianceOf(plane_), varianceOf(height_)}; }
+
+double DriftScale::varianceOf(const LogPosterior& log_posterior) const {
+  const double peak = *std::max_element(log_posterior.begin(), log_posterior.end());
   double all = 0.0;
-  for (const double l : log_posterior_) all += std::exp(l - peak);
+  for (const double l : log_posterior) all += std::exp(l - peak);
   double sum = 0.0;
   for (std::size_t i = 0; i < log_scales_.size(); ++i) {
-    sum += std::exp(log_posterior_[i] - peak);
+    sum += std::exp(log_posterior[i] - peak);
     if (sum >= quantile_ * all) return std::exp(2.0 * log_scales_[i]);
   }
   return std::exp(2.0 * log_scales_.back());

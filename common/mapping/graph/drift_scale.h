@@ -5,10 +5,13 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "common/mapping/frames/anchor.h"
 #include "common/mapping/parameters.h"
 
 namespace perdure::mapping {
 
+/// Place and yaw share one scale. Heights have their own: odometry without gravity errs in pitch,
+/// so that its height drifts far more than its place.
 class DriftScale {
  public:
   explicit DriftScale(const DriftScaleParameters& parameters);
@@ -18,14 +21,17 @@ class DriftScale {
   void add(const Eigen::Vector4d& error, const Eigen::Matrix4d& measured,
            const Eigen::Matrix4d& odometry);
 
-  /// The factor for covariances of the odometry. It is an upper quantile, because a factor that is
-  /// too small leads to wrong associations.
-  double variance() const;
+  /// The factors for covariances of the odometry. They are upper quantiles, because factors that
+  /// are too small lead to wrong associations.
+  DriftVariance variance() const;
 
  private:
+  using LogPosterior = std::vector<double>;  ///< over log_scales_
+  double varianceOf(const LogPosterior& log_posterior) const;
+
   double quantile_;
   std::vector<double> log_scales_;  ///< grid over the scale of the standard deviation
-  std::vector<double> log_posterior_;
+  LogPosterior plane_, height_;
 };
 
 }  // namespace perdure::mapping

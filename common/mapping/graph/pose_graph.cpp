@@ -168,10 +168,10 @@ void PoseGraph::remove(EdgeId id) {
   weights_.erase(id);
 }
 
-void PoseGraph::scaleOdometry(double factor, const std::set<AnchorId>& anchors) {
+void PoseGraph::scaleOdometry(const DriftVariance& factor, const std::set<AnchorId>& anchors) {
   for (auto& [id, edge] : edges_) {
     if (edge.kind == EdgeKind::kOdometry && anchors.contains(edge.b)) {
-      edge.T_ab.covariance *= factor;
+      edge.T_ab.covariance = factor.of(edge.T_ab.covariance);
     }
   }
 }

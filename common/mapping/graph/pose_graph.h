@@ -54,7 +54,7 @@ class PoseGraph {
   void restore(EdgeId id, const Edge& edge, double weight);
   void remove(EdgeId id);
   /// Multiplies the covariances of odometry edges that lead to `anchors`.
-  void scaleOdometry(double factor, const std::set<AnchorId>& anchors);
+  void scaleOdometry(const DriftVariance& factor, const std::set<AnchorId>& anchors);
   /// Fixes the first anchor of each component, and no other. optimise() calls it.
   void holdFirstAnchors();
 

@@ -194,7 +194,7 @@ TEST(MapState, AnyStepsLeaveWhatOneSaveWouldHaveWritten) {
         pair.both([](MapState& state) { state.optimise(); });
       } else if (any < 88) {
         const WorldId session{1 + random() % 3, 0};
-        pair.both([&](MapState& state) { state.scaleOdometry(1.5, session); });
+        pair.both([&](MapState& state) { state.scaleOdometry({1.5, 2.0}, session); });
       } else if (any < 92) {
         const std::string name = "class" + std::to_string(random() % 5);
         pair.both([&](MapState& state) { state.numberOf(name); });

@@ -115,11 +115,11 @@ TEST(Restart, DoesNotScaleTheOdometryTwice) {
   ASSERT_GT(broken.loops().size(), loops);
   // The scale learned after it also applies to the trajectory before it. Both together are reported
   // as one scale.
-  const double scale2 = broken.mapper().anchors().rbegin()->second.scale2;
-  for (const auto& [id, anchor] : broken.mapper().anchors()) EXPECT_EQ(anchor.scale2, scale2) << id;
+  const auto scale = broken.mapper().anchors().rbegin()->second.scale;
+  for (const auto& [id, anchor] : broken.mapper().anchors()) EXPECT_EQ(anchor.scale, scale) << id;
   EXPECT_NE(share(broken, 5), before) << "a loop came after it";
   EXPECT_GT(share(broken, 5), 0.9 * share(whole, 5)) << "loops of before are forgotten, no more";
-  EXPECT_LT(scale2, 1.0);
+  EXPECT_LT(scale.plane, 1.0);
 }
 
 TEST(Restart, WhatIsSavedInManyStepsIsAllOfIt) {

@@ -99,7 +99,7 @@ inline void expectSame(const SavedMap& a, const SavedMap& b) {
     EXPECT_EQ(x.T_MA.p, y.T_MA.p) << what;
     EXPECT_EQ(x.T_MA.yaw, y.T_MA.yaw) << what;
     expectSame(x.anchor.from_previous, y.anchor.from_previous, what);
-    EXPECT_EQ(x.anchor.scale2, y.anchor.scale2) << what;
+    EXPECT_EQ(x.anchor.scale, y.anchor.scale) << what;
     EXPECT_EQ(x.anchor.T_WA.p, y.anchor.T_WA.p) << what;
   }
   for (const auto& [id, x] : a.edges) {

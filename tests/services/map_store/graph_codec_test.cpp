@@ -122,7 +122,19 @@ TEST(GraphCodec, GivesBackEveryBitOfARecord) {
 TEST(GraphCodec, WritesItsVersionAndIdLittleEndian) {
   const Bytes bytes = encodeAnchor(test::RandomGraph(1).anchor(0x0102030405060708u, 0));
   const Bytes head(bytes.begin(), bytes.begin() + 10);
-  EXPECT_EQ(head, (Bytes{1, 0, 8, 7, 6, 5, 4, 3, 2, 1}));
+  EXPECT_EQ(head, (Bytes{2, 0, 8, 7, 6, 5, 4, 3, 2, 1}));
+}
+
+TEST(GraphCodec, ReadsAnchorsOfVersionOneWhichHadOneScale) {
+  mapping::Anchor anchor = someMap(5).anchors.at(2).anchor;
+  anchor.scale = {2.5, 1.5};
+  Bytes old = encodeAnchor(anchor);
+  old[0] = 1;
+  EXPECT_FALSE(decodeAnchor(old).has_value()) << "the second scale is left over";
+  old.resize(old.size() - sizeof(double));
+  const auto back = decodeAnchor(old);
+  ASSERT_TRUE(back.has_value()) << back.error().detail;
+  EXPECT_EQ(back->scale, (mapping::DriftVariance{2.5, 2.5}));
 }
 
 TEST(GraphCodec, RefusesEveryTruncationLeftOverBytesAndOtherVersions) {
@@ -136,7 +148,7 @@ TEST(GraphCodec, RefusesEveryTruncationLeftOverBytesAndOtherVersions) {
     }
     Bytes longer = blob.bytes, newer = blob.bytes;
     longer.push_back(0);
-    newer[0] = 2;
+    newer[0] = 3;
     EXPECT_FALSE(blob.decode(longer).has_value());
     EXPECT_FALSE(blob.decode(newer).has_value());
   }

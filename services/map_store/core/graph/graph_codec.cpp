@@ -21,12 +21,20 @@ constexpr auto gaussianFields = [](auto& io, auto& gaussian) {
   io(gaussian.mean.p, gaussian.mean.yaw, gaussian.covariance);
 };
 
-constexpr auto anchorFields = [](auto& io, auto& anchor) {
+constexpr std::uint16_t kOneScale = 1;      // of anchors, for place and height
+constexpr std::uint16_t kAnchorFormat = 2;  // with a scale for each
+
+constexpr auto anchorOfOneScale = [](auto& io, auto& anchor) {
   auto& stamp = anchor.stamp;
   io(anchor.id, anchor.previous, anchor.session.world, anchor.session.epoch, stamp.source,
      stamp.sequence, stamp.time, stamp.captured_ns, anchor.T_WA.q.coeffs(), anchor.T_WA.p);
   gaussianFields(io, anchor.from_previous);
-  io(anchor.way_m, anchor.scale2);
+  io(anchor.way_m, anchor.scale.plane);
+};
+
+constexpr auto anchorFields = [](auto& io, auto& anchor) {
+  anchorOfOneScale(io, anchor);
+  io(anchor.scale.height);
 };
 
 constexpr auto edgeFields = [](auto& io, auto& edge) {
@@ -75,11 +83,12 @@ tl::unexpected<Reason> malformed(const std::string& what, const ByteReader& in) 
 
 /// Checks the version first, then that all bytes are read and the value is sound.
 template <class T>
-Result<T> decode(const std::string& what, std::span<const std::uint8_t> bytes, auto fields) {
+Result<T> decode(const std::string& what, std::span<const std::uint8_t> bytes, auto fields,
+                 std::uint16_t format = kGraphFormat) {
   ByteReader in(bytes);
   std::uint16_t version = 0;
   in(version);
-  if (version != kGraphFormat) {
+  if (version != format) {
     return fail("graph_malformed",
                 what + ": format " + std::to_string(version) + " is not known here");
   }
@@ -98,7 +107,8 @@ bool isSound(const Anchor& anchor) {
   return anchor.id != 0 && anchor.previous < anchor.id && anchor.T_WA.finite() &&
          std::abs(anchor.T_WA.q.norm() - 1.0) < kRounding &&
          isSoundGaussian(anchor.from_previous) && std::isfinite(anchor.way_m) &&
-         std::isfinite(anchor.scale2) && anchor.scale2 > 0.0;
+         std::isfinite(anchor.scale.plane) && anchor.scale.plane > 0.0 &&
+         std::isfinite(anchor.scale.height) && anchor.scale.height > 0.0;
 }
 
 bool isSound(const Edge& edge) {
@@ -117,10 +127,14 @@ bool isSound(const mapping::View& view) {
          });
 }
 
-Bytes encodeAnchor(const Anchor& anchor) { return encode(kGraphFormat, anchor, anchorFields); }
+Bytes encodeAnchor(const Anchor& anchor) { return encode(kAnchorFormat, anchor, anchorFields); }
 
 Result<Anchor> decodeAnchor(std::span<const std::uint8_t> bytes) {
-  return decode<Anchor>("anchor", bytes, anchorFields);
+  const bool one_scale = bytes.size() > 1 && bytes[0] == kOneScale && bytes[1] == 0;
+  if (!one_scale) return decode<Anchor>("anchor", bytes, anchorFields, kAnchorFormat);
+  auto anchor = decode<Anchor>("anchor", bytes, anchorOfOneScale, kOneScale);
+  if (anchor) anchor->scale.height = anchor->scale.plane;
+  return anchor;
 }
 
 Bytes encodeEdge(const Edge& edge) { return encode(kGraphFormat, edge, edgeFields); }
