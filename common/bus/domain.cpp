@@ -1,14 +1,13 @@
 #include "common/bus/domain.h"
 
-#include <arpa/inet.h>
-#include <ifaddrs.h>
-
 #include <cstdlib>
 #include <filesystem>
+#include <sstream>
 #include <utility>
 
 #include "common/base/errors.h"
 #include "common/bus/dds.h"
+#include "common/bus/interfaces.h"
 #include "common/bus/security/roles.h"
 #include "common/bus/security_log.h"
 #include "common/bus/shared_memory.h"
@@ -20,32 +19,21 @@ namespace {
 constexpr int kMaxParticipantIndex = 60;
 constexpr double kMostSharedMemory = 256;  // MB; common/types/description.h allows no larger images
 
+/// The ids of Cyclone's domains are per process, those on the network are not.
+constexpr std::int64_t kForeignId = 1000;
+
+std::string indexXml() {
+  return "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>" +
+         std::to_string(kMaxParticipantIndex) + "</MaxAutoParticipantIndex>";
+}
+
 std::string loopbackXml() {
   // Unicast only. Fragments and buffers are large, because no data can be lost between hosts.
   return "<General><Interfaces><NetworkInterface name=\"lo\"/></Interfaces>"
          "<AllowMulticast>false</AllowMulticast>"
          "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize></General>"
-         "<Discovery><ParticipantIndex>auto</ParticipantIndex>"
-         "<MaxAutoParticipantIndex>" +
-         std::to_string(kMaxParticipantIndex) +
-         "</MaxAutoParticipantIndex>"
-         "<Peers><Peer Address=\"127.0.0.1\"/></Peers></Discovery>";
-}
-
-/// The IPv4 address of an interface. Without one it returns the name, so that Cyclone reports the
-/// error.
-std::string addressOf(const std::string& interface) {
-  ifaddrs* all = nullptr;
-  if (getifaddrs(&all) != 0) return interface;
-  const std::unique_ptr<ifaddrs, decltype(&freeifaddrs)> owned(all, &freeifaddrs);
-  for (const ifaddrs* one = all; one != nullptr; one = one->ifa_next) {
-    if (interface != one->ifa_name || one->ifa_addr == nullptr) continue;
-    if (one->ifa_addr->sa_family != AF_INET) continue;
-    char text[INET_ADDRSTRLEN] = "";
-    const auto* address = reinterpret_cast<const sockaddr_in*>(one->ifa_addr);
-    if (inet_ntop(AF_INET, &address->sin_addr, text, sizeof text) != nullptr) return text;
-  }
-  return interface;
+         "<Discovery>" +
+         indexXml() + "<Peers><Peer Address=\"127.0.0.1\"/></Peers></Discovery>";
 }
 
 /// Data lost between hosts are requested and sent again within a frame's period. With Cyclone's
@@ -66,21 +54,31 @@ std::string peersXml(const std::string& interface, const std::vector<std::string
 /// s). The default takes half a minute.
 constexpr char kMeetSoon[] = "<SPDPInterval>2s</SPDPInterval>";
 
-std::string networkXml(const Options& options) {
-  return "<General><Interfaces><NetworkInterface name=\"" + options.interface +
-         "\"/></Interfaces><AllowMulticast>" + (options.peers.empty() ? "true" : "false") +
-         "</AllowMulticast></General>"
-         "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>" +
-         std::to_string(kMaxParticipantIndex) + "</MaxAutoParticipantIndex>" + kMeetSoon +
-         peersXml(options.interface, options.peers) + "</Discovery>";
+/// Third-party programs get large messages by unicast, as Fast DDS sends them.
+std::string networkXml(const Options& options, bool foreign) {
+  std::string xml = "<General><Interfaces>";
+  std::istringstream interfaces(options.interface);
+  for (std::string one; std::getline(interfaces, one, ',');) {
+    // Linux sends multicast over loopback, but does not set its flag.
+    xml += "<NetworkInterface name=\"" + one + (one == "lo" ? "\" multicast=\"true" : "") + "\"/>";
+  }
+  const std::string first = options.interface.substr(0, options.interface.find(','));
+  return xml + "</Interfaces><AllowMulticast>" +
+         (!options.peers.empty() ? "false"
+          : foreign              ? "spdp"
+                                 : "true") +
+         "</AllowMulticast></General><Discovery>" + indexXml() + kMeetSoon +
+         (foreign ? "<ExternalDomainId>" + std::to_string(options.domain) + "</ExternalDomainId>"
+                  : "") +
+         peersXml(first, options.peers) + "</Discovery>";
 }
 
-std::string domainXml(const Options& options, const std::string& locator,
-                      const std::string& beside) {
-  const bool loopback = options.interface == "lo";
-  const std::string id = options.domain == 0 ? "any" : std::to_string(options.domain);
-  return "<CycloneDDS><Domain Id=\"" + id + "\">" +
-         (loopback ? loopbackXml() : networkXml(options)) +
+std::string domainXml(const Options& options, const std::string& locator, const std::string& beside,
+                      bool foreign = false) {
+  const bool loopback = options.interface == "lo" && !foreign;
+  const bool any = options.domain == 0 || foreign;
+  return "<CycloneDDS><Domain Id=\"" + (any ? "any" : std::to_string(options.domain)) + "\">" +
+         (loopback ? loopbackXml() : networkXml(options, foreign)) +
          "<Internal><SocketReceiveBufferSize max=\"10MB\"/>" + (loopback ? "" : kResendSoon) +
          "<Watermarks><WhcHigh>32MB</WhcHigh></Watermarks></Internal>"
          "<SharedMemory><Enable>" +
@@ -106,15 +104,16 @@ bool isPlainName(const std::string& name) {
   return !name.empty() && name.find_first_of("<>&\"' \t\n") == std::string::npos;
 }
 
-void requireNames(const Options& options) {
+/// `group`: of the keys, "bus" or "ros".
+void requireNames(const std::string& group, const Options& options) {
   if (!isPlainName(options.interface)) {
-    throw StartupError(ExitCode::kConfiguration,
-                       "bus.interface: \"" + options.interface + "\" is not an interface's name");
+    throw StartupError(ExitCode::kConfiguration, group + ".interface: \"" + options.interface +
+                                                     "\" is not an interface's name");
   }
   for (const std::string& peer : options.peers) {
     if (isPlainName(peer)) continue;
     throw StartupError(ExitCode::kConfiguration,
-                       "bus.peers: \"" + peer + "\" is no address and no host's name");
+                       group + ".peers: \"" + peer + "\" is no address and no host's name");
   }
 }
 
@@ -148,22 +147,24 @@ SharedMemory findSharedMemory(const Options& options) {
   return {*locator, {}, (static_cast<std::size_t>(options.shared_memory_mb) << 20) - kAround};
 }
 
+std::int32_t createDomain(std::int64_t id, const Options& options, const std::string& configuration,
+                          const std::string& fix) {
+  const dds_entity_t domain =
+      dds_create_domain(static_cast<dds_domainid_t>(id), configuration.c_str());
+  if (domain >= 0) return domain;
+  throw StartupError(ExitCode::kUnavailable,
+                     "DDS cannot open domain " + std::to_string(options.domain) + " on interface " +
+                         options.interface + " (" + dds_strretcode(-domain) + "); " + fix);
+}
+
 std::int32_t createDomain(const Options& options, const std::string& locator) {
-  requireNames(options);
+  requireNames("bus", options);
   const char* given = givenConfiguration();
   if (!options.security.empty()) (void)securityLog(given == nullptr);
-  const std::string configuration = given != nullptr ? given : configurationXml(options, locator);
-  const auto id = static_cast<dds_domainid_t>(options.domain);
-  const dds_entity_t domain = dds_create_domain(id, configuration.c_str());
-  if (domain < 0) {
-    throw StartupError(
-        ExitCode::kUnavailable,
-        "DDS cannot open domain " + std::to_string(options.domain) + " on interface " +
-            options.interface + " (" + dds_strretcode(-domain) +
-            "); bus.interface names an interface that `ip link` shows as up" +
-            (given != nullptr ? ", and CYCLONEDDS_URI, which is set, goes before it" : ""));
-  }
-  return domain;
+  return createDomain(
+      options.domain, options, given != nullptr ? given : configurationXml(options, locator),
+      std::string("bus.interface names an interface that `ip link` shows as up") +
+          (given != nullptr ? ", and CYCLONEDDS_URI, which is set, goes before it" : ""));
 }
 
 /// Assigns the identity in `folder` to a participant. Its properties take precedence over the
@@ -268,13 +269,24 @@ Domain::Domain(const Options& options)
 Domain::Domain(Options options, SharedMemory memory)
     : options_(std::move(options)),
       shared_memory_(std::move(memory)),
+      id_(options_.domain),
       domain_(keptBy(nullptr, Entity(createDomain(options_, shared_memory_.locator)))) {}
 
+Domain::Domain(Options options, std::int64_t id, Entity domain)
+    : options_(std::move(options)), id_(id), domain_(keptBy(nullptr, std::move(domain))) {}
+
 Domain Domain::foreign(Options options) {
-  options.shared_memory_mb = 0;
   options.security.clear();
-  options.identity.clear();
-  return {std::move(options), SharedMemory()};
+  if (givenConfiguration() != nullptr) {
+    // Cyclone itself opens this domain, for its participant.
+    options.interface = "CYCLONEDDS_URI";
+    return {options, options.domain, Entity()};
+  }
+  if (options.interface.empty()) options.interface = interfacesUp();
+  requireNames("ros", options);
+  Entity domain(createDomain(kForeignId, options, domainXml(options, {}, {}, true),
+                             "ros.interface names interfaces that `ip link` shows as up"));
+  return {std::move(options), kForeignId, std::move(domain)};
 }
 
 Domain Domain::as(std::string vehicle, std::string security, std::string identity) const {
@@ -311,7 +323,7 @@ Participant::Participant(const Domain& domain, const std::string& process)
   if (!options.security.empty()) {
     identity_ = secure(*qos, identityFolder(options, process));
   }
-  const auto id = static_cast<dds_domainid_t>(options.domain);
+  const auto id = static_cast<dds_domainid_t>(domain.id());
   const dds_entity_t participant = dds_create_participant(id, qos.get(), nullptr);
   if (participant < 0) refuseParticipant(participant, identity_);
   participant_ = keptBy(domain.entity(), Entity(participant));

@@ -68,8 +68,9 @@ class Domain {
  public:
   /// Throws StartupError (69) if DDS cannot use the interface.
   explicit Domain(const Options& options);
-  /// A second domain in the same process, for third-party programs. `options.domain` is used as it
-  /// is; shared memory and security are off.
+  /// A second domain in the same process, for third-party programs; its number may be the bus's.
+  /// Its interfaces are separated by commas, or empty: all that are up. Shared memory and security
+  /// are off. Throws StartupError (69, 78).
   static Domain foreign(Options options);
   /// The same domain, for participants of another vehicle or with another identity.
   Domain as(std::string vehicle, std::string security, std::string identity) const;
@@ -81,12 +82,15 @@ class Domain {
   /// Returns whether a process that starts now can share memory with this process.
   bool sharesMemory() const;
   const std::shared_ptr<const Entity>& entity() const { return domain_; }
+  std::int64_t id() const { return id_; }
 
  private:
   Domain(Options options, SharedMemory memory);
+  Domain(Options options, std::int64_t id, Entity domain);
 
   Options options_;
   SharedMemory shared_memory_;
+  std::int64_t id_;  ///< in this process
   std::shared_ptr<const Entity> domain_;
 };
 

@@ -120,8 +120,9 @@ QosPtr writerQos(const Qos& qos, const WriterOptions& options, const SharedMemor
   const bool kept = qos.kept && !(memory.on() && through);
   if (kept) dds_qset_durability(result.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
   if (qos.latched || kept) {
-    dds_qset_durability_service(result.get(), 0, DDS_HISTORY_KEEP_LAST, kept ? 1 : qos.depth,
-                                DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
+    const int late = kept ? 1 : qos.late > 0 ? qos.late : qos.depth;
+    dds_qset_durability_service(result.get(), 0, DDS_HISTORY_KEEP_LAST, late, DDS_LENGTH_UNLIMITED,
+                                DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
   }
   const double lease = options.lease_s > 0 ? options.lease_s : qos.lease_s;
   if (qos.exclusive) {

@@ -79,9 +79,9 @@ void Mirror::onFrame(const Frame& frame) {
 }
 
 void Mirror::onImu(const ImuSample& sample) {
-  gyro_ = sample.gyro;
   const bool known = calibration_ && calibration_->imu;
-  say(prefix_ + "/imu", [&] { return imuOf(sample, known ? &*calibration_->imu : nullptr); });
+  imu_ = imuOf(sample, known ? &*calibration_->imu : nullptr);
+  say(prefix_ + "/imu", [&] { return *imu_; });
 }
 
 RigidTransform Mirror::inMap(const WorldId& world) const {
@@ -91,7 +91,7 @@ RigidTransform Mirror::inMap(const WorldId& world) const {
 void Mirror::onOdometry(const perdure::Odometry& odometry) {
   if (odometry.state == OdometryState::kInitialising) return;
   newest_ = std::max(newest_, odometry.stamp.time);
-  say(prefix_ + "/odometry", [&] { return odometryOf(odometry, gyro_); });
+  say(prefix_ + "/odometry", [&] { return odometryOf(odometry, imu_); });
   say("/tf",
       [&] { return movingFrames(odometry.stamp.time, inMap(odometry.world), odometry.T_WB); });
 }

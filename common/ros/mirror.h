@@ -75,7 +75,7 @@ class Mirror {
   std::optional<Calibration> calibration_;
   std::map<std::uint64_t, ModelInfo> models_;
   std::optional<MapFrame> map_frame_;
-  std::optional<Eigen::Vector3d> gyro_;
+  std::optional<Imu> imu_;  ///< newest
   TimePoint newest_;
 };
 

@@ -143,7 +143,7 @@ MarkerArray markersOf(const Objects& objects) {
   return array;
 }
 
-Odometry odometryOf(const perdure::Odometry& odometry, const std::optional<Eigen::Vector3d>& gyro) {
+Odometry odometryOf(const perdure::Odometry& odometry, const std::optional<Imu>& imu) {
   Odometry message;
   message.header = headerOf(odometry.stamp.time, kOdomFrame);
   message.child_frame_id = kBodyFrame;
@@ -161,9 +161,14 @@ Odometry odometryOf(const perdure::Odometry& odometry, const std::optional<Eigen
   J.block<3, 3>(0, 0) = cross;
   J.block<3, 3>(0, 6) = R.transpose();
   Matrix6 twist = J * odometry.covariance * J.transpose();
-  const Eigen::Vector3d w =
-      gyro ? Eigen::Vector3d(*gyro - odometry.gyro_bias) : Eigen::Vector3d(Eigen::Vector3d::Zero());
-  if (!gyro) twist.bottomRightCorner<3, 3>().diagonal().setConstant(kUnknownVariance);
+  Eigen::Vector3d w = Eigen::Vector3d::Zero();
+  double noise = 0;
+  if (imu) {
+    const Vector3& rate = imu->angular_velocity;
+    w = Eigen::Vector3d(rate.x, rate.y, rate.z) - odometry.gyro_bias;
+    noise = imu->angular_velocity_covariance[0];
+  }
+  twist.bottomRightCorner<3, 3>().diagonal().setConstant(noise > 0 ? noise : kUnknownVariance);
   message.twist.twist = {{v.x(), v.y(), v.z()}, {w.x(), w.y(), w.z()}};
   message.twist.covariance = numbersOf(twist);
   return message;

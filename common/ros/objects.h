@@ -22,9 +22,9 @@ Detection2DArray detections2dOf(const Detections& detections, const ModelInfo* m
 /// The first marker deletes all earlier ones. Visible objects are solid, others have edges only;
 /// the edges of occluded objects are dashed. Namespaces are the classes.
 MarkerArray markersOf(const Objects& objects);
-/// `gyro`: the latest angular rate, for the twist. Without it the angular part has a huge
-/// covariance.
-Odometry odometryOf(const perdure::Odometry& odometry, const std::optional<Eigen::Vector3d>& gyro);
+/// `imu`: the latest sample, for the angular rate. Its variance is that of the gyroscope's noise,
+/// beside which that of the bias is small; it is huge if the noise or the sample is not known.
+Odometry odometryOf(const perdure::Odometry& odometry, const std::optional<Imu>& imu);
 /// x, y, z and σ of each landmark in `odom`. The field of σ has the name `intensity`, which viewers
 /// expect.
 PointCloud2 cloudOf(const Landmarks& landmarks);

@@ -7,9 +7,6 @@
 
 namespace perdure::service {
 
-/// A reason in Health, set if the silence of inputs is the only cause of the degraded state.
-inline constexpr char kInputSilent[] = "input_silent";
-
 /// To be used in the loop's thread only.
 class Input {
  public:

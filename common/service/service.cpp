@@ -12,6 +12,7 @@
 #include "common/bus/security_log.h"
 #include "common/service/process.h"
 #include "common/service/signals.h"
+#include "common/types/end_of_drive.h"
 
 namespace perdure::service {
 namespace {

@@ -33,7 +33,8 @@ namespace perdure::wire {
 struct Qos {
   bool reliable = true;
   int depth = 1;               ///< KEEP_LAST
-  bool latched = false;        ///< TRANSIENT_LOCAL: late joiners receive the last `depth` samples
+  bool latched = false;        ///< TRANSIENT_LOCAL: late joiners receive the last samples
+  int late = 0;                ///< number of those; 0: `depth`
   bool kept = false;           ///< writers store the newest sample for ReadFrom::kKept
   bool exclusive = false;      ///< OWNERSHIP EXCLUSIVE and LIVELINESS MANUAL_BY_TOPIC
   double lease_s = 0.0;        ///< lease of the liveliness; 0: infinite
@@ -76,6 +77,9 @@ constexpr Qos bestEffort(int depth) { return {.reliable = false, .depth = depth}
 constexpr Qos latched(int depth, double lease_s = 0.0) {
   return {.depth = depth, .latched = true, .lease_s = lease_s};
 }
+/// A sensor whose gaps cost the pose: for a reader that stops, 10 s at 400 Hz are kept (then DDS
+/// itself gives it up), for one that begins, what the start of vio needs.
+constexpr Qos kSensor{.depth = 4096, .latched = true, .late = 512};
 constexpr Qos exclusive(int depth, double rate_hz) {
   return {.depth = depth, .exclusive = true, .lease_s = leaseFor(rate_hz)};
 }
@@ -100,9 +104,8 @@ constexpr Roles kServices = kCapture | kVio | kInference | kSemanticFilter | kMa
 constexpr std::tuple kRows{
     PERDURE_FINAL_TOPIC(Frame, "frame/", keptAndShared(4), kCameraHz, kRecorded,
                         kCapture | kRos2Driver, kVio | kInference),
-    PERDURE_FINAL_TOPIC(ImuSample, "imu", latched(512), kImuHz, kRecorded, kCapture | kRos2Driver,
-                        kVio),
-    PERDURE_FINAL_TOPIC(SpeedSample, "speed", latched(512), kImuHz, kRecorded, kCapture, kVio),
+    PERDURE_FINAL_TOPIC(ImuSample, "imu", kSensor, kImuHz, kRecorded, kCapture | kRos2Driver, kVio),
+    PERDURE_FINAL_TOPIC(SpeedSample, "speed", kSensor, kImuHz, kRecorded, kCapture, kVio),
     PERDURE_TOPIC(Calibration, "calibration", latched(1), kOnChange, kRecorded,
                   kCapture | kRos2Driver,
                   kVio | kSemanticFilter | kMapStore | kSubscriber),  // map_store: place on Earth

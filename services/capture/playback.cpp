@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "common/types/end_of_drive.h"
 #include "services/capture/live/clocks.h"
 #include "services/capture/run_file.h"
 
@@ -139,7 +140,7 @@ void Playback::finish() {
 void Playback::updateHealth() {
   auto& health = context_.health();
   if (finished_) {
-    health.state(HealthState::kOk, "end of drive");
+    health.state(HealthState::kOk, kEndOfDrive);
   } else if (!node_) {
     health.state(HealthState::kStarting,
                  fmt::format("waits for readers: {}", fmt::join(gate_.missing(), ", ")));

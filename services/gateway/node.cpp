@@ -39,6 +39,12 @@ void Node::send(std::uint32_t channel, std::string payload, std::optional<TimePo
       {channel, time.value_or(time_), std::make_shared<const std::string>(std::move(payload))});
 }
 
+void Node::sendScene() {
+  SceneUpdate update = scene_.update(*objects_);
+  outputs_.message({kScene, time_, std::make_shared<const std::string>(std::move(update.changes)),
+                    std::make_shared<const std::string>(std::move(update.whole))});
+}
+
 void Node::sendWanted(std::initializer_list<std::uint32_t> channels) {
   for (const std::uint32_t channel : channels) {
     if (wants(channel)) sendNow(channel);
@@ -64,6 +70,7 @@ void Node::setWanted(const Channels& wanted) {
   away_ = away_ || wanted.empty();
   if (before.empty() && !wanted.empty() && time_ != TimePoint{}) outputs_.time(time_);
   if (!wantsTiles()) map_.clear();  // their reader is closed
+  if (!before.contains(kScene)) scene_ = Scene();
   for (const std::uint32_t channel : wanted) {
     if (!before.contains(channel)) sendNow(channel);
   }
@@ -95,7 +102,7 @@ void Node::sendNow(std::uint32_t channel) {
       if (trajectory_.size() > 0) send(kTrajectory, trajectory_.posesInFrame());
       return;
     case kScene:
-      if (objects_) send(kScene, scene_.update(*objects_));
+      if (objects_) sendScene();
       return;
     case kObjects:
       if (objects_) send(kObjects, objectsAtAGlance(*objects_, latency_ms_));
@@ -175,9 +182,11 @@ void Node::onLandmarks(const Landmarks& landmarks) {
 }
 
 void Node::onDetections(const Detections& detections) {
-  constexpr std::size_t kMostCameras = 16;
+  constexpr std::size_t kMostCameras = 16, kMostFrames = 16;
   if (!detections_.contains(detections.camera) && detections_.size() >= kMostCameras) return;
-  detections_[detections.camera] = detections;
+  auto& frames = detections_[detections.camera];
+  frames.push_back(detections);
+  if (frames.size() > kMostFrames) frames.pop_front();
   for (std::size_t i = 0; i < config_.cameras.size(); ++i) {
     if (awaited_.contains(i) && config_.cameras[i] == detections.camera) sendAnnotations(i, true);
   }
@@ -246,22 +255,24 @@ void Node::sendAnnotations(std::size_t camera, bool now) {
       wants(cameraChannel(camera, kAnnotations)) || wants(cameraChannel(camera, kLikelihood));
   awaited_.erase(camera);
   if (!cameras_[camera] || !wanted) return;
-  const auto found = detections_.find(config_.cameras[camera]);
-  const bool same = found != detections_.end() && found->second.stamp.sameFrame(objects_->stamp);
+  const auto& frames = detections_[config_.cameras[camera]];
+  const auto same = std::find_if(frames.begin(), frames.end(), [&](const Detections& one) {
+    return one.stamp.sameFrame(objects_->stamp);
+  });
   constexpr std::chrono::milliseconds kLately{500};
-  const bool may_come = found != detections_.end() && !same &&
-                        found->second.stamp.time < objects_->stamp.time &&
-                        objects_->stamp.time - found->second.stamp.time < kLately;
+  const bool may_come = !frames.empty() && same == frames.end() &&
+                        frames.back().stamp.time < objects_->stamp.time &&
+                        objects_->stamp.time - frames.back().stamp.time < kLately;
   if (may_come && !now) {
     awaited_.insert(camera);
     return;
   }
-  const Detections* detections = same ? &found->second : nullptr;
+  const Detections* detections = same != frames.end() ? &*same : nullptr;
   if (wants(cameraChannel(camera, kAnnotations)))
     send(cameraChannel(camera, kAnnotations),
          imageAnnotations(*objects_, *cameras_[camera], detections), objects_->stamp.time);
   // Without received detections, the likelihood is not known.
-  if (wants(cameraChannel(camera, kLikelihood)) && found != detections_.end())
+  if (wants(cameraChannel(camera, kLikelihood)) && !frames.empty())
     send(cameraChannel(camera, kLikelihood),
          likelihoodRegions(*objects_, *cameras_[camera], detections, model_ ? &*model_ : nullptr),
          objects_->stamp.time);

@@ -2,6 +2,7 @@
 // Only channels with viewers are computed, and each message only once.
 #pragma once
 
+#include <deque>
 #include <map>
 #include <optional>
 #include <set>
@@ -69,6 +70,10 @@ class Node {
   }
   const VitalSigns& vitalSigns() const { return vital_signs_; }
   std::size_t objects() const { return objects_ ? objects_->objects.size() : 0; }
+  /// Time of the objects that are shown.
+  std::optional<TimePoint> shownTime() const {
+    return objects_ ? std::optional(objects_->stamp.time) : std::nullopt;
+  }
   /// Whether the last objects and odometry are older than `longest_ns`, or there were none.
   bool hearsNothing(std::int64_t now_ns, std::int64_t longest_ns) const;
   const ReasonCounts& reasons() const { return reasons_; }
@@ -89,6 +94,7 @@ class Node {
   bool wants(std::uint32_t channel) const { return wanted_.contains(channel); }
   /// `time`: by default, that of the newest message.
   void send(std::uint32_t channel, std::string payload, std::optional<TimePoint> time = {});
+  void sendScene();
   void sendWanted(std::initializer_list<std::uint32_t> channels);
   void sendNow(std::uint32_t channel);
   void sendNow(std::size_t camera, std::uint32_t channel);
@@ -144,7 +150,7 @@ class Node {
   std::optional<Odometry> odometry_;
   std::optional<Objects> objects_;
   std::optional<ModelInfo> model_;
-  std::map<std::string, Detections> detections_;  ///< newest detections, by camera
+  std::map<std::string, std::deque<Detections>> detections_;  ///< of the newest frames, by camera
   std::set<std::size_t> awaited_;  ///< cameras whose annotations wait for the detections of
                                    ///< objects_' frame
   bool unplaced_ = false;          ///< an event of the whole map was received before the first pose

@@ -11,11 +11,12 @@ constexpr std::string_view kPacked = "/compressed";
 
 void describeRos(Config& c, config::Fields& fields) {
   fields.integer("ros.domain", c.domain, config::between(-1, 230),
-                 {"ROS_DOMAIN_ID; -1: the bus's own domain, with its interface"});
+                 {"ROS_DOMAIN_ID; -1: as bus.domain"});
   fields.text("ros.interface", c.interface,
-              {"network interface of a separate ros.domain; empty: the bus's interface"});
+              {"network interfaces to ROS, as eth0,wlan0; empty: all that are up, at most four; "
+               "lo: this host only"});
   fields.texts("ros.peers", c.peers,
-               {"addresses of the ROS hosts in a separate ros.domain; empty: multicast"});
+               {"addresses of the ROS hosts, if multicast does not reach them; empty: multicast"});
 }
 
 void describeOut(Config& c, config::Fields& fields) {
@@ -188,11 +189,6 @@ void verify(const Config& c) {
   for (const CameraInput& camera : c.cameras()) {
     if (camera.bits > 0 && camera.bits < 8)
       refuseConfig("in." + camera.name + ".bits is under 8; write 8 … 16, or 0");
-  }
-  if (c.domain < 0 && (!c.interface.empty() || !c.peers.empty())) {
-    refuseConfig(
-        "ros.interface and ros.peers are of a ros.domain of its own, and that is -1: set "
-        "ros.domain to ROS_DOMAIN_ID, other than bus.domain, or use bus.interface");
   }
   if (!c.out && !c.anyInput()) {
     refuseConfig("nothing goes out and nothing comes in: set out.enabled, or a topic under in");

@@ -263,11 +263,10 @@ void serve(service::Context& context, const ros2::Config& config) {
   if (config.anyInput()) in = std::make_unique<Inwards>(context, config, ros);
   if (config.out) out = std::make_unique<Outwards>(context, config, ros);
   context.onHealth([&] {
-    if (!in) return;
-    const auto [state, sentence] = in->health();
-    const std::string unheard = state == HealthState::kOk ? ros.unheard() : std::string();
-    if (unheard.empty()) return context.health().state(state, sentence);
-    context.health().state(HealthState::kDegraded, unheard);
+    const auto [state, sentence] = in ? in->health() : std::pair(HealthState::kOk, std::string());
+    const std::string trouble = state == HealthState::kOk ? ros.trouble() : std::string();
+    if (trouble.empty()) return context.health().state(state, sentence);
+    context.health().state(HealthState::kDegraded, trouble);
   });
   context.run();
 }

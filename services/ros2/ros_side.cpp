@@ -1,6 +1,7 @@
 #include "services/ros2/ros_side.h"
 
 #include "common/base/errors.h"
+#include "common/bus/interfaces.h"
 
 namespace perdure::ros2 {
 
@@ -11,30 +12,30 @@ std::string wireType(const std::string& type) {
   return type.substr(0, slash) + "::msg::dds_::" + type.substr(slash + 1) + "_";
 }
 
-bus::Participant RosSide::participantFor(service::Context& context, const Config& config) {
-  const bus::Options& bus = context.busOptions();
-  if (config.domain < 0 || config.domain == bus.domain) {
-    if (context.participant().identity()) {
-      throw StartupError(ExitCode::kConfiguration,
-                         "bus.security closes the bus, and ROS without SROS2 cannot join it: set "
-                         "ros.domain to a domain of its own, as ROS_DOMAIN_ID says it to ROS");
-    }
-    if (!config.interface.empty() && config.interface != bus.interface) {
-      throw StartupError(ExitCode::kConfiguration,
-                         "ros.interface is another than bus.interface, but ros.domain is the bus's "
-                         "domain, which has one interface; set ros.domain to another one");
-    }
-    return context.participant();
+bus::Domain RosSide::domainFor(service::Context& context, const Config& config) {
+  bus::Options options = context.busOptions();
+  const bool same = config.domain < 0 || config.domain == options.domain;
+  if (same && context.participant().identity()) {
+    throw StartupError(ExitCode::kConfiguration,
+                       "bus.security closes the bus, and ROS without SROS2 cannot join it: set "
+                       "ros.domain to a domain of its own, as ROS_DOMAIN_ID says it to ROS");
   }
-  bus::Options options = bus;
-  options.domain = config.domain;
+  if (!same) options.domain = config.domain;
   options.peers = config.peers;
-  if (!config.interface.empty()) options.interface = config.interface;
-  return {bus::Domain::foreign(options), "perdure ros2"};
+  options.interface = config.interface;
+  bus::Domain domain = bus::Domain::foreign(options);
+  context.log().info(
+      "meets ROS nodes with ROS_DOMAIN_ID={} (ros.domain) on {} (ros.interface), {}",
+      options.domain, domain.options().interface,
+      options.peers.empty() ? "found by multicast; without it set ros.peers" : "at ros.peers");
+  return domain;
 }
 
 RosSide::RosSide(service::Context& context, const Config& config)
-    : context_(context), participant_(participantFor(context, config)) {
+    : context_(context),
+      all_interfaces_(config.interface.empty()),
+      domain_(domainFor(context, config)),
+      participant_(domain_, "perdure ros2") {
   context_.countReasons([this](ReasonCounts& counts) {
     for (const auto& [topic, writer] : writers_) writer->report(counts);
     for (const Input& input : inputs_) input.reader->report(counts);
@@ -75,7 +76,12 @@ void RosSide::read(const std::string& input, const std::string& topic, const std
   inputs_.push_back({topic, type, std::move(reader)});
 }
 
-std::string RosSide::unheard() const {
+std::string RosSide::trouble() const {
+  const std::string interfaces = bus::interfacesUp(), &joined = domain_.options().interface;
+  if (all_interfaces_ && joined.starts_with("lo") && interfaces != joined) {
+    return "the network interfaces were " + joined + " at the start and are " + interfaces +
+           ": restart perdure-ros2, or set ros.interface";
+  }
   for (const auto& [topic, type, reader] : inputs_) {
     if (topic == "/tf_static" || reader->matched() > 0) continue;
     return "nobody writes " + topic + " as " + type +

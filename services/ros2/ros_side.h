@@ -21,8 +21,8 @@ std::string wireType(const std::string& type);
 
 class RosSide {
  public:
-  /// Joins the bus's own domain, or a separate one. Throws StartupError: a secured bus cannot
-  /// include ROS (78), or DDS fails (69).
+  /// Joins the domain of ROS. Throws StartupError: a secured bus cannot include ROS (78), or DDS
+  /// fails (69).
   RosSide(service::Context& context, const Config& config);
 
   void advertise(const ros::Outlet& outlet);
@@ -33,17 +33,19 @@ class RosSide {
   /// compatible with all drivers.
   void read(const std::string& input, const std::string& topic, const std::string& type,
             bool reliable, bool latched, int depth, bus::ForeignReader::Handler handler);
-  /// A sentence with the fix if an input has no writer; otherwise empty.
-  std::string unheard() const;
+  /// A sentence with the fix if the network changed or an input has no writer; otherwise empty.
+  std::string trouble() const;
 
  private:
   struct Input {
     std::string topic, type;
     std::unique_ptr<bus::ForeignReader> reader;
   };
-  static bus::Participant participantFor(service::Context& context, const Config& config);
+  static bus::Domain domainFor(service::Context& context, const Config& config);
 
   service::Context& context_;
+  const bool all_interfaces_;
+  const bus::Domain domain_;
   const bus::Participant participant_;
   std::map<std::string, std::unique_ptr<bus::ForeignWriter>> writers_;
   std::vector<Input> inputs_;

@@ -164,7 +164,7 @@ TEST_F(MapStoreProcess, SaysWhyOverDdsAndFromItsFileAlike) {
   const auto asked = why("3", {});
   EXPECT_EQ(asked.first, 0) << asked.second;
   EXPECT_THAT(asked.second, HasSubstr("Object 3 exists with probability 0.970"));
-  EXPECT_THAT(asked.second, HasSubstr("7 looks showed it"));
+  EXPECT_THAT(asked.second, HasSubstr("detected in 7 observations"));
   const auto read = why("3", file);
   EXPECT_EQ(read.first, 0) << read.second;
   EXPECT_THAT(read.second, StartsWith(asked.second)) << "the same, and what the graph knows";

@@ -17,6 +17,7 @@
 #include "common/base/ids.h"
 #include "common/base/subprocess.h"
 #include "common/replay/ros_topics.h"
+#include "common/types/end_of_drive.h"
 #include "tools/base/files.h"
 #include "tools/data_check/data_check.h"
 #include "tools/evaluate/object_report.h"
@@ -201,7 +202,7 @@ bool Demo::over() {
   if (interrupted_) return true;
   if (options_.seconds > 0 && reporter_->secondsOfDrive() >= options_.seconds) return true;
   const Health* capture = reporter_->healthOf("capture");
-  if (capture == nullptr || capture->message != "end of drive") return false;
+  if (capture == nullptr || capture->message != kEndOfDrive) return false;
   // Detections may still arrive. The demo waits 1 s if all frames have objects, otherwise 5 s.
   const std::int64_t quiet = monotonicNs() - reporter_->lastMessageNs();
   return quiet > (reporter_->drained() ? kSecond : 5 * kSecond);

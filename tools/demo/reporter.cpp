@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "common/bus/topics.h"
+#include "common/types/end_of_drive.h"
 #include "tools/outputs/stage_timer.h"
 
 namespace perdure::tools {
@@ -108,7 +109,7 @@ const Health* Reporter::healthOf(const std::string& process) const {
 
 bool Reporter::drained() const {
   const Health* capture = healthOf("capture");
-  if (capture == nullptr || capture->message != "end of drive") return false;
+  if (capture == nullptr || capture->message != kEndOfDrive) return false;
   return std::includes(objects_.begin(), objects_.end(), odometry_.begin(), odometry_.end());
 }
 

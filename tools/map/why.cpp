@@ -16,42 +16,48 @@ std::string aThing(const std::string& class_name) {
   return (vowel ? "an " : "a ") + class_name;
 }
 
-std::string looks(std::uint32_t n) { return n == 1 ? "1 look" : fmt::format("{} looks", n); }
+std::string observations(std::uint32_t n) {
+  return n == 1 ? "1 observation" : fmt::format("{} observations", n);
+}
+std::string hypotheses(std::uint32_t n) {
+  return n == 1 ? "1 hypothesis" : fmt::format("{} hypotheses", n);
+}
 std::string times(std::uint32_t n) { return n == 1 ? "once" : fmt::format("{} times", n); }
 
 /// Text for an object that came back; a note if it has evidence from before this ledger.
 std::string backFrom(const char* where, const LedgerEntry& entry) {
-  return fmt::format("back from {} {}{}", where, times(entry.count),
-                     std::abs(entry.log_odds) < kNothing ? "" : ": believed before this ledger");
+  return fmt::format(
+      "back from {} {}{}", where, times(entry.count),
+      std::abs(entry.log_odds) < kNothing ? "" : ": evidence from before this ledger");
 }
 
 std::string sentence(ExistenceEvidence kind, const LedgerEntry& entry) {
   const std::uint32_t n = entry.count;
   switch (kind) {
     case ExistenceEvidence::kPrior:
-      return "before its first box: few boxes are new things";
+      return "before its first box: few boxes are new objects";
     case ExistenceEvidence::kHit:
-      return looks(n) + " showed it";
+      return "detected in " + observations(n);
     case ExistenceEvidence::kRepeated:
-      return looks(n) + " more showed it from where it had been looked at: worth little";
+      return "detected in " + observations(n) + " more from the same place: little weight";
     case ExistenceEvidence::kMiss:
-      return looks(n) + " at its place did not show it";
+      return "not detected in " + observations(n) + " of its place";
     case ExistenceEvidence::kUnmappedOccluder:
-      return "of these is excused: something off the map may have hidden it";
+      return "of these excused: an object that is not on the map may have occluded it";
     case ExistenceEvidence::kHidden:
-      return looks(n) + " not used: something hid it";
+      return observations(n) + " not used: it was occluded";
     case ExistenceEvidence::kAway:
-      return looks(n) + " not used: it was out of view";
+      return observations(n) + " not used: it was out of view";
     case ExistenceEvidence::kTime:
-      return "time passed: things leave";
+      return "time passed: objects leave";
     case ExistenceEvidence::kMisshapen:
-      return "given up " + times(n) + ": explanations that lost the size of their class";
+      return hypotheses(n) + " removed: no longer of the size of their class";
     case ExistenceEvidence::kLost:
-      return "given up " + times(n) + ": that it drove off unseen";
+      return hypotheses(n) + " removed: that it drove off unseen";
     case ExistenceEvidence::kShared:
       return "its first box may have been another object's";
     case ExistenceEvidence::kMerge:
-      return "merged " + times(n) + " with an object that was the same thing";
+      return "merged " + times(n) + " with an object that was the same";
     case ExistenceEvidence::kRestore:
       return backFrom("a restart", entry);
     case ExistenceEvidence::kRecall:
@@ -65,21 +71,21 @@ const char* sentence(ClassEvidence kind) {
     case ClassEvidence::kPrior:
       return "how frequent the two are";
     case ClassEvidence::kActivation:
-      return "what the network said of its boxes";
+      return "activations of the network in its boxes";
     case ClassEvidence::kGeometry:
       return "how well size and place explain the boxes";
     case ClassEvidence::kMiss:
-      return "looks that did not show it";
+      return "observations without a detection";
     case ClassEvidence::kMotion:
       return "whether it moves";
     case ClassEvidence::kPruning:
-      return "explanations that were given up";
+      return "hypotheses that were removed";
     case ClassEvidence::kMerge:
-      return "objects that were the same thing";
+      return "merged objects";
     case ClassEvidence::kRestore:
-      return "believed before this ledger";
+      return "evidence from before this ledger";
     case ClassEvidence::kContext:
-      return "what stands near it";
+      return "objects near it";
   }
   return "";
 }

@@ -29,6 +29,7 @@ py::object unpacked(py::handle packed) {
 
 PYBIND11_MODULE(_perdure, module) {
   python::translateStartupErrors();
+  module.attr("__version__") = PERDURE_VERSION;
   module.def("schema", &python::schema);
   module.def("topic_types", &python::topicTypes);
   module.def("register_class", &python::registerClass);

@@ -50,7 +50,7 @@ def class_text(name, fields):
             lines.append(f"    {field[0]}: {hints.pop(field[0])}  # {said}")
     for base in reversed(mixin.__mro__[:-1] if mixin else []):
         for key, value in vars(base).items():
-            if not key.startswith("__") or key in ("__iter__", "__len__", "__matmul__"):
+            if not key.startswith("__") or key in ("__getitem__", "__iter__", "__len__", "__matmul__"):
                 lines += member(key, value)
     return "\n".join(lines) + "\n"
 
@@ -90,6 +90,7 @@ def package_text():
         for name in names.replace("(", "").replace(")", "").replace(",", " ").split():
             lines.append(f"from {module} import {name} as {name}\n")
     lines += [f"from .messages import {name} as {name}\n" for name in messages.CLASSES]
+    lines.append("\n__version__: str\n")
     return "".join(lines)
 
 

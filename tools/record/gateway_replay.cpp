@@ -101,11 +101,16 @@ void GatewayReplay::measure() {
                        "show; `perdure record info` tells what it has");
   }
   first_ = last_ = *first;
-  constexpr std::uint64_t kTail = 5'000'000'000;
-  recording_.rewind(isTimed, end_ns_ > kTail ? end_ns_ - kTail : 0);
-  while (const auto message = recording_.next()) {
-    const auto time = sensorTimeOf(*message);
-    if (time && *time > last_.time) last_ = {message->log_ns, *time};
+  // A recording may go on long after its drive, so the search back is extended until it finds one.
+  constexpr std::uint64_t kTail = 5'000'000'000, kGrows = 4;
+  for (std::uint64_t tail = kTail; last_.time == first_.time; tail *= kGrows) {
+    const bool all = end_ns_ - first_.log_ns <= tail;
+    recording_.rewind(isTimed, all ? first_.log_ns : end_ns_ - tail);
+    while (const auto message = recording_.next()) {
+      const auto time = sensorTimeOf(*message);
+      if (time && *time > last_.time) last_ = {message->log_ns, *time};
+    }
+    if (all) break;
   }
   begin_ns_ = first_.log_ns;
   end_ns_ = last_.log_ns;
@@ -164,11 +169,11 @@ void GatewayReplay::seek(std::uint64_t log_ns) {
   next_ = recording_.next();
   while (next_ && next_->log_ns < log_ns) (void)pull();
   node_->setWanted(wanted_);
-  repeatFrames({});
   at_ns_ = log_ns;
   ended_ = false;
   setClock();
   if (!playing_) showFrame();
+  repeatFrames({});
 }
 
 /// Restores the last calibration and model before a time; if there are none, uses the known ones.
@@ -182,11 +187,18 @@ void GatewayReplay::recallRig(std::uint64_t log_ns) {
   }
 }
 
-/// Repeats the newest messages for a client that opens a channel.
+/// Repeats messages for a client that opens a channel: the image of the shown objects, and the
+/// newest of other topics.
 void GatewayReplay::repeatFrames(const gateway::Channels& before) {
-  for (const auto& [topic, message] : newest_) {
+  const auto shown = node_->shownTime();
+  for (const auto& [topic, messages] : newest_) {
     const auto channel = channelOf(topic, config_.cameras);
-    if (channel && wanted_.contains(*channel) && !before.contains(*channel)) feed(message);
+    if (!channel || !wanted_.contains(*channel) || before.contains(*channel)) continue;
+    const auto fits = std::find_if(messages.rbegin(), messages.rend(), [&](const auto& message) {
+      const auto frame = replay::valueOf<Frame>(message);
+      return frame && frame->stamp.time == shown;
+    });
+    feed(fits != messages.rend() ? *fits : messages.back());
   }
 }
 
@@ -208,10 +220,13 @@ void GatewayReplay::recallGraph(std::uint64_t log_ns) {
   }
 }
 
-/// Advances to the next objects, so that a paused replay shows them.
+/// Advances to the next objects, so that a paused replay shows them. repeatFrames() adds their
+/// image.
 void GatewayReplay::showFrame() {
   fed_objects_ = false;
+  const gateway::Channels wanted = std::exchange(wanted_, {});
   while (next_ && !fed_objects_) (void)pull();
+  wanted_ = wanted;
 }
 
 void GatewayReplay::seekToNextEvent(const gateway::Call& call) {
@@ -242,7 +257,12 @@ bool GatewayReplay::pull() {
   if (!next_) return false;
   at_ns_ = std::max(at_ns_, next_->log_ns);
   feed(*next_);
-  if (channelOf(next_->topic, config_.cameras)) newest_[next_->topic] = std::move(*next_);
+  if (channelOf(next_->topic, config_.cameras)) {
+    constexpr std::size_t kMost = 16;  // objects come some frames after their image
+    auto& newest = newest_[next_->topic];
+    newest.push_back(std::move(*next_));
+    if (newest.size() > kMost) newest.pop_front();
+  }
   next_ = recording_.next();
   return true;
 }

@@ -81,7 +81,7 @@ class GatewayReplay {
   std::optional<MapReply> graph_;  ///< newest graph of the map
   std::optional<replay::RecordedMessage> next_;
   /// Newest messages of topics without history, for clients that open a channel.
-  std::map<std::string, replay::RecordedMessage> newest_;
+  std::map<std::string, std::deque<replay::RecordedMessage>> newest_;
   std::uint64_t at_ns_ = 0;  ///< log time of the display
   bool playing_ = true, stopped_ = false, ended_ = false;
   double speed_ = 1.0;

@@ -64,7 +64,7 @@ Recorder::Recorder(service::Context& context, const RecorderOptions& options, St
   context.countReasons([this](ReasonCounts& counts) { report(counts); });
   context.onHealth([this] { updateHealth(); });
   context.every(std::chrono::milliseconds(100), [this] {
-    if (!draft_.empty() && LogClock::steadyNs() - draft_began_ns_ >= kLongestChunk) cut();
+    if (!empty() && LogClock::steadyNs() - draft_began_ns_ >= kLongestChunk) cut();
     onFault(watch_.onSilent(health_->silent(), FaultWatch::Time::clock::now()));
   });
   if (options.images && options.topics.empty()) {
@@ -86,7 +86,8 @@ void Recorder::listen(const std::string& topic) {
   const bus::TopicInfo* info = bus::findTopic(topic);
   if (info == nullptr) refuseTopic(topic);
   std::unique_ptr<Source> source(new Source{bus::CdrReader(context_.participant(), topic),
-                                            addChannel(topic, *info), 0, isLatchedAlone(*info)});
+                                            addChannel(topic, *info), 0, isLatchedAlone(*info),
+                                            topic.starts_with(kFramePrefix) ? images_ : draft_});
   Source& kept = *sources_.emplace(topic, std::move(source)).first->second;
   context_.loop().on(kept.reader,
                      [this, &kept](const bus::CdrMessage& message) { onMessage(kept, message); });
@@ -110,14 +111,14 @@ std::uint16_t Recorder::addChannel(const std::string& topic, const bus::TopicInf
 }
 
 void Recorder::onMessage(Source& source, const bus::CdrMessage& message) {
-  if (draft_.empty()) draft_began_ns_ = LogClock::steadyNs();
-  draft_.add({source.channel, ++source.sequence, clock_.nowNs(),
-              static_cast<std::uint64_t>(std::max<std::int64_t>(message.written_ns, 0)),
-              message.bytes});
+  if (empty()) draft_began_ns_ = LogClock::steadyNs();
+  source.draft.add({source.channel, ++source.sequence, clock_.nowNs(),
+                    static_cast<std::uint64_t>(std::max<std::int64_t>(message.written_ns, 0)),
+                    message.bytes});
   ++messages_;
   context_.health().frameIn();
   if (source.latched) keepLatched(source, message.bytes);
-  if (draft_.bytes() >= kLargestChunk) cut();
+  if (source.draft.bytes() >= kLargestChunk) cut();
 }
 
 /// Stores the newest message of each content; a repeated one moves to the end.
@@ -134,8 +135,10 @@ void Recorder::keepLatched(const Source& source, std::span<const std::uint8_t> b
 }
 
 void Recorder::cut(bool fault) {
-  if (draft_.empty() && !fault) return;
-  if (draft_.empty()) draft_began_ns_ = LogClock::steadyNs();
+  if (empty() && !fault) return;
+  if (empty()) draft_began_ns_ = LogClock::steadyNs();
+  if (!images_.empty())
+    store_.give({std::exchange(images_, {}), catalogue_, latched_, draft_began_ns_});
   store_.give({std::exchange(draft_, {}), catalogue_, latched_, draft_began_ns_, fault});
 }
 

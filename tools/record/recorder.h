@@ -49,8 +49,10 @@ class Recorder {
     std::uint16_t channel = 0;
     std::uint32_t sequence = 0;
     bool latched = false;
+    replay::mcap::Draft& draft;
   };
 
+  bool empty() const { return draft_.empty() && images_.empty(); }
   void listen(const std::string& topic);
   std::uint16_t addChannel(const std::string& topic, const bus::TopicInfo& info);
   void onMessage(Source& source, const bus::CdrMessage& message);
@@ -68,7 +70,8 @@ class Recorder {
   std::map<std::string, std::unique_ptr<Source>> sources_;
   CatalogueNow catalogue_;
   LatchedNow latched_;
-  replay::mcap::Draft draft_;
+  /// Images have chunks of their own, so that readers of other topics need not unpack them.
+  replay::mcap::Draft draft_, images_;
   std::int64_t draft_began_ns_ = 0;
   FaultWatch watch_;
   const bus::Reader<Health>* health_ = nullptr;

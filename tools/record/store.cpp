@@ -3,7 +3,7 @@
 namespace perdure::tools {
 namespace {
 
-constexpr std::size_t kWaiting = 32;  // chunks: 16 s, or 128 MB of images
+constexpr std::size_t kWaiting = 64;  // chunks: 16 s, or 128 MB of images
 
 }  // namespace
 

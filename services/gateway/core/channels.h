@@ -66,11 +66,12 @@ std::vector<ChannelInfo> channelTable(const std::vector<std::string>& cameras);
 ChannelInfo rawChannel(std::uint32_t id, const std::string& topic, const std::string& type,
                        std::string idl);
 
-/// One message of a channel, encoded once for all clients.
+/// One message of a channel, encoded once for all clients. If `payload` has changes only, `whole`
+/// is for clients that did not get the message before.
 struct Encoded {
   std::uint32_t channel = 0;
   TimePoint time;
-  std::shared_ptr<const std::string> payload;
+  std::shared_ptr<const std::string> payload, whole = {};
 };
 
 /// Services for clients (in the protocol's sense), with JSON in both directions.

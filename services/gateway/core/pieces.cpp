@@ -13,7 +13,7 @@ void put(JsonWriter& json, TimePoint time) {
 }
 
 void put(JsonWriter& json, const Eigen::Vector3d& v) {
-  json.begin('{').with("x", v.x()).with("y", v.y()).with("z", v.z()).end('}');
+  json.begin('{').with("x", v.x(), 3).with("y", v.y(), 3).with("z", v.z(), 3).end('}');
 }
 
 void put(JsonWriter& json, const Eigen::Quaterniond& q) {

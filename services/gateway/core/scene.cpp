@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "common/types/cuboid.h"
 #include "services/gateway/core/pieces.h"
@@ -10,8 +11,12 @@
 namespace perdure::gateway {
 namespace {
 
-constexpr int kTold = 100;
 constexpr double kEllipsoidSigmas = 2.0;
+
+/// An entity without the time at its beginning.
+std::string_view untimed(std::string_view entity) {
+  return entity.substr(std::min(entity.size(), entity.find("frame_id")));
+}
 
 double opacityOf(const ObjectBelief& object) {
   return isInSight(object) ? 0.9 : isHidden(object) ? 0.8 : 0.35;
@@ -24,7 +29,8 @@ void putEllipsoid(JsonWriter& json, const ObjectBelief& object) {
   Eigen::Matrix3d axes = eigen.eigenvectors();
   if (axes.determinant() < 0) axes.col(0) *= -1;
   const Eigen::Vector3d radii = kEllipsoidSigmas * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt();
-  putSolid(json, "spheres", {axes, Eigen::Vector3d(object.best().mean.head<3>())}, 2 * radii,
+  const Eigen::Vector3d size_cm = (200.0 * radii).array().round();  // few changes between frames
+  putSolid(json, "spheres", {axes, Eigen::Vector3d(object.best().mean.head<3>())}, size_cm / 100.0,
            {1, 1, 1, 0.25});
 }
 
@@ -92,38 +98,35 @@ void putEntity(JsonWriter& json, TimePoint time, const MapObject& object) {
 
 }  // namespace
 
-std::string Scene::update(const Objects& objects) {
-  if (world_ != objects.world) {
-    world_ = objects.world;
-    shown_.clear();
-    gone_.clear();
-    clear_ = kTold;
-  }
-  JsonWriter json(4096 + 3072 * objects.objects.size());
-  std::set<ObjectId> now;
+SceneUpdate Scene::update(const Objects& objects) {
+  const TimePoint time = objects.stamp.time;
+  if (std::exchange(world_, objects.world) != objects.world) shown_.clear();
+  const bool begins = shown_.empty();
+  std::map<ObjectId, std::string> now;
+  JsonWriter changes(4096), whole(4096 + 3072 * objects.objects.size());
+  whole.begin('{').key("deletions").begin('[');
+  putDeletion(whole, time, DeletionType::kAll, "");
+  whole.end(']').key("entities").begin('[');
+  changes.begin('{').key("entities").begin('[');
   for (const ObjectBelief& object : objects.objects) {
-    if (object.confirmed) now.insert(object.id);
+    if (!object.confirmed) continue;
+    JsonWriter entity(4096);
+    putEntity(entity, objects, object);
+    std::string& text = now[object.id] = entity.take();
+    auto before = shown_.extract(object.id);
+    if (before && untimed(before.mapped()) == untimed(text)) {
+      text = std::move(before.mapped());
+    } else {
+      changes.raw(text);
+    }
+    whole.raw(text);
   }
-  for (const ObjectId id : shown_) {
-    if (!now.contains(id)) gone_.push_back({id, 0});
-  }
-  std::erase_if(gone_, [&](const Gone& one) { return one.told >= kTold || now.contains(one.id); });
-  json.begin('{').key("deletions").begin('[');
-  if (clear_ > 0) {
-    --clear_;
-    putDeletion(json, objects.stamp.time, DeletionType::kAll, "");
-  }
-  for (Gone& one : gone_) {
-    ++one.told;
-    putDeletion(json, objects.stamp.time, DeletionType::kMatching, std::to_string(one.id));
-  }
-  json.end(']').key("entities").begin('[');
-  for (const ObjectBelief& object : objects.objects) {
-    if (object.confirmed) putEntity(json, objects, object);
-  }
-  json.end(']').end('}');
+  changes.end(']').key("deletions").begin('[');
+  for (const auto& [id, gone] : shown_)
+    putDeletion(changes, time, DeletionType::kMatching, std::to_string(id));
   shown_ = std::move(now);
-  return json.take();
+  std::string all = whole.end(']').end('}').take();
+  return {begins ? all : changes.end(']').end('}').take(), std::move(all)};
 }
 
 std::string mapScene(const std::vector<MapObject>& objects, const std::set<ObjectId>& working,

@@ -2,7 +2,7 @@
 // confirmed object. Edges are dashed if the object is occluded, and faint if it is out of view.
 #pragma once
 
-#include <deque>
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -13,21 +13,18 @@
 
 namespace perdure::gateway {
 
+/// `changes` since the update before, and the `whole` scene for clients that have not got that one.
+struct SceneUpdate {
+  std::string changes, whole;
+};
+
 class Scene {
  public:
-  /// The whole scene in one message, so that a client may lose messages. Deletions are repeated in
-  /// the next hundred messages.
-  std::string update(const Objects& objects);
+  SceneUpdate update(const Objects& objects);
 
  private:
-  struct Gone {
-    ObjectId id = 0;
-    int told = 0;
-  };
   std::optional<WorldId> world_;
-  std::set<ObjectId> shown_;
-  std::deque<Gone> gone_;
-  int clear_ = 0;  ///< remaining messages that delete the whole previous scene
+  std::map<ObjectId, std::string> shown_;  ///< entities
 };
 
 /// The durable map as foxglove.SceneUpdate in the frame `map`: pale cuboids with their names,

@@ -4,6 +4,7 @@
 
 #include <functional>
 
+#include "common/types/end_of_drive.h"
 #include "services/gateway/core/json_writer.h"
 
 namespace perdure::gateway {
@@ -61,6 +62,16 @@ bool VitalSigns::hears(const std::string& process, std::int64_t now_ns) const {
   return found != services_.end() && secondsSince(found->second.heard_ns, now_ns) <= kSilent;
 }
 
+Health VitalSigns::shown(const Health& health, std::int64_t now_ns) const {
+  Health result = health;
+  const bool heard = hears("capture", now_ns);
+  if (endedWith(heard ? &services_.at("capture").health : nullptr, health)) {
+    result.state = HealthState::kOk;
+    result.message = std::string("nothing more comes: ") + kEndOfDrive;
+  }
+  return result;
+}
+
 void VitalSigns::setStandIns(std::map<std::string, std::string> sentences) {
   stand_ins_ = std::move(sentences);
 }
@@ -74,7 +85,7 @@ std::string VitalSigns::json(std::int64_t now_ns, const Silence& last) const {
   }
   for (const auto& [name, service] : services_) {
     if (stand_ins_.contains(name)) continue;
-    const Health& h = service.health;
+    const Health h = shown(service.health, now_ns);
     json.begin('{').with("process", name).with("state", wordOf(h.state)).with("message", h.message);
     json.with("age_s", secondsSince(service.heard_ns, now_ns), 2).with("frames_in", h.frames_in);
     json.with("frames_out", h.frames_out).with("dropped", h.dropped).with("rate_hz", h.rate_hz, 2);
@@ -97,8 +108,9 @@ std::string VitalSigns::healthz(std::int64_t now_ns) const {
     if (stand_ins_.contains(name)) continue;
     const bool silent = secondsSince(service.heard_ns, now_ns) > kSilent;
     if (name != "gateway" && !silent) ++heard;
-    if (silent || service.health.state != HealthState::kOk) status = "degraded";
-    services.textKey(name).text(silent ? "silent" : wordOf(service.health.state));
+    const HealthState state = shown(service.health, now_ns).state;
+    if (silent || state != HealthState::kOk) status = "degraded";
+    services.textKey(name).text(silent ? "silent" : wordOf(state));
   }
   for (const auto& [name, sentence] : stand_ins_) services.textKey(name).text("stood_in_for");
   services.end('}');
@@ -124,7 +136,7 @@ std::string VitalSigns::metrics(std::int64_t now_ns, const std::vector<Figure>& 
   each("service_up", "1 where the service was heard in the last seconds", "gauge",
        [&](const Service& s) { return secondsSince(s.heard_ns, now_ns) <= kSilent ? 1 : 0; });
   each("service_state", "0 starting, 1 ok, 2 degraded, 3 failed", "gauge",
-       [](const Service& s) { return static_cast<double>(s.health.state); });
+       [&](const Service& s) { return static_cast<double>(shown(s.health, now_ns).state); });
   each("frames_in_total", "frames that the service took", "counter",
        [](const Service& s) { return static_cast<double>(s.health.frames_in); });
   each("frames_out_total", "results that it gave", "counter",

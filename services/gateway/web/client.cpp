@@ -55,10 +55,11 @@ class Client : public Viewer, public Connection, public std::enable_shared_from_
   beast::flat_buffer said_;
   std::shared_ptr<Shared> shared_;
   Outgoing sending_;
-  bool joined_ = false, writing_ = false, cut_ = false;
+  bool plays_ = false, joined_ = false, writing_ = false, cut_ = false;
 };
 
 void Client::accept(Request request, const std::string& protocol) {
+  plays_ = protocol == gateway::protocol::kSubprotocols.front();
   beast::get_lowest_layer(socket_).expires_never();
   auto timeouts = websocket::stream_base::timeout::suggested(beast::role_type::server);
   timeouts.handshake_timeout = std::chrono::seconds(10);
@@ -82,7 +83,7 @@ void Client::onAccepted(beast::error_code error) {
   joined_ = true;
   beast::error_code ignored;
   beast::get_lowest_layer(socket_).socket().set_option(tcp::no_delay(true), ignored);
-  shared_->hub.join(*this);
+  shared_->hub.join(*this, plays_);
   read();
 }
 

@@ -80,7 +80,13 @@ void Files::replaceIn(const std::string& path, const std::string& from, const st
 fs::path usualPageFolder() {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  return program.parent_path().parent_path() / "share" / "perdure" / "viewer";
+  // bin/perdure-gateway, or libexec/perdure/play
+  fs::path page;
+  for (fs::path up = program.parent_path(); up.has_relative_path(); up = up.parent_path()) {
+    page = up / "share" / "perdure" / "viewer";
+    if (fs::exists(page, error)) break;
+  }
+  return page;
 }
 
 }  // namespace perdure::gateway::web

@@ -31,15 +31,16 @@ void Hub::offer(std::vector<ChannelInfo> channels, std::vector<ServiceInfo> serv
   services_ = std::move(services);
 }
 
-void Hub::join(Viewer& viewer) {
+void Hub::join(Viewer& viewer, bool plays) {
   viewer.id_ = next_id_++;
+  viewer.plays_ = plays;
   viewers_[viewer.id_] = &viewer;
   std::vector<ChannelInfo> channels;
   for (const auto& [id, kept] : channels_) channels.push_back(kept.info);
-  say(viewer, protocol::serverInfo(name_, session_, range_));
+  say(viewer, protocol::serverInfo(name_, session_, plays ? range_ : std::nullopt));
   say(viewer, protocol::advertise(channels));
   say(viewer, protocol::advertiseServices(services_));
-  if (!playback_.empty()) say(viewer, playback_, false);
+  if (!playback_.empty() && plays) say(viewer, playback_, false);
 }
 
 void Hub::leave(Viewer& viewer) {
@@ -210,7 +211,8 @@ void Hub::publish(const Encoded& message) {
   if (channel == channels_.end() || channel->second.subscriptions == 0) return;
   Kept& kept = channel->second;
   ++published_;
-  kept.messages.push_back(message);
+  kept.messages.push_back(
+      {message.channel, message.time, message.whole ? message.whole : message.payload});
   const std::size_t most = kept.info.delivery == Delivery::kEach ? most_events_ : 1;
   if (kept.messages.size() > most) kept.messages.pop_front();
   for (const auto& [id, viewer] : viewers_) {
@@ -225,7 +227,8 @@ void Hub::publish(const Encoded& message) {
 }
 
 void Hub::tellPlayback(const PlaybackState& state) {
-  for (const auto& [id, viewer] : viewers_) say(*viewer, protocol::playbackState(state), false);
+  for (const auto& [id, viewer] : viewers_)
+    if (viewer->plays_) say(*viewer, protocol::playbackState(state), false);
   PlaybackState later = state;
   later.id.clear();
   later.did_seek = false;

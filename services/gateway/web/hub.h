@@ -37,6 +37,7 @@ class Viewer {
   static constexpr std::size_t kMostControl = 256;
   Outbox outbox_;
   std::uint64_t id_ = 0;
+  bool plays_ = true;
   std::map<std::uint32_t, std::uint32_t> channel_of_;  ///< channels by subscription
   std::chrono::steady_clock::time_point second_{};
   int said_ = 0;  ///< messages in that second
@@ -51,7 +52,8 @@ class Hub {
   };
   Hub(std::string name, std::string session, std::size_t most_events, Told told);
 
-  void join(Viewer& viewer);
+  /// `plays`: its subprotocol has the control of recordings.
+  void join(Viewer& viewer, bool plays = true);
   void leave(Viewer& viewer);
   /// Handles a message of a client; `now` limits their rate.
   void hear(Viewer& viewer, std::string_view bytes, bool text,

@@ -20,6 +20,7 @@ void Outbox::put(const Encoded& message, std::uint32_t subscription, Delivery de
                     .payload = message.payload};
   if (delivery != Delivery::kEach) {
     if (Waiting* old = find(Kind::kNewest, subscription)) {
+      if (message.whole) outgoing.payload = message.whole;
       old->message = std::move(outgoing);
       ++dropped_;
       return;

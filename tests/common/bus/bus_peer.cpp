@@ -36,6 +36,17 @@ void publishImu(const Participant& participant, int count) {
   pause(3600);
 }
 
+/// Prints a line when it has a writer, and when it has received `count` samples.
+void readImu(const Participant& participant, std::size_t count) {
+  Reader<ImuSample> reader(participant, kTopic<ImuSample>);
+  while (reader.matched() == 0) pause(0.01);
+  std::cout << "reads" << std::endl;
+  for (std::size_t got = 0; got < count; pause(0.01)) {
+    reader.drain([&](const ImuSample&) { ++got; });
+  }
+  std::cout << "has all" << std::endl;
+}
+
 void publishTiles(const Participant& participant, int count) {
   Writer<MapTile> writer(participant, kTopic<MapTile>);
   for (int i = 0; i < count; ++i) {
@@ -62,6 +73,7 @@ int main(int argc, char** argv) {
   const Participant participant(domain, "peer");
   if (what == "detections") publishDetections(participant, argument);
   if (what == "imu") publishImu(participant, argument);
+  if (what == "read imu") return readImu(participant, static_cast<std::size_t>(argument)), 0;
   if (what == "tiles") publishTiles(participant, argument);
   return 64;
 }

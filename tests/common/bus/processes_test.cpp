@@ -70,6 +70,22 @@ TEST_F(Processes, ALateJoinerGetsTheNewest512InertialSamplesInOrder) {
   EXPECT_TRUE(std::is_sorted(got.begin(), got.end()));
 }
 
+TEST_F(Processes, AReaderThatStopsForAWhileGetsAllInertialSamples) {
+  constexpr std::size_t kSamples = 4000;  // 10 s at 400 Hz
+  Writer<ImuSample> writer(participant, kTopic<ImuSample>);
+  const Subprocess reader(peer("read imu", std::to_string(kSamples)));
+  ASSERT_TRUE(saysALine(log_));
+  ASSERT_TRUE(runUntil(loop, [&] { return writer.matched() == 1; }));
+  reader.signal(SIGSTOP);
+  for (std::size_t i = 0; i < kSamples; ++i) (void)writer.write(ImuSample{});
+  reader.signal(SIGCONT);
+  EXPECT_TRUE(runUntil(loop, [&] {
+    std::ifstream file(log_);
+    const std::string text{std::istreambuf_iterator<char>(file), {}};
+    return text.find("has all") != std::string::npos;
+  }));
+}
+
 TEST_F(Processes, TheStandbyIsHeardAfterTheOwnerIsKilled) {
   Reader<Detections> reader(participant, kTopic<Detections>);
   InstanceId last = 0;

@@ -40,7 +40,7 @@ TEST(TopicTable, GivesDetectionsALeaseThatDoesNotFlap) {
 
 TEST(TopicTable, KeepsEnoughInertialSamplesForARestartedReader) {
   EXPECT_TRUE(findTopic("imu")->qos.latched);
-  EXPECT_EQ(findTopic("imu")->qos.depth, 512);
+  EXPECT_EQ(findTopic("imu")->qos.late, 512);
 }
 
 TEST(Once, PassesEachIdentityOnceAndCountsTheRest) {

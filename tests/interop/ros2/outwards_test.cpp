@@ -41,6 +41,7 @@ class Vehicle {
     Calibration c;
     c.source = 77;
     c.cameras = {tests::cameraAhead(64, 48, 50)};
+    c.imu = ImuCalibration{.gyro_noise = 1e-3, .rate_hz = 100};
     (void)calibration_.write(c);
     ModelInfo model;
     model.hash = 5;
@@ -153,6 +154,8 @@ TEST(Ros2Outwards, EveryTopicIsReceivedWithItsValues) {
   EXPECT_NEAR(odometry["linear"][0].get<double>(), 4.0, 1e-12) << "in the body, which faces left";
   EXPECT_NEAR(odometry["angular"][2].get<double>(), 0.3, 1e-12);
   EXPECT_NEAR(odometry["covariance"][0].get<double>(), 0.01, 1e-12);
+  for (const int i : {21, 28, 35})
+    EXPECT_NEAR(odometry["twist_covariance"][i].get<double>(), 1e-4, 1e-12) << "of the gyroscope";
 
   const json& tf = all["/tf"]["transforms"];
   ASSERT_EQ(tf.size(), 2u);

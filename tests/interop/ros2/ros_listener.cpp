@@ -58,7 +58,8 @@ json linesOf(const nav_msgs::msg::dds_::Odometry_& m) {
           {"pose", of(m.pose().pose())},
           {"covariance", m.pose().covariance()},
           {"linear", xyz(m.twist().twist().linear())},
-          {"angular", xyz(m.twist().twist().angular())}};
+          {"angular", xyz(m.twist().twist().angular())},
+          {"twist_covariance", m.twist().covariance()}};
 }
 json linesOf(const sensor::Imu_& m) {
   return {{"header", of(m.header())},

@@ -75,7 +75,8 @@ class Gateway : public ::testing::Test {
   void publish(std::uint64_t sequence, std::size_t objects = 3) {
     std::vector<ObjectBelief> beliefs;
     for (ObjectId id = 1; id <= objects; ++id)
-      beliefs.push_back(objectAt(id, {5.0 * static_cast<double>(id), 0, 0}));
+      beliefs.push_back(
+          objectAt(id, {5.0 * static_cast<double>(id), 0.01 * static_cast<double>(sequence), 0}));
     ASSERT_TRUE(objects_.write(frameOf(sequence, beliefs)).has_value());
   }
   /// Returns a count of /metrics; 0 if it is missing.

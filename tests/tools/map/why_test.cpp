@@ -51,24 +51,24 @@ TEST(Why, TellsAnObjectEntryByEntry) {
 It was first seen at 101.300 s, and last 12.400 s later.
 
 That it exists, in log-odds (+0.69 doubles the odds, +2.30 makes them tenfold):
-     -1.61  before its first box: few boxes are new things
-     +9.20  31 looks showed it (101.300 s to 113.700 s)
-     +0.31  1 look more showed it from where it had been looked at: worth little (at 104.000 s)
-     -2.10  4 looks at its place did not show it (105.000 s to 106.500 s)
-     +0.90  of these is excused: something off the map may have hidden it
-     +0.00  210 looks not used: something hid it (107.000 s to 112.000 s)
-     +0.00  time passed: things leave
+     -1.61  before its first box: few boxes are new objects
+     +9.20  detected in 31 observations (101.300 s to 113.700 s)
+     +0.31  detected in 1 observation more from the same place: little weight (at 104.000 s)
+     -2.10  not detected in 4 observations of its place (105.000 s to 106.500 s)
+     +0.90  of these excused: an object that is not on the map may have occluded it
+     +0.00  210 observations not used: it was occluded (107.000 s to 112.000 s)
+     +0.00  time passed: objects leave
      +6.70  together
 
 It is a car rather than something of no known class (0.070), 13.3 to 1:
      +4.10  how frequent the two are
-     +0.36  what the network said of its boxes
+     +0.36  activations of the network in its boxes
      -1.87  how well size and place explain the boxes
      +2.59  together
 
 That it is a van was given up at 104.100 s; a car was the better one, 200.3 to 1:
      +0.70  how frequent the two are
-     +3.20  what the network said of its boxes
+     +3.20  activations of the network in its boxes
      +1.40  how well size and place explain the boxes
      +5.30  together
 )");

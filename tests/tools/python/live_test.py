@@ -194,6 +194,14 @@ class Maps(unittest.TestCase):
         self.assertIsNone(map_.get(1 << 40))
         with self.assertRaisesRegex(KeyError, "no object 7777"):
             map_[7777]
+        some = map_.objects()[0]
+        self.assertTrue(some.id in map_ and some in map_ and 7777 not in map_)
+        with self.assertWarnsRegex(UserWarning, "no 'cars'; its classes are: .*car"):
+            self.assertEqual(map_.by_class("cars"), [])
+        with self.assertRaisesRegex(perdure.Refused, "at least 0 m, not -1"):
+            map_.near((0, 0, 0), radius=-1)
+        with self.assertRaisesRegex(perdure.Refused, "3 numbers each"):
+            map_.in_box((0, 0), (1, 1, 1))
 
     def test_the_running_map_store_is_answered_as_perdure_map_answers(self):
         copy = drive.folder / "live.sqlite"

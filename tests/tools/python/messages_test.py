@@ -52,6 +52,11 @@ class EveryTopic(unittest.TestCase):
             for field in made._fields:
                 self.assertIn(f"\n{field}: ", type(made).__doc__)
 
+    def test_a_frame_of_objects_is_a_sequence(self):
+        frame = perdure.Objects(objects=[perdure.ObjectBelief(id=4), perdure.ObjectBelief(id=7)])
+        self.assertEqual([frame[0].id, frame[-1].id, len(frame)], [4, 7, 2])
+        self.assertRegex(perdure.__version__, r"^\d+\.\d+")
+
     def test_type_hints_are_those_of_the_messages(self):
         stubs = support.run(support.PYTHON, support.SOURCE / "tools/python/stubs.py", "--check")
         self.assertIn("up to date", stubs)

@@ -26,12 +26,15 @@ using gateway::test::RawClient;
 using nlohmann::json;
 using ::testing::HasSubstr;
 constexpr std::uint64_t kSecond = 1'000'000'000;
+constexpr char kNewest[] = "foxglove.sdk.v1";
 
 class Replayed : public ::testing::Test {
  protected:
   Replayed() { record("run.mcap", 5000 * kSecond); }
-  /// Twenty seconds at 10 Hz; log times differ from sensor times; events at 7 and 12 s.
-  void record(const std::string& name, std::uint64_t begin_ns) {
+  /// Twenty seconds at 10 Hz; log times differ from sensor times; events at 7 and 12 s. Objects
+  /// come `late` frames after their image. The recording goes on for `rest_s`.
+  void record(const std::string& name, std::uint64_t begin_ns, std::uint64_t late = 0,
+              std::uint64_t rest_s = 0) {
     replay::RecordingWriter writer(folder_.file(name));
     Calibration calibration = gateway::test::forwardCamera();
     calibration.source = 42;
@@ -40,12 +43,19 @@ class Replayed : public ::testing::Test {
       const std::uint64_t log = begin_ns + i * kSecond / 10;
       mustBe(writer.add("frame/cam0", imageOf(i), log));
       mustBe(writer.add("landmarks", landmarksOf(i), log));
-      mustBe(writer.add("objects", frameOf(i, {objectAt(1, {0.1 * static_cast<double>(i), 0, 0})}),
-                        log));
+      const std::uint64_t of = i - std::min(i, late);
+      mustBe(writer.add("objects",
+                        frameOf(of, {objectAt(1, {0.1 * static_cast<double>(of), 0, 0})}), log));
       if (i == 70) mustBe(writer.add("events", eventOf(EventKind::kOccluded, 1), log));
       if (i == 120) mustBe(writer.add("events", eventOf(EventKind::kReappeared, 1), log));
       if (i == 20) mustBe(writer.add("map/reply", graphFor({}, frameOf(i, {}).world), log));
       if (i % 10 == 9) mustBe(writer.cut());
+    }
+    Health health;
+    health.process = "capture";
+    for (std::uint64_t s = 0; s < rest_s; ++s) {
+      mustBe(writer.add("health", health, begin_ns + (20 + s) * kSecond));
+      mustBe(writer.cut());
     }
     mustBe(writer.finish());
   }
@@ -85,7 +95,7 @@ class Replayed : public ::testing::Test {
     replay_ = std::make_unique<GatewayReplay>(*recording_, config, how, start_s);
     thread_ = std::thread([this] { replay_->run(); });
     client_ = std::make_unique<RawClient>(replay_->port());
-    ASSERT_THAT(client_->upgrade(), HasSubstr("101"));
+    ASSERT_THAT(client_->upgrade("", kNewest), HasSubstr("101"));
     info_ = json::parse(client_->readFrame().payload);
     client_->sendFrame(R"({"op":"subscribe","subscriptions":[{"id":1,"channelId":8}]})");
   }
@@ -162,7 +172,7 @@ TEST_F(Replayed, PlaysOnFromThereAndSaysWhenItHasEnded) {
 class LateClient {
  public:
   explicit LateClient(std::uint16_t port) : client_(port) {
-    (void)client_.upgrade();
+    (void)client_.upgrade("", kNewest);
     client_.sendFrame(R"({"op":"subscribe","subscriptions":[{"id":1,"channelId":1},
         {"id":2,"channelId":2},{"id":5,"channelId":5},{"id":8,"channelId":8},
         {"id":100,"channelId":100},{"id":101,"channelId":101},{"id":102,"channelId":102}]})");
@@ -219,6 +229,48 @@ TEST_F(Replayed, ShowsTheImageOfAPlaceThatIsSoughtWhilePaused) {
   EXPECT_FALSE(client_->readMessage(5).empty());
   control(false, 1, 21'900'000'000);
   EXPECT_FALSE(client_->readMessage(5).empty());
+}
+
+TEST_F(Replayed, ShowsTheImageOfTheShownObjectsWhilePaused) {
+  record("late.mcap", 100 * kSecond, 2);
+  gateway::PlaybackRequest how;
+  how.play = false;
+  start(how, "late.mcap");
+  client_->sendFrame(R"({"op":"subscribe","subscriptions":[{"id":5,"channelId":100}]})");
+  control(false, 1, 12 * kSecond);
+  std::map<std::uint32_t, std::uint64_t> newest;  // times by subscription
+  const auto fits = [&] { return newest[1] > 11 * kSecond && newest[1] == newest[5]; };
+  while (!fits()) {
+    const auto frame = client_->readFrame();
+    ASSERT_NE(frame.opcode, 0xff) << "objects of " << newest[1] << ", image of " << newest[5];
+    if (frame.opcode != 2 || frame.payload[0] != 1) continue;
+    std::uint32_t subscription = 0;
+    std::memcpy(&subscription, &frame.payload[1], 4);
+    std::memcpy(&newest[subscription], &frame.payload[5], 8);
+  }
+}
+
+TEST_F(Replayed, HasTheLengthOfTheDriveIfTheRecordingGoesOn) {
+  record("rest.mcap", 100 * kSecond, 0, 60);
+  start({}, "rest.mcap");
+  EXPECT_EQ(info_["dataEndTime"], (json{{"sec", 21}, {"nsec", 900'000'000}}));
+}
+
+TEST_F(Replayed, TellsNoPlaybackInTheOlderSubprotocol) {
+  startPaused();
+  RawClient older(replay_->port());
+  ASSERT_THAT(older.upgrade("", "foxglove.websocket.v1"), HasSubstr("101"));
+  EXPECT_THAT(json::parse(older.readFrame().payload)["capabilities"],
+              ::testing::Not(::testing::Contains("playbackControl")));
+  older.sendFrame(R"({"op":"subscribe","subscriptions":[{"id":1,"channelId":8}]})");
+  control(false, 1, 12 * kSecond);
+  for (std::uint64_t sequence = 0; sequence != 100;) {
+    const auto frame = older.readFrame();
+    ASSERT_NE(frame.opcode, 0xff);
+    if (frame.opcode != 2) continue;
+    ASSERT_NE(frame.payload[0], 5) << "the state of the playback";
+    if (frame.payload[0] == 1) sequence = json::parse(frame.payload.substr(13))["sequence"];
+  }
 }
 
 TEST_F(Replayed, EndsWhereItIsPlayedOnFromTheLastFrame) {

@@ -33,7 +33,8 @@ std::vector<fs::path> filesIn(const fs::path& folder) {
   return files;
 }
 
-/// Publishes inertial samples at 200 Hz, odometry at 20 Hz and a calibration until its destruction.
+/// Publishes inertial samples at 200 Hz, odometry and images at 20 Hz and a calibration until its
+/// destruction.
 class Vehicle {
  public:
   Vehicle()
@@ -41,6 +42,7 @@ class Vehicle {
         participant_(domain_, "vehicle"),
         imu_(participant_, bus::kTopic<ImuSample>),
         odometry_(participant_, bus::kTopic<Odometry>),
+        frames_(participant_, bus::frameTopic("cam0")),
         calibration_(participant_, bus::kTopic<Calibration>),
         health_(participant_, bus::kTopic<Health>),
         loop_(participant_) {
@@ -66,6 +68,11 @@ class Vehicle {
     (void)imu_.write(sample);
     if (published_ % 10 == 0) {
       (void)odometry_.write(scene::odometryAt(published_ / 10, RigidTransform()));
+      Frame frame;
+      frame.camera = "cam0";
+      frame.width = frame.height = 16;
+      frame.data = std::make_shared<const std::vector<std::uint8_t>>(256, std::uint8_t{70});
+      (void)frames_.write(frame);
     }
     ++published_;
   }
@@ -80,6 +87,7 @@ class Vehicle {
   bus::Participant participant_;
   bus::Writer<ImuSample> imu_;
   bus::Writer<Odometry> odometry_;
+  bus::Writer<Frame> frames_;
   bus::Writer<Calibration> calibration_;
   bus::Writer<Health> health_;
   bus::WaitLoop loop_;
@@ -131,6 +139,27 @@ TEST(RecordProcess, KilledLosesLessThanASecondAndTheNextOneMakesTheFileWhole) {
   EXPECT_THAT(next.log(), HasSubstr("had been cut off and is whole again"));
   EXPECT_EQ(stateOf(files[0]), "finished");
   EXPECT_EQ(filesIn(out).size(), 2u);
+}
+
+TEST(RecordProcess, ImagesHaveChunksOfTheirOwn) {
+  const test::Folder place;
+  (void)test::ownNetwork();
+  Vehicle vehicle;
+  test::Child recorder(
+      {perdure(), "record", "--images", "--out", place.file("rec"), "--seconds", "3"},
+      place.file("record.log"));
+  ASSERT_EQ(recorder.wait(30s), 0) << recorder.log();
+  const auto file = replay::mcap::Reader::open(filesIn(place.file("rec")).at(0));
+  ASSERT_TRUE(file);
+  std::size_t of_images = 0;
+  for (const auto& chunk : file->chunks()) {
+    std::size_t images = 0;
+    for (const auto& [channel, offset] : chunk.index_offsets)
+      images += file->catalogue().channels.at(channel).topic.ends_with("frame/cam0") ? 1 : 0;
+    EXPECT_TRUE(images == 0 || chunk.index_offsets.size() == 1);
+    of_images += images;
+  }
+  EXPECT_GT(of_images, 1u);
 }
 
 TEST(RecordProcess, WhatIsLostToAFullDiskEndsWith74) {

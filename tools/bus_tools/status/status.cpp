@@ -5,17 +5,16 @@
 #include <algorithm>
 
 #include "common/bus/discovery.h"
-#include "common/service/input.h"
+#include "common/types/end_of_drive.h"
 #include "tools/bus_tools/common.h"
 
 namespace perdure::tools {
 namespace {
 
-constexpr double kSilentHealth = 1.5;           // s; Health is published each second
-constexpr double kJustStarted = 5.0;            // s; a recent restart is reported
-constexpr double kSlow = 0.8;                   // share of the expected rate; less is degraded
-constexpr double kLate = 200.0;                 // ms from capture
-constexpr char kEndOfDrive[] = "end of drive";  // message in the Health of capture
+constexpr double kSilentHealth = 1.5;  // s; Health is published each second
+constexpr double kJustStarted = 5.0;   // s; a recent restart is reported
+constexpr double kSlow = 0.8;          // share of the expected rate; less is degraded
+constexpr double kLate = 200.0;        // ms from capture
 
 Level levelOf(HealthState state) {
   switch (state) {
@@ -52,7 +51,7 @@ std::string spanText(double seconds) {
 struct Source {
   bool gives = false;
   std::string why_not;
-  bool ended = false;
+  const Health* heard = nullptr;  ///< Health of capture
 };
 
 bool isHeard(const StatusSeen& seen, const std::string& process) {
@@ -64,15 +63,10 @@ Source sourceOf(const StatusSeen& seen) {
   const auto it = seen.services.find("capture");
   if (it == seen.services.end()) return {true, {}};
   const Health& health = it->second.health;
-  if (health.message == kEndOfDrive) return {false, health.message, isHeard(seen, "capture")};
+  if (health.message == kEndOfDrive)
+    return {false, health.message, isHeard(seen, "capture") ? &health : nullptr};
   if (health.state == HealthState::kStarting) return {false, "capture is starting"};
   return {true, {}};
-}
-
-/// Whether the service's only fault is that the recording has ended.
-bool endedWith(const Source& source, const Health& health) {
-  return source.ended && health.state == HealthState::kDegraded &&
-         health.reasons.contains(service::kInputSilent);
 }
 
 StatusNode judgeService(const std::string& name, const ServiceSeen* seen, const Source& source) {
@@ -101,7 +95,7 @@ StatusNode judgeService(const std::string& name, const ServiceSeen* seen, const 
                             seen->age_s, h.pid);
     return node;
   }
-  const bool ended = endedWith(source, h);
+  const bool ended = endedWith(source.heard, h);
   node.level = ended ? Level::kOk : levelOf(h.state);
   node.text = fmt::format("{:.1f} Hz  in {} out {} dropped {}  {} MB", seen->frames_hz, h.frames_in,
                           h.frames_out, h.dropped, h.rss_bytes >> 20);

@@ -17,6 +17,7 @@ metres, angles in radians, times in nanoseconds of the sensor clock. W is the re
 odometry, B the body, M the map.
 """
 
+from ._perdure import __version__
 from .bus import Gone, Publisher, Subscription, publisher, subscribe, topics
 from .errors import (
     Error,

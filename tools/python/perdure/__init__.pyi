@@ -62,3 +62,5 @@ from .messages import MapLoopPair as MapLoopPair
 from .messages import MapLoop as MapLoop
 from .messages import MapReply as MapReply
 from .messages import Health as Health
+
+__version__: str

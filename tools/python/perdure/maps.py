@@ -10,7 +10,7 @@ import numpy as np
 
 from . import messages
 from .bus import Publisher, Subscription
-from .errors import Missing, Unavailable, Unusable
+from .errors import Missing, Refused, Unavailable, Unusable
 
 _MOST = 100_000  # limit of objects in a reply
 
@@ -40,9 +40,9 @@ class Map:
 
     def __init__(self, path=None, *, frame="M", patience_s=5.0, **settings) -> None:
         if frame not in ("M", "W"):
-            raise ValueError(f'frame must be "M" or "W", not {frame!r}')
+            raise Refused(f'frame must be "M" or "W", not {frame!r}')
         if path is None and frame == "W":
-            raise ValueError('frame="W" reads what is stored: give the map\'s file')
+            raise Refused('frame="W" reads what is stored: give the map\'s file')
         self._as_stored = frame == "W"
         self._path = None if path is None else os.fspath(path)
         if self._path is not None and not os.path.exists(self._path):
@@ -61,15 +61,23 @@ class Map:
         return self._ask(kind="all").objects
 
     def by_class(self, name: str) -> List["messages.MapObject"]:
-        """Objects whose most probable class has this name, by id."""
-        return self._ask(kind="by_class", class_name=name).objects
+        """Objects whose most probable class has this name, by id. Warns if there are none."""
+        found = self._ask(kind="by_class", class_name=name).objects
+        if not found:
+            names = ", ".join(sorted({o.class_name for o in self})) or "none"
+            warnings.warn(f"the map has no {name!r}; its classes are: {names}", stacklevel=2)
+        return found
 
     def near(self, place, radius: float) -> List["messages.MapObject"]:
         """Objects whose centre is within ``radius`` m of ``place`` (3,), the nearest first."""
+        if not radius >= 0:
+            raise Refused(f"radius must be at least 0 m, not {radius!r}")
         return self._ask(kind="by_radius", low=place, radius=radius).objects
 
     def in_box(self, low, high) -> List["messages.MapObject"]:
         """Objects whose centre is between two corners (3,), m, by id."""
+        if np.shape(low) != (3,) or np.shape(high) != (3,):
+            raise Refused(f"low and high must have 3 numbers each, not {low!r} and {high!r}")
         corners = np.array([low, high], float)
         return self._ask(kind="by_box", low=corners.min(0), high=corners.max(0)).objects
 
@@ -89,6 +97,10 @@ class Map:
 
     def __len__(self) -> int:
         return len(self.objects())
+
+    def __contains__(self, item) -> bool:
+        """Whether the map has an object with this id, or this object's id."""
+        return self.get(getattr(item, "id", item)) is not None
 
     def __getitem__(self, object_id: int) -> "messages.MapObject":
         found = self.get(object_id)

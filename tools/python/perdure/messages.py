@@ -171,6 +171,9 @@ class _Objects:
     def __len__(self) -> "int":
         return len(self.objects)
 
+    def __getitem__(self, index) -> "ObjectBelief":
+        return self.objects[index]
+
     @property
     def ids(self) -> "npt.NDArray[np.uint64]":
         """(N,) uint64."""

@@ -10,7 +10,8 @@ export class CameraView {
   constructor(figure, canvas, caption) {
     Object.assign(this, { figure, canvas, caption });
     this.pen = canvas.getContext('2d');
-    this.images = []; // {time, at, bitmap}
+    this.images = []; // {time, at, bitmap}, not shown yet
+    this.shown = null; // the image on the canvas
     this.annotations = null;
     this.likelihood = false; // shows the likelihood of a class as brightness
     this.drawn = 0;
@@ -33,13 +34,17 @@ export class CameraView {
   showLikelihood(on) {
     this.likelihood = on;
     this.annotations = null; // channel of the other kind
+    if (this.shown) this.draw(this.shown, null);
   }
 
+  /** Also draws the shown image again, if its annotations arrive later than it. */
   drawMatching() {
-    const found = this.images.findIndex((i) => this.annotations && Math.abs(i.time - this.annotations.time) < 1e-4);
-    if (found < 0) return;
-    for (const old of this.images.splice(0, found)) old.bitmap.close();
-    this.draw(this.images.shift(), this.annotations.message);
+    const fits = (i) => i && this.annotations && Math.abs(i.time - this.annotations.time) < 1e-4;
+    const found = this.images.findIndex(fits);
+    if (found >= 0) {
+      for (const old of this.images.splice(0, found)) old.bitmap.close();
+      this.draw(this.images.shift(), this.annotations.message);
+    } else if (fits(this.shown)) this.draw(this.shown, this.annotations.message);
   }
 
   /** Shows an image without annotations if none arrive. */
@@ -50,14 +55,15 @@ export class CameraView {
     this.draw(this.images.shift(), null);
   }
 
-  draw({ bitmap, time }, message) {
-    const { canvas, pen } = this;
+  draw(image, message) {
+    const { canvas, pen } = this, { bitmap, time } = image;
+    if (this.shown && this.shown !== image) this.shown.bitmap.close();
+    this.shown = image;
     if (canvas.width !== bitmap.width || canvas.height !== bitmap.height) {
       canvas.width = bitmap.width;
       canvas.height = bitmap.height;
     }
     pen.drawImage(bitmap, 0, 0);
-    bitmap.close();
     this.figure.classList.add('has-image');
     this.caption.textContent = '';
     this.shownTime = time;

@@ -164,7 +164,7 @@ export class Connection {
       for (const service of message.services) this.services.set(service.name, service.id);
     }
     if (message.op === 'serviceCallFailure') this.take(message.callId)?.reject(new Error(message.message));
-    if (message.op === 'status' && message.level > 0) console.warn(message.message);
+    if (message.op === 'status' && message.level > 0) this.onStatus?.(message.message);
   }
 
   take(call) {

@@ -1,5 +1,5 @@
 // The searchable list of objects, the log of events, and the state of services.
-import { colourOf, escaped, looksLike, percent, visibilityWords, wordsOfTime } from './words.js';
+import { KINDS, colourOf, escaped, looksLike, percent, visibilityWords, wordsOfTime } from './words.js';
 
 const MOST_ROWS = 400;
 
@@ -11,6 +11,10 @@ export class ObjectList {
       const row = e.target.closest('tr');
       if (row) onChoose(Number(row.dataset.id));
     });
+    body.addEventListener('focusin', (e) => {
+      const id = Number(e.target.closest('tr')?.dataset.id);
+      if (id && id !== this.model.chosen && e.target.matches(':focus-visible')) onChoose(id, { reveal: false, open: false });
+    });
   }
 
   distance(o) {
@@ -20,15 +24,16 @@ export class ObjectList {
 
   /** Whether every word occurs in the description of an object. */
   matches(o, words, onlyMap) {
-    if (this.model.answer?.asked === this.search.value.trim()) return this.model.answer.ids.has(o.id);
+    if (this.model.answer?.objects) return this.model.answer.objects.has(o.id);
     const text = `${o.class} ${o.id} ${onlyMap ? 'remembered map' : visibilityWords(o)} ${this.model.isProvisional(o.id) ? 'provisional' : ''} ${o.elsewhere ? 'elsewhere' : ''} ${o.confirmed ? 'confirmed' : 'unconfirmed'} ${(o.moving ?? 0) >= 0.5 ? 'moving' : ''}`.toLowerCase();
-    return words.every((w) => text.includes(w));
+    const tokens = text.split(/\s+/);
+    return words.every((w) => (/^\d+$/.test(w) ? w === String(o.id) : tokens.some((t) => t.startsWith(w))));
   }
 
   found() {
     const words = this.search.value.toLowerCase().split(/\s+/).filter(Boolean);
     const asked = words.some((w) => 'unconfirmed'.startsWith(w) && w.length > 3);
-    const here = [...this.model.objects.values()].filter((o) => (o.confirmed || asked || o.id === this.model.chosen) && this.matches(o, words, false));
+    const here = [...this.model.objects.values()].filter((o) => (o.confirmed || asked || this.model.answer?.objects || o.id === this.model.chosen) && this.matches(o, words, false));
     const left = [...this.model.remembered.values()].filter((o) => !this.model.objects.has(o.id) && this.matches(o, words, true));
     const rank = { seen: 0, hidden: 1, away: 2 };
     here.sort((a, b) => rank[looksLike(a)] - rank[looksLike(b)] || this.distance(a) - this.distance(b));
@@ -41,9 +46,9 @@ export class ObjectList {
     const all = [...here, ...left], shown = all.slice(0, MOST_ROWS);
     this.order = shown.map((o) => o.id);
     const seen = here.filter((o) => looksLike(o) === 'seen').length, hidden = here.filter((o) => looksLike(o) === 'hidden').length;
-    this.note.textContent = all.length === 0
+    this.note.textContent = this.model.answer?.note ?? (all.length === 0
       ? (this.search.value ? 'Nothing here matches; the whole map can be asked.' : 'No objects yet.')
-      : `${seen} in sight, ${hidden} hidden, ${here.length - seen - hidden} out of view, ${left.length} on the map only${this.model.elsewhere > 0 ? `; ${this.model.elsewhere} of earlier sessions: where they are from here is not known yet` : ''}`;
+      : `${seen} in sight, ${hidden} hidden, ${here.length - seen - hidden} out of view, ${left.length} on the map only${this.model.elsewhere > 0 ? `; ${this.model.elsewhere} of earlier sessions: where they are from here is not known yet` : ''}`);
     const wanted = new Set(this.order);
     for (const [id, row] of this.rows) {
       if (wanted.has(id)) continue;
@@ -63,6 +68,7 @@ export class ObjectList {
     if (!row) {
       row = document.createElement('tr');
       row.dataset.id = o.id;
+      row.tabIndex = 0;
       row.innerHTML = '<td class="what"><i></i><span></span></td><td class="dim"></td><td><span class="bar" title="exists"><b></b></span></td><td class="n"></td>';
       this.rows.set(o.id, row);
     }
@@ -89,44 +95,77 @@ export class ObjectList {
   }
 
   reveal() {
-    this.rows.get(this.model.chosen)?.scrollIntoView({ block: 'nearest' });
+    const row = this.rows.get(this.model.chosen);
+    row?.scrollIntoView({ block: 'nearest' });
+    if (this.body.contains(document.activeElement)) row?.focus();
   }
 }
 
+const FLIP_S = 1; // shorter changes of visibility are not listed
+
 export class EventLog {
-  constructor(list, model, onLink, onPlace) {
-    this.list = list;
-    this.model = model;
+  constructor(list, filter, model, onLink, onPlace) {
+    Object.assign(this, { list, filter, model });
     list.addEventListener('click', (e) => {
       const link = e.target.closest('[data-object]'), place = e.target.closest('[data-at]');
       if (link) onLink(Number(link.dataset.object));
       else if (place) onPlace(place.dataset.at.split(',').map(Number));
+    });
+    filter.addEventListener('click', (e) => {
+      if (!e.target.dataset.group) return;
+      e.target.setAttribute('aria-pressed', String(e.target.getAttribute('aria-pressed') !== 'true'));
+      this.applyFilter();
     });
     this.clear();
   }
 
   clear() {
     this.list.innerHTML = '<li class="empty">No events yet.</li>';
-    this.predicted = new Map(); // object → line of its newest prediction
+    this.newest = new Map(); // "group object" → {line, time, event} of the newest event
+  }
+
+  applyFilter() {
+    for (const button of this.filter.children) this.list.classList.toggle(`without-${button.dataset.group}`, button.getAttribute('aria-pressed') !== 'true');
+  }
+
+  /** Removes what the event replaces: an earlier prediction, and a short change of visibility. Returns whether the
+      event itself is then nothing new. */
+  replaces(event, group, time) {
+    const before = this.newest.get(`${group} ${event.object_id}`);
+    if (!before) return false;
+    const flips = group === 'sight' && time - before.time < FLIP_S;
+    if (group !== 'return' && !flips) return false;
+    before.line.remove();
+    return flips && before.event === 'occluded' && event.event === 'reappeared';
   }
 
   add(event) {
-    if (this.model.events.length === 1) this.list.innerHTML = '';
-    const time = event.timestamp.sec + 1e-9 * event.timestamp.nsec - (this.model.firstTime ?? event.timestamp.sec);
+    this.list.querySelector('.empty')?.remove();
+    const time = event.timestamp.sec + 1e-9 * event.timestamp.nsec, group = KINDS[event.event] ?? 'object', key = `${group} ${event.object_id}`;
+    if (this.replaces(event, group, time)) return void this.newest.delete(key);
     const line = document.createElement('li');
     line.dataset.kind = event.event;
+    line.dataset.group = group;
     if (event.at) line.dataset.at = event.at.join();
     let words = escaped(event.words) + (event.detail ? ` <span class="dim">${escaped(event.detail)}</span>` : '');
     for (const id of new Set([event.object_id, event.other_id])) {
       // Skips digits inside a number, such as 0.1 s.
       if (id) words = words.replace(new RegExp(`(?<![\\d.])${id}(?!\\.?\\d)`), `<a data-object="${id}">${id}</a>`);
     }
-    line.innerHTML = `<time>${wordsOfTime(time)}</time><span>${words}</span>`;
-    if (event.event === 'predicted_return') {
-      // Keeps only the newest prediction, because it is repeated until the object is visible.
-      this.predicted.get(event.object_id)?.remove();
-      this.predicted.set(event.object_id, line);
-    }
+    line.innerHTML = `<time>${wordsOfTime(time, this.model.origin)}</time><span>${words}</span>`;
+    this.newest.set(key, { line, time, event: event.event });
+    this.prepend(line);
+  }
+
+  /** A sentence of the gateway, such as that events were lost. */
+  say(sentence) {
+    const line = document.createElement('li');
+    line.className = 'said';
+    line.textContent = sentence;
+    this.prepend(line);
+  }
+
+  prepend(line) {
     this.list.prepend(line);
     while (this.list.childElementCount > 500) this.list.lastElementChild.remove();
   }

@@ -6,7 +6,7 @@ import { wordsOfPart } from './graph_panel.js';
 import { Model, troubleOf } from './model.js';
 import { ObjectPanel } from './object_panel.js';
 import { PlaybackBar } from './playback.js';
-import { MARKS, escaped, lookOfLoop, wordsOfImage, wordsOfNoImage, wordsOfPlace } from './words.js';
+import { MARKS, escaped, lookOfLoop, wordsOfImage, wordsOfNoImage, wordsOfPlace, wordsOfTime } from './words.js';
 import { World } from './world.js';
 
 const $ = (id) => document.getElementById(id);
@@ -33,13 +33,14 @@ try {
 }
 const camera = new CameraView($('camera'), $('image'), $('image-caption'));
 const list = new ObjectList($('list').tBodies[0], $('list-note'), $('search'), model, choose);
-const log = new EventLog($('events'), model, choose, (at) => world?.lookAtPlace(at));
+const log = new EventLog($('events'), $('events-filter'), model, choose, (at) => world?.lookAtPlace(at));
+connection.onStatus = (sentence) => log.say(sentence);
 const panel = new ObjectPanel($('object'), model, connection, choose);
 
 const playback = new PlaybackBar($('playback'), connection, model);
 connection.onSeek = () => { model.jumped(); log.clear(); };
 
-function choose(id, { reveal = true } = {}) {
+function choose(id, { reveal = true, open = true } = {}) {
   world?.choosePart(undefined);
   model.chosen = id;
   world?.choose(id);
@@ -47,7 +48,7 @@ function choose(id, { reveal = true } = {}) {
   list.render();
   if (id !== 0) {
     if (reveal) list.reveal();
-    if (document.activeElement !== $('search')) openTab('object');
+    if (open && document.activeElement !== $('search')) openTab('object');
     panel.ask();
   }
 }
@@ -111,7 +112,6 @@ function showLegendOfGraph() {
 }
 connection.on('/map/graph', takeGraph);
 connection.on('/events', (event) => {
-  model.takeEvent(event);
   log.add(event);
   if (event.at && MARKS[event.event]) world?.addMark(event.at, MARKS[event.event], `${event.world}/${event.epoch}`);
 });
@@ -122,8 +122,15 @@ connection.on('/health', (health) => {
 });
 
 // User queries.
-$('search').addEventListener('input', () => list.render());
-$('ask-map').addEventListener('click', askMap);
+function setAnswer(objects, note) {
+  if (note) model.takeAnswer(objects, note);
+  else model.answer = null;
+  $('ask-map').setAttribute('aria-pressed', String(Boolean(objects)));
+  world?.syncRemembered(model);
+  list.render();
+}
+$('search').addEventListener('input', () => setAnswer());
+$('ask-map').addEventListener('click', () => (model.answer?.objects ? setAnswer() : askMap()));
 /** Parses a query: a number, "near 30" (m around the vehicle), "at 12 -40 30", or a class. */
 function questionOf(text) {
   const words = text.toLowerCase().split(/\s+/).filter(Boolean), numbers = words.slice(1).map(Number);
@@ -143,17 +150,12 @@ async function askMap() {
   $('list-note').textContent = 'The map is asked …';
   try {
     const reply = await connection.call('/map/query', request);
-    model.takeAnswer(reply.objects, 'near' in request ? word : '');
-    world?.syncRemembered(model);
-    list.render();
     const many = reply.truncated ? ', and there are more' : '';
-    $('list-note').textContent = reply.objects.length === 0 ? `The map has nothing ${'near' in request ? 'there' : `that is "${word}"`}.` : `The map has ${reply.objects.length}${many}.`;
+    setAnswer(reply.objects, reply.objects.length === 0 ? `The map has nothing ${'near' in request ? 'there' : `that is "${word}"`}.` : `The map has ${reply.objects.length}${many}.`);
   } catch (error) {
-    $('list-note').textContent = `The map does not answer: ${error.message}`;
+    setAnswer(null, `The map does not answer: ${error.message}`);
   }
-  noteHeldUntil = performance.now() + 4000;
 }
-let noteHeldUntil = 0;
 
 // Keys and buttons.
 const toggles = {
@@ -211,7 +213,7 @@ document.addEventListener('keydown', (e) => {
     const id = list.next(1);
     if (id) choose(id); else askMap();
   } else if (e.key === 'Escape') {
-    if (typing && $('search').value) { $('search').value = ''; list.render(); } else { $('search').blur(); choose(0); openTab('objects'); }
+    if (typing && $('search').value) { $('search').value = ''; setAnswer(); } else { $('search').blur(); choose(0); openTab('objects'); }
   } else if (typing) {
     return;
   } else if (e.key === '/') {
@@ -235,8 +237,7 @@ document.addEventListener('keydown', (e) => {
 function figures(now) {
   const frame = model.frame, items = [];
   const stands = connection.range && connection.playback?.status !== 'playing';
-  const since = connection.range?.first ?? model.firstTime; // start of the recording's bar
-  if (frame) items.push(['time', `${Math.max(0, model.time - since).toFixed(1)} s`, ''], ['objects', [...model.objects.values()].filter((o) => o.confirmed).length, '']);
+  if (frame) items.push(['time', wordsOfTime(model.time, model.origin), ''], ['objects', [...model.objects.values()].filter((o) => o.confirmed).length, '']);
   const map = model.mapFrame;
   if (frame && map) items.push(['sessions', map.sessions, 'minor'], ['loops', map.loops, 'minor'], ['σ in map', wordsOfPlace(map.body_sigma), 'minor']);
   if (frame) items.push(['rate', stands ? '–' : `${model.rate(now).toFixed(0)} Hz`, 'minor'], ['latency', frame.latency_ms >= 0 && model.silentFor(now) < 2 ? `${frame.latency_ms.toFixed(0)} ms` : '–', 'minor']);
@@ -256,6 +257,7 @@ const openedAt = performance.now();
 
 let stateAt = 0;
 function showState() {
+  model.origin = connection.range?.first ?? 0;
   const now = performance.now();
   if (now - stateAt > 1500) model.stoodStill(now);
   stateAt = now;
@@ -275,7 +277,7 @@ function showState() {
 
 function refresh() {
   if (now4(4)) {
-    if (!document.querySelector('[data-panel=objects]').hidden && performance.now() > noteHeldUntil) list.render();
+    if (!document.querySelector('[data-panel=objects]').hidden) list.render();
     if (!document.querySelector('[data-panel=object]').hidden && (model.chosen || panel.part)) panel.part ? panel.renderPart() : panel.render();
     showState();
   }

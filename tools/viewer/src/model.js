@@ -9,12 +9,11 @@ export class Model {
     this.mapFrame = null; // the newest perdure.MapFrame
     this.graph = null; // the newest perdure.MapGraph
     this.history = new Map(); // id → [[time, r], …]
-    this.events = [];
     this.chosen = 0;
     this.frame = null; // the newest perdure.Objects without its objects
     this.health = null;
     this.heardAt = 0; // performance.now() of the newest objects
-    this.firstTime = null;
+    this.origin = 0; // start of a recording on the sensor clock
     this.arrivals = []; // arrival times of the last seconds
   }
 
@@ -25,7 +24,6 @@ export class Model {
     if (this.world !== undefined && this.world !== world) this.history.clear();
     const another = this.frame && time < this.time - 2; // whether a recording starts again
     if (another) this.history.clear();
-    if (another || this.firstTime === null) this.firstTime = time;
     this.world = world;
     this.time = time;
     this.frame = frame;
@@ -49,24 +47,19 @@ export class Model {
   /** Clears the data of another time after a jump to another position of a recording. */
   jumped() {
     this.history.clear();
-    this.events = [];
-  }
-
-  takeEvent(event) {
-    this.events.push(event);
-    if (this.events.length > 500) this.events.shift();
   }
 
   takeMap(message) {
-    this.remembered = new Map(message.objects.map((o) => [o.id, o]));
+    this.remembered = new Map([...(this.answer?.objects ?? []), ...message.objects.map((o) => [o.id, o])]);
     this.onMap = message.all;
     this.elsewhere = message.elsewhere;
   }
 
-  /** For a query about a place, `asked` is its text; the list then shows the objects there. */
-  takeAnswer(objects, asked) {
-    for (const o of objects) this.remembered.set(o.id, o);
-    this.answer = asked ? { asked, ids: new Set(objects.map((o) => o.id)) } : null;
+  /** The map's answer to a query: the list shows its objects, until the search changes. */
+  takeAnswer(objects, note) {
+    this.answer = { objects: objects && new Map(objects.map((o) => [o.id, o])), note };
+    if (!objects) return; // the map did not answer
+    for (const [id, o] of this.answer.objects) this.remembered.set(id, o);
   }
 
   /** T_MW as [x y z qx qy qz qw] if it belongs to the displayed W; otherwise W is M. */

@@ -20,26 +20,27 @@ export const isInSight = (o) => o.visibility === 'visible' || o.visibility === '
 export const looksLike = (o) => (isHidden(o) ? 'hidden' : isInSight(o) ? 'seen' : 'away');
 
 export const percent = (p) => (p > 0.9995 ? '100 %' : p >= 0.0995 ? `${(100 * p).toFixed(1)} %` : p >= 0.001 ? `${(100 * p).toFixed(2)} %` : p > 0 ? '< 0.1 %' : '0 %');
-const looks = (n) => (n === 1 ? '1 look' : `${n} looks`);
+const observations = (n) => (n === 1 ? '1 observation' : `${n} observations`);
+const hypotheses = (n) => (n === 1 ? '1 hypothesis' : `${n} hypotheses`);
 const times = (n) => (n === 1 ? 'once' : `${n} times`);
 
 /** A sentence for each kind of evidence for existence. */
 export function existenceWords(kind, n) {
   const words = {
-    prior: 'before its first box: few boxes are new things',
-    hit: `${looks(n)} showed it`,
-    repeated: `${looks(n)} more showed it from where it had been looked at: worth little`,
-    miss: `${looks(n)} at its place did not show it`,
-    unmapped_occluder: 'of these is excused: something off the map may have hidden it',
-    hidden: `${looks(n)} not used: something hid it`,
-    away: `${looks(n)} not used: it was out of view`,
-    time: 'time passed: things leave',
-    misshapen: `given up ${times(n)}: explanations that lost the size of their class`,
-    lost: `given up ${times(n)}: that it drove off unseen`,
+    prior: 'before its first box: few boxes are new objects',
+    hit: `detected in ${observations(n)}`,
+    repeated: `detected in ${observations(n)} more from the same place: little weight`,
+    miss: `not detected in ${observations(n)} of its place`,
+    screened: 'of these excused: an object that is not on the map may have occluded it',
+    hidden: `${observations(n)} not used: it was occluded`,
+    away: `${observations(n)} not used: it was out of view`,
+    time: 'time passed: objects leave',
+    misshapen: `${hypotheses(n)} removed: no longer of the size of their class`,
+    lost: `${hypotheses(n)} removed: that it drove off unseen`,
     shared: "its first box may have been another object's",
-    merge: `merged ${times(n)} with an object that was the same thing`,
-    restore: `back from a restart ${times(n)}: believed before this ledger`,
-    recall: `back from the map ${times(n)}: believed before this ledger`,
+    merge: `merged ${times(n)} with an object that was the same`,
+    restore: `back from a restart ${times(n)}: evidence from before this ledger`,
+    recall: `back from the map ${times(n)}: evidence from before this ledger`,
   };
   return words[kind] ?? kind;
 }
@@ -47,14 +48,14 @@ export function existenceWords(kind, n) {
 export function classWords(kind) {
   const words = {
     prior: 'how frequent the two are',
-    activation: 'what the network said of its boxes',
+    activation: 'activations of the network in its boxes',
     geometry: 'how well size and place explain the boxes',
-    miss: 'looks that did not show it',
+    miss: 'observations without a detection',
     motion: 'whether it moves',
-    pruning: 'explanations that were given up',
-    merge: 'objects that were the same thing',
-    restore: 'believed before this ledger',
-    context: 'what stands near it',
+    pruning: 'hypotheses that were removed',
+    merge: 'merged objects',
+    restore: 'evidence from before this ledger',
+    context: 'objects near it',
   };
   return words[kind] ?? kind;
 }
@@ -67,6 +68,11 @@ export function visibilityWords(o) {
   if (o.visibility === 'behind') return 'behind the camera';
   return o.visibility ?? 'not known';
 }
+
+/** Groups of events for the filter; others are of objects. */
+export const KINDS = {
+  occluded: 'sight', reappeared: 'sight', left_view: 'sight', predicted_return: 'return', loop_closed: 'map', loop_withdrawn: 'map', relocalised: 'map',
+};
 
 /** Events of the whole map, which are marked in it. */
 export const MARKS = { loop_closed: '#c58cff', relocalised: '#9fe5bf', loop_withdrawn: '#ff8f88' };
@@ -104,8 +110,10 @@ export function wordsOfPlace(sigma) {
   return sigma.length > 0 ? `${Math.max(sigma[0], sigma[1]).toFixed(2)} m` : 'not known';
 }
 
-/** Seconds since the page was opened; much earlier times may come from another clock. */
-export function wordsOfTime(seconds) {
-  if (seconds >= 0) return `${seconds.toFixed(1)} s`;
-  return seconds > -3600 ? `−${(-seconds).toFixed(1)} s` : 'before';
+/** Time of the sensor clock; `origin`: start of a recording, otherwise 0. */
+export function wordsOfTime(seconds, origin) {
+  const kDay = 86400;
+  if (origin || seconds < 1000 * kDay) return `${(seconds - origin).toFixed(1)} s`;
+  const day = new Date(1000 * seconds); // the clock has the time of day
+  return `${day.toTimeString().slice(0, 8)}.${Math.floor(day.getMilliseconds() / 100)}`;
 }

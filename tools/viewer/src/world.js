@@ -62,7 +62,11 @@ export class World {
     }
     const lines = new THREE.BufferGeometry();
     lines.setAttribute('position', new THREE.Float32BufferAttribute(points, 3));
-    this.grid = new THREE.LineSegments(lines, new THREE.LineBasicMaterial({ color: '#24313e', depthWrite: false }));
+    this.grid = new THREE.LineSegments(lines, new THREE.LineBasicMaterial({ color: '#2d3d4d', depthWrite: false }));
+    const plane = new THREE.Mesh(new THREE.PlaneGeometry(2 * half, 2 * half), new THREE.MeshBasicMaterial({ color: '#121b24', depthWrite: false }));
+    plane.renderOrder = -2; // before the lines, which lie in it
+    this.grid.renderOrder = -1;
+    this.grid.add(plane);
     this.scene.add(this.grid);
     this.ground = null;
   }

@@ -64,36 +64,49 @@ TEST(FoxgloveLayout, NamesChannelsThatThereAre) {
   EXPECT_EQ(scene["followTf"], "base_link");
 }
 
-TEST(Scene, HasTheWholeSceneInEachMessageAndTellsForAWhileWhatHasGone) {
-  Scene scene;
-  (void)scene.update(frameOf(1, {objectAt(1, {10, 0, 0}), objectAt(2, {20, 0, 0})}));
-  for (int i = 0; i < 100; ++i) {
-    const json update = json::parse(scene.update(frameOf(2, {objectAt(1, {10, 0, 0})})));
-    ASSERT_EQ(idsIn(update["entities"]), std::set<std::string>{"1"});
-    ASSERT_TRUE(idsIn(update["deletions"]).contains("2")) << i;
-  }
-  const json later = json::parse(scene.update(frameOf(3, {objectAt(1, {10, 0, 0})})));
-  EXPECT_FALSE(idsIn(later["deletions"]).contains("2"));
+struct Parsed {
+  json changes, whole;
+};
+Parsed updated(Scene& scene, const Objects& objects) {
+  const SceneUpdate update = scene.update(objects);
+  return {json::parse(update.changes), json::parse(update.whole)};
 }
 
-TEST(Scene, TellsNoDeletionOfWhatHasComeBack) {
+TEST(Scene, TellsChangesAndTheWholeForWhoMissedSome) {
+  constexpr int kAll = 1;
   Scene scene;
-  (void)scene.update(frameOf(1, {objectAt(1, {10, 0, 0})}));
-  (void)scene.update(frameOf(2, {}));
-  const json back = json::parse(scene.update(frameOf(3, {objectAt(1, {10, 0, 0})})));
-  EXPECT_FALSE(idsIn(back["deletions"]).contains("1"));
+  const Parsed first =
+      updated(scene, frameOf(1, {objectAt(1, {10, 0, 0}), objectAt(2, {20, 0, 0})}));
+  EXPECT_EQ(first.changes, first.whole);
+  EXPECT_EQ(first.whole["deletions"][0]["type"], kAll);
+
+  const Parsed same =
+      updated(scene, frameOf(2, {objectAt(1, {10, 0, 0}), objectAt(2, {20, 0, 0})}));
+  EXPECT_TRUE(same.changes["entities"].empty());
+  EXPECT_TRUE(same.changes["deletions"].empty());
+  EXPECT_EQ(same.whole["entities"], first.whole["entities"]);
+
+  const Parsed moved =
+      updated(scene, frameOf(3, {objectAt(1, {10, 0, 0}), objectAt(2, {20.1, 0, 0})}));
+  EXPECT_EQ(idsIn(moved.changes["entities"]), std::set<std::string>{"2"});
+  const Parsed gone = updated(scene, frameOf(4, {objectAt(2, {20.1, 0, 0})}));
+  EXPECT_TRUE(gone.changes["entities"].empty());
+  EXPECT_EQ(idsIn(gone.changes["deletions"]), std::set<std::string>{"1"});
+  EXPECT_EQ(idsIn(gone.whole["entities"]), std::set<std::string>{"2"});
+  const Parsed back =
+      updated(scene, frameOf(5, {objectAt(1, {10, 0, 0}), objectAt(2, {20.1, 0, 0})}));
+  EXPECT_EQ(idsIn(back.changes["entities"]), std::set<std::string>{"1"});
+  EXPECT_TRUE(back.changes["deletions"].empty());
 }
 
 TEST(Scene, BeginsAnewInANewFrameOfReference) {
-  constexpr int kAll = 1;
   Scene scene;
-  for (int i = 0; i < 150; ++i) (void)scene.update(frameOf(1, {objectAt(1, {10, 0, 0})}));
-  EXPECT_TRUE(json::parse(scene.update(frameOf(1, {})))["deletions"][0]["type"] != kAll);
-  Objects other = frameOf(2, {objectAt(5, {1, 0, 0})});
+  (void)updated(scene, frameOf(1, {objectAt(1, {10, 0, 0})}));
+  Objects other = frameOf(2, {objectAt(1, {10, 0, 0})});
   other.world.epoch = 2;
-  const json update = json::parse(scene.update(other));
-  EXPECT_EQ(update["deletions"][0]["type"], kAll);
-  EXPECT_EQ(update["deletions"].size(), 1u);
+  const Parsed update = updated(scene, other);
+  EXPECT_EQ(update.changes, update.whole);
+  EXPECT_EQ(update.changes["deletions"].size(), 1u);
 }
 
 TEST(Scene, DrawsWhatIsHiddenAsStrokesWithoutABody) {
@@ -101,8 +114,8 @@ TEST(Scene, DrawsWhatIsHiddenAsStrokesWithoutABody) {
   hidden.visibility = Visibility::kOccluded;
   hidden.blocked_by = 9;
   Scene scene;
-  const json seen = json::parse(scene.update(frameOf(1, {objectAt(3, {10, 0, 0})})))["entities"][0];
-  const json strokes = json::parse(scene.update(frameOf(2, {hidden})))["entities"][0];
+  const json seen = updated(scene, frameOf(1, {objectAt(3, {10, 0, 0})})).whole["entities"][0];
+  const json strokes = updated(scene, frameOf(2, {hidden})).changes["entities"][0];
   EXPECT_EQ(seen["cubes"].size(), 1u);
   EXPECT_TRUE(strokes["cubes"].empty());
   EXPECT_EQ(seen["lines"][0]["points"].size(), 2u * 13);
@@ -116,7 +129,7 @@ TEST(Scene, PutsTheCuboidAndTheEllipsoidWhereTheBeliefIs) {
   object.classes[0].covariance.topLeftCorner<3, 3>() =
       Eigen::Vector3d(0.01, 0.04, 0.09).asDiagonal();
   Scene scene;
-  const json entity = json::parse(scene.update(frameOf(1, {object})))["entities"][0];
+  const json entity = updated(scene, frameOf(1, {object})).whole["entities"][0];
   const json cube = entity["cubes"][0];
   EXPECT_NEAR(cube["pose"]["position"]["y"], -2, 1e-9);
   EXPECT_NEAR(cube["pose"]["orientation"]["z"], std::sin(0.25), 1e-5);
@@ -330,6 +343,29 @@ TEST(VitalSigns, TellOfAServiceThatAnotherProcessStandsInFor) {
   EXPECT_EQ(services[0]["stood_in_for"], true);
   EXPECT_THAT(services[0]["message"], HasSubstr("ros2 stands in for it"));
   EXPECT_EQ(services[1]["process"], "ros2");
+}
+
+TEST(VitalSigns, TellNoFaultOfServicesWhoseDriveHasEnded) {
+  constexpr std::int64_t kNow = 1'000'000'000;
+  VitalSigns signs("ego");
+  Health vio;
+  vio.process = "vio";
+  vio.state = HealthState::kDegraded;
+  vio.message = "no frames for 9.0 s; mend the camera, or start capture";
+  vio.reasons["input_silent"] = 1;
+  signs.onHealth(vio, kNow);
+  EXPECT_EQ(json::parse(signs.healthz(kNow))["services"]["vio"], "degraded");
+  Health capture;
+  capture.process = "capture";
+  capture.state = HealthState::kOk;
+  capture.message = "end of drive";
+  signs.onHealth(capture, kNow);
+  EXPECT_EQ(json::parse(signs.healthz(kNow))["status"], "ok");
+  EXPECT_THAT(signs.json(kNow, {}), HasSubstr("nothing more comes: end of drive"));
+  EXPECT_THAT(signs.metrics(kNow, {}, {}), HasSubstr("service_state{process=\"vio\"} 1"));
+  vio.reasons.clear();
+  signs.onHealth(vio, kNow);
+  EXPECT_EQ(json::parse(signs.healthz(kNow))["status"], "degraded") << "another fault";
 }
 
 TEST(VitalSigns, TellSilenceProcessorTimeAndReasons) {

@@ -100,6 +100,23 @@ TEST_F(HubTest, GivesASlowClientTheNewestAndOthersEverything) {
   EXPECT_EQ(hub_.dropped(), 49u);
 }
 
+TEST_F(HubTest, GivesTheWholeToWhoMissedChanges) {
+  TestViewer slow(4), late(4);
+  join(slow), join(late);
+  say(slow, subscribe(7, 1));
+  const auto publish = [&](const std::string& step) {
+    Encoded changes = message(1, "change " + step);
+    changes.whole = std::make_shared<const std::string>("whole " + step);
+    hub_.publish(changes);
+  };
+  publish("0");
+  EXPECT_THAT(slow.read(), ElementsAre("change 0"));
+  publish("1"), publish("2");
+  EXPECT_THAT(slow.read(), ElementsAre("whole 2"));
+  say(late, subscribe(7, 1));
+  EXPECT_THAT(late.read(), ElementsAre("whole 2"));
+}
+
 TEST_F(HubTest, KeepsABoundedQueueOfEventsAndTellsTheLoss) {
   TestViewer viewer(4);
   join(viewer);
