@@ -1,8 +1,10 @@
 #include "common/bus/domain.h"
 
+#include <charconv>
 #include <cstdlib>
 #include <filesystem>
 #include <sstream>
+#include <string_view>
 #include <utility>
 
 #include "common/base/errors.h"
@@ -208,13 +210,12 @@ Entity& Entity::operator=(Entity&& other) noexcept {
 }
 
 void describe(Options& options, config::Fields& fields) {
-  constexpr double kMaxDomain = 230;  // port numbers end there
   fields.text("bus.interface", options.interface,
               {"network interface of the topics: lo, or one that other hosts are on"});
   fields.texts(
       "bus.peers", options.peers,
       {"addresses of the other hosts, where multicast does not reach them; none: multicast"});
-  fields.integer("bus.domain", options.domain, config::between(0, kMaxDomain),
+  fields.integer("bus.domain", options.domain, config::between(0, double{kMaxDomain}),
                  {"DDS domain; the variable PERDURE_DOMAIN goes before it"});
   fields.text("bus.vehicle", options.vehicle, {"the vehicle's name in the topics' names"});
   fields.integer("bus.shared_memory_mb", options.shared_memory_mb,
@@ -244,8 +245,16 @@ Options commonOptions(const std::string& folder, std::vector<config::Problem>& p
 }
 
 Options withEnvironment(Options options) {
-  if (const char* domain = std::getenv("PERDURE_DOMAIN")) {
-    options.domain = std::strtol(domain, nullptr, 10);
+  const char* given = std::getenv("PERDURE_DOMAIN");
+  if (given == nullptr || *given == '\0') return options;
+  const std::string_view text = given;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), options.domain);
+  if (error != std::errc() || end != text.data() + text.size()) options.domain = -1;
+  if (options.domain < 0 || options.domain > kMaxDomain) {
+    throw StartupError(ExitCode::kConfiguration,
+                       "PERDURE_DOMAIN is `{}`, which is not a whole number 0 … {}; correct it, "
+                       "or unset it: bus.domain is used then",
+                       text, kMaxDomain);
   }
   return options;
 }

@@ -26,6 +26,8 @@ class Entity {
   std::int32_t handle_;
 };
 
+inline constexpr int kMaxDomain = 230;  ///< the port numbers of DDS end there
+
 struct Options {
   std::string interface = "lo";
   std::int64_t domain = 0;
@@ -44,7 +46,7 @@ void describe(Options& options, config::Fields& fields);
 /// appended to `problems`.
 Options commonOptions(const std::string& folder, std::vector<config::Problem>& problems);
 
-/// The options after applying PERDURE_DOMAIN.
+/// The options after applying PERDURE_DOMAIN. Throws StartupError (78) if it is no domain.
 Options withEnvironment(Options options);
 
 /// Cyclone's configuration for these options, in the form of CYCLONEDDS_URI. `locator` is that of

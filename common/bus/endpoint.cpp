@@ -38,6 +38,7 @@ QosPtr readerQos(const Qos& qos, const SharedMemory& memory, ReadFrom from) {
   const bool of_before = from == ReadFrom::kKept;  // shared memory does not store earlier messages
   QosPtr result = commonQos(qos, memory, qos.shared_memory && !of_before);
   if (of_before) dds_qset_durability(result.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
+  if (from == ReadFrom::kNew) dds_qset_durability(result.get(), DDS_DURABILITY_VOLATILE);
   return result;
 }
 

@@ -78,9 +78,10 @@ class AnyWriter : public Endpoint {
 
 class RawWriter;
 
-/// The earlier messages that a reader of a non-latched topic receives.
+/// The earlier messages that a reader receives.
 enum class ReadFrom {
-  kNow,   ///< none
+  kNow,   ///< none; those of a latched topic
+  kNew,   ///< none, of a latched topic either
   kKept,  ///< the newest message, from writers that store it (Qos::kept); no others match
 };
 

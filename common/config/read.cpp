@@ -269,8 +269,14 @@ std::vector<Problem> assign(Fields& fields, const std::string& assignment) {
   }
   Reader reader(fields, file, false);
   try {
+    const std::string key = assignment.substr(0, equals), value = assignment.substr(equals + 1);
+    const bool text = std::any_of(fields.all().begin(), fields.all().end(), [&](const Field& one) {
+      return one.key == key && one.choices.empty() &&
+             std::holds_alternative<std::string*>(one.target);
+    });
+    const bool quoted = value.starts_with('"') || value.starts_with('\'');
     YAML::Node map;
-    map[assignment.substr(0, equals)] = YAML::Load(assignment.substr(equals + 1));
+    map[key] = text && !quoted ? YAML::Node(value) : YAML::Load(value);
     reader.readGroup(map, "");
   } catch (const YAML::Exception& error) {
     reader.problem(error.mark, "the value is not YAML: " + error.msg);

@@ -6,6 +6,7 @@
 
 #include "common/base/algorithms/median.h"
 #include "common/base/errors.h"
+#include "common/base/files/access.h"
 #include "common/replay/files/rig_file.h"
 #include "common/replay/files/stamps.h"
 #include "common/replay/files/text_file.h"
@@ -119,10 +120,25 @@ Recording readRecording(const DatasetOptions& options) {
                          "(.mcap, .db3, .bag)");
 }
 
+/// A part that may not be read looks as if it were missing, so permissions are checked after a
+/// failure.
+Recording readReadable(const DatasetOptions& options) {
+  try {
+    Recording recording = readRecording(options);
+    const auto& frames = recording.frames;
+    if (options.decode && !frames.empty()) refuseUnreadable(frames.front().path);
+    return recording;
+  } catch (const std::runtime_error&) {
+    const std::string why = whyUnreadableIn(options.path);
+    if (why.empty()) throw;
+    throw StartupError(ExitCode::kUnavailable, why);
+  }
+}
+
 }  // namespace
 
 std::unique_ptr<Dataset> Dataset::open(const DatasetOptions& options) {
-  Recording recording = readRecording(options);
+  Recording recording = readReadable(options);
   if (!options.rig.empty() && recording.kind != DatasetKind::kRosRecording) {
     const Calibration rig = readRig(options.rig, &recording.notes);
     applyRig(rig, options.rig.string(), recording.calibration);

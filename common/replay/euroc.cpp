@@ -271,6 +271,7 @@ class EurocCalibration {
     SensorFile file(path);
     if (file.has("imu0")) file = file.section("imu0");
     T_BI_ = file.T_BS();
+    T_I_reference_ = file.transform("T_i_b").value_or(RigidTransform());
     const ImuCalibration imu = readImuCalibration(file);
     file.noteUnknownKeys(recording.notes);
     return imu;
@@ -281,7 +282,9 @@ class EurocCalibration {
     const CameraCalibration* in_rig = rig_ ? rig_->camera(name) : nullptr;
     if (!fs::exists(path) && in_rig) {
       noteChoice(chains_, recording);
-      return *in_rig;
+      CameraCalibration camera = *in_rig;
+      camera.T_BC = T_I_reference_ * camera.T_BC;
+      return camera;
     }
     SensorFile file(path);
     if (file.has(name)) file = file.section(name);
@@ -297,7 +300,8 @@ class EurocCalibration {
   fs::path mav0_;
   std::vector<fs::path> chains_;  ///< the first of these is rig_
   std::optional<Calibration> rig_;
-  RigidTransform T_BI_;  ///< IMU in EuRoC's body, from which all data are transformed
+  RigidTransform T_BI_;           ///< IMU in EuRoC's body, from which all data are transformed
+  RigidTransform T_I_reference_;  ///< Kalibr's reference IMU in the IMU, if there are several
 };
 
 }  // namespace
@@ -330,6 +334,11 @@ Recording readEuroc(const DatasetOptions& options) {
     if (rate <= 0.0) rate = rateOf(recording.frames, recording.calibration.cameras.size() - 1);
   }
   if (fs::exists(mav0 / "speed0" / "data.csv")) readSpeed(mav0 / "speed0", recording);
+  for (const char* sensor : {"cam1", "speed0"}) {
+    const fs::path folder = mav0 / sensor;
+    if (!fs::is_directory(folder) || fs::exists(folder / "data.csv")) continue;
+    recording.notes.push_back(folder.string() + " has no data.csv and is left out");
+  }
   sortFrames(recording);
   readTruth(mav0, calibration.T_BI(), recording);
   return recording;

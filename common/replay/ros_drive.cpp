@@ -1,7 +1,10 @@
 // A ROS recording as a dataset: images, inertial samples, and calibration from camera_info and
 // tf_static. The rig file gives the missing calibration. Images are read on request.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <map>
+#include <tuple>
 #include <utility>
 
 #include "common/base/errors.h"
@@ -95,7 +98,8 @@ class RosImages {
 struct RosCamera {
   CameraTopics topics;
   std::vector<RosImage> images = {};
-  std::optional<ros::CameraInfo> info = {};
+  std::optional<ros::CameraInfo> info = {};  ///< the first
+  bool info_changes = false;
   std::string frame_id = {};
   int bits = 8;  ///< used bits of 16, from the brightest image
 };
@@ -196,10 +200,26 @@ class RosDriveReader {
       if (const auto value = valueIn<ros::Imu>(message, "imu")) takeImu(*value, message.log_ns);
     }
     for (RosCamera& camera : cameras_) {
-      if (message.topic == camera.topics.info && !camera.info)
-        camera.info = valueIn<ros::CameraInfo>(message, "camera_info");
+      if (message.topic == camera.topics.info) takeInfo(camera, message);
       if (message.topic == camera.topics.image) takeImage(camera, message);
     }
+  }
+
+  void takeInfo(RosCamera& camera, const RosMessage& message) {
+    const auto info = valueIn<ros::CameraInfo>(message, "camera_info");
+    if (!camera.info) camera.info = info;
+    const auto lensOf = [](const ros::CameraInfo& of) {
+      return std::tie(of.width, of.height, of.distortion_model, of.k, of.d, of.p);
+    };
+    if (!info || camera.info_changes || lensOf(*info) == lensOf(*camera.info)) return;
+    camera.info_changes = true;
+    recording_.reasons.add("camera_info_changed");
+    recording_.notes.push_back(fmt::format(
+        "{} changes during the recording: the focal length {:.1f} px becomes {:.1f} px, the size "
+        "{}x{} {}x{}. The first is used for all images; fix zoom, focus and resolution, or give a "
+        "part of the drive",
+        camera.topics.info, camera.info->k[0], info->k[0], camera.info->width, camera.info->height,
+        info->width, info->height));
   }
 
   void takeImu(const ros::Imu& imu, std::uint64_t log_ns) {

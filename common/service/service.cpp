@@ -9,6 +9,7 @@
 #include <iostream>
 
 #include "common/base/errors.h"
+#include "common/base/files/access.h"
 #include "common/bus/security_log.h"
 #include "common/service/process.h"
 #include "common/service/signals.h"
@@ -291,6 +292,11 @@ int runService(int argc, char** argv, const Program& program) {
   } catch (const StartupError& error) {
     std::cerr << error.what() << '\n';
     return static_cast<int>(error.code());
+  } catch (const std::filesystem::filesystem_error& error) {
+    const std::string forbidden = whyUnreadable(error.path1());
+    std::cerr << executableOf(program)
+              << " ends: " << (forbidden.empty() ? error.what() : forbidden) << '\n';
+    return static_cast<int>(ExitCode::kUnavailable);
   } catch (const std::exception& error) {
     std::cerr << executableOf(program) << " ends by an error: " << error.what() << '\n';
     return static_cast<int>(ExitCode::kFailure);

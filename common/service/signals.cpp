@@ -12,6 +12,9 @@ sigset_t endSignals() {
   sigemptyset(&set);
   sigaddset(&set, SIGTERM);
   sigaddset(&set, SIGINT);
+  struct sigaction hangup {};
+  sigaction(SIGHUP, nullptr, &hangup);
+  if (hangup.sa_handler != SIG_IGN) sigaddset(&set, SIGHUP);
   return set;
 }
 
@@ -20,6 +23,7 @@ sigset_t endSignals() {
 BlockedSignals::BlockedSignals() {
   const sigset_t set = endSignals();
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
+  std::signal(SIGXFSZ, SIG_IGN);
 }
 
 SignalThread::SignalThread(const BlockedSignals&, std::function<void()> on_signal)

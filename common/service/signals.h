@@ -1,4 +1,6 @@
-// Delivers SIGTERM and SIGINT as a normal call in a normal thread.
+// The signals of a program: SIGTERM, SIGINT and SIGHUP (the terminal was closed) end it in order,
+// by a normal call in a normal thread. SIGXFSZ is ignored, so a write beyond the largest size of a
+// file fails like one to a full disk.
 #pragma once
 
 #include <functional>
@@ -6,7 +8,8 @@
 
 namespace perdure::service {
 
-/// Blocks both signals in this thread and in all threads that it starts later. Create it first.
+/// Blocks the signals in this thread and in all threads that it starts later. Create it first.
+/// SIGHUP stays ignored if it is, as under nohup.
 class BlockedSignals {
  public:
   BlockedSignals();

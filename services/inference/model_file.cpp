@@ -1,10 +1,12 @@
 #include "services/inference/model_file.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 
 #include "common/base/errors.h"
+#include "common/base/files/access.h"
 #include "common/base/ids.h"
 
 namespace perdure::inference {
@@ -13,6 +15,9 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string readBytes(const fs::path& path, const std::string& what, const std::string& mend) {
+  if (const auto why = whyUnreadable(path); !why.empty()) {
+    throw StartupError(ExitCode::kUnavailable, why);
+  }
   std::error_code error;
   if (!fs::is_regular_file(path, error)) {
     const char* why = fs::is_directory(path, error) ? " is a folder; " : " is missing; ";
@@ -35,6 +40,30 @@ std::string listOf(const std::vector<fs::path>& paths) {
 }
 
 }  // namespace
+
+std::string whyNoNetwork(std::string_view bytes) {
+  const auto begins = bytes.substr(0, 512);
+  const auto text = begins.substr(std::min(begins.find_first_not_of(" \t\r\n"), begins.size()));
+  if (begins.starts_with("version https://git-lfs")) {
+    return "is a pointer of Git LFS, not the network; run `git lfs pull` in its repository";
+  }
+  if (text.starts_with("<!") || text.starts_with("<html") || text.starts_with("<HTML")) {
+    return "is a page in HTML; fetch the file itself (the address of the raw file)";
+  }
+  if (begins.substr(std::min<std::size_t>(4, begins.size())).starts_with("TFL3")) {
+    return "is a network of TensorFlow Lite; export it as ONNX (python -m tf2onnx.convert "
+           "--tflite)";
+  }
+  if (begins.starts_with("PK\x03\x04")) {
+    return "is a ZIP archive, as PyTorch's .pt; unpack it, or export the network as ONNX";
+  }
+  if (begins.starts_with("\x1f\x8b") || begins.starts_with("\x28\xb5\x2f\xfd")) {
+    return "is compressed; unpack it";
+  }
+  if (begins.starts_with("<?xml")) return "is XML, as OpenVINO's; export the network as ONNX";
+  if (begins.starts_with("\x89HDF")) return "is HDF5, as Keras' .h5; export the network as ONNX";
+  return {};
+}
 
 std::vector<std::string> standardModelFolders() {
   std::vector<std::string> folders = {"config/models"};
@@ -78,6 +107,9 @@ ModelFile readModelFile(const std::string& path, const std::string& description,
   const fs::path model = path;
   ModelFile file;
   file.network = readBytes(model, "The network", "set model.path to an .onnx or .cfg file.");
+  if (const auto why = whyNoNetwork(file.network); !why.empty()) {
+    throw StartupError(ExitCode::kConfiguration, "{} {}", model.string(), why);
+  }
   if (model.extension() == ".cfg") {
     file.darknet_weights = readBytes(fs::path(model).replace_extension(".weights"), "The weights",
                                      "put them beside their .cfg file.");
@@ -86,6 +118,13 @@ ModelFile readModelFile(const std::string& path, const std::string& description,
   const std::string text =
       readBytes(described, "The description", "set model.description to a model.json.");
   file.description = parseModelDescription(text, described.string());
+  const std::string sum = toHex(digest(file.network + file.darknet_weights));
+  if (!file.description.digest.empty() && file.description.digest != sum) {
+    throw StartupError(ExitCode::kConfiguration,
+                       "{} is not the network that {} describes: its digest is {}, not {}. It was "
+                       "damaged or replaced; copy it again, or import it again",
+                       model.string(), described.string(), sum, file.description.digest);
+  }
   if (file.description.name.empty()) file.description.name = model.stem().string();
   std::string all = file.network + file.darknet_weights + text;
   for (const std::string& name : file.description.classes) all += "\n" + name;

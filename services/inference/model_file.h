@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "services/inference/core/description.h"
@@ -22,6 +23,10 @@ struct ModelFile {
 /// a file is invalid).
 ModelFile readModelFile(const std::string& path, const std::string& description,
                         const std::vector<std::string>& folders);
+
+/// What a file is that is recognised as no network, with the fix: a pointer of Git LFS, HTML,
+/// another format. Empty for other files.
+std::string whyNoNetwork(std::string_view bytes);
 
 /// Description that readModelFile() uses for `path`. Throws StartupError (69).
 std::string findDescription(const std::string& path, const std::vector<std::string>& folders);

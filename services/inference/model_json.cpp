@@ -111,6 +111,7 @@ void readCalibration(const Json& json, JsonReader& parent, Calibration& calibrat
 
 void readAll(JsonReader& reader, const std::string& file, ModelDescription& model) {
   model.name = reader.text("name", false);
+  model.digest = reader.text("digest", false);
   reader.choice<Family>("family", model.family,
                         {{"yolox", Family::kYolox},
                          {"yolo-fastest", Family::kYoloFastest},

@@ -31,7 +31,7 @@ void measure(const HzOptions& options, const bus::Topic<T>& topic) {
   const bus::Domain domain(options.bus);
   const bus::Participant participant(domain, "perdure hz");
   bus::WaitLoop loop(participant);
-  bus::Reader<T> reader(participant, topic);
+  bus::Reader<T> reader(participant, topic, bus::ReadFrom::kNew);
   RateMeter meter;
   loop.on(reader, [&](const T&) { meter.arrived(steadySeconds()); });
   loop.every(std::chrono::seconds(1),

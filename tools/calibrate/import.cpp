@@ -9,6 +9,7 @@
 #include "common/replay/files/rig_file.h"
 #include "common/replay/files/sensor_file.h"
 #include "common/replay/files/text_file.h"
+#include "tools/calibrate/foreign.h"
 
 namespace perdure::calibrate {
 namespace {
@@ -26,16 +27,22 @@ class Import {
     const SensorFile file(path);
     if (file.has("cam0") || file.has("imu0")) {
       takeSections(file, path);
+    } else if (const auto foreign = sectionsOf(file, path)) {
+      append(result_.ignored, foreign->without_effect);
+      takeSections(SensorFile(path.string(), foreign->sections), path);
+      append(result_.found, foreign->notes);
     } else if (file.has("gyroscope_noise_density")) {
       takeImu(file, path.string());
     } else if (file.has("intrinsics") || file.has("camera_matrix")) {
       takeCamera(file, path.string());
     } else {
-      throw StartupError(ExitCode::kData,
-                         path.string() +
-                             " has none of the keys cam0, imu0, intrinsics, camera_matrix and "
-                             "gyroscope_noise_density; give Kalibr's camchain and imu yaml, ROS' "
-                             "camera_info, or a sensor.yaml");
+      const std::string maker = replay::makerOf(file);
+      throw StartupError(
+          ExitCode::kData,
+          "{} has none of the keys cam0, imu0, intrinsics, camera_matrix and "
+          "gyroscope_noise_density{}; give Kalibr's camchain and imu yaml, ROS' "
+          "camera_info, a sensor.yaml, or a calibration of VINS, ORB-SLAM3 or Basalt",
+          path.string(), maker.empty() ? "" : ", it is " + maker);
     }
   }
 
@@ -53,12 +60,16 @@ class Import {
                                      places_.size(), given_));
     }
     for (std::size_t i = 0; i < cameras.size(); ++i) {
-      if (in_body_[i]) cameras[i].T_BC = T_B_I_.inverse() * cameras[i].T_BC;
+      cameras[i].T_BC = (in_body_[i] ? T_I_body_ : T_I_reference_) * cameras[i].T_BC;
     }
     return std::move(result_);
   }
 
  private:
+  static void append(std::vector<std::string>& to, const std::vector<std::string>& more) {
+    to.insert(to.end(), more.begin(), more.end());
+  }
+
   void takeSections(const SensorFile& file, const fs::path& path) {
     for (const std::string name : {"cam0", "cam1"}) {
       if (file.has(name)) takeCamera(file.section(name), path.string() + ": " + name);
@@ -102,7 +113,8 @@ class Import {
                               "calibrate with Kalibr's --imu-models calibrated");
     }
     result_.rig.imu = replay::readImuCalibration(file);
-    T_B_I_ = file.T_BS();
+    T_I_body_ = file.T_BS().inverse();
+    T_I_reference_ = file.transform("T_i_b").value_or(RigidTransform());
     result_.found.push_back("imu0 from " + from);
     noteKeys(file);
   }
@@ -112,7 +124,8 @@ class Import {
   std::vector<RigidTransform> places_;
   std::size_t given_ = 0;
   std::vector<bool> in_body_;  ///< one per camera: its file gives the pose in EuRoC's body
-  RigidTransform T_B_I_;       ///< IMU pose in EuRoC's sensor.yaml; our body is the IMU
+  /// In the IMU, which is our body: EuRoC's body, and the IMU that Kalibr's T_cam_imu is of.
+  RigidTransform T_I_body_, T_I_reference_;
   ImportedRig result_;
 };
 

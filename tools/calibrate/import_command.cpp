@@ -22,6 +22,7 @@ Reads what others have calibrated and writes a rig file of our own (--rig of pip
   perdure calibrate import ost.yaml imu.yaml --out rig.yaml \
       --T_BS "0 0 1 .05  -1 0 0 0  0 -1 0 .02  0 0 0 1"                        ROS' camera_info
   perdure calibrate import cam0/sensor.yaml imu0/sensor.yaml --out rig.yaml    EuRoC
+  perdure calibrate import FILE --out rig.yaml         VINS-Mono, VINS-Fusion, ORB-SLAM3, Basalt
 
 Lenses: pinhole with radtan, rational or equidistant distortion; omni, eucm and ds become the
 equidistant lens nearest to them, where it is within half a pixel up to 85 degrees off the axis.

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <signal.h>
 #include <sys/file.h>
 #include <unistd.h>
 
@@ -35,7 +36,8 @@ constexpr std::int64_t kSecond = 1'000'000'000;
 
 /// Locks a DDS domain that no other demo of this host uses, until this process ends.
 void leaseDomain() {
-  if (std::getenv("PERDURE_DOMAIN") != nullptr) return;
+  const char* given = std::getenv("PERDURE_DOMAIN");
+  if (given != nullptr && *given != '\0') return;
   constexpr int kFirst = 60, kLast = 99;
   for (int domain = kFirst; domain <= kLast; ++domain) {
     const auto path = fs::temp_directory_path() / fmt::format("perdure-domain-{}", domain);
@@ -250,6 +252,24 @@ void Demo::endOne(const std::string& service) {
     loop_->runOnce(50ms);
     const auto states = supervisor_->states();
     if (!states || !states->contains(service) || states->at(service).ended()) return;
+  }
+}
+
+/// Ends the processes that `perdure inference swap` started, which supervisord does not know.
+void Demo::endSwappedIn() const {
+  const auto isInference = [](pid_t pid) {
+    std::error_code gone;
+    return fs::read_symlink(fmt::format("/proc/{}/exe", pid), gone).filename() ==
+           "perdure-inference";
+  };
+  std::vector<pid_t> left = reporter_->pidsOf("inference");
+  const std::int64_t end = monotonicNs() + 6 * kSecond;
+  for (const pid_t pid : left) {
+    if (isInference(pid)) kill(pid, SIGTERM);
+  }
+  while (std::erase_if(left, [&](pid_t pid) { return !isInference(pid); }), !left.empty()) {
+    if (monotonicNs() > end) return;
+    loop_->runOnce(50ms);
   }
 }
 

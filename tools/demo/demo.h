@@ -20,6 +20,9 @@ class Demo {
   /// Checks data, model and configuration, then starts everything. Throws StartupError with the
   /// fix.
   Demo(const DemoOptions& options, const std::atomic<bool>& interrupted);
+  ~Demo() { endSwappedIn(); }
+  Demo(const Demo&) = delete;
+  Demo& operator=(const Demo&) = delete;
 
   /// Runs until the drive has ended and all data are processed, --seconds are over, or the demo is
   /// interrupted. Then it ends the services in order (unless --keep is given) and writes the
@@ -38,6 +41,7 @@ class Demo {
   void addGateway();
   void endInOrder();
   void endOne(const std::string& service);
+  void endSwappedIn() const;
   void write();
   void setTruthOfPictures();
   void drawOverlay() const;

@@ -5,6 +5,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <charconv>
 #include <fstream>
 
@@ -91,21 +92,30 @@ ServicePlan planOf(const std::string& name, const DemoOptions& options, const De
   return plan;
 }
 
-/// Quotes a word for a command of supervisord: double quotes, and doubled % signs.
+/// A text that supervisord expands to `text`. It has no other escape for the characters that begin
+/// a comment or end a line.
+std::string escaped(const std::string& text) {
+  std::string result;
+  for (const char c : text) {
+    const auto found = std::find_if(kSupervisorEnvironment.begin(), kSupervisorEnvironment.end(),
+                                    [&](const auto& entry) { return entry.second[0] == c; });
+    if (found != kSupervisorEnvironment.end()) {
+      result += "%(ENV_" + found->first + ")s";
+    } else {
+      result += c == '%' ? "%%" : std::string(1, c);
+    }
+  }
+  return result;
+}
+
+/// Quotes a word for a command of supervisord.
 std::string quoted(const std::string& word) {
   std::string text = "\"";
   for (const char c : word) {
     if (c == '"' || c == '\\') text += '\\';
-    if (c == '%') text += '%';
     text += c;
   }
-  return text + "\"";
-}
-
-std::string escaped(const std::string& path) {
-  std::string text;
-  for (const char c : path) text += c == '%' ? "%%" : std::string(1, c);
-  return text;
+  return escaped(text + "\"");
 }
 
 }  // namespace

@@ -24,24 +24,35 @@ std::int64_t monotonicNs() {
   return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
 }
 
-std::uint64_t ServiceCounts::sum(std::uint64_t Health::*field) const {
-  std::uint64_t total = 0;
-  for (const auto& [instance, health] : by_instance_) total += health.*field;
-  return total;
+void ServiceCounts::add(const Health& health) {
+  Process& process =
+      by_instance_.try_emplace(health.instance, Process{{}, in_, out_, dropped_}).first->second;
+  process.health = health;
+  in_ = std::max(in_, process.in + health.frames_in);
+  out_ = std::max(out_, process.out + health.frames_out);
+  dropped_ = std::max(dropped_, process.dropped + health.dropped);
 }
 
 double ServiceCounts::cpuSeconds() const {
   double total = 0.0;
-  for (const auto& [instance, health] : by_instance_) total += health.cpu_s;
+  for (const auto& [instance, process] : by_instance_) total += process.health.cpu_s;
   return total;
 }
 
 std::map<std::string, std::uint64_t> ServiceCounts::reasons() const {
   std::map<std::string, std::uint64_t> total;
-  for (const auto& [instance, health] : by_instance_) {
-    for (const auto& [reason, count] : health.reasons) total[reason] += count;
+  for (const auto& [instance, process] : by_instance_) {
+    for (const auto& [reason, count] : process.health.reasons) total[reason] += count;
   }
   return total;
+}
+
+std::vector<pid_t> ServiceCounts::pids() const {
+  std::vector<pid_t> all;
+  for (const auto& [instance, process] : by_instance_) {
+    all.push_back(static_cast<pid_t>(process.health.pid));
+  }
+  return all;
 }
 
 Reporter::Reporter(const bus::Participant& participant, bus::WaitLoop& loop, OutputWriter& outputs,
@@ -105,6 +116,11 @@ void Reporter::onHealth(const Health& health) {
 const Health* Reporter::healthOf(const std::string& process) const {
   const auto found = newest_health_.find(process);
   return found == newest_health_.end() ? nullptr : &found->second;
+}
+
+std::vector<pid_t> Reporter::pidsOf(const std::string& process) const {
+  const auto found = services_.find(process);
+  return found == services_.end() ? std::vector<pid_t>() : found->second.pids();
 }
 
 bool Reporter::drained() const {

@@ -1,6 +1,8 @@
 // Subscribes to a running system and writes the files of `perdure pipeline`.
 #pragma once
 
+#include <sys/types.h>
+
 #include <cstdint>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -15,19 +17,25 @@
 
 namespace perdure::tools {
 
-/// Sums the counts of one service over all of its processes, because each process counts from 0.
+/// The counts of one service over all of its processes, because each process counts from 0.
 class ServiceCounts {
  public:
-  void add(const Health& health) { by_instance_[health.instance] = health; }
-  std::uint64_t framesIn() const { return sum(&Health::frames_in); }
-  std::uint64_t framesOut() const { return sum(&Health::frames_out); }
-  std::uint64_t dropped() const { return sum(&Health::dropped); }
+  void add(const Health& health);
+  /// Frames of processes that run at the same time, as in a swap of the network, count once.
+  std::uint64_t framesIn() const { return in_; }
+  std::uint64_t framesOut() const { return out_; }
+  std::uint64_t dropped() const { return dropped_; }
   double cpuSeconds() const;
   std::map<std::string, std::uint64_t> reasons() const;
+  std::vector<pid_t> pids() const;
 
  private:
-  std::uint64_t sum(std::uint64_t Health::*field) const;
-  std::map<InstanceId, Health> by_instance_;
+  struct Process {
+    Health health;
+    std::uint64_t in = 0, out = 0, dropped = 0;  ///< totals before its first frame
+  };
+  std::map<InstanceId, Process> by_instance_;
+  std::uint64_t in_ = 0, out_ = 0, dropped_ = 0;
 };
 
 class Reporter {
@@ -46,6 +54,8 @@ class Reporter {
   /// Arrival of the last message about a frame, by CLOCK_MONOTONIC.
   std::int64_t lastMessageNs() const { return last_message_ns_; }
   const Health* healthOf(const std::string& process) const;
+  /// The processes that were heard under this name.
+  std::vector<pid_t> pidsOf(const std::string& process) const;
 
   /// Progress text such as "frame 57/154  10.0 Hz  objects 9  latency 83 ms".
   std::string progressLine(std::size_t frames_in_all) const;

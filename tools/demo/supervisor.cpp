@@ -12,6 +12,7 @@
 
 #include "common/base/errors.h"
 #include "tools/base/files.h"
+#include "tools/demo/plan.h"
 
 namespace perdure::tools {
 namespace {
@@ -122,6 +123,7 @@ Supervisor::Supervisor(const std::string& config_file, const std::string& socket
   }
   // Runs in its own session, so that only this program receives Ctrl-C.
   process_.emplace(ProgramOptions{.command = {"supervisord", "-n", "-c", config_file},
+                                  .environment = kSupervisorEnvironment,
                                   .log = log,
                                   .own_session = true,
                                   .ends_with_parent = true});

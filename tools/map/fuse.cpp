@@ -50,10 +50,11 @@ void refuseForeign(const std::string& path, const map_store::Identity& identity)
                " is not a map of Perdure's, or its beginning is damaged; give files that "
                "map_store writes (its store.path).");
   }
-  refuse(ExitCode::kUnavailable,
-         fmt::format("The map {} cannot be read ({}: {}); this user must be able to read it and to "
-                     "write to its folder. What can be read of a damaged one: sqlite3 {} .recover",
-                     path, reason.code, reason.detail, path));
+  refuse(
+      ExitCode::kUnavailable,
+      fmt::format("The map {} cannot be read ({}: {}). What can be read of a damaged one: sqlite3 "
+                  "{} .recover",
+                  path, reason.code, reason.detail, path));
 }
 
 WholeMap readMap(const std::string& path) {
@@ -63,7 +64,6 @@ WholeMap readMap(const std::string& path) {
   }
   const auto connection = map_store::Connection::open(path, map_store::Connection::Mode::kReadOnly);
   if (!connection) cannotReadMap(path, connection.error());
-  (void)connection->execute("PRAGMA busy_timeout=1000");
   const auto identity = map_store::identityOf(*connection);
   if (!identity) cannotReadMap(path, identity.error());
   refuseForeign(path, *identity);

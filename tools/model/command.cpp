@@ -5,9 +5,12 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 
+#include "common/base/checked_file.h"
 #include "common/base/errors.h"
+#include "common/base/ids.h"
 #include "tools/model/check.h"
 #include "tools/model/importer.h"
 #include "tools/model/look.h"
@@ -66,6 +69,14 @@ void compare(const fs::path& network, const fs::path& reference) {
               answers.difference);
 }
 
+/// Adds the digest of the network to its description, so that a damaged copy is refused.
+void seal(const fs::path& network) {
+  const fs::path description = network.string() + ".model.json";
+  auto json = nlohmann::ordered_json::parse(textOf(description));
+  json["digest"] = toHex(digest(textOf(network)));
+  writeChecked(description, json.dump(1) + "\n");
+}
+
 /// Runs the Python part and checks its network in OpenCV.
 void importTo(const fs::path& out, const Staging& staging, const ImportOptions& request) {
   const TemporaryFolder reference = temporaryFolder(fs::temp_directory_path(), "perdure-model-",
@@ -79,6 +90,7 @@ void importTo(const fs::path& out, const Staging& staging, const ImportOptions& 
   }
   std::fflush(stdout);
   if (const int status = importNetwork(wanted); status != 0) throw CLI::RuntimeError(status);
+  seal(made);
   compare(made, reference.path());
   showSights(made, request.image, request.threshold, fs::path(made).replace_extension(".png"));
 }

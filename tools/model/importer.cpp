@@ -6,6 +6,8 @@
 #include "common/base/errors.h"
 #include "common/base/subprocess.h"
 #include "services/inference/core/network/network.h"
+#include "services/inference/model_file.h"
+#include "tools/base/files.h"
 
 namespace perdure::tools {
 namespace {
@@ -55,6 +57,9 @@ int importNetwork(const ImportRequest& request) {
   if (!fs::exists(kPython)) {
     throw StartupError(ExitCode::kUnavailable,
                        std::string(kPython) + " is missing; apt-get install python3-onnx");
+  }
+  if (const auto why = inference::whyNoNetwork(textOf(request.network)); !why.empty()) {
+    throw StartupError(ExitCode::kData, "{} {}", request.network.string(), why);
   }
   Subprocess python({.command = words, .environment = {{"PYTHONPATH", folder->string()}}});
   return python.waitForEnd();

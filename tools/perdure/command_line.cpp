@@ -1,15 +1,18 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <filesystem>
 #include <iostream>
 #include <string>
 #include <system_error>
 
 #include "common/base/check.h"
 #include "common/base/errors.h"
+#include "common/base/files/access.h"
 #include "tools/perdure/commands.h"
 
 namespace perdure::tools {
@@ -42,6 +45,10 @@ int run(CLI::App& app, int argc, char** argv) {
   } catch (const StartupError& error) {
     std::cerr << "perdure: " << error.what() << std::endl;
     return static_cast<int>(error.code());
+  } catch (const std::filesystem::filesystem_error& error) {
+    const std::string forbidden = whyUnreadable(error.path1());
+    std::cerr << "perdure: " << (forbidden.empty() ? error.what() : forbidden) << std::endl;
+    return static_cast<int>(ExitCode::kUnavailable);
   } catch (const std::system_error& error) {
     if (std::ferror(stdout) != 0) return refuseOutput(error.code().message());  // by fmt::print
     std::cerr << "perdure: " << error.what() << std::endl;
@@ -58,6 +65,7 @@ int run(CLI::App& app, int argc, char** argv) {
 int runCommand(const char* name, void (*set_up)(CLI::App&), int argc, char** argv) {
   const auto entry = std::ranges::find(commands(), std::string(name), &CommandEntry::name);
   check(entry != commands().end(), "a subcommand has a line in tools/perdure/commands.cpp");
+  std::signal(SIGXFSZ, SIG_IGN);  // a limit of the file size is reported like a full disk
   CLI::App app(entry->summary, std::string("perdure ") + name);
   set_up(app);
   return checkedOutput(run(app, argc, argv));

@@ -82,6 +82,12 @@ void Pipeline::checkDetectionFile() const {
   if (!detection_file_ || frames.empty() || detection_file_->rows() == 0) return;
   const auto [first, last] = std::minmax_element(
       frames.begin(), frames.end(), [](const auto& a, const auto& b) { return a.index < b.index; });
+  const CameraCalibration& camera = dataset_->calibration().cameras.front();
+  if (detection_file_->hasSizes(camera.width, camera.height)) {
+    refuse(options_.detections +
+           ": x2 and y2 are the same in nearly all rows while x1 moves, so they are a width and a "
+           "height; write x1 + width and y1 + height in their place");
+  }
   if (detection_file_->firstFrame() <= last->index && detection_file_->lastFrame() >= first->index)
     return;
   refuse(

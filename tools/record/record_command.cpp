@@ -62,6 +62,12 @@ void printSummary(const StoreReport& stored, std::uint64_t messages, const std::
 }
 
 void refuseLoss(const StoreReport& stored) {
+  if (stored.lost == 0 && stored.overrun > 0) {
+    throw StartupError(ExitCode::kInputOutput,
+                       "{} chunks were lost to a slow disk; give --out a folder on a faster disk, "
+                       "or fewer --topics",
+                       stored.overrun);
+  }
   if (stored.lost == 0) return;
   throw StartupError(ExitCode::kInputOutput,
                      fmt::format("{} messages were lost and are in no file: {}; free some room, or "

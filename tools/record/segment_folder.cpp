@@ -3,7 +3,10 @@
 #include <fcntl.h>
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <linux/magic.h>
 #include <sys/file.h>
+#include <sys/resource.h>
+#include <sys/statfs.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
 
@@ -98,6 +101,15 @@ void SegmentFolder::keepQuota() {
     remove(fs::path(sizes_.begin()->first));
     ++removed_;
   }
+}
+
+std::uint64_t SegmentFolder::largestFile() const {
+  constexpr std::uint64_t kLargestOfFat = 0xFFFF'FFFF;
+  struct statfs disk {};
+  rlimit limit{};
+  const bool fat = statfs(folder_.c_str(), &disk) == 0 && disk.f_type == MSDOS_SUPER_MAGIC;
+  getrlimit(RLIMIT_FSIZE, &limit);  // RLIM_INFINITY is the largest number
+  return std::min<std::uint64_t>(fat ? kLargestOfFat : UINT64_MAX, limit.rlim_cur);
 }
 
 bool SegmentFolder::hasRoomFor(std::uint64_t bytes) const {

@@ -27,6 +27,8 @@ class SegmentFolder {
   void remove(const std::filesystem::path& file);
   /// Removes the oldest files until the quota is met, but never the newest.
   void keepQuota();
+  /// Size limit of a file, of this process (`ulimit -f`) and of FAT.
+  std::uint64_t largestFile() const;
   /// Whether enough free space remains after `bytes` more.
   bool hasRoomFor(std::uint64_t bytes) const;
 

@@ -1,5 +1,7 @@
 #include "tools/record/segment_writer.h"
 
+#include <algorithm>
+
 #include "common/replay/recordings/mcap_reader.h"
 
 namespace perdure::tools {
@@ -19,10 +21,15 @@ bool SegmentWriter::note(const Result<void>& written) {
   return written.has_value();
 }
 
-/// A file ends after its time, or earlier if the quota would hold too few files of its size.
+/// A file ends after its time, or earlier if the quota would hold too few files of its size, or at
+/// the size limit of files.
 bool SegmentWriter::isOver(const PackedChunk& packed) const {
   constexpr std::uint64_t kFilesOfQuota = 8;
-  const bool large = folder_.quota() > 0 && file_->size() > folder_.quota() / kFilesOfQuota;
+  constexpr std::uint64_t kSummary = 1u << 20;  // bytes: schemas, and 250 for each of 1000 chunks
+  const std::uint64_t limit = folder_.largestFile();
+  const std::uint64_t end = file_->size() + packed.chunk.bytes() + std::min(kSummary, limit / 4);
+  const bool large =
+      end > limit || (folder_.quota() > 0 && file_->size() > folder_.quota() / kFilesOfQuota);
   return large || packed.steady_ns - began_ns_ >= longest_ns_;
 }
 

@@ -1,5 +1,7 @@
 #include "common/replay/files/detection_file.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,6 +17,7 @@ namespace {
 struct Columns {
   std::size_t frame = 0, x1 = 0, y1 = 0, x2 = 0, y2 = 0, score = 0, count = 0;
   char separator = ',';
+  bool mot = false;  ///< x2 and y2 are width and height, and frames count from 1
   std::optional<std::size_t> class_name, azimuth;
   std::optional<std::size_t> sigma_azimuth;
   std::optional<std::array<std::size_t, 4>> sigmas;
@@ -45,6 +48,9 @@ Columns readHeader(const std::filesystem::path& file, const TextLine& line,
                                "frame,class,x1,y1,x2,y2,score[,azimuth][,logit:<class>]");
     return 0;
   };
+  if (at.contains("w") || at.contains("width")) {
+    wrong.add(line.number, "a width and a height are no corner: write x2 = x1 + w, y2 = y1 + h");
+  }
   columns.frame = need("frame");
   columns.x1 = need("x1"), columns.y1 = need("y1");
   columns.x2 = need("x2"), columns.y2 = need("y2");
@@ -59,27 +65,44 @@ Columns readHeader(const std::filesystem::path& file, const TextLine& line,
 }
 
 Columns headerlessColumns(const TextLine& line) {
+  constexpr std::size_t kRrc = 6, kLeastOfMot = 7, kMostOfMot = 10;
   Columns columns;
   columns.separator = separatorOf(line.text);
-  columns.frame = 0, columns.x1 = 1, columns.y1 = 2, columns.x2 = 3, columns.y2 = 4;
-  columns.score = 5, columns.count = 6;
+  columns.count = split(line.text, columns.separator).size();
+  columns.mot = columns.count >= kLeastOfMot && columns.count <= kMostOfMot;
+  if (!columns.mot) columns.count = kRrc;
+  const std::size_t x1 = columns.mot ? 2 : 1;
+  columns.x1 = x1, columns.y1 = x1 + 1, columns.x2 = x1 + 2, columns.y2 = x1 + 3;
+  columns.score = x1 + 4;
   return columns;
 }
 
 /// Returns an empty string, or the error in the numbers of the row.
+std::string fillBox(const Box& box, double score, const DetectionFileOptions& options,
+                    DetectionFile::Row& row) {
+  if (box.x2 <= box.x1 || box.y2 <= box.y1) {
+    return "x1 < x2 and y1 < y2: corners, not a corner and a size";
+  }
+  if (!(score >= 0 && score <= 1)) return "score is a number from 0 to 1";
+  const double o = options.box_origin;
+  row.detection.box = Box{box.x1 - o, box.y1 - o, box.x2 - o, box.y2 - o};
+  const double clipped = std::clamp(score, options.score_floor, 1.0 - options.score_floor);
+  row.logit = std::log(clipped / (1.0 - clipped));
+  return {};
+}
+
 std::string fillBox(const std::vector<std::string_view>& fields, const Columns& columns,
                     const DetectionFileOptions& options, DetectionFile::Row& row) {
   const auto x1 = parseNumber(fields[columns.x1]), y1 = parseNumber(fields[columns.y1]);
   const auto x2 = parseNumber(fields[columns.x2]), y2 = parseNumber(fields[columns.y2]);
   const auto score = parseNumber(fields[columns.score]);
+  if (!score && fields[columns.score].find(',') != std::string_view::npos) {
+    return std::string(fields[columns.score]) + " has a decimal comma; write a point";
+  }
   if (!x1 || !y1 || !x2 || !y2) return "x1, y1, x2 and y2 are finite numbers, in pixels";
-  if (*x2 <= *x1 || *y2 <= *y1) return "x1 < x2 and y1 < y2: corners, not a corner and a size";
-  if (!score || *score < 0 || *score > 1) return "score is a number from 0 to 1";
-  const double o = options.box_origin;
-  row.detection.box = Box{*x1 - o, *y1 - o, *x2 - o, *y2 - o};
-  const double clipped = std::clamp(*score, options.score_floor, 1.0 - options.score_floor);
-  row.logit = std::log(clipped / (1.0 - clipped));
-  return {};
+  if (!score) return "score is a number from 0 to 1";
+  const bool mot = columns.mot;
+  return fillBox(Box{*x1, *y1, mot ? *x1 + *x2 : *x2, mot ? *y1 + *y2 : *y2}, *score, options, row);
 }
 
 std::string fillEvidence(const std::vector<std::string_view>& fields, const Columns& columns,
@@ -152,11 +175,16 @@ Result<NumberedRow> readRow(const std::string& text, const Columns& columns,
                             const DetectionFileOptions& options, const ClassAliases& aliases) {
   const auto fields = split(text, columns.separator);
   if (fields.size() != columns.count) {
-    return fail("detection_malformed", std::to_string(fields.size()) + " fields; " +
-                                           std::to_string(columns.count) + " are expected");
+    return fail("detection_malformed",
+                std::to_string(fields.size()) + " fields; " + std::to_string(columns.count) +
+                    " are expected (frame,x1,y1,x2,y2,score without a header; MOT's lines have 7 "
+                    "to 10)");
   }
-  const auto frame = parseInteger(fields[columns.frame]);
-  if (!frame || *frame < 0) return fail("detection_malformed", "frame is a whole number from 0");
+  auto frame = parseInteger(fields[columns.frame]);
+  if (frame && columns.mot) --*frame;
+  if (!frame || *frame < 0) {
+    return fail("detection_malformed", "frame is a whole number from {}", columns.mot ? 1 : 0);
+  }
   DetectionFile::Row row;
   row.class_name =
       aliases.canonical(columns.class_name ? fields[*columns.class_name] : options.class_name);
@@ -175,23 +203,80 @@ DetectionFile DetectionFile::read(const DetectionFileOptions& options,
   DetectionFile result;
   result.options_ = options;
   result.listed_frames_ = readFrameList(options.file);
+  if (!lines.empty() && looksLikeCoco(lines.front().text)) {
+    result.takeCoco(readCoco(options.file, options.class_name), aliases);
+  } else {
+    result.takeLines(lines, aliases);
+  }
+  result.noteClasses();
+  result.refuseShares();
+  return result;
+}
+
+void DetectionFile::takeCoco(const CocoBoxes& coco, const ClassAliases& aliases) {
+  Complaints wrong(options_.file);
+  for (const CocoBox& box : coco.boxes) {
+    Row row;
+    row.class_name = aliases.canonical(box.class_name);
+    const std::string error = fillBox(box.box, box.score, options_, row);
+    if (!error.empty())
+      wrong.add(fmt::format("{}: {}: {}", options_.file.c_str(), box.name, error));
+    rows_[box.frame].push_back(std::move(row));
+  }
+  wrong.throwIfAny();
+  if (!listed_frames_) listed_frames_ = coco.frames;
+}
+
+void DetectionFile::takeLines(const std::vector<TextLine>& lines, const ClassAliases& aliases) {
+  const DetectionFileOptions& options = options_;
   const bool headerless = isHeaderless(lines, options);
   const Columns columns =
       headerless ? headerlessColumns(lines[0]) : readHeader(options.file, lines[0], aliases);
-  for (const auto& [column, name] : columns.logits) result.logit_classes_.push_back(name);
+  for (const auto& [column, name] : columns.logits) logit_classes_.push_back(name);
   Complaints wrong(options.file);
   for (std::size_t i = headerless ? 0 : 1; i < lines.size(); ++i) {
     const auto row = readRow(lines[i].text, columns, options, aliases);
     if (row) {
-      result.rows_[row->first].push_back(row->second);
+      rows_[row->first].push_back(row->second);
     } else {
       wrong.add(lines[i].number, row.error().detail);
     }
   }
   wrong.throwIfAny();
-  if (headerless) result.first_seen_.emplace_back(0, aliases.canonical(options.class_name));
-  result.noteClasses();
-  return result;
+  if (headerless) first_seen_.emplace_back(0, aliases.canonical(options.class_name));
+}
+
+/// Refuses boxes whose sides are shares of the image.
+void DetectionFile::refuseShares() const {
+  constexpr double kMost = 1.5;  // a share may lie a little outside of the image
+  double most = 0.0;
+  for (const auto& [frame, rows] : rows_) {
+    for (const Row& row : rows) most = std::max({most, row.detection.box.x2, row.detection.box.y2});
+  }
+  if (rows_.empty() || most + options_.box_origin > kMost) return;
+  throw StartupError(ExitCode::kData,
+                     "{}: no side of a box is beyond {} px, so the numbers are shares of the "
+                     "image; multiply x1, x2 by its width and y1, y2 by its height",
+                     options_.file.c_str(), most + options_.box_origin);
+}
+
+bool DetectionFile::hasSizes(double width, double height) const {
+  constexpr std::size_t kLeast = 20;
+  constexpr double kBorder = 2.0;  // px: boxes end there that the border cuts off
+  std::map<std::pair<double, double>, std::set<double>> lefts;
+  std::map<std::pair<double, double>, std::size_t> times;
+  for (const auto& [frame, rows] : rows_) {
+    for (const Row& row : rows) {
+      const Box& box = row.detection.box;
+      lefts[{box.x2, box.y2}].insert(box.x1);
+      ++times[{box.x2, box.y2}];
+    }
+  }
+  return std::any_of(times.begin(), times.end(), [&](const auto& entry) {
+    const auto& [corner, count] = entry;
+    const bool inside = corner.first < width - kBorder && corner.second < height - kBorder;
+    return inside && rows() >= kLeast && 10 * count >= 9 * rows() && lefts[corner].size() > 2;
+  });
 }
 
 void DetectionFile::noteClasses() {

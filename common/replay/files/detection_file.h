@@ -1,7 +1,8 @@
-// Reads detections from a CSV file as evidence. Its header is `frame,class,x1,y1,x2,y2,score`.
+// Reads detections from a file as evidence: a CSV with the header `frame,class,x1,y1,x2,y2,score`.
 // Optional columns are an azimuth (its name begins with alpha or azimuth) and `logit:<class>`.
-// Alternatively it has RRC's format without header, `frame,x1,y1,x2,y2,score`; the caller then
-// gives the class.
+// Without a header, lines are RRC's `frame,x1,y1,x2,y2,score` or MOT's `frame,id,x,y,width,height,
+// score,…`, whose frames count from 1; the caller then gives the class. COCO's JSON is read too
+// (coco_file.h).
 #pragma once
 
 #include <cstdint>
@@ -13,6 +14,8 @@
 #include <vector>
 
 #include "common/replay/files/class_aliases.h"
+#include "common/replay/files/coco_file.h"
+#include "common/replay/files/text_file.h"
 #include "common/types/detections.h"
 
 namespace perdure::replay {
@@ -50,6 +53,9 @@ class DetectionFile {
   std::uint64_t lastFrame() const { return rows_.empty() ? 0 : rows_.rbegin()->first; }
   /// The number of detections in the file.
   std::size_t rows() const;
+  /// Whether x2 and y2 are probably a width and a height in images of this size: nearly all boxes
+  /// have the same, away from the image's border, and their left sides move.
+  bool hasSizes(double width, double height) const;
 
   struct Row {
     Detection detection;     ///< activations are empty until known, if the file has no logits
@@ -58,6 +64,9 @@ class DetectionFile {
   };
 
  private:
+  void takeCoco(const CocoBoxes& coco, const ClassAliases& aliases);
+  void takeLines(const std::vector<TextLine>& lines, const ClassAliases& aliases);
+  void refuseShares() const;
   void noteClasses();
   std::vector<std::string> classesAt(std::uint64_t frame) const;
 

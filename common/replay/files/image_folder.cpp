@@ -31,7 +31,10 @@ ImageFolder::ImageFolder(fs::path folder) : folder_(std::move(folder)) {
       continue;
     }
     // Of two files with the same stem, the first by name is used.
-    std::string& name = by_stem_[file.stem().string()];
+    const std::string stem = file.stem().string();
+    const auto [form, first] = by_form_.try_emplace(withoutAccents(toLower(stem)), stem);
+    if (!first && form->second != stem) form->second.clear();
+    std::string& name = by_stem_[stem];
     const std::string other = file.filename().string();
     if (name.empty() || other < name) name = other;
   }
@@ -42,8 +45,10 @@ std::optional<fs::path> ImageFolder::find(std::string_view name, TimePoint stamp
   const fs::path written(name);
   if (!name.empty() && fs::is_regular_file(folder_ / written, ignored)) return folder_ / written;
   const std::string last = written.filename().string();
+  const auto form = by_form_.find(withoutAccents(toLower(written.stem().string())));
   for (const std::string& stem :
-       {last, written.stem().string(), std::to_string(toNanoseconds(stamp))}) {
+       {last, written.stem().string(), form == by_form_.end() ? "" : form->second,
+        std::to_string(toNanoseconds(stamp))}) {
     const auto found = stem.empty() ? by_stem_.end() : by_stem_.find(stem);
     if (found == by_stem_.end()) continue;
     ++found_otherwise_;

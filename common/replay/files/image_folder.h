@@ -19,7 +19,8 @@ class ImageFolder {
   explicit ImageFolder(std::filesystem::path folder);
 
   /// Finds an image by its name; otherwise by the last part of the name with another extension or
-  /// none; otherwise by the stamp. Returns nothing if no image matches.
+  /// none, in other case or Unicode form; otherwise by the stamp. Returns nothing if no image
+  /// matches.
   std::optional<std::filesystem::path> find(std::string_view name, TimePoint stamp);
   /// Number of images, recognised by their extensions.
   std::size_t size() const { return by_stem_.size(); }
@@ -34,6 +35,8 @@ class ImageFolder {
  private:
   std::filesystem::path folder_;
   std::map<std::string, std::string, std::less<>> by_stem_;  ///< file names
+  std::map<std::string, std::string>
+      by_form_;  ///< stems in lower case, without accents; "" if ambiguous
   std::map<std::string, std::size_t> other_endings_;
   std::size_t dead_links_ = 0;
   std::string first_dead_;

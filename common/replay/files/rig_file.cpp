@@ -5,7 +5,6 @@
 #include <sstream>
 
 #include "common/base/errors.h"
-#include "common/replay/files/sensor_file.h"
 
 namespace perdure::replay {
 namespace {
@@ -35,10 +34,46 @@ SensorFile opened(const std::filesystem::path& path) {
   return SensorFile(path);
 }
 
+/// Refuses a file without any section, which would have no effect.
+void refuseForeign(const SensorFile& file, const std::string& path) {
+  if (file.has("cam0") || file.has("cam1") || file.has("imu0")) return;
+  const std::string maker = makerOf(file);
+  const bool imported = !maker.empty() && !maker.ends_with(kNotImported);
+  throw StartupError(
+      ExitCode::kData, "{} is no rig file: it has none of the sections cam0, cam1 and imu0{}; {}",
+      path, maker.empty() ? "" : " and is " + maker,
+      imported ? "`perdure calibrate import " + path + " --out rig.yaml` makes one of it"
+               : "write them with the keys of EuRoC's sensor.yaml, or use `perdure calibrate`");
+}
+
 }  // namespace
+
+std::string makerOf(const SensorFile& file) {
+  constexpr std::pair<const char*, const char*> kKeys[] = {
+      {"Camera.type", kOrbSlam},
+      {"Camera.fx", kOrbSlam},
+      {"Camera1.fx", kOrbSlam},
+      {"value0", kBasalt},
+      {"body_T_cam0", kVins},
+      {"cam0_calib", kVins},
+      {"extrinsicRotation", kVins},
+      {"projection_parameters", kVins},
+      {"mirror_parameters", kVins},
+      {"cameras", "of Spectacular AI (not imported)"},
+      {"relative_config_imucam", "of OpenVINS, which names the files to give (not imported)"},
+      {"target_type", "Kalibr's description of a board (not imported)"},
+      {"gyroscope_noise_density", "an IMU's alone, without its cameras"},
+      {"intrinsics", "one camera's"},
+      {"camera_matrix", "ROS' camera_info"}};
+  for (const auto& [key, maker] : kKeys) {
+    if (file.has(key)) return maker;
+  }
+  return {};
+}
 
 RigParts readRigParts(const std::filesystem::path& path, std::vector<std::string>* notes) {
   const SensorFile file = opened(path);
+  refuseForeign(file, path.string());
   RigParts parts;
   Calibration& rig = parts.sensors;
   const auto takeTopic = [&](const SensorFile& section, const std::string& role) {
@@ -57,7 +92,7 @@ RigParts readRigParts(const std::filesystem::path& path, std::vector<std::string
     const SensorFile imu = file.section("imu0");
     rig.imu = readImuCalibration(imu);
     takeTopic(imu, "imu");
-    for (auto& camera : rig.cameras) camera.T_BC = imu.T_BS().inverse() * camera.T_BC;
+    for (auto& camera : rig.cameras) camera.T_BC = imu.T_IB() * camera.T_BC;
     if (notes) imu.noteUnknownKeys(*notes);
   }
   return parts;
@@ -65,6 +100,7 @@ RigParts readRigParts(const std::filesystem::path& path, std::vector<std::string
 
 Calibration readRig(const std::filesystem::path& path, std::vector<std::string>* notes) {
   const SensorFile file = opened(path);
+  refuseForeign(file, path.string());
   if (!file.has("cam0")) file.wrong("cam0", "is missing");
   return readRigParts(path, notes).sensors;
 }

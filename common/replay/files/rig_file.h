@@ -9,9 +9,13 @@
 #include <string>
 #include <vector>
 
+#include "common/replay/files/sensor_file.h"
 #include "common/types/sensors.h"
 
 namespace perdure::replay {
+
+inline constexpr char kVins[] = "of VINS", kOrbSlam[] = "of ORB-SLAM3", kBasalt[] = "of Basalt",
+                      kNotImported[] = "(not imported)";
 
 /// The contents of a rig file, which may have cameras only or the IMU only.
 struct RigParts {
@@ -20,6 +24,9 @@ struct RigParts {
 };
 /// Throws StartupError with the key and the fix. `notes` receives a sentence for each unknown key.
 RigParts readRigParts(const std::filesystem::path& file, std::vector<std::string>* notes = nullptr);
+/// The origin of a calibration without sections of a rig file: "of ORB-SLAM3", or with kNotImported
+/// at its end; empty if it is not known.
+std::string makerOf(const SensorFile& file);
 /// Reads a rig file that must contain cam0.
 Calibration readRig(const std::filesystem::path& file, std::vector<std::string>* notes = nullptr);
 

@@ -113,6 +113,11 @@ std::optional<RigidTransform> SensorFile::transform(const char* key) const {
   return RigidTransform(R, Eigen::Vector3d(m.topRightCorner<3, 1>()));
 }
 
+RigidTransform SensorFile::T_IB() const {
+  const auto T_ib = transform("T_i_b");
+  return T_ib ? *T_ib : T_BS().inverse();
+}
+
 void SensorFile::wrong(const std::string& key, const std::string& what) const {
   throw StartupError(ExitCode::kData,
                      name_ + ": " + key + " " + what + "; compare it with a sensor.yaml of EuRoC");
@@ -129,7 +134,6 @@ void SensorFile::noteUnknownKeys(std::vector<std::string>& notes) const {
                                               "camera_id",
                                               "projection_matrix",
                                               "gyroscope_misalignment",
-                                              "T_i_b",
                                               "model",
                                               "T_BS",
                                               "rectification_matrix",

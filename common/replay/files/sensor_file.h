@@ -21,6 +21,11 @@ class SensorFile {
   /// key is repeated. The other functions throw if a value is missing or invalid.
   explicit SensorFile(const std::filesystem::path& file);
 
+  /// A map that was made from a file; `name` is for messages.
+  SensorFile(std::string name, YAML::Node root) : name_(std::move(name)), root_(std::move(root)) {
+    refuseKeysThatComeTwice();
+  }
+
   bool has(const std::string& key) const { return static_cast<bool>(value(key)); }
   /// The section under `key`; messages contain the name of the file.
   SensorFile section(const std::string& key) const;
@@ -37,14 +42,14 @@ class SensorFile {
   std::optional<RigidTransform> transform(const char* key) const;
   /// The pose of the sensor in the body; the identity if the file does not contain it.
   RigidTransform T_BS() const { return transform("T_BS").value_or(RigidTransform()); }
+  /// The frame of cameras in the IMU: T_i_b of Kalibr, the inverse of T_BS, or the identity.
+  RigidTransform T_IB() const;
+  const YAML::Node& root() const { return root_; }
   [[noreturn]] void wrong(const std::string& key, const std::string& what) const;
   /// Adds a sentence for each key that was not read and is not known as irrelevant.
   void noteUnknownKeys(std::vector<std::string>& notes) const;
 
  private:
-  SensorFile(std::string name, YAML::Node root) : name_(std::move(name)), root_(std::move(root)) {
-    refuseKeysThatComeTwice();
-  }
   void refuseKeysThatComeTwice() const;
   YAML::Node value(const std::string& key) const;
 

@@ -9,6 +9,7 @@
 #include <fstream>
 
 #include "common/base/errors.h"
+#include "common/base/files/access.h"
 
 namespace perdure::replay {
 namespace {
@@ -26,11 +27,29 @@ std::optional<Number> parseWhole(std::string_view text) {
   return value;
 }
 
+/// The name beside a missing file or folder that differs from it only in case or Unicode form.
+std::string similarTo(const std::filesystem::path& path) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  fs::path missing = fs::absolute(path);
+  while (missing.has_relative_path() && !fs::exists(missing.parent_path(), error)) {
+    missing = missing.parent_path();
+  }
+  const auto key = [](const fs::path& of) {
+    return withoutAccents(toLower(of.filename().string()));
+  };
+  for (const auto& entry : fs::directory_iterator(missing.parent_path(), error)) {
+    if (key(entry.path()) == key(missing) && entry.path() != missing) return entry.path().string();
+  }
+  return {};
+}
+
 }  // namespace
 
 std::vector<TextLine> readLines(const std::filesystem::path& path, std::string_view mend) {
   std::ifstream file(path);
   if (!file || std::filesystem::is_directory(path)) {
+    refuseUnreadable(path);
     throw StartupError(ExitCode::kUnavailable, "{} cannot be read; {}", path.c_str(), mend);
   }
   std::vector<TextLine> lines;
@@ -46,7 +65,22 @@ std::vector<TextLine> readLines(const std::filesystem::path& path, std::string_v
   return lines;
 }
 
+void refuseUnreadable(const std::filesystem::path& path) {
+  if (const auto why = whyUnreadable(path); !why.empty()) {
+    throw StartupError(ExitCode::kUnavailable, why);
+  }
+}
+
 void throwMissing(const std::filesystem::path& path, std::string_view what, std::string_view mend) {
+  refuseUnreadable(path);
+  const std::string similar = std::filesystem::exists(path) ? "" : similarTo(path);
+  if (!similar.empty()) {
+    throw StartupError(
+        ExitCode::kUnavailable,
+        "{} is missing: {}; {} is there, whose name differs in case or in its Unicode "
+        "form (composed or decomposed); rename it",
+        what, path.c_str(), similar);
+  }
   throw StartupError(ExitCode::kUnavailable, "{} is missing: {}; {}", what, path.c_str(), mend);
 }
 
@@ -54,6 +88,29 @@ std::string_view trim(std::string_view text) {
   const auto first = text.find_first_not_of(kBlanks);
   if (first == text.npos) return {};
   return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
+}
+
+std::string withoutAccents(std::string_view text) {
+  constexpr char32_t kFirstMark = 0x300, kLastMark = 0x36F;  // combining marks
+  constexpr char kOther = '\x01';
+  std::string result;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    if (byte >= 0x80 && byte < 0xC0) continue;  // within a character
+    if (byte < 0x80) {
+      result += text[i];
+      continue;
+    }
+    const auto next = i + 1 < text.size() ? static_cast<unsigned char>(text[i + 1]) : 0U;
+    const char32_t code = byte < 0xE0 ? (byte & 0x1FU) << 6U | (next & 0x3FU) : 0;
+    const bool mark = code >= kFirstMark && code <= kLastMark && !result.empty();
+    if (mark) {
+      result.back() = kOther;
+    } else {
+      result += kOther;
+    }
+  }
+  return result;
 }
 
 std::string toLower(std::string_view text) {

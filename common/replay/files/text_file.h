@@ -20,7 +20,16 @@ struct TextLine {
 /// StartupError(kUnavailable) if the file cannot be read; `mend` is the sentence with the fix.
 std::vector<TextLine> readLines(const std::filesystem::path& path, std::string_view mend);
 
-/// Throws StartupError(kUnavailable): "`what` is missing: `path`; `mend`".
+/// Throws StartupError(kUnavailable) if the permissions of the file or of a folder above forbid to
+/// read it.
+void refuseUnreadable(const std::filesystem::path& path);
+
+/// The text with one character in place of each one beyond ASCII, so that composed and decomposed
+/// Unicode (é as one code point, or as e and an accent) are equal.
+std::string withoutAccents(std::string_view text);
+
+/// Throws StartupError(kUnavailable): "`what` is missing: `path`; `mend`". The mend
+/// is the name that is there instead, if it differs only in case or Unicode form.
 [[noreturn]] void throwMissing(const std::filesystem::path& path, std::string_view what,
                                std::string_view mend);
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "common/base/errors.h"
+#include "common/base/files/sqlite_file.h"
 #include "common/replay/recordings/ros_messages.h"
 #include "common/ros/definition.h"
 
@@ -25,14 +26,14 @@ std::string textIn(sqlite3_stmt* row, int column) {
 class Db3 : public RosSource {
  public:
   explicit Db3(const std::filesystem::path& path) : path_(path) {
-    sqlite3* database = nullptr;
-    const int opened = sqlite3_open_v2(path.c_str(), &database, SQLITE_OPEN_READONLY, nullptr);
-    database_.reset(database);
-    if (opened != SQLITE_OK) refuse(sqlite3_errmsg(database));
+    const OpenedSqlite opened = openSqliteToRead(path);
+    database_.reset(opened.connection);
     std::error_code ignored;
     if (std::filesystem::file_size(path, ignored) == 0) refuse("it is empty, 0 bytes");
+    if (opened.code != SQLITE_OK) refuse(opened.why);
     readTopics();
     countMessages();
+    if (end_ns_ == 0) refuseLeftBehind();
   }
 
   void rewind(const std::set<std::string>& wanted, std::uint64_t from_ns) override {
@@ -96,7 +97,17 @@ class Db3 : public RosSource {
             *data, data};
   }
 
+  /// The recorder writes to FILE-wal first. Without it a file of a killed recorder is empty.
+  void refuseLeftBehind() const {
+    if (!lacksWriteAheadLog(path_)) return;
+    throw StartupError(ExitCode::kData,
+                       "{0} has no message: it was copied without {1}-wal, which has them; copy "
+                       "that file from the recorder's disk, too",
+                       path_.string(), path_.filename().string());
+  }
+
   [[noreturn]] void refuse(const std::string& why) const {
+    refuseLeftBehind();
     if (sqlite3_errcode(database_.get()) == SQLITE_CORRUPT) {
       throw StartupError(ExitCode::kData, path_.string() + " is damaged (" + why + "); `sqlite3 " +
                                               path_.string() +

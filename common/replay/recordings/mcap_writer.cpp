@@ -177,7 +177,7 @@ Result<void> Writer::write(const std::vector<std::uint8_t>& bytes) {
       if (ftruncate(file_.get(), static_cast<off_t>(size_)) != 0) {
         return fail("file", "{}: {}", path_.c_str(), std::strerror(errno));
       }
-      const bool full = error == ENOSPC || error == EDQUOT;
+      const bool full = error == ENOSPC || error == EDQUOT || error == EFBIG;
       return fail(full ? "disk_full" : "file", "{}: {}", path_.c_str(), std::strerror(error));
     }
     done += static_cast<std::size_t>(n);

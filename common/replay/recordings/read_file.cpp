@@ -7,6 +7,8 @@
 #include <cerrno>
 #include <cstring>
 
+#include "common/base/files/access.h"
+
 namespace perdure::replay {
 namespace {
 
@@ -20,7 +22,11 @@ Result<ReadFile> ReadFile::open(const std::filesystem::path& path) {
   ReadFile file;
   file.path_ = path;
   file.file_ = Descriptor(openedToRead(path));
-  if (!file.file_.open()) return fail("file", "{}: {}", path.c_str(), std::strerror(errno));
+  if (!file.file_.open()) {
+    const std::string why_not = path.string() + ": " + std::strerror(errno);
+    const std::string forbidden = whyUnreadable(path);
+    return fail("file", "{}", forbidden.empty() ? why_not : forbidden);
+  }
   struct stat status {};
   if (fstat(file.file_.get(), &status) != 0 || !S_ISREG(status.st_mode)) {
     return fail("file", "{}: not a file", path.c_str());

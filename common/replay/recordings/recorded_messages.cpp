@@ -6,6 +6,7 @@
 #include "common/base/algorithms/folder.h"
 #include "common/base/errors.h"
 #include "common/base/ids.h"
+#include "common/replay/recordings/recording_parts.h"
 
 namespace perdure::replay {
 namespace {
@@ -47,7 +48,9 @@ RecordedMessages::RecordedMessages(const fs::path& path, Chunks look)
   for (const auto& file : unpacked_) files.push_back(file->path());
   std::sort(files.begin(), files.end(),
             [](const auto& a, const auto& b) { return a.filename() < b.filename(); });
-  for (const fs::path& file : files) openFile(file, look);
+  std::vector<RecordingPart> parts;
+  for (const fs::path& file : files) openFile(file, look, parts);
+  notes_ = joinParts(std::move(parts));
   for (std::size_t i = 0; i < files_.size(); ++i) {
     for (const auto& chunk : files_[i].chunks()) chunks_.push_back({i, &chunk});
   }
@@ -63,7 +66,8 @@ RecordedMessages::RecordedMessages(const fs::path& path, Chunks look)
   rewind();
 }
 
-void RecordedMessages::openFile(const fs::path& path, Chunks look) {
+void RecordedMessages::openFile(const fs::path& path, Chunks look,
+                                std::vector<RecordingPart>& parts) {
   auto reader = mcap::Reader::open(path);
   if (!reader) {
     if (reader.error().code == "file") {
@@ -80,6 +84,7 @@ void RecordedMessages::openFile(const fs::path& path, Chunks look) {
   }
   for (const mcap::Damage& one : reader->damage()) reasons_.add(one.reason);
   if (!reader->damage().empty()) last_problem_ = mcap::sentenceOfDamage(givenFor(path), *reader);
+  RecordingPart part{givenFor(path), UINT64_MAX, 0, {}};
   const auto& catalogue = reader->catalogue();
   for (const auto& [id, n] : reader->statistics().by_channel) {
     const auto channel = catalogue.channels.find(id);
@@ -92,11 +97,15 @@ void RecordedMessages::openFile(const fs::path& path, Chunks look) {
       topic.schema_encoding = schema->second.encoding;
     }
     topic.messages += n;
+    part.topics.insert(channel->second.topic);
   }
   for (const auto& chunk : reader->chunks()) {
-    start_ns_ = std::min(start_ns_, chunk.start_ns);
-    end_ns_ = std::max(end_ns_, chunk.end_ns);
+    part.start_ns = std::min(part.start_ns, chunk.start_ns);
+    part.end_ns = std::max(part.end_ns, chunk.end_ns);
   }
+  start_ns_ = std::min(start_ns_, part.start_ns);
+  end_ns_ = std::max(end_ns_, part.end_ns);
+  parts.push_back(std::move(part));
   reader->letGo();  // a folder may have more segments than a process may open
   files_.push_back(*std::move(reader));
 }
@@ -119,7 +128,7 @@ std::string RecordedMessages::whyUnfinished(const mcap::Reader& reader) const {
 }
 
 std::vector<std::string> RecordedMessages::notes() const {
-  std::vector<std::string> notes;
+  std::vector<std::string> notes = notes_;
   for (const auto& file : unpacked_) notes.push_back(file->note());
   return notes;
 }

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "common/replay/recordings/mcap_reader.h"
+#include "common/replay/recordings/recording_parts.h"
 #include "common/replay/recordings/unpacked_file.h"
 #include "common/wire/cdr.h"
 
@@ -56,7 +57,7 @@ class RecordedMessages {
   /// Counts of files without a summary and of damaged chunks found so far.
   const ReasonCounts& reasons() const { return reasons_; }
   const std::string& lastProblem() const { return last_problem_; }
-  /// Notes for users about unpacked files.
+  /// Notes for users about unpacked files and about files that were joined.
   std::vector<std::string> notes() const;
 
   /// Restarts with these topics only (all if `wanted` is empty), without chunks that end before
@@ -79,7 +80,7 @@ class RecordedMessages {
     }
   };
 
-  void openFile(const std::filesystem::path& path, Chunks look);
+  void openFile(const std::filesystem::path& path, Chunks look, std::vector<RecordingPart>& parts);
   std::string whyUnfinished(const mcap::Reader& reader) const;
   std::filesystem::path givenFor(const std::filesystem::path& file) const;
   void count(const Reason& reason);
@@ -87,6 +88,7 @@ class RecordedMessages {
   void load(const ChunkPlace& place);
   bool isRepeated(const RecordedMessage& message);
 
+  std::vector<std::string> notes_;
   UnpackedFiles unpacked_;  // must be destroyed after the files
   std::vector<mcap::Reader> files_;
   std::vector<ChunkPlace> chunks_;  // sorted by time

@@ -4,6 +4,7 @@
 
 #include "common/base/algorithms/folder.h"
 #include "common/replay/recordings/recorded_messages.h"
+#include "common/replay/recordings/recording_parts.h"
 #include "common/replay/recordings/unpack.h"
 #include "common/ros/definition.h"
 
@@ -74,10 +75,27 @@ bool RosMessages::looksLikeOne(const fs::path& path) {
 }
 
 RosMessages::RosMessages(const fs::path& path) : unpacked_(unpackedFiles(path, ".db3")) {
-  for (const auto& file : filesWith(path, ".bag")) sources_.push_back(openBag(file));
-  for (const auto& file : filesWith(path, ".db3")) sources_.push_back(openDb3(file));
-  for (const auto& file : unpacked_) sources_.push_back(openDb3(file->path()));
-  if (sources_.empty()) sources_.push_back(std::make_unique<McapSource>(path));
+  std::vector<RecordingPart> parts;
+  const auto add = [&](std::unique_ptr<RosSource> source, const fs::path& file) {
+    RecordingPart part{file, source->startNs(), source->endNs(), {}};
+    for (const auto& [name, topic] : source->topics()) {
+      if (topic.messages > 0) part.topics.insert(name);
+    }
+    parts.push_back(std::move(part));
+    sources_.push_back(std::move(source));
+  };
+  for (const auto& file : filesWith(path, ".bag")) add(openBag(file), file);
+  for (const auto& file : filesWith(path, ".db3")) add(openDb3(file), file);
+  for (const auto& file : unpacked_) add(openDb3(file->path()), file->packed());
+  notes_ = joinParts(std::move(parts));
+  const auto others = filesWith(path, ".mcap");
+  if (sources_.empty()) {
+    sources_.push_back(std::make_unique<McapSource>(path));
+  } else if (!others.empty()) {
+    notes_.push_back(others.front().string() +
+                     " is left out, because the folder holds .bag or .db3 files; give it alone to "
+                     "read it");
+  }
   for (const auto& source : sources_) {
     start_ns_ = std::min(start_ns_, source->startNs());
     end_ns_ = std::max(end_ns_, source->endNs());
@@ -91,7 +109,7 @@ RosMessages::RosMessages(const fs::path& path) : unpacked_(unpackedFiles(path, "
 }
 
 std::vector<std::string> RosMessages::notes() const {
-  std::vector<std::string> notes;
+  std::vector<std::string> notes = notes_;
   for (const auto& file : unpacked_) notes.push_back(file->note());
   for (const auto& source : sources_) {
     for (auto& note : source->notes()) notes.push_back(std::move(note));

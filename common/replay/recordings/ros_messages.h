@@ -42,7 +42,7 @@ class RosSource {
   /// Restarts with these topics only, without data that ended before `from_ns`.
   virtual void rewind(const std::set<std::string>& wanted, std::uint64_t from_ns) = 0;
   virtual std::optional<RosMessage> next() = 0;
-  /// Notes for users about unpacked files.
+  /// Notes for users about unpacked files and about files that were joined.
   virtual std::vector<std::string> notes() const { return {}; }
   /// Recording time of the first message; the next function returns that of the last one.
   std::uint64_t startNs() const { return start_ns_; }
@@ -92,6 +92,7 @@ class RosMessages : public RosSource {
   /// damaged, which is counted.
   bool unpack(RosMessage& message);
   UnpackedFiles unpacked_;  ///< for SQLite files; must be destroyed after the sources
+  std::vector<std::string> notes_;
   std::vector<std::unique_ptr<RosSource>> sources_;
   std::vector<std::optional<RosMessage>> heads_;  ///< the next message of each source
 };

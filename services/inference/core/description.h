@@ -111,6 +111,7 @@ struct Azimuth {
 
 struct ModelDescription {
   std::string name;
+  std::string digest;  ///< of the network and its weights; empty: not known
   Family family = Family::kYolox;
   Input input;
   std::vector<std::string> classes;  ///< lower-case, unique, in the order of the network

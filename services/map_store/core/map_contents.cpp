@@ -191,8 +191,8 @@ void completeFile(const WholeMap& map, const std::string& path) {
 }
 
 [[noreturn]] void cannotWriteWhole(const std::string& path, const Reason& reason) {
-  const bool full = reason.code == "disk_full";
-  throw StartupError(ExitCode::kUnavailable,
+  const bool full = exitCodeOf(reason) == ExitCode::kInputOutput;
+  throw StartupError(exitCodeOf(reason),
                      "The map " + path + " cannot be written (" + reason.code + ": " +
                          reason.detail + "); " +
                          (full ? "free space there, or name a file on another disk."

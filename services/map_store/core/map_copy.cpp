@@ -25,9 +25,7 @@ namespace fs = std::filesystem;
                            "; give another one. What can be read of it: sqlite3 " + from +
                            " .recover");
   }
-  throw StartupError(ExitCode::kUnavailable,
-                     "The map " + from + " cannot be read" + why +
-                         "; this user must be able to read it and to write to its folder.");
+  throw StartupError(ExitCode::kUnavailable, "The map " + from + " cannot be read" + why + ".");
 }
 
 std::string mendOfWriting(const Reason& reason) {
@@ -37,9 +35,8 @@ std::string mendOfWriting(const Reason& reason) {
 }
 
 [[noreturn]] void cannotWrite(const std::string& to, const Reason& reason) {
-  throw StartupError(ExitCode::kUnavailable, "The map cannot be copied to " + to + " (" +
-                                                 reason.code + ": " + reason.detail + "); " +
-                                                 mendOfWriting(reason));
+  throw StartupError(exitCodeOf(reason), "The map cannot be copied to " + to + " (" + reason.code +
+                                             ": " + reason.detail + "); " + mendOfWriting(reason));
 }
 
 Connection openSource(const std::string& from) {
@@ -50,7 +47,6 @@ Connection openSource(const std::string& from) {
   }
   auto connection = Connection::open(from, Connection::Mode::kReadOnly);
   if (!connection) cannotRead(from, connection.error());
-  (void)connection->execute("PRAGMA busy_timeout=1000");
   const auto identity = identityOf(*connection);
   if (!identity) cannotRead(from, identity.error());
   if (identity->application != kApplicationId) {

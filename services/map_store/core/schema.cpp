@@ -37,14 +37,14 @@ CREATE TABLE working(position INTEGER PRIMARY KEY, id INTEGER NOT NULL, belief B
 
 std::string mendOfUse(const Reason& reason) {
   if (reason.code == "disk_full") return "free space, or raise store.max_size.";
+  if (reason.code == "io_error") return "see the disk and the size limit of files (ulimit -f).";
   if (reason.code == "busy") return "end the other program that writes it.";
   return "set store.path to a file in a folder that this user may write.";
 }
 
 [[noreturn]] void cannotUse(const std::string& path, const Reason& reason) {
-  const auto code = reason.code == "disk_full" ? ExitCode::kInputOutput : ExitCode::kUnavailable;
-  throw StartupError(code, "The map " + path + " cannot be used (" + reason.code + ": " +
-                               reason.detail + "); " + mendOfUse(reason));
+  throw StartupError(exitCodeOf(reason), "The map " + path + " cannot be used (" + reason.code +
+                                             ": " + reason.detail + "); " + mendOfUse(reason));
 }
 
 bool damaged(const Reason& reason) {
@@ -185,14 +185,12 @@ Connection openStoreForReading(const std::string& path) {
                                                    "map_store writes (its store.path).");
   }
   auto connection = Connection::open(path, Connection::Mode::kReadOnly);
-  if (!connection) cannotUse(path, connection.error());
-  const auto identity = identityOf(*connection);
+  const auto identity = connection.and_then(identityOf);
   if (!identity) {
     throw StartupError(ExitCode::kUnavailable,
                        "The map " + path + " cannot be read (" + identity.error().detail + ").");
   }
   refuseForeign(path, *identity);
-  (void)connection->execute("PRAGMA busy_timeout=1000");
   return std::move(*connection);
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "common/base/check.h"
+#include "common/base/files/sqlite_file.h"
 
 namespace perdure::map_store {
 namespace {
@@ -50,6 +51,11 @@ Reason reasonOf(int code, std::string_view detail) {
       break;
   }
   return {word, std::string(detail)};
+}
+
+ExitCode exitCodeOf(const Reason& reason) {
+  const bool writing = reason.code == "disk_full" || reason.code == "io_error";
+  return writing ? ExitCode::kInputOutput : ExitCode::kUnavailable;
 }
 
 void Statement::Finalize::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
@@ -128,10 +134,16 @@ bool Statement::isNumber(int column) const {
 void Connection::Close::operator()(sqlite3* connection) const { sqlite3_close_v2(connection); }
 
 Result<Connection> Connection::open(const std::string& path, Mode mode) {
+  if (mode == Mode::kReadOnly) {
+    const OpenedSqlite opened = openSqliteToRead(path);
+    Connection connection(opened.connection);
+    if (opened.code != SQLITE_OK) return tl::unexpected(reasonOf(opened.code, opened.why));
+    return connection;
+  }
   sqlite3* raw = nullptr;
-  const int flags =
-      mode == Mode::kReadOnly ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
-  const int code = sqlite3_open_v2(path.c_str(), &raw, flags | SQLITE_OPEN_NOMUTEX, nullptr);
+  const int code =
+      sqlite3_open_v2(path.c_str(), &raw,
+                      SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, nullptr);
   Connection connection(raw);
   if (code != SQLITE_OK) return failure(code, raw);
   sqlite3_extended_result_codes(raw, 1);

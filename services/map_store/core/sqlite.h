@@ -12,6 +12,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "common/base/errors.h"
 #include "common/base/result.h"
 #include "common/base/time.h"
 
@@ -24,6 +25,9 @@ namespace perdure::map_store {
 /// "not_a_database", "cannot_open", "io_error", "constraint" or "database_error"; the detail is
 /// SQLite's sentence.
 Reason reasonOf(int code, std::string_view detail);
+
+/// The exit status of a program that ends for this reason: 74 for a failed write, else 69.
+ExitCode exitCodeOf(const Reason& reason);
 
 /// A failure on its way through the functions of one module, up to attempt().
 struct Failed : std::exception {

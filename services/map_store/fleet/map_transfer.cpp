@@ -39,8 +39,8 @@ std::string mendOf(const Reason& reason) {
 }
 
 [[noreturn]] void giveUp(const std::string& what, const Reason& reason) {
-  throw StartupError(ExitCode::kUnavailable, what + " (" + reason.code + ": " + reason.detail +
-                                                 "); " + mendOf(reason) + ".");
+  throw StartupError(exitCodeOf(reason), what + " (" + reason.code + ": " + reason.detail + "); " +
+                                             mendOf(reason) + ".");
 }
 
 template <class T>

@@ -178,6 +178,10 @@ TEST(Fields, SetTakesYamlValuesAndReportsWithoutAPlace) {
   Example e;
   Fields fields = describe(e);
   EXPECT_THAT(assign(fields, "imu.offsets=[0, 0, 1]"), IsEmpty());
+  EXPECT_THAT(assign(fields, "model=/a #b: [c/net.onnx"), IsEmpty());
+  EXPECT_EQ(e.model, "/a #b: [c/net.onnx") << "a path is not YAML";
+  EXPECT_THAT(assign(fields, "model=\"0000\""), IsEmpty());
+  EXPECT_EQ(e.model, "0000");
   EXPECT_THAT(e.offsets, ElementsAre(0, 0, 1));
   EXPECT_THAT(lines(assign(fields, "tracker.max_points=5")),
               ElementsAre("--set tracker.max_points=5: tracker.max_points: 5 is not 10 … 1000"));

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <fstream>
+#include <thread>
 
 #include "common/base/subprocess.h"
 #include "common/bus/wait_loop.h"
@@ -81,6 +82,38 @@ TEST_F(Service, SaysWhatToMendWhereItCannotStart) {
   const ProgramAnswer outcome = runProbe({"--set", "bus.interface=nosuch0"});
   EXPECT_EQ(outcome.status, 69);
   EXPECT_THAT(outcome.output, HasSubstr("bus.interface names an interface"));
+}
+
+TEST_F(Service, NamesAWrongDomainOfTheEnvironmentAndItsRange) {
+  for (const char* wrong : {"abc", "300", "-5", "7x", " 7", "1.5", "99999999999999999999"}) {
+    const ProgramAnswer outcome =
+        runProgram({.command = {probe()}, .environment = {{"PERDURE_DOMAIN", wrong}}},
+                   std::chrono::seconds(10));
+    EXPECT_EQ(outcome.status, 78) << wrong;
+    EXPECT_THAT(outcome.output, HasSubstr("PERDURE_DOMAIN is `" + std::string(wrong) +
+                                          "`, which is not a whole number 0 … 230"));
+  }
+}
+
+TEST_F(Service, EndsInOrderWhenItsTerminalIsClosedButNotUnderNohup) {
+  const auto status = [](std::vector<std::string> command) {
+    const std::string log = testing::TempDir() + "perdure_service_hangup.log";
+    std::remove(log.c_str());
+    Subprocess running({.command = std::move(command), .log = log});
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    const auto started = [&] {
+      std::ifstream in(log);
+      return std::string(std::istreambuf_iterator<char>(in), {}).find("version") !=
+             std::string::npos;
+    };
+    while (!started() && std::chrono::steady_clock::now() < end) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    running.signal(SIGHUP);
+    return running.wait(std::chrono::seconds(2));
+  };
+  EXPECT_EQ(status({probe()}), 0);
+  EXPECT_FALSE(status({"nohup", probe()}));
 }
 
 TEST_F(Service, WorksTellsItsHealthAndEndsInOrderAtSigterm) {

@@ -213,7 +213,7 @@ TEST_F(MapCopy, SaysWhereItCannotBeWrittenAndLeavesNoPart) {
       copyMap(from_, to_);
     } catch (const StartupError& error) {
       const bool says = std::string(error.what()).find("cannot be copied to " + to_) == 8;
-      _exit(error.code() == ExitCode::kUnavailable && says ? 0 : 3);
+      _exit(error.code() == ExitCode::kInputOutput && says ? 0 : 3);
     }
     _exit(1);
   }

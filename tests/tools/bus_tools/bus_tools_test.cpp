@@ -96,6 +96,15 @@ TEST_F(BusTools, HzTellsTheRate) {
   EXPECT_THAT(outcome.output, HasSubstr(" Hz, interval "));
 }
 
+TEST_F(BusTools, HzDoesNotCountMessagesFromBeforeItsStart) {
+  const bus::Domain domain{bus::Options{}};
+  const bus::Participant participant(domain, "capture");
+  bus::Writer<ImuSample> imu(participant, bus::kTopic<ImuSample>);
+  for (int i = 0; i < 400; ++i) EXPECT_TRUE(imu.write(ImuSample{}));
+  EXPECT_THAT(run({perdure, "hz", "imu", "--seconds", "1.5"}).output,
+              HasSubstr("imu: 0 messages, 1 writers"));
+}
+
 TEST_F(BusTools, TopicsListsTheTableAndWhoIsThere) {
   const ProgramAnswer outcome = runWhilePublishing({perdure, "topics"});
   EXPECT_EQ(outcome.status, 0);

@@ -16,8 +16,11 @@ namespace perdure::calibrate {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class RigImport : public ::testing::Test {
  protected:
@@ -104,6 +107,143 @@ TEST_F(RigImport, KalibrsFilesAreTheNativeRig) {
   expectSame(imported.rig, native);
   // The written file must read back the same.
   expectSame(replay::readRig(file("rig.yaml", replay::rigText(imported.rig, "imported"))), native);
+}
+
+// The same calibration in the words of other programs.
+const std::string kVinsLens =
+    "%YAML:1.0\n---\nmodel_type: PINHOLE\ncamera_name: camera\nimage_width: 752\n"
+    "image_height: 480\ndistortion_parameters:\n   k1: -0.28340811\n   k2: 0.07395907\n"
+    "   p1: 0.00019359\n   p2: 1.76187114e-05\nprojection_parameters:\n   fx: 458.654\n"
+    "   fy: 457.296\n   cx: 367.215\n   cy: 248.375\n";
+const std::string kVinsNoise = "acc_n: 0.08\ngyr_n: 0.004\nacc_w: 4.0e-5\ngyr_w: 2.0e-6\n";
+const std::string kMatrix =
+    "!!opencv-matrix\n   rows: 4\n   cols: 4\n   dt: d\n   data: "
+    "[0, 0, 1, 0.07, -1, 0, 0, 0.01, 0, -1, 0, -0.02, 0, 0, 0, 1]\n";
+const std::string kOrbSlam =
+    "%YAML:1.0\nFile.version: \"1.0\"\nCamera.type: \"PinHole\"\nCamera1.fx: 458.654\n"
+    "Camera1.fy: 457.296\nCamera1.cx: 367.215\nCamera1.cy: 248.375\nCamera1.k1: -0.28340811\n"
+    "Camera1.k2: 0.07395907\nCamera1.p1: 0.00019359\nCamera1.p2: 1.76187114e-05\n"
+    "Camera.width: 752\nCamera.height: 480\nCamera.newWidth: 600\nCamera.fps: 20\nIMU.T_b_c1: " +
+    kMatrix +
+    "IMU.NoiseGyro: 1.6968e-04\nIMU.NoiseAcc: 2.0e-3\nIMU.GyroWalk: 1.9393e-05\n"
+    "IMU.AccWalk: 3.0e-3\nIMU.Frequency: 200.0\nORBextractor.nFeatures: 1000\n";
+
+TEST_F(RigImport, CalibrationsOfVinsAndOrbSlamAreTheNativeRig) {
+  const Calibration native = replay::readRig(file("native.yaml", kNative));
+  Calibration without_imu = native;
+  without_imu.imu.reset();
+  const auto mono = importRig(
+      {file("vins_mono.yaml",
+            kVinsLens + kVinsNoise +
+                "imu_topic: \"/imu0\"\nextrinsicRotation: !!opencv-matrix\n   rows: 3\n   cols: 3\n"
+                "   dt: d\n   data: [0, 0, 1, -1, 0, 0, 0, -1, 0]\nextrinsicTranslation: "
+                "!!opencv-matrix\n   rows: 3\n   cols: 1\n   dt: d\n   data: [0.07, 0.01, -0.02]\n"
+                "td: 0.0031\nrolling_shutter: 0\nrolling_shutter_tr: 0.02\n")});
+  expectSame(mono.rig, without_imu);
+  EXPECT_THAT(mono.found, Contains(HasSubstr("no noise of the IMU")));
+  file("cam0_pinhole.yaml", kVinsLens);
+  const fs::path fusion = file("vins_fusion.yaml",
+                               "%YAML:1.0\nimu: 1\nnum_of_cam: 1\ncam0_calib: "
+                               "\"cam0_pinhole.yaml\"\nbody_T_cam0: " +
+                                   kMatrix + kVinsNoise + "td: 0.0031\n");
+  expectSame(importRig({fusion}).rig, without_imu);
+  expectSame(importRig({fusion, file("imu.yaml", kKalibrImu)}).rig, native);
+  Calibration orb = importRig({file("orb.yaml", kOrbSlam)}).rig;
+  EXPECT_EQ(orb.cameras[0].rate_hz, 20.0);
+  orb.cameras[0].time_offset_s = 0.0031;  // ORB-SLAM3 knows no offset
+  expectSame(orb, native);
+}
+
+TEST_F(RigImport, TheSecondCameraOfOrbSlamIsPlacedByTheFirst) {
+  const std::string second =
+      "Camera2.fx: 457\nCamera2.fy: 456\nCamera2.cx: 379\nCamera2.cy: 255\nStereo.T_c1_c2: "
+      "!!opencv-matrix\n   rows: 4\n   cols: 4\n   dt: f\n"
+      "   data: [1, 0, 0, 0.11, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n";
+  const auto rig = importRig({file("orb.yaml", kOrbSlam + second)}).rig;
+  ASSERT_EQ(rig.cameras.size(), 2u);
+  const RigidTransform T_C0_C1 = rig.cameras[0].T_BC.inverse() * rig.cameras[1].T_BC;
+  EXPECT_NEAR(T_C0_C1.p.x(), 0.11, 1e-12);
+  EXPECT_EQ(rig.cameras[1].distortion, DistortionModel::kNone);
+}
+
+TEST_F(RigImport, RollingShutterOfVinsIsStampedAtTheFirstRow) {
+  const auto rig =
+      importRig(
+          {file("vins.yaml", kVinsLens + "body_T_cam0: " + kMatrix +
+                                 "td: -0.01\nrolling_shutter: 1\nrolling_shutter_tr: 0.02\n")})
+          .rig;
+  EXPECT_NEAR(rig.cameras[0].time_offset_s, 0.0, 1e-12);
+  EXPECT_EQ(rig.cameras[0].readout_s, 0.02);
+}
+
+std::string basalt(const std::string& accel_scale = "0.0") {
+  return "{\"value0\": {\"T_imu_cam\": [{\"px\": 0.07, \"py\": 0.01, \"pz\": -0.02,\n"
+         "\"qx\": -0.5, \"qy\": 0.5, \"qz\": -0.5, \"qw\": 0.5}], \"intrinsics\": [\n"
+         "{\"camera_type\": \"kb4\", \"intrinsics\": {\"fx\": 380.8, \"fy\": 380.7, "
+         "\"cx\": 510.3,\n\"cy\": 514.3, \"k1\": 0.01, \"k2\": -0.02, \"k3\": 0.03, \"k4\": "
+         "-0.004}}],\n\"resolution\": [[1024, 1024]], \"vignette\": [],\n"
+         "\"calib_accel_bias\": [0.01, 0.02, 0.03, " +
+         accel_scale +
+         ", 0, 0, 0, 0, 0], \"calib_gyro_bias\": [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0],\n"
+         "\"imu_update_rate\": 200.0, \"accel_noise_std\": [0.016, 0.016, 0.02],\n"
+         "\"gyro_noise_std\": [0.000282, 0.000282, 0.000282], \"accel_bias_std\": [0.001, 0.001, "
+         "0.001],\n\"gyro_bias_std\": [0.0001, 0.0001, 0.0001], \"cam_time_offset_ns\": "
+         "-3000000}}\n";
+}
+
+TEST_F(RigImport, BasaltsJsonIsRead) {
+  const auto rig = importRig({file("calibration.json", basalt())}).rig;
+  const auto& camera = rig.cameras.at(0);
+  EXPECT_EQ(camera.distortion, DistortionModel::kEquidistant);
+  EXPECT_EQ(camera.distortion_coefficients[3], -0.004);
+  EXPECT_EQ(camera.width, 1024u);
+  EXPECT_DOUBLE_EQ(camera.time_offset_s, -0.003);
+  EXPECT_LT(
+      (camera.T_BC.matrix() - transformOf("0 0 1 .07  -1 0 0 .01  0 -1 0 -.02  0 0 0 1").matrix())
+          .cwiseAbs()
+          .maxCoeff(),
+      1e-12);
+  ASSERT_TRUE(rig.imu);
+  EXPECT_EQ(rig.imu->accel_noise, 0.02);
+  EXPECT_EQ(rig.imu->gyro_bias_walk, 0.0001);
+  EXPECT_THAT(
+      importRig({file("scaled.json", basalt("0.012"))}).ignored,
+      ElementsAre(HasSubstr("calib_accel_bias holds scales and misalignments of up to 1.2 %")));
+}
+
+TEST_F(RigImport, KalibrsCamerasAreSeenFromAnotherImuThanTheReference) {
+  const std::string other =
+      "T_i_b:\n- [1, 0, 0, 0.5]\n- [0, 1, 0, 0]\n- [0, 0, 1, 0]\n"
+      "- [0, 0, 0, 1]\n";
+  const auto chain = file("camchain.yaml", kChain);
+  const auto place = [&](const std::string& imu) {
+    return importRig({chain, file("imu.yaml", imu)}).rig.cameras[0].T_BC.p.x();
+  };
+  EXPECT_NEAR(place(kKalibrImu), 0.07, 1e-12);
+  EXPECT_NEAR(place(kKalibrImu + other), 0.57, 1e-12);
+}
+
+TEST_F(RigImport, FilesOfOtherProgramsAreNamedAsARig) {
+  const auto why = [&](const std::string& name, const std::string& text) -> std::string {
+    try {
+      replay::readRigParts(file(name, text));
+    } catch (const StartupError& error) {
+      return error.what();
+    }
+    return "it was taken";
+  };
+  const std::string imports = "`perdure calibrate import ";
+  EXPECT_THAT(why("orb.yaml", kOrbSlam), AllOf(HasSubstr("of ORB-SLAM3"), HasSubstr(imports)));
+  EXPECT_THAT(why("vins.yaml", kVinsLens), AllOf(HasSubstr("of VINS"), HasSubstr(imports)));
+  EXPECT_THAT(why("basalt.json", basalt()), AllOf(HasSubstr("of Basalt"), HasSubstr(imports)));
+  EXPECT_THAT(why("imu.yaml", kKalibrImu), AllOf(HasSubstr("an IMU's alone"), HasSubstr(imports)));
+  EXPECT_THAT(why("ost.yaml", kCameraInfo), AllOf(HasSubstr("camera_info"), HasSubstr(imports)));
+  EXPECT_THAT(why("sai.json", "{\"cameras\": [{\"focalLengthX\": 500}]}"),
+              AllOf(HasSubstr("of Spectacular AI (not imported)"), Not(HasSubstr(imports))));
+  EXPECT_THAT(why("board.yaml", "target_type: aprilgrid\n"),
+              HasSubstr("Kalibr's description of a"));
+  EXPECT_THAT(why("other.yaml", "speed: 3\n"),
+              HasSubstr("none of the sections cam0, cam1 and imu0"));
 }
 
 TEST_F(RigImport, CameraInfoIsTheSameWithAPlace) {

@@ -138,11 +138,12 @@ TEST_F(DemoPlan, EmptiesAnEarlierRunButNoFolderOfSomeoneElse) {
 }
 
 TEST_F(DemoPlan, QuotesWordsForSupervisord) {
-  options_.model = "/odd \"name\" 100%/net.onnx";
+  options_.model = "/odd \"name\" 100% ;a #b/net.onnx";
   const auto folders = prepareFolders(options_);
   const std::string config =
       supervisorConfig(planServices(options_, folders), folders, "/tmp/s.sock", options_.root);
-  EXPECT_THAT(config, HasSubstr(R"("model.path=/odd \"name\" 100%%/net.onnx")"));
+  EXPECT_THAT(config, HasSubstr(R"("model.path=/odd \"name\" 100%% %(ENV_PERDURE_SEMICOLON)sa )"
+                                R"(%(ENV_PERDURE_HASH)sb/net.onnx")"));
   EXPECT_THAT(config, HasSubstr("[program:semantic_filter]"));
   EXPECT_THAT(config, HasSubstr("file=/tmp/s.sock"));
 }

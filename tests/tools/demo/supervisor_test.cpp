@@ -117,7 +117,7 @@ class Supervision : public ::testing::Test {
     }
     std::string name = (fs::temp_directory_path() / "perdure-sv-XXXXXX").string();
     place_ = mkdtemp(name.data());
-    folders_.out = place_ / "50% off";
+    folders_.out = place_ / "50% off ;a #b";
     fs::create_directories(folders_.out);
     folders_.run = folders_.state = folders_.out;
   }

@@ -297,6 +297,17 @@ class Families(Importing):
         self.assertIn("1 priors were given for",
                       self.refused(path, NAMES, boxes, f"--priors={self.folder / 'priors.txt'}")[0])
 
+    def test_rotated_boxes_are_named_and_their_angle_is_no_class(self):
+        path = self.made(tiny.yolov8)
+        model = onnx.load(str(path))
+        helper.set_model_props(model, {"task": "obb", "names": "{0: 'car', 1: 'dog'}"})
+        onnx.save(model, str(path))
+        message, status = self.refused(path)
+        self.assertIn("finds rotated boxes (task obb)", message)
+        self.assertEqual(status, 78)
+        message, _ = self.refused(self.made(tiny.yolox), "--classes=car,person")
+        self.assertIn("is the last one the angle of rotated boxes", message)
+
     def test_outputs_that_could_both_be_the_boxes_are_asked_about(self):
         self.assertIn("could both be the boxes; say --boxes", self.refused(self.made(tiny.ssd_offsets), NAMES)[0])
 

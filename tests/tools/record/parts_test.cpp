@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 #include <sched.h>
 #include <sys/mount.h>
+#include <sys/resource.h>
 
 #include <algorithm>
+#include <csignal>
 
 #include "common/base/errors.h"
 #include "common/replay/recordings/mcap_reader.h"
@@ -71,6 +73,29 @@ TEST(SegmentWriter, KeepsTheQuotaByRemovingTheOldest) {
   EXPECT_LE(bytes, kQuota);
   EXPECT_GT(bytes, kQuota / 2);
   EXPECT_EQ(bytes, folder.bytes());
+}
+
+TEST(SegmentWriter, BeginsANewFileAtTheSizeLimitOfFiles) {
+  const test::Folder place;
+  SegmentFolder folder(place.file("rec"), kNoLimit, kNoLimit);
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const rlimit small{200'000, before.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+  const auto disposition = std::signal(SIGXFSZ, SIG_IGN);
+  SegmentWriter writer(folder, 60.0, "");
+  for (int i = 0; i < 40; ++i) EXPECT_TRUE(writer.add(chunkAt(i, 10'000)));
+  EXPECT_FALSE(writer.add(chunkAt(41, 400'000))) << "no file can hold it";
+  EXPECT_THAT(writer.problem(), HasSubstr("File too large"));
+  writer.finish();
+  std::signal(SIGXFSZ, disposition);
+  setrlimit(RLIMIT_FSIZE, &before);
+  const auto files = filesIn(place.file("rec"));
+  EXPECT_GT(files.size(), 1u);
+  for (const auto& file : files) {
+    EXPECT_GT(messagesIn(file), 0) << file << " is not finished";
+    EXPECT_LE(fs::file_size(file), 200'000u);
+  }
 }
 
 TEST(SegmentWriter, LeavesTheDiskWhatIsToBeLeft) {

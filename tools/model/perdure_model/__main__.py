@@ -30,6 +30,7 @@ USUAL_CLUTTER_RATE = 0.79  # measured for the networks in services/inference/REA
 
 def recognise(path, graph, size, request):
     sayings.refuse_own(path, graph)
+    sayings.refuse_rotated(path, graph)
     heads, others = tracing.find_heads(graph)
     found = []
     if heads and request.family not in ("ssd", "detr"):
@@ -67,8 +68,9 @@ def check_names(path, found, request, graph):
         raise Fault(f"{path} does not say the names of its {found.classes} classes; give --classes FILE or "
                     "NAME,NAME,…", USAGE)
     if len(names) != found.classes:
+        rotated = "; or is the last one the angle of rotated boxes (OBB), which are not read?"
         raise Fault(f"{path} ({found.family}) has {found.classes} classes and {len(names)} names were given; "
-                    "give as many, in the network's order")
+                    f"give as many, in the network's order{rotated if found.classes == len(names) + 1 else ''}")
     return names
 
 

@@ -57,6 +57,13 @@ def refuse_own(path, graph):
                     "tools/train wrote beside it")
 
 
+def refuse_rotated(path, graph):
+    """Refuses rotated boxes, whose angle would be taken for a class."""
+    if graph.metadata.get("task") == "obb":
+        raise Fault(f"{path} finds rotated boxes (task obb), and Perdure reads upright ones; export a network that was "
+                    f"trained for the task detect. {exports('yolov8')}")
+
+
 def inside(path, graph, family, onnx_runtime):
     """The remaining operators that OpenCV 4.6 lacks. Refuses them without ONNX Runtime, and refuses
     operators of other runtimes or with subgraphs."""

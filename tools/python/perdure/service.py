@@ -175,15 +175,17 @@ def _answers_of(said, asked, k: int) -> List["messages.Detection"]:
 
 @contextlib.contextmanager
 def _ended_by_signal():
-    """SIGTERM ends ``publish`` in order, like Ctrl-C."""
-    before = None
+    """SIGTERM and SIGHUP (unless ignored) end ``publish`` in order, like Ctrl-C."""
+    before = {}
     if threading.current_thread() is threading.main_thread():
-        before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            if signal.getsignal(number) != signal.SIG_IGN:
+                before[number] = signal.signal(number, lambda *_: sys.exit(0))
     try:
         yield
     finally:
-        if before is not None:
-            signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def publish(

@@ -131,6 +131,89 @@ TEST(DetectionFile, TablesOfOtherProgramsAreReadWhereTheirMeaningIsSure) {
   EXPECT_EQ(readCsv("3 1 2 3 4 .5\n", options).at(3)->size(), 1U) << "without a header";
 }
 
+DetectionFileOptions ofClass(const char* name) {
+  DetectionFileOptions options;
+  options.class_name = name;
+  return options;
+}
+
+TEST(DetectionFile, MotLinesAreReadWithFramesFromOne) {
+  const auto file =
+      readCsv("1,-1,100,90,40,60,.9,-1,-1,-1\n3,7,10.5,20,30,40,.5,-1,-1,-1\n", ofClass("car"));
+  ASSERT_EQ(file.at(0)->size(), 1U);
+  EXPECT_DOUBLE_EQ(file.at(0)->front().box.x2, 140.0);
+  EXPECT_DOUBLE_EQ(file.at(0)->front().box.y2, 150.0);
+  EXPECT_DOUBLE_EQ(file.at(2)->front().box.x1, 10.5);
+  EXPECT_EQ(readCsv("1 2 100 90 40 60 1 3 .8\n", ofClass("car")).at(0)->size(), 1U) << "gt.txt";
+  const auto wrong = [](const std::string& line) {
+    return startupErrorOf([&] { readCsv(line, ofClass("car")); });
+  };
+  EXPECT_THAT(wrong("0,-1,100,90,40,60,.9,-1,-1,-1\n"),
+              HasSubstr("frame is a whole number from 1"));
+  EXPECT_THAT(wrong("1,-1,100,90,40,60,-1,-1,-1,-1\n"), HasSubstr("score"));
+  EXPECT_THAT(wrong("1,-1,100,90,-40,60,.9,-1,-1,-1\n"), HasSubstr("x1 < x2"));
+  EXPECT_THAT(wrong("0 .5 .5 .1 .2\n"), HasSubstr("MOT's lines have 7 to 10"));
+}
+
+constexpr char kCocoTables[] =
+    R"({"images": [{"id": 11, "file_name": "0/000002.png"}, {"id": 12, "file_name": "x.png"}],
+        "categories": [{"id": 3, "name": "Car"}, {"id": 4, "name": "Van"}], "annotations": [)";
+
+TEST(DetectionFile, CocoIsReadAsResultsAndWithItsTables) {
+  const std::string results =
+      R"([{"image_id": 2, "category_id": 3, "bbox": [100, 90, 40, 60], "score": 0.9}])";
+  const auto plain = readCsv(results, ofClass("car"));
+  ASSERT_EQ(plain.at(2)->size(), 1U);
+  EXPECT_DOUBLE_EQ(plain.at(2)->front().box.y2, 150.0);
+  EXPECT_THAT(plain.modelAt(2).classes, ElementsAre("car"));
+  EXPECT_THAT(*plain.at(0), IsEmpty());
+  EXPECT_THAT(errorOfCsv(results), HasSubstr("no name of category 3: give --class"));
+  const auto whole = readCsv(
+      std::string(kCocoTables) +
+      R"({"id": 1, "image_id": 11, "category_id": 4, "bbox": [1, 2, 30.5, 40], "area": 3}]})");
+  EXPECT_DOUBLE_EQ(whole.at(2)->front().box.x2, 31.5);
+  EXPECT_THAT(whole.modelAt(2).classes, ElementsAre("van"));
+  EXPECT_THAT(*whole.at(12), IsEmpty()) << "an image without annotations";
+  EXPECT_FALSE(whole.at(0)) << "no image";
+}
+
+TEST(DetectionFile, WhatIsWrongInCocoIsNamed) {
+  const auto results = [](const std::string& annotation) {
+    return startupErrorOf([&] { readCsv("[" + annotation + "]", ofClass("car")); });
+  };
+  EXPECT_THAT(results(R"({"image_id": 0, "category_id": 3, "bbox": [1, 2, 3, 4)"),
+              HasSubstr("is no whole JSON"));
+  EXPECT_THAT(results(R"({"image_id": "a", "category_id": 3, "bbox": [1, 2, 3, 4]})"),
+              HasSubstr("`image_id`: \"a\""));
+  EXPECT_THAT(results(R"({"image_id": 0, "category_id": 3, "segmentation": []})"),
+              HasSubstr("annotation 0 without `bbox`"));
+  EXPECT_THAT(results(R"({"image_id": 0, "category_id": 3, "bbox": [1, 2, -3, 4]})"),
+              HasSubstr("annotation 0: x1 < x2"));
+  EXPECT_THAT(results(R"({"image_id": 0, "category_id": 3, "bbox": [1, 2, 3, 4]},)"
+                      R"({"image_id": 0, "category_id": 1, "bbox": [1, 2, 3, 4]})"),
+              HasSubstr("--class names one category only"));
+  EXPECT_THAT(errorOfCsv(R"({"version": "5.0", "shapes": []})"), HasSubstr("no list of COCO's"));
+  EXPECT_THAT(errorOfCsv("3"), HasSubstr("--class"));
+}
+
+TEST(DetectionFile, SharesOfTheImageAndSizesAreRecognised) {
+  const std::string header = "frame,class,x1,y1,x2,y2,score\n";
+  EXPECT_THAT(errorOfCsv(header + "0,car,.3,.4,.45,.7,.9\n1,car,.3,.4,1.02,.7,.9\n"),
+              HasSubstr("shares of the image"));
+  EXPECT_EQ(errorOfCsv(header + "0,car,.3,.4,2,3,.9\n"), "");
+  EXPECT_THAT(errorOfCsv("frame;class;x1;y1;x2;y2;score\n0;car;1;2;3;4;0,9\n"),
+              HasSubstr("0,9 has a decimal comma"));
+  EXPECT_THAT(errorOfCsv("frame,class,x,y,w,h,score\n0,car,1,2,3,4,.9\n"),
+              HasSubstr("write x2 = x1 + w"));
+  std::string sizes = header, cut = header;
+  for (int k = 0; k < 60; ++k) {
+    sizes += std::to_string(k) + ",car," + std::to_string(20 + k / 10) + ",30,80,90,.9\n";
+    cut += std::to_string(k) + ",car," + std::to_string(200 + k) + ",30,319,239,.9\n";
+  }
+  EXPECT_TRUE(readCsv(sizes).hasSizes(320, 240));
+  EXPECT_FALSE(readCsv(cut).hasSizes(320, 240)) << "the border of the image cuts them off";
+}
+
 TEST(DetectionFile, EveryWrongLineIsLocated) {
   const std::string h = kHeader;
   EXPECT_THAT(errorOfCsv(h + "0,car,1,2,3,4,0.5,\n0,car,9,2,3,4,0.5,\n"),

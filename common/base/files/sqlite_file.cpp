@@ -1,0 +1,100 @@
+#include "common/base/files/sqlite_file.h"
+
+#include <fmt/format.h>
+#include <sqlite3.h>
+#include <sys/stat.h>
+
+#include <array>
+#include <fstream>
+#include <sstream>
+
+#include "common/base/files/access.h"
+
+namespace perdure {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The address of a file for SQLite, which takes options after a question mark.
+std::string addressOf(const fs::path& file, const char* options) {
+  std::string address = "file://";
+  for (const char c : fs::absolute(file).string()) {
+    const bool special = c == '%' || c == '?' || c == '#';
+    address += special ? fmt::format("%{:02X}", static_cast<unsigned char>(c)) : std::string(1, c);
+  }
+  return address + options;
+}
+
+int openAs(const std::string& name, sqlite3*& connection) {
+  constexpr int kFlags = SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_URI;
+  sqlite3_close(connection);
+  if (const int code = sqlite3_open_v2(name.c_str(), &connection, kFlags, nullptr)) return code;
+  sqlite3_extended_result_codes(connection, 1);
+  sqlite3_busy_timeout(connection, 1000);
+  // Opening does not touch the file; this does.
+  return sqlite3_exec(connection, "PRAGMA schema_version", nullptr, nullptr, nullptr);
+}
+
+bool holds(const fs::path& file, const char* suffix) {
+  std::error_code missing;
+  const auto size = fs::file_size(file.string() + suffix, missing);
+  return !missing && size > 0;
+}
+
+/// " (process 12)": the one that locks the file, if the kernel names it. The file is not opened,
+/// because closing it would release locks of this process.
+std::string lockerOf(const fs::path& file) {
+  struct stat status {};
+  if (stat(file.c_str(), &status) != 0) return {};
+  const std::string inode = fmt::format(":{} ", status.st_ino);
+  std::ifstream locks("/proc/locks");
+  for (std::string line; std::getline(locks, line);) {
+    std::string number, kind, advisory, mode, process;
+    std::istringstream(line) >> number >> kind >> advisory >> mode >> process;
+    if (line.find(inode) != std::string::npos && mode == "WRITE" && process != "0") {
+      return " (process " + process + ")";
+    }
+  }
+  return {};
+}
+
+std::string whyNot(const fs::path& file, int code, const char* of_sqlite) {
+  if (std::string why = whyUnreadable(file); !why.empty()) return why;
+  const int kind = code & 0xff;
+  if (kind == SQLITE_BUSY || kind == SQLITE_LOCKED) {
+    return file.string() + " is locked by another program" + lockerOf(file) +
+           "; end it, or read a copy";
+  }
+  for (const char* suffix : {"-wal", "-journal"}) {
+    const bool wants_to_write = kind == SQLITE_READONLY || kind == SQLITE_CANTOPEN;
+    if (!wants_to_write || !holds(file, suffix)) continue;
+    return fmt::format(
+        "{0} has unfinished changes in {0}{1}, which can be read only in a folder that this user "
+        "may write; copy both files to one",
+        file.string(), suffix);
+  }
+  return of_sqlite;
+}
+
+}  // namespace
+
+OpenedSqlite openSqliteToRead(const fs::path& file) {
+  OpenedSqlite opened;
+  opened.code = openAs(addressOf(file, ""), opened.connection);
+  const int kind = opened.code & 0xff;
+  const bool wants_to_write = kind == SQLITE_READONLY || kind == SQLITE_CANTOPEN;
+  if (wants_to_write && !holds(file, "-wal") && !holds(file, "-journal")) {
+    opened.code = openAs(addressOf(file, "?immutable=1"), opened.connection);
+  }
+  if (opened.code != 0) opened.why = whyNot(file, opened.code, sqlite3_errmsg(opened.connection));
+  return opened;
+}
+
+bool lacksWriteAheadLog(const fs::path& file) {
+  constexpr std::size_t kWriteVersion = 18;  // in the header; 2: WAL mode
+  std::array<char, kWriteVersion + 1> head{};
+  std::ifstream(file, std::ios::binary).read(head.data(), head.size());
+  return head[kWriteVersion] == 2 && !holds(file, "-wal");
+}
+
+}  // namespace perdure

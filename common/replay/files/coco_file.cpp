@@ -1,0 +1,122 @@
+#include "common/replay/files/coco_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "common/base/errors.h"
+#include "common/replay/files/text_file.h"
+
+namespace perdure::replay {
+namespace {
+
+using Json = nlohmann::json;
+
+class CocoReader {
+ public:
+  CocoReader(const std::filesystem::path& file, const std::string& class_name)
+      : file_(file), class_name_(class_name) {}
+
+  CocoBoxes read() {
+    const Json json = Json::parse(std::ifstream(file_), nullptr, false);
+    if (json.is_discarded()) refuse("is no whole JSON document; write it again");
+    const Json& boxes = json.is_array() ? json : memberOf(json, "annotations");
+    if (!boxes.is_array()) refuse("is no list of COCO's results and has no `annotations`");
+    if (json.is_object()) readTables(json);
+    for (std::size_t i = 0; i < boxes.size(); ++i) take(boxes[i], fmt::format("annotation {}", i));
+    return std::move(result_);
+  }
+
+ private:
+  [[noreturn]] void refuse(const std::string& why, ExitCode code = ExitCode::kData) const {
+    throw StartupError(code, file_.string() + " " + why);
+  }
+
+  /// Null if there is none.
+  static const Json& memberOf(const Json& object, const char* name) {
+    static const Json kNone;
+    const auto found = object.is_object() ? object.find(name) : object.end();
+    return found == object.end() ? kNone : *found;
+  }
+
+  void readTables(const Json& json) {
+    for (const Json& category : memberOf(json, "categories")) {
+      const Json& name = memberOf(category, "name");
+      if (name.is_string()) names_[memberOf(category, "id").dump()] = name.get<std::string>();
+    }
+    const Json& images = memberOf(json, "images");
+    if (images.is_array() && !images.empty()) result_.frames.emplace();
+    for (const Json& image : images) {
+      const Json& name = memberOf(image, "file_name");
+      const auto number =
+          name.is_string()
+              ? parseInteger(std::filesystem::path(name.get<std::string>()).stem().string())
+              : std::nullopt;
+      const std::uint64_t frame =
+          number && *number >= 0 ? static_cast<std::uint64_t>(*number) : frameOf(image, "id");
+      frames_[memberOf(image, "id").dump()] = frame;
+      result_.frames->insert(frame);
+    }
+  }
+
+  std::uint64_t frameOf(const Json& object, const char* name) const {
+    const Json& id = memberOf(object, name);
+    if (id.is_number_unsigned()) return id.get<std::uint64_t>();
+    refuse(fmt::format("has `{}`: {}; it must be the number of a frame of the drive, from 0", name,
+                       id.dump()));
+  }
+
+  void take(const Json& annotation, const std::string& name) {
+    CocoBox box;
+    box.name = name;
+    const auto image = frames_.find(memberOf(annotation, "image_id").dump());
+    box.frame = image != frames_.end() ? image->second : frameOf(annotation, "image_id");
+    box.class_name = classOf(memberOf(annotation, "category_id"));
+    const Json& sides = memberOf(annotation, "bbox");
+    const bool whole =
+        sides.is_array() && sides.size() == 4 &&
+        std::all_of(sides.begin(), sides.end(), [](const Json& side) { return side.is_number(); });
+    if (!whole) refuse("has " + name + " without `bbox`: [x, y, width, height]");
+    const auto v = sides.get<std::vector<double>>();
+    box.box = {v[0], v[1], v[0] + v[2], v[1] + v[3]};
+    const Json& score = memberOf(annotation, "score");
+    if (score.is_number()) box.score = score.get<double>();
+    result_.boxes.push_back(std::move(box));
+  }
+
+  std::string classOf(const Json& category) {
+    const auto name = names_.find(category.dump());
+    if (name != names_.end()) return name->second;
+    unnamed_.insert(category.dump());
+    if (unnamed_.size() == 1 && !class_name_.empty()) return class_name_;
+    refuse(fmt::format("has no name of category {}: {}, or add `categories`: {{\"categories\": "
+                       "[{{\"id\": {}, \"name\": \"car\"}}, …], \"annotations\": […]}}",
+                       category.dump(),
+                       unnamed_.size() > 1 ? "--class names one category only"
+                                           : "give --class NAME if there is one category",
+                       category.dump()),
+           ExitCode::kUsage);
+  }
+
+  const std::filesystem::path& file_;
+  const std::string& class_name_;
+  std::map<std::string, std::string> names_;     ///< of categories
+  std::map<std::string, std::uint64_t> frames_;  ///< of images
+  std::set<std::string> unnamed_;                ///< categories
+  CocoBoxes result_;
+};
+
+}  // namespace
+
+bool looksLikeCoco(std::string_view first_line) {
+  return first_line.starts_with('[') || first_line.starts_with('{');
+}
+
+CocoBoxes readCoco(const std::filesystem::path& file, const std::string& class_name) {
+  return CocoReader(file, class_name).read();
+}
+
+}  // namespace perdure::replay

@@ -1,0 +1,68 @@
+#include "services/inference/model_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "common/base/errors.h"
+#include "common/base/ids.h"
+#include "tests/services/inference/tiny_model.h"
+
+namespace perdure::inference {
+namespace {
+
+using ::testing::HasSubstr;
+
+TEST(ModelFile, WhatIsNoNetworkIsNamed) {
+  const std::pair<std::string, const char*> cases[] = {
+      {"version https://git-lfs.github.com/spec/v1\noid sha256:1\nsize 3\n", "git lfs pull"},
+      {"\n<!DOCTYPE html><html>", "page in HTML"},
+      {"<html lang=en>", "page in HTML"},
+      {std::string("\x1c\0\0\0TFL3", 8), "TensorFlow Lite"},
+      {"PK\x03\x04 archive/data.pkl", "PyTorch"},
+      {"<?xml version='1.0'?><net>", "OpenVINO"},
+      {"\x1f\x8b\x08", "compressed"},
+      {"\x89HDF\r\n", "Keras"}};
+  for (const auto& [bytes, words] : cases) EXPECT_THAT(whyNoNetwork(bytes), HasSubstr(words));
+  EXPECT_EQ(whyNoNetwork(""), "");
+  EXPECT_EQ(whyNoNetwork("\x08\x07\x12\x07pytorch"), "") << "ONNX";
+  EXPECT_EQ(whyNoNetwork("[net]\nwidth=320\n"), "") << "Darknet";
+}
+
+TEST(ModelFile, ADamagedNetworkIsRefusedByTheDigestOfItsDescription) {
+  const auto folder =
+      std::filesystem::temp_directory_path() / ("perdure-model-file-" + std::to_string(getpid()));
+  const testing::TinyModel tiny;
+  const std::string network = tiny.write(folder), described = network + ".model.json";
+  std::string digest_of_network;
+  const auto read = [&] {
+    const std::string key =
+        digest_of_network.empty() ? "" : "\"digest\": \"" + digest_of_network + "\", ";
+    std::ofstream(described) << "{" << key << tiny.json().substr(1);
+    return readModelFile(network, "", {});
+  };
+  const ModelFile file = read();  // without a digest
+  digest_of_network = toHex(digest(file.network + file.darknet_weights));
+  EXPECT_NO_THROW(read());
+  std::fstream weights(folder / "tiny.weights", std::ios::in | std::ios::out | std::ios::binary);
+  weights.seekp(30);
+  weights.put('\x5a');
+  weights.close();
+  EXPECT_THROW(
+      {
+        try {
+          read();
+        } catch (const StartupError& error) {
+          EXPECT_EQ(error.code(), ExitCode::kConfiguration);
+          EXPECT_THAT(error.what(), HasSubstr("damaged or replaced"));
+          throw;
+        }
+      },
+      StartupError);
+  std::filesystem::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace perdure::inference

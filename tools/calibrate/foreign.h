@@ -1,0 +1,24 @@
+// Calibrations of VINS, ORB-SLAM3 and Basalt as sections of a rig file.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/replay/files/sensor_file.h"
+
+namespace perdure::calibrate {
+
+struct ForeignRig {
+  YAML::Node sections;             ///< cam0, cam1 and imu0 with the keys of Kalibr
+  std::vector<std::string> notes;  ///< for people
+  std::vector<std::string> without_effect;
+};
+
+/// Converts the file; returns nothing if it is of another program. A camera whose file does not say
+/// where it is has no transform. Throws StartupError with the key and the fix.
+std::optional<ForeignRig> sectionsOf(const replay::SensorFile& file,
+                                     const std::filesystem::path& path);
+
+}  // namespace perdure::calibrate
