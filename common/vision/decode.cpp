@@ -11,24 +11,54 @@ namespace {
 
 using std::string_view_literals::operator""sv;
 
-/// libjpeg fills missing data with grey and reports success. The end marks are checked instead.
-bool endsAsItShould(std::string_view bytes) {
-  constexpr std::string_view kJpegStart = "\xFF\xD8"sv, kJpegEnd = "\xFF\xD9"sv;
-  constexpr std::string_view kPngStart = "\x89PNG"sv, kPngEnd = "IEND\xAE\x42\x60\x82"sv;
-  constexpr std::size_t kTrailing = 64;  // writers may add padding after the end mark
-  const auto tail = bytes.substr(bytes.size() - std::min(bytes.size(), kTrailing));
-  if (bytes.starts_with(kJpegStart)) return tail.find(kJpegEnd) != tail.npos;
-  if (bytes.starts_with(kPngStart)) return tail.find(kPngEnd) != tail.npos;
-  return true;
+/// Byte `at` as a number; 0 behind the end.
+std::size_t byteAt(std::string_view bytes, std::size_t at) {
+  return at < bytes.size() ? static_cast<unsigned char>(bytes[at]) : 0;
 }
 
+/// Walks over the segments of a JPEG to its end mark. A thumbnail's end mark lies inside a segment,
+/// and what follows the end mark (padding, a vendor's trailer) is not read.
+bool hasJpegEnd(std::string_view bytes) {
+  constexpr std::size_t kEnd = 0xD9, kFirstOfNoLength = 0xD0;
+  for (std::size_t at = 2; at + 1 < bytes.size();) {
+    const std::size_t mark = byteAt(bytes, at + 1);
+    const bool is_mark = byteAt(bytes, at) == 0xFF && mark != 0 && mark != 0xFF;
+    if (is_mark && mark == kEnd) return true;
+    if (is_mark && (mark < kFirstOfNoLength || mark > kEnd)) {
+      at += 2 + std::max<std::size_t>(2, 256 * byteAt(bytes, at + 2) + byteAt(bytes, at + 3));
+    } else {  // compressed data, up to the next mark
+      at = std::min(bytes.find('\xFF', at + (is_mark ? 2 : 1)), bytes.size());
+    }
+  }
+  return false;
+}
+
+bool hasPngEnd(std::string_view bytes) {
+  for (std::size_t at = 8; at + 12 <= bytes.size();) {
+    if (bytes.substr(at + 4, 4) == "IEND") return true;
+    std::size_t length = 0;
+    for (std::size_t i = 0; i < 4; ++i) length = 256 * length + byteAt(bytes, at + i);
+    at += 12 + length;
+  }
+  return false;
+}
+
+/// libjpeg fills missing data with grey and reports success. The end marks are checked instead.
+bool endsAsItShould(std::string_view bytes) {
+  if (bytes.starts_with("\xFF\xD8"sv)) return hasJpegEnd(bytes);
+  return !bytes.starts_with("\x89PNG"sv) || hasPngEnd(bytes);
+}
+
+/// The pixels as the sensor gave them: an orientation tag (EXIF) does not turn them.
+constexpr int kAsSensed = cv::IMREAD_IGNORE_ORIENTATION;
+
 int readFlags(std::optional<ImageEncoding> encoding) {
-  if (!encoding) return cv::IMREAD_ANYCOLOR;
-  return *encoding == ImageEncoding::kBgr8 ? cv::IMREAD_COLOR : cv::IMREAD_GRAYSCALE;
+  if (!encoding) return kAsSensed | cv::IMREAD_ANYCOLOR;
+  return kAsSensed | (*encoding == ImageEncoding::kBgr8 ? cv::IMREAD_COLOR : cv::IMREAD_GRAYSCALE);
 }
 
 constexpr std::size_t kDepthOfPng = 24;
-constexpr int kSixteenGrey = cv::IMREAD_ANYDEPTH | cv::IMREAD_GRAYSCALE;
+constexpr int kSixteenGrey = kAsSensed | cv::IMREAD_ANYDEPTH | cv::IMREAD_GRAYSCALE;
 
 std::string headOf(const std::string& path) {
   std::string head(kDepthOfPng + 1, '\0');

@@ -1,4 +1,6 @@
-// Decodes image files (PNG, JPEG). Truncated files are refused instead of being filled with grey.
+// The one decoder of images (PNG, JPEG). Pixels are as the sensor gave them: an orientation tag
+// (EXIF) does not turn them, because lens and T_BS are those of the sensor. Truncated images are
+// refused instead of being filled with grey; bytes after the end mark are ignored.
 #pragma once
 
 #include <opencv2/core/mat.hpp>
