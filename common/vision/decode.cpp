@@ -57,6 +57,13 @@ int readFlags(std::optional<ImageEncoding> encoding) {
   return kAsSensed | (*encoding == ImageEncoding::kBgr8 ? cv::IMREAD_COLOR : cv::IMREAD_GRAYSCALE);
 }
 
+int reducedBy(int factor) {
+  if (factor == 1) return 0;
+  return factor == 2   ? cv::IMREAD_REDUCED_GRAYSCALE_2
+         : factor == 4 ? cv::IMREAD_REDUCED_GRAYSCALE_4
+                       : cv::IMREAD_REDUCED_GRAYSCALE_8;
+}
+
 constexpr std::size_t kDepthOfPng = 24;
 constexpr int kSixteenGrey = kAsSensed | cv::IMREAD_ANYDEPTH | cv::IMREAD_GRAYSCALE;
 
@@ -85,8 +92,8 @@ int bitsOf(const cv::Mat& image) {
 
 }  // namespace
 
-Result<cv::Mat> decodeImage(std::string_view bytes, std::optional<ImageEncoding> encoding,
-                            int bits) {
+Result<cv::Mat> decodeImage(std::string_view bytes, std::optional<ImageEncoding> encoding, int bits,
+                            int reduce) {
   if (bytes.empty()) return fail("image_truncated", "the file is empty");
   if (!endsAsItShould(bytes)) return fail("image_truncated", "the end of the image is missing");
   auto* data = const_cast<char*>(bytes.data());
@@ -94,7 +101,8 @@ Result<cv::Mat> decodeImage(std::string_view bytes, std::optional<ImageEncoding>
   cv::Mat image;
   try {
     const bool scaled = bits < 16;
-    image = cv::imdecode(raw, readFlags(encoding) | (scaled ? cv::IMREAD_ANYDEPTH : 0));
+    image = cv::imdecode(
+        raw, readFlags(encoding) | reducedBy(reduce) | (scaled ? cv::IMREAD_ANYDEPTH : 0));
     if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / (1 << (bits - 8)));
   } catch (const cv::Exception& error) {
     return fail("image_corrupt", error.what());
@@ -104,7 +112,7 @@ Result<cv::Mat> decodeImage(std::string_view bytes, std::optional<ImageEncoding>
 }
 
 Result<cv::Mat> decodeImageFile(const std::string& path, std::optional<ImageEncoding> encoding,
-                                int bits) {
+                                int bits, int reduce) {
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   const auto size = file ? std::streamoff(file.tellg()) : -1;
   if (size < 0 || std::filesystem::is_directory(path)) {
@@ -113,7 +121,7 @@ Result<cv::Mat> decodeImageFile(const std::string& path, std::optional<ImageEnco
   std::string bytes(static_cast<std::size_t>(size), '\0');
   file.seekg(0).read(bytes.data(), size);
   bytes.resize(static_cast<std::size_t>(file.gcount()));
-  auto image = decodeImage(bytes, encoding, bits);
+  auto image = decodeImage(bytes, encoding, bits, reduce);
   if (!image) return fail(image.error().code, path + ": " + image.error().detail);
   return image;
 }

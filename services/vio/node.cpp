@@ -319,7 +319,9 @@ void Node::publish(const FrameStamp& stamp, const FrameEstimate& e) {
   o.stamp = stamp;
   o.instance = instance_;
   o.world = world_;
-  unaided_frames_ = e.at_rest || e.points_used > 0 ? 0 : unaided_frames_ + 1;
+  const bool unaided = !e.at_rest && e.points_used == 0;
+  if (unaided) reasons_.add("frame_without_update");
+  unaided_frames_ = unaided ? unaided_frames_ + 1 : 0;
   const bool degraded = degraded_frames_ > 0 || unaided_frames_ > kUnaidedFrames;
   if (degraded_frames_ > 0) --degraded_frames_;
   o.state = degraded ? OdometryState::kDegraded : OdometryState::kTracking;
