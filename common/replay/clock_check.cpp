@@ -224,8 +224,8 @@ DataFinding findingOf(const ClockChange& first, std::size_t count, const std::st
   using Grade = DataFinding::Grade;
   const std::string sensor = nameOfSensor(first.sensor);
   const bool back = first.after < first.before;
-  const std::string step = secondsText(between(first.after, first.before)) +
-                           (count > 1 ? fmt::format(" ({} times in all)", count) : "");
+  const std::string more = count > 1 ? fmt::format(" ({} times in all)", count) : "",
+                    step = secondsText(between(first.after, first.before)) + more;
   if (first.kind == Kind::kCounter) {
     return {Grade::kWarning, "clock_wrapped",
             fmt::format("{}: the stamps of {} go back by {}: a counter of {} came round; they are "
@@ -242,7 +242,7 @@ DataFinding findingOf(const ClockChange& first, std::size_t count, const std::st
     return {Grade::kWarning, "clock_set",
             fmt::format("{}: the clock was set {} by {} in mid-drive, for all sensors alike; the "
                         "drive is read on without that step",
-                        places, back ? "back" : "ahead", secondsText(first.added))};
+                        places, back ? "back" : "ahead", secondsText(first.added) + more)};
   }
   const bool judged = first.sensor == "imu" || first.sensor == "frame";
   return {judged ? Grade::kFatal : Grade::kWarning, "clock_set_alone",
@@ -250,6 +250,25 @@ DataFinding findingOf(const ClockChange& first, std::size_t count, const std::st
                       sensor, back ? "go back" : "jump ahead", step,
                       isRestart(first) ? ", to their start: the device was restarted"
                                        : ", those of the other sensors not so: its clock was set")};
+}
+
+/// A pause of one sensor that ends later than the other one by as much is none.
+void addSetAhead(const Recording& recording, const ClockChange& pause, DataFinding& finding) {
+  if (recording.imu.empty() || recording.frames.empty()) return;
+  const auto ofBoth = [](const auto& a, const auto& b) {
+    return std::pair(between(a.front().time, b.front().time),
+                     between(a.back().time, b.back().time));
+  };
+  const auto [starts, ends] = pause.sensor == "imu" ? ofBoth(recording.imu, recording.frames)
+                                                    : ofBoth(recording.frames, recording.imu);
+  const Duration half = between(pause.after, pause.before) / 2;
+  if (std::chrono::abs(starts) > half || ends < half) return;
+  finding.grade = DataFinding::Grade::kFatal, finding.code = "clock_set_alone";
+  finding.text = fmt::format(
+      "{}: the stamps of {} jump ahead by {}, and end so much later than "
+      "those of the other sensor: its clock was set; subtract it from there "
+      "on, or cut the drive",
+      pause.place, nameOfSensor(pause.sensor), secondsText(2 * half));
 }
 
 }  // namespace
@@ -282,6 +301,7 @@ void checkClockChanges(const Recording& recording, const DataUse& use, DataFindi
     }
     const auto count = std::count_if(first, all.end(), isSame);
     findings.push_back(findingOf(*first, static_cast<std::size_t>(count), places));
+    if (first->kind == Kind::kPause) addSetAhead(recording, *first, findings.back());
   }
 }
 

@@ -162,6 +162,7 @@ class ClockWalk {
   ClockWalk(const Times& stamps, const AreSame& same)
       : stamps_(stamps), same_(same), times_(stamps), usual_(medianInterval(stamps)) {
     if (usual_ <= Duration{0}) return;
+    for (std::size_t i = 1; i < stamps.size(); ++i) back_ += stamps[i] < stamps[i - 1] ? 1 : 0;
     const auto [least, most] = std::minmax_element(stamps.begin(), stamps.end());
     least_ = *least, most_ = *most;
     if (!walk()) times_ = stamps, changes_.clear();
@@ -171,8 +172,9 @@ class ClockWalk {
 
  private:
   static constexpr std::size_t kMostSet =
-      8;                            ///< clocks that were set; overlapping batches are more
-  static constexpr int kLost = 20;  ///< intervals in which samples may be missing
+      8;  ///< clocks that were set; overlapping batches are more
+  static constexpr std::size_t kOrdered = 20;  ///< one step back per this number is a list in order
+  static constexpr int kLost = 20;             ///< intervals in which samples may be missing
 
   /// Returns false if the stamps are no clock that was set.
   bool walk() {
@@ -198,7 +200,7 @@ class ClockWalk {
     const std::size_t behind = std::min(kFew + 1, stamps_.size() - i);
     const bool regular = i > kFew && goesOn(i - kFew - 1, kFew + 1) && goesOn(i, kFew + 1);
     if (step < Duration{0} && goesOn(i, behind) && findCounter(change, regular)) return change;
-    if (!regular) return std::nullopt;
+    if (!regular || kOrdered * back_ > stamps_.size()) return std::nullopt;
     if (step > Duration{0} && step <= hours(24)) return change;  // a pause
     if (step < Duration{0} && (isSmall(step) || isMoved(i))) return std::nullopt;
     change.kind = Kind::kSet, change.added = between(TimePoint(usual_), TimePoint(step));
@@ -272,6 +274,7 @@ class ClockWalk {
   std::vector<ClockChange> changes_;
   Duration usual_;
   TimePoint least_, most_;
+  std::size_t back_ = 0;  ///< number of steps back
 };
 
 }  // namespace
