@@ -5,11 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 
 #include "common/base/algorithms/median.h"
 #include "common/base/errors.h"
+#include "common/replay/clock_check.h"
 #include "common/replay/image_check.h"
-#include "common/replay/stamp_check.h"
 #include "common/vision/decode.h"
 #include "common/vision/image.h"
 #include "common/vision/jpeg.h"
@@ -72,71 +73,6 @@ void addForceUnit(const std::vector<ImuSample>& samples, double force, DataFindi
   }
 }
 
-/// The range in nanoseconds, which shows the unit of the stamps.
-std::string rangeText(TimePoint first, TimePoint last) {
-  return fmt::format("{} … {} ns", toNanoseconds(first), toNanoseconds(last));
-}
-
-/// A guess at the relation of the two ranges of stamps: a different unit or a different clock.
-std::string guessOfClock(TimePoint images, TimePoint imu) {
-  const double ratio = static_cast<double>(toNanoseconds(images)) /
-                       std::max(1.0, static_cast<double>(toNanoseconds(imu)));
-  constexpr std::array<std::pair<double, const char*>, 3> kUnits{
-      {{1e3, "microseconds"}, {1e6, "milliseconds"}, {1e9, "seconds"}}};
-  for (const auto& [factor, unit] : kUnits) {
-    if (std::abs(ratio / factor - 1.0) < 0.05) {
-      return fmt::format("the IMU's stamps look like {}: multiply them by {:.0f}", unit, factor);
-    }
-    if (std::abs(ratio * factor - 1.0) < 0.05) {
-      return fmt::format("the images' stamps look like {}: multiply them by {:.0f}", unit, factor);
-    }
-  }
-  return fmt::format(
-      "they are {:.9g} s apart: they come from two clocks; add the difference of the clocks to one "
-      "of them",
-      std::abs(toSeconds(images) - toSeconds(imu)));
-}
-
-void checkClocks(const Recording& recording, DataFindings& findings) {
-  if (recording.imu.empty() || recording.frames.empty()) return;
-  const TimePoint first = recording.frames.front().time, last = recording.frames.back().time;
-  const TimePoint from = recording.imu.front().time, to = recording.imu.back().time;
-  if (from > last || to < first) {
-    findings.push_back(
-        {Grade::kFatal, "clocks_apart",
-         fmt::format("camera and IMU stamps do not overlap: images {}, inertial "
-                     "samples {}; {}",
-                     rangeText(first, last), rangeText(from, to), guessOfClock(first, from))});
-    return;
-  }
-  const auto covered =
-      std::count_if(recording.frames.begin(), recording.frames.end(),
-                    [&](const auto& frame) { return frame.time >= from && frame.time <= to; });
-  const auto all = static_cast<std::ptrdiff_t>(recording.frames.size());
-  if (2 * covered >= all) return;
-  findings.push_back(
-      {Grade::kWarning, "imu_covers_part",
-       fmt::format("only {} of {} images lie within the time of the inertial samples: "
-                   "images {}, samples {}",
-                   covered, all, rangeText(first, last), rangeText(from, to))});
-}
-
-void checkRate(const Recording& recording, DataFindings& findings) {
-  const auto& imu = recording.imu;
-  if (!recording.calibration.imu || imu.size() < 10) return;
-  std::vector<double> intervals;
-  for (std::size_t i = 1; i < imu.size(); ++i)
-    intervals.push_back(toSeconds(imu[i].time - imu[i - 1].time));
-  const double rate = 1.0 / std::max(1e-9, medianOf(intervals));
-  const double said = recording.calibration.imu->rate_hz;
-  if (said <= 0.0 || (rate < 1.5 * said && rate > said / 1.5)) return;
-  findings.push_back(
-      {Grade::kWarning, "imu_rate",
-       fmt::format("inertial samples come at {:.4g} Hz, the calibration says {:.4g}: "
-                   "see the unit of their stamps, or set rate_hz",
-                   rate, said)});
-}
-
 /// Checks whether the mean specific force, which points upwards, points down in the image.
 void checkUpright(const Recording& recording, DataFindings& findings) {
   if (recording.imu.size() < 20 || recording.calibration.cameras.empty()) return;
@@ -186,13 +122,9 @@ DataFindings checkImuUnits(const std::vector<ImuSample>& samples) {
 }
 
 DataFindings checkData(const Recording& recording, const DataUse& use) {
-  DataFindings findings;
-  checkStamps(recording, use, findings);
+  DataFindings findings = checkClocks(recording, use);
   const auto isFatal = [](const auto& one) { return one.grade == Grade::kFatal; };
-  const bool times = std::none_of(findings.begin(), findings.end(), isFatal);
-  if (use.imu && times && !recording.imu.empty()) {
-    checkClocks(recording, findings);
-    checkRate(recording, findings);
+  if (use.imu && std::none_of(findings.begin(), findings.end(), isFatal)) {
     const DataFindings units = checkImuUnits(recording.imu);
     findings.insert(findings.end(), units.begin(), units.end());
   }
@@ -204,16 +136,20 @@ DataFindings checkData(const Recording& recording, const DataUse& use) {
   return findings;
 }
 
-Result<cv::Mat> monoImageOf(const Recording::FrameFile& file) {
+Result<cv::Mat> monoImageOf(const Recording::FrameFile& file, int reduce) {
   if (!file.load) {
-    return vision::decodeImageFile(file.path, ImageEncoding::kMono8, vision::usedBits(file.path));
+    return vision::decodeImageFile(file.path, ImageEncoding::kMono8, vision::usedBits(file.path),
+                                   reduce);
   }
   const auto loaded = file.load();
   if (!loaded) return tl::unexpected(loaded.error());
   const auto frame = vision::decompressed(*loaded);
   if (!frame) return tl::unexpected(frame.error());
   auto image = vision::monoOf(*frame);
-  return image ? Result<cv::Mat>(image->clone()) : image;
+  if (!image) return image;
+  cv::Mat copy;
+  cv::resize(*image, copy, {image->cols / reduce, image->rows / reduce}, 0, 0, cv::INTER_AREA);
+  return copy;
 }
 
 void refuseFatal(const DataFindings& findings, const std::string& where) {

@@ -38,7 +38,8 @@ DataFindings checkImuUnits(const std::vector<ImuSample>& samples);
 
 /// The image of a frame in grey; 16-bit images are scaled by their used bits. Reasons as counted by
 /// Dataset.
-Result<cv::Mat> monoImageOf(const Recording::FrameFile& frame);
+/// `reduce`: 1, 2, 4 or 8, the factor by which it is smaller.
+Result<cv::Mat> monoImageOf(const Recording::FrameFile& frame, int reduce = 1);
 
 /// Throws StartupError(kData) with all fatal findings; does nothing if there are none. The message
 /// begins with `where`.

@@ -7,6 +7,7 @@
 #include "common/base/algorithms/median.h"
 #include "common/base/errors.h"
 #include "common/base/files/access.h"
+#include "common/replay/clock_check.h"
 #include "common/replay/files/rig_file.h"
 #include "common/replay/files/stamps.h"
 #include "common/replay/files/text_file.h"
@@ -139,6 +140,7 @@ Recording readReadable(const DatasetOptions& options) {
 
 std::unique_ptr<Dataset> Dataset::open(const DatasetOptions& options) {
   Recording recording = readReadable(options);
+  settleClocks(recording);
   if (!options.rig.empty() && recording.kind != DatasetKind::kRosRecording) {
     const Calibration rig = readRig(options.rig, &recording.notes);
     applyRig(rig, options.rig.string(), recording.calibration);

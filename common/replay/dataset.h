@@ -16,6 +16,7 @@
 
 #include "common/base/result.h"
 #include "common/replay/files/pose_file.h"
+#include "common/replay/files/stamp_order.h"
 #include "common/types/sensors.h"
 
 namespace perdure::replay {
@@ -67,6 +68,7 @@ struct Recording {
   /// True poses of the body, in a world whose z points up. For KITTI drives they come from OXTS:
   /// east, north and up.
   std::optional<PoseFile> truth;
+  std::vector<ClockChange> clock_changes = {};
   ReasonCounts reasons;  ///< counts of data left out while reading
   std::vector<std::string> notes =
       {};  ///< for users: data that were repaired or are not known, a sentence each

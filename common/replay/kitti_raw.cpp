@@ -115,7 +115,7 @@ std::vector<OxtsRecord> readOxts(const fs::path& folder, Recording& recording) {
     }
     records.push_back({*stamps[i], *values});
   }
-  orderByTime(records, "imu", recording, [](const OxtsRecord& record) { return record.time; });
+  orderByTime(records, "imu", (folder / "timestamps.txt").string(), recording);
   return records;
 }
 
@@ -183,7 +183,7 @@ void addCamera(const fs::path& folder, const std::vector<std::optional<TimePoint
     }
     frames.push_back({*stamps[i], i, number, imagePath(folder / "data", tenDigits(i)).string()});
   }
-  orderByTime(frames, "frame", recording, [](const auto& frame) { return frame.time; });
+  orderByTime(frames, "frame", (folder / "timestamps.txt").string(), recording);
   recording.frames.insert(recording.frames.end(), frames.begin(), frames.end());
 }
 

@@ -1,5 +1,7 @@
 // Recordings of `perdure record` as a dataset: sensors, calibration, and images if they were
 // recorded. Images are decoded on request.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstring>
 #include <tuple>
@@ -17,7 +19,8 @@ constexpr std::string_view kFramePrefix = "frame/";
 
 /// Reference to one image in the recording; its pixels are read on request.
 struct Seen {
-  FrameStamp stamp;
+  TimePoint time;    ///< corrected (files/stamp_order.h)
+  FrameStamp stamp;  ///< as recorded
   std::string camera;
   std::uint64_t log_ns = 0;
 };
@@ -111,16 +114,16 @@ class DriveReader {
       if (const auto value = valueIn<SpeedSample>(message)) recording_.speed.push_back(*value);
     } else if (message.topic == "odometry") {
       if (const auto value = valueIn<Odometry>(message)) {
-        looks_.push_back({value->stamp, {}, message.log_ns});
+        looks_.push_back({value->stamp.time, value->stamp, {}, message.log_ns});
       }
     } else if (const auto value = valueIn<Frame>(message)) {
-      images_.push_back({value->stamp, value->camera, message.log_ns});
+      images_.push_back({value->stamp.time, value->stamp, value->camera, message.log_ns});
     }
   }
 
   void orderSamples() {
-    orderImu(recording_);
-    orderByTime(recording_.speed, "speed", recording_, [](const auto& one) { return one.time; });
+    orderImu(recording_, "imu");
+    orderByTime(recording_.speed, "speed", "speed", recording_);
     for (std::size_t i = 0; i < recording_.speed.size(); ++i) recording_.speed[i].sequence = i;
   }
 
@@ -136,13 +139,15 @@ class DriveReader {
 
   void addFrames() {
     std::map<std::pair<InstanceId, std::uint64_t>, Recording::FrameFile> first;
-    std::stable_sort(images_.begin(), images_.end(),
-                     [](const Seen& a, const Seen& b) { return a.stamp.time < b.stamp.time; });
     const auto store = std::make_shared<Images>(path_);
     for (const std::size_t wanted : {0u, 1u}) {
-      for (const Seen& seen : images_) {
-        if (cameraOf(seen) != wanted) continue;
-        Recording::FrameFile file{seen.stamp.time, recording_.frame_count, wanted, {}};
+      std::vector<Seen> images;
+      std::copy_if(images_.begin(), images_.end(), std::back_inserter(images),
+                   [&](const Seen& seen) { return cameraOf(seen) == wanted; });
+      orderByTime(images, wanted == 0 ? "frame" : "stereo", fmt::format("frame/cam{}", wanted),
+                  recording_);
+      for (const Seen& seen : images) {
+        Recording::FrameFile file{seen.time, recording_.frame_count, wanted, {}};
         if (!seen.camera.empty()) file.load = [store, seen] { return store->at(seen); };
         const std::pair identity(seen.stamp.source, seen.stamp.sequence);
         if (wanted == 0) {

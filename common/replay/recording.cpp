@@ -31,8 +31,13 @@ std::optional<std::pair<std::uint32_t, std::uint32_t>> firstImageSize(
   return std::nullopt;
 }
 
-void noteOrder(const StampOrder& order, const std::string& kind, const std::string& where,
-               const std::string& all, Recording& recording) {
+void noteOrder(StampOrder& order, const std::string& kind, const std::string& where,
+               const std::string& all, const std::function<std::string(std::size_t)>& placeOf,
+               Recording& recording) {
+  for (ClockChange& change : order.changes) {
+    change.sensor = kind, change.place = placeOf(change.index);
+    recording.clock_changes.push_back(std::move(change));
+  }
   const auto note = [&](std::size_t count, const char* reason, const char* what) {
     if (count == 0) return;
     recording.reasons.add(kind + reason, count);
@@ -44,8 +49,8 @@ void noteOrder(const StampOrder& order, const std::string& kind, const std::stri
   note(order.moved, "_unsorted", " were not in the order of their stamps and were sorted");
 }
 
-void orderImu(Recording& recording) {
-  orderByTime(recording.imu, "imu", recording, [](const ImuSample& sample) { return sample.time; });
+void orderImu(Recording& recording, const std::string& where) {
+  orderByTime(recording.imu, "imu", where, recording);
   for (std::size_t i = 0; i < recording.imu.size(); ++i) recording.imu[i].sequence = i;
 }
 

@@ -1,6 +1,7 @@
 // Common functions of the readers for dataset folders, and the readers themselves.
 #pragma once
 
+#include <concepts>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -8,13 +9,16 @@
 #include <vector>
 
 #include "common/replay/dataset.h"
-#include "common/replay/files/stamps.h"
+#include "common/replay/files/stamp_order.h"
 
 namespace perdure::replay {
 
-/// Counts and notes the stamps that an order leaves out or moves, of `all` in `where`.
-void noteOrder(const StampOrder& order, const std::string& kind, const std::string& where,
-               const std::string& all, Recording& recording);
+/// Applies what files/stamp_order.h decides about a sensor's stamps: counts KIND_not_increasing,
+/// KIND_stray, KIND_unsorted, and adds the changes of the clock to the recording. Notes name
+/// `where` and `all`. `placeOf` names a stamp by its index in the file.
+void noteOrder(StampOrder& order, const std::string& kind, const std::string& where,
+               const std::string& all, const std::function<std::string(std::size_t)>& placeOf,
+               Recording& recording);
 
 /// Returns whether the folder has the layout of a kind. The reader then reports missing parts.
 bool looksLikeEuroc(const std::filesystem::path& folder);
@@ -37,27 +41,37 @@ std::filesystem::path imagePath(const std::filesystem::path& folder, const std::
 /// Width and height of the first image that can be decoded. Returns nothing if there is none.
 std::optional<std::pair<std::uint32_t, std::uint32_t>> firstImageSize(
     const std::filesystem::path& folder);
-/// Sorts the samples by time and numbers them. Samples left out are counted as imu_not_increasing
-/// or imu_stray, moved ones as imu_unsorted (files/stamps.h).
-void orderImu(Recording& recording);
-/// Sorts items by their stamps, and counts KIND_not_increasing, KIND_stray, KIND_unsorted. Notes
-/// name `where` and `all`. Returns whether the items were sorted.
+/// Orders the samples and numbers them; `where` is the file or topic.
+void orderImu(Recording& recording, const std::string& where);
+/// Orders items, which have a member `time`, and may have `isSame`, by files/stamp_order.h; see
+/// noteOrder. Returns whether they were sorted.
 template <class Item>
 bool orderByTime(std::vector<Item>& items, const std::string& kind, const std::string& where,
-                 const std::string& all, Recording& recording, const auto& timeOf) {
+                 const std::string& all, Recording& recording, const auto& placeOf) {
   std::vector<TimePoint> stamps;
-  for (const Item& item : items) stamps.push_back(timeOf(item));
-  const StampOrder order = orderOf(stamps);
-  noteOrder(order, kind, where, all, recording);
+  for (const Item& item : items) stamps.push_back(item.time);
+  StampOrder order = orderOf(stamps, [&](std::size_t a, std::size_t b) {
+    if constexpr (requires { items[a].isSame(items[b]); }) return items[a].isSame(items[b]);
+    if constexpr (std::same_as<Item, ImuSample>) {
+      return items[a].gyro == items[b].gyro && items[a].accel == items[b].accel;
+    }
+    return true;
+  });
+  noteOrder(order, kind, where, all, placeOf, recording);
   std::vector<Item> ordered;
-  for (const std::size_t i : order.kept) ordered.push_back(std::move(items[i]));
+  for (const std::size_t i : order.kept) {
+    items[i].time = order.times[i];
+    ordered.push_back(std::move(items[i]));
+  }
   items = std::move(ordered);
   return order.moved == 0;
 }
+/// The place is the number of the message.
 template <class Item>
-void orderByTime(std::vector<Item>& items, const std::string& kind, Recording& recording,
-                 const auto& timeOf) {
-  orderByTime(items, kind, kind, std::to_string(items.size()), recording, timeOf);
+void orderByTime(std::vector<Item>& items, const std::string& kind, const std::string& where,
+                 Recording& recording) {
+  orderByTime(items, kind, where, std::to_string(items.size()), recording,
+              [&](std::size_t i) { return where + ", message " + std::to_string(i + 1); });
 }
 /// Sorts frames by time, then camera.
 void sortFrames(Recording& recording);

@@ -23,7 +23,8 @@ constexpr char kTransforms[] = "/tf_static";
 
 /// Reference to one image in the recording; its pixels are read on request.
 struct RosImage {
-  TimePoint time;
+  TimePoint time;   ///< corrected (files/stamp_order.h)
+  TimePoint stamp;  ///< as in its header
   std::uint64_t log_ns = 0;
   std::uint64_t number = 0;  ///< position in the order of the recording
 };
@@ -61,13 +62,13 @@ class RosImages {
       if (message->log_ns > wanted.log_ns) break;
       const auto [time, frame] =
           topics_.compressed ? take<ros::CompressedImage>(*message) : take<ros::Image>(*message);
-      if (time != wanted.time) continue;
+      if (time != wanted.stamp) continue;
       next_ = wanted.number + 1;
       return frame;
     }
     next_ = UINT64_MAX;
     return fail("image_missing", topics_.image + " has no image of " +
-                                     std::to_string(toNanoseconds(wanted.time)) + " ns any more");
+                                     std::to_string(toNanoseconds(wanted.stamp)) + " ns any more");
   }
 
  private:
@@ -120,7 +121,7 @@ class RosDriveReader {
     requireImages();
     for (std::size_t i = 0; i < cameras_.size(); ++i) addFrames(i);
     sortFrames(recording_);
-    orderImu(recording_);
+    orderImu(recording_, imu_);
     for (std::size_t i = 0; i < cameras_.size(); ++i)
       recording_.calibration.cameras.push_back(calibrationOf(i));
     if (!recording_.imu.empty()) recording_.calibration.imu = imuCalibration();
@@ -246,7 +247,8 @@ class RosDriveReader {
 
   void addImage(RosCamera& camera, const ros::Header& header, std::uint64_t log_ns) {
     if (camera.frame_id.empty()) camera.frame_id = header.frame_id;
-    camera.images.push_back({stamp(header, log_ns), log_ns, camera.images.size()});
+    const TimePoint time = stamp(header, log_ns);
+    camera.images.push_back({time, time, log_ns, camera.images.size()});
   }
 
   TimePoint stamp(const ros::Header& header, std::uint64_t log_ns) {
@@ -263,8 +265,7 @@ class RosDriveReader {
 
   void addFrames(std::size_t index) {
     RosCamera& camera = cameras_[index];
-    orderByTime(camera.images, index == 0 ? "frame" : "stereo", recording_,
-                [](const RosImage& seen) { return seen.time; });
+    orderByTime(camera.images, index == 0 ? "frame" : "stereo", camera.topics.image, recording_);
     const auto store = std::make_shared<RosImages>(options_.path, camera.topics, camera.bits);
     const std::vector<Recording::FrameFile> first = recording_.frames;
     if (index == 0) recording_.frame_count = camera.images.size();

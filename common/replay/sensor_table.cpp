@@ -24,7 +24,7 @@ SensorTable::SensorTable(const std::filesystem::path& file, const std::string& k
       takeHead(line.text);
       continue;
     }
-    TableRow row{lines_++, {}, fieldsOf(line.text)};
+    TableRow row{lines_++, line.number, {}, fieldsOf(line.text)};
     const auto time = parseNanoseconds(row.fields[0]);
     const std::string why = time ? judge(row.fields) : whyNoStamp(row.fields[0]);
     if (!why.empty()) {
@@ -46,8 +46,9 @@ SensorTable::SensorTable(const std::filesystem::path& file, const std::string& k
         fmt::format("{}: {} of {} cannot be read and were left out; the first: {}", file.c_str(),
                     wrong, lines, first_wrong));
   }
-  sorted_ = orderByTime(rows_, kind, file.string(), lines, recording,
-                        [](const TableRow& row) { return row.time; });
+  sorted_ = orderByTime(rows_, kind, file.string(), lines, recording, [&](std::size_t i) {
+    return fmt::format("{}:{}", file.c_str(), rows_[i].line);
+  });
 }
 
 void SensorTable::takeHead(std::string_view line) {

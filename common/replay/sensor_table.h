@@ -1,6 +1,7 @@
 // The data.csv of a sensor's folder: a stamp and values per line, sorted by time.
 #pragma once
 
+#include <algorithm>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -15,8 +16,15 @@ namespace perdure::replay {
 
 struct TableRow {
   std::size_t number = 0;  ///< row number from 0, including skipped rows
+  std::size_t line = 0;    ///< line number in the file, from 1
   TimePoint time;
   std::vector<std::string_view> fields;  ///< the first is the stamp
+
+  /// Apart from the stamp.
+  bool isSame(const TableRow& other) const {
+    return std::equal(fields.begin() + 1, fields.end(), other.fields.begin() + 1,
+                      other.fields.end());
+  }
 };
 
 class SensorTable {

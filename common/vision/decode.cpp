@@ -11,24 +11,61 @@ namespace {
 
 using std::string_view_literals::operator""sv;
 
-/// libjpeg fills missing data with grey and reports success. The end marks are checked instead.
-bool endsAsItShould(std::string_view bytes) {
-  constexpr std::string_view kJpegStart = "\xFF\xD8"sv, kJpegEnd = "\xFF\xD9"sv;
-  constexpr std::string_view kPngStart = "\x89PNG"sv, kPngEnd = "IEND\xAE\x42\x60\x82"sv;
-  constexpr std::size_t kTrailing = 64;  // writers may add padding after the end mark
-  const auto tail = bytes.substr(bytes.size() - std::min(bytes.size(), kTrailing));
-  if (bytes.starts_with(kJpegStart)) return tail.find(kJpegEnd) != tail.npos;
-  if (bytes.starts_with(kPngStart)) return tail.find(kPngEnd) != tail.npos;
-  return true;
+/// Byte `at` as a number; 0 behind the end.
+std::size_t byteAt(std::string_view bytes, std::size_t at) {
+  return at < bytes.size() ? static_cast<unsigned char>(bytes[at]) : 0;
 }
 
+/// Walks over the segments of a JPEG to its end mark. A thumbnail's end mark lies inside a segment,
+/// and what follows the end mark (padding, a vendor's trailer) is not read.
+bool hasJpegEnd(std::string_view bytes) {
+  constexpr std::size_t kEnd = 0xD9, kFirstOfNoLength = 0xD0;
+  for (std::size_t at = 2; at + 1 < bytes.size();) {
+    const std::size_t mark = byteAt(bytes, at + 1);
+    const bool is_mark = byteAt(bytes, at) == 0xFF && mark != 0 && mark != 0xFF;
+    if (is_mark && mark == kEnd) return true;
+    if (is_mark && (mark < kFirstOfNoLength || mark > kEnd)) {
+      at += 2 + std::max<std::size_t>(2, 256 * byteAt(bytes, at + 2) + byteAt(bytes, at + 3));
+    } else {  // compressed data, up to the next mark
+      at = std::min(bytes.find('\xFF', at + (is_mark ? 2 : 1)), bytes.size());
+    }
+  }
+  return false;
+}
+
+bool hasPngEnd(std::string_view bytes) {
+  for (std::size_t at = 8; at + 12 <= bytes.size();) {
+    if (bytes.substr(at + 4, 4) == "IEND") return true;
+    std::size_t length = 0;
+    for (std::size_t i = 0; i < 4; ++i) length = 256 * length + byteAt(bytes, at + i);
+    at += 12 + length;
+  }
+  return false;
+}
+
+/// libjpeg fills missing data with grey and reports success. The end marks are checked instead.
+bool endsAsItShould(std::string_view bytes) {
+  if (bytes.starts_with("\xFF\xD8"sv)) return hasJpegEnd(bytes);
+  return !bytes.starts_with("\x89PNG"sv) || hasPngEnd(bytes);
+}
+
+/// The pixels as the sensor gave them: an orientation tag (EXIF) does not turn them.
+constexpr int kAsSensed = cv::IMREAD_IGNORE_ORIENTATION;
+
 int readFlags(std::optional<ImageEncoding> encoding) {
-  if (!encoding) return cv::IMREAD_ANYCOLOR;
-  return *encoding == ImageEncoding::kBgr8 ? cv::IMREAD_COLOR : cv::IMREAD_GRAYSCALE;
+  if (!encoding) return kAsSensed | cv::IMREAD_ANYCOLOR;
+  return kAsSensed | (*encoding == ImageEncoding::kBgr8 ? cv::IMREAD_COLOR : cv::IMREAD_GRAYSCALE);
+}
+
+int reducedBy(int factor) {
+  if (factor == 1) return 0;
+  return factor == 2   ? cv::IMREAD_REDUCED_GRAYSCALE_2
+         : factor == 4 ? cv::IMREAD_REDUCED_GRAYSCALE_4
+                       : cv::IMREAD_REDUCED_GRAYSCALE_8;
 }
 
 constexpr std::size_t kDepthOfPng = 24;
-constexpr int kSixteenGrey = cv::IMREAD_ANYDEPTH | cv::IMREAD_GRAYSCALE;
+constexpr int kSixteenGrey = kAsSensed | cv::IMREAD_ANYDEPTH | cv::IMREAD_GRAYSCALE;
 
 std::string headOf(const std::string& path) {
   std::string head(kDepthOfPng + 1, '\0');
@@ -55,8 +92,8 @@ int bitsOf(const cv::Mat& image) {
 
 }  // namespace
 
-Result<cv::Mat> decodeImage(std::string_view bytes, std::optional<ImageEncoding> encoding,
-                            int bits) {
+Result<cv::Mat> decodeImage(std::string_view bytes, std::optional<ImageEncoding> encoding, int bits,
+                            int reduce) {
   if (bytes.empty()) return fail("image_truncated", "the file is empty");
   if (!endsAsItShould(bytes)) return fail("image_truncated", "the end of the image is missing");
   auto* data = const_cast<char*>(bytes.data());
@@ -64,7 +101,8 @@ Result<cv::Mat> decodeImage(std::string_view bytes, std::optional<ImageEncoding>
   cv::Mat image;
   try {
     const bool scaled = bits < 16;
-    image = cv::imdecode(raw, readFlags(encoding) | (scaled ? cv::IMREAD_ANYDEPTH : 0));
+    image = cv::imdecode(
+        raw, readFlags(encoding) | reducedBy(reduce) | (scaled ? cv::IMREAD_ANYDEPTH : 0));
     if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / (1 << (bits - 8)));
   } catch (const cv::Exception& error) {
     return fail("image_corrupt", error.what());
@@ -74,7 +112,7 @@ Result<cv::Mat> decodeImage(std::string_view bytes, std::optional<ImageEncoding>
 }
 
 Result<cv::Mat> decodeImageFile(const std::string& path, std::optional<ImageEncoding> encoding,
-                                int bits) {
+                                int bits, int reduce) {
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   const auto size = file ? std::streamoff(file.tellg()) : -1;
   if (size < 0 || std::filesystem::is_directory(path)) {
@@ -83,7 +121,7 @@ Result<cv::Mat> decodeImageFile(const std::string& path, std::optional<ImageEnco
   std::string bytes(static_cast<std::size_t>(size), '\0');
   file.seekg(0).read(bytes.data(), size);
   bytes.resize(static_cast<std::size_t>(file.gcount()));
-  auto image = decodeImage(bytes, encoding, bits);
+  auto image = decodeImage(bytes, encoding, bits, reduce);
   if (!image) return fail(image.error().code, path + ": " + image.error().detail);
   return image;
 }

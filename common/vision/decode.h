@@ -1,4 +1,6 @@
-// Decodes image files (PNG, JPEG). Truncated files are refused instead of being filled with grey.
+// The one decoder of images (PNG, JPEG). Pixels are as the sensor gave them: an orientation tag
+// (EXIF) does not turn them, because lens and T_BS are those of the sensor. Truncated images are
+// refused instead of being filled with grey; bytes after the end mark are ignored.
 #pragma once
 
 #include <opencv2/core/mat.hpp>
@@ -15,10 +17,11 @@ namespace perdure::vision {
 /// 16-bit images, the upper eight of the lower `bits` (8 … 16) are used. Reasons: image_truncated
 /// (no end mark of JPEG or PNG), image_corrupt (cannot be decoded).
 Result<cv::Mat> decodeImage(std::string_view bytes, std::optional<ImageEncoding> encoding,
-                            int bits = 16);
+                            int bits = 16, int reduce = 1);
 /// Decodes a file; reason image_missing if it cannot be read.
+/// With `reduce` (1, 2, 4, 8) it is smaller by that factor, which decodes large JPEGs faster.
 Result<cv::Mat> decodeImageFile(const std::string& path, std::optional<ImageEncoding> encoding,
-                                int bits = 16);
+                                int bits = 16, int reduce = 1);
 /// A depth image (16 bits, one channel) without conversion, CV_16UC1. Reasons as above, and
 /// image_depth (another kind of image).
 Result<cv::Mat> decodeDepthFile(const std::string& path);

@@ -301,6 +301,7 @@ void Node::lose(const Reason& reason) {
   motion_initialiser_.clear();
   ++world_.epoch;
   last_sequence_.reset();
+  aided_ = false;
 }
 
 void Node::publishWaiting(const FrameStamp& stamp) {
@@ -319,7 +320,15 @@ void Node::publish(const FrameStamp& stamp, const FrameEstimate& e) {
   o.stamp = stamp;
   o.instance = instance_;
   o.world = world_;
-  unaided_frames_ = e.at_rest || e.points_used > 0 ? 0 : unaided_frames_ + 1;
+  const bool unaided = !e.at_rest && e.points_used == 0;
+  unaided_frames_ = unaided ? unaided_frames_ + 1 : 0;
+  // The first points come into use some ten frames after a start.
+  constexpr int kFirstFrames = 20;
+  aided_ = aided_ || e.points_used > 0;
+  const bool late = unaided_frames_ == kFirstFrames;
+  if (unaided && (aided_ || unaided_frames_ >= kFirstFrames)) {
+    reasons_.add("frame_without_update", !aided_ && late ? kFirstFrames : 1);
+  }
   const bool degraded = degraded_frames_ > 0 || unaided_frames_ > kUnaidedFrames;
   if (degraded_frames_ > 0) --degraded_frames_;
   o.state = degraded ? OdometryState::kDegraded : OdometryState::kTracking;

@@ -100,6 +100,7 @@ class Node {
   std::optional<std::uint64_t> last_sequence_;  ///< sequence of the last output with a pose
   std::uint64_t frame_ = 0;
   int degraded_frames_ = 0, unaided_frames_ = 0;
+  bool aided_ = false;  ///< a point was of use since the start
   std::string last_start_reason_;
   OdometryState last_state_ = OdometryState::kInitialising;
   mutable ReasonCounts all_reasons_;

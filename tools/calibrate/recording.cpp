@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <opencv2/core/utility.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <optional>
 
 #include "common/base/errors.h"
 #include "common/replay/data_check.h"
 #include "common/replay/dataset.h"
 #include "common/replay/files/text_file.h"
+#include "common/vision/decode.h"
 #include "common/vision/image.h"
 
 namespace perdure::calibrate {
@@ -81,11 +81,12 @@ void readPictures(const std::vector<fs::path>& files, const Board& board,
   camera.rate_hz = 1.0;
   Finder finder(board, drive);
   for (std::size_t i = 0; i < files.size(); i += options.every) {
-    const cv::Mat grey = cv::imread(files[i].string(), cv::IMREAD_GRAYSCALE);
-    if (grey.empty()) {
-      drive.problem = files[i].string() + " is no image that can be read";
+    const auto decoded = vision::decodeImageFile(files[i].string(), ImageEncoding::kMono8);
+    if (!decoded) {
+      drive.problem = decoded.error().detail;
       continue;
     }
+    const cv::Mat& grey = *decoded;
     if (camera.width == 0) {
       camera.width = static_cast<std::uint32_t>(grey.cols);
       camera.height = static_cast<std::uint32_t>(grey.rows);

@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <opencv2/core.hpp>
 
 #include "tools/data_check/axes_check.h"
 #include "tools/data_check/axis_changes.h"
+#include "tools/data_check/clock_shift.h"
 #include "tools/data_check/motion_check.h"
 #include "tools/data_check/pair_check.h"
 #include "tools/data_check/poses/pose_check.h"
@@ -44,6 +46,9 @@ bool offsetExplainsAxes(const std::vector<Turn>& turns, const std::vector<ImuSam
 replay::DataFindings checkTurns(const replay::Recording& recording) {
   const CameraCalibration& camera = recording.calibration.cameras.front();
   const auto turns = turnsOfImages(recording, recording.imu);
+  if (haveNothingInCommon(turns, recording.imu, camera)) {
+    if (const auto shift = shiftOfClocks(recording)) return shiftFinding(*shift, camera);
+  }
   const auto findings = judgeTurns(turns, recording.imu, camera);
   const bool unit = !findings.empty() && (findings.front().code.starts_with("gyro_") ||
                                           findings.front().code == "images_still");
@@ -71,8 +76,13 @@ replay::DataFindings checkDrive(const replay::Recording& recording, const replay
   add("the recording", findings, [&] { return replay::checkData(recording, use); });
   add("the rig", findings, [&] { return checkRigNumbers(recording.calibration); });
   if (!use.images || recording.calibration.cameras.empty()) return findings;
-  for (const auto& finding : findings) {
-    if (finding.grade == Grade::kFatal) return findings;  // rotations would fail as well
+  const auto fatal = std::find_if(findings.begin(), findings.end(),
+                                  [](const auto& one) { return one.grade == Grade::kFatal; });
+  if (fatal != findings.end()) {  // rotations would fail as well
+    const auto shift =
+        fatal->code == "clocks_apart" ? shiftOfClocks(recording) : std::optional<double>();
+    if (shift) *fatal = shiftFinding(*shift, recording.calibration.cameras.front()).front();
+    return findings;
   }
   add("what belongs together", findings, [&] { return checkPairs(recording); });
   add("the two cameras", findings, [&] { return checkStereo(recording); });
@@ -86,8 +96,11 @@ replay::DataFindings checkPoses(const replay::Recording& recording, const replay
   auto findings = judgePoseTimes(file, recording);
   if (!findings.empty()) return findings;
   const auto poses = timedPoses(file, recording);
-  findings = judgePoseJumps(poses);
-  if (!findings.empty()) return findings;  // all other checks would fail too
+  // After one of these all other checks would fail too.
+  findings = judgePosesOfCamera(poses, recording);
+  if (findings.empty()) findings = judgePosesFrozen(poses, recording, use.images);
+  if (findings.empty()) findings = judgePoseJumps(poses);
+  if (!findings.empty()) return findings;
   findings = judgePosesByGyro(poses, recording);
   if (findings.empty() && (use.images || recording.imu.empty())) {
     const CameraCalibration& camera = recording.calibration.cameras.front();

@@ -14,6 +14,7 @@
 #include "common/base/errors.h"
 #include "common/replay/files/output_place.h"
 #include "common/replay/files/sensor_file.h"
+#include "tools/data_check/clock_shift.h"
 #include "tools/data_check/data_check.h"
 
 namespace perdure::tools {
@@ -46,6 +47,18 @@ constexpr std::array kMends{
          [](Recording& r) { forEachSample(r, [](ImuSample& s) { s.gyro *= kRadians; }); }},
     Mend{"imu_columns_exchanged", "the gyroscope's columns are before the accelerometer's now",
          [](Recording& r) { forEachSample(r, [](ImuSample& s) { std::swap(s.gyro, s.accel); }); }},
+    Mend{"clock_wrapped", "the stamps go on where a counter came round",
+         [](Recording& r) {
+           std::erase_if(r.clock_changes, [](const auto& change) {
+             return change.kind == replay::ClockChange::Kind::kCounter;
+           });
+         }},
+    Mend{"clock_set", "the stamps go on where the clock was set",
+         [](Recording& r) {
+           std::erase_if(r.clock_changes, [](const auto& change) { return change.common; });
+         }},
+    Mend{"clock_shift", "the stamps of the images are on the clock of the IMU",
+         [](Recording& r) { shiftImages(shiftOfClocks(r).value_or(0.0), r); }},
     Mend{"T_BS_inverted", "T_BS of cam0 is inverted: the camera in the frame of the IMU",
          [](Recording& r) {
            auto& T_BC = r.calibration.cameras.front().T_BC;

@@ -12,9 +12,9 @@
 #include "common/base/algorithms/median.h"
 #include "common/base/checked_file.h"
 #include "common/base/errors.h"
+#include "common/replay/clock_check.h"
 #include "common/replay/files/stamps.h"
 #include "common/replay/files/text_file.h"
-#include "common/replay/stamp_check.h"
 
 namespace perdure::tools {
 namespace {

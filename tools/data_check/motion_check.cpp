@@ -64,15 +64,33 @@ std::vector<Run> liveliestRuns(const std::vector<double>& values, std::size_t mo
   return chosen;
 }
 
+/// The camera of images that are smaller by a factor.
+CameraCalibration reduced(CameraCalibration camera, int factor) {
+  const auto n = static_cast<double>(factor);
+  camera.width /= static_cast<std::uint32_t>(factor);
+  camera.height /= static_cast<std::uint32_t>(factor);
+  camera.fx /= n, camera.fy /= n;
+  camera.cx = (camera.cx + 0.5) / n - 0.5, camera.cy = (camera.cy + 0.5) / n - 0.5;
+  return camera;
+}
+
 std::vector<Turn> turnsOfRun(const Frames& frames, const CameraCalibration& calibration,
                              const Run& run) {
-  const CameraModel camera(calibration);
+  constexpr std::uint32_t kEnough = 800;  // px of width
+  int factor = 1;
+  while (factor < 8 && calibration.width / static_cast<std::uint32_t>(2 * factor) >= kEnough) {
+    factor *= 2;
+  }
+  const CameraModel camera(reduced(calibration, factor));
   std::vector<Turn> turns;
   FollowedImage before;
   for (std::size_t i = run.first; i <= run.second; ++i) {
-    const auto image = replay::monoImageOf(*frames[i]);
-    const bool fits = image && image->cols == static_cast<int>(calibration.width) &&
-                      image->rows == static_cast<int>(calibration.height);
+    const auto image = replay::monoImageOf(*frames[i], factor);
+    const auto isOf = [&](int reduced_px, std::uint32_t px) {
+      return std::abs(reduced_px * factor - static_cast<int>(px)) < factor;
+    };
+    const bool fits =
+        image && isOf(image->cols, calibration.width) && isOf(image->rows, calibration.height);
     FollowedImage now = fits ? FollowedImage(*image) : FollowedImage();
     if (i > run.first && !before.empty() && !now.empty()) {
       const auto flow = flowBetween(camera, before, now);
@@ -81,6 +99,23 @@ std::vector<Turn> turnsOfRun(const Frames& frames, const CameraCalibration& cali
       }
     }
     before = std::move(now);
+  }
+  return turns;
+}
+
+/// Files are read in parallel; frames inside a recording file are read one after another.
+std::vector<Turn> turnsOfRuns(const Frames& frames, const CameraCalibration& calibration,
+                              const std::vector<Run>& chosen) {
+  const bool files = !frames.front()->load;
+  std::vector<std::future<std::vector<Turn>>> runs;
+  for (const auto& run : chosen) {
+    runs.push_back(std::async(files ? std::launch::async : std::launch::deferred,
+                              [&, run] { return turnsOfRun(frames, calibration, run); }));
+  }
+  std::vector<Turn> turns;
+  for (auto& run : runs) {
+    const auto more = run.get();
+    turns.insert(turns.end(), more.begin(), more.end());
   }
   return turns;
 }
@@ -240,20 +275,30 @@ std::vector<Turn> turnsOfImages(const Recording& recording, const std::vector<Im
                                 std::size_t most) {
   const Frames frames = firstCamera(recording);
   if (frames.size() < 2 || samples.size() < 2) return {};
-  const CameraCalibration& calibration = recording.calibration.cameras.front();
-  // Files are read in parallel; frames inside a recording file are read one after another.
-  const bool files = !frames.front()->load;
-  std::vector<std::future<std::vector<Turn>>> runs;
-  for (const auto& run : liveliestRuns(liveliness(frames, samples), most)) {
-    runs.push_back(std::async(files ? std::launch::async : std::launch::deferred,
-                              [&, run] { return turnsOfRun(frames, calibration, run); }));
+  return turnsOfRuns(frames, recording.calibration.cameras.front(),
+                     liveliestRuns(liveliness(frames, samples), most));
+}
+
+std::vector<Turn> turnsAlong(const Recording& recording) {
+  constexpr std::size_t kRuns = 8, kPairs = 15;
+  const Frames frames = firstCamera(recording);
+  if (frames.size() < 2) return {};
+  const std::size_t pairs = frames.size() - 1, length = std::min(kPairs, pairs),
+                    runs = std::min(kRuns, pairs / length);
+  std::vector<Run> chosen;
+  for (std::size_t i = 0; i < runs; ++i) {
+    const std::size_t first = i * (pairs - length) / std::max<std::size_t>(1, runs - 1);
+    chosen.emplace_back(first, first + length);
   }
-  std::vector<Turn> turns;
-  for (auto& run : runs) {
-    const auto more = run.get();
-    turns.insert(turns.end(), more.begin(), more.end());
-  }
-  return turns;
+  return turnsOfRuns(frames, recording.calibration.cameras.front(), chosen);
+}
+
+bool haveNothingInCommon(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,
+                         const CameraCalibration& camera) {
+  const TurnPairs pairs = pairsOf(turns, TurnIntegral(samples), camera.time_offset_s);
+  if (2 * pairs.count() < turns.size()) return true;
+  if (std::max(pairs.turning(), pairs.turningOfGiven()) * camera.fx < kEnough_px) return false;
+  return pairs.unexplained(camera.T_BC.R().transpose()) > kUnexplained;
 }
 
 replay::DataFindings judgeTurns(const std::vector<Turn>& turns,

@@ -24,6 +24,13 @@ struct Turn {
 std::vector<Turn> turnsOfImages(const replay::Recording& recording,
                                 const std::vector<ImuSample>& samples, std::size_t most = 60);
 
+/// Rotations of image pairs of cam0 from places all over the drive, whatever any sensor measured.
+std::vector<Turn> turnsAlong(const replay::Recording& recording);
+
+/// Whether images or gyroscope turn enough for a judgement and have nothing in common.
+bool haveNothingInCommon(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,
+                         const CameraCalibration& camera);
+
 /// Codes: gyro_in_degrees, images_still, gyro_too_small, gyro_constant, gyro_factor, T_BS_inverted,
 /// T_BS_turned, time_offset. Returns nothing if images or gyroscope rotate too little.
 replay::DataFindings judgeTurns(const std::vector<Turn>& turns,

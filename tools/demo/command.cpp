@@ -66,7 +66,7 @@ void complete(DemoOptions& options, const std::atomic<bool>& interrupted) {
                  }).string();
 }
 
-void summarise(const fs::path& out) {
+void summarise(const fs::path& out, const std::string& end_of_line) {
   const auto report = nlohmann::json::parse(std::ifstream(out / "report.json"));
   std::cout << fmt::format(
       "frames {}  odometry {}  detections {}  objects {}\n"
@@ -88,7 +88,7 @@ void summarise(const fs::path& out) {
         report["objects"]["recall"].get<double>(), report["objects"]["precision"].get<double>(),
         report["objects"]["duplicates"].get<double>());
   }
-  std::cout << "outputs: " << out.string() << std::endl;
+  std::cout << "outputs: " << out.string() << end_of_line << std::endl;
 }
 
 void runDemo(DemoOptions options) {
@@ -98,7 +98,7 @@ void runDemo(DemoOptions options) {
   complete(options, interrupted);
   Demo demo(options, interrupted);
   demo.run();
-  summarise(fs::absolute(options.out));
+  summarise(fs::absolute(options.out), demo.endOfLine());
   if (interrupted) throw CLI::RuntimeError(130);
   if (options.keep) demo.keep();
 }

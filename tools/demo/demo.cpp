@@ -139,9 +139,9 @@ void Demo::openData() {
   with_images.decode = true;
   const auto dataset = replay::Dataset::open(with_images);
   frames_ = dataset->frameCount();
-  const auto findings = checkDrive(dataset->recording(), {});
-  replay::refuseFatal(findings, options_.data);
-  printDoubts(dataset->recording(), findings);
+  findings_ = checkDrive(dataset->recording(), {});
+  replay::refuseFatal(findings_, options_.data);
+  printDoubts(dataset->recording(), findings_);
   if (!fs::exists(options_.model)) {
     throw StartupError(ExitCode::kUnavailable,
                        options_.model + " does not exist; give --model a network, FILE.onnx");
@@ -305,6 +305,11 @@ void Demo::write() {
                                    {"frames", frames_},
                                    {"complete", !interrupted_ && options_.seconds == 0.0}};
   report.update(reporter_->report());
+  const Doubts doubts = doubtsOfRun(reporter_->facts(findings_));
+  report["data_check"] = {{"findings", toJson(findings_)}};
+  report["doubts"] = toJson(doubts);
+  printWarnings(doubts);
+  end_of_line_ = tools::endOfLine(doubts);
   const auto spawns = countSpawns(textOf(folders_.run / "supervisord.log"));
   for (const auto& [service, count] : spawns) {
     report["services"][service]["restarts"] = count - 1;

@@ -30,6 +30,8 @@ class Demo {
   void run();
   /// Keeps everything running after the drive if --keep is given, until interrupted; then ends it.
   void keep();
+  /// What the last line says of doubts about the run.
+  const std::string& endOfLine() const { return end_of_line_; }
 
  private:
   void openData();
@@ -53,7 +55,8 @@ class Demo {
   std::vector<ServicePlan> services_;
   std::optional<TruthFiles> truth_;
   std::size_t frames_ = 0;
-  std::string configurations_, address_;
+  replay::DataFindings findings_;  ///< before the run
+  std::string configurations_, address_, end_of_line_;
   std::unique_ptr<OutputWriter> outputs_;
   std::unique_ptr<bus::Domain> domain_;
   std::unique_ptr<bus::Participant> participant_;

@@ -72,7 +72,10 @@ Reporter::Reporter(const bus::Participant& participant, bus::WaitLoop& loop, Out
   loop.on(landmarks_reader_, [this](const Landmarks& l) { outputs_.onLandmarks(l); });
   loop.on(model_reader_, [this](const ModelInfo& m) { onModel(m); });
   loop.on(detections_reader_, [this](const Detections& d) {
-    if (detections_.insert(d.stamp.sequence).second) outputs_.onDetections(d);
+    if (detections_.insert(d.stamp.sequence).second) {
+      boxes_ += d.detections.size();
+      outputs_.onDetections(d);
+    }
     latency_.onDetections(d);
     last_message_ns_ = monotonicNs();
   });
@@ -158,6 +161,17 @@ Json Reporter::report() const {
                 {"objects", objects_.size()}}}};
   all.update(latency_.report());
   return all;
+}
+
+RunFacts Reporter::facts(const replay::DataFindings& before) const {
+  RunFacts facts{.frames = odometry_.size(),
+                 .boxes = boxes_,
+                 .objects = outputs_.history().lastBeliefs().size(),
+                 .findings = before};
+  const auto vio = services_.find("vio");
+  if (vio == services_.end()) return facts;
+  for (const auto& [code, times] : vio->second.reasons()) facts.vio.add(code, times);
+  return facts;
 }
 
 Json Reporter::timing() const {

@@ -14,6 +14,7 @@
 #include "common/types/health.h"
 #include "tools/demo/latency.h"
 #include "tools/outputs/output_writer.h"
+#include "tools/outputs/run_doubts.h"
 
 namespace perdure::tools {
 
@@ -61,6 +62,7 @@ class Reporter {
   std::string progressLine(std::size_t frames_in_all) const;
   /// Services, latency and message counts; the caller adds the restarts.
   nlohmann::ordered_json report() const;
+  RunFacts facts(const replay::DataFindings& before) const;
   /// Processor time for each frame by service, averaged over each second.
   nlohmann::ordered_json timing() const;
 
@@ -81,7 +83,7 @@ class Reporter {
   bus::Reader<Event> events_reader_;
   bus::Reader<Health> health_reader_;
   std::set<std::uint64_t> odometry_, objects_, detections_;
-  std::uint64_t newest_frame_ = 0;
+  std::uint64_t newest_frame_ = 0, boxes_ = 0;
   TimePoint first_time_, newest_time_;
   std::int64_t last_message_ns_ = 0;
   LatencyMeter latency_;

@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "common/base/checked_file.h"
 #include "common/base/errors.h"
 #include "common/replay/files/text_file.h"
+#include "common/vision/decode.h"
 #include "services/inference/core/decode/evidence.h"
 #include "services/inference/node.h"
 #include "tools/outputs/pictures/drawing.h"
@@ -49,13 +49,12 @@ Frame frameOf(const cv::Mat& pixels) {
 }  // namespace
 
 Frame readPicture(const fs::path& file) {
-  const cv::Mat pixels = cv::imread(file.string(), cv::IMREAD_COLOR);
-  if (pixels.empty()) {
-    throw StartupError(ExitCode::kUnavailable, "the picture " + file.string() +
-                                                   " is missing or cannot be read; give --image a "
-                                                   "JPEG or PNG");
+  const auto pixels = vision::decodeImageFile(file.string(), ImageEncoding::kBgr8);
+  if (!pixels) {
+    throw StartupError(ExitCode::kUnavailable,
+                       "the picture " + pixels.error().detail + "; give --image a JPEG or PNG");
   }
-  return frameOf(pixels);
+  return frameOf(*pixels);
 }
 
 Frame greyRamp(int width, int height) {

@@ -33,6 +33,9 @@ void addOptions(CLI::App& app, PipelineOptions& options) {
                  "vio, truth, drifting (truth with a drift, --set drifting.KEY=VALUE), a pose file "
                  "(TUM or KITTI lines), or recorded")
       ->required();
+  app.add_option("--odometry-of", options.odometry_of,
+                 "Frame of a pose file: body, or camera (cam0, z forward; KITTI's ground truth is)")
+      ->check(CLI::IsMember({"body", "camera"}));
   app.add_option("--odometry-walk", options.odometry_walk,
                  "Accuracy of a pose file: random walk POSITION,YAW over the distance, m/√m and "
                  "rad/√m; .03,.0005 if not given");
@@ -108,9 +111,7 @@ void printReasons(const Pipeline& pipeline) {
   if (const auto doubt = pipeline.doubtOfPoses(); !doubt.empty()) {
     std::fprintf(stderr, "At the end: %s\n", doubt.c_str());
   }
-  for (const auto& doubt : pipeline.doubts()) {
-    std::fprintf(stderr, "warning: %s\n", doubt.c_str());
-  }
+  printWarnings(pipeline.doubts());
 }
 
 /// Writes to options.out. If there are no results, returns the error to report after the outputs
@@ -126,11 +127,12 @@ std::optional<StartupError> runInto(const PipelineOptions& options, const std::s
   pipeline.outputs().writeJson("report.json", makeReport(pipeline, options));
   if (options.pictures) drawOverlay(pipeline, options.quiet);
   printReasons(pipeline);
-  std::printf("%llu frames, %llu poses, %llu detections, %zu objects on the map: %s\n",
+  std::printf("%llu frames, %llu poses, %llu detections, %zu objects on the map: %s%s\n",
               static_cast<unsigned long long>(pipeline.counts().frames),
               static_cast<unsigned long long>(pipeline.counts().odometry),
               static_cast<unsigned long long>(pipeline.counts().detections),
-              pipeline.outputs().history().lastBeliefs().size(), named.c_str());
+              pipeline.outputs().history().lastBeliefs().size(), named.c_str(),
+              endOfLine(pipeline.doubts()).c_str());
   try {
     pipeline.refuseNothing();
   } catch (const StartupError& nothing) {

@@ -21,6 +21,7 @@
 #include "services/vio/node.h"
 #include "tools/calibrate/rig_check.h"
 #include "tools/outputs/output_writer.h"
+#include "tools/outputs/run_doubts.h"
 #include "tools/outputs/stage_timer.h"
 #include "tools/pipeline/map_follower.h"
 #include "tools/pipeline/map_memory.h"
@@ -73,7 +74,7 @@ class Pipeline {
   /// A sentence if the given poses contradict the images; else empty.
   std::string doubtOfPoses() const;
   /// The problems of the run for the user, as sentences.
-  std::vector<std::string> doubts() const;
+  Doubts doubts() const;
   /// Counted reasons by service.
   std::map<std::string, ReasonCounts> reasons() const;
 
@@ -81,6 +82,7 @@ class Pipeline {
   // These are in pipeline_open.cpp.
   void openOdometry(const PipelineOptions& options);
   void checkWalk() const;
+  void turnPosesToBody();
   void checkLandmarks() const;
   void openKnownPoses();
   void openDetections(const PipelineOptions& options);

@@ -11,7 +11,6 @@
 #include "services/vio/cameras.h"
 #include "tools/data_check/data_check.h"
 #include "tools/data_check/poses/pose_check.h"
-#include "tools/pipeline/doubts.h"
 #include "tools/pipeline/pipeline.h"
 
 namespace perdure::tools {
@@ -71,7 +70,10 @@ void Pipeline::checkData() {
   }
   replay::refuseFatal(findings_, options_.data);
   if (!pose_file_) return;
-  const auto of_poses = checkPoses(dataset_->recording(), *pose_file_, {.images = data.decode});
+  auto of_poses = checkPoses(dataset_->recording(), *pose_file_, {.images = data.decode});
+  if (options_.odometry_of == "body") {
+    std::erase_if(of_poses, [](const auto& one) { return one.code == "poses_of_camera"; });
+  }
   replay::refuseFatal(of_poses, options_.odometry);
   findings_.insert(findings_.end(), of_poses.begin(), of_poses.end());
 }
@@ -110,12 +112,21 @@ void Pipeline::refuseUnwritten() const {
   }
 }
 
-std::vector<std::string> Pipeline::doubts() const {
+Doubts Pipeline::doubts() const {
   const ReasonCounts of_vio = vio_           ? vio_->reasons()
                               : known_poses_ ? known_poses_->reasons()
                                              : ReasonCounts();
-  auto doubts = doubtsOfRun(of_vio, counts_.frames, reasons_.of("frame_without_pose"));
-  if (rig_watch_ && doubts.empty()) doubts = doubtsOfRig(rig_watch_->check(of_vio));
+  auto doubts = doubtsOfRun({.vio = of_vio,
+                             .frames = counts_.frames,
+                             .without_pose = reasons_.of("frame_without_pose"),
+                             .boxes = counts_.detections,
+                             .objects = outputs_->history().lastBeliefs().size(),
+                             .findings = findings_});
+  if (!rig_watch_ || !doubts.empty()) return doubts;
+  for (const auto& judgement : calibrate::judgeBelief(rig_watch_->check(of_vio))) {
+    if (judgement.grade == calibrate::Grade::kBad)
+      doubts.push_back({"the rig, or an axis of the IMU, does not fit the run", judgement.text});
+  }
   return doubts;
 }
 

@@ -136,6 +136,7 @@ replay::DatasetOptions Pipeline::dataOptions() const {
 
 void Pipeline::openData() {
   dataset_ = replay::Dataset::open(dataOptions());
+  turnPosesToBody();
   checkData();
   if (options_.from <= 0.0) return;
   const auto first = dataset_->skip(durationFromSeconds(options_.from));
@@ -144,6 +145,24 @@ void Pipeline::openData() {
                        options_.data + " has no frame as late as --from says; give fewer seconds");
   }
   first_index_ = *first;
+}
+
+/// T_WB of poses that are those of the first camera.
+void Pipeline::turnPosesToBody() {
+  if (options_.odometry_of.empty()) return;
+  if (!pose_file_) {
+    throw StartupError(ExitCode::kUsage, "--odometry-of is of a pose file; leave it out");
+  }
+  if (options_.odometry_of != "camera" || dataset_->calibration().cameras.empty()) return;
+  if (pose_file_->hasSteps()) {
+    throw StartupError(ExitCode::kUsage,
+                       "the covariances of steps are of the body: give poses of the body with "
+                       "them, or leave those columns out");
+  }
+  const RigidTransform T_CB = dataset_->calibration().cameras.front().T_BC.inverse();
+  std::vector<replay::StampedPose> poses = pose_file_->poses();
+  for (auto& pose : poses) pose.T_WB = pose.T_WB * T_CB;
+  pose_file_.emplace(pose_file_->format(), std::move(poses));
 }
 
 void Pipeline::openOdometry(const PipelineOptions& options) {

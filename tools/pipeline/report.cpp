@@ -98,6 +98,7 @@ Json makeReport(const Pipeline& pipeline, const PipelineOptions& options) {
                  {"model", options.model}};
   report["data_check"] = {{"notes", pipeline.dataset().recording().notes},
                           {"findings", toJson(pipeline.findings())}};
+  report["doubts"] = toJson(pipeline.doubts());
   report["frames"] = framesToJson(usedFrames(pipeline));
   const auto& latency = pipeline.counts().latency_ms;
   report["services"] = services(pipeline, pipeline.reasons());

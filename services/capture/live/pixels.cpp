@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <iterator>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <string_view>
+
+#include "common/vision/decode.h"
 
 namespace perdure::capture {
 namespace {
@@ -90,11 +92,10 @@ cv::Mat fromOnePlane(const OnePlane& layout, int width, int height, const ImageP
 Result<cv::Mat> decodeJpeg(const std::vector<ImagePlane>& planes, cv::Size size, bool grey) {
   if (planes.size() != 1 || planes[0].bytes.empty()) return fail("image_truncated", "no bytes");
   const auto& bytes = planes[0].bytes;
-  const cv::Mat coded(1, static_cast<int>(bytes.size()), CV_8U,
-                      const_cast<std::uint8_t*>(bytes.data()));
-  cv::Mat image = cv::imdecode(coded, grey ? cv::IMREAD_GRAYSCALE : cv::IMREAD_COLOR);
-  if (image.empty()) return fail("image_corrupt", "a JPEG that cannot be decoded");
-  if (image.size() != size) return fail("image_size", "a JPEG of another size than agreed");
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  auto image = vision::decodeImage(text, grey ? ImageEncoding::kMono8 : ImageEncoding::kBgr8);
+  if (!image) return image;
+  if (image->size() != size) return fail("image_size", "a JPEG of another size than agreed");
   return image;
 }
 

@@ -85,6 +85,42 @@ TEST(Decode, ATruncatedImageIsRefusedHoweverMuchOfItIsThere) {
   }
 }
 
+/// A JPEG with a segment of EXIF that asks to turn it, and with a thumbnail of its own end mark.
+std::string tagged(const std::string& jpeg, char orientation) {
+  std::string exif("Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0", 28);
+  exif += std::string({orientation, 0, 0, 0, 0, 0, 0, 0}) + "\xFF\xD8\xFF\xD9";
+  const std::size_t length = exif.size() + 2;
+  return jpeg.substr(0, 2) + "\xFF\xE1" + static_cast<char>(length / 256) +
+         static_cast<char>(length % 256) + exif + jpeg.substr(2);
+}
+
+TEST(Decode, PixelsAreAsTheSensorGaveThemWhateverTheOrientationTagSays) {
+  const std::string plain = encoded(".jpg", cv::Mat(16, 32, CV_8UC1, cv::Scalar(90)));
+  for (const char orientation : {1, 3, 6, 8}) {
+    for (const auto encoding : {ImageEncoding::kMono8, ImageEncoding::kBgr8}) {
+      const auto image = decodeImage(tagged(plain, orientation), encoding);
+      ASSERT_TRUE(image) << image.error().detail;
+      EXPECT_EQ(image->size(), cv::Size(32, 16)) << int{orientation};
+    }
+  }
+  const std::string whole = tagged(plain, 6);
+  EXPECT_EQ(decodeImage(whole.substr(0, whole.size() - 40), std::nullopt).error().code,
+            "image_truncated")
+      << "the thumbnail's end mark is not the image's";
+}
+
+TEST(Decode, BytesAfterTheEndMarkAreNoFault) {
+  for (const char* extension : {".png", ".jpg"}) {
+    const std::string whole = encoded(extension, colours());
+    for (const std::string& trailer :
+         {std::string(4096, '\0'), std::string(300, 'v'), whole, std::string("\xFF\xD8\xFF")}) {
+      EXPECT_TRUE(decodeImage(whole + trailer, std::nullopt)) << extension << trailer.size();
+    }
+    const std::string lost = whole.substr(0, whole.size() - 3) + std::string(4096, '\0');
+    EXPECT_FALSE(decodeImage(lost, std::nullopt)) << "a copy that was cut off and filled up";
+  }
+}
+
 TEST(Decode, BytesThatAreNoImageAreCorrupt) {
   EXPECT_EQ(decodeImage("this is a text, not an image", std::nullopt).error().code,
             "image_corrupt");

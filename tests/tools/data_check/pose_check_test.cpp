@@ -1,5 +1,6 @@
 #include "tools/data_check/poses/pose_check.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -287,6 +288,67 @@ TEST(PoseCheck, APauseIsNoJump) {
   Poses poses = eachOf(phone().poses, 10);
   poses.erase(poses.begin() + 100, poses.begin() + 140);  // a gap of 2 s and 4 m
   EXPECT_THAT(codesIn(findingsOf(phone(), poses)), ElementsAre());
+}
+
+/// A vehicle that drives a curve of 100 m in the direction of its x, without inertial samples.
+Way curve(double yaw) {
+  Way way = phone();
+  way.recording.imu.clear();
+  way.poses.clear();
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();
+  for (int i = 0; i < 200; ++i) {
+    const double heading = yaw * i / 200.0;
+    const Eigen::Quaterniond q(Eigen::AngleAxisd(heading, Eigen::Vector3d::UnitZ()));
+    way.poses.push_back({TimePoint(durationFromSeconds(100.0 + 0.1 * i)), RigidTransform(q, p)});
+    p += q * Eigen::Vector3d(0.5, 0.0, 0.0);
+  }
+  return way;
+}
+
+TEST(PoseCheck, PosesOfACameraAreToldByTheirDirectionOfMotion) {
+  for (const double yaw : {0.0, 0.4, 3.0, 9.0}) {
+    const Way way = curve(yaw);
+    EXPECT_THAT(codesIn(findingsOf(way, way.poses)), ElementsAre()) << yaw;
+    const RigidTransform first = tests::trueCameraPlace().inverse();  // KITTI: of the first camera
+    const auto in_first = [&](const RigidTransform& T) { return first * T; };
+    for (const Poses& poses : {ofCamera(way.poses), changed(ofCamera(way.poses), in_first)}) {
+      const auto findings = findingsOf(way, poses);
+      ASSERT_THAT(codesIn(findings), ElementsAre("poses_of_camera")) << yaw;
+      EXPECT_EQ(findings[0].grade, DataFinding::Grade::kFatal);
+      EXPECT_THAT(findings[0].text, HasSubstr("--odometry-of camera"));
+    }
+    EXPECT_THAT(codesIn(findingsOf(way, changed(way.poses, in_first))), ElementsAre()) << yaw;
+  }
+}
+
+TEST(PoseCheck, PosesThatStandStillWhileTheBodyMovesAreToldWithTheTime) {
+  const Poses sound = eachOf(phone().poses, 10);
+  for (const std::size_t last : {sound.size(), std::size_t{230}}) {
+    Poses poses = sound;
+    for (std::size_t i = 200; i < last; ++i) poses[i].T_WB = poses[200].T_WB;
+    const auto findings = findingsOf(phone(), poses);
+    ASSERT_THAT(codesIn(findings), ElementsAre("poses_frozen"));
+    EXPECT_THAT(findings[0].text, AllOf(HasSubstr(std::to_string(toNanoseconds(poses[200].time))),
+                                        HasSubstr(fmt::format("poses 201 to {} of them", last)),
+                                        HasSubstr("while the gyroscope turns")));
+  }
+}
+
+TEST(PoseCheck, ABodyAtRestMayRepeatItsPose) {
+  Way way = curve(0.4);
+  for (std::size_t i = 50; i < 100; ++i) way.poses[i].T_WB = way.poses[50].T_WB;
+  for (int i = 0; i < 4000; ++i) {
+    ImuSample sample;
+    sample.time = TimePoint(durationFromSeconds(100.0 + 0.005 * i));
+    sample.gyro = {0.01, -0.02, 0.015 + (i % 2 == 0 ? 0.01 : -0.01)};
+    sample.accel = {0.0, 0.0, 9.81};
+    way.recording.imu.push_back(sample);
+  }
+  EXPECT_THAT(codesIn(findingsOf(way, way.poses)), Not(testing::Contains("poses_frozen")));
+  SpeedSample speed;
+  speed.time = TimePoint(durationFromSeconds(107.0)), speed.speed = 5.0;
+  way.recording.speed.push_back(speed);
+  EXPECT_THAT(codesIn(findingsOf(way, way.poses)), ElementsAre("poses_frozen"));
 }
 
 TEST(PoseCheck, ASpeedThatNothingHasIsToldWithoutAnImu) {

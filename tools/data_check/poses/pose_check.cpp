@@ -42,7 +42,8 @@ constexpr char kEither[] =
     "give their inverse, the body in the world, where the positions are those of the world in the "
     "body; else conjugate the quaternions alone (write -qx, -qy, -qz)";
 constexpr char kOrder[] = "write the quaternions as qx qy qz qw";
-constexpr char kAxes[] = "give T_WB, which is T_WC times the inverse of T_BS";
+constexpr char kAxes[] =
+    "give --odometry-of camera, or T_WB, which is T_WC times the inverse of T_BS";
 constexpr char kBoth[] = "give T_WB, in the order t x y z qx qy qz qw";
 constexpr std::array kReadings{
     Reading{"", "as they are", "", false, false, false},

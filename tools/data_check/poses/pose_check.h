@@ -44,6 +44,16 @@ replay::DataFindings judgePoseTurning(const std::vector<replay::StampedPose>& po
 replay::DataFindings judgePoseMoving(const std::vector<replay::StampedPose>& poses,
                                      const replay::Recording& recording);
 
+/// Poses of the camera, z forward, if they travel upwards as those of the body. Code:
+/// poses_of_camera. Needs twenty metres in a constant direction of the body.
+replay::DataFindings judgePosesOfCamera(const std::vector<replay::StampedPose>& poses,
+                                        const replay::Recording& recording);
+
+/// A pose that is repeated for over a second while gyroscope, speed or (`images`) images move.
+/// Code: poses_frozen.
+replay::DataFindings judgePosesFrozen(const std::vector<replay::StampedPose>& poses,
+                                      const replay::Recording& recording, bool images);
+
 /// Text with the times of the frames and those of poses that match no frame. Both must not be
 /// empty.
 std::string timesBeside(const replay::Recording& recording,

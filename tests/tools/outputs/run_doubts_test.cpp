@@ -1,4 +1,4 @@
-#include "tools/pipeline/doubts.h"
+#include "tools/outputs/run_doubts.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,19 +7,22 @@ namespace perdure::tools {
 namespace {
 
 using testing::AllOf;
+using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
+std::vector<std::string> sentences(const RunFacts& facts) { return toJson(doubtsOfRun(facts)); }
+
 std::vector<std::string> doubtsAt(const char* code, std::uint64_t times) {
   ReasonCounts vio;
   vio.add(code, times);
-  return doubtsOfRun(vio, 240, 0);
+  return sentences({.vio = vio, .frames = 240});
 }
 
 TEST(Doubts, AGoodRunHasNone) {
-  EXPECT_THAT(doubtsOfRun({}, 240, 0), IsEmpty());
-  EXPECT_THAT(doubtsOfRun({}, 0, 0), IsEmpty());
+  EXPECT_THAT(sentences({.frames = 240, .boxes = 9, .objects = 2}), IsEmpty());
+  EXPECT_THAT(sentences({}), IsEmpty());
   EXPECT_THAT(doubtsAt("msckf_gated", 900), IsEmpty());
   EXPECT_THAT(doubtsAt("speed_gated", 20), IsEmpty());
 }
@@ -40,24 +43,24 @@ TEST(Doubts, TwoFramesOfReferenceAreTold) {
   EXPECT_THAT(doubtsAt("reset", 1), ElementsAre(HasSubstr("not in one frame of reference")));
 }
 
-TEST(Doubts, ARigThatTheRunContradictsIsTold) {
-  calibrate::RigCheck check;
-  check.believed = true;
-  check.camera.width = 640, check.camera.height = 480;
-  vio::Innovation one;
-  one.used = true, one.rows = 2, one.nis = 1.4;
-  check.innovations.assign(600, one);
-  EXPECT_THAT(doubtsOfRig(check), IsEmpty());
-  check.turned = {0.3, 0, 0};
-  EXPECT_THAT(doubtsOfRig(check), ElementsAre(AllOf(HasSubstr("does not fit the run"),
-                                                    HasSubstr("the camera's rotation 17.19°"))));
-  check.innovations.clear();  // another check reports a run that did not start
-  EXPECT_THAT(doubtsOfRig(check), IsEmpty());
+TEST(Doubts, TheLastLineNamesWhatWouldElseBeSilent) {
+  EXPECT_EQ(endOfLine(doubtsOfRun({.frames = 240})), "");
+  EXPECT_THAT(doubtsAt("frame_without_update", 24), IsEmpty());
+  ReasonCounts vio;
+  vio.add("frame_without_update", 90);
+  RunFacts facts{.vio = vio, .frames = 240, .boxes = 70};
+  facts.findings.push_back({{}, "clock_set", "set back by 2 s"});
+  facts.findings.push_back({{}, "time_offset", "not of this kind"});
+  EXPECT_EQ(endOfLine(doubtsOfRun(facts)),
+            " | WARNING: no point of the image was of use at 90 of 240 frames; the map is empty "
+            "though 70 boxes came; stamps were changed");
+  EXPECT_THAT(sentences(facts), Contains(HasSubstr("set back by 2 s")));
 }
 
 TEST(Doubts, PosesOfAPartOfTheDriveAreTold) {
-  EXPECT_THAT(doubtsOfRun({}, 240, 10), IsEmpty());
-  EXPECT_THAT(doubtsOfRun({}, 240, 234), ElementsAre(HasSubstr("234 of 240 frames have no pose")));
+  EXPECT_THAT(sentences({.frames = 240, .without_pose = 10}), IsEmpty());
+  EXPECT_THAT(sentences({.frames = 240, .without_pose = 234}),
+              ElementsAre(HasSubstr("234 of 240 frames have no pose")));
 }
 
 }  // namespace

@@ -1,0 +1,372 @@
+#include "common/replay/clock_check.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include "common/base/algorithms/median.h"
+#include "common/replay/files/stamps.h"
+#include "common/replay/recording.h"
+
+namespace perdure::replay {
+namespace {
+
+using StampGrade = DataFinding::Grade;
+using StampList = std::vector<TimePoint>;
+
+/// The median interval of ordered stamps in ns, without equal stamps.
+std::optional<double> intervalOf(StampList stamps) {
+  std::sort(stamps.begin(), stamps.end());
+  std::vector<std::int64_t> intervals;
+  for (std::size_t i = 1; i < stamps.size(); ++i) {
+    const Duration interval = between(stamps[i], stamps[i - 1]);
+    if (interval > Duration{0}) intervals.push_back(interval.count());
+  }
+  constexpr std::size_t kFewIntervals = 5;
+  if (intervals.size() < kFewIntervals) return std::nullopt;
+  return static_cast<double>(medianOf(std::move(intervals)));
+}
+
+StampList stampsOfImu(const Recording& recording) {
+  StampList stamps;
+  for (const ImuSample& sample : recording.imu) stamps.push_back(sample.time);
+  return stamps;
+}
+StampList stampsOfCamera(const Recording& recording) {
+  StampList stamps;
+  for (const auto& frame : recording.frames) {
+    if (frame.camera == 0) stamps.push_back(frame.time);
+  }
+  return stamps;
+}
+
+/// `repeated` stamps were left out, because they were equal to earlier ones.
+bool checkEqual(const char* of, std::uint64_t repeated, std::size_t kept, DataFindings& findings) {
+  const auto all = repeated + kept;
+  const bool unusable = 10 * kept < all;
+  // A list with each line twice has lost no data.
+  if (2 * repeated <= all || repeated < 3) return false;
+  findings.push_back(
+      {unusable ? StampGrade::kFatal : StampGrade::kWarning, "stamps_equal",
+       fmt::format("{} of {} stamps of the {} are equal to another: they lost digits (written as "
+                   "float?){}; write them as integers of nanoseconds or with 9 decimals",
+                   repeated, all, of, unusable ? "" : ", or are those of packets")});
+  return unusable;
+}
+
+/// Detects the counts 0, 1, 2 … in place of times.
+void checkCount(const char* of, const StampList& stamps, DataFindings& findings) {
+  constexpr std::int64_t kHighest = 100'000'000;
+  if (stamps.empty() || toNanoseconds(stamps.back()) > kHighest) return;
+  const auto interval = intervalOf(stamps);
+  const auto first = toNanoseconds(stamps.front());
+  if (!interval || *interval != 1.0 || first > 10'000'000) return;
+  findings.push_back(
+      {StampGrade::kFatal, "stamps_count",
+       fmt::format(
+           "the stamps of the {} ({} … {}) count them and are no times: write when each was "
+           "taken, in nanoseconds, on the clock of the other sensors",
+           of, first, toNanoseconds(stamps.back()))});
+}
+
+/// The range in nanoseconds, which shows the unit of the stamps.
+std::string rangeText(TimePoint first, TimePoint last) {
+  return fmt::format("{} … {} ns", toNanoseconds(first), toNanoseconds(last));
+}
+
+/// A guess at the relation of the two ranges of stamps: a different unit or a different clock.
+std::string guessOfClock(TimePoint images, TimePoint imu) {
+  const double ratio = static_cast<double>(toNanoseconds(images)) /
+                       std::max(1.0, static_cast<double>(toNanoseconds(imu)));
+  constexpr std::array<std::pair<double, const char*>, 3> kUnits{
+      {{1e3, "microseconds"}, {1e6, "milliseconds"}, {1e9, "seconds"}}};
+  for (const auto& [factor, unit] : kUnits) {
+    if (std::abs(ratio / factor - 1.0) < 0.05) {
+      return fmt::format("the IMU's stamps look like {}: multiply them by {:.0f}", unit, factor);
+    }
+    if (std::abs(ratio * factor - 1.0) < 0.05) {
+      return fmt::format("the images' stamps look like {}: multiply them by {:.0f}", unit, factor);
+    }
+  }
+  const double apart = std::abs(toSeconds(images) - toSeconds(imu));
+  return fmt::format(
+      "they are {:.9g} s apart{}: they come from two clocks; add the difference of the clocks to "
+      "one "
+      "of them",
+      apart, causeOfShift(apart));
+}
+
+/// Whether camera and IMU share one clock.
+void checkShared(const Recording& recording, DataFindings& findings) {
+  if (recording.imu.empty() || recording.frames.empty()) return;
+  const TimePoint first = recording.frames.front().time, last = recording.frames.back().time;
+  const TimePoint from = recording.imu.front().time, to = recording.imu.back().time;
+  if (from > last || to < first) {
+    findings.push_back(
+        {StampGrade::kFatal, "clocks_apart",
+         fmt::format("camera and IMU stamps do not overlap: images {}, inertial "
+                     "samples {}; {}",
+                     rangeText(first, last), rangeText(from, to), guessOfClock(first, from))});
+    return;
+  }
+  const auto covered =
+      std::count_if(recording.frames.begin(), recording.frames.end(),
+                    [&](const auto& frame) { return frame.time >= from && frame.time <= to; });
+  const auto all = static_cast<std::ptrdiff_t>(recording.frames.size());
+  if (2 * covered >= all) return;
+  findings.push_back(
+      {StampGrade::kWarning, "imu_covers_part",
+       fmt::format("only {} of {} images lie within the time of the inertial samples: "
+                   "images {}, samples {}",
+                   covered, all, rangeText(first, last), rangeText(from, to))});
+}
+
+void checkRate(const Recording& recording, DataFindings& findings) {
+  const auto& imu = recording.imu;
+  if (!recording.calibration.imu || imu.size() < 10) return;
+  std::vector<double> intervals;
+  for (std::size_t i = 1; i < imu.size(); ++i)
+    intervals.push_back(toSeconds(imu[i].time - imu[i - 1].time));
+  const double rate = 1.0 / std::max(1e-9, medianOf(intervals));
+  const double said = recording.calibration.imu->rate_hz;
+  if (said <= 0.0 || (rate < 1.5 * said && rate > said / 1.5)) return;
+  findings.push_back(
+      {StampGrade::kWarning, "imu_rate",
+       fmt::format("inertial samples come at {:.4g} Hz, the calibration says {:.4g}: "
+                   "see the unit of their stamps, or set rate_hz",
+                   rate, said)});
+}
+
+using Kind = ClockChange::Kind;
+
+const char* nameOfSensor(const std::string& sensor) {
+  if (sensor == "imu") return "the IMU";
+  if (sensor == "frame") return "the images";
+  return sensor == "stereo" ? "cam1" : sensor == "speed" ? "the speed" : "the ground truth";
+}
+
+/// The changes of a sensor of one kind, in order.
+std::vector<ClockChange*> changesOf(Recording& recording, const std::string& sensor, Kind kind) {
+  std::vector<ClockChange*> some;
+  for (ClockChange& change : recording.clock_changes) {
+    if (change.sensor == sensor && change.kind == kind) some.push_back(&change);
+  }
+  return some;
+}
+
+/// Adds `by` to the times of a sensor from `from` on.
+void shift(Recording& recording, const std::string& sensor, TimePoint from, Duration by) {
+  const auto move = [&](auto& items) {
+    for (auto& item : items) item.time += item.time >= from ? by : Duration{0};
+  };
+  if (sensor == "imu") move(recording.imu);
+  if (sensor == "speed") move(recording.speed);
+  if (sensor == "frame") move(recording.frames), sortFrames(recording);
+}
+
+/// How long the device was off is not known.
+bool isRestart(const ClockChange& change) {
+  constexpr Duration kStart = std::chrono::seconds(5);
+  return change.after < change.before && change.after >= TimePoint{} &&
+         change.after < TimePoint{} + kStart;
+}
+
+/// Whether a sensor's clock was set when that of the IMU was, by as much. The amount is known to an
+/// interval, or to more where samples are missing.
+bool isAlike(const ClockChange& change, const ClockChange& imu) {
+  const Duration more = between(TimePoint(imu.added), TimePoint(change.added));
+  return !isRestart(imu) && multipleOf(5, more) > multipleOf(-4, change.usual) &&
+         more < multipleOf(20, change.usual);
+}
+
+void settleSet(Recording& recording) {
+  const auto of_imu = changesOf(recording, "imu", Kind::kSet);
+  for (const std::string sensor : {"frame", "stereo", "speed", "truth"}) {
+    const auto of_sensor = changesOf(recording, sensor, Kind::kSet);
+    if (!std::equal(of_sensor.begin(), of_sensor.end(), of_imu.begin(), of_imu.end(),
+                    [](const auto* one, const auto* imu) { return isAlike(*one, *imu); })) {
+      continue;
+    }
+    Duration more{0};
+    for (std::size_t i = 0; i < of_imu.size(); ++i) {
+      const Duration by = of_imu[i]->added - of_sensor[i]->added;
+      shift(recording, sensor, of_sensor[i]->continues + more, by);
+      more += by;
+      of_sensor[i]->common = true;
+      if (sensor == "frame") of_imu[i]->common = true;
+    }
+  }
+}
+
+/// Continues a sensor that began after the counter of the other one had come round.
+void settleCounters(Recording& recording) {
+  if (recording.imu.empty() || recording.frames.empty()) return;
+  const TimePoint imu = recording.imu.front().time, images = recording.frames.front().time;
+  if (images <= recording.imu.back().time && imu <= recording.frames.back().time) return;
+  for (const ClockChange& change : recording.clock_changes) {
+    if (change.kind != Kind::kCounter) continue;
+    const Duration behind = between(imu, images);
+    const auto rounds = (std::chrono::abs(behind) + change.added / 2) / change.added;
+    return shift(recording, behind > Duration{0} ? "frame" : "imu", TimePoint::min(),
+                 multipleOf(rounds, change.added));
+  }
+}
+
+std::string secondsText(Duration amount) {
+  return fmt::format("{:.10g} s", std::abs(toSeconds(amount)));
+}
+
+/// The sentence about `count` changes of a kind, with the place and the amount of the first.
+DataFinding findingOf(const ClockChange& first, std::size_t count, const std::string& places) {
+  using Grade = DataFinding::Grade;
+  const std::string sensor = nameOfSensor(first.sensor);
+  const bool back = first.after < first.before;
+  const std::string more = count > 1 ? fmt::format(" ({} times in all)", count) : "",
+                    step = secondsText(between(first.after, first.before)) + more;
+  if (first.kind == Kind::kCounter) {
+    return {Grade::kWarning, "clock_wrapped",
+            fmt::format("{}: the stamps of {} go back by {}: a counter of {} came round; they are "
+                        "read on from there",
+                        places, sensor, step, first.counter)};
+  }
+  if (first.kind == Kind::kPause) {
+    return {Grade::kWarning, "clock_paused",
+            fmt::format("{}: nothing from {} for {}: the recording paused, or its clock was set "
+                        "ahead; what comes after is a new start",
+                        places, sensor, step)};
+  }
+  if (first.common) {
+    return {Grade::kWarning, "clock_set",
+            fmt::format("{}: the clock was set {} by {} in mid-drive, for all sensors alike; the "
+                        "drive is read on without that step",
+                        places, back ? "back" : "ahead", secondsText(first.added) + more)};
+  }
+  const bool judged = first.sensor == "imu" || first.sensor == "frame";
+  return {judged ? Grade::kFatal : Grade::kWarning, "clock_set_alone",
+          fmt::format("{}: the stamps of {} {} by {}{}: cut the drive there into two", places,
+                      sensor, back ? "go back" : "jump ahead", step,
+                      isRestart(first) ? ", to their start: the device was restarted"
+                                       : ", those of the other sensors not so: its clock was set")};
+}
+
+/// A pause of one sensor that ends later than the other one by as much is none.
+void addSetAhead(const Recording& recording, const ClockChange& pause, DataFinding& finding) {
+  if (recording.imu.empty() || recording.frames.empty()) return;
+  const auto ofBoth = [](const auto& a, const auto& b) {
+    return std::pair(between(a.front().time, b.front().time),
+                     between(a.back().time, b.back().time));
+  };
+  const auto [starts, ends] = pause.sensor == "imu" ? ofBoth(recording.imu, recording.frames)
+                                                    : ofBoth(recording.frames, recording.imu);
+  const Duration half = between(pause.after, pause.before) / 2;
+  if (std::chrono::abs(starts) > half || ends < half) return;
+  finding.grade = DataFinding::Grade::kFatal, finding.code = "clock_set_alone";
+  finding.text = fmt::format(
+      "{}: the stamps of {} jump ahead by {}, and end so much later than "
+      "those of the other sensor: its clock was set; subtract it from there "
+      "on, or cut the drive",
+      pause.place, nameOfSensor(pause.sensor), secondsText(2 * half));
+}
+
+}  // namespace
+
+void settleClocks(Recording& recording) {
+  settleSet(recording);
+  settleCounters(recording);
+}
+
+void checkClockChanges(const Recording& recording, const DataUse& use, DataFindings& findings) {
+  const auto& all = recording.clock_changes;
+  for (auto first = all.begin(); first != all.end(); ++first) {
+    const bool judged = first->sensor == "imu" || first->sensor == "frame";
+    if ((first->sensor == "imu" && !use.imu) || (first->kind == Kind::kPause && !judged)) continue;
+    const auto isSame = [&](const ClockChange& other) {
+      return other.kind == first->kind && other.sensor == first->sensor &&
+             other.common == first->common;
+    };
+    if (std::any_of(all.begin(), first, isSame)) continue;
+    // One sentence for a clock of all sensors.
+    const auto isAlso = [&](const ClockChange& other) {
+      return other.common && first->common && other.kind == first->kind;
+    };
+    if (std::any_of(all.begin(), first, isAlso)) continue;
+    std::string places;
+    for (const auto& other : all) {
+      if (!isAlso(other) && &other != &*first) continue;
+      if (places.find(other.place.substr(0, other.place.rfind(':'))) != places.npos) continue;
+      places += (places.empty() ? "" : ", ") + other.place;
+    }
+    const auto count = std::count_if(first, all.end(), isSame);
+    findings.push_back(findingOf(*first, static_cast<std::size_t>(count), places));
+    if (first->kind == Kind::kPause) addSetAhead(recording, *first, findings.back());
+  }
+}
+
+std::int64_t factorOfStamps(StampList imu, StampList images) {
+  const auto of_imu = intervalOf(std::move(imu)), of_images = intervalOf(std::move(images));
+  if (!of_imu || !of_images) return 1;
+  for (const std::int64_t factor : {1, 1'000, 1'000'000}) {
+    const double scale = 1e-9 * static_cast<double>(factor);
+    const double imu_hz = 1.0 / (*of_imu * scale), images_hz = 1.0 / (*of_images * scale);
+    if (imu_hz >= 20.0 && imu_hz <= 4000.0 && images_hz >= 1.0 && images_hz <= 200.0) return factor;
+  }
+  return 1;
+}
+
+std::string causeOfShift(double seconds) {
+  struct Cause {
+    double seconds;
+    const char* text;
+  };
+  constexpr std::array kCauses{
+      Cause{18.0, "GPS time is ahead of UTC by 18 s"},
+      Cause{19.0, "TAI is ahead of GPS time by 19 s"},
+      Cause{37.0, "TAI is ahead of UTC by 37 s"},
+      Cause{315'964'782.0, "GPS time counts from 1980, UTC from 1970"},
+      Cause{315'964'800.0, "GPS time counts from 1980, UTC from 1970"},
+      Cause{2'208'988'800.0, "NTP's time counts from 1900, UTC from 1970"}};
+  constexpr double kNear_s = 0.2, kHour_s = 3600.0;
+  seconds = std::abs(seconds);
+  for (const Cause& cause : kCauses) {
+    if (std::abs(seconds - cause.seconds) < kNear_s) return std::string(", as ") + cause.text;
+  }
+  const double hours = std::round(seconds / kHour_s);
+  if (hours < 1.0 || hours > 14.0 || std::abs(seconds - kHour_s * hours) > kNear_s) return {};
+  return fmt::format(", as a time zone is of {:.0f} h", hours);
+}
+
+DataFindings checkClocks(const Recording& recording, const DataUse& use) {
+  DataFindings findings;
+  checkClockChanges(recording, use, findings);
+  const bool of_imu = use.imu && !recording.imu.empty();
+  const StampList imu = of_imu ? stampsOfImu(recording) : StampList(),
+                  images = stampsOfCamera(recording);
+  if (of_imu) checkEqual("IMU", recording.reasons.of("imu_not_increasing"), imu.size(), findings);
+  checkEqual("images", recording.reasons.of("frame_not_increasing"), images.size(), findings);
+  // Frames without IMU may be numbered if there are no other times, as in KITTI tracking.
+  if (!of_imu || images.empty()) return findings;
+  const auto factor = factorOfStamps(imu, images);
+  if (factor == 1) {  // also detects 1 kHz samples in whole ms
+    checkCount("images", images, findings);
+    checkCount("samples of the IMU", imu, findings);
+  } else {
+    findings.push_back(
+        {StampGrade::kFatal, "stamps_unit",
+         fmt::format("the stamps are in {}, not nanoseconds (in those images would come every "
+                     "{:.0f} ns and inertial samples every {:.0f} ns): multiply them by {}, or let "
+                     "perdure doctor --data DRIVE --fix COPY do it",
+                     factor == 1000 ? "µs" : "ms", *intervalOf(images), *intervalOf(imu), factor)});
+  }
+  if (std::any_of(findings.begin(), findings.end(),
+                  [](const auto& one) { return one.grade == StampGrade::kFatal; })) {
+    return findings;
+  }
+  checkShared(recording, findings);
+  checkRate(recording, findings);
+  return findings;
+}
+
+}  // namespace perdure::replay

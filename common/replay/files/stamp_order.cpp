@@ -1,0 +1,323 @@
+#include "common/replay/files/stamp_order.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <optional>
+
+#include "common/base/algorithms/median.h"
+#include "common/replay/files/stamps.h"
+
+namespace perdure::replay {
+namespace {
+
+using std::chrono::hours, std::chrono::seconds;
+using Times = std::vector<TimePoint>;
+using Kind = ClockChange::Kind;
+
+constexpr std::size_t kFew = 3;        ///< number of strays accepted for any number of stamps
+constexpr std::size_t kFewShare = 50;  ///< one stray per this number of stamps
+constexpr int kFarIntervals = 32;      ///< distance from the neighbours' stamps, in intervals
+
+struct Counter {
+  Duration length;
+  std::string name;
+};
+
+/// Lengths after which clocks of sensors begin again.
+std::vector<Counter> counters() {
+  struct Tick {
+    std::int64_t ns;
+    const char* name;
+  };
+  constexpr std::array kTicks{Tick{1, "ns"},           Tick{100, "100 ns"},
+                              Tick{1000, "µs"},        Tick{10'000, "10 µs"},
+                              Tick{100'000, "100 µs"}, Tick{1'000'000, "ms"}};
+  std::vector<Counter> all;
+  for (const int bits : {16, 24, 30, 31, 32}) {
+    for (const Tick& tick : kTicks) {
+      all.push_back({Duration((std::int64_t{1} << bits) * tick.ns),
+                     fmt::format("{} bits of {}", bits, tick.name)});
+    }
+  }
+  all.insert(all.end(), {{std::chrono::minutes(1), "a minute"},
+                         {hours(1), "an hour"},
+                         {hours(24), "a day"},
+                         {hours(7 * 24), "a week"}});
+  return all;
+}
+
+/// Indices of a longest subsequence of stamps that do not decrease.
+std::vector<std::size_t> longestInOrder(const Times& stamps) {
+  std::vector<std::size_t> ends, before(stamps.size());  // ends[k]: end of the best k + 1
+  for (std::size_t i = 0; i < stamps.size(); ++i) {
+    const auto at =
+        std::upper_bound(ends.begin(), ends.end(), stamps[i],
+                         [&](TimePoint time, std::size_t j) { return time < stamps[j]; });
+    before[i] = at == ends.begin() ? stamps.size() : *(at - 1);
+    if (at == ends.end())
+      ends.push_back(i);
+    else
+      *at = i;
+  }
+  std::vector<std::size_t> list(ends.size());
+  for (std::size_t k = ends.size(), i = ends.empty() ? 0 : ends.back(); k > 0; i = before[i]) {
+    list[--k] = i;
+  }
+  return list;
+}
+
+/// The median of the intervals that are positive.
+Duration medianInterval(const Times& stamps) {
+  std::vector<Duration> intervals;
+  for (std::size_t i = 1; i < stamps.size(); ++i) {
+    if (stamps[i] > stamps[i - 1]) intervals.push_back(between(stamps[i], stamps[i - 1]));
+  }
+  return medianOf(std::move(intervals));
+}
+
+bool areFew(std::size_t count, std::size_t all) {
+  return 2 * count < all && count <= std::max(kFew, all / kFewShare);
+}
+
+/// The longest ordered sequence of stamps, used to judge the other stamps.
+class Line {
+ public:
+  explicit Line(const Times& stamps) : stamps_(stamps) {
+    indices_ = longestInOrder(stamps);
+    for (const std::size_t i : indices_) sorted_.push_back(stamps[i]);
+    usual_ = medianInterval(sorted_);
+  }
+  const std::vector<std::size_t>& indices() const { return indices_; }
+
+  /// Returns true if the stamp is far outside its neighbours' stamps and does not fill a gap
+  /// elsewhere.
+  bool isStray(std::size_t index) const {
+    const auto next = std::lower_bound(indices_.begin(), indices_.end(), index);
+    const TimePoint stamp = stamps_[index];
+    Duration outside{0};
+    if (next != indices_.end()) outside = std::max(outside, between(stamp, stamps_[*next]));
+    if (next != indices_.begin()) {
+      outside = std::max(outside, between(stamps_[*(next - 1)], stamp));
+    }
+    return outside > multipleOf(kFarIntervals, usual_) && !fillsHole(stamp);
+  }
+
+ private:
+  bool fillsHole(TimePoint stamp) const {
+    const auto behind = std::upper_bound(sorted_.begin(), sorted_.end(), stamp);
+    if (behind == sorted_.begin() || behind == sorted_.end()) return false;
+    return multipleOf(2, between(*behind, *(behind - 1))) > multipleOf(3, usual_);
+  }
+
+  const Times& stamps_;
+  std::vector<std::size_t> indices_;  // increasing, as are their stamps
+  Times sorted_;
+  Duration usual_{0};
+};
+
+/// Removes a few stamps before or after a long pause at the ends.
+void cutEnds(const Times& stamps, StampOrder& order) {
+  auto& kept = order.kept;
+  if (kept.size() < 20) return;
+  Times sorted;
+  for (const std::size_t i : kept) sorted.push_back(stamps[i]);
+  const Duration pause =
+      std::max<Duration>(std::chrono::seconds(10), multipleOf(1000, medianInterval(sorted)));
+  for (std::size_t few = kFew; few > 0; --few) {
+    if (between(sorted[few], sorted[few - 1]) > pause) {
+      kept.erase(kept.begin(), kept.begin() + static_cast<std::ptrdiff_t>(few));
+      order.strays += few;
+      break;
+    }
+  }
+  for (std::size_t few = kFew; few > 0; --few) {
+    const std::size_t first = sorted.size() - few;
+    if (between(sorted[first], sorted[first - 1]) > pause) {
+      kept.resize(kept.size() - few);
+      order.strays += few;
+      break;
+    }
+  }
+}
+
+void dropRepeated(const Times& stamps, StampOrder& order) {
+  const auto end =
+      std::unique(order.kept.begin(), order.kept.end(),
+                  [&](std::size_t a, std::size_t b) { return stamps[a] == stamps[b]; });
+  order.repeated = static_cast<std::size_t>(order.kept.end() - end);
+  order.kept.erase(end, order.kept.end());
+}
+
+/// a + b, limited to ±292 years.
+Duration sum(Duration a, Duration b) {
+  return between(TimePoint(a), TimePoint(-std::max(b, -Duration::max())));
+}
+
+/// Finds the changes of a clock, from stamp to stamp.
+class ClockWalk {
+ public:
+  ClockWalk(const Times& stamps, const AreSame& same)
+      : stamps_(stamps), same_(same), times_(stamps), usual_(medianInterval(stamps)) {
+    if (usual_ <= Duration{0}) return;
+    for (std::size_t i = 1; i < stamps.size(); ++i) back_ += stamps[i] < stamps[i - 1] ? 1 : 0;
+    const auto [least, most] = std::minmax_element(stamps.begin(), stamps.end());
+    least_ = *least, most_ = *most;
+    if (!walk()) times_ = stamps, changes_.clear();
+  }
+  Times times() && { return std::move(times_); }
+  std::vector<ClockChange> changes() && { return std::move(changes_); }
+
+ private:
+  static constexpr std::size_t kMostSet =
+      8;  ///< clocks that were set; overlapping batches are more
+  static constexpr std::size_t kOrdered = 20;  ///< one step back per this number is a list in order
+  static constexpr int kLost = 20;             ///< intervals in which samples may be missing
+
+  /// Returns false if the stamps are no clock that was set.
+  bool walk() {
+    Duration added{0};
+    std::size_t set = 0;
+    for (std::size_t i = 1; i < stamps_.size(); ++i) {
+      if (auto change = changeAt(i)) {
+        added = sum(added, change->added);
+        change->continues = TimePoint(sum(change->after.time_since_epoch(), added));
+        if (change->kind == Kind::kSet && ++set > kMostSet) return false;
+        changes_.push_back(*std::move(change));
+      }
+      times_[i] = TimePoint(sum(stamps_[i].time_since_epoch(), added));
+    }
+    return true;
+  }
+
+  std::optional<ClockChange> changeAt(std::size_t i) const {
+    const Duration step = between(stamps_[i], stamps_[i - 1]);
+    const Duration pause = std::max<Duration>(seconds(1), multipleOf(kLost, usual_));
+    if (step >= Duration{0} && step <= pause) return std::nullopt;
+    ClockChange change{.index = i, .before = stamps_[i - 1], .after = stamps_[i], .usual = usual_};
+    const std::size_t behind = std::min(kFew + 1, stamps_.size() - i);
+    const bool regular = i > kFew && goesOn(i - kFew - 1, kFew + 1) && goesOn(i, kFew + 1);
+    if (step < Duration{0} && goesOn(i, behind) && findCounter(change, regular)) return change;
+    if (!regular || kOrdered * back_ > stamps_.size()) return std::nullopt;
+    if (step > Duration{0} && step <= hours(24)) return change;  // a pause
+    if (step < Duration{0} && (isSmall(step) || isMoved(i))) return std::nullopt;
+    change.kind = Kind::kSet, change.added = between(TimePoint(usual_), TimePoint(step));
+    return change;
+  }
+
+  bool isSmall(Duration step) const {
+    return step >= -std::max<Duration>(std::chrono::milliseconds(50), multipleOf(3, usual_));
+  }
+
+  /// Whether `count` stamps from `first` increase without a pause.
+  bool goesOn(std::size_t first, std::size_t count) const {
+    if (first + count > stamps_.size()) return false;
+    for (std::size_t i = first + 1; i < first + count; ++i) {
+      if (!isNext(stamps_[i - 1], stamps_[i])) return false;
+    }
+    return true;
+  }
+  bool isNext(TimePoint before, TimePoint after) const {
+    return after > before && between(after, before) <= multipleOf(kLost, usual_);
+  }
+
+  /// The counter that came round, if the step back has its length: to about a sample between
+  /// regular stamps, or more roughly if all stamps lie inside of it.
+  bool findCounter(ClockChange& change, bool regular) const {
+    static const std::vector<Counter> kCounters = counters();
+    for (const Counter& counter : kCounters) {
+      const Duration gap = counter.length - between(change.before, change.after);
+      const bool whole = least_ >= TimePoint{} && most_ < TimePoint{} + counter.length;
+      const Duration most = std::max(multipleOf(3, usual_), whole ? counter.length / 100 : usual_);
+      if (!(whole || regular) || gap <= Duration{0} || gap > most ||
+          multipleOf(whole ? 2 : 10, most) > counter.length)
+        continue;
+      change.kind = Kind::kCounter, change.added = counter.length, change.counter = counter.name;
+      return true;
+    }
+    return false;
+  }
+
+  /// Whether the stamps from i on are lines at another place: they fill a gap between the times
+  /// before, or repeat them.
+  bool isMoved(std::size_t i) const {
+    std::size_t end = i + 1;
+    while (end < stamps_.size() && isNext(stamps_[end - 1], stamps_[end])) ++end;
+    const Duration added = between(times_[i - 1], stamps_[i - 1]);
+    const auto corrected = [&](std::size_t k) {
+      return TimePoint(sum(stamps_[k].time_since_epoch(), added));
+    };
+    using Sample = std::pair<TimePoint, std::size_t>;
+    std::vector<Sample> earlier;
+    for (std::size_t k = 0; k < i; ++k) earlier.emplace_back(times_[k], k);
+    std::sort(earlier.begin(), earlier.end());
+    const TimePoint first = corrected(i), last = corrected(end - 1);
+    const auto low = std::lower_bound(earlier.begin(), earlier.end(), Sample(first, 0)),
+               high = std::upper_bound(low, earlier.end(), Sample(last, i));
+    std::size_t inside = 0, repeated = 0;
+    for (std::size_t k = i; k < end && stamps_[k] <= stamps_[i - 1]; ++k, ++inside) {
+      const auto at = std::lower_bound(low, high, Sample(corrected(k), 0));
+      if (at != high && at->first == corrected(k) && same_(at->second, k)) ++repeated;
+    }
+    if (2 * repeated > inside) return true;
+    constexpr std::ptrdiff_t kAmong = 10;
+    if (kAmong * (high - low) > static_cast<std::ptrdiff_t>(inside)) return false;
+    return (low != earlier.begin() && isNext((low - 1)->first, first)) ||
+           (high != earlier.end() && isNext(last, high->first));
+  }
+
+  const Times& stamps_;
+  const AreSame& same_;
+  Times times_;
+  std::vector<ClockChange> changes_;
+  Duration usual_;
+  TimePoint least_, most_;
+  std::size_t back_ = 0;  ///< number of steps back
+};
+
+}  // namespace
+
+StampOrder orderOf(const std::vector<TimePoint>& given, const AreSame& same) {
+  StampOrder order;
+  ClockWalk walk(given, same);
+  order.changes = std::move(walk).changes();
+  order.times = std::move(walk).times();
+  const Times& stamps = order.times;
+  order.kept.resize(stamps.size());
+  std::iota(order.kept.begin(), order.kept.end(), 0);
+  if (!std::is_sorted(stamps.begin(), stamps.end())) {
+    const Line line(stamps);
+    std::vector<bool> in_line(stamps.size(), false);
+    for (const std::size_t i : line.indices()) in_line[i] = true;
+    std::vector<bool> stray(stamps.size(), false);
+    for (std::size_t i = 0; i < stamps.size(); ++i) {
+      if (in_line[i]) continue;
+      ++order.moved;
+      stray[i] = line.isStray(i);
+    }
+    const auto strays = static_cast<std::size_t>(std::count(stray.begin(), stray.end(), true));
+    const bool mostly_sorted = order.moved <= std::max(kFew, stamps.size() / 5);
+    if (mostly_sorted && areFew(strays, stamps.size())) {
+      order.strays = strays;
+      order.moved -= strays;
+      std::erase_if(order.kept, [&](std::size_t i) { return stray[i]; });
+    }
+    std::stable_sort(order.kept.begin(), order.kept.end(),
+                     [&](std::size_t a, std::size_t b) { return stamps[a] < stamps[b]; });
+  }
+  dropRepeated(stamps, order);
+  cutEnds(stamps, order);
+  // Lines at another place may fill a pause.
+  std::erase_if(order.changes, [&](const ClockChange& change) {
+    const auto next =
+        std::lower_bound(order.kept.begin(), order.kept.end(), change.continues,
+                         [&](std::size_t i, TimePoint time) { return stamps[i] < time; });
+    return change.kind == Kind::kPause && next != order.kept.begin() &&
+           between(change.continues, stamps[*(next - 1)]) < between(change.after, change.before);
+  });
+  return order;
+}
+
+}  // namespace perdure::replay

@@ -1,0 +1,99 @@
+#include "common/replay/clock_check.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/replay/recording.h"
+
+namespace perdure::replay {
+namespace {
+
+using std::chrono::milliseconds, std::chrono::seconds;
+using testing::HasSubstr;
+using Stamp = std::function<Duration(Duration)>;
+
+constexpr Duration kSame(Duration time) { return time; }
+
+/// A drive of 20 s whose sensors write their stamps so; read and settled.
+Recording readWith(const Stamp& imu, const Stamp& images) {
+  Recording recording;
+  for (int i = 0; i < 2000; ++i) {
+    ImuSample sample;
+    sample.time = TimePoint(imu(seconds(100) + i * milliseconds(10)));
+    sample.gyro.x() = i;
+    recording.imu.push_back(sample);
+  }
+  recording.frames.resize(200);
+  for (int i = 0; i < 200; ++i) {
+    recording.frames[static_cast<std::size_t>(i)].time =
+        TimePoint(images(seconds(100) + i * milliseconds(100)));
+  }
+  orderImu(recording, "imu.csv");
+  orderByTime(recording.frames, "frame", "images.csv", recording);
+  settleClocks(recording);
+  return recording;
+}
+
+std::string finding(const Recording& recording, DataFinding::Grade grade, const char* code) {
+  for (const auto& one : checkClocks(recording, {})) {
+    if (one.code == code && one.grade == grade) return one.text;
+  }
+  return "none";
+}
+
+Stamp setBy(Duration by) {
+  return [by](Duration time) { return time + (time >= seconds(110) ? by : Duration{0}); };
+}
+
+TEST(ClockCheck, AClockThatWasSetForAllSensorsIsReadOnAndSaid) {
+  const auto drive = readWith(setBy(-milliseconds(2003)), setBy(-milliseconds(2003)));
+  EXPECT_THAT(finding(drive, DataFinding::Grade::kWarning, "clock_set"),
+              HasSubstr("imu.csv, message 1001, images.csv, message 101: the clock was set back by "
+                        "2.003 s in mid-drive"));
+  ASSERT_EQ(drive.frames.size(), 200U);
+  EXPECT_EQ(drive.frames.back().time - drive.imu.back().time, -milliseconds(90));
+}
+
+TEST(ClockCheck, AClockThatWasSetForOneSensorIsRefusedWithItsPlace) {
+  EXPECT_THAT(finding(readWith(kSame, setBy(-milliseconds(2003))), DataFinding::Grade::kFatal,
+                      "clock_set_alone"),
+              HasSubstr("images.csv, message 101: the stamps of the images go back by 1.903 s"));
+  EXPECT_THAT(
+      finding(readWith(kSame, setBy(seconds(5))), DataFinding::Grade::kFatal, "clock_set_alone"),
+      HasSubstr("message 101: the stamps of the images jump ahead by 5.1 s"));
+  const auto restarted = [](Duration time) { return time % seconds(110); };
+  EXPECT_THAT(
+      finding(readWith(restarted, restarted), DataFinding::Grade::kFatal, "clock_set_alone"),
+      HasSubstr("the device was restarted"));
+}
+
+TEST(ClockCheck, APauseOfBothSensorsIsNoFault) {
+  const auto drive = readWith(setBy(seconds(60)), setBy(seconds(60)));
+  EXPECT_THAT(finding(drive, DataFinding::Grade::kWarning, "clock_paused"),
+              HasSubstr("message 1001: nothing from the IMU for 60.01 s"));
+}
+
+TEST(ClockCheck, ACounterThatOneSensorDoesNotHaveIsContinuedInBoth) {
+  const Duration length = Duration(4'294'967'296'000);
+  const auto round = [&](Duration time) { return (length - seconds(110) + time) % length; };
+  const auto whole = [&](Duration time) { return length - seconds(110) + time; };
+  for (const auto& drive : {readWith(round, round), readWith(round, whole)}) {
+    EXPECT_THAT(finding(drive, DataFinding::Grade::kWarning, "clock_wrapped"),
+                HasSubstr("imu.csv, message 1001: the stamps of the IMU go back by 4294.957296 s: "
+                          "a counter of 32 bits of µs came round"));
+    EXPECT_EQ(drive.frames.back().time - drive.imu.back().time, -milliseconds(90));
+  }
+  const auto behind = [&](Duration time) { return time - seconds(90); };  // after the wrap only
+  const auto drive = readWith(round, behind);
+  EXPECT_EQ(drive.frames.front().time - drive.imu.front().time, seconds(20));
+}
+
+TEST(ClockCheck, DifferencesOfClocksHaveTheirCauses) {
+  EXPECT_EQ(causeOfShift(37.01), ", as TAI is ahead of UTC by 37 s");
+  EXPECT_EQ(causeOfShift(-18.0), ", as GPS time is ahead of UTC by 18 s");
+  EXPECT_EQ(causeOfShift(7200.0), ", as a time zone is of 2 h");
+  EXPECT_EQ(causeOfShift(3.0), "");
+}
+
+}  // namespace
+}  // namespace perdure::replay

@@ -1,0 +1,107 @@
+#include "tools/data_check/clock_shift.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "common/math/so3.h"
+#include "tools/data_check/turn_integral.h"
+
+namespace perdure::tools {
+namespace {
+
+using std::chrono::milliseconds, std::chrono::seconds;
+using testing::HasSubstr;
+
+constexpr TimePoint kStart = TimePoint(seconds(1'700'000'000));
+
+/// A body that turns at random for 90 s: rates at 100 Hz, smooth over half a second.
+std::vector<ImuSample> randomTurning(std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> push(0.0, 0.15);
+  std::vector<ImuSample> samples;
+  Eigen::Vector3d rate = Eigen::Vector3d::Zero();
+  for (int i = 0; i < 9000; ++i) {
+    for (int axis = 0; axis < 3; ++axis) rate(axis) += push(random);
+    rate *= 0.98;
+    ImuSample sample;
+    sample.time = kStart + i * milliseconds(10);
+    sample.gyro = rate;
+    samples.push_back(sample);
+  }
+  return samples;
+}
+
+CameraCalibration camera() {
+  CameraCalibration calibration;
+  calibration.name = "cam0", calibration.fx = 300.0;
+  calibration.T_BC.q = Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5);
+  return calibration;
+}
+
+/// What the camera shows of the turning in eight parts of the drive, with its noise; its stamps are
+/// `ahead`.
+std::vector<Turn> turnsOf(const std::vector<ImuSample>& samples, Duration ahead) {
+  const TurnIntegral gyro(samples);
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> noise(0.0, 0.002);
+  std::vector<Turn> turns;
+  for (int part = 0; part < 8; ++part) {
+    for (int i = 0; i < 15; ++i) {
+      const TimePoint from = kStart + part * seconds(11) + i * milliseconds(50);
+      const TimePoint to = from + milliseconds(50);
+      const Eigen::Vector3d turn = camera().T_BC.q.conjugate() * gyro.between(from, to);
+      turns.push_back({from + ahead, to + ahead,
+                       turn + Eigen::Vector3d(noise(random), noise(random), noise(random))});
+    }
+  }
+  return turns;
+}
+
+TEST(ClockShift, IsFoundWhateverItsSizeIs) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    const auto samples = randomTurning(seed);
+    for (const double ahead : {-40.0, -3.0, 0.0, 1.7, 18.0, 37.0, 44.0, 1e9}) {
+      const auto shift =
+          shiftOfTurns(turnsOf(samples, durationFromSeconds(ahead)), samples, camera());
+      ASSERT_TRUE(shift) << ahead << " of seed " << seed;
+      EXPECT_NEAR(*shift, -ahead, 0.011) << "seed " << seed;
+    }
+  }
+}
+
+TEST(ClockShift, IsNotFoundInTheTurningOfAnotherDrive) {
+  EXPECT_FALSE(shiftOfTurns(turnsOf(randomTurning(1), seconds(3)), randomTurning(2), camera()));
+}
+
+TEST(ClockShift, IsNotCertainWhereTheTurningComesAgain) {
+  auto samples = randomTurning(1);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const double angle = 2.0 * M_PI * static_cast<double>(i) / 200.0;  // every two seconds
+    samples[i].gyro = {std::sin(angle), std::cos(angle), 0.5 * std::sin(2.0 * angle)};
+  }
+  EXPECT_FALSE(shiftOfTurns(turnsOf(samples, seconds(3)), samples, camera()));
+}
+
+TEST(ClockShift, IsNamedWithItsCauseAndItsMend) {
+  const auto textOf = [](double shift) { return shiftFinding(shift, camera()).front().text; };
+  EXPECT_THAT(textOf(-37.0), HasSubstr("37 s ahead of that of the IMU by their turning, as TAI"));
+  EXPECT_THAT(textOf(-18.0), HasSubstr("as GPS time is ahead of UTC by 18 s: subtract"));
+  EXPECT_THAT(textOf(19.0), HasSubstr("19 s behind that of the IMU"));
+  EXPECT_THAT(textOf(7200.1), HasSubstr("a time zone is of 2 h: add"));
+  EXPECT_THAT(textOf(-3.25),
+              HasSubstr("3.25 s ahead of that of the IMU by their turning: subtract"));
+}
+
+TEST(ClockShift, MovesAllImages) {
+  replay::Recording recording;
+  recording.frames.resize(2);
+  recording.frames[1].time = TimePoint(seconds(41));
+  shiftImages(-37.0, recording);
+  EXPECT_EQ(recording.frames[1].time, TimePoint(seconds(4)));
+}
+
+}  // namespace
+}  // namespace perdure::tools

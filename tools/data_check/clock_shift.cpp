@@ -1,0 +1,142 @@
+#include "tools/data_check/clock_shift.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/replay/clock_check.h"
+
+namespace perdure::tools {
+namespace {
+
+using replay::DataFinding;
+using replay::Recording;
+
+constexpr double kStep_s = 0.01;  ///< of the shifts; a turn of a carried camera takes much longer
+
+/// Integral of the rates on a grid. Turns between two images are small, so that rates add up.
+class TurnGrid {
+ public:
+  explicit TurnGrid(const std::vector<ImuSample>& samples) : start_(samples.front().time) {
+    constexpr double kHole_s = 0.35;
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    int holes = 0;
+    for (std::size_t i = 1; i < samples.size(); ++i) {
+      const double from = toSeconds(samples[i - 1].time - start_),
+                   to = toSeconds(samples[i].time - start_);
+      if (to - from > kHole_s) ++holes;
+      const Eigen::Vector3d rate = 0.5 * (samples[i - 1].gyro + samples[i].gyro);
+      for (; static_cast<double>(cells_.size()) * kStep_s <= to; holes_.push_back(holes)) {
+        const double at = static_cast<double>(cells_.size()) * kStep_s;
+        cells_.push_back(sum + (at - from) * rate);
+      }
+      sum += (to - from) * rate;
+    }
+  }
+  std::int64_t cells() const { return static_cast<std::int64_t>(cells_.size()); }
+  std::int64_t cellOf(TimePoint time) const {
+    return std::llround(toSeconds(time - start_) / kStep_s);
+  }
+  /// Nothing if samples are missing between the two cells.
+  std::optional<Eigen::Vector3d> between(std::int64_t from, std::int64_t to) const {
+    if (from < 0 || to >= cells()) return std::nullopt;
+    const auto a = static_cast<std::size_t>(from), b = static_cast<std::size_t>(to);
+    if (holes_[a] != holes_[b]) return std::nullopt;
+    return cells_[b] - cells_[a];
+  }
+
+ private:
+  TimePoint start_;
+  std::vector<Eigen::Vector3d> cells_;
+  std::vector<int> holes_;
+};
+
+/// A turn of the images, in B, over cells of the grid.
+struct CellTurn {
+  std::int64_t from, to;
+  Eigen::Vector3d of_images;
+};
+
+/// Share of the images' turning that the gyroscope does not explain at a shift in cells, without
+/// the means; 1 if it covers less than half of them.
+double unexplainedAt(const std::vector<CellTurn>& turns, const TurnGrid& gyro, std::int64_t shift) {
+  Eigen::Vector3d images = Eigen::Vector3d::Zero(), off = Eigen::Vector3d::Zero();
+  double images_squared = 0.0, off_squared = 0.0;
+  std::size_t count = 0;
+  for (const CellTurn& turn : turns) {
+    const auto given = gyro.between(turn.from + shift, turn.to + shift);
+    if (!given) continue;
+    const Eigen::Vector3d error = turn.of_images - *given;
+    images += turn.of_images, images_squared += turn.of_images.squaredNorm();
+    off += error, off_squared += error.squaredNorm();
+    ++count;
+  }
+  if (2 * count < turns.size()) return 1.0;
+  const auto n = static_cast<double>(count);
+  const double all = images_squared - images.squaredNorm() / n;
+  return std::min(1.0, (off_squared - off.squaredNorm() / n) / std::max(1e-18, all));
+}
+
+}  // namespace
+
+std::optional<double> shiftOfTurns(const std::vector<Turn>& turns,
+                                   const std::vector<ImuSample>& samples,
+                                   const CameraCalibration& camera) {
+  constexpr std::size_t kFewest = 24;
+  constexpr double kEnough_px = 2.0, kExplained = 0.3, kClearly = 2.0, kApart_s = 0.5;
+  if (turns.size() < kFewest || samples.size() < 2) return std::nullopt;
+  const TurnGrid gyro(samples);
+  std::vector<CellTurn> cells;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double squared = 0.0;
+  for (const Turn& turn : turns) {
+    cells.push_back({gyro.cellOf(turn.from), gyro.cellOf(turn.to), camera.T_BC.q * turn.of_images});
+    sum += turn.of_images, squared += turn.of_images.squaredNorm();
+  }
+  const auto n = static_cast<double>(turns.size());
+  if (std::sqrt((squared - sum.squaredNorm() / n) / n) * camera.fx < kEnough_px)
+    return std::nullopt;
+  const std::int64_t least = -cells.back().to, most = gyro.cells() - cells.front().from;
+  std::vector<double> left;
+  for (std::int64_t shift = least; shift <= most; ++shift) {
+    left.push_back(unexplainedAt(cells, gyro, shift));
+  }
+  const auto best = std::min_element(left.begin(), left.end());
+  const auto apart = static_cast<std::ptrdiff_t>(kApart_s / kStep_s);
+  double second = 1.0;
+  for (auto other = left.begin(); other != left.end(); ++other) {
+    if (std::abs(other - best) > apart) second = std::min(second, *other);
+  }
+  if (*best > kExplained || kClearly * *best > second) return std::nullopt;
+  return kStep_s * static_cast<double>(least + (best - left.begin()));
+}
+
+std::optional<double> shiftOfClocks(const Recording& recording) {
+  if (recording.calibration.cameras.empty()) return std::nullopt;
+  const CameraCalibration& camera = recording.calibration.cameras.front();
+  constexpr double kLeast_s = 1.0;
+  auto shift = shiftOfTurns(turnsAlong(recording), recording.imu, camera);
+  if (!shift) return std::nullopt;
+  *shift -= camera.time_offset_s;
+  if (std::abs(*shift) < kLeast_s) return std::nullopt;
+  // A difference with a name is whole seconds; the rest is the camera's own delay.
+  const bool named = !replay::causeOfShift(*shift).empty();
+  return named ? std::round(*shift) : *shift;
+}
+
+replay::DataFindings shiftFinding(double shift_s, const CameraCalibration& camera) {
+  return {{DataFinding::Grade::kFatal, "clock_shift",
+           fmt::format("the clock of {} is {:.10g} s {} that of the IMU by their turning{}: {} as "
+                       "much {} the stamps of the images, or let perdure doctor --data DRIVE --fix "
+                       "COPY do it",
+                       camera.name, std::abs(shift_s), shift_s < 0 ? "ahead of" : "behind",
+                       replay::causeOfShift(shift_s), shift_s < 0 ? "subtract" : "add",
+                       shift_s < 0 ? "from" : "to")}};
+}
+
+void shiftImages(double shift_s, Recording& recording) {
+  for (auto& frame : recording.frames) frame.time += durationFromSeconds(shift_s);
+}
+
+}  // namespace perdure::tools

@@ -1,0 +1,28 @@
+// Finds the difference of two clocks of camera and IMU of any size: the turning of images from the
+// whole drive is compared with that of the gyroscope at every shift.
+#pragma once
+
+#include <optional>
+
+#include "common/replay/data_check.h"
+#include "tools/data_check/motion_check.h"
+
+namespace perdure::tools {
+
+/// t_imu − t_image in s, if the gyroscope explains the turning of the images at this shift, and
+/// twice as well as at any other one. `turns`: from places all over the drive.
+std::optional<double> shiftOfTurns(const std::vector<Turn>& turns,
+                                   const std::vector<ImuSample>& samples,
+                                   const CameraCalibration& camera);
+
+/// Reads images from places all over the drive, and returns what to add to their stamps. Returns
+/// nothing if no shift of over a second is certain.
+std::optional<double> shiftOfClocks(const replay::Recording& recording);
+
+/// Code: clock_shift.
+replay::DataFindings shiftFinding(double shift_s, const CameraCalibration& camera);
+
+/// Adds the shift to the stamps of all images.
+void shiftImages(double shift_s, replay::Recording& recording);
+
+}  // namespace perdure::tools

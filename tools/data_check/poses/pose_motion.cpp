@@ -1,0 +1,152 @@
+// Compares the motion of given poses with the drive: poses of the camera, and poses that stand
+// still while the body moves.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "common/base/algorithms/median.h"
+#include "tools/data_check/image_turn.h"
+#include "tools/data_check/poses/pose_check.h"
+#include "tools/data_check/turn_integral.h"
+
+namespace perdure::tools {
+namespace {
+
+using replay::DataFinding;
+using replay::DataFindings;
+using replay::StampedPose;
+using Grade = DataFinding::Grade;
+using Poses = std::vector<StampedPose>;
+
+/// The mean of the directions of travel, in the frame that the poses have, over steps of a metre;
+/// its length shows how constant they are. Zero for a path under twenty metres.
+Eigen::Vector3d courseOf(const Poses& poses) {
+  constexpr double kStep_m = 1.0, kFewest = 20.0;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double count = 0.0;
+  for (std::size_t i = 0, from = 0; i < poses.size(); ++i) {
+    const Eigen::Vector3d step = poses[i].T_WB.p - poses[from].T_WB.p;
+    if (step.norm() < kStep_m) continue;
+    sum += poses[from].T_WB.q.conjugate() * step.normalized();
+    from = i, count += 1.0;
+  }
+  return count < kFewest ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : Eigen::Vector3d(sum / count);
+}
+
+/// How constant an axis of the poses is in their world: 1 is constant.
+double constancyOf(const Eigen::Vector3d& axis, const Poses& poses) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const StampedPose& pose : poses) sum += pose.T_WB.q * axis;
+  return sum.norm() / static_cast<double>(poses.size());
+}
+
+struct Still {
+  std::size_t first, last;
+};
+
+/// The longest time, over a second, in which a pose is repeated.
+std::optional<Still> longestStill(const Poses& poses) {
+  constexpr double kSame_m = 1e-4, kSame_rad = 1e-4;
+  constexpr Duration kLeast = std::chrono::seconds(1);
+  constexpr std::size_t kFewest = 5;
+  std::optional<Still> longest;
+  Duration most = kLeast;
+  for (std::size_t i = 0, from = 0; i < poses.size(); ++i) {
+    const auto &a = poses[from].T_WB, &b = poses[i].T_WB;
+    if ((b.p - a.p).norm() > kSame_m || a.q.angularDistance(b.q) > kSame_rad) from = i;
+    if (poses[i].time - poses[from].time < most || i - from < kFewest) continue;
+    most = poses[i].time - poses[from].time;
+    longest = Still{from, i};
+  }
+  return longest;
+}
+
+/// RMS of the gyroscope's turning in steps of 0.3 s, without its mean.
+double turningIn(const replay::Recording& recording, TimePoint from, TimePoint to) {
+  if (recording.imu.size() < 2) return 0.0;
+  constexpr Duration kStep = std::chrono::milliseconds(300);
+  const TurnIntegral gyro(recording.imu);
+  std::vector<Eigen::Vector3d> turns;
+  for (TimePoint time = from; time + kStep <= to; time += kStep) {
+    if (gyro.covers(time, time + kStep)) turns.push_back(gyro.between(time, time + kStep));
+  }
+  return turns.size() < 3 ? 0.0 : TurnPairs(turns, turns).turning();
+}
+
+double speedIn(const replay::Recording& recording, TimePoint from, TimePoint to) {
+  std::vector<double> speeds;
+  for (const SpeedSample& sample : recording.speed) {
+    if (sample.time >= from && sample.time <= to) speeds.push_back(std::abs(sample.speed));
+  }
+  return medianOf(std::move(speeds));
+}
+
+/// Median flow in px of image pairs at three places; the background of a camera at rest has none.
+double flowIn(const replay::Recording& recording, TimePoint from, TimePoint to) {
+  std::vector<const replay::Recording::FrameFile*> frames;
+  for (const auto& frame : recording.frames) {
+    const bool inside = frame.camera == 0 && frame.time >= from && frame.time <= to;
+    if (inside && (frame.load || !frame.path.empty())) frames.push_back(&frame);
+  }
+  if (frames.size() < 4) return 0.0;
+  const CameraModel camera(recording.calibration.cameras.front());
+  std::vector<double> flows;
+  for (const std::size_t at : {frames.size() / 4, frames.size() / 2, frames.size() * 3 / 4}) {
+    const auto first = replay::monoImageOf(*frames[at - 1]),
+               second = replay::monoImageOf(*frames[at]);
+    if (!first || !second || first->size() != second->size()) continue;
+    std::vector<double> steps;
+    for (const Flow& flow : flowBetween(camera, FollowedImage(*first), FollowedImage(*second))) {
+      steps.push_back(recording.calibration.cameras.front().fx * flow.step.norm());
+    }
+    if (!steps.empty()) flows.push_back(medianOf(std::move(steps)));
+  }
+  return medianOf(std::move(flows));
+}
+
+}  // namespace
+
+DataFindings judgePosesOfCamera(const Poses& poses, const replay::Recording& recording) {
+  constexpr double kCourse = 0.95, kTurned_rad = 0.2, kAlong = 0.9, kAsConstant = 0.01;
+  if (poses.empty() || recording.calibration.cameras.empty()) return {};
+  const CameraCalibration& camera = recording.calibration.cameras.front();
+  const Eigen::Vector3d course = courseOf(poses), down = Eigen::Vector3d::UnitY();
+  if (course.norm() < kCourse || Eigen::AngleAxisd(camera.T_BC.q).angle() < kTurned_rad) return {};
+  const Eigen::Vector3d as_body = camera.T_BC.q.conjugate() * course;
+  if (std::abs(course.z()) < kAlong || std::abs(as_body.y()) < kAlong) return {};
+  if (constancyOf(down, poses) + kAsConstant < constancyOf(camera.T_BC.q * down, poses)) return {};
+  return {{Grade::kFatal, "poses_of_camera",
+           fmt::format("by the poses {} moves {} all the time, and along its own axis where they "
+                       "are read as those of the camera (z forward, y down), whose y also stays "
+                       "upright: give --odometry-of camera, or T_WB, which is T_WC times the "
+                       "inverse of T_BS",
+                       camera.name, as_body.y() < 0 ? "upwards" : "downwards")}};
+}
+
+DataFindings judgePosesFrozen(const Poses& poses, const replay::Recording& recording, bool images) {
+  constexpr double kTurns_rad = 0.02, kMoves_mps = 0.5, kFlows_px = 2.0;
+  const auto still = longestStill(poses);
+  if (!still || recording.calibration.cameras.empty()) return {};
+  if (still->first == 0 && still->last + 1 == poses.size()) return {};
+  const TimePoint from = poses[still->first].time, to = poses[still->last].time;
+  std::string moves;
+  if (turningIn(recording, from, to) > kTurns_rad) {
+    moves = "the gyroscope turns";
+  } else if (const double speed = speedIn(recording, from, to); speed > kMoves_mps) {
+    moves = fmt::format("the speed is {:.1f} m/s", speed);
+  } else if (images && flowIn(recording, from, to) > kFlows_px) {
+    moves = "the images move";
+  } else {
+    return {};
+  }
+  return {{Grade::kWarning, "poses_frozen",
+           fmt::format("the poses stand still from {} to {} ns ({:.1f} s, poses {} to {} of them) "
+                       "while {}: a tracker that is lost repeats its last pose; leave those lines "
+                       "out",
+                       toNanoseconds(from), toNanoseconds(to), toSeconds(to - from),
+                       still->first + 1, still->last + 1, moves)}};
+}
+
+}  // namespace perdure::tools

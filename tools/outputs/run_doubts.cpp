@@ -1,0 +1,85 @@
+#include "tools/outputs/run_doubts.h"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+
+namespace perdure::tools {
+namespace {
+
+/// A message that is due if more than one frame in `one_of` has the reason.
+struct Rule {
+  const char* code;
+  std::uint64_t one_of;
+  const char *what, *mend;
+};
+
+constexpr Rule kRules[] = {
+    {"frame_without_update", 10, "no point of the image was of use",
+     "poses came from the IMU alone there; see exposure, contrast, size and lens of the images"},
+    {"images_contradict_imu", 20, "images contradict the IMU",
+     "T_BS, the IMU's axes, signs or units, the focal length or time_offset_s may be wrong; see "
+     "perdure doctor --data"},
+    {"poses_contradict_images", 20, "the poses contradict the images",
+     "they may be inverted (T_BW for T_WB), in other axes than T_BS says, with the quaternion's w "
+     "at the wrong end, or on another clock"},
+    {"points_too_far", 20, "nearly all points lie beyond vision.max_depth",
+     "see that the poses are in metres, or raise it"},
+    {"speed_gated", 5, "the speed contradicts camera and IMU and was refused",
+     "see its unit (m/s), its stamps and the IMU, or leave it away (vio.speed.enabled=false)"},
+};
+
+std::string sentenceOf(const Doubt& doubt) { return doubt.what + ": " + doubt.mend; }
+
+}  // namespace
+
+Doubts doubtsOfRun(const RunFacts& facts) {
+  Doubts doubts;
+  for (const Rule& rule : kRules) {
+    const std::uint64_t times = facts.vio.of(rule.code);
+    if (rule.one_of * times <= facts.frames) continue;
+    doubts.push_back(
+        {fmt::format("{} at {} of {} frames", rule.what, times, facts.frames), rule.mend});
+  }
+  if (const std::uint64_t times = facts.vio.of("reset"); times > 0) {
+    doubts.push_back({fmt::format("vio lost its way {} times and began anew", times),
+                      "what came before and after is not in one frame of reference; perdure doctor "
+                      "--data says why"});
+  }
+  if (4 * facts.without_pose > facts.frames) {
+    doubts.push_back({fmt::format("{} of {} frames have no pose and were left out",
+                                  facts.without_pose, facts.frames),
+                      "give poses of the whole drive, at most .5 s apart"});
+  }
+  if (facts.boxes > 0 && facts.objects == 0) {
+    doubts.push_back({fmt::format("the map is empty though {} boxes came", facts.boxes),
+                      "do they belong to these frames, are they of known classes, and does the "
+                      "camera move past what they show?"});
+  }
+  for (const auto& finding : facts.findings) {
+    if (finding.code != "clock_wrapped" && finding.code != "clock_set") continue;
+    doubts.push_back({"stamps were changed", finding.text});
+    break;
+  }
+  return doubts;
+}
+
+std::string endOfLine(const Doubts& doubts) {
+  std::string text;
+  for (const Doubt& doubt : doubts) text += (text.empty() ? " | WARNING: " : "; ") + doubt.what;
+  return text;
+}
+
+void printWarnings(const Doubts& doubts) {
+  for (const Doubt& doubt : doubts) {
+    std::fprintf(stderr, "warning: %s\n", sentenceOf(doubt).c_str());
+  }
+}
+
+nlohmann::ordered_json toJson(const Doubts& doubts) {
+  auto list = nlohmann::ordered_json::array();
+  for (const Doubt& doubt : doubts) list.push_back(sentenceOf(doubt));
+  return list;
+}
+
+}  // namespace perdure::tools

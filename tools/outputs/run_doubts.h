@@ -1,0 +1,39 @@
+// Problems of a run that ended normally, for the user. Pipeline and demo print them as warnings,
+// end their last line with them, and write them into report.json.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "common/replay/data_check.h"
+
+namespace perdure::tools {
+
+struct Doubt {
+  std::string what;  ///< for the last line
+  std::string mend;  ///< causes and fixes
+};
+using Doubts = std::vector<Doubt>;
+
+/// What a run counted.
+struct RunFacts {
+  ReasonCounts vio = {};     ///< of vio, or, with given poses, of the node that computes landmarks
+  std::uint64_t frames = 0;  ///< of the first camera
+  std::uint64_t without_pose = 0;  ///< those without a given pose
+  std::uint64_t boxes = 0, objects = 0;
+  replay::DataFindings findings = {};  ///< before the run
+};
+
+/// Doubts about a run, whatever its input was: frames without a visual update, an empty map, clocks
+/// that were changed, contradictions.
+Doubts doubtsOfRun(const RunFacts& facts);
+
+/// " | WARNING: …" with each `what`; "" if there are none.
+std::string endOfLine(const Doubts& doubts);
+/// Prints a warning for each on standard error.
+void printWarnings(const Doubts& doubts);
+/// A list of sentences.
+nlohmann::ordered_json toJson(const Doubts& doubts);
+
+}  // namespace perdure::tools
