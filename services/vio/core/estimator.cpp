@@ -220,7 +220,7 @@ Result<void> Estimator::visionUpdate(const FrameInput& input, FrameEstimate& out
   const auto once = updateMsckf(*state_, tracks, options_.vision, reasons_);
   if (!once) return tl::unexpected(once.error());
   forgetUsed(tracks, input.frame);
-  if (2 * once->supposed > slam->used + once->used) widenBySupposedDepth();
+  if (2 * once->supposed > once->used) widenBySupposedDepth();
   out.points_used = slam->used + once->used;
   out.points_refused = slam->gated + once->gated + once->behind;
   return {};
