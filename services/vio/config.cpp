@@ -61,6 +61,11 @@ void describeInput(Config& c, Fields& f) {
             "landmarks only"});
   f.boolean("input.moving_mask", c.moving_mask.enabled,
             {"read `objects`, and use no points on moving objects"});
+  f.number(
+      "odometry.position_growth", c.position_growth_m, positive(),
+      {"growth of the position's standard deviation in ten seconds above which the odometry is "
+       "degraded",
+       "m"});
   f.text("state.directory", c.state_directory,
          {"folder in which the state is saved each second for the next start; empty: not saved", "",
           "give a folder that the service may write"});
@@ -109,8 +114,9 @@ void describeExpertWindow(Options& o, Fields& f) {
 void describeExpertVision(Options& o, Fields& f) {
   f.number("vision.gate_probability", o.vision.gate_probability, between(0.5, 0.99999),
            {"probability of the χ² gates: share of correct points that pass"});
-  f.number("vision.max_condition", o.vision.max_condition, positive(),
-           {"largest condition number of a triangulation's normal matrix"});
+  f.number(
+      "vision.max_condition", o.vision.max_condition, positive(),
+      {"above this condition number of a triangulation's normal matrix the rays are parallel"});
   f.number("vision.max_relative_sigma", o.vision.max_relative_sigma, positive(),
            {"largest relative standard deviation of a triangulated depth"});
   f.number("calibration.extrinsic_rotation", o.calibration.extrinsic_rotation, positive(),

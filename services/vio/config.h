@@ -27,6 +27,7 @@ struct Config {
   double longest_gap_s = 2.0;       ///< a longer IMU gap ends the frame of reference
   double longest_blackout_s = 0.8;  ///< a longer gap without frames also ends it
   std::int64_t max_pending = 40;    ///< frames that wait for their IMU samples
+  double position_growth_m = 2.0;   ///< growth of the deviation in 10 s that is degraded
   double restore_age_s = 10.0;      ///< an older saved state is not resumed
   std::string state_directory;      ///< main: directory of the saved state; empty: not saved
 };

@@ -16,6 +16,10 @@ constexpr char kLate[] =
 constexpr char kNoSamples[] =
     "frames have no inertial samples of their time; start the IMU, or give both one clock";
 
+constexpr char kPositionUncertain[] =
+    "the position is uncertain: its deviation grew by more than odometry.position_growth in ten "
+    "seconds; let the camera see things nearby and move sideways, or calibrate the rig";
+
 constexpr char kImagesContradict[] =
     "most of what the images show contradicts the IMU: see T_BS (is it the inverse?), the IMU's "
     "axes, signs and units (radians per second), the focal length and time_offset_s; or what moves "
@@ -31,6 +35,7 @@ Node::Node(const Config& config, InstanceId instance, Outputs outputs)
       speeds_(config.core.speed.max_age_s),
       waiting_(config.pair_tolerance_s),
       moving_(config.moving_mask),
+      position_doubt_(config.position_growth_m),
       motion_initialiser_(config.core) {}
 
 const ReasonCounts& Node::reasons() const {
@@ -105,6 +110,7 @@ std::string Node::status() const {
   if (agreement_.verdict() == Agreement::Verdict::kContradicted) return kImagesContradict;
   if (started() && *speed_doubt_.sentence() != '\0') return speed_doubt_.sentence();
   if (last_state_ != OdometryState::kDegraded) return whyAlone();
+  if (position_doubt_.uncertain()) return kPositionUncertain;
   return degraded_frames_ > 0 ? "has just come over a gap or a restart"
                               : "sees no points; it goes by inertia (and speed)";
 }
@@ -299,6 +305,7 @@ void Node::lose(const Reason& reason) {
     cameras_->tracker.reset();
   }
   motion_initialiser_.clear();
+  position_doubt_.clear();
   ++world_.epoch;
   last_sequence_.reset();
   aided_ = false;
@@ -329,7 +336,9 @@ void Node::publish(const FrameStamp& stamp, const FrameEstimate& e) {
   if (unaided && (aided_ || unaided_frames_ >= kFirstFrames)) {
     reasons_.add("frame_without_update", !aided_ && late ? kFirstFrames : 1);
   }
-  const bool degraded = degraded_frames_ > 0 || unaided_frames_ > kUnaidedFrames;
+  const bool uncertain = position_doubt_.add(stamp.time, e.covariance);
+  if (uncertain) reasons_.add("position_uncertain");
+  const bool degraded = degraded_frames_ > 0 || unaided_frames_ > kUnaidedFrames || uncertain;
   if (degraded_frames_ > 0) --degraded_frames_;
   o.state = degraded ? OdometryState::kDegraded : OdometryState::kTracking;
   o.T_WB = e.nav.T_WB();

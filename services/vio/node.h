@@ -20,6 +20,7 @@
 #include "services/vio/core/start/motion_initialiser.h"
 #include "services/vio/core/start/speed_history.h"
 #include "services/vio/in_vain.h"
+#include "services/vio/position_doubt.h"
 #include "services/vio/speed_doubt.h"
 #include "services/vio/waiting_frames.h"
 
@@ -94,6 +95,7 @@ class Node {
   InVain in_vain_;
   Agreement agreement_;  ///< not reset at a start, because a wrong rig causes repeated losses
   SpeedDoubt speed_doubt_;
+  PositionDoubt position_doubt_;
   MotionInitialiser motion_initialiser_;
   std::optional<SavedState> saved_;
   std::optional<TimePoint> last_image_, last_imu_time_;

@@ -1,6 +1,7 @@
 #include "services/vio/core/estimator.h"
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 #include <utility>
 
@@ -199,6 +200,7 @@ Result<void> Estimator::admitPoints(std::uint64_t frame, bool window_full) {
     if (!added) {
       reasons_.add(added.error());
       if (added.error().code.starts_with("update_")) return added;
+      if (added.error().code == "slam_depth_unknown") continue;  // the track may be used once
     }
     database_.erase(track->id);
   }
@@ -218,9 +220,21 @@ Result<void> Estimator::visionUpdate(const FrameInput& input, FrameEstimate& out
   const auto once = updateMsckf(*state_, tracks, options_.vision, reasons_);
   if (!once) return tl::unexpected(once.error());
   forgetUsed(tracks, input.frame);
+  if (2 * once->supposed > once->used) widenBySupposedDepth();
   out.points_used = slam->used + once->used;
   out.points_refused = slam->gated + once->gated + once->behind;
   return {};
+}
+
+/// The length of a path whose points have the depth of the scene is as uncertain as that depth. The
+/// whole path has one error, which grows with its length.
+void Estimator::widenBySupposedDepth() {
+  const Clone* const last = previous_frame_ ? state_->clone(*previous_frame_) : nullptr;
+  if (!last) return;
+  const double before = supposed_m_;
+  supposed_m_ += (state_->nav.p_WB - last->T_WB.p).norm();
+  const double variance = supposed_m_ * supposed_m_ - before * before;
+  state_->widenPositions(options_.vision.sceneSigma() * std::sqrt(variance));
 }
 
 void Estimator::report(const FrameInput& input, FrameEstimate& out) {

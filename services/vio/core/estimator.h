@@ -105,6 +105,7 @@ class Estimator {
   void forgetUsed(const std::vector<const Track*>& used, std::uint64_t frame);
   Result<void> admitPoints(std::uint64_t frame, bool window_full);
   void dropLostPoints(std::uint64_t frame);
+  void widenBySupposedDepth();
   void report(const FrameInput& input, FrameEstimate& out);
   void marginalise(bool at_rest);
   void measureRows(const ImuBuffer& imu);
@@ -124,7 +125,8 @@ class Estimator {
   std::vector<ImuReading> readings_;  ///< of one interval; a member so that its memory is reused
   std::vector<ImuReading> rows_;      ///< readings around one image; a member for the same reason
   ReasonCounts reasons_;
-  bool agreed_ = false;  ///< most points of the last image agreed with their predictions
+  bool agreed_ = false;      ///< most points of the last image agreed with their predictions
+  double supposed_m_ = 0.0;  ///< length of the path whose points had the depth of the scene
   std::optional<std::uint64_t> previous_frame_;
   Matrix6d previous_pose_covariance_ = Matrix6d::Zero();
 };

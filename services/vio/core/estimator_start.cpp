@@ -49,6 +49,7 @@ void Estimator::start(const Start& start) {
   database_.clear();
   previous_frame_.reset();
   agreed_ = false;
+  supposed_m_ = 0.0;
   standstill_.forget();
   if (start.at_rest) standstill_.confirm(start.time, restExpectation(*state_, options_.gravity));
 }

@@ -94,6 +94,8 @@ std::vector<Clip> allClips(const fs::path& data) {
       {"hall_fly", T, "a hall, flown fast", {}, false, hallFly},
       {"hall_even", J, "a hall, flown slowly and evenly", {}, false, hallEven},
       {"shaky", J, "a room, fast and shaken at 4 to 9 Hz", {}, false, shaky},
+      {"turn", J, "a room; turning in place for a minute", {}, false, turn},
+      {"pan", T, "a room; a slow turn at arm's length, IMU of a phone", {}, false, pan},
       {"dim", T, "a room, dim: long exposures and much noise", {}, false, dim},
       {"plain", J, "a room with walls and little else", {}, false, plain},
       {"street", T, "a street, driven, without wheel speed", {}, false, street},

@@ -20,6 +20,7 @@ struct Flight {
   double lap_s = 16.0;
   double gaze = 0.9, gaze_s = 7.0;  ///< amplitude of the yaw relative to the direction of travel,
                                     ///< rad
+  double side = 0.0;                ///< mean of that yaw, rad
   double nod = 0.12, lean = 0.12;   ///< pitch and roll, rad
   double shake_m = 0.0, shake_rad = 0.0;
 };
@@ -47,7 +48,7 @@ sim::Trajectory flown(const Flight& f) {
     const Vector3d place(f.radii.x() * std::cos(phase), f.radii.y() * std::sin(phase),
                          f.height + f.radii.z() * std::sin(1.7 * phase));
     const double way = std::atan2(f.radii.y() * std::cos(phase), -f.radii.x() * std::sin(phase));
-    const double yaw = way + f.gaze * on * std::sin(2.0 * M_PI * t / f.gaze_s);
+    const double yaw = way + f.side + f.gaze * on * std::sin(2.0 * M_PI * t / f.gaze_s);
     const Eigen::Quaterniond q = expQuaternion({0, 0, yaw}) *
                                  expQuaternion({0, on * f.nod * wave(0.37, 0.5), 0}) *
                                  expQuaternion({on * f.lean * wave(0.29, 1.5), 0, 0}) *
@@ -167,6 +168,24 @@ sim::Scene shaky(const sim::SceneOptions& options, unsigned draw) {
   f.shake_m = 0.006;
   f.shake_rad = 0.02;
   return inRoom("shaky", seedOf(25, draw), options, 1.0, f);
+}
+
+sim::Scene turn(const sim::SceneOptions& options, unsigned draw) {
+  Flight f;
+  f.seconds = 60.0;
+  f.radii = {1e-9, 1e-9, 0.0};  // the direction of the gaze needs a path
+  f.lap_s = 12.0;
+  return inRoom("turn", seedOf(33, draw), options, 1.0, f);
+}
+
+sim::Scene pan(const sim::SceneOptions& options, unsigned draw) {
+  Flight f;
+  f.radii = {0.3, 0.3, 0.02};
+  f.lap_s = 60.0;
+  f.gaze = 0.1;
+  f.side = -M_PI / 2;
+  f.nod = f.lean = 0.03;
+  return inRoom("pan", seedOf(34, draw), options, 1.0, f, kPhone);
 }
 
 sim::Scene dim(const sim::SceneOptions& options, unsigned draw) {

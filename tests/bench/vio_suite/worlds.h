@@ -11,6 +11,8 @@ sim::Scene roomFly(const sim::SceneOptions& options, unsigned draw);
 sim::Scene hallFly(const sim::SceneOptions& options, unsigned draw);
 sim::Scene hallEven(const sim::SceneOptions& options, unsigned draw);
 sim::Scene shaky(const sim::SceneOptions& options, unsigned draw);
+sim::Scene turn(const sim::SceneOptions& options, unsigned draw);
+sim::Scene pan(const sim::SceneOptions& options, unsigned draw);
 sim::Scene dim(const sim::SceneOptions& options, unsigned draw);
 sim::Scene plain(const sim::SceneOptions& options, unsigned draw);
 sim::Scene street(const sim::SceneOptions& options, unsigned draw);

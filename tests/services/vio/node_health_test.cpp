@@ -71,6 +71,33 @@ TEST(VioNodeHealth, ARigWhoseSecondCameraDoesNotComeGoesOnWithOneAndSaysSo) {
   EXPECT_EQ(mono.reasons().of("stereo_unpaired"), 0u);
 }
 
+TEST(VioNodeHealth, IsDegradedOnlyWhileThePositionGrowsUncertain) {
+  PositionDoubt doubt(2.0);
+  const auto grown = [&](double t, double sigma) {
+    Matrix9d P = Matrix9d::Zero();
+    P(3, 3) = sigma * sigma;
+    return doubt.add(fromNanoseconds(0) + durationFromSeconds(t), P);
+  };
+  for (int t = 0; t < 100; ++t) EXPECT_FALSE(grown(t, 30.0 + 0.01 * t)) << "a long, healthy drive";
+  EXPECT_TRUE(grown(100, 31.1));
+  EXPECT_TRUE(doubt.uncertain());
+  EXPECT_FALSE(grown(115, 31.1)) << "it grows no further";
+}
+
+TEST(VioNodeHealth, SaysThatAPositionIsUncertain) {
+  Player player(5.0);
+  Config config;
+  config.position_growth_m = 1e-4;
+  Recorder r;
+  Node node(config, 5, r.outputs());
+  node.onCalibration(calibration());
+  player.play(node, 0.0, 4.0);
+  EXPECT_EQ(r.odometry.back().state, OdometryState::kDegraded);
+  EXPECT_EQ(node.health(), HealthState::kDegraded);
+  EXPECT_THAT(node.status(), HasSubstr("odometry.position_growth"));
+  EXPECT_GT(node.reasons().of("position_uncertain"), 10u);
+}
+
 TEST(VioNodeHealth, SaysThatItsConfigurationNamesACameraThatIsNotThere) {
   Player player(2.0);
   const auto statusWith = [&](const std::vector<std::string>& cameras) {

@@ -112,13 +112,17 @@ double SimulatedDrive::phase(double t) const {
 Vector3d SimulatedDrive::position(double t) const {
   const double s = phase(t);
   if (options_.place == DrivePlace::kStreet) return {kStreetSpeed * s, 0.0, 0.0};
-  if (options_.place == DrivePlace::kSpot) return Vector3d::Zero();
+  if (options_.place == DrivePlace::kSpot) {
+    const double yaw = 0.5 * options_.spot_pace * s;
+    return options_.spot_radius_m * Vector3d(std::cos(yaw), std::sin(yaw), 0.0);
+  }
   return {2.5 * std::cos(0.5 * s), 2.0 * std::sin(0.5 * s) + 0.3 * std::sin(1.7 * s),
           0.5 * std::sin(0.9 * s)};
 }
 
 Matrix3d SimulatedDrive::rotation(double t) const {
-  const double s = phase(t);
+  double s = phase(t);
+  if (options_.place == DrivePlace::kSpot) s *= options_.spot_pace;
   if (options_.place == DrivePlace::kStreet) {
     return rotationAboutZ(0.003 * std::sin(0.7 * s)) *
            expSo3(Vector3d(0.002 * std::sin(1.3 * s), 0.004 * std::sin(2.1 * s), 0));

@@ -30,6 +30,8 @@ struct DriveOptions {
   double time_offset_s = 0.0;   ///< true t_imu − t_image
   double readout_s = 0.0;       ///< true, of a rolling shutter: first to last row
   double rest_s = 0.0;          ///< time at rest at the start
+  double spot_radius_m = 0.0;   ///< on the spot: of the circle that the body moves on
+  double spot_pace = 1.0;       ///< on the spot: factor on the rates
   int points = 600;             ///< on a street: per 150 m
   int points_per_image = 100;
   /// Motion of the world that the cameras see, during this interval of their clock.

@@ -35,6 +35,12 @@ TEST(Doubts, ContradictionsOfATenthOfTheRunAreTold) {
   EXPECT_THAT(doubtsAt("points_too_far", 24), ElementsAre(HasSubstr("in metres")));
 }
 
+TEST(Doubts, AnUncertainPositionIsTold) {
+  EXPECT_THAT(doubtsAt("position_uncertain", 24),
+              ElementsAre(HasSubstr("no object was confirmed")));
+  EXPECT_THAT(doubtsAt("position_uncertain", 12), IsEmpty());
+}
+
 TEST(Doubts, ASpeedThatIsRefusedIsTold) {
   EXPECT_THAT(doubtsAt("speed_gated", 200), ElementsAre(HasSubstr("its unit (m/s)")));
 }

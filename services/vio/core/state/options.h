@@ -1,6 +1,7 @@
 // Options of the filter's core. Defaults suit a 20 Hz camera with a 200 Hz MEMS IMU.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 namespace perdure::vio {
@@ -36,12 +37,20 @@ struct VisionOptions {
   double sigma_px = 0.4;
   double gate_probability = 0.95;
   double min_depth_m = 0.1, max_depth_m = 75.0;
-  double max_condition = 10000.0;  ///< largest condition number of a triangulation's normal matrix
+  /// Rays whose normal matrix has a larger condition number are parallel.
+  double max_condition = 10000.0;
   /// Largest standard deviation along the ray, relative to the depth, of a point of the state.
   double max_relative_sigma = 0.4;
   /// Possible jump of the pose, assumed if nearly all points of a frame contradict the prediction.
   double jump_position_m = 0.3;
   double jump_rotation = 0.03;  ///< rad
+  /// Deviation of the inverse depth of a point without parallax, relative to its mean.
+  double scene_scatter = 0.7;
+
+  /// Mean inverse depth of a point without parallax, and the deviation of its logarithm for the
+  /// whole scene: the depth lies between the two limits at two deviations.
+  double sceneInverse() const { return 1.0 / std::sqrt(min_depth_m * max_depth_m); }
+  double sceneSigma() const { return 0.25 * std::log(max_depth_m / min_depth_m); }
 };
 
 /// Standard deviations of the calibration's values.

@@ -124,6 +124,15 @@ void State::widenPose(double rotation, double position_m) {
   }
 }
 
+void State::widenPositions(double sigma_m) {
+  std::vector<int> at{kPosition};
+  for (const Clone& c : clones) at.push_back(c.at + 3);
+  for (const PointState& p : points) at.push_back(p.at);
+  for (const int a : at) {
+    for (const int b : at) P_.block<3, 3>(a, b).diagonal().array() += sigma_m * sigma_m;
+  }
+}
+
 void State::removeClone(std::uint64_t frame) {
   const Clone* const gone = clone(frame);
   if (!gone) return;

@@ -147,6 +147,8 @@ class State {
   /// Enlarges the covariance of the current pose and of the newest clone, which is the same pose.
   /// Deviations are in rad about the body's axes and in m along the world's axes.
   void widenPose(double rotation, double position_m);
+  /// Adds a common error to all positions, m along each axis.
+  void widenPositions(double sigma_m);
   void removeClone(std::uint64_t frame);
   /// Adds a point with its covariance and its cross-covariance (3 × size()).
   void addPoint(std::uint64_t id, const Eigen::Vector3d& p_W, const Eigen::Matrix3d& covariance,

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "common/base/check.h"
 #include "services/vio/core/update/triangulation.h"
@@ -118,6 +119,36 @@ Innovation innovationOf(const State& state, const PointRows& rows, const ImagePo
           used};
 }
 
+/// The rows of a track that depend on the state alone. A point without parallax whose depth does
+/// not follow from the state gets that of the scene (tools/docs/maths/vio-visual-update.md).
+Result<PointSystem> rowsOfTrack(const Track& track, const State& state, const MatrixView& P,
+                                const VisionOptions& options, bool& supposed) {
+  const std::vector<Ray> rays = raysOf(track, state, options.sigma_px);
+  auto point = triangulate(rays, options);
+  if (!point && point.error().code == "triangulation_parallel") {
+    const double scene = options.sceneInverse();
+    const Eigen::Vector3d p_W = rays.back().T_WC * (rays.back().normalised.homogeneous() / scene);
+    PointSystem s = stackViews(track, state, p_W, options.sigma_px);
+    if (s.r.size() < 4) return PointSystem{};
+    separatePoint(s);
+    const InverseDepth depth = inverseDepth(track, state, p_W);
+    if (!(depthSigma(s, depth, P) < options.max_relative_sigma * scene)) {
+      supposed = true;
+      addScene(s, depth, options);
+      separatePoint(s);
+      dropPoint(s);
+      return s;
+    }
+    point = triangulate(rays, options, scene);
+  }
+  if (!point) return tl::unexpected(point.error());
+  PointSystem s = stackViews(track, state, point->p_W, options.sigma_px);
+  if (s.r.size() < 4) return PointSystem{};
+  separatePoint(s);
+  dropPoint(s);
+  return s;
+}
+
 }  // namespace
 
 Result<UpdateCounts> updateMsckf(State& state, const std::vector<const Track*>& tracks,
@@ -129,16 +160,15 @@ Result<UpdateCounts> updateMsckf(State& state, const std::vector<const Track*>& 
   Eigen::Index rows = 0;
   systems.reserve(tracks.size());
   for (const Track* const track : tracks) {
-    const auto point = triangulate(raysOf(*track, state, options.sigma_px), options);
-    if (!point) {
-      if (point.error().code == "triangulation_depth") ++counts.behind;
-      reasons.add(point.error());
+    bool supposed = false;
+    auto rows_of = rowsOfTrack(*track, state, P, options, supposed);
+    if (!rows_of) {
+      if (rows_of.error().code == "triangulation_depth") ++counts.behind;
+      reasons.add(rows_of.error());
       continue;
     }
-    PointSystem s = stackViews(*track, state, point->p_W, options.sigma_px);
-    if (s.r.size() < 4) continue;
-    separatePoint(s);
-    dropPoint(s);
+    PointSystem& s = *rows_of;
+    if (s.r.size() == 0) continue;
     const auto of_views = [&] { return s.H_x * P * s.H_x.transpose(); };
     if (!passesGateWith(s.r, of_views, options.gate_probability)) {
       ++counts.gated;
@@ -146,6 +176,7 @@ Result<UpdateCounts> updateMsckf(State& state, const std::vector<const Track*>& 
       continue;
     }
     ++counts.used;
+    counts.supposed += supposed;
     rows += s.r.size();
     systems.push_back(std::move(s));
   }
@@ -201,12 +232,16 @@ Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
 }
 
 Result<void> initialisePoint(State& state, const Track& track, const VisionOptions& options) {
-  const auto point = triangulate(raysOf(track, state, options.sigma_px), options);
+  const auto point =
+      triangulate(raysOf(track, state, options.sigma_px), options, options.sceneInverse());
   if (!point) return tl::unexpected(point.error());
   PointSystem s = stackViews(track, state, point->p_W, options.sigma_px);
   if (s.r.size() < 4) return fail("slam_few_views");
   const std::vector<Block> blocks = calibrationAndClones(state);
   separatePoint(s);
+  const InverseDepth depth = inverseDepth(track, state, point->p_W);
+  const double sigma = depthSigma(s, depth, state.covarianceOf(blocks));
+  if (!(sigma < options.max_relative_sigma * depth.value)) return fail("slam_depth_unknown");
   const Eigen::Matrix3d R_f = s.H_f.topRows<3>();
   if (!(R_f.diagonal().cwiseAbs().minCoeff() > 1e-9)) return fail("slam_unobserved");
   const Eigen::MatrixXd H_1 = s.H_x.topRows<3>();

@@ -15,7 +15,8 @@ namespace perdure::vio {
 
 struct UpdateCounts {
   int used = 0, gated = 0;
-  int behind = 0;  ///< not triangulated because the rays do not meet in front of the cameras
+  int supposed = 0;  ///< of those used: with the depth of the scene
+  int behind = 0;    ///< not triangulated because the rays do not meet in front of the cameras
 };
 
 /// Triangulates and gates each track, counts failures, and updates once. Fails with the update.

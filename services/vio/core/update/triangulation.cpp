@@ -42,8 +42,17 @@ struct Normal {
   bool in_front = true;
 };
 
-Normal linearise(const std::vector<Relative>& views, const Vector3d& m) {
+/// Expected inverse depth, and 1 / σ; 0: none.
+struct Prior {
+  double inverse_depth, weight;
+};
+
+Normal linearise(const std::vector<Relative>& views, const Vector3d& m, const Prior& prior) {
   Normal n;
+  const double r_prior = prior.weight * (prior.inverse_depth - m.z());
+  n.A(2, 2) = prior.weight * prior.weight;
+  n.b.z() = prior.weight * r_prior;
+  n.cost = r_prior * r_prior;
   for (const Relative& v : views) {
     const Vector3d h = v.R * Vector3d(m.x(), m.y(), 1.0) + v.t * m.z();
     if (!(h.z() > 1e-6)) {
@@ -65,11 +74,13 @@ Normal linearise(const std::vector<Relative>& views, const Vector3d& m) {
 
 }  // namespace
 
-Result<Triangulated> triangulate(const std::vector<Ray>& rays, const VisionOptions& options) {
+Result<Triangulated> triangulate(const std::vector<Ray>& rays, const VisionOptions& options,
+                                 std::optional<double> scene) {
   if (rays.size() < 2) return fail("triangulation_views");
   double condition = 0.0;
   const Vector3d linear = nearestToRays(rays, condition);
-  if (!(condition < options.max_condition)) return fail("triangulation_parallel");
+  const bool parallel = !(condition < options.max_condition);
+  if (parallel && !scene) return fail("triangulation_parallel");
   const RigidTransform& T_WA = rays.back().T_WC;
   std::vector<Relative> views;
   views.reserve(rays.size());
@@ -78,17 +89,21 @@ Result<Triangulated> triangulate(const std::vector<Ray>& rays, const VisionOptio
     views.push_back({T_CA.R(), T_CA.p, ray.normalised, ray.weight});
   }
   const Vector3d p_A = T_WA.inverse() * linear;
-  if (!(p_A.z() > 0.5 * options.min_depth_m)) return fail("triangulation_depth");
+  if (!parallel && !(p_A.z() > 0.5 * options.min_depth_m)) return fail("triangulation_depth");
   Vector3d m(p_A.x() / p_A.z(), p_A.y() / p_A.z(), 1.0 / p_A.z());
-  Normal n = linearise(views, m);
+  if (parallel) m << rays.back().normalised, *scene;
+  // Only parallel rays need the prior.
+  const Prior prior{m.z(), parallel ? 1.0 / (options.scene_scatter * *scene) : 0.0};
+  Normal n = linearise(views, m, prior);
   double lambda = 1e-4;
   for (int i = 0; i < kIterations && n.in_front; ++i) {
     Matrix3d damped = n.A;
     damped.diagonal() *= 1.0 + lambda;
-    const Vector3d step = damped.ldlt().solve(n.b);
-    const Normal next = linearise(views, m + step);
+    Vector3d to = m + damped.ldlt().solve(n.b);
+    if (parallel) to.z() = std::max(to.z(), 1.0 / options.max_depth_m);
+    const Normal next = linearise(views, to, prior);
     if (next.in_front && next.cost <= n.cost) {
-      m += step;
+      m = to;
       const bool done = n.cost - next.cost < 1e-4 * (1.0 + n.cost);
       n = next;
       lambda *= 0.1;
@@ -99,10 +114,10 @@ Result<Triangulated> triangulate(const std::vector<Ray>& rays, const VisionOptio
   }
   const double depth = 1.0 / m.z();
   if (!n.in_front || !(depth > options.min_depth_m)) return fail("triangulation_depth");
-  if (!(depth < options.max_depth_m)) return fail("triangulation_far");
+  if (!parallel && !(depth < options.max_depth_m)) return fail("triangulation_far");
   const Matrix3d cov_m = n.A.inverse();
   const double relative = std::sqrt(cov_m(2, 2)) * depth;  // σ(1/z) · z = σ(z) / z
-  if (!(relative < options.max_relative_sigma)) return fail("triangulation_condition");
+  if (!parallel && !(relative < options.max_relative_sigma)) return fail("triangulation_condition");
   Matrix3d J;  // d point in A / d m
   J << depth, 0, -m.x() * depth * depth, 0, depth, -m.y() * depth * depth, 0, 0, -depth * depth;
   const Matrix3d J_W = T_WA.R() * J;

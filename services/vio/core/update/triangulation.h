@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "common/base/result.h"
@@ -29,8 +30,10 @@ struct Triangulated {
 };
 
 /// Needs two rays. Fails with "triangulation_…": views, parallel, depth (behind a camera, or too
-/// near), far, condition.
-Result<Triangulated> triangulate(const std::vector<Ray>& rays, const VisionOptions& options);
+/// near), far, condition. With the inverse depth of the scene, parallel rays get the nearest depth
+/// to it that they permit, at most the largest.
+Result<Triangulated> triangulate(const std::vector<Ray>& rays, const VisionOptions& options,
+                                 std::optional<double> scene = {});
 
 /// Rays of a track from the clones that saw it.
 std::vector<Ray> raysOf(const Track& track, const State& state, double sigma_px);

@@ -1,7 +1,9 @@
 #include "services/vio/core/update/visual.h"
 
 #include <Eigen/QR>
+#include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "common/base/check.h"
 #include "common/math/chi2.h"
@@ -26,22 +28,34 @@ double gate(int dof, double probability) {
   return entry;
 }
 
+/// Derivatives of a quantity with derivative J_C by p_C, a point in the camera.
+template <class Row>
+struct Chain {
+  Chain(const Row& J_C, const RigidTransform& T_WB, const RigidTransform& T_BC,
+        const Eigen::Vector3d& p_W) {
+    const Eigen::Matrix3d R_BW = T_WB.R().transpose(), R_CB = T_BC.R().transpose();
+    const Eigen::Vector3d p_B = R_BW * (p_W - T_WB.p), p_C = R_CB * (p_B - T_BC.p);
+    const Row J_B = J_C * R_CB;
+    point = J_B * R_BW;
+    pose << J_B * skew(p_B), -point;
+    extrinsic << J_C * skew(p_C), -J_B;
+  }
+  Row point;
+  Eigen::Matrix<double, Row::RowsAtCompileTime, 6> pose, extrinsic;
+};
+
 }  // namespace
 
 bool projectPoint(const RigidTransform& T_WB, const RigidTransform& T_BC,
                   const Eigen::Vector3d& p_W, Eigen::Vector2d& normalised, ProjectionJacobians* J) {
-  const Eigen::Matrix3d R_BW = T_WB.R().transpose(), R_CB = T_BC.R().transpose();
-  const Eigen::Vector3d p_B = R_BW * (p_W - T_WB.p), p_C = R_CB * (p_B - T_BC.p);
+  const Eigen::Vector3d p_C = T_BC.inverse() * (T_WB.inverse() * p_W);
   if (!(p_C.z() > 1e-3)) return false;
   normalised = p_C.hnormalized();
   if (!J) return true;
   Eigen::Matrix<double, 2, 3> J_C;
   J_C << 1, 0, -normalised.x(), 0, 1, -normalised.y();
-  J_C /= p_C.z();
-  const Eigen::Matrix<double, 2, 3> J_B = J_C * R_CB;
-  J->point = J_B * R_BW;
-  J->pose << J_B * skew(p_B), -J->point;
-  J->extrinsic << J_C * skew(p_C), -J_B;
+  const Chain chain(Eigen::Matrix<double, 2, 3>(J_C / p_C.z()), T_WB, T_BC, p_W);
+  *J = {chain.pose, chain.extrinsic, chain.point};
   return true;
 }
 
@@ -125,6 +139,46 @@ PointSystem stackViews(const Track& track, const State& state, const Eigen::Vect
   s.H_x.conservativeResize(row, Eigen::NoChange);
   s.H_f.conservativeResize(row, Eigen::NoChange);
   return s;
+}
+
+InverseDepth inverseDepth(const Track& track, const State& state, const Eigen::Vector3d& p_W) {
+  const Eigen::Index first_clone =
+      6 * static_cast<Eigen::Index>(state.T_BC.size()) + state.readoutCount();
+  const auto clone = std::find_if(state.clones.begin(), state.clones.end(), [&](const Clone& c) {
+    return c.frame == track.observations.back().frame;
+  });
+  check(clone != state.clones.end(), "the newest view is in the window");
+  const RigidTransform& T_BC = state.T_BC[0];
+  const auto depth = [&](const RigidTransform& T_WB, const Eigen::Vector3d& p) {
+    return (T_BC.inverse() * (T_WB.inverse() * p)).z();
+  };
+  InverseDepth result{1.0 / depth(clone->T_WB, p_W), {}, {}};
+  const Eigen::Vector3d p_linear = linearisationPoint(state, track, p_W);
+  const double z = depth(clone->linear, p_linear);
+  const Chain chain(Eigen::RowVector3d(0, 0, -1.0 / (z * z)), clone->linear, T_BC, p_linear);
+  result.x.setZero(first_clone + 6 * static_cast<Eigen::Index>(state.clones.size()));
+  result.x.head<6>() = chain.extrinsic;
+  result.x.segment<6>(first_clone + 6 * (clone - state.clones.begin())) = chain.pose;
+  result.f = chain.point;
+  return result;
+}
+
+double depthSigma(const PointSystem& s, const InverseDepth& depth, const MatrixView& P) {
+  const Eigen::RowVector3d by_rows =
+      s.H_f.topRows<3>().triangularView<Eigen::Upper>().transpose().solve(depth.f.transpose());
+  const Eigen::RowVectorXd by_state = depth.x - by_rows * s.H_x.topRows<3>();
+  return std::sqrt(by_rows.squaredNorm() + (by_state * P).dot(by_state));
+}
+
+void addScene(PointSystem& s, const InverseDepth& depth, const VisionOptions& options) {
+  const Eigen::Index rows = s.r.size();
+  const double scene = options.sceneInverse(), weight = 1.0 / (options.scene_scatter * scene);
+  s.H_x.conservativeResize(rows + 1, Eigen::NoChange);
+  s.H_f.conservativeResize(rows + 1, Eigen::NoChange);
+  s.r.conservativeResize(rows + 1);
+  s.H_x.row(rows) = weight * depth.x;
+  s.H_f.row(rows) = weight * depth.f;
+  s.r[rows] = weight * (scene - depth.value);
 }
 
 void separatePoint(PointSystem& s) {

@@ -39,7 +39,7 @@ std::optional<View> viewOf(const State& state, const Clone& clone, std::size_t c
 
 /// Measurements of a point, whitened: r = H_x δx + H_f δf + n, n ~ N(0, I).
 struct PointSystem {
-  Eigen::MatrixXd H_x;  ///< columns of `blocks`
+  Eigen::MatrixXd H_x;  ///< columns of calibrationAndClones
   Eigen::MatrixXd H_f;  ///< rows × 3
   Eigen::VectorXd r;
 };
@@ -55,6 +55,21 @@ Eigen::Vector3d linearisationPoint(const State& state, const Track& track,
 /// is empty if the point lies behind a camera.
 PointSystem stackViews(const Track& track, const State& state, const Eigen::Vector3d& p_W,
                        double sigma_px);
+
+/// Inverse depth of a point in the first camera at its newest view, ρ; δρ = x δx + f δf.
+struct InverseDepth {
+  double value = 0.0;
+  Eigen::RowVectorXd x;
+  Eigen::RowVector3d f = Eigen::RowVector3d::Zero();
+};
+InverseDepth inverseDepth(const Track& track, const State& state, const Eigen::Vector3d& p_W);
+
+/// Standard deviation of ρ by the views and the state, where P is the covariance of
+/// calibrationAndClones. Needs separatePoint before. Not finite if the views give no depth.
+double depthSigma(const PointSystem& system, const InverseDepth& depth, const MatrixView& P);
+
+/// Appends the row of the prior: ρ is that of the scene, up to its scatter.
+void addScene(PointSystem& system, const InverseDepth& depth, const VisionOptions& options);
 
 /// Makes H_f upper triangular: only the first three rows then depend on the point.
 void separatePoint(PointSystem& system);

@@ -113,6 +113,31 @@ TEST(Estimator, TheIncrementExplainsThePoseCovariance) {
   }
 }
 
+TEST(Estimator, HoldsThePositionWhileItTurnsOnTheSpot) {
+  for (const unsigned seed : {1u, 2u}) {
+    test::DriveOptions drive;
+    drive.place = test::DrivePlace::kSpot;
+    drive.seed = seed;
+    drive.rest_s = 1.0;
+    const RunResult r = run(drive, Options{}, {.seconds = 60.0, .start_sigma_scale = 0.5});
+    EXPECT_LT(r.largest_error, 0.3);
+    const double sigma = std::sqrt(r.estimates.back().covariance.block<3, 3>(3, 3).trace());
+    EXPECT_LT(r.position_error, 3.0 * sigma);
+  }
+}
+
+TEST(Estimator, KnowsThatItSupposedTheLengthOfASlowTurnAtArmsLength) {
+  test::DriveOptions drive;
+  drive.place = test::DrivePlace::kSpot;
+  drive.rest_s = 1.0;
+  drive.spot_radius_m = 0.3;
+  drive.spot_pace = 0.2;
+  const RunResult r = run(drive, Options{}, {.seconds = 30.0, .start_sigma_scale = 0.5});
+  EXPECT_LT(r.largest_error, 1.0);
+  const double sigma = std::sqrt(r.estimates.back().covariance.block<3, 3>(3, 3).trace());
+  EXPECT_LT(r.position_error, 3.0 * sigma);
+}
+
 TEST(Estimator, SpeedHoldsTheScaleOfOneCamera) {
   test::DriveOptions drive;
   drive.noise.accel = 0.1;  // accelerometer noise that hides the scale
