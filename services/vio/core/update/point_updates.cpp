@@ -232,9 +232,11 @@ Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
 }
 
 Result<void> initialisePoint(State& state, const Track& track, const VisionOptions& options) {
-  const auto point =
-      triangulate(raysOf(track, state, options.sigma_px), options, options.sceneInverse());
-  if (!point) return tl::unexpected(point.error());
+  const auto point = triangulate(raysOf(track, state, options.sigma_px), options);
+  if (!point) {
+    const bool parallel = point.error().code == "triangulation_parallel";
+    return parallel ? fail("slam_depth_unknown") : tl::unexpected(point.error());
+  }
   PointSystem s = stackViews(track, state, point->p_W, options.sigma_px);
   if (s.r.size() < 4) return fail("slam_few_views");
   const std::vector<Block> blocks = calibrationAndClones(state);
