@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "tools/bus_tools/doctor/doctor.h"
+#include "tools/calibrate/motion/from_motion.h"
 #include "tools/calibrate/rig_check.h"
 #include "tools/data_check/data_check.h"
 #include "tools/data_check/mended_copy.h"
@@ -32,6 +33,13 @@ void checkPosesOf(const Drive& drive, const replay::Recording& recording, Findin
   }
 }
 
+void checkMotionOf(const replay::Recording& recording, Findings& findings) {
+  if (recording.imu.empty() || recording.calibration.cameras.empty()) return;
+  const auto check = calibrate::checkMotion(recording);
+  addFindings(check.findings, findings);
+  findings.push_back({Verdict::kOk, check.basis});
+}
+
 /// Returns whether the rig can be judged by the recording.
 bool checkRecording(const Drive& drive, Findings& findings) {
   const auto dataset =
@@ -44,7 +52,10 @@ bool checkRecording(const Drive& drive, Findings& findings) {
     findings.push_back({of_layout ? Verdict::kOk : Verdict::kWarn, note});
   }
   const bool usable = addFindings(checkDrive(dataset->recording(), {}), findings);
-  if (findings.empty()) findings.push_back({Verdict::kOk, "stamps, units, images and axes agree"});
+  if (findings.empty()) {
+    findings.push_back({Verdict::kOk, "stamps, units, images and axes agree"});
+    checkMotionOf(recording, findings);
+  }
   if (usable) checkPosesOf(drive, recording, findings);
   if (usable && of_layout && !recording.calibration.imu) {
     findings.push_back(
