@@ -55,7 +55,7 @@ TEST(MotionJoint, StatesHonestDeviations) {
     const auto moving = moveCamera({.truth = phoneWith(480.0, -0.04, 0.03), .seed = seed});
     const auto found = estimated(moving, 1.05);
     const JointVector error = between(moving.truth, found.state).cwiseQuotient(found.sigma);
-    for (const int i : {kFocal, kLater, kReadout, kTurnOf, kTurnOf + 1, kTurnOf + 2}) {
+    for (const int i : {+kFocal, +kLater, +kReadout, +kTurnOf, kTurnOf + 1, kTurnOf + 2}) {
       squares += error[i] * error[i];
       ++count;
     }
