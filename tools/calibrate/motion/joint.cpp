@@ -377,12 +377,14 @@ JointVector Problem::sigmaOf(const std::vector<Reduced>& all) {
     H += one.H_joint;
     meat += one.g_joint * one.g_joint.transpose();
   }
-  const double count = static_cast<double>(all.size());
-  meat *= count / std::max(1.0, count - 1.0);
   const JointVector weight = priorWeights();
   const JointMatrix inverse =
       (H + JointMatrix(weight.asDiagonal())).ldlt().solve(JointMatrix::Identity());
-  const double excess = (inverse * meat).trace() / (inverse * H).trace() / unit();
+  // Residuals of a fit are smaller than errors: the windows lose the degrees of freedom that the
+  // parameters take.
+  const double count = static_cast<double>(all.size()), taken = (inverse * H).trace();
+  meat *= count / std::max(0.25 * count, count - taken);
+  const double excess = (inverse * meat).trace() / taken / unit();
 
   const JointVector sandwich = (inverse * meat * inverse).diagonal();
   const JointVector bound = excess * unit() * (inverse * H * inverse).diagonal();
