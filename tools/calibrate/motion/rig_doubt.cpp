@@ -1,6 +1,7 @@
 // Compares a recording's own calibration with what its motion shows.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -21,11 +22,6 @@ JointVector narrowPriors(const CameraCalibration& camera) {
   sigma << turn, turn, turn, free, 0.03, 0.05, 0.05, 0.05, free, centre, centre, 0.02, 0.02, 0.05,
       0.05, 0.05;
   return sigma;
-}
-
-/// Images per second of rows; the readout of a frame is shorter than the time between frames.
-bool isPossible(double readout_s, const CameraCalibration& camera) {
-  return readout_s > 0.0 && (camera.rate_hz <= 0.0 || readout_s < 1.0 / camera.rate_hz);
 }
 
 replay::DataFindings judge(const CameraCalibration& given, const JointEstimate& joint) {
@@ -54,13 +50,12 @@ replay::DataFindings judge(const CameraCalibration& given, const JointEstimate& 
                     given.name, 1e3 * found.time_offset_s, 1e3 * s[kLater],
                     1e3 * given.time_offset_s, found.time_offset_s));
   }
-  if (differs(found.readout_s - given.readout_s, kReadout_s, s[kReadout]) &&
-      isPossible(found.readout_s, given)) {
+  const double readout = std::max(0.0, found.readout_s);
+  if (differs(readout - given.readout_s, kReadout_s, s[kReadout])) {
     add("readout",
         fmt::format("the rows of {} are exposed one after another within {:.0f} ± {:.0f} ms, not "
                     "{:.0f} (rolling shutter): set readout_s to {:.4f}",
-                    given.name, 1e3 * found.readout_s, 1e3 * s[kReadout], 1e3 * given.readout_s,
-                    found.readout_s));
+                    given.name, 1e3 * readout, 1e3 * s[kReadout], 1e3 * given.readout_s, readout));
   }
   return findings;
 }
@@ -81,10 +76,12 @@ MotionCheck checkMotion(const replay::Recording& recording) {
   const JointOptions options{{given, Eigen::Vector3d::Zero()}, narrowPriors(given), 10};
   const JointEstimate joint = estimateJointly(tracks.windows, recording.imu, options);
   const JointVector& s = joint.sigma;
+  const CameraCalibration& found = joint.state.camera;
   const std::string shown = fmt::format(
-      "{} images in {} stretches: focal length ± {:.1f} %, time offset ± {:.1f} ms, readout ± "
-      "{:.1f} ms",
-      tracks.images, joint.windows, 100.0 * s[kFocal], 1e3 * s[kLater], 1e3 * s[kReadout]);
+      "{} images in {} stretches: focal length {:.0f} px ± {:.1f} %, time offset {:.1f} ± {:.1f} "
+      "ms, readout {:.1f} ± {:.1f} ms",
+      tracks.images, joint.windows, found.fx, 100.0 * s[kFocal], 1e3 * found.time_offset_s,
+      1e3 * s[kLater], 1e3 * found.readout_s, 1e3 * s[kReadout]);
   if (!(s[kFocal] < kSureShare) || !(s[kLater] < kSure_s) || !(joint.residual_px < kResidual_px) ||
       joint.inliers < kInliers) {
     return {{}, "the motion is too little to judge the lens and the stamps (" + shown + ")"};
