@@ -34,7 +34,7 @@ const std::vector<Layers> kLayers{
     {"services/map_store/", {"core", "fleet", ""}},
     {"services/ros2/", {"core", ""}},
     {"tools/bus_tools/", {"", "status", "doctor"}},
-    {"tools/calibrate/", {"estimate", ""}},
+    {"tools/calibrate/", {"estimate", "motion", ""}},
     {"tools/evaluate/", {"", "memory"}},
     {"tools/outputs/", {"frames", "pictures", ""}},
     {"tools/simulate/", {"shapes", "render", ""}}};

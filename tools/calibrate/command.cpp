@@ -185,6 +185,7 @@ void setUpCalibrate(CLI::App& command) {
   board->callback([line] { runBoard(*line); });
   addSimulate(command, line);
   addCalibrateImport(command);
+  addCalibrateFromMotion(command);
   command.require_subcommand(0, 1);
   command.final_callback([&command, line] {
     if (command.get_subcommands().empty()) runCalibrate(*line);

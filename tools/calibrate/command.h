@@ -9,5 +9,7 @@ namespace perdure::tools {
 
 /// Adds the subcommand `import`.
 void addCalibrateImport(CLI::App& calibrate);
+/// Adds the subcommand `from-motion`.
+void addCalibrateFromMotion(CLI::App& calibrate);
 
 }  // namespace perdure::tools

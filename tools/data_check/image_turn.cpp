@@ -104,25 +104,42 @@ FollowedImage::FollowedImage(const cv::Mat& grey) : image(grey) {
   if (!grey.empty()) cv::buildOpticalFlowPyramid(grey, pyramid, kWindow, kLevels);
 }
 
-std::vector<Flow> flowBetween(const CameraModel& camera, const FollowedImage& first,
-                              const FollowedImage& second) {
-  std::vector<cv::Point2f> from, to;
-  cv::goodFeaturesToTrack(first.image, from, 150, 0.01, 0.02 * first.image.cols + 2.0);
-  if (from.size() < kFewestCorners) return {};
-  std::vector<uchar> found;
+std::vector<cv::Point2f> cornersOf(const FollowedImage& image) {
+  std::vector<cv::Point2f> corners;
+  cv::goodFeaturesToTrack(image.image, corners, 150, 0.01, 0.02 * image.image.cols + 2.0);
+  return corners;
+}
+
+std::vector<std::optional<cv::Point2f>> follow(const FollowedImage& first,
+                                               const FollowedImage& second,
+                                               const std::vector<cv::Point2f>& from) {
+  std::vector<std::optional<cv::Point2f>> followed(from.size());
+  if (from.empty()) return followed;
+  std::vector<cv::Point2f> to, back;
+  std::vector<uchar> found, found_back;
   std::vector<float> error;
   cv::calcOpticalFlowPyrLK(first.pyramid, second.pyramid, from, to, found, error, kWindow, kLevels);
   // Rejects points that backward tracking does not return to their origin.
-  std::vector<cv::Point2f> back;
-  std::vector<uchar> found_back;
   cv::calcOpticalFlowPyrLK(second.pyramid, first.pyramid, to, back, found_back, error, kWindow,
                            kLevels);
   constexpr double kBack_px = 1.0;
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    const bool good = found[i] != 0 && found_back[i] != 0;
+    if (good && cv::norm(back[i] - from[i]) <= kBack_px) followed[i] = to[i];
+  }
+  return followed;
+}
+
+std::vector<Flow> flowBetween(const CameraModel& camera, const FollowedImage& first,
+                              const FollowedImage& second) {
+  const auto from = cornersOf(first);
+  if (from.size() < kFewestCorners) return {};
+  const auto followed = follow(first, second, from);
   std::vector<Flow> flow;
   for (std::size_t i = 0; i < from.size(); ++i) {
-    if (found[i] == 0 || found_back[i] == 0 || cv::norm(back[i] - from[i]) > kBack_px) continue;
+    if (!followed[i]) continue;
     const auto a = camera.unproject({from[i].x, from[i].y});
-    const auto b = camera.unproject({to[i].x, to[i].y});
+    const auto b = camera.unproject({followed[i]->x, followed[i]->y});
     if (!a || !b) continue;
     const Eigen::Vector3d ray = a->homogeneous().normalized();
     flow.push_back({ray, b->homogeneous().normalized() - ray});

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "common/camera/camera_model.h"
@@ -24,6 +25,13 @@ struct FollowedImage {
   explicit FollowedImage(const cv::Mat& grey);
   bool empty() const { return image.empty(); }
 };
+
+/// Corners of an image, well distributed.
+std::vector<cv::Point2f> cornersOf(const FollowedImage& image);
+/// Where each point of the first image is in the second; nothing if it cannot be tracked.
+std::vector<std::optional<cv::Point2f>> follow(const FollowedImage& first,
+                                               const FollowedImage& second,
+                                               const std::vector<cv::Point2f>& from);
 
 /// Flow of the corners that can be tracked; empty if they are too few.
 std::vector<Flow> flowBetween(const CameraModel& camera, const FollowedImage& first,

@@ -111,7 +111,7 @@ void checkOffset(const CameraCalibration& camera, DataFindings& findings) {
 
 void checkNoise(const ImuCalibration& imu, DataFindings& findings) {
   constexpr double kGyro = 5e-3, kAccel = 0.3;  // the cheapest units have a fifth of these
-  constexpr double kRadians = M_PI / 180.0;
+  constexpr double kRadianOfDegree = M_PI / 180.0;
   for (const auto& [value, name] :
        {std::pair(imu.gyro_noise, "gyroscope"), std::pair(imu.accel_noise, "accelerometer")}) {
     if (value > 0.0) continue;
@@ -126,7 +126,7 @@ void checkNoise(const ImuCalibration& imu, DataFindings& findings) {
          fmt::format("the gyroscope's noise density of {:.3g} rad/s/√Hz is more than the cheapest "
                      "units have: is it in degrees (then {:.3g}), or the deviation of a sample "
                      "(divide it by the root of the rate)?",
-                     imu.gyro_noise, kRadians * imu.gyro_noise)});
+                     imu.gyro_noise, kRadianOfDegree * imu.gyro_noise)});
   }
   if (imu.accel_noise > kAccel) {
     findings.push_back(

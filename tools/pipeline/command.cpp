@@ -7,6 +7,8 @@
 #include <string>
 
 #include "common/base/errors.h"
+#include "common/replay/ros_topics.h"
+#include "tools/calibrate/motion/from_motion.h"
 #include "tools/data_check/data_check.h"
 #include "tools/outputs/results_folder.h"
 #include "tools/perdure/commands.h"
@@ -21,8 +23,10 @@ void addOptions(CLI::App& app, PipelineOptions& options) {
                  "Dataset folder: EuRoC (simulated too), KITTI raw or tracking, 7-Scenes; or a "
                  "recording: a .mcap file (of ROS too), .db3, .bag, or a folder of them")
       ->required();
-  app.add_option("--rig", options.rig,
-                 "Rig file of perdure calibrate, instead of the drive's own calibration");
+  app.add_option(
+      "--rig", options.rig,
+      "Rig file of perdure calibrate, instead of the drive's own calibration; auto: found "
+      "from the motion of the first minute");
   app.add_option("--topic", options.topics,
                  "Of a recording of ROS where there are several: cam0=TOPIC, cam1=TOPIC, imu=TOPIC")
       ->take_all();
@@ -141,11 +145,25 @@ std::optional<StartupError> runInto(const PipelineOptions& options, const std::s
   return std::nullopt;
 }
 
+/// --rig auto: writes OUT/rig.yaml.
+void findRig(PipelineOptions& options) {
+  constexpr double kFirst_s = 60.0;
+  const std::string file = options.out + "/rig.yaml";
+  const replay::DatasetOptions drive{.path = options.data,
+                                     .sequence = options.sequence,
+                                     .topics = replay::topicsOf(options.topics)};
+  for (const auto& line : calibrate::writeMotionRig(drive, {.until_s = kFirst_s}, file)) {
+    std::fprintf(stderr, "rig: %s\n", line.c_str());
+  }
+  options.rig = file;
+}
+
 void run(const PipelineOptions& given) {
   refuseOut(given);
   ResultsFolder results(given.out);
   PipelineOptions options = given;
   options.out = results.folder().string();
+  if (options.rig == "auto") findRig(options);
   const auto nothing = runInto(options, given.out);
   results.keep();
   if (nothing) throw StartupError(*nothing);

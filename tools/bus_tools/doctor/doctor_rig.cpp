@@ -1,9 +1,11 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 
 #include "tools/bus_tools/doctor/doctor.h"
+#include "tools/calibrate/motion/from_motion.h"
 #include "tools/calibrate/rig_check.h"
 #include "tools/data_check/data_check.h"
 #include "tools/data_check/mended_copy.h"
@@ -32,6 +34,19 @@ void checkPosesOf(const Drive& drive, const replay::Recording& recording, Findin
   }
 }
 
+/// Adds what the motion says about the rig. It is more exact than coarse findings about the same.
+void checkMotionOf(const replay::Recording& recording, replay::DataFindings& of_data,
+                   Findings& findings) {
+  const auto is_coarse = [](const replay::DataFinding& finding) {
+    return finding.code == "time_offset" || finding.code == "gyro_factor";
+  };
+  if (!std::all_of(of_data.begin(), of_data.end(), is_coarse)) return;
+  if (recording.imu.empty() || recording.calibration.cameras.empty()) return;
+  const auto check = calibrate::checkMotion(recording);
+  if (!check.findings.empty()) of_data = check.findings;
+  findings.push_back({Verdict::kOk, check.basis});
+}
+
 /// Returns whether the rig can be judged by the recording.
 bool checkRecording(const Drive& drive, Findings& findings) {
   const auto dataset =
@@ -43,8 +58,12 @@ bool checkRecording(const Drive& drive, Findings& findings) {
   for (const auto& note : recording.notes) {
     findings.push_back({of_layout ? Verdict::kOk : Verdict::kWarn, note});
   }
-  const bool usable = addFindings(checkDrive(dataset->recording(), {}), findings);
-  if (findings.empty()) findings.push_back({Verdict::kOk, "stamps, units, images and axes agree"});
+  auto of_data = checkDrive(recording, {});
+  if (findings.empty() && of_data.empty()) {
+    findings.push_back({Verdict::kOk, "stamps, units, images and axes agree"});
+  }
+  checkMotionOf(recording, of_data, findings);
+  const bool usable = addFindings(of_data, findings);
   if (usable) checkPosesOf(drive, recording, findings);
   if (usable && of_layout && !recording.calibration.imu) {
     findings.push_back(

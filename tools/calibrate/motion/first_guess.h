@@ -1,0 +1,25 @@
+// Focal length, rotation between camera and IMU, and time offset from rotations alone, without an
+// initial estimate: for each focal length and each offset the rotation follows in closed form
+// (Wahba's problem, Kabsch).
+#pragma once
+
+#include <optional>
+
+#include "tools/calibrate/motion/track_windows.h"
+
+namespace perdure::calibrate {
+
+struct FirstGuess {
+  CameraCalibration camera;  ///< focal length, T_BC's rotation, time offset
+  double unexplained = 1.0;  ///< share of the image rotation that the gyroscope does not explain
+  double turning_px = 0.0;   ///< RMS rotation between two images
+  double second_px = 0.0;    ///< about the second most rotated axis
+  std::size_t pairs = 0;
+};
+
+/// `camera`: image size and name. Focal lengths from 0.4 to 2.5 widths, offsets up to half a
+/// second.
+FirstGuess guessFromTurns(const std::vector<TrackWindow>& windows,
+                          const std::vector<ImuSample>& samples, const CameraCalibration& camera);
+
+}  // namespace perdure::calibrate

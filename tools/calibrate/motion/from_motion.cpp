@@ -1,0 +1,181 @@
+#include "tools/calibrate/motion/from_motion.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+
+#include "common/base/checked_file.h"
+#include "common/base/errors.h"
+#include "common/replay/files/rig_file.h"
+
+namespace perdure::calibrate {
+namespace {
+
+constexpr double kDegrees = 180.0 / M_PI;
+constexpr double kFree = std::numeric_limits<double>::infinity();
+constexpr double kUnseen =
+    0.7;  ///< share of a prior's deviation above which the motion shows nothing
+
+/// Deviations of real rigs: readouts of phones are below 35 ms, principal points within 1 % of the
+/// middle, biases of MEMS gyroscopes below 0.05 rad/s.
+JointVector widePriors(const CameraCalibration& camera) {
+  JointVector sigma;
+  const double centre = 0.01 * camera.width;
+  sigma << kFree, kFree, kFree, kFree, 0.03, 0.05, 0.05, 0.05, kFree, centre, centre, 0.2, 0.1,
+      0.05, 0.05, 0.05;
+  return sigma;
+}
+
+double rotationSigma(const JointVector& sigma) { return kDegrees * sigma.head<3>().norm(); }
+
+Result<TrackWindows> windowsOf(const replay::Recording& recording, const WindowOptions& options) {
+  constexpr std::size_t kFewest = 6;
+  TrackWindows found = trackWindows(recording, options);
+  if (found.windows.size() >= kFewest) return found;
+  if (found.blank > 0) {
+    return fail("motion_blank",
+                fmt::format("{} of {} stretches of images show fewer than 15 corners that can be "
+                            "followed: blank walls, darkness, blur or unreadable images; record "
+                            "again in light, with things to see",
+                            found.blank, found.blank + found.windows.size()));
+  }
+  return fail("motion_few_images",
+              "images and inertial samples have less than three seconds in common; record half a "
+              "minute, with both running");
+}
+
+const char* kMotion =
+    "turn the camera to and fro about all three axes for half a minute, by 30 degrees and about "
+    "once in two seconds, with things to see in the image";
+
+Result<FirstGuess> guessOf(const TrackWindows& tracks, const replay::Recording& recording) {
+  constexpr double kLeast_px = 0.4, kApart = 0.5;
+  const auto guess =
+      guessFromTurns(tracks.windows, recording.imu, recording.calibration.cameras.front());
+  if (guess.pairs == 0 || guess.turning_px < kLeast_px) {
+    return fail("motion_no_rotation",
+                fmt::format("the camera hardly turns ({:.2f} px from image to image); {}",
+                            guess.turning_px, kMotion));
+  }
+  if (guess.unexplained > kApart) {
+    return fail("motion_apart",
+                fmt::format("the gyroscope does not turn as the images do, with any focal length, "
+                            "mounting and offset within half a second ({:.0f} % of the turning "
+                            "disagrees): see that both are of one recording and of one clock, "
+                            "that columns have their order and signs, and that the images show "
+                            "more than moving things",
+                            100.0 * guess.unexplained));
+  }
+  if (guess.second_px < kLeast_px) {
+    return fail("motion_no_rotation",
+                fmt::format("the camera turns about one axis only (about the second by {:.2f} px "
+                            "from image to image); {}",
+                            guess.second_px, kMotion));
+  }
+  return guess;
+}
+
+CameraCalibration startOf(const FirstGuess& guess) {
+  CameraCalibration camera = guess.camera;
+  camera.cx = 0.5 * (camera.width - 1.0), camera.cy = 0.5 * (camera.height - 1.0);
+  camera.distortion = DistortionModel::kRadialTangential;
+  camera.distortion_coefficients.assign(4, 0.0);
+  camera.T_BC.p.setZero();
+  camera.readout_s = 0.0;
+  return camera;
+}
+
+/// The parameters that every use needs and that are too uncertain; empty if there are none.
+std::string unsureOf(const JointEstimate& joint) {
+  constexpr double kFocal_share = 0.015, kTurn_deg = 1.5, kLater_s = 0.004, kResidual_px = 3.0;
+  const JointVector& s = joint.sigma;
+  std::string unsure;
+  const auto add = [&](bool bad, const std::string& what) {
+    if (bad) unsure += (unsure.empty() ? "" : ", ") + what;
+  };
+  add(!(joint.residual_px < kResidual_px),
+      fmt::format("corners miss their places by {:.1f} px", joint.residual_px));
+  add(!(s[kFocal] < kFocal_share), fmt::format("focal length ± {:.1f} %", 100.0 * s[kFocal]));
+  add(!(rotationSigma(s) < kTurn_deg), fmt::format("rotation ± {:.1f}°", rotationSigma(s)));
+  add(!(s[kLater] < kLater_s), fmt::format("time offset ± {:.1f} ms", 1e3 * s[kLater]));
+  return unsure;
+}
+
+}  // namespace
+
+Result<MotionRig> rigFromMotion(const replay::Recording& recording, const WindowOptions& options) {
+  const auto tracks = windowsOf(recording, options);
+  if (!tracks) return tl::unexpected(tracks.error());
+  const auto guess = guessOf(*tracks, recording);
+  if (!guess) return tl::unexpected(guess.error());
+  MotionRig found;
+  JointOptions joint{{startOf(*guess), Eigen::Vector3d::Zero()}, widePriors(guess->camera)};
+  found.joint = estimateJointly(tracks->windows, recording.imu, joint);
+  if (const auto unsure = unsureOf(found.joint); !unsure.empty()) {
+    return fail("motion_unsure", "the motion does not show enough ({}); {}", unsure, kMotion);
+  }
+  found.prior_sigma = joint.prior_sigma;
+  found.rig.cameras = {found.joint.state.camera};
+  found.rig.imu = recording.calibration.imu;
+  found.images = tracks->images;
+  found.second_px = guess->second_px;
+  return found;
+}
+
+std::vector<std::string> linesOf(const MotionRig& found) {
+  const CameraCalibration& c = found.joint.state.camera;
+  const JointVector& s = found.joint.sigma;
+  const auto shown = [&](int first, int count) {
+    for (int i = first; i < first + count; ++i) {
+      if (s[i] < kUnseen * found.prior_sigma[i]) return "";
+    }
+    return "  (not shown by the motion: stays at what is usual)";
+  };
+  const Eigen::Quaterniond& q = c.T_BC.q;
+  const Eigen::Vector3d &p = c.T_BC.p, &b = found.joint.state.gyro_bias;
+  return {
+      fmt::format("focal length      {:.1f} ± {:.1f} px", c.fx, s[kFocal] * c.fx),
+      fmt::format("principal point   {:.1f} ± {:.1f}, {:.1f} ± {:.1f} px{}", c.cx, s[kCentre], c.cy,
+                  s[kCentre + 1], shown(kCentre, 2)),
+      fmt::format("distortion        k1 {:.3f} ± {:.3f}, k2 {:.3f} ± {:.3f}{}",
+                  c.distortion_coefficients[0], s[kDistortion], c.distortion_coefficients[1],
+                  s[kDistortion + 1], shown(kDistortion, 2)),
+      fmt::format("rotation          [{:.4f}, {:.4f}, {:.4f}, {:.4f}] (x y z w, camera in body) ± "
+                  "{:.2f}°",
+                  q.x(), q.y(), q.z(), q.w(), rotationSigma(s)),
+      fmt::format("position          [{:.3f}, {:.3f}, {:.3f}] ± [{:.3f}, {:.3f}, {:.3f}] m{}",
+                  p.x(), p.y(), p.z(), s[kPlace], s[kPlace + 1], s[kPlace + 2], shown(kPlace, 3)),
+      fmt::format("time offset       {:.1f} ± {:.1f} ms", 1e3 * c.time_offset_s, 1e3 * s[kLater]),
+      fmt::format("readout           {:.1f} ± {:.1f} ms{}", 1e3 * c.readout_s, 1e3 * s[kReadout],
+                  shown(kReadout, 1)),
+      fmt::format("gyroscope bias    [{:.4f}, {:.4f}, {:.4f}] ± [{:.4f}, {:.4f}, {:.4f}] rad/s",
+                  b.x(), b.y(), b.z(), s[kBias], s[kBias + 1], s[kBias + 2]),
+      fmt::format("from              {} stretches of {} images, turning by {:.1f} px about the "
+                  "second axis from image to image; residual {:.2f} px",
+                  found.joint.windows, found.images, found.second_px, found.joint.residual_px)};
+}
+
+std::vector<std::string> writeMotionRig(const replay::DatasetOptions& drive,
+                                        const WindowOptions& options,
+                                        const std::filesystem::path& file) {
+  const auto dataset = replay::Dataset::open(drive);
+  const replay::Recording& recording = dataset->recording();
+  const std::string where = drive.path.string() + ": ";
+  if (recording.imu.empty() || recording.calibration.cameras.empty()) {
+    throw StartupError(ExitCode::kData,
+                       where +
+                           (recording.imu.empty() ? "has no inertial samples" : "has no camera") +
+                           "; record images and IMU together");
+  }
+  replay::refuseFatal(replay::checkData(recording, {}), drive.path.string());
+  const auto found = rigFromMotion(recording, options);
+  if (!found) throw StartupError(ExitCode::kData, where + found.error().detail);
+  const auto lines = linesOf(*found);
+  std::string comment = "written by perdure calibrate from-motion:";
+  for (const auto& line : lines) comment += "\n  " + line;
+  writeChecked(file, replay::rigText(found->rig, comment));
+  return lines;
+}
+
+}  // namespace perdure::calibrate

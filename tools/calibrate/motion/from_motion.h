@@ -1,0 +1,46 @@
+// The rig of a camera and an IMU from the motion of any recording, without a board: first from
+// rotations alone (first_guess.h), then jointly with the structure that parallax shows (joint.h).
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/replay/data_check.h"
+#include "tools/calibrate/motion/first_guess.h"
+#include "tools/calibrate/motion/joint.h"
+
+namespace perdure::calibrate {
+
+struct MotionRig {
+  Calibration rig;  ///< cam0 and the IMU's noise
+  JointEstimate joint;
+  JointVector prior_sigma;
+  std::size_t images = 0;
+  double second_px = 0.0;  ///< RMS rotation about the second axis between two images
+};
+
+/// Estimates everything from nothing but the image size. Fails with motion_few_images,
+/// motion_blank, motion_apart (images and gyroscope do not rotate together), motion_no_rotation or
+/// motion_unsure, with a detail for users.
+Result<MotionRig> rigFromMotion(const replay::Recording& recording, const WindowOptions& options);
+
+/// One line for each parameter: value, standard deviation, and whether the motion shows it.
+std::vector<std::string> linesOf(const MotionRig& found);
+
+/// Writes the rig file of a drive, and returns its linesOf(). Throws StartupError: kData with the
+/// reason if there is no rig to be found.
+std::vector<std::string> writeMotionRig(const replay::DatasetOptions& drive,
+                                        const WindowOptions& options,
+                                        const std::filesystem::path& file);
+
+/// What the motion says about a recording's own calibration.
+struct MotionCheck {
+  replay::DataFindings findings;  ///< codes: focal_length, time_offset, readout
+  std::string basis;              ///< the motion that it is based on, or why it says nothing
+};
+/// Uses a few short runs of images. The rest of the calibration is taken as nearly right.
+MotionCheck checkMotion(const replay::Recording& recording);
+
+}  // namespace perdure::calibrate

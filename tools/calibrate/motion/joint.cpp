@@ -1,0 +1,495 @@
+#include "tools/calibrate/motion/joint.h"
+
+#include <ceres/jet.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core/utility.hpp>
+#include <optional>
+
+#include "common/base/algorithms/median.h"
+#include "common/camera/camera_model.h"
+#include "common/math/so3.h"
+#include "tools/calibrate/estimate/lens.h"
+#include "tools/calibrate/motion/inertial_path.h"
+
+namespace perdure::calibrate {
+namespace {
+
+constexpr int kOwn = 6;                      // velocity and gravity of a window
+constexpr int kShared = kParameters + kOwn;  // all but the inverse depth
+constexpr int kAll = kShared + 1;
+constexpr double kGravity = 9.81, kGravitySigma = 0.3;  // m/s²; includes the accelerometer's bias
+constexpr double kUsualInverse = 0.3, kInverseSigma = 1.0;  // 1/m
+constexpr double kLeastScale_px = 0.3;
+constexpr Duration kMargin = std::chrono::milliseconds(100);  // the offset may change by it
+
+using Jet = ceres::Jet<double, kAll>;
+template <class T>
+using Vec3 = Eigen::Matrix<T, 3, 1>;
+using Shared = Eigen::Matrix<double, kShared, 1>;
+using SharedMatrix = Eigen::Matrix<double, kShared, kShared>;
+using Own = Eigen::Matrix<double, kOwn, 1>;
+
+/// What belongs to one window: unknowns, and the quantities of the last linearisation.
+struct Window {
+  const TrackWindow* tracks;
+  TimePoint from;               ///< start of its inertial path, before the first image
+  Own own = Own::Zero();        ///< velocity and gravity, in the body's frame at the start
+  std::vector<double> inverse;  ///< inverse depths
+};
+
+/// Unknowns as T: doubles, or dual numbers whose derivatives are those of a small step.
+template <class T>
+struct Unknowns {
+  Vec3<T> turn, bias, place, velocity, gravity;
+  T later, readout;
+  std::array<T, 4> focal, distortion;
+};
+
+template <class T>
+T variable(double value, int index) {
+  if constexpr (std::is_same_v<T, double>) {
+    return value;
+  } else {
+    return T(value, index);
+  }
+}
+
+template <class T>
+Vec3<T> variables(const Eigen::Vector3d& value, int index) {
+  return {variable<T>(value.x(), index), variable<T>(value.y(), index + 1),
+          variable<T>(value.z(), index + 2)};
+}
+
+template <class T>
+Unknowns<T> unknownsOf(const JointState& state, const Own& own) {
+  const CameraCalibration& c = state.camera;
+  Unknowns<T> u;
+  u.turn = variables<T>(Eigen::Vector3d::Zero(), kTurnOf);
+  u.bias = variables<T>(Eigen::Vector3d::Zero(), kBias);
+  u.place = variables<T>(c.T_BC.p, kPlace);
+  u.velocity = variables<T>(own.head<3>(), kParameters);
+  u.gravity = variables<T>(own.tail<3>(), kParameters + 3);
+  u.later = variable<T>(0.0, kLater);
+  u.readout = variable<T>(0.0, kReadout);
+  const T scale = variable<T>(1.0, kFocal);
+  u.focal = {c.fx * scale, c.fy * scale, variable<T>(c.cx, kCentre),
+             variable<T>(c.cy, kCentre + 1)};
+  u.distortion = {T(0.0), T(0.0), T(0.0), T(0.0)};
+  for (std::size_t i = 0; i < c.distortion_coefficients.size() && i < 4; ++i) {
+    const double d = c.distortion_coefficients[i];
+    u.distortion[i] = i < 2 ? variable<T>(d, kDistortion + static_cast<int>(i)) : T(d);
+  }
+  return u;
+}
+
+/// Body at the exposure of a pixel. The time may change by a small offset.
+template <class T>
+struct BodyAt {
+  Eigen::Quaterniond q;
+  Vec3<T> turn;      ///< small rotation on the right of q
+  Vec3<T> position;  ///< in the window's frame
+
+  Vec3<T> toWindow(const Vec3<T>& v) const { return q.cast<T>() * Vec3<T>(v + turn.cross(v)); }
+  Vec3<T> fromWindow(const Vec3<T>& v) const {
+    const Vec3<T> still = q.conjugate().cast<T>() * v;
+    return still - turn.cross(still);
+  }
+};
+
+double shareOfRow(double row, const CameraCalibration& camera) {
+  return row / (camera.height - 1.0) - 0.5;
+}
+
+template <class T>
+BodyAt<T> bodyAt(const InertialPath& path, double stamp_s, const Eigen::Vector2d& pixel,
+                 const JointState& state, const Unknowns<T>& u) {
+  const double share = shareOfRow(pixel.y(), state.camera);
+  const double t = stamp_s + state.camera.time_offset_s + share * state.camera.readout_s;
+  const InertialState inertial = path.at(t);
+  const T dt = u.later + share * u.readout, at = T(t) + dt;
+  BodyAt<T> body;
+  body.q = inertial.q;
+  body.turn = inertial.rate.cast<T>() * dt - inertial.by_bias.cast<T>() * u.bias;
+  body.position = inertial.position.cast<T>() + inertial.velocity.cast<T>() * dt + u.velocity * at +
+                  u.gravity * (at * at * 0.5);
+  return body;
+}
+
+/// Normalised point of a pixel, with derivatives by the lens: a last Newton step in T.
+template <class T>
+std::optional<Vec3<T>> rayOf(const CameraModel& lens, const Eigen::Vector2d& pixel,
+                             const Unknowns<T>& u) {
+  const auto point = lens.unproject(pixel);
+  if (!point) return std::nullopt;
+  const CameraCalibration& camera = lens.calibration();
+  Eigen::Matrix2d J;
+  lens.distort(*point, &J);
+  const Vec3<T> start = point->homogeneous().cast<T>();
+  const auto again = projectPoint<T>(camera.distortion, u.focal.data(), u.distortion.data(), start);
+  const Eigen::Matrix<T, 2, 1> step = J.inverse().cast<T>() * (pixel.cast<T>() - again);
+  return Vec3<T>(start.x() + step.x(), start.y() + step.y(), T(1.0));
+}
+
+/// Residuals of one track, in pixels: `each(residual)` for every image after the first.
+template <class T, class Each>
+void forResiduals(const Window& window, std::size_t k, const InertialPath& path,
+                  const CameraModel& lens, const JointState& state, const Unknowns<T>& u,
+                  const Each& each) {
+  const Track& track = window.tracks->tracks[k];
+  const auto stampOf = [&](std::size_t i) {
+    return toSeconds(window.tracks->times[i] - window.from);
+  };
+  const auto ray = rayOf<T>(lens, track.front(), u);
+  if (!ray) return;
+  const T rho = variable<T>(window.inverse[k], kShared);
+  const Eigen::Quaternion<T> q_BC = state.camera.T_BC.q.template cast<T>();
+  const Vec3<T> in_body = q_BC * Vec3<T>(*ray + u.turn.cross(*ray)) + rho * u.place;
+  const BodyAt<T> first = bodyAt<T>(path, stampOf(0), track.front(), state, u);
+  const Vec3<T> in_window = first.toWindow(in_body) + rho * first.position;
+  for (std::size_t i = 1; i < track.size(); ++i) {
+    const BodyAt<T> body = bodyAt<T>(path, stampOf(i), track[i], state, u);
+    const Vec3<T> there = q_BC.conjugate() *
+                          Vec3<T>(body.fromWindow(in_window - rho * body.position) - rho * u.place);
+    const Vec3<T> seen = there - u.turn.cross(there);
+    if (!(seen.z() > T(1e-2))) continue;
+    each(Eigen::Matrix<T, 2, 1>(track[i].cast<T>() - projectPoint<T>(state.camera.distortion,
+                                                                     u.focal.data(),
+                                                                     u.distortion.data(), seen)));
+  }
+}
+
+/// Normal equations of one window after its corners, and then the window itself, are eliminated.
+struct Reduced {
+  SharedMatrix H = SharedMatrix::Zero();
+  Shared g = Shared::Zero();                         ///< gradient of half the cost
+  std::vector<Eigen::Matrix<double, kAll, 1>> rows;  ///< of each corner: coupling, information
+  std::vector<double> pulls;                         ///< gradients of the inverse depths
+  JointMatrix H_joint = JointMatrix::Zero();
+  JointVector g_joint = JointVector::Zero();
+};
+
+/// Cauchy's weight.
+double weightOf(double squared, double scale) { return 1.0 / (1.0 + squared / (scale * scale)); }
+double costOf(double squared, double scale) {
+  return 0.5 * scale * scale * std::log1p(squared / (scale * scale));
+}
+
+class Problem {
+ public:
+  Problem(const std::vector<TrackWindow>& tracks, const std::vector<ImuSample>& samples,
+          const JointOptions& options)
+      : samples_(samples), options_(options), state_(options.prior) {
+    for (const TrackWindow& window : tracks) {
+      Window one{&window,
+                 window.times.front() - kMargin + durationFromSeconds(state_.camera.time_offset_s),
+                 Own::Zero(), std::vector<double>(window.tracks.size(), kUsualInverse)};
+      one.own.tail<3>() = gravityIn(one);
+      windows_.push_back(std::move(one));
+    }
+  }
+
+  JointEstimate solve();
+
+ private:
+  void descend();
+  InertialPath pathOf(const Window& window, const JointState& state) const {
+    const Duration length = window.tracks->times.back() - window.tracks->times.front();
+    return InertialPath(samples_, state.gyro_bias, window.from, window.from + length + 2 * kMargin);
+  }
+  /// Minus the mean force, as if the body did not accelerate.
+  Eigen::Vector3d gravityIn(const Window& window) const;
+  /// Squared residuals, in px².
+  std::vector<double> squares(const JointState& state, const Window& window) const;
+  std::vector<double> allSquares() const;
+  double cost(const JointState& state, const Window& window) const;
+  double cost(const JointState& state, const std::vector<Window>& windows) const;
+  Reduced reduce(const JointState& state, const Window& window) const;
+  std::vector<Reduced> reduceAll() const;
+  JointVector priorWeights() const {
+    return excess_ * unit() * options_.prior_sigma.cwiseAbs2().cwiseInverse();
+  }
+  JointVector solveJoint(const std::vector<Reduced>& all) const;
+  /// The window's own unknowns with the smallest cost for a given state, by a few steps.
+  void settle(const JointState& state, Window& window) const;
+  std::vector<Window> settled(const JointState& state, std::vector<Window> windows) const;
+  Window advanced(const Window& window, const Reduced& reduced, const JointVector& step,
+                  double length) const;
+  JointVector sigmaOf(const std::vector<Reduced>& all);
+
+  /// The variance of a residual, px², which priors are weighed against.
+  double unit() const { return 0.25 * scale_ * scale_; }
+
+  const std::vector<ImuSample>& samples_;
+  const JointOptions& options_;
+  JointState state_;
+  std::vector<Window> windows_;
+  double residual_px_ = 0.0;
+  double scale_ = 3.0;  ///< px, of the robust loss
+  /// Variance of a window's gradient, as a multiple of that of independent residuals.
+  double excess_ = 1.0;
+};
+
+Eigen::Vector3d Problem::gravityIn(const Window& window) const {
+  const double length = toSeconds(window.tracks->times.back() - window.from);
+  return -kGravity * pathOf(window, state_).at(length).velocity.normalized();
+}
+
+std::vector<double> Problem::squares(const JointState& state, const Window& window) const {
+  std::vector<double> all;
+  const CameraModel lens(state.camera);
+  const InertialPath path = pathOf(window, state);
+  const auto u = unknownsOf<double>(state, window.own);
+  for (std::size_t k = 0; k < window.inverse.size(); ++k) {
+    forResiduals<double>(window, k, path, lens, state, u,
+                         [&](const Eigen::Vector2d& r) { all.push_back(r.squaredNorm()); });
+  }
+  return all;
+}
+
+double Problem::cost(const JointState& state, const Window& window) const {
+  double sum = 0.0, priors = 0.0;
+  for (const double squared : squares(state, window)) sum += costOf(squared, scale_);
+  for (const double inverse : window.inverse) {
+    const double off = (inverse - kUsualInverse) / kInverseSigma;
+    priors += off * off;
+  }
+  const double off = (window.own.tail<3>().norm() - kGravity) / kGravitySigma;
+  return sum + 0.5 * unit() * (priors + off * off);
+}
+
+double Problem::cost(const JointState& state, const std::vector<Window>& windows) const {
+  double sum = 0.0;
+  for (const Window& window : windows) sum += cost(state, window);
+  const JointVector off = between(options_.prior, state).cwiseQuotient(options_.prior_sigma);
+  return sum + 0.5 * excess_ * unit() * off.squaredNorm();
+}
+
+Reduced Problem::reduce(const JointState& state, const Window& window) const {
+  Reduced out;
+  const CameraModel lens(state.camera);
+  const InertialPath path = pathOf(window, state);
+  const auto u = unknownsOf<Jet>(state, window.own);
+  using Row = Eigen::Matrix<double, kAll, 1>;
+  using Full = Eigen::Matrix<double, kAll, kAll>;
+  for (std::size_t k = 0; k < window.inverse.size(); ++k) {
+    Full H = Full::Zero();
+    Row g = Row::Zero();
+    H(kShared, kShared) = unit() / (kInverseSigma * kInverseSigma);
+    g[kShared] = H(kShared, kShared) * (window.inverse[k] - kUsualInverse);
+    forResiduals<Jet>(window, k, path, lens, state, u, [&](const Eigen::Matrix<Jet, 2, 1>& r) {
+      const double weight = weightOf(r[0].a * r[0].a + r[1].a * r[1].a, scale_);
+      for (const Jet& one : {r[0], r[1]}) {
+        H.noalias() += weight * one.v * one.v.transpose();
+        g += weight * one.a * one.v;
+      }
+    });
+    const Shared coupling = H.col(kShared).head<kShared>();
+    const double information = H(kShared, kShared);
+    out.H += H.topLeftCorner<kShared, kShared>() - coupling * coupling.transpose() / information;
+    out.g += g.head<kShared>() - coupling * (g[kShared] / information);
+    out.rows.push_back(H.col(kShared));
+    out.pulls.push_back(g[kShared]);
+  }
+  const Eigen::Vector3d gravity = window.own.tail<3>(), down = gravity.normalized();
+  const double information = unit() / (kGravitySigma * kGravitySigma);
+  out.H.bottomRightCorner<3, 3>() += information * down * down.transpose();
+  out.g.tail<3>() += information * (gravity.norm() - kGravity) * down;
+  // A weak pull to the present value keeps a window with few corners solvable.
+  out.H.bottomRightCorner<kOwn, kOwn>().diagonal().array() += 1e-3 * unit();
+  const Eigen::LDLT<Eigen::Matrix<double, kOwn, kOwn>> own(out.H.bottomRightCorner<kOwn, kOwn>());
+  const Eigen::Matrix<double, kOwn, kParameters> cross =
+      out.H.bottomLeftCorner<kOwn, kParameters>();
+  out.H_joint =
+      out.H.topLeftCorner<kParameters, kParameters>() - cross.transpose() * own.solve(cross);
+  out.g_joint = out.g.head<kParameters>() - cross.transpose() * own.solve(out.g.tail<kOwn>());
+  return out;
+}
+
+std::vector<Reduced> Problem::reduceAll() const {
+  std::vector<Reduced> all(windows_.size());
+  cv::parallel_for_(cv::Range(0, static_cast<int>(all.size())), [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i) {
+      all[static_cast<std::size_t>(i)] = reduce(state_, windows_[static_cast<std::size_t>(i)]);
+    }
+  });
+  return all;
+}
+
+JointVector Problem::solveJoint(const std::vector<Reduced>& all) const {
+  const JointVector weight = priorWeights();
+  JointMatrix H = weight.asDiagonal();
+  JointVector g = weight.cwiseProduct(between(options_.prior, state_));
+  for (const Reduced& one : all) H += one.H_joint, g += one.g_joint;
+  return -H.ldlt().solve(g);
+}
+
+Window Problem::advanced(const Window& window, const Reduced& reduced, const JointVector& step,
+                         double length) const {
+  Shared all;
+  all.head<kParameters>() = step;
+  const Eigen::Matrix<double, kOwn, kParameters> cross =
+      reduced.H.bottomLeftCorner<kOwn, kParameters>();
+  all.tail<kOwn>() = -reduced.H.bottomRightCorner<kOwn, kOwn>().ldlt().solve(
+      reduced.g.tail<kOwn>() + cross * step);
+  Window next = window;
+  next.own += length * all.tail<kOwn>();
+  for (std::size_t k = 0; k < next.inverse.size(); ++k) {
+    const auto& row = reduced.rows[k];
+    next.inverse[k] -= length * (reduced.pulls[k] + row.head<kShared>().dot(all)) / row[kShared];
+  }
+  return next;
+}
+
+void Problem::settle(const JointState& state, Window& window) const {
+  constexpr int kRounds = 3;
+  constexpr double kShortest = 1.0 / 32.0, kLittle = 1e-3;
+  double before = cost(state, window);
+  for (int round = 0; round < kRounds; ++round) {
+    const Reduced reduced = reduce(state, window);
+    double after = before;
+    for (double length = 1.0; length > kShortest && !(after < before); length *= 0.5) {
+      Window next = advanced(window, reduced, JointVector::Zero(), length);
+      after = cost(state, next);
+      if (after < before) window = std::move(next);
+    }
+    if (!(before - after > kLittle * before)) return;
+    before = after;
+  }
+}
+
+std::vector<Window> Problem::settled(const JointState& state, std::vector<Window> windows) const {
+  cv::parallel_for_(cv::Range(0, static_cast<int>(windows.size())), [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i) {
+      settle(state, windows[static_cast<std::size_t>(i)]);
+    }
+  });
+  return windows;
+}
+
+/// The sum of the windows' outer products of gradients (sandwich) accounts for residuals that are
+/// correlated within a window. If windows are few, their mean ratio to the information is a bound.
+JointVector Problem::sigmaOf(const std::vector<Reduced>& all) {
+  JointMatrix H = JointMatrix::Zero(), meat = H;
+  for (const Reduced& one : all) {
+    H += one.H_joint;
+    meat += one.g_joint * one.g_joint.transpose();
+  }
+  const JointVector weight = priorWeights();
+  const JointMatrix inverse =
+      (H + JointMatrix(weight.asDiagonal())).ldlt().solve(JointMatrix::Identity());
+  // Residuals of a fit are smaller than errors: the windows lose the degrees of freedom that the
+  // parameters take.
+  const double count = static_cast<double>(all.size()), taken = (inverse * H).trace();
+  meat *= count / std::max(0.25 * count, count - taken);
+  const double excess = (inverse * meat).trace() / taken / unit();
+
+  const JointVector sandwich = (inverse * meat * inverse).diagonal();
+  const JointVector bound = excess * unit() * (inverse * H * inverse).diagonal();
+  // A prior contributes with the deviation that it states.
+  const JointVector prior = excess_ * unit() * options_.prior_sigma.cwiseInverse();
+  const JointVector of_prior =
+      (inverse * JointMatrix(prior.cwiseAbs2().asDiagonal()) * inverse).diagonal();
+  excess_ = std::max(1.0, excess);
+  return (sandwich.cwiseMax(bound) + of_prior).cwiseSqrt();
+}
+
+std::vector<double> Problem::allSquares() const {
+  std::vector<double> all;
+  for (const Window& window : windows_) {
+    const auto some = squares(state_, window);
+    all.insert(all.end(), some.begin(), some.end());
+  }
+  return all;
+}
+
+/// Gauss-Newton on the shared unknowns; a step that does not reduce the cost is halved.
+void Problem::descend() {
+  constexpr double kShortest = 1.0 / 64.0, kLittle = 1e-4;  // steps; share of the cost
+  for (int round = 0; round < options_.most_rounds; ++round) {
+    // For two-dimensional normal residuals the median square is 2 ln 2 of the variance.
+    residual_px_ = std::sqrt(medianOf(allSquares()) / (2.0 * std::log(2.0)));
+    scale_ = std::max(kLeastScale_px, 2.0 * residual_px_);
+    windows_ = settled(state_, std::move(windows_));
+    const double before = cost(state_, windows_);
+    const auto reduced = reduceAll();
+    const JointVector step = solveJoint(reduced);
+    double after = before;
+    for (double length = 1.0; length > kShortest && !(after < before); length *= 0.5) {
+      const JointState next = moved(state_, length * step);
+      std::vector<Window> windows;
+      for (std::size_t i = 0; i < windows_.size(); ++i) {
+        windows.push_back(advanced(windows_[i], reduced[i], step, length));
+      }
+      windows = settled(next, std::move(windows));
+      after = cost(next, windows);
+      if (after < before) state_ = next, windows_ = std::move(windows);
+    }
+    if (!(before - after > kLittle * before)) return;
+  }
+}
+
+JointEstimate Problem::solve() {
+  JointEstimate out;
+  if (allSquares().size() < kParameters) return out;
+  descend();
+  sigmaOf(reduceAll());  // for the weight of the priors
+  descend();
+  out.sigma = sigmaOf(reduceAll());
+  out.state = state_;
+  out.windows = windows_.size();
+  out.residual_px = residual_px_;
+  const auto all = allSquares();
+  out.residuals = all.size();
+  const double limit = 9.0 * residual_px_ * residual_px_;
+  out.inliers = static_cast<double>(
+                    std::count_if(all.begin(), all.end(), [&](double s) { return s < limit; })) /
+                static_cast<double>(all.size());
+  return out;
+}
+
+}  // namespace
+
+JointState moved(const JointState& state, const JointVector& step) {
+  JointState next = state;
+  CameraCalibration& c = next.camera;
+  c.T_BC.q = (c.T_BC.q * expQuaternion(step.segment<3>(kTurnOf))).normalized();
+  c.T_BC.p += step.segment<3>(kPlace);
+  c.time_offset_s += step[kLater];
+  c.readout_s += step[kReadout];
+  next.gyro_bias += step.segment<3>(kBias);
+  const double scale = std::clamp(1.0 + step[kFocal], 0.5, 2.0);
+  c.fx *= scale, c.fy *= scale;
+  c.cx += step[kCentre], c.cy += step[kCentre + 1];
+  if (c.distortion_coefficients.size() >= 2) {
+    c.distortion_coefficients[0] += step[kDistortion];
+    c.distortion_coefficients[1] += step[kDistortion + 1];
+  }
+  return next;
+}
+
+JointVector between(const JointState& from, const JointState& to) {
+  const CameraCalibration &a = from.camera, &b = to.camera;
+  JointVector step = JointVector::Zero();
+  step.segment<3>(kTurnOf) = logSo3(Eigen::Quaterniond(a.T_BC.q.conjugate() * b.T_BC.q));
+  step[kLater] = b.time_offset_s - a.time_offset_s;
+  step[kReadout] = b.readout_s - a.readout_s;
+  step.segment<3>(kBias) = to.gyro_bias - from.gyro_bias;
+  step[kFocal] = std::log(b.fx / a.fx);
+  step[kCentre] = b.cx - a.cx, step[kCentre + 1] = b.cy - a.cy;
+  if (a.distortion_coefficients.size() >= 2) {
+    step[kDistortion] = b.distortion_coefficients[0] - a.distortion_coefficients[0];
+    step[kDistortion + 1] = b.distortion_coefficients[1] - a.distortion_coefficients[1];
+  }
+  step.segment<3>(kPlace) = b.T_BC.p - a.T_BC.p;
+  return step;
+}
+
+JointEstimate estimateJointly(const std::vector<TrackWindow>& windows,
+                              const std::vector<ImuSample>& samples, const JointOptions& options) {
+  return Problem(windows, samples, options).solve();
+}
+
+}  // namespace perdure::calibrate

@@ -1,0 +1,92 @@
+// Compares a recording's own calibration with what its motion shows.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tools/calibrate/motion/from_motion.h"
+
+namespace perdure::calibrate {
+namespace {
+
+using Grade = replay::DataFinding::Grade;
+
+constexpr double kSurely = 4.0;  ///< standard deviations
+
+/// The given calibration is nearly right but for what is checked.
+JointVector narrowPriors(const CameraCalibration& camera) {
+  const double free = std::numeric_limits<double>::infinity();
+  const double turn = 2.0 * M_PI / 180.0, centre = 0.01 * camera.width;
+  JointVector sigma;
+  sigma << turn, turn, turn, free, 0.03, 0.05, 0.05, 0.05, free, centre, centre, 0.02, 0.02, 0.05,
+      0.05, 0.05;
+  return sigma;
+}
+
+replay::DataFindings judge(const CameraCalibration& given, const JointEstimate& joint) {
+  constexpr double kLeastShare = 0.025, kLater_s = 0.008, kReadout_s = 0.01;  // least errors
+  const CameraCalibration& found = joint.state.camera;
+  const JointVector& s = joint.sigma;
+  replay::DataFindings findings;
+  const auto differs = [&](double change, double least, double sigma) {
+    return std::abs(change) > std::max(least, kSurely * sigma);
+  };
+  const auto add = [&](const char* code, const std::string& text) {
+    findings.push_back({Grade::kWarning, code,
+                        text + "; or let perdure calibrate from-motion find the whole rig"});
+  };
+  if (differs(found.fx / given.fx - 1.0, kLeastShare, s[kFocal])) {
+    add("focal_length",
+        fmt::format("{} turns as with a focal length of {:.0f} ± {:.0f} px, not {:.0f}: set "
+                    "intrinsics to [{:.1f}, {:.1f}, {:.1f}, {:.1f}]",
+                    given.name, found.fx, s[kFocal] * found.fx, given.fx, found.fx, found.fy,
+                    given.cx, given.cy));
+  }
+  if (differs(found.time_offset_s - given.time_offset_s, kLater_s, s[kLater])) {
+    add("time_offset",
+        fmt::format("the images of {} and the IMU are {:.1f} ± {:.1f} ms apart, not {:.1f}: set "
+                    "time_offset_s to {:.4f}",
+                    given.name, 1e3 * found.time_offset_s, 1e3 * s[kLater],
+                    1e3 * given.time_offset_s, found.time_offset_s));
+  }
+  const double readout = std::max(0.0, found.readout_s);
+  if (differs(readout - given.readout_s, kReadout_s, s[kReadout])) {
+    add("readout",
+        fmt::format("the rows of {} are exposed one after another within {:.0f} ± {:.0f} ms, not "
+                    "{:.0f} (rolling shutter): set readout_s to {:.4f}",
+                    given.name, 1e3 * readout, 1e3 * s[kReadout], 1e3 * given.readout_s, readout));
+  }
+  return findings;
+}
+
+}  // namespace
+
+MotionCheck checkMotion(const replay::Recording& recording) {
+  constexpr std::size_t kWindows = 12, kFewest = 6;
+  constexpr double kSureShare = 0.01, kSure_s = 0.004, kResidual_px = 2.0, kInliers = 0.6;
+  const CameraCalibration& given = recording.calibration.cameras.front();
+  if (given.distortion == DistortionModel::kRational) {
+    return {{}, "the motion is not compared with a lens of eight coefficients"};
+  }
+  const TrackWindows tracks = trackWindows(recording, {.most = kWindows});
+  if (tracks.windows.size() < kFewest) {
+    return {{}, "too few images with corners to judge focal length, time offset and readout"};
+  }
+  const JointOptions options{{given, Eigen::Vector3d::Zero()}, narrowPriors(given), 10};
+  const JointEstimate joint = estimateJointly(tracks.windows, recording.imu, options);
+  const JointVector& s = joint.sigma;
+  const CameraCalibration& found = joint.state.camera;
+  const std::string shown = fmt::format(
+      "{} images in {} stretches: focal length {:.0f} px ± {:.1f} %, time offset {:.1f} ± {:.1f} "
+      "ms, readout {:.1f} ± {:.1f} ms",
+      tracks.images, joint.windows, found.fx, 100.0 * s[kFocal], 1e3 * found.time_offset_s,
+      1e3 * s[kLater], 1e3 * found.readout_s, 1e3 * s[kReadout]);
+  if (!(s[kFocal] < kSureShare) || !(s[kLater] < kSure_s) || !(joint.residual_px < kResidual_px) ||
+      joint.inliers < kInliers) {
+    return {{}, "the motion is too little to judge the lens and the stamps (" + shown + ")"};
+  }
+  return {judge(given, joint), "the motion judges the lens and the stamps by " + shown};
+}
+
+}  // namespace perdure::calibrate

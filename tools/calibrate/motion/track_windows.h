@@ -1,0 +1,36 @@
+// Corners followed through short runs of images, where the camera turns most.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "common/replay/dataset.h"
+
+namespace perdure::calibrate {
+
+/// Pixels of one corner in consecutive images from the window's first one; two or more.
+using Track = std::vector<Eigen::Vector2d>;
+
+struct TrackWindow {
+  std::vector<TimePoint> times;  ///< stamps of the images
+  std::vector<Track> tracks;
+};
+
+struct WindowOptions {
+  std::size_t most = 40;  ///< windows
+  double seconds = 0.7;   ///< length of a window, at least three images; shorter ones do not
+                         ///< separate slow translation from rotation
+  double until_s = 1e9;  ///< since the first image; later images are not used
+};
+
+struct TrackWindows {
+  std::vector<TrackWindow> windows;  ///< sorted by time
+  std::size_t images = 0;            ///< images that were read
+  std::size_t blank = 0;             ///< windows without enough corners, or unreadable
+};
+
+/// Windows of cam0, distributed over the rotation about all axes. Images of another size than the
+/// calibration's are not used.
+TrackWindows trackWindows(const replay::Recording& recording, const WindowOptions& options);
+
+}  // namespace perdure::calibrate
