@@ -2,8 +2,8 @@
 // rigs.
 #include <cmath>
 
+#include "common/replay/files/boxes/detection_file.h"
 #include "common/replay/files/class_aliases.h"
-#include "common/replay/files/detection_file.h"
 #include "common/replay/files/kitti_calibration.h"
 #include "common/replay/files/kitti_labels.h"
 #include "common/replay/files/pose_file.h"

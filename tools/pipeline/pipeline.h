@@ -12,7 +12,7 @@
 #include "common/bus/once.h"
 #include "common/replay/data_check.h"
 #include "common/replay/dataset.h"
-#include "common/replay/files/detection_file.h"
+#include "common/replay/files/boxes/detection_file.h"
 #include "common/replay/recordings/recorded_messages.h"
 #include "common/replay/recordings/recording_writer.h"
 #include "services/inference/node.h"

@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "common/base/errors.h"
-#include "common/replay/files/detection_file.h"
+#include "common/replay/files/boxes/detection_file.h"
 #include "tests/common/replay/tiny_datasets.h"
 #include "tests/services/inference/tiny_onnx.h"
 

@@ -1,4 +1,4 @@
-#include "common/replay/files/coco_file.h"
+#include "common/replay/files/boxes/coco_file.h"
 
 #include <fmt/format.h>
 

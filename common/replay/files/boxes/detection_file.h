@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
+#include "common/replay/files/boxes/coco_file.h"
 #include "common/replay/files/class_aliases.h"
-#include "common/replay/files/coco_file.h"
 #include "common/replay/files/text_file.h"
 #include "common/types/detections.h"
 

@@ -1,4 +1,4 @@
-#include "common/replay/files/detection_file.h"
+#include "common/replay/files/boxes/detection_file.h"
 
 #include <fmt/format.h>
 
