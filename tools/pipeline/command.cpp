@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -149,6 +150,7 @@ std::optional<StartupError> runInto(const PipelineOptions& options, const std::s
 void findRig(PipelineOptions& options) {
   constexpr double kFirst_s = 60.0;
   const std::string file = options.out + "/rig.yaml";
+  std::filesystem::create_directories(options.out);
   const replay::DatasetOptions drive{.path = options.data,
                                      .sequence = options.sequence,
                                      .topics = replay::topicsOf(options.topics)};

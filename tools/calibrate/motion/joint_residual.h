@@ -1,0 +1,164 @@
+// The residuals of joint.h, for doubles and for dual numbers.
+#pragma once
+
+#include <ceres/jet.h>
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+#include <type_traits>
+#include <vector>
+
+#include "common/camera/camera_model.h"
+#include "tools/calibrate/estimate/lens.h"
+#include "tools/calibrate/motion/inertial_path.h"
+#include "tools/calibrate/motion/joint.h"
+
+namespace perdure::calibrate::joint {
+
+inline constexpr int kOwn = 6;                      // velocity and gravity of a window
+inline constexpr int kShared = kParameters + kOwn;  // all but the inverse depth
+inline constexpr int kAll = kShared + 1;
+inline constexpr double kGravity = 9.81,
+                        kGravitySigma = 0.3;  // m/s²; includes the accelerometer's bias
+inline constexpr double kUsualInverse = 0.3, kInverseSigma = 1.0;  // 1/m
+inline constexpr double kLeastScale_px = 0.3;
+inline constexpr Duration kMargin = std::chrono::milliseconds(100);  // the offset may change by it
+
+using Jet = ceres::Jet<double, kAll>;
+template <class T>
+using Vec3 = Eigen::Matrix<T, 3, 1>;
+using Shared = Eigen::Matrix<double, kShared, 1>;
+using SharedMatrix = Eigen::Matrix<double, kShared, kShared>;
+using Own = Eigen::Matrix<double, kOwn, 1>;
+
+/// What belongs to one window: unknowns, and the quantities of the last linearisation.
+struct Window {
+  const TrackWindow* tracks;
+  TimePoint from;               ///< start of its inertial path, before the first image
+  Own own = Own::Zero();        ///< velocity and gravity, in the body's frame at the start
+  std::vector<double> inverse;  ///< inverse depths
+};
+
+/// Unknowns as T: doubles, or dual numbers whose derivatives are those of a small step.
+template <class T>
+struct Unknowns {
+  Vec3<T> turn, bias, place, velocity, gravity;
+  T later, readout;
+  std::array<T, 4> focal, distortion;
+};
+
+template <class T>
+T variable(double value, int index) {
+  if constexpr (std::is_same_v<T, double>) {
+    return value;
+  } else {
+    return T(value, index);
+  }
+}
+
+template <class T>
+Vec3<T> variables(const Eigen::Vector3d& value, int index) {
+  return {variable<T>(value.x(), index), variable<T>(value.y(), index + 1),
+          variable<T>(value.z(), index + 2)};
+}
+
+template <class T>
+Unknowns<T> unknownsOf(const JointState& state, const Own& own) {
+  const CameraCalibration& c = state.camera;
+  Unknowns<T> u;
+  u.turn = variables<T>(Eigen::Vector3d::Zero(), kTurnOf);
+  u.bias = variables<T>(Eigen::Vector3d::Zero(), kBias);
+  u.place = variables<T>(c.T_BC.p, kPlace);
+  u.velocity = variables<T>(own.head<3>(), kParameters);
+  u.gravity = variables<T>(own.tail<3>(), kParameters + 3);
+  u.later = variable<T>(0.0, kLater);
+  u.readout = variable<T>(0.0, kReadout);
+  const T scale = variable<T>(1.0, kFocal);
+  u.focal = {c.fx * scale, c.fy * scale, variable<T>(c.cx, kCentre),
+             variable<T>(c.cy, kCentre + 1)};
+  u.distortion = {T(0.0), T(0.0), T(0.0), T(0.0)};
+  for (std::size_t i = 0; i < c.distortion_coefficients.size() && i < 4; ++i) {
+    const double d = c.distortion_coefficients[i];
+    u.distortion[i] = i < 2 ? variable<T>(d, kDistortion + static_cast<int>(i)) : T(d);
+  }
+  return u;
+}
+
+/// Body at the exposure of a pixel. The time may change by a small offset.
+template <class T>
+struct BodyAt {
+  Eigen::Quaterniond q;
+  Vec3<T> turn;      ///< small rotation on the right of q
+  Vec3<T> position;  ///< in the window's frame
+
+  Vec3<T> toWindow(const Vec3<T>& v) const { return q.cast<T>() * Vec3<T>(v + turn.cross(v)); }
+  Vec3<T> fromWindow(const Vec3<T>& v) const {
+    const Vec3<T> still = q.conjugate().cast<T>() * v;
+    return still - turn.cross(still);
+  }
+};
+
+inline double shareOfRow(double row, const CameraCalibration& camera) {
+  return row / (camera.height - 1.0) - 0.5;
+}
+
+template <class T>
+BodyAt<T> bodyAt(const InertialPath& path, double stamp_s, const Eigen::Vector2d& pixel,
+                 const JointState& state, const Unknowns<T>& u) {
+  const double share = shareOfRow(pixel.y(), state.camera);
+  const double t = stamp_s + state.camera.time_offset_s + share * state.camera.readout_s;
+  const InertialState inertial = path.at(t);
+  const T dt = u.later + share * u.readout, at = T(t) + dt;
+  BodyAt<T> body;
+  body.q = inertial.q;
+  body.turn = inertial.rate.cast<T>() * dt - inertial.by_bias.cast<T>() * u.bias;
+  body.position = inertial.position.cast<T>() + inertial.velocity.cast<T>() * dt + u.velocity * at +
+                  u.gravity * (at * at * 0.5);
+  return body;
+}
+
+/// Normalised point of a pixel, with derivatives by the lens: a last Newton step in T.
+template <class T>
+std::optional<Vec3<T>> rayOf(const CameraModel& lens, const Eigen::Vector2d& pixel,
+                             const Unknowns<T>& u) {
+  const auto point = lens.unproject(pixel);
+  if (!point) return std::nullopt;
+  const CameraCalibration& camera = lens.calibration();
+  Eigen::Matrix2d J;
+  lens.distort(*point, &J);
+  const Vec3<T> start = point->homogeneous().cast<T>();
+  const auto again = projectPoint<T>(camera.distortion, u.focal.data(), u.distortion.data(), start);
+  const Eigen::Matrix<T, 2, 1> step = J.inverse().cast<T>() * (pixel.cast<T>() - again);
+  return Vec3<T>(start.x() + step.x(), start.y() + step.y(), T(1.0));
+}
+
+/// Residuals of one track, in pixels: `each(residual)` for every image after the first.
+template <class T, class Each>
+void forResiduals(const Window& window, std::size_t k, const InertialPath& path,
+                  const CameraModel& lens, const JointState& state, const Unknowns<T>& u,
+                  const Each& each) {
+  const Track& track = window.tracks->tracks[k];
+  const auto stampOf = [&](std::size_t i) {
+    return toSeconds(window.tracks->times[i] - window.from);
+  };
+  const auto ray = rayOf<T>(lens, track.front(), u);
+  if (!ray) return;
+  const T rho = variable<T>(window.inverse[k], kShared);
+  const Eigen::Quaternion<T> q_BC = state.camera.T_BC.q.template cast<T>();
+  const Vec3<T> in_body = q_BC * Vec3<T>(*ray + u.turn.cross(*ray)) + rho * u.place;
+  const BodyAt<T> first = bodyAt<T>(path, stampOf(0), track.front(), state, u);
+  const Vec3<T> in_window = first.toWindow(in_body) + rho * first.position;
+  for (std::size_t i = 1; i < track.size(); ++i) {
+    const BodyAt<T> body = bodyAt<T>(path, stampOf(i), track[i], state, u);
+    const Vec3<T> there = q_BC.conjugate() *
+                          Vec3<T>(body.fromWindow(in_window - rho * body.position) - rho * u.place);
+    const Vec3<T> seen = there - u.turn.cross(there);
+    if (!(seen.z() > T(1e-2))) continue;
+    each(Eigen::Matrix<T, 2, 1>(track[i].cast<T>() - projectPoint<T>(state.camera.distortion,
+                                                                     u.focal.data(),
+                                                                     u.distortion.data(), seen)));
+  }
+}
+
+}  // namespace perdure::calibrate::joint
