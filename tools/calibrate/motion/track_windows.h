@@ -19,8 +19,8 @@ struct TrackWindow {
 struct WindowOptions {
   std::size_t most = 40;  ///< windows
   double seconds = 0.7;   ///< length of a window, at least three images; shorter ones do not
-                         ///< separate slow translation from rotation
-  double until_s = 1e9;  ///< since the first image; later images are not used
+                          ///< separate slow translation from rotation
+  double until_s = 1e9;   ///< since the first image; later images are not used
 };
 
 struct TrackWindows {
