@@ -66,7 +66,7 @@ void MapState::scaleOdometry(const DriftVariance& factor, const WorldId& session
   for (auto& [id, anchor] : anchors_) {
     if (anchor.session != session) continue;
     anchor.from_previous.covariance = factor.of(anchor.from_previous.covariance);
-    anchor.scale = {anchor.scale.plane * factor.plane, anchor.scale.height * factor.height};
+    anchor.scale = anchor.scale.times(factor);
     of_session.insert(id);
   }
   graph_.scaleOdometry(factor, of_session);

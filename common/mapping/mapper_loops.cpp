@@ -139,9 +139,9 @@ void Mapper::learnDrift(const PlaceMatch& match, const LevelGaussian& prior) {
   addFloor(measured, parameters_.loop.floor_m, parameters_.loop.floor_rad);
   drift_scale_.add(difference(match.T_MB.mean, prior.mean), measured,
                    DriftVariance().over(odometry_variance_).of(prior.covariance));
-  const DriftVariance variance = drift_scale_.variance();
-  state_.scaleOdometry(variance.over(odometry_variance_), *session_);
-  odometry_variance_ = variance;
+  const DriftVariance factor = drift_scale_.variance().over(odometry_variance_);
+  state_.scaleOdometry(factor, *session_);
+  odometry_variance_ = odometry_variance_.times(factor);
 }
 
 /// In similar streets one search may find the wrong street. A second search uses more objects.

@@ -336,7 +336,7 @@ void Node::publish(const FrameStamp& stamp, const FrameEstimate& e) {
   if (unaided && (aided_ || unaided_frames_ >= kFirstFrames)) {
     reasons_.add("frame_without_update", !aided_ && late ? kFirstFrames : 1);
   }
-  const bool uncertain = position_doubt_.add(stamp.time, e.covariance);
+  const bool uncertain = position_doubt_.add(stamp.time, e.nav.p_WB, e.covariance);
   if (uncertain) reasons_.add("position_uncertain");
   const bool degraded = degraded_frames_ > 0 || unaided_frames_ > kUnaidedFrames || uncertain;
   if (degraded_frames_ > 0) --degraded_frames_;

@@ -1,9 +1,10 @@
 // Detects that the position has become uncertain: its standard deviation has grown by more than a
-// limit over the last ten seconds. The error of a long and healthy drive grows more slowly.
+// limit over the last ten seconds, beyond what the error of the heading adds with the way.
 #pragma once
 
+#include <Eigen/Core>
+#include <cmath>
 #include <deque>
-#include <utility>
 
 #include "common/base/time.h"
 #include "common/types/odometry.h"
@@ -15,14 +16,16 @@ class PositionDoubt {
   explicit PositionDoubt(double limit_m) : limit_m_(limit_m) {}
 
   /// Adds the next pose of the same world; true if its position is uncertain.
-  bool add(TimePoint now, const Matrix9d& covariance) {
-    const double variance = covariance.block<3, 3>(3, 3).trace();
-    while (!before_.empty() && before_.front().first < now - std::chrono::seconds(10)) {
+  bool add(TimePoint now, const Eigen::Vector3d& p_W, const Matrix9d& covariance) {
+    const double sigma = std::sqrt(covariance.block<3, 3>(3, 3).trace());
+    while (!before_.empty() && before_.front().time < now - std::chrono::seconds(10)) {
       before_.pop_front();
     }
-    before_.emplace_back(now, variance);
-    // Errors of separate distances add as variances.
-    return uncertain_ = variance - before_.front().second > limit_m_ * limit_m_;
+    before_.push_back({now, p_W, sigma});
+    const Pose& then = before_.front();
+    const double by_heading =
+        std::sqrt(covariance.block<3, 3>(0, 0).trace()) * (p_W - then.p_W).norm();
+    return uncertain_ = sigma - then.sigma > limit_m_ + by_heading;
   }
   bool uncertain() const { return uncertain_; }
   void clear() {
@@ -32,7 +35,12 @@ class PositionDoubt {
 
  private:
   double limit_m_;
-  std::deque<std::pair<TimePoint, double>> before_;  ///< variances of the position
+  struct Pose {
+    TimePoint time;
+    Eigen::Vector3d p_W;
+    double sigma;  ///< m
+  };
+  std::deque<Pose> before_;
   bool uncertain_ = false;
 };
 

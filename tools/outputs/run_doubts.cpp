@@ -21,8 +21,9 @@ constexpr Rule kRules[] = {
      "T_BS, the IMU's axes, signs or units, the focal length or time_offset_s may be wrong; see "
      "perdure doctor --data"},
     {"position_uncertain", 20, "the position is uncertain",
-     "its deviation grew by more than vio.odometry.position_growth in ten seconds, and no object "
-     "was confirmed meanwhile: turn less on the spot, or calibrate the rig (perdure doctor --data)"},
+     "its deviation grew by more than vio.odometry.position_growth in ten seconds: turn less on "
+     "the "
+     "spot, or calibrate the rig (perdure doctor --data)"},
     {"poses_contradict_images", 20, "the poses contradict the images",
      "they may be inverted (T_BW for T_WB), in other axes than T_BS says, with the quaternion's w "
      "at the wrong end, or on another clock"},

@@ -49,7 +49,6 @@ HistoryFrame& History::add(const Odometry& odometry, std::shared_ptr<const Camer
   input.view.T_WB = odometry.T_WB;
   input.view.up_W = odometry.up_W;
   input.pose_error = pose_error_;
-  input.pose_error.degraded = odometry.state == OdometryState::kDegraded;
   frames_.push_back({std::move(input), odometry.world, std::move(camera), {}});
   if (frames_.size() > most_) {
     spare_ = std::move(frames_.front().before);

@@ -73,15 +73,17 @@ TEST(VioNodeHealth, ARigWhoseSecondCameraDoesNotComeGoesOnWithOneAndSaysSo) {
 
 TEST(VioNodeHealth, IsDegradedOnlyWhileThePositionGrowsUncertain) {
   PositionDoubt doubt(2.0);
-  const auto grown = [&](double t, double sigma) {
+  const auto grown = [&](double t, double sigma, double x = 0.0) {
     Matrix9d P = Matrix9d::Zero();
+    P(2, 2) = 0.05 * 0.05;
     P(3, 3) = sigma * sigma;
-    return doubt.add(fromNanoseconds(0) + durationFromSeconds(t), P);
+    return doubt.add(fromNanoseconds(0) + durationFromSeconds(t), {x, 0.0, 0.0}, P);
   };
   for (int t = 0; t < 100; ++t) EXPECT_FALSE(grown(t, 30.0 + 0.01 * t)) << "a long, healthy drive";
-  EXPECT_TRUE(grown(100, 31.1));
+  EXPECT_TRUE(grown(100, 33.1));
   EXPECT_TRUE(doubt.uncertain());
-  EXPECT_FALSE(grown(115, 31.1)) << "it grows no further";
+  EXPECT_FALSE(grown(115, 33.1)) << "it grows no further";
+  EXPECT_FALSE(grown(125, 39.1, 200.0)) << "by the heading";
 }
 
 TEST(VioNodeHealth, SaysThatAPositionIsUncertain) {

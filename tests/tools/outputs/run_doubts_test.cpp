@@ -37,7 +37,7 @@ TEST(Doubts, ContradictionsOfATenthOfTheRunAreTold) {
 
 TEST(Doubts, AnUncertainPositionIsTold) {
   EXPECT_THAT(doubtsAt("position_uncertain", 24),
-              ElementsAre(HasSubstr("no object was confirmed")));
+              ElementsAre(HasSubstr("turn less on the spot")));
   EXPECT_THAT(doubtsAt("position_uncertain", 12), IsEmpty());
 }
 

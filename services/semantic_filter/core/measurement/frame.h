@@ -24,7 +24,6 @@ struct PoseError {
   /// The covariance is what odometry reports. Its corrections shrink it below what a
   /// cross-covariance may belong to (belief/pose_correlation.h). A walk only grows.
   bool reported = false;
-  bool degraded = false;  ///< odometry reports itself degraded: nothing is confirmed
 };
 
 /// Brings `error` from the frame before to the frame of `odometry`. `last_T_WB`: pose of the frame

@@ -36,7 +36,7 @@ std::vector<Track> confirmAndDelete(std::vector<Track>& tracks, const FrameConte
       o.life.confirmed = false;
       continue;
     }
-    if (!frame.pose_error.degraded && established(o, frame) && sigma < parameters.confirm_sigma_m) {
+    if (established(o, frame) && sigma < parameters.confirm_sigma_m) {
       o.life.confirmed = o.life.once_confirmed = true;
     }
   }

@@ -30,21 +30,6 @@ TEST_F(Lifecycle, ATrackWithTwoPossiblePlacesIsNotConfirmed) {
   EXPECT_TRUE(claimed(15.0, 0.001)) << "that it is near is ruled out";
 }
 
-TEST_F(Lifecycle, NothingIsConfirmedWhileTheOdometryIsDegraded) {
-  Track o = makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
-  o.existence = {0.97, ExistenceEvidence::kPrior, o.as_of};
-  for (const bool degraded : {true, false}) {
-    frame.pose_error.degraded = degraded;
-    std::vector<Track> objects{o};
-    objects[0].life.confirmed = false;
-    confirmAndDelete(objects, frame);
-    EXPECT_EQ(objects.at(0).life.confirmed, !degraded);
-    objects[0].life.confirmed = true;
-    confirmAndDelete(objects, frame);
-    EXPECT_TRUE(objects.at(0).life.confirmed) << "a confirmed one stays";
-  }
-}
-
 TEST_F(Lifecycle, DetectionOnAnotherVisitRaisesTheLimitOfExistence) {
   Track o = makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.004);
   EXPECT_EQ(existenceCeiling(o, parameters.tracks), parameters.tracks.certain);
