@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <set>
+
 namespace perdure::bus {
 namespace {
 

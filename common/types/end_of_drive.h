@@ -10,7 +10,7 @@ inline constexpr char kEndOfDrive[] = "end of drive";
 /// A reason in Health, set if the silence of inputs is the only cause of the degraded state.
 inline constexpr char kInputSilent[] = "input_silent";
 
-/// Returns whether the end of the drive is the only fault. `capture` is null if it is not heard.
+/// Returns whether the end of the drive is the only fault. `capture` is null if none was received.
 inline bool endedWith(const Health* capture, const Health& health) {
   return capture != nullptr && capture->message == kEndOfDrive &&
          health.state == HealthState::kDegraded && health.reasons.contains(kInputSilent);

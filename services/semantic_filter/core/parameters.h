@@ -21,9 +21,7 @@ struct BoxParameters {
   std::int64_t iterations = 3;    ///< of the iterated EKF
   double prior_sides = 200.0;     ///< weight of the assumed noise, in sides of boxes
   double prior_azimuths = 10.0;   ///< weight of the assumed noise, in azimuths
-  /// Share of a side's variance that is detector bias. Three detectors on KITTI tracking: .3 to .5
-  /// of it is left after a change of the view by the lengths below.
-  double bias_share = 0.4;
+  double bias_share = 0.3;        ///< share of a side's variance that is detector bias
   /// View change after which the bias has fallen to 1/e.
   double bias_angle = 0.3;         ///< direction to the object, rad
   double bias_log_distance = 0.3;  ///< logarithm of the distance

@@ -106,10 +106,10 @@ TEST(OdometryReset, IdsAreBackAfterAFewMetres) {
     const auto before = idsOf(*pair);
     beginAnew(*pair);
     const double distance_m = metresUntilBack(*pair, before, 110.0, 4);
-    EXPECT_LT(distance_m, 25.0) << seed;
+    EXPECT_LT(distance_m, 20.0) << seed;
     sum_m += distance_m;
   }
-  EXPECT_LT(sum_m / static_cast<double>(seeds.size()), 15.0);
+  EXPECT_LT(sum_m / static_cast<double>(seeds.size()), 14.0);
 }
 
 TEST(OdometryReset, ArchivedObjectsComeBackIntoTheNewFrameOfReference) {

@@ -55,13 +55,6 @@ SwapNotice notice(SwapStep step, InstanceId who, InstanceId about) {
   return n;
 }
 
-/// The boxes of this world have independent errors.
-Config independentBoxes() {
-  Config config;
-  config.filter.box.bias_share = 0.3;
-  return config;
-}
-
 struct Watch : Harness {
   std::uint64_t next = 0;
 
@@ -72,7 +65,7 @@ struct Watch : Harness {
     }
   }
   /// Twenty frames from the old process, then the new one takes over.
-  explicit Watch(bool told = true) : Harness(independentBoxes()) {
+  explicit Watch(bool told = true) {
     frames(kSwapAt, kParked, kOldModel);
     if (told) node.onSwap(notice(SwapStep::kTookOver, kNewModel, kOldModel));
   }
