@@ -49,9 +49,8 @@ using AreSame = std::function<bool(std::size_t, std::size_t)>;
 /// gap before it (lines in another order) or repeat samples before it. A counter is recognised by
 /// its length. More than eight clocks that were set are none: batches overlap.
 ///
-/// Of the other stamps out of order, those are strays that are few and far outside their
-/// neighbours' stamps, and do not fill a gap elsewhere. Few means a fiftieth or three, if at most a
-/// fifth is out of order. With more of them the list is unsorted, and no stamp is left out.
+/// Other stamps out of order are strays if they are few, far outside their neighbours' stamps, and
+/// do not fill a gap elsewhere. Few means a fiftieth or three, if at most a fifth is out of order. With more of them the list is unsorted, and no stamp is left out.
 /// Up to three stamps at either end are strays as well, if they are separated by a pause longer
 /// than ten seconds and a thousand usual intervals.
 StampOrder orderOf(
