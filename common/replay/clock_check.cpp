@@ -249,7 +249,9 @@ DataFinding findingOf(const ClockChange& first, std::size_t count, const std::st
           fmt::format("{}: the stamps of {} {} by {}{}: cut the drive there into two", places,
                       sensor, back ? "go back" : "jump ahead", step,
                       isRestart(first) ? ", to their start: the device was restarted"
-                                       : ", those of the other sensors not so: its clock was set")};
+
+                                       : ", those of the other sensors show no such step (they "
+                                         "come too seldom, or have another clock)")};
 }
 
 /// A pause of one sensor that ends later than the other one by as much is none.

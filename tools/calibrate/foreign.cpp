@@ -145,8 +145,9 @@ ForeignRig ofOrbSlam(const SensorFile& file) {
   for (const char* key : {"IMU.T_b_c1", "Tbc"}) {
     if (const auto place = file.transform(key)) put(rig.sections["cam0"], "T_imu_cam", *place);
   }
-  const auto second = orbSecond(file);
-  if (file.has("Camera2.fx") && second) {
+  if (file.has("Camera2.fx")) {
+    const auto second = orbSecond(file);
+    if (!second) file.wrong("Stereo.T_c1_c2", "is missing, but Camera2 is given");
     rig.sections["cam1"] = orbCamera(file, "Camera2.");
     put(rig.sections["cam1"], "T_cn_cnm1", second->inverse());
   }
@@ -191,12 +192,14 @@ void basaltLens(const SensorFile& intrinsics, YAML::Node camera) {
 
 RigidTransform basaltPose(const SensorFile& pose) {
   const auto p = valuesOf(pose, {"px", "py", "pz"}), q = valuesOf(pose, {"qx", "qy", "qz", "qw"});
-  return {Eigen::Quaterniond(q[3], q[0], q[1], q[2]).normalized(), {p[0], p[1], p[2]}};
+  const Eigen::Quaterniond rotation(q[3], q[0], q[1], q[2]);
+  if (std::abs(rotation.norm() - 1.0) > 1e-2) pose.wrong("qx, qy, qz, qw", "is no unit quaternion");
+  return {rotation.normalized(), {p[0], p[1], p[2]}};
 }
 
 /// The largest of a noise's numbers, one for each axis; older files have one for all.
 double basaltNoise(const SensorFile& file, const char* key) {
-  if (file.root()[key].IsScalar()) return file.number(key, 0.0);
+  if (file.has(key) && file.root()[key].IsScalar()) return file.number(key, 0.0);
   const auto values = file.numbers(key, 3);
   return *std::max_element(values.begin(), values.end());
 }
@@ -216,6 +219,9 @@ void noteScale(const SensorFile& file, const char* key, const std::string& path,
 
 ForeignRig ofBasalt(const SensorFile& root, const fs::path& path) {
   const SensorFile file = root.section("value0");
+  for (const char* key : {"T_imu_cam", "intrinsics", "resolution"}) {
+    if (!file.has(key) || !file.root()[key].IsSequence()) file.wrong(key, "is missing or no list");
+  }
   const YAML::Node places = file.root()["T_imu_cam"], lenses = file.root()["intrinsics"];
   const YAML::Node sizes = file.root()["resolution"];
   ForeignRig rig;
@@ -223,6 +229,8 @@ ForeignRig ofBasalt(const SensorFile& root, const fs::path& path) {
     const std::string name = fmt::format("cam{}", i);
     if (i >= places.size()) file.wrong("T_imu_cam", "is missing or has too few poses");
     if (i >= sizes.size()) file.wrong("resolution", "is missing or has too few sizes");
+    if (!lenses[i].IsMap()) file.wrong("intrinsics", "is no list of objects");
+    if (!places[i].IsMap()) file.wrong("T_imu_cam", "is no list of objects");
     YAML::Node camera;
     camera["resolution"] = sizes[i];
     basaltLens(SensorFile(path.string() + ": " + name, lenses[i]), camera);

@@ -92,11 +92,11 @@ void Pipeline::checkDetectionFile() const {
   }
   if (detection_file_->firstFrame() <= last->index && detection_file_->lastFrame() >= first->index)
     return;
-  refuse(
-      fmt::format("{}: none of its {} rows is of a frame of this drive ({} … {}), they are of {} … "
-                  "{}; its first column must count the drive's frames from 0",
-                  options_.detections, detection_file_->rows(), first->index, last->index,
-                  detection_file_->firstFrame(), detection_file_->lastFrame()));
+  refuse(fmt::format(
+      "{}: none of its {} rows is of a frame of this drive ({} … {}), they are of {} … "
+      "{}; its first column (COCO: `file_name`, else `id`) must count the drive's frames from 0",
+      options_.detections, detection_file_->rows(), first->index, last->index,
+      detection_file_->firstFrame(), detection_file_->lastFrame()));
 }
 
 void Pipeline::refuseUnwritten() const {

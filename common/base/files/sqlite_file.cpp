@@ -76,9 +76,17 @@ std::string whyNot(const fs::path& file, int code, const char* of_sqlite) {
   return of_sqlite;
 }
 
+/// SQLite keeps `-wal` beside the file that a link leads to.
+fs::path targetOf(const fs::path& link) {
+  std::error_code missing;
+  const fs::path target = fs::canonical(link, missing);
+  return missing ? link : target;
+}
+
 }  // namespace
 
-OpenedSqlite openSqliteToRead(const fs::path& file) {
+OpenedSqlite openSqliteToRead(const fs::path& link) {
+  const fs::path file = targetOf(link);
   OpenedSqlite opened;
   opened.code = openAs(addressOf(file, ""), opened.connection);
   const int kind = opened.code & 0xff;
@@ -90,7 +98,8 @@ OpenedSqlite openSqliteToRead(const fs::path& file) {
   return opened;
 }
 
-bool lacksWriteAheadLog(const fs::path& file) {
+bool lacksWriteAheadLog(const fs::path& link) {
+  const fs::path file = targetOf(link);
   constexpr std::size_t kWriteVersion = 18;  // in the header; 2: WAL mode
   std::array<char, kWriteVersion + 1> head{};
   std::ifstream(file, std::ios::binary).read(head.data(), head.size());

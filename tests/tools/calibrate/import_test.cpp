@@ -211,6 +211,17 @@ TEST_F(RigImport, BasaltsJsonIsRead) {
       ElementsAre(HasSubstr("calib_accel_bias holds scales and misalignments of up to 1.2 %")));
 }
 
+TEST_F(RigImport, WhatBasaltsJsonLacksIsNamed) {
+  const auto without = [&](const std::string& what, const std::string& put) {
+    std::string text = basalt();
+    text.replace(text.find(what), what.size(), put);
+    return errorOf({file("calibration.json", text)});
+  };
+  EXPECT_THAT(without("\"T_imu_cam\"", "\"other\""), HasSubstr("T_imu_cam is missing"));
+  EXPECT_THAT(without("\"intrinsics\": [", "\"other\": ["), HasSubstr("intrinsics is missing"));
+  EXPECT_THAT(without("\"gyro_noise_std\"", "\"other\""), HasSubstr("gyro_noise_std"));
+}
+
 TEST_F(RigImport, KalibrsCamerasAreSeenFromAnotherImuThanTheReference) {
   const std::string other =
       "T_i_b:\n- [1, 0, 0, 0.5]\n- [0, 1, 0, 0]\n- [0, 0, 1, 0]\n"

@@ -51,6 +51,12 @@ const char* kMotion =
 
 Result<FirstGuess> guessOf(const TrackWindows& tracks, const replay::Recording& recording) {
   constexpr double kLeast_px = 0.4, kApart = 0.5;
+  const bool dead = std::all_of(recording.imu.begin(), recording.imu.end(),
+                                [](const ImuSample& sample) { return sample.gyro.isZero(); });
+  if (dead) {
+    return fail("motion_gyro_dead",
+                "all angular rates of the gyroscope are 0; see its driver or its columns");
+  }
   const auto guess =
       guessFromTurns(tracks.windows, recording.imu, recording.calibration.cameras.front());
   if (guess.pairs == 0 || guess.turning_px < kLeast_px) {

@@ -48,7 +48,8 @@ class CocoReader {
       if (name.is_string()) names_[memberOf(category, "id").dump()] = name.get<std::string>();
     }
     const Json& images = memberOf(json, "images");
-    if (images.is_array() && !images.empty()) result_.frames.emplace();
+    if (!images.is_array() && !images.is_null()) refuse("has `images` that are no list");
+    if (!images.empty()) result_.frames.emplace();
     for (const Json& image : images) {
       const Json& name = memberOf(image, "file_name");
       const auto number =
@@ -81,8 +82,14 @@ class CocoReader {
         std::all_of(sides.begin(), sides.end(), [](const Json& side) { return side.is_number(); });
     if (!whole) refuse("has " + name + " without `bbox`: [x, y, width, height]");
     const auto v = sides.get<std::vector<double>>();
+    if (!(v[2] > 0.0 && v[3] > 0.0)) {
+      refuse("has " + name + " with a `bbox` whose width or height is not above 0");
+    }
     box.box = {v[0], v[1], v[0] + v[2], v[1] + v[3]};
     const Json& score = memberOf(annotation, "score");
+    if (!score.is_number() && !score.is_null()) {
+      refuse("has " + name + " with `score`: " + score.dump() + "; it is a number from 0 to 1");
+    }
     if (score.is_number()) box.score = score.get<double>();
     result_.boxes.push_back(std::move(box));
   }

@@ -188,7 +188,11 @@ TEST(DetectionFile, WhatIsWrongInCocoIsNamed) {
   EXPECT_THAT(results(R"({"image_id": 0, "category_id": 3, "segmentation": []})"),
               HasSubstr("annotation 0 without `bbox`"));
   EXPECT_THAT(results(R"({"image_id": 0, "category_id": 3, "bbox": [1, 2, -3, 4]})"),
-              HasSubstr("annotation 0: x1 < x2"));
+              HasSubstr("annotation 0 with a `bbox` whose width"));
+  EXPECT_THAT(results(R"({"image_id": 0, "category_id": 3, "bbox": [1, 2, 3, 4], "score": "1"})"),
+              HasSubstr("annotation 0 with `score`: \"1\""));
+  EXPECT_THAT(errorOfCsv(R"({"images": {"0": {"id": 0}}, "annotations": []})"),
+              HasSubstr("`images` that are no list"));
   EXPECT_THAT(results(R"({"image_id": 0, "category_id": 3, "bbox": [1, 2, 3, 4]},)"
                       R"({"image_id": 0, "category_id": 1, "bbox": [1, 2, 3, 4]})"),
               HasSubstr("--class names one category only"));

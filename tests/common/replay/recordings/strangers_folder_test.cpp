@@ -74,10 +74,14 @@ TEST(StrangersFolder, ARecordingWithoutItsLogIsNamed) {
   const fs::path whole = freshFolder("ros_whole") / "killed.db3";
   fs::copy_file(killed, whole);
   fs::copy_file(killed.string() + "-wal", whole.string() + "-wal");
+  const fs::path link = freshFolder("ros_link") / "link.db3";
+  fs::create_symlink(whole, link);
+  EXPECT_FALSE(lacksWriteAheadLog(link)) << "it is beside the file itself";
   fs::permissions(whole.parent_path(), fs::perms(0555));
   {
     const tests::AsNobody nobody;
     EXPECT_THAT(errorOf(twin, whole), HasSubstr("copy both files"));
+    EXPECT_THAT(errorOf(twin, link), HasSubstr("copy both files")) << "not read without its log";
   }
   fs::permissions(whole.parent_path(), fs::perms(0755));
   EXPECT_EQ(framesOf(twin, whole), 5u);
