@@ -235,7 +235,7 @@ DataFinding findingOf(const ClockChange& first, std::size_t count, const std::st
   if (first.kind == Kind::kPause) {
     return {Grade::kWarning, "clock_paused",
             fmt::format("{}: nothing from {} for {}: the recording paused, or its clock was set "
-                        "ahead; what comes after is a new start",
+                        "ahead; vio begins again behind it",
                         places, sensor, step)};
   }
   if (first.common) {
@@ -254,23 +254,50 @@ DataFinding findingOf(const ClockChange& first, std::size_t count, const std::st
                                          "come too seldom, or have another clock)")};
 }
 
-/// A pause of one sensor that ends later than the other one by as much is none.
-void addSetAhead(const Recording& recording, const ClockChange& pause, DataFinding& finding) {
-  if (recording.imu.empty() || recording.frames.empty()) return;
+Duration stepOf(const ClockChange& change) { return between(change.after, change.before); }
+
+bool isShort(const ClockChange& pause) {
+  return stepOf(pause) <= std::max<Duration>(std::chrono::seconds(1), multipleOf(20, pause.usual));
+}
+
+/// Whether the sensor ends later than the other one by the length of its pause: its clock was set.
+bool isSetAhead(const Recording& recording, const ClockChange& pause) {
+  if (recording.imu.empty() || recording.frames.empty()) return false;
   const auto ofBoth = [](const auto& a, const auto& b) {
     return std::pair(between(a.front().time, b.front().time),
                      between(a.back().time, b.back().time));
   };
   const auto [starts, ends] = pause.sensor == "imu" ? ofBoth(recording.imu, recording.frames)
                                                     : ofBoth(recording.frames, recording.imu);
-  const Duration half = between(pause.after, pause.before) / 2;
-  if (std::chrono::abs(starts) > half || ends < half) return;
-  finding.grade = DataFinding::Grade::kFatal, finding.code = "clock_set_alone";
+  const Duration half = stepOf(pause) / 2;
+  if (std::chrono::abs(starts) > half || ends < half) return false;
+  return !isShort(pause) ||
+         std::chrono::abs(ends - starts - (stepOf(pause) - pause.usual)) < half / 2;
+}
+
+/// Lost samples make short pauses. Others are those of a clock that was set, or of all sensors.
+void dropShortPauses(Recording& recording) {
+  constexpr Duration kAlike = std::chrono::milliseconds(100);
+  const std::vector<ClockChange> all = recording.clock_changes;
+  std::erase_if(recording.clock_changes, [&](const ClockChange& pause) {
+    if (pause.kind != Kind::kPause || !isShort(pause) || isSetAhead(recording, pause)) return false;
+    return std::none_of(all.begin(), all.end(), [&](const ClockChange& other) {
+      return other.kind == Kind::kPause && (other.sensor == "imu") != (pause.sensor == "imu") &&
+             std::chrono::abs(between(other.before, pause.before)) < kAlike &&
+             std::chrono::abs(stepOf(other) - stepOf(pause)) < kAlike;
+    });
+  });
+}
+
+void addSetAhead(const Recording& recording, const ClockChange& pause, DataFinding& finding) {
+  if (!isSetAhead(recording, pause)) return;
+  finding.grade = isShort(pause) ? DataFinding::Grade::kWarning : DataFinding::Grade::kFatal;
+  finding.code = "clock_set_alone";
   finding.text = fmt::format(
       "{}: the stamps of {} jump ahead by {}, and end so much later than "
       "those of the other sensor: its clock was set; subtract it from there "
       "on, or cut the drive",
-      pause.place, nameOfSensor(pause.sensor), secondsText(2 * half));
+      pause.place, nameOfSensor(pause.sensor), secondsText(stepOf(pause)));
 }
 
 }  // namespace
@@ -278,6 +305,7 @@ void addSetAhead(const Recording& recording, const ClockChange& pause, DataFindi
 void settleClocks(Recording& recording) {
   settleSet(recording);
   settleCounters(recording);
+  dropShortPauses(recording);
 }
 
 void checkClockChanges(const Recording& recording, const DataUse& use, DataFindings& findings) {

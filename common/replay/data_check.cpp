@@ -89,6 +89,25 @@ void checkUpright(const Recording& recording, DataFindings& findings) {
                    kUpsideDown, camera.name)});
 }
 
+/// Lines that were left out are otherwise only counted.
+void checkLost(const Recording& recording, const DataUse& use, DataFindings& findings) {
+  constexpr std::uint64_t kFew = 20;  // one in so many
+  const std::uint64_t images = recording.frames.size(), samples = recording.imu.size();
+  for (const auto& [kind, kept] : {std::pair("imu", use.imu ? samples : 0), {"frame", images}}) {
+    std::uint64_t lost = 0;
+    for (const char* reason : {"_malformed", "_stray"}) {
+      lost += recording.reasons.of(std::string(kind) + reason);
+    }
+    if (kept == 0 || kFew * lost <= kept) continue;
+    findings.push_back({Grade::kWarning, "lines_lost",
+                        fmt::format("{} of {} {} were left out, because their lines cannot be read "
+                                    "or their stamps are far from their neighbours'; the notes say "
+                                    "where; record or copy them again",
+                                    lost, kept + lost,
+                                    std::string(kind) == "imu" ? "inertial samples" : "images")});
+  }
+}
+
 }  // namespace
 
 DataFindings checkImuUnits(const std::vector<ImuSample>& samples) {
@@ -123,6 +142,7 @@ DataFindings checkImuUnits(const std::vector<ImuSample>& samples) {
 
 DataFindings checkData(const Recording& recording, const DataUse& use) {
   DataFindings findings = checkClocks(recording, use);
+  checkLost(recording, use, findings);
   const auto isFatal = [](const auto& one) { return one.grade == Grade::kFatal; };
   if (use.imu && std::none_of(findings.begin(), findings.end(), isFatal)) {
     const DataFindings units = checkImuUnits(recording.imu);

@@ -121,6 +121,15 @@ Recording readRecording(const DatasetOptions& options) {
                          "(.mcap, .db3, .bag)");
 }
 
+void numberFrames(Recording& recording) {
+  for (const auto& frame : recording.frames) {
+    if (frame.camera != 0) continue;
+    const std::string stem = std::filesystem::path(frame.path).stem().string();
+    recording.numbers.emplace(stem.empty() ? std::to_string(toNanoseconds(frame.time)) : stem,
+                              frame.index);
+  }
+}
+
 /// A part that may not be read looks as if it were missing, so permissions are checked after a
 /// failure.
 Recording readReadable(const DatasetOptions& options) {
@@ -145,6 +154,7 @@ std::unique_ptr<Dataset> Dataset::open(const DatasetOptions& options) {
     const Calibration rig = readRig(options.rig, &recording.notes);
     applyRig(rig, options.rig.string(), recording.calibration);
   }
+  numberFrames(recording);
   if (options.every > 1) keepEach(options.every, recording);
   return std::make_unique<Dataset>(options, std::move(recording));
 }

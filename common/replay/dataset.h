@@ -62,6 +62,9 @@ struct Recording {
   Calibration calibration;
   std::size_t frame_count = 0;
   std::vector<FrameFile> frames;         ///< sorted by time, cameras in order
+  /// Numbers of cam0's frames, also of those that --every leaves out, by the names of their images
+  /// without ending; else by their stamps.
+  std::map<std::string, std::uint64_t> numbers = {};
   std::vector<TimePoint> unpaired = {};  ///< frames of cam1 without a frame of cam0 nearby
   std::vector<ImuSample> imu;            ///< sorted by time
   std::vector<SpeedSample> speed;

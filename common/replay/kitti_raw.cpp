@@ -204,6 +204,8 @@ Recording readKittiRaw(const DatasetOptions& options) {
   const KittiCalibration calibration = readRawCalibration(calibrationFolder(drive));
   Recording recording;
   recording.kind = DatasetKind::kKittiRaw;
+  const auto records = readOxts(drive / "oxts", recording);
+  if (records.empty()) throwMissing(drive / "oxts" / "data", "any OXTS record", "fetch it again");
   const auto stamps = readStamps(drive / "image_02" / "timestamps.txt");
   recording.frame_count = stamps.size();
   addCamera(drive / "image_02", stamps, calibration.camera("cam0"), recording);
@@ -211,8 +213,6 @@ Recording readKittiRaw(const DatasetOptions& options) {
     addCamera(drive / "image_03", stamps, calibration.camera("cam1"), recording);
   }
   sortFrames(recording);
-  const auto records = readOxts(drive / "oxts", recording);
-  if (records.empty()) throwMissing(drive / "oxts" / "data", "any OXTS record", "fetch it again");
   addOxts(records, recording);
   recording.truth = truthOf(records);
   return recording;

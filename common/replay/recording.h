@@ -50,13 +50,14 @@ bool orderByTime(std::vector<Item>& items, const std::string& kind, const std::s
                  const std::string& all, Recording& recording, const auto& placeOf) {
   std::vector<TimePoint> stamps;
   for (const Item& item : items) stamps.push_back(item.time);
-  StampOrder order = orderOf(stamps, [&](std::size_t a, std::size_t b) {
+  const auto isSame = [&](std::size_t a, std::size_t b) {
     if constexpr (requires { items[a].isSame(items[b]); }) return items[a].isSame(items[b]);
     if constexpr (std::same_as<Item, ImuSample>) {
       return items[a].gyro == items[b].gyro && items[a].accel == items[b].accel;
     }
     return true;
-  });
+  };
+  StampOrder order = orderOf(stamps, isSame, recording.clock_changes);
   noteOrder(order, kind, where, all, placeOf, recording);
   std::vector<Item> ordered;
   for (const std::size_t i : order.kept) {

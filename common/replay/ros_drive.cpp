@@ -119,9 +119,9 @@ class RosDriveReader {
     imu_ = chosen.imu;
     readMessages();
     requireImages();
+    orderImu(recording_, imu_);
     for (std::size_t i = 0; i < cameras_.size(); ++i) addFrames(i);
     sortFrames(recording_);
-    orderImu(recording_, imu_);
     for (std::size_t i = 0; i < cameras_.size(); ++i)
       recording_.calibration.cameras.push_back(calibrationOf(i));
     if (!recording_.imu.empty()) recording_.calibration.imu = imuCalibration();

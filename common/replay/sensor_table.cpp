@@ -18,7 +18,9 @@ SensorTable::SensorTable(const std::filesystem::path& file, const std::string& k
                          Recording& recording, const Judge& judge)
     : text_(readLines(file, "EuRoC keeps data.csv in each sensor's folder")) {
   std::string first_wrong;
-  std::size_t wrong = 0;
+  constexpr std::size_t kFewNegative = 3;
+  std::size_t wrong = 0, negative = 0;
+  const TextLine* first_negative = nullptr;
   for (const TextLine& line : text_) {
     if (line.text.starts_with('#') || (lines_ == 0 && head_.empty() && !beginsNumber(line.text))) {
       takeHead(line.text);
@@ -27,12 +29,23 @@ SensorTable::SensorTable(const std::filesystem::path& file, const std::string& k
     TableRow row{lines_++, line.number, {}, fieldsOf(line.text)};
     const auto time = parseNanoseconds(row.fields[0]);
     const std::string why = time ? judge(row.fields) : whyNoStamp(row.fields[0]);
+    if (!time && parseNumber(row.fields[0]).value_or(0.0) < 0.0) {
+      ++negative;
+      if (!first_negative) first_negative = &line;
+    }
     if (!why.empty()) {
       if (wrong++ == 0) first_wrong = fmt::format("{}:{}: {}", file.c_str(), line.number, why);
       continue;
     }
     row.time = *time;
     rows_.push_back(std::move(row));
+  }
+  if (first_negative && negative > kFewNegative) {
+    throw StartupError(ExitCode::kData,
+                       "{}:{}: {} of {} stamps are negative, the first is `{}`; add the same number "
+                       "to the stamps of all sensors",
+                       file.c_str(), first_negative->number, negative, lines_,
+                       fieldsOf(first_negative->text)[0]);
   }
   if (2 * rows_.size() < lines_) {
     if (wrong == 1) throw StartupError(ExitCode::kData, first_wrong);

@@ -160,6 +160,12 @@ ForeignRig ofOrbSlam(const SensorFile& file) {
     imu["accelerometer_random_walk"] = file.number("IMU.AccWalk", 0.0);
     rig.sections["imu0"] = imu;
   }
+  file.noteUnknownKeys(
+      rig.without_effect,
+      {"File.", "ORBextractor.", "Viewer.", "System.", "RGBD.", "LEFT.", "RIGHT.", "loopClosing",
+       "DepthMapFactor", "ThDepth", "Stereo.ThDepth", "Stereo.b", "Camera.bf", "Camera.RGB",
+       "Camera.new", "Camera.lapping", "Camera2.lapping", "Camera1.overlapping",
+       "Camera2.overlapping", "IMU.InsertKFsWhenLost", "IMU.fastInit"});
   return rig;
 }
 

@@ -66,9 +66,9 @@ void importTo(const RigImportRequest& request) {
 void addCalibrateImport(CLI::App& calibrate) {
   const auto request = std::make_shared<RigImportRequest>();
   CLI::App* command =
-      calibrate.add_subcommand("import", "A rig from what Kalibr, ROS or EuRoC have calibrated");
+      calibrate.add_subcommand("import", "A rig from a calibration of Kalibr, ROS, EuRoC, VINS, ORB-SLAM3 or Basalt");
   command->footer(kHelp);
-  command->add_option("files", request->files, "camchain, imu, camera_info or sensor yaml")
+  command->add_option("files", request->files, "files of the calibration; see below")
       ->required()
       ->type_name("FILE");
   command->add_option("--out", request->out, "the rig file")->required()->type_name("RIG.yaml");

@@ -76,7 +76,7 @@ CameraCalibration reduced(CameraCalibration camera, int factor) {
 
 std::vector<Turn> turnsOfRun(const Frames& frames, const CameraCalibration& calibration,
                              const Run& run) {
-  constexpr std::uint32_t kEnough = 800;  // px of width
+  constexpr std::uint32_t kEnough = 600;  // px of width
   int factor = 1;
   while (factor < 8 && calibration.width / static_cast<std::uint32_t>(2 * factor) >= kEnough) {
     factor *= 2;

@@ -65,7 +65,9 @@ MapReply ask(const Request& request) {
   if (reply.truncated) {
     std::cerr
         << "perdure map: there are more than these " << reply.objects.size()
-        << " objects; raise --limit and map_store's query.limit, or read the file with --db\n";
+        << " objects; raise --limit"
+        << (request.db.empty() ? " and map_store's query.limit, or read the file with --db" : "")
+        << "\n";
   }
   return reply;
 }

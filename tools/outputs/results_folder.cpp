@@ -31,7 +31,8 @@ void removeAll(const fs::path& path) {
 
 }  // namespace
 
-ResultsFolder::ResultsFolder(fs::path out) : out_(std::move(out)), written_(out_) {
+ResultsFolder::ResultsFolder(fs::path out)
+    : out_(std::move(out)), written_(out_), is_new_(!fs::exists(out_)) {
   removeAll(out_ / "unfinished");
   if (holdsARun(out_)) written_ = out_ / "unfinished";
 }
@@ -39,6 +40,7 @@ ResultsFolder::ResultsFolder(fs::path out) : out_(std::move(out)), written_(out_
 ResultsFolder::~ResultsFolder() {
   std::error_code none;
   if (written_ != out_) fs::remove_all(written_, none);
+  if (is_new_) fs::remove(out_, none);  // does nothing if it is not empty
 }
 
 void ResultsFolder::keep() {

@@ -7,7 +7,7 @@ namespace perdure::tools {
 
 /// A folder without a run is written directly. Otherwise files are written to a subfolder
 /// `unfinished`, and replace the earlier ones when the run has ended. If the run fails, the
-/// subfolder is removed.
+/// subfolder is removed, and so is a new folder that stayed empty.
 class ResultsFolder {
  public:
   /// Throws StartupError(kUnavailable) if the remains of a killed run cannot be removed.
@@ -24,6 +24,7 @@ class ResultsFolder {
 
  private:
   std::filesystem::path out_, written_;
+  bool is_new_;
 };
 
 }  // namespace perdure::tools

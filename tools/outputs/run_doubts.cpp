@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
+#include <iterator>
+#include <utility>
 
 namespace perdure::tools {
 namespace {
@@ -60,10 +63,18 @@ Doubts doubtsOfRun(const RunFacts& facts) {
                       "do they belong to these frames, are they of known classes, and does the "
                       "camera move past what they show?"});
   }
+  constexpr std::pair<const char*, const char*> kFindings[] = {
+      {"clock_wrapped", "stamps were changed"},
+      {"clock_set", "stamps were changed"},
+      {"clock_", "stamps pause or jump"},
+      {"lines_lost", "lines of the recording were left out"},
+      {"boxes_beyond", "boxes of other frames were left out"},
+      {"poses_", "the poses contradict the drive"}};
   for (const auto& finding : facts.findings) {
-    if (finding.code != "clock_wrapped" && finding.code != "clock_set") continue;
-    doubts.push_back({"stamps were changed", finding.text});
-    break;
+    const auto kind = std::find_if(std::begin(kFindings), std::end(kFindings), [&](const auto& one) {
+      return finding.code.starts_with(one.first);
+    });
+    if (kind != std::end(kFindings)) doubts.push_back({kind->second, finding.text});
   }
   return doubts;
 }

@@ -1,8 +1,10 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <filesystem>
@@ -60,6 +62,20 @@ int run(CLI::App& app, int argc, char** argv) {
   return static_cast<int>(ExitCode::kOk);
 }
 
+/// A comparison with a bound accepts "nan".
+void refuseInfinite(CLI::App& app) {
+  const CLI::Validator finite(
+      [](std::string& text) {
+        const double value = std::strtod(text.c_str(), nullptr);
+        return std::isfinite(value) ? std::string() : text + " is no finite number";
+      },
+      "", "finite");
+  for (CLI::Option* option : app.get_options()) {
+    if (option->get_type_name().starts_with("FLOAT")) option->check(finite);
+  }
+  for (CLI::App* nested : app.get_subcommands({})) refuseInfinite(*nested);
+}
+
 }  // namespace
 
 int runCommand(const char* name, void (*set_up)(CLI::App&), int argc, char** argv) {
@@ -68,6 +84,7 @@ int runCommand(const char* name, void (*set_up)(CLI::App&), int argc, char** arg
   std::signal(SIGXFSZ, SIG_IGN);  // a limit of the file size is reported like a full disk
   CLI::App app(entry->summary, std::string("perdure ") + name);
   set_up(app);
+  refuseInfinite(app);
   return checkedOutput(run(app, argc, argv));
 }
 

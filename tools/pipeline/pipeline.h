@@ -99,7 +99,7 @@ class Pipeline {
   void askForGraph();
   // These are in pipeline_checks.cpp.
   void checkData();
-  void checkDetectionFile() const;
+  void checkDetectionFile();
   void refuseUnwritten() const;
   // These are in pipeline_recorded.cpp.
   void checkRecorded();

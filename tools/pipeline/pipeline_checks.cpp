@@ -70,33 +70,60 @@ void Pipeline::checkData() {
   }
   replay::refuseFatal(findings_, options_.data);
   if (!pose_file_) return;
-  auto of_poses = checkPoses(dataset_->recording(), *pose_file_, {.images = data.decode});
-  if (options_.odometry_of == "body") {
-    std::erase_if(of_poses, [](const auto& one) { return one.code == "poses_of_camera"; });
+  const auto judge = [&](const replay::PoseFile& file) {
+    return checkPoses(dataset_->recording(), file, {.images = data.decode});
+  };
+  auto of_poses = judge(*pose_file_);
+  for (auto& finding : of_poses) {  // the user knows it better
+    if (options_.odometry_of == "body" && finding.code == "poses_of_camera")
+      finding.grade = replay::DataFinding::Grade::kWarning;
+  }
+  if (options_.odometry_of == "camera" && !of_poses.empty() &&
+      judge(replay::PoseFile::read(options_.odometry)).empty()) {
+    refuse(options_.odometry +
+           ": the poses agree with the drive as those of the body and contradict it as those of "
+           "the camera; leave --odometry-of camera out");
   }
   replay::refuseFatal(of_poses, options_.odometry);
   findings_.insert(findings_.end(), of_poses.begin(), of_poses.end());
 }
 
 /// Rows of other frames would be ignored without a message.
-void Pipeline::checkDetectionFile() const {
-  const auto& frames = dataset_->recording().frames;
-  if (!detection_file_ || frames.empty() || detection_file_->rows() == 0) return;
-  const auto [first, last] = std::minmax_element(
-      frames.begin(), frames.end(), [](const auto& a, const auto& b) { return a.index < b.index; });
+void Pipeline::checkDetectionFile() {
+  const auto& numbers = dataset_->recording().numbers;
+  if (numbers.empty() || detection_file_->rows() == 0) return;
+  const auto [first_frame, last_frame] =
+      std::minmax_element(numbers.begin(), numbers.end(),
+                          [](const auto& a, const auto& b) { return a.second < b.second; });
+  const std::uint64_t first = first_frame->second, last = last_frame->second;
   const CameraCalibration& camera = dataset_->calibration().cameras.front();
   if (detection_file_->hasSizes(camera.width, camera.height)) {
     refuse(options_.detections +
            ": x2 and y2 are the same in nearly all rows while x1 moves, so they are a width and a "
            "height; write x1 + width and y1 + height in their place");
   }
-  if (detection_file_->firstFrame() <= last->index && detection_file_->lastFrame() >= first->index)
-    return;
-  refuse(fmt::format(
-      "{}: none of its {} rows is of a frame of this drive ({} … {}), they are of {} … "
-      "{}; its first column (COCO: `file_name`, else `id`) must count the drive's frames from 0",
-      options_.detections, detection_file_->rows(), first->index, last->index,
-      detection_file_->firstFrame(), detection_file_->lastFrame()));
+  if (detection_file_->firstFrame() > last || detection_file_->lastFrame() < first) {
+    refuse(fmt::format(
+        "{}: none of its {} rows is of a frame of this drive ({} … {}), they are of {} … "
+        "{}; its first column (COCO: `file_name`, else `id`) must count the drive's frames from 0",
+        options_.detections, detection_file_->rows(), first, last, detection_file_->firstFrame(),
+        detection_file_->lastFrame()));
+  }
+  if (first == 0 && detection_file_->firstFrame() == 1 && detection_file_->lastFrame() == last + 1) {
+    refuse(fmt::format("{}: its frames are 1 … {}, those of the drive 0 … {}: they count from 1; "
+                       "subtract 1 from each",
+                       options_.detections, last + 1, last));
+  }
+  const auto warn = [&](const char* code, const std::string& text) {
+    findings_.push_back(
+        {replay::DataFinding::Grade::kWarning, code, options_.detections + ": " + text});
+  };
+  if (!detection_file_->note().empty()) warn("boxes_from_one", detection_file_->note());
+  if (const std::size_t beyond = detection_file_->rowsBeyond(last); beyond > 0) {
+    warn("boxes_beyond", fmt::format("{} of {} boxes are of frames that this drive ({} … {}) does "
+                                     "not have and were left out; see whether they are of it",
+                                     beyond, detection_file_->rows(), first, last));
+  }
 }
 
 void Pipeline::refuseUnwritten() const {

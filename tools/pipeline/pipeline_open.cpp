@@ -270,6 +270,7 @@ void Pipeline::openDetections(const PipelineOptions& options) {
     file.file = options.detections;
     file.class_name = options.class_name;
     file.box_origin = options.box_origin;
+    file.numbers = dataset_->recording().numbers;
     if (options.outline_boxes) file.boxes = BoxExtent::kOutline;
     if (options.cuboid_boxes) file.boxes = BoxExtent::kCuboid;
     detection_file_ = replay::DetectionFile::read(file, aliases);

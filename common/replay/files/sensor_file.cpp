@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 
@@ -123,7 +124,8 @@ void SensorFile::wrong(const std::string& key, const std::string& what) const {
                      name_ + ": " + key + " " + what + "; compare it with a sensor.yaml of EuRoC");
 }
 
-void SensorFile::noteUnknownKeys(std::vector<std::string>& notes) const {
+void SensorFile::noteUnknownKeys(std::vector<std::string>& notes,
+                                 std::initializer_list<std::string_view> of_no_use) const {
   // Keys of EuRoC, Kalibr and ROS that are not used here.
   static const std::set<std::string> kOfNoUse{"sensor_type",
                                               "comment",
@@ -145,6 +147,8 @@ void SensorFile::noteUnknownKeys(std::vector<std::string>& notes) const {
   for (const auto& entry : root_) {
     const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : std::string();
     if (key.empty() || asked_.contains(key) || kOfNoUse.contains(key)) continue;
+    const auto beginsKey = [&](std::string_view prefix) { return key.starts_with(prefix); };
+    if (std::any_of(of_no_use.begin(), of_no_use.end(), beginsKey)) continue;
     notes.push_back(name_ + ": the key `" + key + "` is not known and has no effect");
   }
 }

@@ -5,6 +5,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <filesystem>
+#include <initializer_list>
 #include <optional>
 #include <set>
 #include <string>
@@ -47,7 +48,8 @@ class SensorFile {
   const YAML::Node& root() const { return root_; }
   [[noreturn]] void wrong(const std::string& key, const std::string& what) const;
   /// Adds a sentence for each key that was not read and is not known as irrelevant.
-  void noteUnknownKeys(std::vector<std::string>& notes) const;
+  void noteUnknownKeys(std::vector<std::string>& notes,
+                       std::initializer_list<std::string_view> of_no_use = {}) const;
 
  private:
   void refuseKeysThatComeTwice() const;

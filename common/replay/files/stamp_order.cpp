@@ -159,8 +159,12 @@ Duration sum(Duration a, Duration b) {
 /// Finds the changes of a clock, from stamp to stamp.
 class ClockWalk {
  public:
-  ClockWalk(const Times& stamps, const AreSame& same)
-      : stamps_(stamps), same_(same), times_(stamps), usual_(medianInterval(stamps)) {
+  ClockWalk(const Times& stamps, const AreSame& same, const std::vector<ClockChange>& known)
+      : stamps_(stamps),
+        same_(same),
+        known_(known),
+        times_(stamps),
+        usual_(medianInterval(stamps)) {
     if (usual_ <= Duration{0}) return;
     for (std::size_t i = 1; i < stamps.size(); ++i) back_ += stamps[i] < stamps[i - 1] ? 1 : 0;
     const auto [least, most] = std::minmax_element(stamps.begin(), stamps.end());
@@ -194,21 +198,51 @@ class ClockWalk {
 
   std::optional<ClockChange> changeAt(std::size_t i) const {
     const Duration step = between(stamps_[i], stamps_[i - 1]);
-    const Duration pause = std::max<Duration>(seconds(1), multipleOf(kLost, usual_));
-    if (step >= Duration{0} && step <= pause) return std::nullopt;
+    const Duration pause =
+        std::max<Duration>(std::chrono::milliseconds(250), multipleOf(3, usual_));
     ClockChange change{.index = i, .before = stamps_[i - 1], .after = stamps_[i], .usual = usual_};
+    if (const ClockChange* set = knownAt(change)) {
+      change.kind = Kind::kSet, change.added = set->added;
+      return change;
+    }
+    if (step >= Duration{0} && step <= pause) return std::nullopt;
     const std::size_t behind = std::min(kFew + 1, stamps_.size() - i);
     const bool regular = i > kFew && goesOn(i - kFew - 1, kFew + 1) && goesOn(i, kFew + 1);
     if (step < Duration{0} && goesOn(i, behind) && findCounter(change, regular)) return change;
     if (!regular || kOrdered * back_ > stamps_.size()) return std::nullopt;
     if (step > Duration{0} && step <= hours(24)) return change;  // a pause
-    if (step < Duration{0} && (isSmall(step) || isMoved(i))) return std::nullopt;
+    if (step < Duration{0} && (isSwap(i) || isMoved(i))) return std::nullopt;
     change.kind = Kind::kSet, change.added = between(TimePoint(usual_), TimePoint(step));
     return change;
   }
 
-  bool isSmall(Duration step) const {
-    return step >= -std::max<Duration>(std::chrono::milliseconds(50), multipleOf(3, usual_));
+  /// The change of another sensor at this place, if it explains the interval here.
+  const ClockChange* knownAt(const ClockChange& here) const {
+    const auto explains = [&](const ClockChange& set) {
+      if (set.kind != Kind::kSet || set.added <= Duration{0}) return false;
+      const Duration awaited = usual_ - set.added, step = between(here.after, here.before);
+      const Duration most = std::min(multipleOf(2, usual_) / 5, set.added / 2);
+      return std::chrono::abs(between(TimePoint(step), TimePoint(awaited))) < most &&
+             between(here.before, set.before) < usual_ && between(set.after, here.after) < usual_ &&
+             between(set.before, here.before) < multipleOf(3, usual_);
+    };
+    const auto set = std::find_if(known_.begin(), known_.end(), explains);
+    return set == known_.end() ? nullptr : &*set;
+  }
+
+  /// Whether a step back is short, or passes over no more stamps than usual: neighbours that
+  /// changed places. Behind a clock that was set they come a second time.
+  bool isSwap(std::size_t i) const {
+    const TimePoint before = stamps_[i - 1], after = stamps_[i];
+    const Duration back = between(before, after);
+    if (back <= std::chrono::milliseconds(50)) return true;
+    const auto passed = static_cast<std::size_t>(back / usual_) + 1;
+    std::size_t found = 0;
+    for (std::size_t k = i - std::min(i, 2 * passed); k < std::min(stamps_.size(), i + 2 * passed);
+         ++k) {
+      if (stamps_[k] >= after && stamps_[k] <= before) ++found;
+    }
+    return 2 * found < 3 * passed;
   }
 
   /// Whether `count` stamps from `first` increase without a pause.
@@ -270,6 +304,7 @@ class ClockWalk {
 
   const Times& stamps_;
   const AreSame& same_;
+  const std::vector<ClockChange>& known_;
   Times times_;
   std::vector<ClockChange> changes_;
   Duration usual_;
@@ -279,9 +314,10 @@ class ClockWalk {
 
 }  // namespace
 
-StampOrder orderOf(const std::vector<TimePoint>& given, const AreSame& same) {
+StampOrder orderOf(const std::vector<TimePoint>& given, const AreSame& same,
+                   const std::vector<ClockChange>& known) {
   StampOrder order;
-  ClockWalk walk(given, same);
+  ClockWalk walk(given, same, known);
   order.changes = std::move(walk).changes();
   order.times = std::move(walk).times();
   const Times& stamps = order.times;

@@ -47,13 +47,16 @@ using AreSame = std::function<bool(std::size_t, std::size_t)>;
 /// Increasing stamps are all kept. A step back, or one of over a day ahead, between stamps that
 /// increase regularly on both sides is a change of the clock, unless the stamps behind it fill a
 /// gap before it (lines in another order) or repeat samples before it. A counter is recognised by
-/// its length. More than eight clocks that were set are none: batches overlap.
+/// its length. More than eight clocks that were set are none: batches overlap. A clock that was set
+/// back by a few intervals is recognised by `known`, the changes that the recording's other sensors
+/// show.
 ///
 /// Other stamps out of order are strays if they are few, far outside their neighbours' stamps, and
 /// do not fill a gap elsewhere. Few means a fiftieth or three, if at most a fifth is out of order. With more of them the list is unsorted, and no stamp is left out.
 /// Up to three stamps at either end are strays as well, if they are separated by a pause longer
 /// than ten seconds and a thousand usual intervals.
 StampOrder orderOf(
-    const std::vector<TimePoint>& stamps, const AreSame& same = [](auto, auto) { return true; });
+    const std::vector<TimePoint>& stamps, const AreSame& same = [](auto, auto) { return true; },
+    const std::vector<ClockChange>& known = {});
 
 }  // namespace perdure::replay

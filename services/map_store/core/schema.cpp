@@ -184,6 +184,15 @@ Connection openStoreForReading(const std::string& path) {
                                                    "; give the file that "
                                                    "map_store writes (its store.path).");
   }
+  if (fs::is_directory(path)) {
+    throw StartupError(ExitCode::kUnavailable,
+                       path + " is a folder; give the map's file in it, such as map.sqlite");
+  }
+  std::error_code unknown;
+  if (fs::file_size(path, unknown) == 0) {
+    throw StartupError(ExitCode::kData,
+                       path + " is empty (0 bytes) and no map; copy it again, or give another");
+  }
   auto connection = Connection::open(path, Connection::Mode::kReadOnly);
   const auto identity = connection.and_then(identityOf);
   if (!identity) {

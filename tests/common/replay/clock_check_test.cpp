@@ -54,6 +54,21 @@ TEST(ClockCheck, AClockThatWasSetForAllSensorsIsReadOnAndSaid) {
   EXPECT_EQ(drive.frames.back().time - drive.imu.back().time, -milliseconds(90));
 }
 
+TEST(ClockCheck, ASmallStepBackOfAllSensorsIsSeenInTheIntervalsOfTheImages) {
+  for (const int ms : {62, 80, 100, 120, 149, 150, 180, 200, 250, 299, 300, 350}) {
+    const auto drive = readWith(setBy(-milliseconds(ms)), setBy(-milliseconds(ms)));
+    EXPECT_THAT(finding(drive, DataFinding::Grade::kWarning, "clock_set"), HasSubstr("set back"));
+    EXPECT_EQ(finding(drive, DataFinding::Grade::kFatal, "clock_set_alone"), "none") << ms;
+    ASSERT_EQ(drive.frames.size(), 200U);
+    for (std::size_t i = 1; i < 200; ++i) {
+      EXPECT_EQ(drive.frames[i].time - drive.frames[i - 1].time, milliseconds(100)) << ms;
+    }
+    EXPECT_THAT(finding(readWith(setBy(-milliseconds(ms)), kSame), DataFinding::Grade::kFatal,
+                        "clock_set_alone"),
+                HasSubstr("of the IMU go back"));
+  }
+}
+
 TEST(ClockCheck, AClockThatWasSetForOneSensorIsRefusedWithItsPlace) {
   EXPECT_THAT(finding(readWith(kSame, setBy(-milliseconds(2003))), DataFinding::Grade::kFatal,
                       "clock_set_alone"),
@@ -71,6 +86,25 @@ TEST(ClockCheck, APauseOfBothSensorsIsNoFault) {
   const auto drive = readWith(setBy(seconds(60)), setBy(seconds(60)));
   EXPECT_THAT(finding(drive, DataFinding::Grade::kWarning, "clock_paused"),
               HasSubstr("message 1001: nothing from the IMU for 60.01 s"));
+}
+
+TEST(ClockCheck, AShortJumpAheadOfOneClockIsSaidAndLostImagesAreNot) {
+  for (const int ms : {400, 700, 950}) {
+    EXPECT_THAT(finding(readWith(kSame, setBy(milliseconds(ms))), DataFinding::Grade::kWarning,
+                        "clock_set_alone"),
+                HasSubstr("images.csv, message 101: the stamps of the images jump ahead by"))
+        << ms;
+    EXPECT_THAT(finding(readWith(setBy(milliseconds(ms)), setBy(milliseconds(ms))),
+                        DataFinding::Grade::kWarning, "clock_paused"),
+                HasSubstr("nothing from the IMU"));
+    const auto lost = [&](Duration time) {  // repeated stamps are left out
+      const bool inside = time >= seconds(110) && time < seconds(110) + milliseconds(ms);
+      return inside ? seconds(110) - milliseconds(100) : time;
+    };
+    const auto drive = readWith(kSame, lost);
+    EXPECT_EQ(finding(drive, DataFinding::Grade::kWarning, "clock_set_alone"), "none");
+    EXPECT_EQ(finding(drive, DataFinding::Grade::kWarning, "clock_paused"), "none");
+  }
 }
 
 TEST(ClockCheck, ACounterThatOneSensorDoesNotHaveIsContinuedInBoth) {

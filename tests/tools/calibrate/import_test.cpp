@@ -148,6 +148,9 @@ TEST_F(RigImport, CalibrationsOfVinsAndOrbSlamAreTheNativeRig) {
                                    kMatrix + kVinsNoise + "td: 0.0031\n");
   expectSame(importRig({fusion}).rig, without_imu);
   expectSame(importRig({fusion, file("imu.yaml", kKalibrImu)}).rig, native);
+  EXPECT_THAT(importRig({file("orb.yaml", kOrbSlam)}).ignored, testing::IsEmpty());
+  EXPECT_THAT(importRig({file("orb.yaml", kOrbSlam + "Camera1.k4: .1\nIMU.Tbc: 1\n")}).ignored,
+              testing::ElementsAre(HasSubstr("`Camera1.k4`"), HasSubstr("`IMU.Tbc`")));
   Calibration orb = importRig({file("orb.yaml", kOrbSlam)}).rig;
   EXPECT_EQ(orb.cameras[0].rate_hz, 20.0);
   orb.cameras[0].time_offset_s = 0.0031;  // ORB-SLAM3 knows no offset

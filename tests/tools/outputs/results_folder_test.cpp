@@ -47,6 +47,12 @@ TEST(ResultsFolder, AnEmptyOneIsWrittenDirectly) {
     writeTo(out / "events.jsonl", "of a run that fails");
   }
   EXPECT_TRUE(fs::exists(out / "events.jsonl"));
+  const fs::path other = folderOf("results_never");
+  {
+    const ResultsFolder results(other);
+    fs::create_directories(other);
+  }
+  EXPECT_FALSE(fs::exists(other)) << "it was new and stayed empty";
 }
 
 TEST(ResultsFolder, AnEarlierRunStaysWhereTheNewOneFails) {

@@ -61,6 +61,11 @@ TEST(Doubts, TheLastLineNamesWhatWouldElseBeSilent) {
             " | WARNING: no point of the image was of use at 90 of 240 frames; the map is empty "
             "though 70 boxes came; stamps were changed");
   EXPECT_THAT(sentences(facts), Contains(HasSubstr("set back by 2 s")));
+  for (const char* code : {"clock_paused", "poses_other_axes", "boxes_beyond", "lines_lost"}) {
+    EXPECT_THAT(sentences({.frames = 9, .findings = {{{}, code, "the amount"}}}),
+                ElementsAre(HasSubstr("the amount")))
+        << code;
+  }
 }
 
 TEST(Doubts, PosesOfAPartOfTheDriveAreTold) {

@@ -130,6 +130,19 @@ TEST(PipelineRefusal, DetectionsOfOtherFramesAreRefusedBeforeTheRun) {
                                             65));
 }
 
+TEST(PipelineRefusal, DetectionsThatCountFromOneAreRefusedAndBoxesBeyondTheDriveAreSaid) {
+  const auto root = makeTurningDrive("from_one");
+  auto options = optionsFor(root);
+  options.detections = (root / "boxes.csv").string();
+  const std::string header = "frame,class,x1,y1,x2,y2,score\n", box = ",car,1,2,30,40,0.9\n";
+  writeText(options.detections, header + "1" + box + "41" + box);
+  EXPECT_THAT(endOf(options), testing::Pair(HasSubstr("1 … 41, those of the drive 0 … 40"), 65));
+  writeText(options.detections, header + "0" + box + "40" + box + "60" + box);
+  const Pipeline pipeline(options);
+  EXPECT_THAT(endOfLine(pipeline.doubts()), HasSubstr("boxes of other frames were left out"));
+  EXPECT_THAT(pipeline.findings().back().text, HasSubstr("1 of 3 boxes"));
+}
+
 /// Twenty poses along x, `step_m` apart.
 std::string posesAlongX(double step_m) {
   std::string poses;

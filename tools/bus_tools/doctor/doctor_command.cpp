@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "common/base/errors.h"
+#include "common/base/heap.h"
 #include "tools/bus_tools/common.h"
 #include "tools/bus_tools/doctor/doctor.h"
 #include "tools/perdure/commands.h"
@@ -66,6 +67,7 @@ void runDoctor(const DoctorOptions& given) {
     throw StartupError(ExitCode::kUsage, "--fix mends a recording; give --data DRIVE as well");
   }
   if (!given.drive.data.empty()) {
+    keepFreedMemory();
     Findings findings = given.copy.empty() ? checkRigBy(given.drive, given.rig_seconds)
                                            : fixRecording(given.drive, given.copy);
     const bool named = !given.network.empty();

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <future>
 
 #include "tools/bus_tools/doctor/doctor.h"
 #include "tools/calibrate/motion/from_motion.h"
@@ -14,15 +15,19 @@
 namespace perdure::tools {
 namespace {
 
-/// Returns whether vio can run on the recording.
-bool addFindings(const replay::DataFindings& of_data, Findings& findings) {
-  bool usable = true;
+bool isFatal(const replay::DataFinding& finding) {
+  return finding.grade == replay::DataFinding::Grade::kFatal;
+}
+
+/// Whether vio can run on the recording.
+bool isUsable(const replay::DataFindings& of_data) {
+  return std::none_of(of_data.begin(), of_data.end(), isFatal);
+}
+
+void addFindings(const replay::DataFindings& of_data, Findings& findings) {
   for (const auto& finding : of_data) {
-    const bool fatal = finding.grade == replay::DataFinding::Grade::kFatal;
-    findings.push_back({fatal ? Verdict::kFail : Verdict::kWarn, finding.text});
-    usable = usable && !fatal;
+    findings.push_back({isFatal(finding) ? Verdict::kFail : Verdict::kWarn, finding.text});
   }
-  return usable;
 }
 
 void checkPosesOf(const Drive& drive, const replay::Recording& recording, Findings& findings) {
@@ -47,8 +52,11 @@ void checkMotionOf(const replay::Recording& recording, replay::DataFindings& of_
   findings.push_back({Verdict::kOk, check.basis});
 }
 
-/// Returns whether the rig can be judged by the recording.
-bool checkRecording(const Drive& drive, Findings& findings) {
+/// Starts vio beside the checks of the motion, if `options` are given. Returns nothing if the rig
+/// cannot be judged by the recording.
+std::future<calibrate::RigCheck> checkRecording(const Drive& drive,
+                                                const calibrate::RigCheckOptions* options,
+                                                Findings& findings) {
   const auto dataset =
       replay::Dataset::open({.path = drive.data, .sequence = drive.sequence, .rig = drive.rig});
   const replay::Recording& recording = dataset->recording();
@@ -62,19 +70,22 @@ bool checkRecording(const Drive& drive, Findings& findings) {
   if (findings.empty() && of_data.empty()) {
     findings.push_back({Verdict::kOk, "stamps, units, images and axes agree"});
   }
+  const bool usable = isUsable(of_data), without_imu = of_layout && !recording.calibration.imu;
+  std::future<calibrate::RigCheck> vio;
+  if (options && usable && !without_imu)
+    vio = std::async(std::launch::async, calibrate::checkRig, *options);
   checkMotionOf(recording, of_data, findings);
-  const bool usable = addFindings(of_data, findings);
+  addFindings(of_data, findings);
   if (usable) checkPosesOf(drive, recording, findings);
-  if (usable && of_layout && !recording.calibration.imu) {
+  if (usable && without_imu) {
     findings.push_back(
         {Verdict::kOk,
          fmt::format("there are no inertial samples, as always in {}: the rig is not judged, and "
                      "vio cannot run; --odometry {}",
                      scenes ? "7-Scenes" : "KITTI tracking",
                      scenes ? "truth takes the poses" : "takes a file of poses")});
-    return false;
   }
-  return usable;
+  return vio;
 }
 
 void showProgress(std::size_t done, std::size_t all) {
@@ -97,12 +108,13 @@ void settleUpsideDown(bool vio_agrees, Findings& findings) {
 
 Findings checkRigBy(const Drive& drive, std::optional<double> seconds) {
   Findings findings;
-  if (!checkRecording(drive, findings)) return findings;
   calibrate::RigCheckOptions options;
   options.data = drive.data, options.rig = drive.rig, options.sequence = drive.sequence;
   options.until_sure = !seconds;
   if (seconds) options.seconds = *seconds;
-  const auto check = calibrate::checkRig(options);
+  auto vio = checkRecording(drive, &options, findings);
+  if (!vio.valid()) return findings;
+  const auto check = vio.get();
   auto judgements = calibrate::judgeRig(check);
   settleUpsideDown(calibrate::worstOf(judgements) == calibrate::Grade::kGood, findings);
   if (check.cameras > 1 && calibrate::isSecondSuspect(check)) {
@@ -133,7 +145,8 @@ Findings fixRecording(const Drive& given, const std::string& folder) {
   }
   for (const auto& mend : drive.mends) findings.push_back({Verdict::kOk, mend});
   if (findings.empty() && given.rig.empty()) {
-    if (addFindings(drive.left, findings)) {
+    addFindings(drive.left, findings);
+    if (isUsable(drive.left)) {
       findings.push_back({Verdict::kOk, "there is nothing to mend; no copy is written"});
     } else {
       findings.push_back({Verdict::kWarn, "no correction of this is certain; no copy is written"});
@@ -145,7 +158,7 @@ Findings fixRecording(const Drive& given, const std::string& folder) {
         {Verdict::kWarn, std::to_string(left_out) + " images cannot be read and are left out"});
   }
   findings.push_back({Verdict::kOk, "written: " + folder});
-  checkRecording({.data = folder}, findings);
+  checkRecording({.data = folder}, nullptr, findings);
   return findings;
 }
 

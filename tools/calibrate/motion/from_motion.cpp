@@ -49,6 +49,18 @@ const char* kMotion =
     "turn the camera to and fro about all three axes for half a minute, by 30 degrees and about "
     "once in two seconds, with things to see in the image";
 
+/// Whether a gyroscope with all signs exchanged would fit, which also means one exchanged sign.
+bool isMirrored(const TrackWindows& tracks, const replay::Recording& recording,
+                const FirstGuess& guess) {
+  constexpr double kDoubtful = 0.1, kClearly = 3.0;
+  if (guess.unexplained < kDoubtful) return false;
+  std::vector<ImuSample> mirrored = recording.imu;
+  for (ImuSample& sample : mirrored) sample.gyro = -sample.gyro;
+  const auto other =
+      guessFromTurns(tracks.windows, mirrored, recording.calibration.cameras.front());
+  return kClearly * other.unexplained < guess.unexplained;
+}
+
 Result<FirstGuess> guessOf(const TrackWindows& tracks, const replay::Recording& recording) {
   constexpr double kLeast_px = 0.4, kApart = 0.5;
   const bool dead = std::all_of(recording.imu.begin(), recording.imu.end(),
@@ -63,6 +75,12 @@ Result<FirstGuess> guessOf(const TrackWindows& tracks, const replay::Recording& 
     return fail("motion_no_rotation",
                 fmt::format("the camera hardly turns ({:.2f} px from image to image); {}",
                             guess.turning_px, kMotion));
+  }
+  if (isMirrored(tracks, recording, guess)) {
+    return fail("motion_mirrored",
+                "the gyroscope turns as the mirror image of the images, which no mounting explains: "
+                "one of its axes, or all three, have the wrong sign; see the driver's axes, or "
+                "negate one of the columns w_x, w_y, w_z");
   }
   if (guess.unexplained > kApart) {
     return fail("motion_apart",

@@ -17,8 +17,9 @@ using Json = nlohmann::json;
 
 class CocoReader {
  public:
-  CocoReader(const std::filesystem::path& file, const std::string& class_name)
-      : file_(file), class_name_(class_name) {}
+  CocoReader(const std::filesystem::path& file, const std::string& class_name,
+             const std::map<std::string, std::uint64_t>& numbers)
+      : file_(file), class_name_(class_name), numbers_(numbers) {}
 
   CocoBoxes read() {
     const Json json = Json::parse(std::ifstream(file_), nullptr, false);
@@ -27,6 +28,7 @@ class CocoReader {
     if (!boxes.is_array()) refuse("is no list of COCO's results and has no `annotations`");
     if (json.is_object()) readTables(json);
     for (std::size_t i = 0; i < boxes.size(); ++i) take(boxes[i], fmt::format("annotation {}", i));
+    if (!named_) countFromZero();
     return std::move(result_);
   }
 
@@ -50,17 +52,56 @@ class CocoReader {
     const Json& images = memberOf(json, "images");
     if (!images.is_array() && !images.is_null()) refuse("has `images` that are no list");
     if (!images.empty()) result_.frames.emplace();
+    named_ = std::any_of(images.begin(), images.end(),
+                         [&](const Json& image) { return numbers_.contains(stemOf(image)); });
     for (const Json& image : images) {
-      const Json& name = memberOf(image, "file_name");
-      const auto number =
-          name.is_string()
-              ? parseInteger(std::filesystem::path(name.get<std::string>()).stem().string())
-              : std::nullopt;
-      const std::uint64_t frame =
-          number && *number >= 0 ? static_cast<std::uint64_t>(*number) : frameOf(image, "id");
-      frames_[memberOf(image, "id").dump()] = frame;
-      result_.frames->insert(frame);
+      const std::uint64_t frame = frameOfImage(image);
+      if (!frames_.emplace(memberOf(image, "id").dump(), frame).second) {
+        refuse("has two `images` with the id " + memberOf(image, "id").dump());
+      }
+      if (!result_.frames->insert(frame).second && frame != kNoFrame) {
+        refuse(fmt::format("has two `images` of frame {}, the second is {}; give the boxes of one "
+                           "camera of one drive",
+                           frame, memberOf(image, "file_name").dump()));
+      }
     }
+  }
+
+  static std::string stemOf(const Json& image) {
+    const Json& name = memberOf(image, "file_name");
+    return name.is_string() ? std::filesystem::path(name.get<std::string>()).stem().string() : "";
+  }
+
+  std::uint64_t frameOfImage(const Json& image) const {
+    const std::string stem = stemOf(image);
+    if (named_) {
+      const auto found = numbers_.find(stem);
+      return found == numbers_.end() ? kNoFrame : found->second;
+    }
+    const auto number = parseInteger(stem.substr(stem.find_last_not_of("0123456789") + 1));
+    return number ? static_cast<std::uint64_t>(*number) : frameOf(image, "id");
+  }
+
+  /// Subtracts 1 from all frames if they surely count from 1.
+  void countFromZero() {
+    std::set<std::uint64_t> frames = result_.frames.value_or(std::set<std::uint64_t>());
+    for (const CocoBox& box : result_.boxes) frames.insert(box.frame);
+    if (frames.empty() || *frames.begin() != 1) return;
+    std::uint64_t last = 0;
+    for (const auto& [name, number] : numbers_) last = std::max(last, number);
+    const bool beyond = !numbers_.empty() && *frames.rbegin() == last + 1;
+    if (!beyond && !(result_.frames && *frames.rbegin() == frames.size())) {
+      result_.note = "its frames begin at 1 and are taken as counted from 0; if they count from 1, "
+                     "subtract 1 from each";
+      return;
+    }
+    for (CocoBox& box : result_.boxes) --box.frame;
+    if (result_.frames) {
+      result_.frames->clear();
+      for (const std::uint64_t frame : frames) result_.frames->insert(frame - 1);
+    }
+    result_.note = fmt::format("its frames are 1 … {}: they count from 1 and were read so",
+                               *frames.rbegin());
   }
 
   std::uint64_t frameOf(const Json& object, const char* name) const {
@@ -110,6 +151,8 @@ class CocoReader {
 
   const std::filesystem::path& file_;
   const std::string& class_name_;
+  const std::map<std::string, std::uint64_t>& numbers_;  ///< of the drive's frames
+  bool named_ = false;                                   ///< the images are named as the drive's
   std::map<std::string, std::string> names_;     ///< of categories
   std::map<std::string, std::uint64_t> frames_;  ///< of images
   std::set<std::string> unnamed_;                ///< categories
@@ -122,8 +165,9 @@ bool looksLikeCoco(std::string_view first_line) {
   return first_line.starts_with('[') || first_line.starts_with('{');
 }
 
-CocoBoxes readCoco(const std::filesystem::path& file, const std::string& class_name) {
-  return CocoReader(file, class_name).read();
+CocoBoxes readCoco(const std::filesystem::path& file, const std::string& class_name,
+                   const std::map<std::string, std::uint64_t>& numbers) {
+  return CocoReader(file, class_name, numbers).read();
 }
 
 }  // namespace perdure::replay

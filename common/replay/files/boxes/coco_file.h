@@ -5,6 +5,8 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <limits>
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -26,13 +28,20 @@ struct CocoBox {
 struct CocoBoxes {
   std::vector<CocoBox> boxes;
   std::optional<std::set<std::uint64_t>> frames;  ///< the `images`, if there are any
+  std::string note;  ///< a sentence if they count from 1, or may do so
 };
+
+/// The frame of an image that the drive does not have.
+inline constexpr std::uint64_t kNoFrame = std::numeric_limits<std::uint64_t>::max();
 
 /// Whether a file with this first line is JSON.
 bool looksLikeCoco(std::string_view first_line);
 
-/// The frame of an image is the number in its file name (`images`), or its id. `class_name` is that
-/// of boxes whose category has no name. Throws StartupError with the place and the fix.
-CocoBoxes readCoco(const std::filesystem::path& file, const std::string& class_name);
+/// The frame of an image is that of the drive whose image has the same name (`numbers`); if there is
+/// none, the number in its file name, or its id. These count from 1 if they reach one beyond the
+/// drive's last frame, or are the numbers 1 … n of all `images`. `class_name` is that of boxes whose
+/// category has no name. Throws StartupError with the place and the fix.
+CocoBoxes readCoco(const std::filesystem::path& file, const std::string& class_name,
+                   const std::map<std::string, std::uint64_t>& numbers);
 
 }  // namespace perdure::replay

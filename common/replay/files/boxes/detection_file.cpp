@@ -77,6 +77,30 @@ Columns headerlessColumns(const TextLine& line) {
   return columns;
 }
 
+/// Refuses lines whose corners stand where MOT has the width and the height, or from the second
+/// column on.
+void refuseCorners(const std::filesystem::path& file, const std::vector<TextLine>& lines,
+                   char separator) {
+  constexpr std::size_t kLeast = 3;
+  std::size_t from_second = 0, from_third = 0;
+  for (const TextLine& line : lines) {
+    const auto v = parseNumbers(split(line.text, separator));
+    if (!v || v->size() < 7) return;
+    const auto isBox = [&](std::size_t i) {
+      return (*v)[i] < (*v)[i + 2] && (*v)[i + 1] < (*v)[i + 3];
+    };
+    from_second += isBox(1) && (*v)[5] >= 0.0 && (*v)[5] <= 1.0 ? 1 : 0;
+    from_third += isBox(2) ? 1 : 0;
+  }
+  const bool second = from_second == lines.size();
+  if (!second && (lines.size() < kLeast || from_third < lines.size())) return;
+  throw StartupError(
+      ExitCode::kData,
+      "{}: its lines have no header and corners in columns {}, not MOT's id, x, y, width, height; "
+      "write a header frame,class,x1,y1,x2,y2,score and these columns",
+      file.c_str(), second ? "2 to 5 with a score behind them" : "3 to 6");
+}
+
 /// Returns an empty string, or the error in the numbers of the row.
 std::string fillBox(const Box& box, double score, const DetectionFileOptions& options,
                     DetectionFile::Row& row) {
@@ -199,12 +223,12 @@ Result<NumberedRow> readRow(const std::string& text, const Columns& columns,
 
 DetectionFile DetectionFile::read(const DetectionFileOptions& options,
                                   const ClassAliases& aliases) {
-  const auto lines = readLines(options.file, "--detections takes `model`, `none` or a CSV");
+  const auto lines = readLines(options.file, "--detections takes `model`, `none` or a file of boxes");
   DetectionFile result;
   result.options_ = options;
   result.listed_frames_ = readFrameList(options.file);
   if (!lines.empty() && looksLikeCoco(lines.front().text)) {
-    result.takeCoco(readCoco(options.file, options.class_name), aliases);
+    result.takeCoco(readCoco(options.file, options.class_name, options.numbers), aliases);
   } else {
     result.takeLines(lines, aliases);
   }
@@ -225,6 +249,7 @@ void DetectionFile::takeCoco(const CocoBoxes& coco, const ClassAliases& aliases)
   }
   wrong.throwIfAny();
   if (!listed_frames_) listed_frames_ = coco.frames;
+  note_ = coco.note;
 }
 
 void DetectionFile::takeLines(const std::vector<TextLine>& lines, const ClassAliases& aliases) {
@@ -232,6 +257,7 @@ void DetectionFile::takeLines(const std::vector<TextLine>& lines, const ClassAli
   const bool headerless = isHeaderless(lines, options);
   const Columns columns =
       headerless ? headerlessColumns(lines[0]) : readHeader(options.file, lines[0], aliases);
+  if (columns.mot) refuseCorners(options.file, lines, columns.separator);
   for (const auto& [column, name] : columns.logits) logit_classes_.push_back(name);
   Complaints wrong(options.file);
   for (std::size_t i = headerless ? 0 : 1; i < lines.size(); ++i) {
@@ -301,6 +327,12 @@ std::vector<std::string> DetectionFile::classesAt(std::uint64_t frame) const {
 std::size_t DetectionFile::rows() const {
   std::size_t count = 0;
   for (const auto& [frame, rows] : rows_) count += rows.size();
+  return count;
+}
+
+std::size_t DetectionFile::rowsBeyond(std::uint64_t last) const {
+  std::size_t count = 0;
+  for (auto row = rows_.upper_bound(last); row != rows_.end(); ++row) count += row->second.size();
   return count;
 }
 

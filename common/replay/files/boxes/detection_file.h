@@ -1,7 +1,8 @@
 // Reads detections from a file as evidence: a CSV with the header `frame,class,x1,y1,x2,y2,score`.
 // Optional columns are an azimuth (its name begins with alpha or azimuth) and `logit:<class>`.
 // Without a header, lines are RRC's `frame,x1,y1,x2,y2,score` or MOT's `frame,id,x,y,width,height,
-// score,…`, whose frames count from 1; the caller then gives the class. COCO's JSON is read too
+// score,…`, whose frames count from 1; the caller then gives the class. More columns behind corners
+// are refused, because their meaning is not known. COCO's JSON is read too
 // (coco_file.h).
 #pragma once
 
@@ -31,6 +32,8 @@ struct DetectionFileOptions {
   double score_floor = 0.01;
   double azimuth_sigma = 0.35;  ///< radians
   BoxExtent boxes = BoxExtent::kUnknown;
+  /// Recording::numbers of the drive.
+  std::map<std::string, std::uint64_t> numbers = {};
 };
 
 /// Activations of a row: clutter is 0. Other classes have the values of the `logit:` columns, if
@@ -51,8 +54,11 @@ class DetectionFile {
   std::optional<std::vector<Detection>> at(std::uint64_t frame) const;
   std::uint64_t firstFrame() const { return rows_.empty() ? 0 : rows_.begin()->first; }
   std::uint64_t lastFrame() const { return rows_.empty() ? 0 : rows_.rbegin()->first; }
-  /// The number of detections in the file.
+  /// The number of detections in the file, and of those of frames beyond `last`.
   std::size_t rows() const;
+  std::size_t rowsBeyond(std::uint64_t last) const;
+  /// A sentence if it is not certain or not as usual from where the file counts the frames.
+  const std::string& note() const { return note_; }
   /// Whether x2 and y2 are probably a width and a height in images of this size: nearly all boxes
   /// have the same, away from the image's border, and their left sides move.
   bool hasSizes(double width, double height) const;
@@ -72,6 +78,7 @@ class DetectionFile {
 
   DetectionFileOptions options_;
   std::vector<std::string> logit_classes_;
+  std::string note_;
   std::vector<std::pair<std::uint64_t, std::string>> first_seen_;  ///< classes in file order
   std::map<std::uint64_t, std::vector<Row>> rows_;
   std::optional<std::set<std::uint64_t>> listed_frames_;

@@ -177,6 +177,63 @@ TEST(DetectionFile, CocoIsReadAsResultsAndWithItsTables) {
   EXPECT_FALSE(whole.at(0)) << "no image";
 }
 
+/// A drive of three frames.
+DetectionFileOptions ofDrive() {
+  DetectionFileOptions options = ofClass("car");
+  options.numbers = {{"1403636579763555584", 0}, {"1403636579813555584", 1}, {"14036366", 2}};
+  return options;
+}
+
+TEST(DetectionFile, CocoTablesThatCountFromOneAreReadSo) {
+  std::string images, boxes;
+  for (int k = 1; k <= 3; ++k) {
+    const std::string id = std::to_string(k), comma = k == 1 ? "" : ",";
+    images += comma + R"({"id": )" + id + R"(, "file_name": "frame_00)" + id + R"(.png"})";
+    boxes += comma + R"({"image_id": )" + id + R"(, "category_id": 1, "bbox": [)" + id +
+             "0, 2, 30, 4]}";
+  }
+  const auto tables = readCsv(
+      R"({"images": [)" + images + R"(], "annotations": [)" + boxes + "]}", ofDrive());
+  const auto results = readCsv("[" + boxes + "]", ofDrive());
+  for (const auto& file : {tables, results}) {
+    EXPECT_DOUBLE_EQ(file.at(0)->front().box.x1, 10.0);
+    EXPECT_DOUBLE_EQ(file.at(2)->front().box.x1, 30.0);
+    EXPECT_THAT(file.note(), HasSubstr("count from 1 and were read so"));
+  }
+  const auto unsure = readCsv(R"([{"image_id": 1, "category_id": 1, "bbox": [1, 2, 30, 4]}])",
+                              ofDrive());
+  EXPECT_EQ(unsure.at(1)->size(), 1U);
+  EXPECT_THAT(unsure.note(), HasSubstr("taken as counted from 0"));
+}
+
+TEST(DetectionFile, CocoImagesAreFoundByTheNamesOfTheDrive) {
+  const auto file = readCsv(
+      R"({"images": [{"id": 7, "file_name": "a/1403636579813555584.jpg"},
+                     {"id": 8, "file_name": "1403636579999999999.jpg"}],
+          "annotations": [{"image_id": 7, "category_id": 1, "bbox": [1, 2, 30, 4]},
+                          {"image_id": 8, "category_id": 1, "bbox": [1, 2, 30, 4]}]})",
+      ofDrive());
+  EXPECT_EQ(file.at(1)->size(), 1U);
+  EXPECT_FALSE(file.at(0));
+  EXPECT_EQ(file.rowsBeyond(2), 1U) << "of an image that the drive does not have";
+  EXPECT_THAT(startupErrorOf([&] {
+                readCsv(R"({"images": [{"id": 7, "file_name": "l/1.png"},
+                                       {"id": 8, "file_name": "r/1.png"}], "annotations": []})",
+                        ofDrive());
+              }),
+              HasSubstr("two `images` of frame 1, the second is \"r/1.png\""));
+}
+
+TEST(DetectionFile, CornersWithoutHeaderAreNoMotLines) {
+  const auto errorOf = [](const std::string& text) {
+    return startupErrorOf([&] { readCsv(text, ofClass("car")); });
+  };
+  EXPECT_THAT(errorOf("0,100,90,140,150,.9,2\n1,101,90,141,150,.8,2\n"),
+              HasSubstr("corners in columns 2 to 5 with a score behind them"));
+  EXPECT_THAT(errorOf("0,2,100,90,140,150,.9\n1,2,101,90,141,150,.8\n2,2,99,90,139,150,.8\n"),
+              HasSubstr("corners in columns 3 to 6"));
+}
+
 TEST(DetectionFile, WhatIsWrongInCocoIsNamed) {
   const auto results = [](const std::string& annotation) {
     return startupErrorOf([&] { readCsv("[" + annotation + "]", ofClass("car")); });

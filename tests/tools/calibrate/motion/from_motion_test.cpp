@@ -135,6 +135,18 @@ TEST(MotionRig, IsRefusedWithoutTurning) {
   EXPECT_EQ(found.error().code, "motion_no_rotation");
 }
 
+TEST(MotionRig, IsRefusedWithAMirroredGyroscope) {
+  for (const Eigen::Vector3d& signs :
+       {Eigen::Vector3d(1, -1, 1), Eigen::Vector3d(1, 1, -1), Eigen::Vector3d(-1, -1, -1)}) {
+    tests::TurningDrive drive;
+    drive.seconds = 5.0;
+    drive.change = [&](ImuSample& sample) { sample.gyro = sample.gyro.cwiseProduct(signs); };
+    const auto found = rigOf("from_motion_mirrored", drive);
+    ASSERT_FALSE(found);
+    EXPECT_EQ(found.error().code, "motion_mirrored");
+  }
+}
+
 TEST(MotionRig, IsRefusedWithTheGyroscopeOfAnotherDrive) {
   tests::TurningDrive drive;
   drive.seconds = 5.0;
