@@ -67,6 +67,7 @@ Doubts doubtsOfRun(const RunFacts& facts) {
       {"clock_wrapped", "stamps were changed"},
       {"clock_set", "stamps were changed"},
       {"clock_", "stamps pause or jump"},
+      {"imu_covers_part", "images lie outside of the inertial samples"},
       {"lines_lost", "lines of the recording were left out"},
       {"boxes_beyond", "boxes of other frames were left out"},
       {"poses_", "the poses contradict the drive"}};

@@ -230,12 +230,13 @@ class ClockWalk {
     return set == known_.end() ? nullptr : &*set;
   }
 
-  /// Whether a step back is short, or passes over no more stamps than usual: neighbours that
-  /// changed places. Behind a clock that was set they come a second time.
+  /// Whether a step back is very short, or short and over no more stamps than usual: neighbours
+  /// that changed places. Behind a clock that was set such stamps come a second time.
   bool isSwap(std::size_t i) const {
     const TimePoint before = stamps_[i - 1], after = stamps_[i];
     const Duration back = between(before, after);
     if (back <= std::chrono::milliseconds(50)) return true;
+    if (back > multipleOf(3, usual_)) return false;
     const auto passed = static_cast<std::size_t>(back / usual_) + 1;
     std::size_t found = 0;
     for (std::size_t k = i - std::min(i, 2 * passed); k < std::min(stamps_.size(), i + 2 * passed);

@@ -112,7 +112,7 @@ class Damage {
       if (kind == 0) fs::remove(all[i]);
       if (kind == 1) replay::truncate(all[i], 0.3);
       if (kind == 2) replay::writeText(all[i], "");
-      if (kind == 3) fs::copy_file(all[first], all[i], fs::copy_options::overwrite_existing);
+      if (kind == 3) replay::writeText(all[i], replay::readText(all[first]));
     }
     return std::array{"lost: ", "cut: ", "empty: ", "repeated: "}[kind] + where;
   }
@@ -182,20 +182,23 @@ Outcome outcomeOf(const fs::path& drive) {
   return outcome;
 }
 
-/// The error of the steps of half a second, as a share of their length; 1 for steps without poses.
+/// The error of the steps of half a second, as a share of their length; or the share of the frames
+/// that have no pose, if it is larger.
 double errorOf(const Poses& poses, const Poses& sound) {
   constexpr std::uint64_t kStep = 10;
-  double error = 0.0, length = 0.0;
+  double error = 0.0, length = 0.0, missing = 0.0;
   for (const auto& [frame, from] : sound) {
+    missing += poses.contains(frame) ? 0.0 : 1.0;
     const auto to = sound.find(frame + kStep);
     if (to == sound.end()) continue;
     const Eigen::Vector3d step = (from.T_WB.inverse() * to->second.T_WB).p;
     const auto a = poses.find(frame), b = poses.find(frame + kStep);
-    const bool both = a != poses.end() && b != poses.end();
+    if (a == poses.end() || b == poses.end()) continue;
     length += step.norm();
-    error += both ? ((a->second.T_WB.inverse() * b->second.T_WB).p - step).norm() : step.norm();
+    error += ((a->second.T_WB.inverse() * b->second.T_WB).p - step).norm();
   }
-  return error / length;
+  const double share = missing / static_cast<double>(sound.size());
+  return length == 0.0 ? 1.0 : std::max(error / length, share);
 }
 
 fs::path soundDrive() {
