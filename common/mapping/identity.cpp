@@ -1,7 +1,8 @@
 #include "common/mapping/identity.h"
 
-#include <algorithm>
 #include <utility>
+
+#include "common/base/algorithms/disjoint_sets.h"
 
 namespace perdure::mapping {
 
@@ -43,25 +44,12 @@ std::vector<SameObject> Identity::factsOf(EdgeId loop) const {
   return result;
 }
 
-/// Union of sets; the root of each set is its lowest track.
 void Identity::connect() {
-  object_of_.clear();
+  DisjointSets<TrackId> sets;
+  for (const SameObject& fact : facts_) sets.join(fact.a, fact.b);
+  object_of_ = sets.roots();
   tracks_of_.clear();
-  const auto root = [&](TrackId track) {
-    object_of_.try_emplace(track, track);
-    while (object_of_.at(track) != track) {
-      track = object_of_[track] = object_of_.at(object_of_.at(track));
-    }
-    return track;
-  };
-  for (const SameObject& fact : facts_) {
-    const auto [low, high] = std::minmax({root(fact.a), root(fact.b)});
-    object_of_[high] = low;
-  }
-  for (auto& [track, object] : object_of_) {
-    object = root(track);
-    tracks_of_[object].push_back(track);
-  }
+  for (const auto& [track, object] : object_of_) tracks_of_[object].push_back(track);
 }
 
 }  // namespace perdure::mapping

@@ -3,6 +3,8 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
+#include "common/base/algorithms/utf8.h"
+
 namespace perdure::wire {
 namespace {
 
@@ -31,30 +33,6 @@ bool hasCholesky(const Eigen::MatrixXd& C) {
   return C.size() > 0 && C.allFinite() && Eigen::LLT<Eigen::MatrixXd>(C).info() == Eigen::Success;
 }
 
-/// Length in bytes of the UTF-8 character that begins with `lead`; 0 if `lead` is invalid.
-std::size_t lengthOf(unsigned char lead) {
-  if (lead < 0x80) return 1;
-  if (lead >= 0xc2 && lead < 0xe0) return 2;
-  if (lead >= 0xe0 && lead < 0xf0) return 3;
-  return lead >= 0xf0 && lead < 0xf5 ? 4 : 0;
-}
-
-/// The second byte reveals over-long forms, surrogates and code points beyond U+10FFFF.
-bool secondByteFits(unsigned char lead, unsigned char second) {
-  switch (lead) {
-    case 0xe0:
-      return second >= 0xa0;
-    case 0xed:
-      return second < 0xa0;
-    case 0xf0:
-      return second >= 0x90;
-    case 0xf4:
-      return second < 0x90;
-    default:
-      return true;
-  }
-}
-
 }  // namespace
 
 bool inside(double value, const Limits& limits) {
@@ -70,15 +48,10 @@ bool isSizeOf(const Frame& frame, std::size_t bytes) {
 }
 
 bool isText(std::string_view text) {
-  for (std::size_t i = 0; i < text.size();) {
-    const auto lead = static_cast<unsigned char>(text[i]);
-    const std::size_t length = lengthOf(lead);
-    if (lead == 0 || length == 0 || i + length > text.size()) return false;
-    for (std::size_t k = 1; k < length; ++k) {
-      const auto byte = static_cast<unsigned char>(text[i + k]);
-      if ((byte & 0xc0) != 0x80 || (k == 1 && !secondByteFits(lead, byte))) return false;
-    }
-    i += length;
+  while (!text.empty()) {
+    const std::size_t length = lengthOfCharacter(text);
+    if (length == 0 || text.front() == '\0') return false;
+    text.remove_prefix(length);
   }
   return true;
 }

@@ -53,13 +53,11 @@ void describeVehicle(Config& c, config::Fields& fields) {
                "signed"});
   fields.text("speed.address", c.speed.address,
               {"live: HOST:PORT that receives the UDP datagrams: a speed in m/s, with or without "
-               "its standard deviation; or RMC or VTG of NMEA 0183"});
-  fields.choice("gnss.source", c.gnss.source, {"none", "gpsd", "nmea"},
-                {"live: GNSS receiver for the position of the map on Earth: gpsd, or NMEA 0183 "
-                 "sentences over UDP"});
-  fields.text("gnss.address", c.gnss.address,
-              {"live: HOST:PORT of gpsd, or HOST:PORT that receives NMEA; empty: 127.0.0.1:2947, "
-               "127.0.0.1:10110"});
+               "its standard deviation"});
+  fields.choice("gnss.source", c.gnss.source, {"none", "gpsd"},
+                {"live: position of the map on Earth: gpsd, which reads NMEA over UDP too "
+                 "(`gpsd udp://0.0.0.0:10110`)"});
+  fields.text("gnss.address", c.gnss.address, {"live: HOST:PORT of gpsd"});
   fields.numbers(
       "gnss.antenna", c.gnss.antenna, config::between(-100, 100),
       {"live: position of the antenna in the body frame [x, y, z]; empty: the origin", "m"});
@@ -159,11 +157,6 @@ void describeExpertRun(Config& c, config::Fields& fields) {
 
 }  // namespace
 
-std::string addressOf(const GnssConfig& config) {
-  if (!config.address.empty()) return config.address;
-  return config.source == "gpsd" ? "127.0.0.1:2947" : "127.0.0.1:10110";
-}
-
 void describe(Config& c, config::Fields& fields) {
   fields.choice("source", c.source, {"dataset", "libcamera"},
                 {"source of images and samples: a drive in files, or a camera of libcamera and an "
@@ -227,11 +220,7 @@ void requireSensors(const Config& config) {
   refuseIf(!config.gnss.antenna.empty() && config.gnss.antenna.size() != 3,
            "gnss.antenna is not [x, y, z]; give these three in metres, or none.");
   refuseIf(config.speed.source == "gnss" && config.gnss.source == "none",
-           "speed.source: gnss needs a receiver: set gnss.source to gpsd or nmea.");
-  refuseIf(config.speed.source == "udp" && config.gnss.source == "nmea" &&
-               config.speed.address == addressOf(config.gnss),
-           "speed.address and gnss.address are the same, and one of them would hear "
-           "nothing; set speed.source: gnss, which takes both from one receiver.");
+           "speed.source: gnss needs a receiver: set gnss.source to gpsd.");
 }
 
 }  // namespace

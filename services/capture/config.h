@@ -69,13 +69,10 @@ struct SpeedConfig {
 };
 
 struct GnssConfig {
-  std::string source = "none", address;
+  std::string source = "none", address = "127.0.0.1:2947";
   double most_sigma = 5.0, latency_s = 0.0;
   std::vector<double> antenna;  ///< empty, or 3 values: position in the body, m
 };
-
-/// Configured address, or the default address of the source.
-std::string addressOf(const GnssConfig& config);
 
 struct Config {
   std::string source = "dataset";

@@ -1,5 +1,7 @@
 #include "services/semantic_filter/config.h"
 
+#include <sstream>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -173,59 +175,22 @@ void describeFormer(Fields& fields) {
   for (const auto& [old, now] : renamed) fields.formerly(old, std::string("is now ") + now);
   fields.formerly("context", "is gone: context is no longer laid over the classes; leave it out");
   // Former keys that are constants in core/parameters.h now.
-  static const Pairs fixed{{"box.tail", "5"},
-                           {"box.iterations", "3"},
-                           {"box.bias_log_distance", "0.3"},
-                           {"box.bias_image_angle", "0.3 rad"},
-                           {"clutter.min_size_px", "8 px"},
-                           {"clutter.censored_probability", "0.1"},
-                           {"birth.claimed", "0.5"},
-                           {"birth.max_classes", "4"},
-                           {"birth.class_ratio", "0.01"},
-                           {"birth.landmark_decay", "0.3"},
-                           {"birth.min_landmarks", "6"},
-                           {"birth.min_distance_m", "1.5 m"},
-                           {"motion.yaw_walk", "0.01 rad/√s"},
-                           {"motion.slow_share", "0.25"},
-                           {"motion.creeping", "0.03"},
-                           {"motion.lost_sigma_m", "10 m"},
-                           {"motion.start_probability", "0.02"},
-                           {"motion.misplaced_odds", "5"},
-                           {"motion.misplaced_sigma", "0.1"},
-                           {"motion.start_nis", "3"},
-                           {"looks.angle", "0.1 rad"},
-                           {"looks.log_distance", "0.1"},
-                           {"looks.image_angle", "0.03 rad"},
-                           {"visibility.cell_px", "8 px"},
-                           {"visibility.full", "0.7"},
-                           {"visibility.elusive_found", "0.3"},
-                           {"visibility.screen_angle", "0.15 rad"},
-                           {"visibility.screen_log_distance", "0.3"},
-                           {"tend.gone_tentative", "0.05"},
-                           {"tend.tentative_s", "10 s"},
-                           {"tend.class_dominates", "0.995"},
-                           {"tend.hypothesis_floor", "0.002"},
-                           {"tend.scale_resolved", "0.06"},
-                           {"tend.hypothesis_merge", "1"},
-                           {"tend.merge_turns", "0.1"},
-                           {"tend.merge_inside", "0.3"},
-                           {"smooth.least", "5"},
-                           {"smooth.fresh", "0.3"},
-                           {"smooth.patience", "3"},
-                           {"smooth.new_view", "0.12"},
-                           {"smooth.place", "0.2"},
-                           {"smooth.contradicted", "0.2"},
-                           {"smooth.least_weight", "0.02"},
-                           {"ground.slope", "0.03"},
-                           {"ground.roughness", "0.04 m/√m"},
-                           {"ground.assumed", "5"},
-                           {"ground.sigma_m", "0.05 m"},
-                           {"ground.reach_m", "60 m"},
-                           {"ground.resolved", "0.06"},
-                           {"ground.span_m", "3 m"},
-                           {"ground.body_height_sigma_m", "0.05 m"}};
-  for (const auto& [old, value] : fixed) {
-    fields.formerly(old, std::string("is fixed at ") + value + "; leave it out");
+  std::istringstream fixed(
+      "box.tail box.iterations box.bias_log_distance box.bias_image_angle "
+      "clutter.min_size_px clutter.censored_probability birth.claimed birth.max_classes "
+      "birth.class_ratio birth.landmark_decay birth.min_landmarks birth.min_distance_m "
+      "motion.yaw_walk motion.slow_share motion.creeping motion.lost_sigma_m "
+      "motion.start_probability motion.misplaced_odds motion.misplaced_sigma "
+      "motion.start_nis looks.angle looks.log_distance looks.image_angle visibility.cell_px "
+      "visibility.full visibility.elusive_found visibility.screen_angle "
+      "visibility.screen_log_distance tend.gone_tentative tend.tentative_s "
+      "tend.class_dominates tend.hypothesis_floor tend.scale_resolved tend.hypothesis_merge "
+      "tend.merge_turns tend.merge_inside smooth.least smooth.fresh smooth.patience "
+      "smooth.new_view smooth.place smooth.contradicted smooth.least_weight ground.slope "
+      "ground.roughness ground.assumed ground.sigma_m ground.reach_m ground.resolved "
+      "ground.span_m ground.body_height_sigma_m");
+  for (std::string old; fixed >> old;) {
+    fields.formerly(old, "is fixed now; leave it out");
   }
   for (const char* old :
        {"alignment.nats", "alignment.margin_nats", "alignment.pairs", "alignment.known_share"}) {

@@ -1,13 +1,10 @@
 // Targets: inputs of a vehicle's speed and place. They are lines of a DBC file and CAN frames,
-// lines over UDP, sentences of NMEA, and reports of gpsd.
-#include <fmt/format.h>
-
+// lines over UDP, and reports of gpsd.
 #include <cmath>
 #include <numbers>
 
 #include "services/capture/vehicle/earth_anchor.h"
 #include "services/capture/vehicle/gpsd.h"
-#include "services/capture/vehicle/nmea.h"
 #include "services/capture/vehicle/socket_stream.h"
 #include "services/capture/vehicle/vehicle.h"
 #include "services/capture/vehicle/wheel_speed.h"
@@ -116,53 +113,6 @@ bool takeSpeedLines(View bytes) {
   return all;
 }
 
-/// Returns `$TEXT*SUM` with the correct checksum.
-std::string withSum(std::string_view line) {
-  const std::size_t begin = line.starts_with('$') ? 1 : 0;
-  const std::size_t end = std::max(begin, std::min(line.rfind('*'), line.size()));
-  const std::string_view text = line.substr(begin, end - begin);
-  unsigned sum = 0;
-  for (const char c : text) sum ^= static_cast<unsigned char>(c);
-  return fmt::format("${}*{:02X}", text, sum);
-}
-
-/// Reads each line as it is, and with a correct checksum; otherwise hardly any line would be
-/// accepted.
-bool takeNmea(View bytes) {
-  NmeaReader reader;
-  Places places;
-  bool fix = false;
-  const auto take = [&](std::string_view line, std::int64_t now_ns) {
-    const auto said = reader.read(line, now_ns);
-    if (!said) return require(!said.error().code.empty(), "a refusal has a reason");
-    require(!said->speed || std::isfinite(*said->speed), "a speed is finite");
-    if (said->fix) places.offer(*said->fix);
-    fix |= said->fix.has_value();
-  };
-  forLines(bytes, [&](std::string_view line, std::int64_t now_ns) {
-    take(line, now_ns);
-    take(withSum(line), now_ns + 1);
-  });
-  return fix;
-}
-
-/// A straight drive of three seconds, and other sentences of receivers.
-std::vector<Bytes> nmeaSeeds() {
-  std::string drive, others;
-  for (int tenth = 0; tenth < 30; tenth += 5) {
-    const std::string utc = fmt::format("0835{:02d}.{}0", tenth / 10, tenth % 10);
-    drive += withSum("GNRMC," + utc + ",A,4717.11437,N,00833.91522,E,19.4,77.52,091202,,,A") + "\n";
-    drive += withSum("GNGGA," + utc + ",4717.114,N,00833.915,E,4,12,0.6,499.6,M,48.0,M,,") + "\n";
-  }
-  for (const char* text :
-       {"GPGST,082356.00,1.8,,,,1.7,1.3,2.2", "GPRMC,083559.00,A,4717.1,S,00833.9,W,,,091202,,,A",
-        "GPGGA,083559.00,4717.1,S,00833.9,W,1,08,1.01,499.6,M,,M,,",
-        "GPVTG,77.52,T,,M,0.004,N,0.008,K,A", "GPRMC,083559.00,V,,,,,,,091202,,,N"}) {
-    others += withSum(text) + "\r\n";
-  }
-  return {bytesOf(drive), bytesOf(others)};
-}
-
 bool takeGpsd(View bytes) {
   Places places;
   bool fixed = false;
@@ -195,7 +145,6 @@ std::vector<Target> vehicleTargets() {
   };
   return {{"can_speed", 9000, canSeeds, takeCan},
           {"speed_lines", 9000, speeds, takeSpeedLines},
-          {"nmea", 4200, nmeaSeeds, takeNmea},
           {"gpsd", 4200, gpsdSeeds, takeGpsd}};
 }
 

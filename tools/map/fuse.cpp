@@ -30,46 +30,10 @@ struct GivenMap {
 
 [[noreturn]] void refuse(ExitCode code, const std::string& why) { throw StartupError(code, why); }
 
-void refuseForeign(const std::string& path, const map_store::Identity& identity) {
-  if (identity.application != map_store::kApplicationId) {
-    refuse(ExitCode::kConfiguration,
-           path + " is not a map of Perdure's; give files that map_store writes (its store.path).");
-  }
-  if (identity.version > map_store::kSchemaVersion) {
-    refuse(ExitCode::kConfiguration,
-           fmt::format("The map {} has schema {}, this program knows up to {}; use the newer "
-                       "Perdure, or leave the map out.",
-                       path, identity.version, map_store::kSchemaVersion));
-  }
-}
-
-[[noreturn]] void cannotReadMap(const std::string& path, const Reason& reason) {
-  if (reason.code == "not_a_database") {
-    refuse(ExitCode::kConfiguration,
-           path +
-               " is not a map of Perdure's, or its beginning is damaged; give files that "
-               "map_store writes (its store.path).");
-  }
-  refuse(
-      ExitCode::kUnavailable,
-      fmt::format("The map {} cannot be read ({}: {}). What can be read of a damaged one: sqlite3 "
-                  "{} .recover",
-                  path, reason.code, reason.detail, path));
-}
-
 WholeMap readMap(const std::string& path) {
-  if (!fs::is_regular_file(path)) {
-    refuse(ExitCode::kUnavailable,
-           "There is no map " + path + "; give files that map_store writes (its store.path).");
-  }
-  const auto connection = map_store::Connection::open(path, map_store::Connection::Mode::kReadOnly);
-  if (!connection) cannotReadMap(path, connection.error());
-  const auto identity = map_store::identityOf(*connection);
-  if (!identity) cannotReadMap(path, identity.error());
-  refuseForeign(path, *identity);
-  auto map = map_store::readWholeMap(*connection);
-  if (!map) cannotReadMap(path, map.error());
-  return std::move(*map);
+  auto map = map_store::readWholeMap(map_store::openStoreForReading(path));
+  if (!map) map_store::cannotReadMap(path, map.error());
+  return *std::move(map);
 }
 
 void refuseToReplaceInputs(const FuseRequest& request) {

@@ -17,18 +17,23 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-[[noreturn]] void cannotRead(const std::string& path, const Reason& reason) {
-  throw StartupError(ExitCode::kUnavailable,
-                     path + " cannot be read: " + reason.detail +
-                         "; map_store sets a damaged file aside at its next start");
+template <class T>
+T read(const std::string& path, Result<T> result) {
+  if (!result) map_store::cannotReadMap(path, result.error());
+  if constexpr (!std::is_void_v<T>) return *std::move(result);
 }
 
 /// Opens the file in one transaction, so that objects and graph are consistent even if a service
 /// writes to it.
 map_store::Connection openAtOneState(const std::string& path) {
   auto connection = map_store::openStoreForReading(path);
-  if (const auto begun = connection.execute("BEGIN"); !begun) cannotRead(path, begun.error());
+  read(path, connection.execute("BEGIN"));
   return connection;
+}
+
+WorldId newestWorld(const map_store::MapReader& reader) {
+  const auto working = reader.working();
+  return working && *working ? (*working)->world : WorldId{};
 }
 
 Result<map_store::Found> findInM(const map_store::MapReader& reader, const MapQuery& query,
@@ -81,48 +86,38 @@ Result<MapReply> askMapStore(const bus::Participant& participant, MapQuery query
 MapReply askMapFile(const std::string& path, const MapQuery& query, MapFrameChoice frame) {
   const auto connection = openAtOneState(path);
   const map_store::MapReader reader(&connection);
-  const auto working = reader.working();
-  const WorldId newest = working && *working ? (*working)->world : WorldId{};
+  const WorldId newest = newestWorld(reader);
   const bool as_stored = frame == MapFrameChoice::kW || query.world.world != 0;
-  auto found = as_stored ? reader.find(query, newest, query.limit) : findInM(reader, query, newest);
-  if (!found) cannotRead(path, found.error());
+  auto found = read(
+      path, as_stored ? reader.find(query, newest, query.limit) : findInM(reader, query, newest));
   MapReply reply;
-  reply.truncated = found->truncated;
-  reply.objects = std::move(found->objects);
-  reply.beliefs = std::move(found->beliefs);
+  reply.truncated = found.truncated;
+  reply.objects = std::move(found.objects);
+  reply.beliefs = std::move(found.beliefs);
   return reply;
 }
 
 MapReply askGraphOfFile(const std::string& path, const MapQuery& query) {
   const auto connection = openAtOneState(path);
   const map_store::MapReader reader(&connection);
-  auto graph = reader.graph();
-  if (!graph) cannotRead(path, graph.error());
-  const auto working = reader.working();
-  mapping::Mapper mapper({}, std::move(graph->map));
+  mapping::Mapper mapper({}, read(path, reader.graph()).map);
   MapReply reply;
-  map_store::putGraph(mapper, {}, working && *working ? (*working)->world : WorldId{}, query,
-                      reply);
+  map_store::putGraph(mapper, {}, newestWorld(reader), query, reply);
   return reply;
 }
 
 std::optional<GeoAnchor> earthAnchorOfMapFile(const std::string& path) {
   const auto connection = openAtOneState(path);
   const map_store::MapReader reader(&connection);
-  const auto text = reader.earthAnchor();
-  if (!text) cannotRead(path, text.error());
-  std::istringstream numbers(*text);
+  std::istringstream numbers(read(path, reader.earthAnchor()));
   GeoAnchor anchor;
   double yaw_deg = 0.0;
   if (!(numbers >> anchor.latitude_deg >> anchor.longitude_deg >> anchor.height_m >> yaw_deg)) {
     return std::nullopt;
   }
   anchor.yaw = yaw_deg * std::numbers::pi / 180.0;
-  const auto working = reader.working();
-  const auto graph = reader.graph();
-  if (!graph) cannotRead(path, graph.error());
-  const WorldId newest = working && *working ? (*working)->world : WorldId{};
-  const mapping::MapFrames frames(mapping::MapState({}, graph->map));
+  const WorldId newest = newestWorld(reader);
+  const mapping::MapFrames frames(mapping::MapState({}, read(path, reader.graph()).map));
   const auto last = frames.anchorOf(nullptr, newest, TimePoint::max());
   return frames.at(last, newest).provisional ? std::nullopt : std::optional(anchor);
 }
@@ -133,15 +128,12 @@ Standing askStanding(const std::string& path, ObjectId id) {
   MapQuery query;
   query.kind = MapQueryKind::kById;
   query.object_id = id;
-  auto found = reader.find(query, {}, 1);
-  const auto graph = reader.graph();
-  auto absorbed = reader.mergedInto(id);
-  if (!found) cannotRead(path, found.error());
-  if (!graph) cannotRead(path, graph.error());
-  if (!absorbed) cannotRead(path, absorbed.error());
-  if (found->beliefs.empty()) cannotRead(path, {"no_object", "it no longer has the object"});
-  return standingOf(found->beliefs.front(), found->objects.front().world, graph->map,
-                    std::move(*absorbed));
+  const auto found = read(path, reader.find(query, {}, 1));
+  if (found.beliefs.empty()) {
+    map_store::cannotReadMap(path, {"no_object", "it no longer has the object"});
+  }
+  return standingOf(found.beliefs.front(), found.objects.front().world,
+                    read(path, reader.graph()).map, read(path, reader.mergedInto(id)));
 }
 
 }  // namespace perdure::tools

@@ -43,8 +43,4 @@ CalibrationResult calibrate(const CalibrateOptions& options,
 /// replaced if the file has them. Throws StartupError (78) if it is not a JSON object.
 std::string withCalibration(const std::string& model_json, const CalibrationResult& result);
 
-/// Draws reliability diagrams before and after. Throws StartupError (69) if the file cannot be
-/// written.
-void drawReliability(const CalibrationResult& result, const std::filesystem::path& file);
-
 }  // namespace perdure::tools

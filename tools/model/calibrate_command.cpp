@@ -38,7 +38,7 @@ struct CalibrateRequest {
   CalibrateOptions options;
   std::vector<fs::path> folders;
   std::string sequence;
-  fs::path labels, out, drawing;
+  fs::path labels, out;
   std::uint64_t every = 1;
   bool dry = false, quiet = false;
 };
@@ -99,7 +99,6 @@ void run(const CalibrateRequest& request) {
   });
   if (!request.quiet && terminal) std::fputc('\n', stderr);
   print(result);
-  if (!request.drawing.empty()) drawReliability(result, request.drawing);
   if (request.dry) return;
   const fs::path description = descriptionOf(options.inference);
   const std::string old = textOf(description);
@@ -146,13 +145,11 @@ void addCalibrate(CLI::App& model) {
       ->check(CLI::Range(0.1, 1.0))
       ->capture_default_str();
   command->add_option("--threads", inference.model.threads, "of OpenCV")->check(CLI::Range(1, 64));
-  command->add_option("--drawing", request->drawing, "reliability diagram, a .png")
-      ->type_name("FILE");
   command->add_option("--out", request->out, "another model.json than the network's")
       ->type_name("FILE");
   command->add_flag("--primed-only", request->options.primed_only,
                     "fit the evidence of primed answers; the rest stays as it is");
-  command->add_flag("--dry-run", request->dry, "print and draw, write no model.json");
+  command->add_flag("--dry-run", request->dry, "print, write no model.json");
   command->add_flag("--quiet", request->quiet, "no progress");
   command->callback([request] { run(*request); });
 }

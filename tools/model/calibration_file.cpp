@@ -1,11 +1,9 @@
-// Writes the fitted values to model.json, and draws the reliability diagram.
+// Writes the fitted values to model.json.
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "common/base/errors.h"
 #include "tools/model/calibrate.h"
-#include "tools/outputs/pictures/chart.h"
 
 namespace perdure::tools {
 namespace {
@@ -13,15 +11,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 double rounded(double value) { return std::round(value * 1000.0) / 1000.0; }
-
-std::vector<cv::Point2d> curveOf(const Reliability& reliability) {
-  constexpr std::size_t kFew = 10;  // boxes; a share of fewer is not significant
-  std::vector<cv::Point2d> points;
-  for (const auto& bin : reliability.bins) {
-    if (bin.count >= kFew) points.emplace_back(bin.confidence, bin.right);
-  }
-  return points;
-}
 
 }  // namespace
 
@@ -54,24 +43,6 @@ std::string withCalibration(const std::string& model_json, const CalibrationResu
     }
   }
   return json.dump(2) + "\n";
-}
-
-void drawReliability(const CalibrationResult& result, const std::filesystem::path& file) {
-  const Colour before(60, 130, 230), after(170, 110, 30);
-  cv::Mat picture(560, 640, CV_8UC3, kPaper);
-  Chart chart(picture, {60, 40, 540, 460}, {0.0, 1.0}, {0.0, 1.0});
-  chart.drawGrid(true);
-  chart.drawCurve({{0.0, 0.0}, {1.0, 1.0}}, {.colour = kInk, .dashed = true});
-  chart.drawCurve(curveOf(result.reliability_before), {.colour = before, .thickness = 2});
-  chart.drawCurve(curveOf(result.reliability_after), {.colour = after, .thickness = 2});
-  drawText(picture, "share of boxes that were right, by what they said", {60, 26}, kInk);
-  drawText(picture, "before", {80, 70}, before);
-  drawText(picture, "after, on frames held out", {80, 92}, after);
-  drawText(picture, "probability of the best class", {60, 546}, kInk);
-  if (!cv::imwrite(file.string(), picture)) {
-    throw StartupError(ExitCode::kUnavailable,
-                       file.string() + " cannot be written; give --drawing a .png elsewhere");
-  }
 }
 
 }  // namespace perdure::tools

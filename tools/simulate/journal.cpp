@@ -1,10 +1,6 @@
 #include "tools/simulate/journal.h"
 
-#include <fmt/format.h>
-
-#include <cstdlib>
-#include <optional>
-#include <sstream>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "common/base/errors.h"
@@ -12,62 +8,37 @@
 namespace perdure::tools {
 namespace {
 
-std::string sidesOf(const Box& box) {
-  return fmt::format(" {:a} {:a} {:a} {:a}", box.x1, box.y1, box.x2, box.y2);
-}
+using Json = nlohmann::json;
+
+Json sidesOf(const Box& box) { return {box.x1, box.y1, box.x2, box.y2}; }
+
+Box boxOf(const Json& sides) { return {sides.at(0), sides.at(1), sides.at(2), sides.at(3)}; }
 
 std::string lineOf(const JournalEntry& entry) {
-  std::string line;
+  Json sensors = Json::array(), views = Json::array();
   for (const auto& sensor : entry.sensors) {
-    line += fmt::format("{} {:a} {:a} ", sensor.frames, sensor.log_exposure, sensor.log_gain);
+    sensors.push_back({sensor.frames, sensor.log_exposure, sensor.log_gain});
   }
-  line += fmt::format("{}", entry.views.size());
   for (const auto& view : entry.views) {
-    line += fmt::format(" {} {:a}", view.object_id, view.visible_fraction) + sidesOf(view.box);
-    line += view.inside ? " in" + sidesOf(*view.inside) : " whole";
+    views.push_back({view.object_id, view.visible_fraction, sidesOf(view.box)});
+    if (view.inside) views.back().push_back(sidesOf(*view.inside));
   }
-  return line + " .";
+  return Json{sensors, views}.dump();
 }
 
-/// Reads a hexadecimal number, which streams do not support.
-bool take(std::istringstream& line, double& value) {
-  std::string word;
-  if (!(line >> word)) return false;
-  char* end = nullptr;
-  value = std::strtod(word.c_str(), &end);
-  return *end == '\0';
-}
-
-bool take(std::istringstream& line, Box& box) {
-  return take(line, box.x1) && take(line, box.y1) && take(line, box.x2) && take(line, box.y2);
-}
-
-bool take(std::istringstream& line, sim::TruthView& view) {
-  std::string word;
-  if (!(line >> view.object_id) || !take(line, view.visible_fraction) || !take(line, view.box) ||
-      !(line >> word)) {
-    return false;
-  }
-  return word == "whole" || (word == "in" && take(line, view.inside.emplace()));
-}
-
-std::optional<JournalEntry> entryOf(const std::string& text, std::size_t cameras) {
-  std::istringstream line(text);
+/// Throws Json::exception if the line is truncated.
+JournalEntry entryOf(const std::string& text, std::size_t cameras) {
+  const Json line = Json::parse(text);
   JournalEntry entry;
-  entry.sensors.resize(cameras);
-  bool good = true;
-  for (auto& s : entry.sensors) {
-    good = good && line >> s.frames && take(line, s.log_exposure) && take(line, s.log_gain);
+  for (std::size_t i = 0; i < cameras; ++i) {
+    const Json& sensor = line.at(0).at(i);
+    entry.sensors.push_back({sensor.at(0), sensor.at(1), sensor.at(2)});
   }
-  std::size_t count = 0;
-  if (!good || !(line >> count)) return std::nullopt;
-  for (std::size_t i = 0; i < count; ++i) {
-    sim::TruthView v;
-    if (!take(line, v)) return std::nullopt;
-    entry.views.push_back(v);
+  for (const Json& view : line.at(1)) {
+    entry.views.push_back({view.at(0), view.at(1), boxOf(view.at(2)), {}});
+    if (view.size() > 3) entry.views.back().inside = boxOf(view.at(3));
   }
-  std::string end;
-  return line >> end && end == "." ? std::optional(entry) : std::nullopt;
+  return entry;
 }
 
 }  // namespace
@@ -77,9 +48,13 @@ Journal::Journal(const std::filesystem::path& file, std::size_t cameras,
     : file_(file) {
   std::ifstream old(file_);
   for (std::string text; std::getline(old, text);) {
-    const auto entry = entryOf(text, cameras);
-    if (!entry || !is_whole(entries_.size())) break;
-    entries_.push_back(*entry);
+    try {
+      const JournalEntry entry = entryOf(text, cameras);
+      if (!is_whole(entries_.size())) break;
+      entries_.push_back(entry);
+    } catch (const Json::exception&) {
+      break;
+    }
   }
   old.close();
   stream_.open(file_, std::ios::trunc);

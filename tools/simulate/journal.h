@@ -1,6 +1,5 @@
 // Journal of the frames that a run has rendered. The next run continues after an interruption and
-// produces the same bytes. It has one line for each frame, with hexadecimal numbers, exact to the
-// last bit.
+// produces the same bytes. It has a line of JSON for each frame; its numbers are exact.
 #pragma once
 
 #include <cstdint>

@@ -1,27 +1,16 @@
 #include "common/mapping/graph/components.h"
 
-#include <algorithm>
+#include "common/base/algorithms/disjoint_sets.h"
 
 namespace perdure::mapping {
-namespace {
-
-AnchorId firstOf(std::map<AnchorId, AnchorId>& parents, AnchorId id) {
-  while (parents.at(id) != id) id = parents[id] = parents.at(parents.at(id));
-  return id;
-}
-
-}  // namespace
 
 std::map<AnchorId, AnchorId> componentsOf(const PoseGraph& graph) {
-  std::map<AnchorId, AnchorId> first;
-  for (const auto& [id, pose] : graph.poses()) first.emplace_hint(first.end(), id, id);
+  DisjointSets<AnchorId> sets;
+  for (const auto& [id, pose] : graph.poses()) sets.rootOf(id);
   for (const auto& [id, edge] : graph.edges()) {
-    if (graph.weight(id) < kBelieved) continue;
-    const AnchorId a = firstOf(first, edge.a), b = firstOf(first, edge.b);
-    first[std::max(a, b)] = std::min(a, b);
+    if (graph.weight(id) >= kBelieved) sets.join(edge.a, edge.b);
   }
-  for (auto& [id, of] : first) of = firstOf(first, id);
-  return first;
+  return sets.roots();
 }
 
 }  // namespace perdure::mapping

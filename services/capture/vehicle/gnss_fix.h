@@ -1,7 +1,6 @@
 // Position of a GNSS receiver's antenna, as the receiver reports it.
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 #include <optional>
 
@@ -15,13 +14,5 @@ struct GnssFix {
   std::optional<double> course;  ///< course over ground: radians from east, counter-clockwise, (−π,
                                  ///< π]
 };
-
-/// Whether a height is plausible, including heights in the air and below the sea.
-inline bool isHeight(double metres) { return std::abs(metres) <= 1e5; }
-/// Whether a course is valid, in degrees clockwise from north.
-inline bool isCourse(double degrees) { return degrees >= 0.0 && degrees <= 360.0; }
-
-/// Converts degrees clockwise from north to radians counter-clockwise from east, (−π, π].
-double courseOf(double degrees_from_north);
 
 }  // namespace perdure::capture

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 namespace perdure::capture {
 namespace {
@@ -16,6 +17,16 @@ std::optional<double> number(const Json& json, const char* key) {
   if (it == json.end() || !it->is_number()) return std::nullopt;
   const double value = it->get<double>();
   return std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
+
+/// Whether a height is plausible, including heights in the air and below the sea.
+bool isHeight(double metres) { return std::abs(metres) <= 1e5; }
+
+/// Converts degrees clockwise from north to radians counter-clockwise from east, (−π, π].
+double courseOf(double degrees_from_north) {
+  const double from_east = 90.0 - degrees_from_north;
+  const double turns = std::ceil(from_east / 360.0 - 0.5);
+  return (from_east - 360.0 * turns) * std::numbers::pi / 180.0;
 }
 
 /// False for gpsd's statuses of dead reckoning, of a fixed position, and of a simulator.
@@ -55,7 +66,7 @@ Result<std::optional<GnssFix>> readGpsd(std::string_view line, std::int64_t time
   fix.sigma_m = eph > 0.0 ? eph / kSigmasOfEph : kUnstated_m;
   fix.speed = number(json, "speed");
   const auto track = number(json, "track");
-  if (track && isCourse(*track)) fix.course = courseOf(*track);
+  if (track && *track >= 0.0 && *track <= 360.0) fix.course = courseOf(*track);
   return fix;
 }
 

@@ -45,9 +45,8 @@ OpenSocket socketOf(const SpeedConfig& config) {
 }
 
 OpenSocket socketOf(const GnssConfig& config) {
-  if (config.source == "none") return {};
-  if (config.source == "nmea") return udpSocket(addressOf(config));
-  return tcpSocket(addressOf(config), std::string(kGpsdWatch));
+  return config.source == "none" ? OpenSocket()
+                                 : tcpSocket(config.address, std::string(kGpsdWatch));
 }
 
 AnchorSettings anchorSettings(const GnssConfig& config) {
@@ -91,8 +90,7 @@ Result<SpeedReading> readSpeedLine(std::string_view line, double sigma, std::int
                 "a line of speed says more than 200 m/s, which no vehicle has; is it in m/s?");
   }
   if (right && reading.sigma > 0.0) return reading;
-  return fail("speed_malformed",
-              "a line of speed is not \"SPEED\" or \"SPEED SIGMA\" in m/s, nor a sentence of NMEA");
+  return fail("speed_malformed", "a line of speed is not \"SPEED\" or \"SPEED SIGMA\" in m/s");
 }
 
 void checkVehicle(const SpeedConfig& speed, const GnssConfig& gnss) {
@@ -100,7 +98,7 @@ void checkVehicle(const SpeedConfig& speed, const GnssConfig& gnss) {
     (void)wheelSettings(speed.can_signals, speed.can_reverse, speed.sigma);
   }
   if (speed.source == "udp") requireAddress("speed.address", speed.address);
-  if (gnss.source != "none") requireAddress("gnss.address", addressOf(gnss));
+  if (gnss.source != "none") requireAddress("gnss.address", gnss.address);
 }
 
 Vehicle::Vehicle(const SpeedConfig& speed, const GnssConfig& gnss, Outputs outputs)
@@ -131,15 +129,10 @@ Vehicle::Vehicle(const SpeedConfig& speed, const GnssConfig& gnss, Outputs outpu
         });
   }
   if (gnss_socket) {
-    const bool datagrams = gnss.source == "nmea";
     const auto lines = [this](std::string_view line, std::int64_t t) { onGnssLine(line, t); };
-    gnss_stream_ = std::make_unique<SocketStream>("gnss", gnss.source + " at " + addressOf(gnss),
-                                                  kGnssSilence, std::move(gnss_socket),
-                                                  [this, datagrams, lines](const Packet& packet) {
-                                                    gnss_lines_.add(packet, lines);
-                                                    if (datagrams)
-                                                      gnss_lines_.end(packet.time_ns, lines);
-                                                  });
+    gnss_stream_ = std::make_unique<SocketStream>(
+        "gnss", "gpsd at " + gnss.address, kGnssSilence, std::move(gnss_socket),
+        [this, lines](const Packet& packet) { gnss_lines_.add(packet, lines); });
   }
 }
 
@@ -163,27 +156,15 @@ void Vehicle::onCan(const Packet& packet) {
 }
 
 void Vehicle::onSpeedLine(std::string_view line, std::int64_t time_ns) {
-  if (line.front() == '$') {
-    const auto said = speed_nmea_.read(line, time_ns);
-    if (!said) return count(Of::kSpeed, said.error());
-    if (said->speed) said_ = SpeedReading{time_ns, *said->speed, speed_.sigma};
-    return;
-  }
   const auto reading = readSpeedLine(line, speed_.sigma, time_ns);
   if (!reading) return count(Of::kSpeed, reading.error());
   said_ = *reading;
 }
 
 void Vehicle::onGnssLine(std::string_view line, std::int64_t time_ns) {
-  if (gnss_.source == "gpsd") {
-    const auto fix = readGpsd(line, time_ns);
-    if (!fix) return count(Of::kPlace, fix.error());
-    if (*fix) take(**fix);
-    return;
-  }
-  const auto said = gnss_nmea_.read(line, time_ns);
-  if (!said) return count(Of::kPlace, said.error());
-  if (said->fix) take(*said->fix);
+  const auto fix = readGpsd(line, time_ns);
+  if (!fix) return count(Of::kPlace, fix.error());
+  if (*fix) take(**fix);
 }
 
 void Vehicle::take(GnssFix fix) {
@@ -228,8 +209,7 @@ std::string Vehicle::silence() const {
   };
   std::string all;
   if (flows(gnss_stream_) && now_ns - fix_ns_ > std::chrono::nanoseconds(kGnssSilence).count()) {
-    all = "What " + gnss_stream_->state().name() +
-          " says makes no fix: of NMEA, RMC and GGA of one time are needed.";
+    all = gnss_stream_->state().name() + " reports no fix.";
   }
   const auto& of_speed = speed_.source == "gnss" ? gnss_stream_ : speed_stream_;
   if (flows(of_speed) && now_ns - speed_ns_ > std::chrono::nanoseconds(kGnssSilence).count()) {

@@ -1,4 +1,4 @@
-// Speed of the vehicle and its position on Earth, from a CAN bus, UDP lines or a GNSS receiver.
+// Speed of the vehicle and its position on Earth, from a CAN bus, UDP lines or gpsd.
 #pragma once
 
 #include <atomic>
@@ -12,7 +12,6 @@
 
 #include "services/capture/config.h"
 #include "services/capture/vehicle/earth_anchor.h"
-#include "services/capture/vehicle/nmea.h"
 #include "services/capture/vehicle/socket_stream.h"
 #include "services/capture/vehicle/wheel_speed.h"
 
@@ -57,7 +56,6 @@ class Vehicle {
   const GnssConfig gnss_;
   const Outputs outputs_;
   Lines speed_lines_, gnss_lines_;
-  NmeaReader speed_nmea_, gnss_nmea_;
   std::optional<SpeedReading> said_;  ///< last reading of a datagram's lines
   EarthAnchor anchor_;
   std::atomic<bool> backwards_{false};

@@ -4,10 +4,15 @@
 #include <filesystem>
 #include <string>
 
+#include "common/base/result.h"
+
 namespace perdure::map_store {
 
 /// Suffixes of the files that SQLite may leave beside a database.
 inline constexpr const char* kBeside[] = {"-wal", "-shm", "-journal"};
+
+/// Throws StartupError: "The map PATH cannot be written (why); the fix."
+[[noreturn]] void cannotWriteMap(const std::string& path, const Reason& reason);
 
 /// The file `path`.part. The destructor removes it and its SQLite files unless it was renamed.
 class DraftFile {
@@ -17,13 +22,12 @@ class DraftFile {
   DraftFile(const DraftFile&) = delete;
   DraftFile& operator=(const DraftFile&) = delete;
   const std::string& path() const { return path_; }
+  /// Syncs the draft and renames it to its path. Throws as cannotWriteMap() does.
+  void keep() const;
 
  private:
   void remove() const;
-  std::string path_;
+  std::string final_, path_;
 };
-
-/// Syncs a file or a folder to disk. Not every file system can sync a folder.
-bool sync(const std::filesystem::path& path);
 
 }  // namespace perdure::map_store

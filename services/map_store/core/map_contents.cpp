@@ -190,15 +190,6 @@ void completeFile(const WholeMap& map, const std::string& path) {
   need(connection.execute("PRAGMA journal_mode=DELETE"));
 }
 
-[[noreturn]] void cannotWriteWhole(const std::string& path, const Reason& reason) {
-  const bool full = exitCodeOf(reason) == ExitCode::kInputOutput;
-  throw StartupError(exitCodeOf(reason),
-                     "The map " + path + " cannot be written (" + reason.code + ": " +
-                         reason.detail + "); " +
-                         (full ? "free space there, or name a file on another disk."
-                               : "name a file in a folder that this user may write."));
-}
-
 void writeWholeDraft(const WholeMap& map, const std::string& path, const std::string& draft,
                      std::int64_t max_size_mb) {
   const Objects working = emptyWorkingSet(map);
@@ -209,7 +200,7 @@ void writeWholeDraft(const WholeMap& map, const std::string& path, const std::st
              .write(wholeBatch(map, working, graph)));
     completeFile(map, draft);
   });
-  if (!done) cannotWriteWhole(path, done.error());
+  if (!done) cannotWriteMap(path, done.error());
 }
 
 }  // namespace
@@ -232,7 +223,7 @@ void checkNewFile(const std::string& path, bool replace) {
   const fs::path folder = fs::absolute(path).parent_path();
   fs::create_directories(folder, error);
   if (!error && access(folder.c_str(), W_OK) != 0) error = {errno, std::generic_category()};
-  if (error) cannotWriteWhole(path, {"cannot_open", folder.string() + ": " + error.message()});
+  if (error) cannotWriteMap(path, {"cannot_open", folder.string() + ": " + error.message()});
 }
 
 void writeWholeMap(const WholeMap& map, const std::string& path, bool replace,
@@ -240,13 +231,7 @@ void writeWholeMap(const WholeMap& map, const std::string& path, bool replace,
   checkNewFile(path, replace);
   const DraftFile draft(path);
   writeWholeDraft(map, path, draft.path(), max_size_mb);
-  if (!sync(draft.path())) cannotWriteWhole(path, {"io_error", "it cannot be synced"});
-  // SQLite would take the log of the replaced map for the log of this one.
-  std::error_code error;
-  for (const char* suffix : kBeside) fs::remove(path + suffix, error);
-  fs::rename(draft.path(), path, error);
-  if (error) cannotWriteWhole(path, {"io_error", error.message()});
-  (void)sync(fs::absolute(path).parent_path());  // not every file system can sync a folder
+  draft.keep();
 }
 
 }  // namespace perdure::map_store

@@ -47,10 +47,6 @@ std::string mendOfUse(const Reason& reason) {
                                              ": " + reason.detail + "); " + mendOfUse(reason));
 }
 
-bool damaged(const Reason& reason) {
-  return reason.code == "corrupt" || reason.code == "not_a_database";
-}
-
 /// A file that begins neither like SQLite nor with zeros belongs to another program.
 bool beginsLikeAnotherFile(const std::string& path) {
   static constexpr std::array<char, 16> kMagic = {'S', 'Q', 'L', 'i', 't', 'e', ' ', 'f',
@@ -74,18 +70,19 @@ std::string setAside(const std::string& path) {
   return aside;
 }
 
-void refuseForeign(const std::string& path, const Identity& identity) {
+constexpr char kOtherPath[] = "set store.path to another file";
+constexpr char kGiveMap[] = "give the file that map_store writes (its store.path)";
+
+void refuseForeign(const std::string& path, const Identity& identity, const std::string& mend) {
   if (identity.application != kApplicationId) {
     throw StartupError(ExitCode::kConfiguration,
-                       path +
-                           " is another program's database, not a map of Perdure's; set "
-                           "store.path to another file.");
+                       path + " is not a map of Perdure's; " + mend + ".");
   }
   if (identity.version > kSchemaVersion) {
     throw StartupError(ExitCode::kConfiguration,
                        "The map " + path + " has schema " + std::to_string(identity.version) +
                            ", this program knows up to " + std::to_string(kSchemaVersion) +
-                           "; use the newer Perdure, or set store.path to another file.");
+                           "; use the newer Perdure, or " + mend + ".");
   }
 }
 
@@ -126,7 +123,7 @@ Result<Connection> tryOpen(const StoreOptions& options) {
   return attempt([&] {
     auto connection = need(Connection::open(options.path, Connection::Mode::kReadWriteCreate));
     const Identity identity = need(identityOf(connection));
-    if (!identity.empty()) refuseForeign(options.path, identity);
+    if (!identity.empty()) refuseForeign(options.path, identity, kOtherPath);
     if (options.check_at_start) need(wholeFileIsSound(connection));
     prepareForWriting(connection, options);
     identity.empty() ? create(connection) : adopt(connection, identity);
@@ -164,7 +161,7 @@ OpenedStore openStore(const StoreOptions& options) {
   auto opened = tryOpen(options);
   if (opened) return {std::move(*opened), {}};
   const Reason reason = opened.error();
-  if (!damaged(reason)) cannotUse(options.path, reason);
+  if (!isDamage(reason)) cannotUse(options.path, reason);
   if (beginsLikeAnotherFile(options.path)) {
     throw StartupError(ExitCode::kConfiguration,
                        options.path + " is not a database; set store.path to another file.");
@@ -178,11 +175,29 @@ OpenedStore openStore(const StoreOptions& options) {
               " .recover"};
 }
 
+bool isDamage(const Reason& reason) {
+  return reason.code == "corrupt" || reason.code == "not_a_database";
+}
+
+void cannotReadMap(const std::string& path, const Reason& reason) {
+  const std::string why = " (" + reason.code + ": " + reason.detail + ")";
+  if (reason.code == "not_a_database") {
+    throw StartupError(ExitCode::kConfiguration,
+                       path + " is not a map of Perdure's, or its beginning is damaged" + why +
+                           "; " + kGiveMap + ".");
+  }
+  if (reason.code == "corrupt") {
+    throw StartupError(ExitCode::kUnavailable,
+                       "The map " + path + " cannot be read: it is damaged" + why +
+                           "; give another one. What can be read of it: sqlite3 " + path +
+                           " .recover");
+  }
+  throw StartupError(ExitCode::kUnavailable, "The map " + path + " cannot be read" + why + ".");
+}
+
 Connection openStoreForReading(const std::string& path) {
   if (!fs::exists(path)) {
-    throw StartupError(ExitCode::kUnavailable, "There is no map " + path +
-                                                   "; give the file that "
-                                                   "map_store writes (its store.path).");
+    throw StartupError(ExitCode::kUnavailable, "There is no map " + path + "; " + kGiveMap + ".");
   }
   if (fs::is_directory(path)) {
     throw StartupError(ExitCode::kUnavailable,
@@ -195,12 +210,9 @@ Connection openStoreForReading(const std::string& path) {
   }
   auto connection = Connection::open(path, Connection::Mode::kReadOnly);
   const auto identity = connection.and_then(identityOf);
-  if (!identity) {
-    throw StartupError(ExitCode::kUnavailable,
-                       "The map " + path + " cannot be read (" + identity.error().detail + ").");
-  }
-  refuseForeign(path, *identity);
-  return std::move(*connection);
+  if (!identity) cannotReadMap(path, identity.error());
+  refuseForeign(path, *identity, kGiveMap);
+  return *std::move(connection);
 }
 
 }  // namespace perdure::map_store

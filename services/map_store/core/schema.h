@@ -42,7 +42,11 @@ Result<void> wholeFileIsSound(const Connection& connection);
 /// the file is not a map of ours, or a newer version wrote it.
 OpenedStore openStore(const StoreOptions& options);
 
-/// Opens an existing map read-only, even while the service runs. Throws StartupError.
+/// Whether the content of a file is the cause, rather than its disk or its folder.
+bool isDamage(const Reason& reason);
+/// Throws StartupError with the fix.
+[[noreturn]] void cannotReadMap(const std::string& path, const Reason& reason);
+/// Opens an existing map read-only, even while the service runs. Throws as cannotReadMap() does.
 Connection openStoreForReading(const std::string& path);
 
 }  // namespace perdure::map_store

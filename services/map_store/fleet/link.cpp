@@ -8,6 +8,8 @@
 #include <bit>
 #include <cctype>
 
+#include "common/base/algorithms/utf8.h"
+
 namespace perdure::map_store::fleet {
 namespace {
 
@@ -29,26 +31,10 @@ std::uint64_t fromBigEndian(const char* bytes) {
   return value;
 }
 
-/// The number of bytes of the UTF-8 character at the start of `text`; 0 if there is none.
-std::size_t lengthOfCharacter(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(text[i]); };
-  const std::uint8_t first = byte(0);
-  if (first < 0x80) return first == 0 ? 0 : 1;
-  const std::size_t length = first >= 0xf0 ? 4 : first >= 0xe0 ? 3 : 2;
-  if (first < 0xc2 || first > 0xf4 || text.size() < length) return 0;
-  for (std::size_t i = 1; i < length; ++i) {
-    if ((byte(i) & 0xc0) != 0x80) return 0;
-  }
-  const std::uint8_t second = byte(1);
-  const bool overlong = (first == 0xe0 && second < 0xa0) || (first == 0xf0 && second < 0x90);
-  const bool beyond = (first == 0xed && second > 0x9f) || (first == 0xf4 && second > 0x8f);
-  return overlong || beyond ? 0 : length;
-}
-
 std::string onlyUtf8(std::string_view text) {
   std::string clean;
   while (!text.empty()) {
-    const std::size_t length = lengthOfCharacter(text);
+    const std::size_t length = text.front() == '\0' ? 0 : lengthOfCharacter(text);
     clean += length == 0 ? "?" : std::string(text.substr(0, length));
     text.remove_prefix(std::max<std::size_t>(length, 1));
   }

@@ -6,6 +6,7 @@
 #include <set>
 #include <tuple>
 
+#include "common/base/algorithms/disjoint_sets.h"
 #include "tools/base/quantile.h"
 #include "tools/evaluate/trajectory_score.h"
 
@@ -44,19 +45,6 @@ std::optional<JudgedLoop> judge(const mapping::SavedEdge& saved, const SavedMap&
                loop.off_rad > options.wrong_rad;
   return loop;
 }
-
-/// Connected parts of the graph, each represented by one of its anchors (union-find).
-class Parts {
- public:
-  void join(AnchorId a, AnchorId b) { parent_[of(b)] = of(a); }
-  AnchorId of(AnchorId id) {
-    AnchorId& parent = parent_.try_emplace(id, id).first->second;
-    return parent == id ? id : parent = of(parent);
-  }
-
- private:
-  std::map<AnchorId, AnchorId> parent_;
-};
 
 /// RMSE over all parts, each aligned separately.
 double alignedError(const std::map<AnchorId, std::vector<PosePair>>& parts) {
@@ -141,7 +129,7 @@ LoopJudgement judgeLoops(const SavedMap& map, const replay::PoseFile& truth,
 }
 
 AnchorErrors scoreAnchors(const SavedMap& map, const replay::PoseFile& truth) {
-  Parts sessions, joined;
+  DisjointSets<AnchorId> sessions, joined;
   for (const auto& [id, saved] : map.edges) {
     const bool odometry = saved.edge.kind == mapping::EdgeKind::kOdometry;
     if (odometry || saved.weight >= mapping::kBelieved) joined.join(saved.edge.a, saved.edge.b);
@@ -162,8 +150,8 @@ AnchorErrors scoreAnchors(const SavedMap& map, const replay::PoseFile& truth) {
     const auto T_WA = trueLevel(truth, anchor.stamp.time);
     if (!T_WA) continue;
     ++errors.anchors;
-    by_odometry[sessions.of(id)].push_back({anchor.stamp.time, chained[id].rigid(), *T_WA});
-    by_map[joined.of(id)].push_back({anchor.stamp.time, saved.T_MA.rigid(), *T_WA});
+    by_odometry[sessions.rootOf(id)].push_back({anchor.stamp.time, chained[id].rigid(), *T_WA});
+    by_map[joined.rootOf(id)].push_back({anchor.stamp.time, saved.T_MA.rigid(), *T_WA});
   }
   errors.odometry_m = alignedError(by_odometry);
   errors.map_m = alignedError(by_map);

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "common/base/algorithms/disjoint_sets.h"
 #include "services/map_store/core/graph/graph_tables.h"
 
 namespace perdure::map_store {
@@ -174,36 +175,17 @@ void takeFacts(SavedGraph& graph, const std::set<mapping::SameObject>& facts) {
   }
 }
 
-/// Finds the first anchor of each component, given the edges between anchors.
-class Components {
- public:
-  explicit Components(const SavedMap& map) {
-    for (const auto& [id, anchor] : map.anchors) first_.emplace_hint(first_.end(), id, id);
-    for (const auto& [id, saved] : map.edges) join(saved.edge.a, saved.edge.b);
-  }
-  AnchorId firstOf(AnchorId id) {
-    while (first_.at(id) != id) id = first_[id] = first_.at(first_.at(id));
-    return id;
-  }
-
- private:
-  void join(AnchorId a, AnchorId b) {
-    const auto [first, second] = std::minmax({firstOf(a), firstOf(b)});
-    first_[second] = first;
-  }
-  std::map<AnchorId, AnchorId> first_;
-};
-
 /// Fixes the first anchor of each component without a fixed anchor: that anchor, or an edge to it,
 /// may have been left out.
 void holdEachComponent(SavedMap& map) {
-  Components components(map);
+  DisjointSets<AnchorId> components;
+  for (const auto& [id, saved] : map.edges) components.join(saved.edge.a, saved.edge.b);
   std::set<AnchorId> held;
   for (const auto& [id, saved] : map.anchors) {
-    if (saved.held_fast) held.insert(components.firstOf(id));
+    if (saved.held_fast) held.insert(components.rootOf(id));
   }
   for (auto& [id, saved] : map.anchors) {
-    if (components.firstOf(id) == id && !held.contains(id)) saved.held_fast = true;
+    if (components.rootOf(id) == id && !held.contains(id)) saved.held_fast = true;
   }
 }
 

@@ -1,6 +1,5 @@
 // Tests perdure-capture with live sensors: an IMU behind an iiod, and no camera.
 #include <arpa/inet.h>
-#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -8,6 +7,7 @@
 #include <cmath>
 #include <fstream>
 #include <memory>
+#include <string_view>
 
 #include "common/replay/files/rig_file.h"
 #include "tests/process/support.h"
@@ -161,27 +161,42 @@ class Vehicle {
   int socket_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
 };
 
-/// Returns RMC and GGA sentences of a drive to the east at 10 m/s.
-std::string sentencesOf(int second) {
-  const auto whole = [](const std::string& text) {
-    unsigned sum = 0;
-    for (const char c : text) sum ^= static_cast<unsigned char>(c);
-    return fmt::format("${}*{:02X}\r\n", text, sum);
-  };
-  return whole(fmt::format("GNRMC,1200{:02d}.00,A,4900.0,N,00824.0,E,19.438,90.0,010126,,,A",
-                           second)) +
-         whole(fmt::format("GNGGA,1200{:02d}.00,4900.0,N,00824.0,E,1,12,0.7,65.0,M,45.0,M,,",
-                           second));
-}
+/// Plays gpsd for one client: a drive to the east at 10 m/s.
+class Gpsd {
+ public:
+  explicit Gpsd(const std::string& host) {
+    sockaddr_in at{};
+    at.sin_family = AF_INET;
+    (void)inet_aton(host.c_str(), &at.sin_addr);
+    at.sin_port = htons(2947);
+    (void)::bind(socket_, reinterpret_cast<const sockaddr*>(&at), sizeof at);
+    (void)::listen(socket_, 1);
+  }
+  ~Gpsd() {
+    ::close(client_);
+    ::close(socket_);
+  }
+  void report() {
+    constexpr std::string_view kFix =
+        R"({"class":"TPV","mode":3,"lat":49.0,"lon":8.4,"altHAE":110,"eph":4,"speed":10,"track":90})"
+        "\n";
+    if (client_ < 0) client_ = ::accept4(socket_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    if (client_ >= 0) (void)::send(client_, kFix.data(), kFix.size(), MSG_NOSIGNAL);
+  }
+
+ private:
+  int socket_ = ::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0), client_ = -1;
+};
 
 TEST_F(LiveProcess, GivesTheSpeedAndTheVehiclesPlaceOnEarth) {
   const Vehicle vehicle(address_);
+  Gpsd gpsd(address_);
   std::vector<SpeedSample> speeds;
   bus::Reader<SpeedSample> speed(participant_, bus::kTopic<SpeedSample>);
   loop_.on(speed, [&](const SpeedSample& s) { speeds.push_back(s); });
   const Child capture(
       command({"imu.uri=ip:" + address_, "speed.source=udp", "speed.address=" + address_ + ":5600",
-               "gnss.source=nmea", "gnss.address=" + address_ + ":10110"}),
+               "gnss.source=gpsd", "gnss.address=" + address_ + ":2947"}),
       folder_.file("log"));
   ASSERT_TRUE(runUntil(
       loop_, [&] { return last_health_.message.find("says nothing") != std::string::npos; }))
@@ -192,7 +207,7 @@ TEST_F(LiveProcess, GivesTheSpeedAndTheVehiclesPlaceOnEarth) {
   ASSERT_TRUE(runUntil(loop_,
                        [&] {
                          vehicle.send(5600, "10.0 0.05");
-                         if (++calls % 4 == 0) vehicle.send(10110, sentencesOf(calls / 4 % 60));
+                         if (++calls % 4 == 0) gpsd.report();
                          return calibration_.anchor.has_value() && speeds.size() >= 20;
                        }))
       << last_health_.message << capture.log();

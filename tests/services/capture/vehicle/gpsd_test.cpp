@@ -2,6 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include <numbers>
+#include <string>
+
 namespace perdure::capture {
 namespace {
 
@@ -50,6 +53,19 @@ TEST(Gpsd, SaysWhatIsNone) {
   EXPECT_EQ(code(R"({"class":"TPV","mode":3,"lat":0,"lon":0,"alt":3})"), "gpsd_no_fix");
   EXPECT_EQ(code(R"({"class":"TPV","mode":3,"lat":91,"lon":2,"alt":3})"), "gpsd_malformed");
   EXPECT_EQ(code(R"({"class":"TPV","mode":3,"lat":1,"lon":2,"alt":1e300})"), "gpsd_malformed");
+}
+
+TEST(Gpsd, CoursesAreFromEastCounterClockwise) {
+  const auto course = [](const std::string& track) {
+    const auto fix =
+        readGpsd(R"({"class":"TPV","mode":3,"lat":1,"lon":2,"alt":3,"track":)" + track + "}", 1);
+    return (*fix)->course.value() * 180.0 / std::numbers::pi;
+  };
+  EXPECT_NEAR(course("0"), 90.0, 1e-9);
+  EXPECT_NEAR(course("90"), 0.0, 1e-9);
+  EXPECT_NEAR(course("180"), -90.0, 1e-9);
+  EXPECT_NEAR(course("270"), 180.0, 1e-9);
+  EXPECT_NEAR(course("359"), 91.0, 1e-9);
 }
 
 TEST(Gpsd, ATrackThatIsNoneIsLeftOut) {
