@@ -281,7 +281,9 @@ std::string Node::note() const {
       model && model->outline_styles && history_.belief().learned.extents.outlines(model->hash)) {
     note = "boxes enclose the outlines of objects";
   }
-  say("boxes", history_.belief().learned.sides.ratio(models_.used(), assumed.prior_sides));
+  const SideScales sides = history_.belief().learned.sides.scales(models_.used());
+  const double lasts = assumed.bias_share;
+  say("boxes", (1.0 - lasts) * sides.noise + lasts * sides.lasting);
   say("azimuths", history_.belief().learned.azimuths.ratio(models_.used(), assumed.prior_azimuths));
   return note;
 }

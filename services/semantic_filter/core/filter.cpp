@@ -23,7 +23,7 @@ namespace {
 
 NoiseScale noiseScaleOf(const Belief& belief, const FrameInput& input, const BoxParameters& box) {
   const std::uint64_t model = input.model->hash;
-  return {model, belief.learned.sides.ratio(model, box.prior_sides),
+  return {model, belief.learned.sides.scales(model),
           belief.learned.azimuths.ratio(model, box.prior_azimuths)};
 }
 
@@ -31,8 +31,8 @@ NoiseScale noiseScaleOf(const Belief& belief, const FrameInput& input, const Box
 FrameInput withLearnedNoise(const Belief& belief, FrameInput input, const BoxParameters& box) {
   const NoiseScale scale = noiseScaleOf(belief, input, box);
   for (BoxDetection& detection : *input.boxes) {
-    detection.z.variance *= scale.noise;
-    detection.z.lasting *= scale.lasting();
+    detection.z.variance *= scale.sides.noise;
+    detection.z.lasting *= scale.sides.lasting;
   }
   return input;
 }

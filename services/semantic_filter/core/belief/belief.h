@@ -17,7 +17,7 @@ namespace perdure::semantic_filter {
 /// Learned noise scales, ground roughness and shares of movers. They are kept when a new `world`
 /// begins.
 struct Learned {
-  NoiseScales sides{4000.0};    ///< scales of the variances of box sides
+  SideVariances sides;
   NoiseScales azimuths{200.0};  ///< scales of the variances of azimuths
   GroundRoughness roughness_scale = {};
   MoverShares movers = {};

@@ -21,6 +21,32 @@ T& entryOf(std::vector<std::pair<std::uint64_t, T>>& list, std::uint64_t model) 
 
 constexpr double kLeastRatio = 0.04, kMostRatio = 9.0;
 
+SideScales SideVariances::scales(std::uint64_t model) const {
+  for (const auto& [of, estimate] : estimates_) {
+    if (of == model) return {std::exp(estimate.logs[0]), std::exp(estimate.logs[1])};
+  }
+  return {};
+}
+
+void SideVariances::learn(std::uint64_t model, const SideEvidence& evidence, double assumed) {
+  // A network has other errors on another road.
+  constexpr double kRemembered = 4000.0;  // sides
+  // Nothing but boxes of the same network tells how much of an error lasts. So the assumed share
+  // weighs less than the assumed noise.
+  constexpr double kLastingWeight = 0.1;
+  if (assumed <= 0.0 || !evidence.gradient.allFinite() || !(evidence.information.trace() > 0.0)) {
+    return;
+  }
+  Estimate& e = entryOf(estimates_, model);
+  e.information += evidence.information;
+  Eigen::Matrix2d information = e.information;
+  information(0, 0) += assumed;
+  information(1, 1) += kLastingWeight * assumed;
+  const Eigen::Vector2d next = e.logs + information.inverse() * evidence.gradient;
+  e.logs = next.cwiseMax(std::log(kLeastRatio)).cwiseMin(std::log(kMostRatio));
+  if (e.information(0, 0) > kRemembered) e.information *= kRemembered / e.information(0, 0);
+}
+
 double NoiseScales::ratio(std::uint64_t model, double assumed) const {
   if (assumed <= 0.0) return 1.0;
   for (const auto& [of, heard] : sums_) {

@@ -1,6 +1,7 @@
-// Parameters that the filter learns during a drive: noise scales of networks and shares of movers.
+// Parameters that the filter learns during a drive: variances of networks and shares of movers.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -18,8 +19,37 @@ struct ResidualRatio {
   double count = 0.0;  ///< number of new residuals; keyframes of an earlier fit do not count again
 };
 
-/// Noise scale of box sides, or of azimuths: squared ratio of true to assumed errors, for each
-/// network. Derivation: tools/docs/maths/noise_scale.md.
+/// True over assumed variances of the sides of boxes: of the errors that each box has anew, and of
+/// those that last while the view hardly changes (b).
+struct SideScales {
+  double noise = 1.0, lasting = 1.0;
+};
+
+/// What the residuals of one fit tell about the logarithms of both scales [noise, lasting], at the
+/// scales that the fit used.
+struct SideEvidence {
+  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();  ///< Fisher's, doubled: about sides
+  Eigen::Vector2d gradient = Eigen::Vector2d::Zero();     ///< of the log likelihood, doubled
+};
+
+/// The scales of the sides for each network, by Fisher scoring. Derivation:
+/// tools/docs/maths/noise_scale.md.
+class SideVariances {
+ public:
+  SideScales scales(std::uint64_t model) const;
+  /// The assumption weighs `assumed` sides; 0: the scales stay 1.
+  void learn(std::uint64_t model, const SideEvidence& evidence, double assumed);
+
+ private:
+  struct Estimate {
+    Eigen::Vector2d logs = Eigen::Vector2d::Zero();
+    Eigen::Matrix2d information = Eigen::Matrix2d::Zero();  ///< of all fits, without the assumption
+  };
+  std::vector<std::pair<std::uint64_t, Estimate>> estimates_;  ///< a list, because networks are few
+};
+
+/// Noise scale of azimuths: squared ratio of true to assumed errors, for each network. Derivation:
+/// tools/docs/maths/noise_scale.md.
 class NoiseScales {
  public:
   /// Remembers at most `remembered` residuals, because a network has other errors on another road.

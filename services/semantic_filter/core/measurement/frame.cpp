@@ -24,7 +24,7 @@ ViewWalk viewWalkOf(const FrameContext& frame) {
   walk.focal = frame.view.camera->fx();
   const BoxNoise noise =
       frame.model ? boxNoise(*frame.model, frame.view.camera->width()) : BoxNoise{};
-  walk.lasting = lastingError(box, noise) * std::sqrt(frame.noise_scale.lasting());
+  walk.lasting = lastingError(box, noise) * std::sqrt(frame.noise_scale.sides.lasting);
   walk.bias = biasScales(box);
   walk.unmapped_occluder = visibility.unmapped_occluder;
   walk.occluder = {visibility.occluder_angle, kNever, kNever};

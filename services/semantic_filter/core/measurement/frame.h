@@ -60,11 +60,8 @@ struct FrameInput {
 /// Noise scales of the boxes and azimuths of one network.
 struct NoiseScale {
   std::uint64_t model = 0;
-  double noise = 1.0;    ///< of the variances of the sides: NoiseScales::ratio
+  SideScales sides = {};
   double azimuth = 1.0;  ///< of the variances of the azimuths; only batch estimates use it
-  /// The same for b. An error that all boxes of an object share resembles an error of its place
-  /// and size. So residuals show the scale of b by its square root only.
-  double lasting() const { return std::sqrt(noise); }
 };
 
 /// The viewpoint of a frame. All keyframes of the frame share it. It owns its camera.

@@ -324,6 +324,18 @@ SideColumns<4> BatchProblem::biasNow(const State& x, const Stack& s, const Eigen
   return c;
 }
 
+PerSide BatchProblem::noiseOf(const Stack& s, const PerKeyframe& inflations) const {
+  PerSide result = PerSide::Zero(s.rows.rows());
+  for (std::size_t i = 0; i < batch_.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    result.segment<4>(4 * k) = inflations[k] * noise(*batch_.keyframes()[i]);
+    for (int a = 0; a < 4; ++a) {
+      if (!s.counts[i][a]) result[4 * k + a] = 0.0;
+    }
+  }
+  return result;
+}
+
 SideColumns<6> BatchProblem::poseNow(const Stack& s) const {
   SideColumns<6> c(s.rows.rows(), 6);
   for (std::size_t i = 0; i < batch_.size(); ++i) {
@@ -335,12 +347,12 @@ SideColumns<6> BatchProblem::poseNow(const Stack& s) const {
 
 Eigen::Vector4d BatchProblem::noise(const Keyframe& k) const {
   const NoiseScale &then = k.from->noise_scale, &now = frame_.noise_scale;
-  return (then.model == now.model ? now.noise / then.noise : 1.0) * k.z.variance;
+  return (then.model == now.model ? now.sides.noise / then.sides.noise : 1.0) * k.z.variance;
 }
 
 Eigen::Vector4d BatchProblem::lasting(const Keyframe& k) const {
   const NoiseScale &then = k.from->noise_scale, &now = frame_.noise_scale;
-  return (then.model == now.model ? now.lasting() / then.lasting() : 1.0) * k.z.lasting;
+  return (then.model == now.model ? now.sides.lasting / then.sides.lasting : 1.0) * k.z.lasting;
 }
 
 double BatchProblem::age(std::size_t i) const {

@@ -138,13 +138,15 @@ class BatchProblem {
   /// Returns the covariance of all rows with the present b of deviations `sigma` (widths, heights).
   SideColumns<4> biasNow(const State& x, const Stack& s, const Eigen::Vector4d& sigma,
                          const PerKeyframe& inflations) const;
+  /// Returns the variances of the noise in all rows, widened; 0 for a side that does not count.
+  PerSide noiseOf(const Stack& s, const PerKeyframe& inflations) const;
   /// Returns the covariance of all rows with the present pose error.
   SideColumns<6> poseNow(const Stack& s) const;
 
  private:
   /// Returns the seconds from a keyframe to the newest one, whose time the position has; 0 at rest.
   double age(std::size_t keyframe) const;
-  /// Return the variances of the sides, px², with the present noise scale of the network.
+  /// Return the variances of the sides, px², with the present scales of the network.
   Eigen::Vector4d noise(const Keyframe& k) const;
   Eigen::Vector4d lasting(const Keyframe& k) const;
   /// Returns the covariance of the sides of keyframe i and an earlier or equal j that white

@@ -121,6 +121,22 @@ bool descend(const BatchProblem& model, Fit& fit, Damping& damping, double& pred
   return false;
 }
 
+/// Returns the widened covariance of b in all rows. `noise`: widened; 0 for a side that does not
+/// count. For an object at rest.
+SideMatrix lastingPart(const Fit& fit, const PerSide& noise) {
+  SideMatrix part = fit.covariance->own.selfadjointView<Eigen::Lower>();
+  for (Eigen::Index j = 0; j < fit.inflations.size(); ++j) {
+    for (Eigen::Index i = 0; i < fit.inflations.size(); ++i) {
+      part.block<4, 4>(4 * i, 4 * j) *= std::sqrt(fit.inflations[i] * fit.inflations[j]);
+    }
+  }
+  part.diagonal() -= noise;
+  for (Eigen::Index row = 0; row < noise.size(); ++row) {
+    if (noise[row] == 0.0) part(row, row) = 0.0;
+  }
+  return part;
+}
+
 bool isOneOf(const ScratchVector<const Hypothesis*>& found, const State& x) {
   return std::any_of(found.begin(), found.end(), [&](const Hypothesis* mode) {
     Hypothesis h = *mode;
@@ -261,12 +277,34 @@ std::size_t MapFit::sides() const {
   return sum;
 }
 
-ResidualRatio MapFit::residualRatio() const {
+SideEvidence MapFit::sideEvidence() const {
   // Robust weights, at most one, leave this share of a squared four-dimensional residual.
   constexpr double kShareAfterWeights = 0.83;
-  const double free = static_cast<double>(sides()) - modelOf().dim();
-  if (free <= 0.0) return {};
-  return {frame_->noise_scale.noise * fit_->squaredResidual() / (kShareAfterWeights * free), free};
+  constexpr double kMost = 9.0;  // times the expected squares; one fit must not decide alone
+  const BatchProblem model = modelOf();
+  const Fit& fit = *fit_;
+  const SideRows::ConstColsBlockXpr J = fit.whitened.leftCols(model.dim());
+  const Cholesky G(model.quadratic(fit.x, gramOf(fit.whitened)).G);
+  if (!G.positive()) return {};
+  const SideRows r = fit.whitened.rightCols<1>();
+  // The two parts of R = noise + lasting + pose that have a scale.
+  const PerSide noise = model.noiseOf(fit.stack, fit.inflations);
+  SideMatrix parts[2] = {noise.asDiagonal(), lastingPart(fit, noise)};
+  SideEvidence evidence;
+  for (int c = 0; c < 2; ++c) {
+    const SideMatrix M = fit.R->whiten(fit.R->whiten(parts[c]).transpose().eval());
+    const double squares = (M * r).cwiseProduct(r).sum() / kShareAfterWeights;
+    // What the estimate of the geometry takes away: Q M, where Q = I - J G⁻¹ Jᵀ.
+    parts[c] = M - J * G.solve((J.transpose() * M).eval());
+    const double expected = parts[c].trace();
+    evidence.gradient[c] = std::min(squares, kMost * expected) - expected;
+  }
+  for (int c = 0; c < 2; ++c) {
+    for (int d = 0; d < 2; ++d) {
+      evidence.information(c, d) = parts[c].cwiseProduct(parts[d].transpose()).sum();
+    }
+  }
+  return evidence;
 }
 
 ResidualRatio MapFit::azimuthResidualRatio() const {

@@ -28,9 +28,10 @@ class MapFit {
   const Hypothesis& hypothesis() const { return hypothesis_; }
   /// Returns the share of keyframes that contradict the fit.
   double contradicted() const { return contradictions().cast<double>().mean(); }
-  /// Returns the residuals of the sides, by the first assumption; their count: degrees of freedom.
-  ResidualRatio residualRatio() const;
-  /// Returns the same for the azimuths.
+  /// Returns what the residuals tell about the variances of the sides, by restricted likelihood.
+  /// For an object at rest.
+  SideEvidence sideEvidence() const;
+  /// Returns the residuals of the azimuths, by the first assumption; their count: degrees of freedom.
   ResidualRatio azimuthResidualRatio() const;
   /// Returns the number of sides that count, of all keyframes.
   std::size_t sides() const;

@@ -74,7 +74,8 @@ std::optional<NetworkEvidence> refitClass(Track& track, const std::string& name,
   auto at_rest = heaviest(track.hypotheses.read(), std::move(static_fits));
   std::optional<NetworkEvidence> evidence;
   if (at_rest) {
-    evidence = {at_rest->map_fit.residualRatio(), at_rest->map_fit.azimuthResidualRatio()};
+    evidence = {search ? at_rest->map_fit.sideEvidence() : SideEvidence(),
+                at_rest->map_fit.azimuthResidualRatio()};
     if (frame.estimates_extent && name == track.best().class_name)
       evidence->outline_nats = outlineNats(at_rest->map_fit, batch, frame);
   }
@@ -138,6 +139,11 @@ std::optional<NetworkEvidence> refit(Track& track, const FrameContext& frame) {
     if (at == names.end() || *at != h.class_name) names.insert(at, h.class_name);
   }
   const bool search = track.batch.seen >= track.batch.mode_search_due;
+  // The sides are judged with the mode search, because their evidence costs as much as a fit.
+  const double since_search =
+      (track.batch.seen - 0.5 * track.batch.mode_search_due) / static_cast<double>(batch.size());
+  const double unsearched =
+      track.batch.mode_search_due == 0 ? 1.0 : std::clamp(since_search, 0.0, 1.0);
   if (search) track.batch.mode_search_due = 2 * track.batch.seen;
   ContradictionCounts contradictions;
   ScratchMap<std::string, NetworkEvidence> evidence;
@@ -156,7 +162,9 @@ std::optional<NetworkEvidence> refit(Track& track, const FrameContext& frame) {
   const auto of_best = evidence.find(track.best().class_name);
   if (of_best == evidence.end() || !informsAboutNetwork(track, frame)) return std::nullopt;
   NetworkEvidence result = of_best->second;
-  for (ResidualRatio* one : {&result.sides, &result.azimuths}) one->count *= std::min(fresh, 1.0);
+  result.azimuths.count *= std::min(fresh, 1.0);
+  result.sides.information *= unsearched;
+  result.sides.gradient *= unsearched;
   return result;
 }
 
@@ -171,7 +179,7 @@ void refitNeediest(ScratchVector<Track*>& tracks, Belief& belief, const FrameCon
     const double share = track->batch.fresh / static_cast<double>(track->batch.keyframes.size());
     if (const auto evidence = refit(*track, frame)) {
       const std::uint64_t model = frame.noise_scale.model;
-      belief.learned.sides.learn(model, evidence->sides);
+      belief.learned.sides.learn(model, evidence->sides, frame.parameters->box.prior_sides);
       belief.learned.azimuths.learn(model, evidence->azimuths);
       if (evidence->outline_nats) {
         CountedExtent& counted = track->batch.extent;

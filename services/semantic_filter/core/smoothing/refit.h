@@ -14,7 +14,8 @@ bool considerKeyframe(Track& track, const BoxDetection& box, const std::array<bo
 double refitNeed(const Track& track, double fresh);
 /// Evidence of one track about the boxes of its network.
 struct NetworkEvidence {
-  ResidualRatio sides, azimuths;  ///< of keyframes that no earlier fit counted
+  SideEvidence sides;      ///< of keyframes that no earlier evidence counted; with mode searches
+  ResidualRatio azimuths;  ///< of keyframes that no earlier fit counted
   /// Nats for boxes that enclose outlines, not cuboids, by all keyframes; if the frame asks for it.
   std::optional<double> outline_nats = {};
 };
