@@ -29,17 +29,26 @@ std::vector<TrueObject> parkedCars() {
 }
 
 /// Boxes whose sides have `noise` times the assumed errors, with azimuths if `azimuth_sigma` is not
-/// 0.
-Detections boxesAt(std::uint64_t k, double noise, double azimuth_sigma = 0.0) {
+/// 0. `lasting`: share of the variance that all boxes of a car have in common.
+Detections boxesAt(std::uint64_t k, double noise, double azimuth_sigma = 0.0,
+                   double lasting = 0.0) {
   static const CameraModel camera{testing::makeCamera()};
   static const std::vector<TrueObject> cars = parkedCars();
   std::mt19937 random(static_cast<std::uint32_t>(k) + 77);
   const View view{&camera, driveTo(k, kMetres), Eigen::Vector3d::UnitZ()};
   std::vector<Detection> list;
-  for (const TrueObject& car : cars) {
+  for (std::size_t i = 0; i < cars.size(); ++i) {
+    const TrueObject& car = cars[i];
     if ((car.x.head<3>() - view.T_WB.p).norm() > 40.0) continue;
-    auto d = detect(car, view, BoxParameters{}, noise, 3.0, random);
-    if (!d) continue;
+    auto d = detect(car, view, BoxParameters{}, noise * std::sqrt(1.0 - lasting), 3.0, random);
+    std::mt19937 own(static_cast<std::uint32_t>(i) + 5);
+    auto common = detect(car, view, BoxParameters{}, noise * std::sqrt(lasting), 3.0, own);
+    const auto exact = detect(car, view, BoxParameters{}, 0.0, 3.0, own);
+    if (!d || !common || !exact) continue;
+    d->box.x1 += common->box.x1 - exact->box.x1;
+    d->box.y1 += common->box.y1 - exact->box.y1;
+    d->box.x2 += common->box.x2 - exact->box.x2;
+    d->box.y2 += common->box.y2 - exact->box.y2;
     if (azimuth_sigma > 0.0) {
       std::normal_distribution<double> error(0.0, azimuth_sigma);
       const double straight = yawFromAzimuth(0.0, car.x.head<3>(), view);
@@ -50,16 +59,21 @@ Detections boxesAt(std::uint64_t k, double noise, double azimuth_sigma = 0.0) {
   return detectionsAt(k, std::move(list));
 }
 
-void driveWithNoise(Harness& h, double noise, double azimuth_sigma = 0.0) {
+void driveWithNoise(Harness& h, double noise, double azimuth_sigma = 0.0, double lasting = 0.0) {
   for (std::uint64_t k = 0; k < kFrames; ++k) {
     h.node.onOdometry(odometryAt(k, driveTo(k, kMetres)));
-    h.node.onDetections(boxesAt(k, noise, azimuth_sigma));
+    h.node.onDetections(boxesAt(k, noise, azimuth_sigma, lasting));
   }
 }
 
+SideScales scalesOf(const Harness& h) {
+  return h.node.belief().learned.sides.scales(testing::makeModelInfo().hash);
+}
+
+/// The whole variance over the assumed one.
 double learned(const Harness& h) {
-  return h.node.belief().learned.sides.ratio(testing::makeModelInfo().hash,
-                                             Parameters{}.box.prior_sides);
+  const double share = Parameters{}.box.bias_share;
+  return (1.0 - share) * scalesOf(h).noise + share * scalesOf(h).lasting;
 }
 
 double learnedFrom(double noise) {
@@ -78,6 +92,20 @@ TEST(NodeNoiseScale, LearnsTheNoiseScaleOfBoxes) {
   EXPECT_LT(once, 1.6);
   EXPECT_GT(twice, 1.6);
   EXPECT_LT(twice, 4.5);
+}
+
+TEST(NodeNoiseScale, LearnsTheShareThatLasts) {
+  const auto shareLearned = [](double lasting) {
+    Harness h;
+    driveWithNoise(h, 1.0, 0.0, lasting);
+    return Parameters{}.box.bias_share * scalesOf(h).lasting / learned(h);
+  };
+  const double none = shareLearned(0.0), third = shareLearned(0.3), most = shareLearned(0.8);
+  std::cout << none << " " << third << " " << most << std::endl;
+  EXPECT_LT(none, 0.1);
+  EXPECT_GT(third, 0.12);
+  EXPECT_LT(third, 0.45);
+  EXPECT_GT(most, 0.5);
 }
 
 double azimuthsLearned(const Harness& h, double assumed = Parameters{}.box.prior_azimuths) {

@@ -45,5 +45,72 @@ TEST(NoiseScales, StayWithinTheirLimits) {
   EXPECT_EQ(scales.ratio(kOther, kAssumed), before);
 }
 
+/// What the residuals of a fit tell if the true scales are `truth`: `noise` and `lasting` sides,
+/// of which a part tells about both.
+SideEvidence evidenceOf(const SideVariances& learned, const SideScales& truth, double noise,
+                        double lasting) {
+  const SideScales now = learned.scales(kNetwork);
+  const double both = 0.3 * lasting;
+  SideEvidence evidence;
+  evidence.information << noise, both, both, lasting;
+  const Eigen::Vector2d excess(truth.noise / now.noise - 1.0, truth.lasting / now.lasting - 1.0);
+  evidence.gradient = evidence.information * excess;
+  return evidence;
+}
+
+TEST(SideVariances, AreAsAssumedUntilTheFirstEvidence) {
+  SideVariances variances;
+  EXPECT_EQ(variances.scales(kNetwork).noise, 1.0);
+  EXPECT_EQ(variances.scales(kNetwork).lasting, 1.0);
+  variances.learn(kOther, evidenceOf(variances, {4.0, 4.0}, 1000.0, 100.0), kAssumed);
+  variances.learn(kNetwork, evidenceOf(variances, {4.0, 4.0}, 1000.0, 100.0), 0.0);  // off
+  variances.learn(kNetwork, {}, kAssumed);
+  EXPECT_EQ(variances.scales(kNetwork).noise, 1.0);
+  EXPECT_EQ(variances.scales(kNetwork).lasting, 1.0);
+  EXPECT_GT(variances.scales(kOther).noise, 1.5);
+}
+
+TEST(SideVariances, FindBothScales) {
+  SideVariances variances;
+  for (int i = 0; i < 200; ++i)
+    variances.learn(kNetwork, evidenceOf(variances, {0.3, 4.0}, 40.0, 8.0), kAssumed);
+  EXPECT_NEAR(variances.scales(kNetwork).noise, 0.3, 0.03);
+  EXPECT_NEAR(variances.scales(kNetwork).lasting, 4.0, 0.4);
+}
+
+TEST(SideVariances, TheAssumptionWeighsAsManySides) {
+  SideVariances variances;
+  SideEvidence evidence;
+  evidence.information(0, 0) = kAssumed;
+  evidence.gradient[0] = -0.8 * kAssumed;
+  variances.learn(kNetwork, evidence, kAssumed);
+  EXPECT_NEAR(variances.scales(kNetwork).noise, std::exp(-0.4), 1e-12);
+  EXPECT_EQ(variances.scales(kNetwork).lasting, 1.0);
+}
+
+TEST(SideVariances, FollowANetworkThatGetsWorse) {
+  SideVariances variances;
+  for (int i = 0; i < 2000; ++i)
+    variances.learn(kNetwork, evidenceOf(variances, {0.2, 0.5}, 50.0, 8.0), kAssumed);
+  for (int i = 0; i < 400; ++i)
+    variances.learn(kNetwork, evidenceOf(variances, {2.0, 3.0}, 50.0, 8.0), kAssumed);
+  EXPECT_GT(variances.scales(kNetwork).noise, 1.7);
+  EXPECT_GT(variances.scales(kNetwork).lasting, 2.0);
+}
+
+TEST(SideVariances, StayWithinTheirLimits) {
+  SideVariances variances;
+  for (int i = 0; i < 1000; ++i)
+    variances.learn(kNetwork, evidenceOf(variances, {1e-6, 1e6}, 50.0, 8.0), kAssumed);
+  EXPECT_GE(variances.scales(kNetwork).noise, 0.04);
+  EXPECT_LE(variances.scales(kNetwork).lasting, 9.0);
+  const SideScales before = variances.scales(kNetwork);
+  SideEvidence broken = evidenceOf(variances, {1.0, 1.0}, 50.0, 8.0);
+  broken.gradient[1] = std::nan("");
+  variances.learn(kNetwork, broken, kAssumed);
+  EXPECT_EQ(variances.scales(kNetwork).noise, before.noise);
+  EXPECT_EQ(variances.scales(kNetwork).lasting, before.lasting);
+}
+
 }  // namespace
 }  // namespace perdure::semantic_filter

@@ -13,16 +13,16 @@ namespace {
 
 using testing::Passing;
 
-/// The same keyframes with `factor` times the noise, recorded when the noise scale of their network
-/// was `then`.
-Keyframes lookedAs(const Keyframes& looks, double factor, const NoiseScale& then) {
+/// The same keyframes with variances `factor` times as large, recorded when the scales of their
+/// network were `then`.
+Keyframes lookedAs(const Keyframes& looks, const SideScales& factor, const NoiseScale& then) {
   Keyframes result;
   for (const auto& look : looks) {
     Keyframe k = *look;
     const FrameView& v = *look->from;
     k.from = std::make_shared<const FrameView>(v.view, v.error, v.time, v.styles, then);
-    k.z.variance *= factor;
-    k.z.lasting *= std::sqrt(factor);
+    k.z.variance *= factor.noise;
+    k.z.lasting *= factor.lasting;
     result.push_back(std::make_shared<const Keyframe>(k));
   }
   return result;
@@ -44,13 +44,14 @@ TEST(MapFit, FindsThePlaceFromAStartMetresAway) {
   }
 }
 
-TEST(MapFit, OldKeyframesUseThePresentNoiseScale) {
+TEST(MapFit, OldKeyframesUseThePresentScales) {
   const Passing scene(3);
   FrameContext frame = scene.frame();
-  frame.noise_scale = {17, 0.25};
-  const Keyframes early = lookedAs(scene.keyframes(), 1.0, {17, 1.0});
-  const Keyframes late = lookedAs(scene.keyframes(), 0.25, {17, 0.25});
-  const Keyframes other = lookedAs(scene.keyframes(), 1.0, {18, 1.0});
+  const SideScales now{0.25, 0.5};
+  frame.noise_scale = {17, now};
+  const Keyframes early = lookedAs(scene.keyframes(), {}, {17, {}});
+  const Keyframes late = lookedAs(scene.keyframes(), now, {17, now});
+  const Keyframes other = lookedAs(scene.keyframes(), {}, {18, {}});
   std::vector<Hypothesis> fits;
   for (const Keyframes* looks : {&early, &late, &other}) {
     const KeyframeBatch all(*looks, frame.pose_error);
@@ -63,18 +64,61 @@ TEST(MapFit, OldKeyframesUseThePresentNoiseScale) {
   EXPECT_GT(fits[2].P(0, 0), 1.2 * fits[0].P(0, 0));  // no scale was learned for this network
 }
 
-TEST(MapFit, ResidualsGiveTheNoiseScale) {
-  double left = 0.0, sides = 0.0;
+/// The same keyframes with boxes whose errors are drawn from the model, with its variances times
+/// `truth`: b keeps the share viewCorrelation from one keyframe to the next.
+Keyframes drawnFrom(const Passing& scene, const SideScales& truth, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  const auto four = [&] {
+    return Eigen::Vector4d(normal(random), normal(random), normal(random), normal(random));
+  };
+  Keyframes result;
+  Eigen::Vector4d b = four();
+  for (const auto& look : scene.keyframes()) {
+    Keyframe k = *look;
+    if (!result.empty()) {
+      const double kept =
+          viewCorrelation(scene.truth().head<3>(), result.back()->from->T_WC, look->from->T_WC,
+                          biasScales(scene.frame().parameters->box));
+      b = kept * b + std::sqrt(1.0 - kept * kept) * four();
+    }
+    k.z.sides = projectObserved(scene.truth(), k.from->view, BoxStyle())->sides +
+                (truth.noise * k.z.variance).cwiseSqrt().cwiseProduct(four()) +
+                (truth.lasting * k.z.lasting).cwiseSqrt().cwiseProduct(b);
+    result.push_back(std::make_shared<const Keyframe>(k));
+  }
+  return result;
+}
+
+/// Returns the scales that one Fisher step finds from the residuals of forty cars, whose boxes have
+/// the assumed variances times `truth`.
+SideScales scalesByOneStep(const SideScales& truth) {
+  SideEvidence all;
   for (unsigned seed = 1; seed <= 40; ++seed) {
     const Passing scene(seed);
     const FrameContext frame = scene.frame();
-    const KeyframeBatch looks(scene.keyframes(), frame.pose_error);
+    const Keyframes keyframes = drawnFrom(scene, truth, seed);
+    const KeyframeBatch looks(keyframes, frame.pose_error);
     const auto s = MapFit::make(scene.start(false), looks, frame);
-    ASSERT_TRUE(s) << seed;
-    left += s->residualRatio().count * s->residualRatio().ratio;
-    sides += s->residualRatio().count;
+    EXPECT_TRUE(s) << seed;
+    if (!s) continue;
+    all.information += s->sideEvidence().information;
+    all.gradient += s->sideEvidence().gradient;
   }
-  EXPECT_NEAR(left / sides, 1.0, 0.15);
+  const Eigen::Vector2d logs = all.information.inverse() * all.gradient;
+  return {std::exp(logs[0]), std::exp(logs[1])};
+}
+
+TEST(MapFit, ResidualsGiveTheVariancesOfTheSides) {
+  const SideScales as_assumed = scalesByOneStep({});
+  EXPECT_NEAR(as_assumed.noise, 1.0, 0.15);
+  EXPECT_NEAR(as_assumed.lasting, 1.0, 0.4);
+  const SideScales noisy = scalesByOneStep({1.6, 1.0}), biased = scalesByOneStep({1.0, 2.0});
+  std::cout << as_assumed.noise << " " << as_assumed.lasting << "; " << noisy.noise << " " << noisy.lasting << "; " << biased.noise << " " << biased.lasting << std::endl;
+  EXPECT_GT(noisy.noise, 1.4);
+  EXPECT_LT(noisy.lasting, 1.5);
+  EXPECT_GT(biased.lasting, 1.4);
+  EXPECT_LT(biased.noise, 1.3);
 }
 
 TEST(MapFit, TheJointCovarianceWithThePoseStaysConsistent) {
@@ -239,7 +283,8 @@ Keyframes ofLeaning(const Keyframes& looks, const State& truth, bool with_azimut
 
 TEST(MapFit, AzimuthsLetAnAsymmetricShapeExplainItsBoxes) {
   Passing scene(6);
-  const auto left_over = [&](bool with_azimuths, double turned) {
+  /// Returns by how much the boxes differ more than their noise lets expect; below 0: less.
+  const auto excess = [&](bool with_azimuths, double turned) {
     const Keyframes keyframes = ofLeaning(scene.keyframes(), scene.truth(), with_azimuths);
     FrameContext frame = scene.frame();
     frame.frame_view = keyframes.back()->from;
@@ -247,11 +292,12 @@ TEST(MapFit, AzimuthsLetAnAsymmetricShapeExplainItsBoxes) {
     Hypothesis start = scene.start(false);
     start.x[kYaw] = wrapAngle(start.x[kYaw] + turned);
     const auto fit = MapFit::make(start, looks, frame);
-    return fit ? fit->residualRatio().ratio : 1e9;
+    return fit ? fit->sideEvidence().gradient[0] : 1e9;
   };
-  const double told = left_over(true, 0.0);
-  EXPECT_NEAR(left_over(true, M_PI), told, 1e-3 * told) << "it started turned by 180 degrees";
-  EXPECT_GT(left_over(false, 0.0), 1.5 * told);
+  const double told = excess(true, 0.0);
+  std::cout << told << " " << excess(true, M_PI) << " " << excess(false, 0.0) << std::endl;
+  EXPECT_NEAR(excess(true, M_PI), told, 1e-3 * std::abs(told)) << "it started turned by 180 degrees";
+  EXPECT_GT(excess(false, 0.0), told + 3.0);
 }
 
 TEST(BatchProblem, WhetherACensoredSideCountsDoesNotChangeTheVolume) {
