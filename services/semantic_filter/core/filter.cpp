@@ -241,6 +241,7 @@ StepReport SemanticFilter::step(Belief& belief, const FrameInput& heard, IdBook&
   belief.path.advance(heard.view.T_WB.p);
   // Visibility is published with every frame, with or without detections.
   auto visibilities = updateVisibility(belief, heard, parameters_.visibility);
+  withdrawLostMovers(belief.tracks, heard, parameters_);
   if (!heard.boxes) return report;
   FrameInput input = withLearnedNoise(belief, heard, parameters_.box);
   markSidesBesideNearer(*input.boxes, input.view);

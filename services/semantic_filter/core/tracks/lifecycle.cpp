@@ -4,11 +4,14 @@
 
 #include "common/base/algorithms/stable_sort.h"
 #include "common/math/gaussian.h"
+#include "services/semantic_filter/core/belief/motion_model.h"
 #include "services/semantic_filter/core/belief/pose_correlation.h"
 
 namespace perdure::semantic_filter {
 
 namespace {
+
+constexpr double kWithdrawn = 2.0;  // confirmation ends at so many times confirm_sigma_m
 
 /// Whether a track has few hits, was never confirmed, and has been invisible for tentative_s.
 bool forgettable(const Track& o, const TrackParameters& parameters) {
@@ -27,12 +30,25 @@ bool established(const Track& track, const FrameContext& frame) {
          placeSigma(track.best(), frame.pose_error.covariance) < parameters.confirm_sigma_m;
 }
 
+void withdrawLostMovers(std::vector<Track>& tracks, const FrameInput& frame,
+                        const Parameters& parameters) {
+  const TimePoint now = frame.stamp.time;
+  for (auto& o : tracks) {
+    const auto moves = [](const Hypothesis& h) { return h.moving; };
+    if (!o.life.confirmed || o.as_of >= now) continue;
+    if (std::none_of(o.hypotheses.begin(), o.hypotheses.end(), moves)) continue;
+    const Track then = extrapolated(o, now, parameters.motion);
+    const double sigma = placeSigma(then, frame.pose_error.covariance);
+    if (sigma > kWithdrawn * parameters.tracks.confirm_sigma_m) o.life.confirmed = false;
+  }
+}
+
 std::vector<Track> confirmAndDelete(std::vector<Track>& tracks, const FrameContext& frame) {
   const TrackParameters& parameters = frame.parameters->tracks;
   for (auto& o : tracks) {
     if (o.visibility.fraction <= 0.0) continue;
     const double sigma = placeSigma(o, frame.pose_error.covariance);
-    if (o.existence < 0.5 || sigma > 2.0 * parameters.confirm_sigma_m) {
+    if (o.existence < 0.5 || sigma > kWithdrawn * parameters.confirm_sigma_m) {
       o.life.confirmed = false;
       continue;
     }

@@ -12,6 +12,10 @@ namespace perdure::semantic_filter {
 /// Whether the track surely exists and its best hypothesis is placed. Re-identification needs no
 /// more; confirmation also needs that all hypotheses agree on the place.
 bool established(const Track& track, const FrameContext& frame);
+/// Withdraws the confirmation of tracks that were not seen since they moved on to a place that is
+/// no longer known.
+void withdrawLostMovers(std::vector<Track>& tracks, const FrameInput& frame,
+                        const Parameters& parameters);
 /// Confirms visible tracks that surely exist at a known place, and withdraws it where either is
 /// lost. Removes tracks, and returns those whose existence fell below the threshold.
 std::vector<Track> confirmAndDelete(std::vector<Track>& tracks, const FrameContext& frame);

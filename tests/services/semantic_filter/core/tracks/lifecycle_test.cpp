@@ -57,5 +57,24 @@ TEST_F(Lifecycle, AnInvisibleTrackOfOneHitIsDeletedAndAConfirmedOneIsKept) {
   EXPECT_EQ(hiddenFor(patience + 1.0, 3, true), 1u);
 }
 
+TEST_F(Lifecycle, AnUnseenMoverIsConfirmedOnlyWhileItsPlaceIsKnown) {
+  const auto confirmedAfter = [&](double seconds, bool moving) {
+    Track o = makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
+    o.life.confirmed = o.life.once_confirmed = true;
+    o.visibility.fraction = 0.0;
+    Hypothesis& h = o.hypotheses[0];
+    h.moving = moving;
+    if (moving) h.P.bottomRightCorner<3, 3>().diagonal().setConstant(0.25);
+    FrameInput later;
+    later.stamp.time = o.as_of + Duration(static_cast<std::int64_t>(1e9 * seconds));
+    std::vector<Track> tracks{o};
+    withdrawLostMovers(tracks, later, parameters);
+    return tracks.at(0).life.confirmed;
+  };
+  EXPECT_TRUE(confirmedAfter(0.3, true));
+  EXPECT_FALSE(confirmedAfter(20.0, true));
+  EXPECT_TRUE(confirmedAfter(20.0, false));
+}
+
 }  // namespace
 }  // namespace perdure::semantic_filter
