@@ -1,5 +1,7 @@
 #include "services/semantic_filter/model_book.h"
 
+#include <algorithm>
+
 namespace perdure::semantic_filter {
 namespace {
 
@@ -21,12 +23,21 @@ std::string beyond(const Model& model, const Model& other, const std::string& ti
 }  // namespace
 
 Result<void> ModelBook::add(const ModelInfo& info) {
-  const auto [it, fresh] = entries_.try_emplace(
-      info.hash, Entry{info.name, std::make_shared<const Model>(makeModel(info, priors_))});
-  if (!fresh) {
-    if (it->second.model->classes == info.classes) return {};
+  if (const auto known = find(info.hash)) {
+    if (known->classes == info.classes) return {};
     return fail("model_contradicts_its_hash", info.name);
   }
+  Model model = makeModel(info, priors_);
+  const auto earlier = std::find_if(order_.rbegin(), order_.rend(), [&](std::uint64_t hash) {
+    return entries_.at(hash).name == info.name;
+  });
+  if (earlier != order_.rend()) {
+    const Model& before = *entries_.at(*earlier).model;
+    const auto &old = before.classes, &now = info.classes;
+    if (old.size() < now.size() && std::equal(old.begin(), old.end(), now.begin()))
+      model.network = before.network;
+  }
+  entries_.emplace(info.hash, Entry{info.name, std::make_shared<const Model>(std::move(model))});
   order_.push_back(info.hash);
   if (order_.size() <= kMaxModels) return {};
   if (order_.front() == used_) {  // keep the model in use

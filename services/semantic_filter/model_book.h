@@ -20,7 +20,8 @@ class ModelBook {
   explicit ModelBook(ClassPriors priors = {}) : priors_(std::move(priors)) {}
   const ClassPriors& priors() const { return priors_; }
 
-  /// Reason of failure: "model_contradicts_its_hash". The first model of a hash remains valid.
+  /// Reason of failure: "model_contradicts_its_hash". The first model of a hash remains valid. A
+  /// model whose classes continue the list of the newest one of its name is of the same network.
   Result<void> add(const ModelInfo& info);
   /// Returns nullptr if no model of this hash was added, or if too many were added since.
   std::shared_ptr<const Model> find(std::uint64_t hash) const;

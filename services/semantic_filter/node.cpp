@@ -271,20 +271,21 @@ std::string Node::note() const {
   constexpr double kWorthSaying = 1.1;
   std::string note;
   const BoxParameters& assumed = config_.filter.box;
+  const auto model = models_.find(models_.used());
+  const std::uint64_t network = model ? model->network : 0;
   const auto say = [&](const char* what, double ratio) {
     const double times = std::sqrt(ratio);
     if (std::max(times, 1.0 / times) < kWorthSaying) return;
     if (!note.empty()) note += "; ";
     note += fmt::format("{} err {:.2f} times as far as was assumed", what, times);
   };
-  if (const auto model = models_.find(models_.used());
-      model && model->outline_styles && history_.belief().learned.extents.outlines(model->hash)) {
+  if (model && model->outline_styles && history_.belief().learned.extents.outlines(network)) {
     note = "boxes enclose the outlines of objects";
   }
-  const SideScales sides = history_.belief().learned.sides.scales(models_.used());
+  const SideScales sides = history_.belief().learned.sides.scales(network);
   const double lasts = assumed.bias_share;
   say("boxes", (1.0 - lasts) * sides.noise + lasts * sides.lasting);
-  say("azimuths", history_.belief().learned.azimuths.ratio(models_.used(), assumed.prior_azimuths));
+  say("azimuths", history_.belief().learned.azimuths.ratio(network, assumed.prior_azimuths));
   return note;
 }
 

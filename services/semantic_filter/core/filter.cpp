@@ -22,7 +22,7 @@ namespace perdure::semantic_filter {
 namespace {
 
 NoiseScale noiseScaleOf(const Belief& belief, const FrameInput& input, const BoxParameters& box) {
-  const std::uint64_t model = input.model->hash;
+  const std::uint64_t model = input.model->network;
   return {model, belief.learned.sides.scales(model),
           belief.learned.azimuths.ratio(model, box.prior_azimuths)};
 }
@@ -53,7 +53,7 @@ FrameContext contextOf(const Belief& belief, const FrameInput& input, const Para
                                                 priors, parameters.ground),
           &belief.learned.movers,
           input.styles().get(),
-          input.model->outline_styles && !belief.learned.extents.decided(input.model->hash)};
+          input.model->outline_styles && !belief.learned.extents.decided(input.model->network)};
 }
 
 /// Sets the visibility of all tracks and returns it in the order of the tracks.

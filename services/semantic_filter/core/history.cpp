@@ -66,7 +66,7 @@ void History::step() {
 void History::step(HistoryFrame& frame) {
   const Model& model = *frame.input.model;
   frame.input.estimated_styles =
-      belief_.learned.extents.outlines(model.hash) ? model.outline_styles : nullptr;
+      belief_.learned.extents.outlines(model.network) ? model.outline_styles : nullptr;
   if (frame.before.tracks.empty()) frame.before = std::exchange(spare_, {});
   const std::size_t n = belief_.tracks.size();
   if (frame.before.tracks.capacity() < n) frame.before.tracks.reserve(n + n / 4);

@@ -69,7 +69,7 @@ void markBeside(BoxDetection& far, const BoxDetection& near) {
 
 Model makeModel(const ModelInfo& info, const ClassPriors& priors) {
   Model model;
-  model.hash = info.hash;
+  model.hash = model.network = info.hash;
   model.classes = info.classes;
   model.names = std::make_shared<const ClassNames>(info.classes.begin(), info.classes.end());
   for (std::size_t k = 0; k < info.classes.size(); ++k) model.index.emplace(info.classes[k], k);

@@ -33,6 +33,9 @@ using ClassNames = std::set<std::string>;
 /// What the filter keeps of a ModelInfo.
 struct Model {
   std::uint64_t hash = 0;
+  /// Hash of the first model of the same network; what is learned about its boxes belongs to it.
+  /// It differs from `hash` where the list of classes grew.
+  std::uint64_t network = 0;
   std::vector<std::string> classes;
   /// the same as `classes`
   std::shared_ptr<const ClassNames> names = std::make_shared<const ClassNames>();

@@ -102,8 +102,8 @@ TEST(SideVariances, StayWithinTheirLimits) {
   SideVariances variances;
   for (int i = 0; i < 1000; ++i)
     variances.learn(kNetwork, evidenceOf(variances, {1e-6, 1e6}, 50.0, 8.0), kAssumed);
-  EXPECT_GE(variances.scales(kNetwork).noise, 0.04);
-  EXPECT_LE(variances.scales(kNetwork).lasting, 9.0);
+  EXPECT_GE(variances.scales(kNetwork).noise, 0.04 - 1e-9);
+  EXPECT_LE(variances.scales(kNetwork).lasting, 9.0 + 1e-9);
   const SideScales before = variances.scales(kNetwork);
   SideEvidence broken = evidenceOf(variances, {1.0, 1.0}, 50.0, 8.0);
   broken.gradient[1] = std::nan("");
