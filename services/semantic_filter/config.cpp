@@ -40,7 +40,7 @@ void describeTracks(Parameters& p, Fields& fields) {
                  {"detections that it takes"});
   fields.number(
       "tracks.confirm_sigma_m", t.confirm_sigma_m, positive(),
-      {"deviation of its place relative to the body, at most; given up at 1.6 times that", "m"});
+      {"deviation of its place relative to the body, at most; given up at 1.5 times that", "m"});
   fields.number("tracks.delete_below", t.delete_below, between(0, 1),
                 {"existence below which a track is deleted"});
   fields.number("tracks.reidentify_s", t.reidentify_s, atLeast(0),

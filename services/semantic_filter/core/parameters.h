@@ -111,7 +111,7 @@ struct InitiationParameters {
 struct TrackParameters {
   double confirm = 0.95;          ///< existence that confirms a track
   std::int64_t confirm_hits = 3;  ///< detections that it takes
-  double confirm_sigma_m = 1.8;   ///< of the place relative to the body; given up at 1.6 times that
+  double confirm_sigma_m = 2.0;   ///< of the place relative to the body; given up at 1.5 times that
   double certain = 0.99;          ///< existence stays below it, so that misses count
   double certain_again = 0.999;   ///< the same after a detection on another visit
   double delete_below = 0.02;     ///< existence

@@ -11,7 +11,7 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-constexpr double kWithdrawn = 1.6;  // confirmation ends at so many times confirm_sigma_m
+constexpr double kWithdrawn = 1.5;  // confirmation ends at so many times confirm_sigma_m
 
 /// Whether a track has few hits, was never confirmed, and has been invisible for tentative_s.
 bool forgettable(const Track& o, const TrackParameters& parameters) {

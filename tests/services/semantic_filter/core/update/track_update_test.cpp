@@ -265,6 +265,35 @@ TEST_F(TrackUpdate, MissesFromAViewpointThatDetectedItLowerExistenceAtOnce) {
   EXPECT_LT(object.existence, 0.2);
 }
 
+/// The error of a side lasts for some frames; a later box is a new observation.
+TEST_F(TrackUpdate, BetweenRestAndMotionABoxCountsByTheTimeSinceTheLastOne) {
+  Hypothesis astray = object.hypotheses[0];  // of the same class, away from the box
+  astray.moving = true;
+  astray.x[1] += 0.8;
+  object.hypotheses = {object.hypotheses[0], astray, object.hypotheses[1]};
+  object.hypotheses[0].weight = object.hypotheses[1].weight = 0.35;
+  const std::vector<BoxDetection> boxes = {evidenceOf(object.hypotheses[0].x)};
+  object.views.observed_from = {frame.view.T_WC(), 50.0};  // almost no weight between classes
+  const TrackScore l = scoreHypothesis(boxes, 1.0);
+  double A[3];
+  for (int i = 0; i < 3; ++i) {
+    A[i] =
+        1.0 - l.hypotheses[i].detection_probability * (1.0 - l.hypotheses[i].matches[0].likelihood);
+  }
+  const Track before = object;
+  for (const auto& [seconds, exponent] : {std::pair{0.1, 0.271}, std::pair{5.0, 1.0}}) {
+    object = before;
+    object.life.last_seen = object.as_of - std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
+    update(object, l, Eigen::VectorXd::Ones(1), boxes, frame);
+    double still = 0.0, moving = 0.0;
+    for (const auto& h : object.hypotheses) {
+      if (h.class_name == "car") (h.moving ? moving : still) = h.weight;
+    }
+    EXPECT_NEAR(std::log(moving / still) / std::log(A[1] / A[0]), exponent, 1e-3);
+    EXPECT_NEAR(classProbability(object, "car"), 0.7, 0.05);
+  }
+}
+
 TEST_F(TrackUpdate, AConstantAddedToAllActivationsChangesNothing) {
   const std::vector<BoxDetection> plain = {evidenceOf(object.hypotheses[0].x)};
   const std::vector<BoxDetection> shifted = {evidenceOf(object.hypotheses[0].x, 64.0F)};
