@@ -34,7 +34,7 @@ class Node {
   std::string backend() const;
 
   /// These give the turn that makes the next frames upright (core/upright.h).
-  void onCalibration(const Calibration& calibration) { calibration_ = calibration; }
+  void onCalibration(const perdure::Calibration& calibration) { calibration_ = calibration; }
   void onOdometry(const Odometry& odometry);
 
   /// Boxes in pixels of the frame, not clipped to the image. An empty list is a valid result.
@@ -89,7 +89,7 @@ class Node {
   std::size_t size_ = 0;
   int quarters_ = 0;        ///< clockwise turn of the images
   bool exchanged_ = false;  ///< width and height of all sizes, for images turned by 90° or 270°
-  Calibration calibration_;
+  perdure::Calibration calibration_;
   std::optional<Eigen::Vector3d> up_B_;  ///< against gravity
   std::function<double()> clock_s_;
   double forward_s_ = 0.0;  ///< time of the forward pass for the last frame

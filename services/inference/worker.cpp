@@ -52,7 +52,7 @@ void Worker::expect(const Predictions& predictions) {
   expected_ = predictions;
 }
 
-void Worker::onCalibration(const Calibration& calibration) {
+void Worker::onCalibration(const perdure::Calibration& calibration) {
   const std::lock_guard lock(mutex_);
   calibration_ = calibration;
 }

@@ -45,7 +45,7 @@ class Worker {
   /// Adds a frame. A frame that still waits is dropped and counted.
   void offer(const Frame& frame);
   /// These make the following frames upright.
-  void onCalibration(const Calibration& calibration);
+  void onCalibration(const perdure::Calibration& calibration);
   void onOdometry(const Odometry& odometry);
   /// Sets the predicted objects for the following frames.
   void expect(const Predictions& predictions);
@@ -101,7 +101,7 @@ class Worker {
   std::string failure_, last_problem_;
   ReasonCounts reasons_;
   Predictions expected_;
-  std::optional<Calibration> calibration_;  ///< not yet given to the node, as `odometry_`
+  std::optional<perdure::Calibration> calibration_;  ///< not yet given to the node, as `odometry_`
   std::optional<Odometry> odometry_;
   double scale_ = 1.0;   ///< width of the input relative to its own size
   double age_ms_ = 0.0;  ///< age of the last result when it was ready
