@@ -18,12 +18,12 @@ void run(service::Context& context, const inference::Config& config) {
   auto& detections = context.writer(bus::kTopic<Detections>,
                                     {inference::Worker::firstStrength(ownership), lease_s});
   auto& notices = context.writer(bus::kTopic<SwapNotice>);
-  auto& model = context.writer(bus::kTopic<ModelInfo>);
+  auto& models = context.writer(bus::kTopic<ModelInfo>);
   inference::Worker* worker = nullptr;  // set before handlers use it in context.run()
   const auto& rivals =
       context.on(bus::kTopic<Detections>, [&](const Detections& heard) { worker->heard(heard); });
   inference::Worker the_worker(node, ownership, config.model.budget_ms,
-                               {detections, rivals, model, notices}, context.health(),
+                               {detections, rivals, models, notices}, context.health(),
                                [&] { context.stop(); });
   worker = &the_worker;
 

@@ -64,7 +64,7 @@ void Worker::onOdometry(const Odometry& odometry) {
 
 void Worker::publishModel() {
   swap_.learn(node_.model());
-  (void)bus_.model.write(node_.model());
+  (void)bus_.models.write(node_.model());
 }
 
 Result<Detections> Worker::look(const Frame& frame) {

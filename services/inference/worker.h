@@ -25,7 +25,7 @@ struct WorkerBus {
   bus::Writer<Detections>& detections;
   /// Reader of `detections`, matched with writers of this and of other processes.
   const bus::RawReader& rivals;
-  bus::Writer<ModelInfo>& model;
+  bus::Writer<ModelInfo>& models;
   bus::Writer<SwapNotice>& notices;
 };
 
