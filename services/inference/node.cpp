@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core/utility.hpp>
-#include <utility>
 
 #include "common/base/check.h"
 #include "common/base/errors.h"
@@ -104,7 +103,7 @@ Node::Node(const Config& config, InstanceId instance, ModelFile file)
 
 /// Describes the network for the present turn. Sides are those of the image before its turn.
 void Node::describe() {
-  const Input& input = sizes_.front().description.input;
+  const Input& input = description_.input;
   const bool across = quarters_ % 2 == 1;
   info_.name = description_.name;
   if (quarters_ > 0) info_.name += fmt::format(", turned by {}°", 90 * quarters_);
@@ -118,9 +117,7 @@ void Node::describe() {
     const auto of_image = turned(sides, 4 - quarters_);
     info_.side_insets.insert(info_.side_insets.end(), of_image.begin(), of_image.end());
   }
-  info_.hash =
-      digest(quarters_ == 0 ? identity_
-                            : fmt::format("{}\n{} {}", identity_, info_.name, info_.input_width));
+  info_.hash = digest(quarters_ == 0 ? identity_ : identity_ + "\n" + info_.name);
 }
 
 void Node::onOdometry(const Odometry& odometry) {
@@ -138,25 +135,7 @@ void Node::turnFor(const Frame& frame) {
   }
   if (quarters == quarters_) return;
   quarters_ = quarters;
-  const bool exchange = fitsExchanged(description_.input, static_cast<int>(frame.width),
-                                      static_cast<int>(frame.height), quarters);
-  if (exchange != exchanged_) exchangeSides();
   describe();
-}
-
-/// Networks that do not accept exchanged sides keep theirs, as do those whose outputs have no shape
-/// that would show it.
-void Node::exchangeSides() {
-  if (description_.outputs.any()) return;
-  const auto exchange = [&] {
-    exchanged_ = !exchanged_;
-    for (Size& size : sizes_)
-      std::swap(size.description.input.width, size.description.input.height);
-  };
-  exchange();
-  for (std::size_t i = 0; i < sizes_.size() && exchanged_; ++i) {
-    if (!test(i)) exchange();
-  }
 }
 
 ImageFit Node::fitTo(const Frame& frame) const {
@@ -180,7 +159,14 @@ void Node::addSmallerSizes(const ModelFile& file) {
     const Input& last = sizes_.back().description.input;
     if (input.width * input.height >= last.width * last.height) continue;
     sizes_.push_back(std::move(size));
-    if (!test(sizes_.size() - 1)) sizes_.pop_back();
+    size_ = sizes_.size() - 1;
+    const Frame image = testImage(input);
+    bool works = true;
+    for (int round = 0; round < 2 && works; ++round) {  // the first round allocates
+      works = candidatesIn(image, options_.score_threshold).has_value();
+    }
+    size_ = 0;
+    if (!works) sizes_.pop_back();
   }
 }
 
@@ -200,9 +186,7 @@ void Node::useSize(std::size_t size) {
 
 std::string Node::backend() const { return sizes_.front().network->backend(); }
 
-double Node::inputScale() const {
-  return 1.0 * (quarters_ % 2 == 1 ? at().input.height : at().input.width) / info_.input_width;
-}
+double Node::inputScale() const { return 1.0 * at().input.width / description_.input.width; }
 
 void Node::chooseClasses() {
   const auto& known = description_.classes;
@@ -221,26 +205,16 @@ void Node::chooseClasses() {
   }
 }
 
-/// Runs the network on a test image at one size.
-Result<void> Node::test(std::size_t size) {
-  const std::size_t before = std::exchange(size_, size);
-  const Frame image = testImage(at().input);
-  Result<void> result;
-  for (int round = 0; round < 2 && result; ++round) {  // the first round allocates
-    const auto candidates = candidatesIn(image, options_.score_threshold);
-    if (!candidates) result = tl::unexpected(candidates.error());
-  }
-  size_ = before;
-  return result;
-}
-
 void Node::testItself() {
-  const auto result = test(0);
-  if (result) return;
-  throw StartupError(ExitCode::kConfiguration,
-                     config_.model.path + " fails its test at the start: " + result.error().detail +
-                         " (" + result.error().code +
-                         "); correct its model.json or give another network.");
+  const Frame image = testImage(description_.input);
+  for (int round = 0; round < 2; ++round) {  // the first round allocates
+    if (const auto result = candidatesIn(image, options_.score_threshold); !result) {
+      throw StartupError(
+          ExitCode::kConfiguration,
+          config_.model.path + " fails its test at the start: " + result.error().detail + " (" +
+              result.error().code + "); correct its model.json or give another network.");
+    }
+  }
 }
 
 Result<std::vector<Candidate>> Node::candidatesIn(const Frame& frame, double floor) {

@@ -66,9 +66,7 @@ class Node {
   void describe();
   void testItself();
   void turnFor(const Frame& frame);
-  void exchangeSides();
   ImageFit fitTo(const Frame& frame) const;
-  Result<void> test(std::size_t size);
   bool primes(const Predictions& expected, const Frame& frame) const;
   std::vector<Expectation> expectationsOf(const Predictions& expected, const Frame& frame) const;
   void addPrimed(const Predictions& expected, const Frame& frame,
@@ -87,8 +85,7 @@ class Node {
   ModelDescription description_;  ///< description at its own size
   std::vector<Size> sizes_;       ///< its own first, then smaller ones if there is a budget
   std::size_t size_ = 0;
-  int quarters_ = 0;        ///< clockwise turn of the images
-  bool exchanged_ = false;  ///< width and height of all sizes, for images turned by 90° or 270°
+  int quarters_ = 0;  ///< clockwise turn of the images
   perdure::Calibration calibration_;
   std::optional<Eigen::Vector3d> up_B_;  ///< against gravity
   std::function<double()> clock_s_;

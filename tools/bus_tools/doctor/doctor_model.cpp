@@ -43,18 +43,15 @@ Findings checkNetworkShape(const Drive& drive, const std::string& network) {
   const inference::Input& input = file.description.input;
   const int width = static_cast<int>(camera.width), height = static_cast<int>(camera.height);
   const int quarters = file.description.upright ? quartersOf(dataset->recording()) : 0;
-  inference::Input turned = input;
-  if (inference::fitsExchanged(input, width, height, quarters) && !file.description.outputs.any()) {
-    std::swap(turned.width, turned.height);
-  }
-  const double waste = inference::paddedShare(turned, width, height, quarters);
+  const double waste = inference::paddedShare(input, width, height, quarters);
   if (waste <= kMostWaste) return {};
+  const bool across = quarters % 2 == 1;
   return {{Verdict::kWarn,
            fmt::format("{:.0f} % of the input of {} ({}x{}) stays grey beside images of {}x{}: "
                        "perdure model import NETWORK --input camera --image PICTURE gives it the "
                        "camera's shape",
                        100 * waste, std::filesystem::path(network).filename().string(), input.width,
-                       input.height, camera.width, camera.height)}};
+                       input.height, across ? height : width, across ? width : height)}};
 }
 
 }  // namespace perdure::tools

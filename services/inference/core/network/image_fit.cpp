@@ -103,12 +103,6 @@ ImageFit fitOf(const Input& input, int image_width, int image_height, int quarte
   return fit;
 }
 
-bool fitsExchanged(const Input& input, int image_width, int image_height, int quarters) {
-  const auto leans = [](int width, int height) { return (width > height) - (width < height); };
-  const int image = leans(image_width, image_height);
-  return quarters % 2 == 1 && image != 0 && image == leans(input.width, input.height);
-}
-
 double paddedShare(const Input& input, int image_width, int image_height, int quarters) {
   const ImageFit fit = fitOf(input, image_width, image_height, quarters);
   const double all = static_cast<double>(input.width) * input.height;

@@ -34,9 +34,6 @@ struct ImageFit {
 
 ImageFit fitOf(const Input& input, int image_width, int image_height, int quarters = 0);
 
-/// Whether the turned image fits better if the sides of the input are exchanged.
-bool fitsExchanged(const Input& input, int image_width, int image_height, int quarters);
-
 /// Share of the input outside the image; 0 without letterbox.
 double paddedShare(const Input& input, int image_width, int image_height, int quarters = 0);
 
