@@ -108,11 +108,12 @@ constexpr std::tuple kRows{
     PERDURE_FINAL_TOPIC(SpeedSample, "speed", kSensor, kImuHz, kRecorded, kCapture, kVio),
     PERDURE_TOPIC(Calibration, "calibration", latched(1), kOnChange, kRecorded,
                   kCapture | kRos2Driver,
-                  kVio | kSemanticFilter | kMapStore | kSubscriber),  // map_store: place on Earth
+                  kVio | kInference | kSemanticFilter | kMapStore |
+                      kSubscriber),  // inference: upright images; map_store: place on Earth
     // capture reads odometry with pace.mode; vio reads it only if another program writes it
     PERDURE_FINAL_TOPIC(Odometry, "odometry", reliable(64), kCameraHz, kRecorded,
                         kVio | kRos2Driver,
-                        kSemanticFilter | kCapture | kMapStore | kVio | kSubscriber),
+                        kSemanticFilter | kCapture | kMapStore | kVio | kInference | kSubscriber),
     PERDURE_FINAL_TOPIC(Landmarks, "landmarks", reliable(64), kCameraHz, kRecorded, kVio,
                         kSemanticFilter | kMapStore | kSubscriber),
     PERDURE_TOPIC(Detections, "detections", exclusive(32, kCameraHz), kCameraHz, kRecorded,

@@ -21,6 +21,10 @@ void describe(Config& config, config::Fields& fields) {
                  "keep it; 0: always the network's own size",
                  "ms"});
   fields.text("detection.camera", config.detection.camera, {"camera whose frames are read"});
+  fields.choice("detection.turn", config.detection.turn, {"auto", "0", "90", "180", "270"},
+                {"clockwise turn that makes the images upright for the network; auto: by the "
+                 "newest odometry, 0 until there is one",
+                 "deg"});
   fields.number(
       "detection.score_threshold", config.detection.score_threshold, between(0.001, 0.999),
       {"smallest score of the best class of a box; low, because the filter also uses weak evidence",

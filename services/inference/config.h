@@ -19,6 +19,7 @@ struct ModelConfig {
 
 struct DetectionConfig {
   std::string camera = "cam0";
+  std::string turn = "auto";  ///< clockwise turn of the images in degrees, or "auto"
   double score_threshold = 0.05;
   double merge_iou = 0.5;
   std::int64_t limit = 100;

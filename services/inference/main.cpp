@@ -18,12 +18,12 @@ void run(service::Context& context, const inference::Config& config) {
   auto& detections = context.writer(bus::kTopic<Detections>,
                                     {inference::Worker::firstStrength(ownership), lease_s});
   auto& notices = context.writer(bus::kTopic<SwapNotice>);
-  (void)context.writer(bus::kTopic<ModelInfo>).write(node.model());
+  auto& models = context.writer(bus::kTopic<ModelInfo>);
   inference::Worker* worker = nullptr;  // set before handlers use it in context.run()
   const auto& rivals =
       context.on(bus::kTopic<Detections>, [&](const Detections& heard) { worker->heard(heard); });
   inference::Worker the_worker(node, ownership, config.model.budget_ms,
-                               {detections, rivals, notices}, context.health(),
+                               {detections, rivals, models, notices}, context.health(),
                                [&] { context.stop(); });
   worker = &the_worker;
 
@@ -43,6 +43,8 @@ void run(service::Context& context, const inference::Config& config) {
     }
   });
   context.countReasons([&]() -> const ReasonCounts& { return lost; });
+  context.on(bus::kTopic<Calibration>, [&](const Calibration& m) { worker->onCalibration(m); });
+  context.on(bus::kTopic<Odometry>, [&](const Odometry& m) { worker->onOdometry(m); });
   context.on(bus::kTopic<Predictions>, [&](const Predictions& m) { worker->expect(m); });
   context.every(durationFromSeconds(lease_s / 5), [&] { worker->assertAlive(); });
   constexpr std::chrono::seconds kHangs{10};  // longer than any network needs for a frame

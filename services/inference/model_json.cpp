@@ -137,6 +137,7 @@ void readAll(JsonReader& reader, const std::string& file, ModelDescription& mode
                             {"outline", BoxExtent::kOutline},
                             {"unknown", BoxExtent::kUnknown}},
                            false);
+  reader.flag("upright", model.upright);
   if (const Json* insets = reader.find("side_insets")) readInsets(*insets, reader, model);
   if (const Json* calibration = reader.find("calibration")) {
     readCalibration(*calibration, reader, model.calibration);

@@ -1,5 +1,7 @@
 #include "services/inference/node.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core/utility.hpp>
@@ -7,7 +9,7 @@
 #include "common/base/check.h"
 #include "common/base/errors.h"
 #include "services/inference/core/decode/suppress.h"
-#include "services/inference/core/network/image_fit.h"
+#include "services/inference/core/upright.h"
 
 namespace perdure::inference {
 namespace {
@@ -89,25 +91,56 @@ Node::Node(const Config& config, InstanceId instance, ModelFile file)
   cv::setNumThreads(static_cast<int>(config.model.threads));
   options_.score_threshold = config.detection.score_threshold;
   info_.instance = instance;
-  info_.name = description_.name;
-  info_.input_width = static_cast<std::uint32_t>(description_.input.width);
-  info_.input_height = static_cast<std::uint32_t>(description_.input.height);
   info_.box_sigma = description_.box_sigma;
   info_.boxes = description_.boxes;
   chooseClasses();
-  if (!description_.side_insets.empty()) {
-    for (const std::string& name : info_.classes) {
-      const auto it = description_.side_insets.find(name);
-      const auto sides =
-          it == description_.side_insets.end() ? std::array<double, 4>{} : it->second;
-      info_.side_insets.insert(info_.side_insets.end(), sides.begin(), sides.end());
-    }
-  }
-  std::string identity = toHex(file.hash);
-  for (const std::string& name : info_.classes) identity += "\n" + name;
-  info_.hash = digest(identity);
+  identity_ = toHex(file.hash);
+  for (const std::string& name : info_.classes) identity_ += "\n" + name;
+  describe();
   testItself();
   if (config_.model.budget_ms > 0.0) addSmallerSizes(file);
+}
+
+/// Describes the network for the present turn. Sides are those of the image before its turn.
+void Node::describe() {
+  const Input& input = description_.input;
+  const bool across = quarters_ % 2 == 1;
+  info_.name = description_.name;
+  if (quarters_ > 0) info_.name += fmt::format(", turned by {}°", 90 * quarters_);
+  info_.input_width = static_cast<std::uint32_t>(across ? input.height : input.width);
+  info_.input_height = static_cast<std::uint32_t>(across ? input.width : input.height);
+  info_.side_insets.clear();
+  for (const std::string& name : info_.classes) {
+    if (description_.side_insets.empty()) break;
+    const auto it = description_.side_insets.find(name);
+    const auto sides = it == description_.side_insets.end() ? std::array<double, 4>{} : it->second;
+    const auto of_image = turned(sides, 4 - quarters_);
+    info_.side_insets.insert(info_.side_insets.end(), of_image.begin(), of_image.end());
+  }
+  info_.hash = digest(quarters_ == 0 ? identity_ : identity_ + "\n" + info_.name);
+}
+
+void Node::onOdometry(const Odometry& odometry) {
+  if (odometry.state == OdometryState::kInitialising) return;
+  up_B_ = odometry.T_WB.q.conjugate() * odometry.up_W;
+}
+
+void Node::turnFor(const Frame& frame) {
+  int quarters = quarters_;
+  const CameraCalibration* camera = calibration_.camera(frame.camera);
+  if (config_.detection.turn != "auto") {
+    quarters = std::stoi(config_.detection.turn) / 90;
+  } else if (description_.upright && camera && up_B_) {
+    quarters = uprightQuarters(camera->T_BC.q.conjugate() * *up_B_, quarters_);
+  }
+  if (quarters == quarters_) return;
+  quarters_ = quarters;
+  describe();
+}
+
+ImageFit Node::fitTo(const Frame& frame) const {
+  return fitOf(at().input, static_cast<int>(frame.width), static_cast<int>(frame.height),
+               quarters_);
 }
 
 /// Each size has its own network, because OpenCV initialises one again when its input changes.
@@ -185,7 +218,7 @@ void Node::testItself() {
 }
 
 Result<std::vector<Candidate>> Node::candidatesIn(const Frame& frame, double floor) {
-  const auto blob = makeBlob(at().input, frame);
+  const auto blob = makeBlob(at().input, frame, quarters_);
   if (!blob) return tl::unexpected(blob.error());
   const double begun = clock_s_ ? clock_s_() : 0.0;
   const auto tensors = sizes_[size_].network->forward(*blob);
@@ -207,6 +240,7 @@ bool Node::primes(const Predictions& expected, const Frame& frame) const {
 }
 
 Result<Detections> Node::infer(const Frame& frame, const Predictions& expected) {
+  turnFor(frame);
   const bool priming = primes(expected, frame);
   const double lax = options_.score_threshold;
   auto candidates =
@@ -221,8 +255,7 @@ Result<Detections> Node::infer(const Frame& frame, const Predictions& expected) 
   }
   const auto reported = suppress(std::move(passing), config_.detection.merge_iou,
                                  static_cast<std::size_t>(config_.detection.limit));
-  const ImageFit fit =
-      fitOf(at().input, static_cast<int>(frame.width), static_cast<int>(frame.height));
+  const ImageFit fit = fitTo(frame);
   Detections out;
   out.stamp = frame.stamp;
   out.camera = frame.camera;
@@ -239,8 +272,7 @@ Result<Detections> Node::infer(const Frame& frame, const Predictions& expected) 
 /// too small for the network, or of a class that is not reported.
 std::vector<Expectation> Node::expectationsOf(const Predictions& expected,
                                               const Frame& frame) const {
-  const ImageFit fit =
-      fitOf(at().input, static_cast<int>(frame.width), static_cast<int>(frame.height));
+  const ImageFit fit = fitTo(frame);
   const double after = toSeconds(frame.stamp.time - expected.stamp.time);
   std::vector<Expectation> expectations;
   for (const Prediction& prediction : expected.predictions) {
@@ -249,11 +281,8 @@ std::vector<Expectation> Node::expectationsOf(const Predictions& expected,
     const auto name = std::find(names.begin(), names.end(), prediction.class_name);
     const bool asked = box && name != names.end() && prediction.object_id != 0;
     const auto k = static_cast<std::size_t>(name - names.begin()) + 1;
-    const auto& s = prediction.side_sigma;
     expectations.push_back(
-        {box.value_or(Box{}),
-         asked ? k : 0,
-         {s[0] * fit.scale_x, s[1] * fit.scale_y, s[2] * fit.scale_x, s[3] * fit.scale_y}});
+        {box.value_or(Box{}), asked ? k : 0, fit.toInput(prediction.side_sigma)});
   }
   return expectations;
 }
@@ -261,8 +290,7 @@ std::vector<Expectation> Node::expectationsOf(const Predictions& expected,
 void Node::addPrimed(const Predictions& expected, const Frame& frame,
                      const std::vector<Candidate>& reported,
                      const std::vector<Candidate>& candidates, Detections& out) const {
-  const ImageFit fit =
-      fitOf(at().input, static_cast<int>(frame.width), static_cast<int>(frame.height));
+  const ImageFit fit = fitTo(frame);
   const auto expectations = expectationsOf(expected, frame);
   for (const PrimedAnswer& answer :
        prime(description_.calibration, expectations, reported, candidates)) {

@@ -4,14 +4,17 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/types/detections.h"
+#include "common/types/odometry.h"
 #include "common/types/sensors.h"
 #include "services/inference/config.h"
 #include "services/inference/core/decode/prime.h"
+#include "services/inference/core/network/image_fit.h"
 #include "services/inference/core/network/network.h"
 #include "services/inference/model_file.h"
 
@@ -22,12 +25,17 @@ class Node {
   /// Loads, warms up and tests the network. Throws StartupError with the fix.
   Node(const Config& config, InstanceId instance);
 
-  /// Description of the activations and of the reported classes.
+  /// Description of the activations and of the reported classes. A turn of the images has a
+  /// description of its own, because boxes have other insets then.
   const ModelInfo& model() const { return info_; }
 
   const ModelDescription& description() const { return description_; }
   /// Backend of the network, for people.
   std::string backend() const;
+
+  /// These give the turn that makes the next frames upright (core/upright.h).
+  void onCalibration(const perdure::Calibration& calibration) { calibration_ = calibration; }
+  void onOdometry(const Odometry& odometry);
 
   /// Boxes in pixels of the frame, not clipped to the image. An empty list is a valid result.
   /// `expected`: predicted objects. Each one without a matching box gets a top-down answer
@@ -55,7 +63,10 @@ class Node {
  private:
   Node(const Config& config, InstanceId instance, ModelFile file);
   void chooseClasses();
+  void describe();
   void testItself();
+  void turnFor(const Frame& frame);
+  ImageFit fitTo(const Frame& frame) const;
   bool primes(const Predictions& expected, const Frame& frame) const;
   std::vector<Expectation> expectationsOf(const Predictions& expected, const Frame& frame) const;
   void addPrimed(const Predictions& expected, const Frame& frame,
@@ -74,9 +85,13 @@ class Node {
   ModelDescription description_;  ///< description at its own size
   std::vector<Size> sizes_;       ///< its own first, then smaller ones if there is a budget
   std::size_t size_ = 0;
+  int quarters_ = 0;  ///< clockwise turn of the images
+  perdure::Calibration calibration_;
+  std::optional<Eigen::Vector3d> up_B_;  ///< against gravity
   std::function<double()> clock_s_;
   double forward_s_ = 0.0;  ///< time of the forward pass for the last frame
   DecodeOptions options_;
+  std::string identity_;  ///< of the network, without a turn
   ModelInfo info_;
 };
 

@@ -26,7 +26,7 @@ Worker::Worker(Node& node, const OwnershipConfig& ownership, double budget_ms, W
       end_(std::move(end)),
       ownership_(firstOwnership(ownership, lease_)),
       swap_({node.model().instance, node.model().name, ownership.probation_s, lease_}) {
-  swap_.learn(node.model());
+  publishModel();
   node_.timeBy(
       [] { return std::chrono::duration<double>(Clock::now().time_since_epoch()).count(); });
   thread_ = std::thread([this] { run(); });
@@ -52,16 +52,38 @@ void Worker::expect(const Predictions& predictions) {
   expected_ = predictions;
 }
 
+void Worker::onCalibration(const perdure::Calibration& calibration) {
+  const std::lock_guard lock(mutex_);
+  calibration_ = calibration;
+}
+
+void Worker::onOdometry(const Odometry& odometry) {
+  const std::lock_guard lock(mutex_);
+  odometry_ = odometry;
+}
+
+void Worker::publishModel() {
+  swap_.learn(node_.model());
+  (void)bus_.models.write(node_.model());
+}
+
 Result<Detections> Worker::look(const Frame& frame) {
   Predictions expected;
   {
     const std::lock_guard lock(mutex_);
     expected = expected_;
+    if (const auto new_one = std::exchange(calibration_, {})) node_.onCalibration(*new_one);
+    if (const auto new_one = std::exchange(odometry_, {})) node_.onOdometry(*new_one);
     if (!expected.predictions.empty() && !fitsFrame(expected, frame)) {
       reasons_.add("predictions_stale");
     }
   }
-  return node_.infer(frame, expected);
+  const std::uint64_t before = node_.model().hash;
+  const auto result = node_.infer(frame, expected);
+  if (node_.model().hash == before) return result;
+  const std::lock_guard lock(mutex_);
+  publishModel();
+  return result;
 }
 
 void Worker::assertAlive() {

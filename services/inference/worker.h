@@ -6,6 +6,7 @@
 #include <atomic>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -24,6 +25,7 @@ struct WorkerBus {
   bus::Writer<Detections>& detections;
   /// Reader of `detections`, matched with writers of this and of other processes.
   const bus::RawReader& rivals;
+  bus::Writer<ModelInfo>& models;
   bus::Writer<SwapNotice>& notices;
 };
 
@@ -42,6 +44,9 @@ class Worker {
 
   /// Adds a frame. A frame that still waits is dropped and counted.
   void offer(const Frame& frame);
+  /// These make the following frames upright.
+  void onCalibration(const perdure::Calibration& calibration);
+  void onOdometry(const Odometry& odometry);
   /// Sets the predicted objects for the following frames.
   void expect(const Predictions& predictions);
   /// Asserts liveliness, unless the network is stuck. Call it several times in a lease.
@@ -68,6 +73,7 @@ class Worker {
   Result<Detections> look(const Frame& frame);
   void keepBudget(double ms);
   void publish(const Detections& detections, Duration age);
+  void publishModel();
   void noteFailure(const Reason& reason);
   void noteLapse(Clock::time_point now);
   void adoptStrength(Clock::time_point now);
@@ -95,6 +101,8 @@ class Worker {
   std::string failure_, last_problem_;
   ReasonCounts reasons_;
   Predictions expected_;
+  std::optional<perdure::Calibration> calibration_;  ///< not yet given to the node, as `odometry_`
+  std::optional<Odometry> odometry_;
   double scale_ = 1.0;   ///< width of the input relative to its own size
   double age_ms_ = 0.0;  ///< age of the last result when it was ready
   std::thread thread_;

@@ -42,6 +42,10 @@ void setUpDetect(CLI::App& detect) {
                   "Boxes whose best class scores less are left out")
       ->check(CLI::Range(0.001, 0.999))
       ->capture_default_str();
+  detect
+      .add_option("--turn", options->inference.detection.turn,
+                  "Clockwise turn that makes the images upright for the network, degrees")
+      ->check(CLI::IsMember({"0", "90", "180", "270"}));
   detect.add_option("--threads", options->inference.model.threads, "Of OpenCV")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();

@@ -21,6 +21,8 @@ double wallMs() {
 }  // namespace
 
 void Pipeline::learn(const ModelInfo& model) {
+  if (model.hash == model_hash_) return;
+  model_hash_ = model.hash;
   keep("model", model, TimePoint());
   hear(model);
 }
@@ -158,6 +160,7 @@ void Pipeline::noteLatency(const FrameStamp& stamp) {
 void Pipeline::detect(const Frame& frame) {
   if (inference_) {
     auto detections = timer_.time("inference", [&] { return inference_->infer(frame, expected_); });
+    learn(inference_->model());
     if (detections)
       offer(*std::move(detections));
     else
@@ -172,10 +175,7 @@ void Pipeline::detect(const Frame& frame) {
   const auto found = detection_file_->at(frame.stamp.sequence);
   const ModelInfo model = detection_file_->modelAt(frame.stamp.sequence);
   if (!found || model.classes.empty()) return;
-  if (model.hash != model_hash_) {
-    learn(model);
-    model_hash_ = model.hash;
-  }
+  learn(model);
   Detections detections;
   detections.stamp = frame.stamp;
   detections.camera = frame.camera;

@@ -178,8 +178,13 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
     accuracy = isSimulated(options.data) ? ofExactTruth() : ofMeasuredTruth();
   }
   if (pose_file_) {
-    const auto serve = [this](auto source) {
-      pose_at_ = [source](const FrameStamp& stamp) mutable { return source.at(stamp); };
+    const bool knows_up = accuracy.z_up;  // other poses assume it
+    const auto serve = [this, knows_up](auto source) {
+      pose_at_ = [this, knows_up, source](const FrameStamp& stamp) mutable {
+        auto odometry = source.at(stamp);
+        if (inference_ && knows_up && odometry) inference_->onOdometry(*odometry);
+        return odometry;
+      };
     };
     if (options.odometry == "drifting")
       serve(DriftingOdometry(*pose_file_, instanceOf(kVio), session_, accuracy, configs_.drifting));
@@ -195,6 +200,7 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
   vio::Outputs sinks;
   sinks.odometry = [this](const Odometry& odometry) {
     new_odometry_.push_back(odometry);
+    if (inference_) inference_->onOdometry(odometry);
     rig_watch_->onOdometry(odometry);
   };
   sinks.innovations = [this](const std::vector<vio::Innovation>& all) {
@@ -289,6 +295,7 @@ void Pipeline::openDetections(const PipelineOptions& options) {
                            "give --detections a CSV");
   }
   inference_ = std::make_unique<inference::Node>(configs_.inference, instanceOf(kInference));
+  inference_->onCalibration(dataset_->calibration());
 }
 
 }  // namespace perdure::tools

@@ -134,6 +134,7 @@ struct ModelDescription {
                               ///< has no spread
   double box_sigma = 0.0;  ///< standard deviation of a side relative to the box's size; 0: unknown
   BoxExtent boxes = BoxExtent::kUnknown;
+  bool upright = true;  ///< images may be turned upright (core/upright.h)
   std::map<std::string, std::array<double, 4>> side_insets;  ///< by class; see ModelInfo
   Calibration calibration;
 };

@@ -83,6 +83,27 @@ TEST(CommittedNetwork, TakesSmallerInputsWhereThereIsABudgetAndSaysWhich) {
   }
 }
 
+TEST(CommittedNetwork, AnswersInPixelsOfTheImageBeforeItsTurn) {
+  Config config = committed();
+  config.detection.turn = "270";
+  Node node(config, 1);
+  Frame frame;
+  frame.camera = "cam0";
+  frame.width = 640, frame.height = 480;
+  frame.data = std::make_shared<const std::vector<std::uint8_t>>(640 * 480, std::uint8_t{120});
+  Predictions expected;
+  expected.camera = "cam0";
+  expected.predictions = {{7, "car", {600, 200, 630, 260}, 0.9, {}, {3, 3, 3, 3}}};
+  const auto out = node.infer(frame, expected);
+  ASSERT_TRUE(out) << out.error().detail;
+  EXPECT_EQ(node.model().input_width, 240u) << "along the image's width, which became its height";
+  EXPECT_EQ(node.model().input_height, 320u);
+  const auto primed = std::find_if(out->detections.begin(), out->detections.end(),
+                                   [](const Detection& d) { return d.primed_for == 7; });
+  ASSERT_NE(primed, out->detections.end());
+  EXPECT_GT(intersectionOverUnion(primed->box, expected.predictions[0].box), 0.3);
+}
+
 TEST(CommittedNetwork, AnswersWhatItIsAskedAboutAndOnlyThat) {
   Node node(committed(), 1);
   Frame frame;

@@ -98,6 +98,74 @@ TEST_F(NodeTest, HashFollowsWeightsAndDescription) {
   EXPECT_NE(hash({}, {"car"}), base);
 }
 
+/// A camera with the body's axes.
+perdure::Calibration rig() {
+  perdure::Calibration rig;
+  rig.cameras.emplace_back().name = "cam0";
+  return rig;
+}
+
+Odometry upAt(const Eigen::Vector3d& up) {
+  Odometry odometry;
+  odometry.state = OdometryState::kTracking;
+  odometry.up_W = up;
+  return odometry;
+}
+
+TEST_F(NodeTest, TurnsImagesByTheOdometryAndBoxesAndInsetsBack) {
+  const Config c = config();
+  std::string json = testing::TinyModel{}.json();
+  json.insert(1, R"("side_insets": {"car": [0.01, 0.02, 0.03, 0.04]},)");
+  std::ofstream(c.model.path + ".model.json") << json;
+  Node node(c, 42);
+  node.onCalibration(rig());
+  const auto plain = node.infer(frame());
+  ASSERT_TRUE(plain);
+  const std::uint64_t hash = node.model().hash;
+  EXPECT_EQ(node.model().name, "tiny");
+  Odometry first = upAt({-1, 0, 0});
+  first.state = OdometryState::kInitialising;
+  node.onOdometry(first);
+  EXPECT_EQ(node.infer(frame())->model_hash, hash) << "this odometry says nothing yet";
+
+  node.onOdometry(upAt({-1, 0, 0}));
+  const auto turned = node.infer(frame());
+  ASSERT_TRUE(turned);
+  EXPECT_NE(turned->model_hash, hash);
+  EXPECT_EQ(turned->model_hash, node.model().hash);
+  EXPECT_EQ(node.model().name, "tiny, turned by 90°");
+  // Left of the network's picture is the bottom of the image.
+  EXPECT_EQ(node.model().side_insets, (std::vector<double>{0.02, 0.03, 0.04, 0.01, 0, 0, 0, 0}));
+  ASSERT_EQ(turned->detections.size(), 4u);
+  const Box box = turned->detections[0].box;  // centre 16,16 of 64×64, size 16×8; image 96×128
+  EXPECT_NEAR(box.x1, (16 - 4) * 2.0, 1e-4);
+  EXPECT_NEAR(box.x2, (16 + 4) * 2.0, 1e-4);
+  EXPECT_NEAR(box.y1, 96 - (16 + 8) * 1.5, 1e-4);
+  EXPECT_NEAR(box.y2, 96 - (16 - 8) * 1.5, 1e-4);
+
+  node.onOdometry(upAt({0, -1, 0}));
+  const auto again = node.infer(frame());
+  ASSERT_TRUE(again);
+  EXPECT_EQ(again->model_hash, hash);
+  EXPECT_EQ(again->detections[0].box.x1, plain->detections[0].box.x1);
+}
+
+TEST_F(NodeTest, AModelMayForbidTheTurnAndTheConfigurationMayFixIt) {
+  Config c = config();
+  std::string json = testing::TinyModel{}.json();
+  json.insert(1, R"("upright": false,)");
+  std::ofstream(c.model.path + ".model.json") << json;
+  Node forbidden(c, 1);
+  forbidden.onCalibration(rig());
+  forbidden.onOdometry(upAt({0, 1, 0}));
+  ASSERT_TRUE(forbidden.infer(frame()));
+  EXPECT_EQ(forbidden.model().name, "tiny");
+  c.detection.turn = "180";
+  Node fixed(c, 1);
+  ASSERT_TRUE(fixed.infer(frame())) << "without odometry";
+  EXPECT_EQ(fixed.model().name, "tiny, turned by 180°");
+}
+
 TEST_F(NodeTest, RefusesAMalformedFrameAndGoesOn) {
   Node node(config(), 1);
   Frame bad = frame();

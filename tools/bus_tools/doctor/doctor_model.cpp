@@ -5,6 +5,7 @@
 
 #include "common/replay/dataset.h"
 #include "services/inference/core/network/image_fit.h"
+#include "services/inference/core/upright.h"
 #include "services/inference/model_file.h"
 #include "tools/bus_tools/doctor/doctor.h"
 
@@ -12,6 +13,14 @@ namespace perdure::tools {
 namespace {
 
 constexpr double kMostWaste = 1.0 / 3.0;
+
+/// Clockwise quarter turns that make the images upright, by the mean specific force.
+int quartersOf(const replay::Recording& recording) {
+  Eigen::Vector3d up_B = Eigen::Vector3d::Zero();
+  for (const ImuSample& sample : recording.imu) up_B += sample.accel;
+  const RigidTransform& T_BC = recording.calibration.cameras.front().T_BC;
+  return inference::uprightQuarters(T_BC.q.conjugate() * up_B.normalized(), 0);
+}
 
 }  // namespace
 
@@ -32,15 +41,17 @@ Findings checkNetworkShape(const Drive& drive, const std::string& network) {
   const auto& camera = dataset->calibration().cameras.front();
   const auto file = inference::readModelFile(network, "", inference::standardModelFolders());
   const inference::Input& input = file.description.input;
-  const double waste = inference::paddedShare(input, static_cast<int>(camera.width),
-                                              static_cast<int>(camera.height));
+  const int width = static_cast<int>(camera.width), height = static_cast<int>(camera.height);
+  const int quarters = file.description.upright ? quartersOf(dataset->recording()) : 0;
+  const double waste = inference::paddedShare(input, width, height, quarters);
   if (waste <= kMostWaste) return {};
+  const bool across = quarters % 2 == 1;
   return {{Verdict::kWarn,
            fmt::format("{:.0f} % of the input of {} ({}x{}) stays grey beside images of {}x{}: "
                        "perdure model import NETWORK --input camera --image PICTURE gives it the "
                        "camera's shape",
                        100 * waste, std::filesystem::path(network).filename().string(), input.width,
-                       input.height, camera.width, camera.height)}};
+                       input.height, across ? height : width, across ? width : height)}};
 }
 
 }  // namespace perdure::tools

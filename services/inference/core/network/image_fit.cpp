@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 namespace perdure::inference {
 namespace {
@@ -38,8 +39,53 @@ cv::Mat toPlanes(const Input& input, const cv::Mat& bgr) {
 
 }  // namespace
 
-ImageFit fitOf(const Input& input, int image_width, int image_height) {
+std::array<double, 4> turned(const std::array<double, 4>& sides, int quarters) {
+  std::array<double, 4> result;
+  for (std::size_t i = 0; i < 4; ++i) {
+    result[(i + static_cast<std::size_t>(quarters)) % 4] = sides[i];
+  }
+  return result;
+}
+
+Box turned(const Box& box, int quarters, double width, double height) {
+  Box b = box;
+  for (int i = 0; i < quarters; ++i) {
+    b = {height - b.y2, b.x1, height - b.y1, b.x2};
+    std::swap(width, height);
+  }
+  return b;
+}
+
+Box ImageFit::toImage(const Box& b) const {
+  const Box upright{(b.x1 - offset_x) / scale_x, (b.y1 - offset_y) / scale_y,
+                    (b.x2 - offset_x) / scale_x, (b.y2 - offset_y) / scale_y};
+  const bool across = quarters % 2 == 1;
+  return turned(upright, (4 - quarters) % 4, across ? image_height : image_width,
+                across ? image_width : image_height);
+}
+
+Box ImageFit::toInput(const Box& b) const {
+  const Box upright = turned(b, quarters, image_width, image_height);
+  return {upright.x1 * scale_x + offset_x, upright.y1 * scale_y + offset_y,
+          upright.x2 * scale_x + offset_x, upright.y2 * scale_y + offset_y};
+}
+
+std::array<double, 4> ImageFit::toImage(const std::array<double, 4>& sides) const {
+  return turned({sides[0] / scale_x, sides[1] / scale_y, sides[2] / scale_x, sides[3] / scale_y},
+                4 - quarters);
+}
+
+std::array<double, 4> ImageFit::toInput(const std::array<double, 4>& sides) const {
+  const auto upright = turned(sides, quarters);
+  return {upright[0] * scale_x, upright[1] * scale_y, upright[2] * scale_x, upright[3] * scale_y};
+}
+
+ImageFit fitOf(const Input& input, int image_width, int image_height, int quarters) {
   ImageFit fit;
+  fit.quarters = quarters;
+  fit.image_width = image_width;
+  fit.image_height = image_height;
+  if (quarters % 2 == 1) std::swap(image_width, image_height);
   fit.width = input.width;
   fit.height = input.height;
   if (input.fit != Fit::kResize) {
@@ -57,20 +103,29 @@ ImageFit fitOf(const Input& input, int image_width, int image_height) {
   return fit;
 }
 
-double paddedShare(const Input& input, int image_width, int image_height) {
-  const ImageFit fit = fitOf(input, image_width, image_height);
+double paddedShare(const Input& input, int image_width, int image_height, int quarters) {
+  const ImageFit fit = fitOf(input, image_width, image_height, quarters);
   const double all = static_cast<double>(input.width) * input.height;
   return 1.0 - static_cast<double>(fit.width) * fit.height / all;
 }
 
-Result<cv::Mat> makeBlob(const Input& input, const Frame& frame) {
+Result<cv::Mat> makeBlob(const Input& input, const Frame& frame, int quarters) {
   const auto view = viewOf(frame);
   if (!view) return view;
-  const ImageFit fit = fitOf(input, view->cols, view->rows);
+  const ImageFit fit = fitOf(input, view->cols, view->rows, quarters);
   cv::Mat canvas(input.height, input.width, view->type(), cv::Scalar::all(input.pad));
   cv::Mat target = canvas(cv::Rect(static_cast<int>(fit.offset_x), static_cast<int>(fit.offset_y),
                                    fit.width, fit.height));
-  cv::resize(*view, target, target.size(), 0, 0, cv::INTER_LINEAR);
+  if (quarters == 0) {
+    cv::resize(*view, target, target.size(), 0, 0, cv::INTER_LINEAR);
+  } else {
+    constexpr cv::RotateFlags kTurns[] = {cv::ROTATE_90_CLOCKWISE, cv::ROTATE_180,
+                                          cv::ROTATE_90_COUNTERCLOCKWISE};
+    cv::Mat scaled;
+    const cv::Size size = quarters == 2 ? target.size() : cv::Size(fit.height, fit.width);
+    cv::resize(*view, scaled, size, 0, 0, cv::INTER_LINEAR);
+    cv::rotate(scaled, target, kTurns[quarters - 1]);
+  }
   if (canvas.channels() == 1) cv::cvtColor(canvas, canvas, cv::COLOR_GRAY2BGR);
   return toPlanes(input, canvas);
 }

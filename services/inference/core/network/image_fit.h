@@ -1,4 +1,4 @@
-// Fits an image to the network's input, and maps boxes back to the image.
+// Turns an image upright and fits it to the network's input, and maps boxes back to the image.
 #pragma once
 
 #include <array>
@@ -11,31 +11,34 @@
 
 namespace perdure::inference {
 
-/// Maps pixels of the image to pixels of the input: x_input = x_image · scale_x + offset_x.
+/// Returns what belongs to the sides (x1, y1, x2, y2) after clockwise quarter turns of the image.
+/// `quarters`: 0 to 4.
+std::array<double, 4> turned(const std::array<double, 4>& sides, int quarters);
+/// Returns a box after such turns of an image of this size.
+Box turned(const Box& box, int quarters, double width, double height);
+
+/// Maps pixels of the image to pixels of the input. The image is turned clockwise by `quarters`;
+/// then x_input = x_turned · scale_x + offset_x.
 struct ImageFit {
   double scale_x = 1, scale_y = 1, offset_x = 0, offset_y = 0;
   int width = 0, height = 0;  ///< size of the scaled image, without padding
+  int quarters = 0;           ///< 0 to 3
+  int image_width = 0, image_height = 0;
 
-  Box toImage(const Box& b) const {
-    return {(b.x1 - offset_x) / scale_x, (b.y1 - offset_y) / scale_y, (b.x2 - offset_x) / scale_x,
-            (b.y2 - offset_y) / scale_y};
-  }
-  Box toInput(const Box& b) const {
-    return {b.x1 * scale_x + offset_x, b.y1 * scale_y + offset_y, b.x2 * scale_x + offset_x,
-            b.y2 * scale_y + offset_y};
-  }
-  std::array<double, 4> toImage(const std::array<double, 4>& sides) const {
-    return {sides[0] / scale_x, sides[1] / scale_y, sides[2] / scale_x, sides[3] / scale_y};
-  }
+  Box toImage(const Box& b) const;
+  Box toInput(const Box& b) const;
+  /// The same for lengths at the sides.
+  std::array<double, 4> toImage(const std::array<double, 4>& sides) const;
+  std::array<double, 4> toInput(const std::array<double, 4>& sides) const;
 };
 
-ImageFit fitOf(const Input& input, int image_width, int image_height);
+ImageFit fitOf(const Input& input, int image_width, int image_height, int quarters = 0);
 
 /// Share of the input outside the image; 0 without letterbox.
-double paddedShare(const Input& input, int image_width, int image_height);
+double paddedShare(const Input& input, int image_width, int image_height, int quarters = 0);
 
 /// Input blob (1,3,H,W) of float32. Mono images are repeated in all three channels. Fails with
 /// "frame_malformed" if the frame's size does not match its data.
-Result<cv::Mat> makeBlob(const Input& input, const Frame& frame);
+Result<cv::Mat> makeBlob(const Input& input, const Frame& frame, int quarters = 0);
 
 }  // namespace perdure::inference
