@@ -106,6 +106,13 @@ void checkLost(const Recording& recording, const DataUse& use, DataFindings& fin
                                     lost, kept + lost,
                                     std::string(kind) == "imu" ? "inertial samples" : "images")});
   }
+  const std::uint64_t unlisted = recording.reasons.of("frame_unlisted");
+  if (kFew * unlisted > images) {
+    findings.push_back({Grade::kWarning, "lines_lost",
+                        fmt::format("{} images lie in the folder but not in its data.csv and were "
+                                    "left out: complete the list, or remove them",
+                                    unlisted)});
+  }
 }
 
 }  // namespace

@@ -130,6 +130,7 @@ class FrameList {
           "must be their names",
           list, named_, images, images_.size(), first_, images_.first());
     }
+    if (images_.size() > found_) recording.reasons.add("frame_unlisted", images_.size() - found_);
     if (images_.foundOtherwise() == 0) return;
     recording.notes.push_back(
         fmt::format("{}: {} of {} images are not there by the name in the list and were found by "
