@@ -116,11 +116,7 @@ void checkShared(const Recording& recording, DataFindings& findings) {
       std::count_if(recording.frames.begin(), recording.frames.end(),
                     [&](const auto& frame) { return frame.time >= from && frame.time <= to; });
   const auto all = static_cast<std::ptrdiff_t>(recording.frames.size());
-  // Sensors do not start and stop together, and their clocks may differ by as much.
-  constexpr double kUsual_s = 1.0;
-  const double outside_s =
-      std::max(toSeconds(from - first), 0.0) + std::max(toSeconds(last - to), 0.0);
-  if (10 * covered >= 9 * all || outside_s < kUsual_s) return;
+  if (10 * covered >= 9 * all) return;
   findings.push_back(
       {StampGrade::kWarning, "imu_covers_part",
        fmt::format("only {} of {} images lie within the time of the inertial samples: "

@@ -17,12 +17,12 @@ using Words = std::vector<std::string>;
 
 constexpr int kVideoFrames = 300;  ///< 15 s at 20 Hz
 
-void perdure(const Words& arguments, const fs::path& log, int expected = 0) {
+void perdure(const Words& arguments, const fs::path& log) {
   Words command{(programs() / "perdure").string()};
   command.insert(command.end(), arguments.begin(), arguments.end());
   Child child(command, log.string());
   const int status = child.wait(std::chrono::minutes(20));
-  if (status == expected) return;
+  if (status == 0) return;
   std::string text = "exit status " + std::to_string(status) + " of:";
   for (const auto& word : command) text += " " + word;
   throw std::runtime_error(text + "\n" + child.log());
@@ -79,7 +79,7 @@ void PrintTo(const GoldenRun& run, std::ostream* out) { *out << run.name; }
 
 const std::vector<GoldenRun>& goldenRuns() {
   static const std::vector<GoldenRun> runs{{"toy"},
-                                           {.name = "still", .status = 65},
+                                           {"still"},
                                            {"occlusion"},
                                            {"vanish"},
                                            {"room"},
@@ -111,7 +111,7 @@ void produce(const GoldenRun& run, const fs::path& folder) {
   Words arguments{"pipeline", "--quiet", "--out", (folder / "now").string()};
   const Words input = inputOf(run, folder);
   arguments.insert(arguments.end(), input.begin(), input.end());
-  perdure(arguments, folder / "pipeline.log", run.status);
+  perdure(arguments, folder / "pipeline.log");
   fs::remove_all(folder / "drive");
 }
 

@@ -13,7 +13,6 @@ struct GoldenRun {
   std::string name;
   std::string data = {};  ///< the required data folder; "": the simulator's scene of that name
   bool pictures = false;  ///< the results depend on OpenCV's image processing
-  int status = 0;         ///< exit status of the pipeline: 65 if the map must stay empty
 };
 void PrintTo(const GoldenRun& run, std::ostream* out);
 
