@@ -31,7 +31,8 @@ class MapFit {
   /// Returns what the residuals tell about the variances of the sides, by restricted likelihood.
   /// For an object at rest.
   SideEvidence sideEvidence() const;
-  /// Returns the residuals of the azimuths, by the first assumption; their count: degrees of freedom.
+  /// Returns the residuals of the azimuths, by the first assumption; their count: degrees of
+  /// freedom.
   ResidualRatio azimuthResidualRatio() const;
   /// Returns the number of sides that count, of all keyframes.
   std::size_t sides() const;
