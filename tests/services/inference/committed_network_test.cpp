@@ -83,14 +83,19 @@ TEST(CommittedNetwork, TakesSmallerInputsWhereThereIsABudgetAndSaysWhich) {
   }
 }
 
-TEST(CommittedNetwork, AnswersInPixelsOfTheImageBeforeItsTurn) {
-  Config config = committed();
-  config.detection.turn = "270";
-  Node node(config, 1);
+Frame greyFrame() {
   Frame frame;
   frame.camera = "cam0";
   frame.width = 640, frame.height = 480;
   frame.data = std::make_shared<const std::vector<std::uint8_t>>(640 * 480, std::uint8_t{120});
+  return frame;
+}
+
+TEST(CommittedNetwork, AnswersInPixelsOfTheImageBeforeItsTurn) {
+  Config config = committed();
+  config.detection.turn = "270";
+  Node node(config, 1);
+  const Frame frame = greyFrame();
   Predictions expected;
   expected.camera = "cam0";
   expected.predictions = {{7, "car", {600, 200, 630, 260}, 0.9, {}, {3, 3, 3, 3}}};
@@ -106,10 +111,7 @@ TEST(CommittedNetwork, AnswersInPixelsOfTheImageBeforeItsTurn) {
 
 TEST(CommittedNetwork, AnswersWhatItIsAskedAboutAndOnlyThat) {
   Node node(committed(), 1);
-  Frame frame;
-  frame.camera = "cam0";
-  frame.width = 640, frame.height = 480;
-  frame.data = std::make_shared<const std::vector<std::uint8_t>>(640 * 480, std::uint8_t{120});
+  const Frame frame = greyFrame();
   Predictions expected;
   expected.camera = "cam0";
   expected.predictions = {{7, "car", {200, 200, 300, 260}, 0.9, {}, {3, 3, 3, 3}},

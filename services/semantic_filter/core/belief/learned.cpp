@@ -31,8 +31,8 @@ SideScales SideVariances::scales(std::uint64_t model) const {
 void SideVariances::learn(std::uint64_t model, const SideEvidence& evidence, double assumed) {
   // A network has other errors on another road.
   constexpr double kRemembered = 4000.0;  // sides
-  // Nothing but boxes of the same network tells how much of an error lasts. So the assumed share
-  // weighs less than the assumed noise.
+  // How much of an error lasts differs more between networks than their noise. So the assumed share
+  // has a smaller weight than the assumed noise.
   constexpr double kLastingWeight = 0.1;
   if (assumed <= 0.0 || !evidence.gradient.allFinite() || !(evidence.information.trace() > 0.0)) {
     return;

@@ -19,14 +19,14 @@ struct ResidualRatio {
   double count = 0.0;  ///< number of new residuals; keyframes of an earlier fit do not count again
 };
 
-/// True over assumed variances of the sides of boxes: of the errors that each box has anew, and of
-/// those that last while the view hardly changes (b).
+/// True over assumed variances of the sides of boxes: of the errors that are new in each box, and
+/// of those that last while the view hardly changes (b).
 struct SideScales {
   double noise = 1.0, lasting = 1.0;
 };
 
-/// What the residuals of one fit tell about the logarithms of both scales [noise, lasting], at the
-/// scales that the fit used.
+/// Evidence of the residuals of one fit about the logarithms of both scales [noise, lasting], at
+/// the scales that the fit used.
 struct SideEvidence {
   Eigen::Matrix2d information = Eigen::Matrix2d::Zero();  ///< Fisher's, doubled: about sides
   Eigen::Vector2d gradient = Eigen::Vector2d::Zero();     ///< of the log likelihood, doubled

@@ -28,7 +28,7 @@ class MapFit {
   const Hypothesis& hypothesis() const { return hypothesis_; }
   /// Returns the share of keyframes that contradict the fit.
   double contradicted() const { return contradictions().cast<double>().mean(); }
-  /// Returns what the residuals tell about the variances of the sides, by restricted likelihood.
+  /// Returns the evidence about the variances of the sides, by restricted likelihood.
   /// For an object at rest.
   SideEvidence sideEvidence() const;
   /// Returns the residuals of the azimuths, by the first assumption; their count: degrees of
