@@ -207,9 +207,13 @@ class SwapRig {
       return e.kind == EventKind::kModelChanged && e.detail.find(part) != std::string::npos;
     });
   }
+  /// Returns the objects that were detected more than once. A box behind another object starts a
+  /// tentative object that is hidden from then on, and is forgotten after ten seconds.
   std::set<ObjectId> objectIds() const {
     std::set<ObjectId> ids;
-    for (const auto& o : last_objects_.objects) ids.insert(o.id);
+    for (const auto& o : last_objects_.objects) {
+      if (o.hits > 1) ids.insert(o.id);
+    }
     return ids;
   }
   const Objects& objects() const { return last_objects_; }
