@@ -11,6 +11,7 @@
 #include "common/math/rigid_transform.h"
 #include "common/types/description.h"
 #include "common/types/detections.h"
+#include "common/types/directions.h"
 #include "common/types/ledger.h"
 
 namespace perdure {
@@ -55,6 +56,7 @@ struct ObjectBelief {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s in W, zero while static
   Memory memory = Memory::kWorking;
   bool recalled = false;  ///< recalled from the map and not detected since
+  Directions seen_from = Directions::Zero();  ///< in W; 0 everywhere: not known
   Ledger why;             ///< reasons of existence and class probabilities
 
   const ClassBelief& best() const { return classes.front(); }
@@ -198,6 +200,7 @@ void describe(auto& a, Is<ObjectBelief> auto& d, auto& w) {
   a.value("recalled", d.recalled, w.recalled);
   a.object("why", d.why, w);
   a.value("track", d.track, w.track);
+  a.matrix("seen_from", d.seen_from, w.seen_from, kNotNegative);
 }
 
 void describe(auto& a, Is<EndedTrack> auto& d, auto& w) {

@@ -249,7 +249,7 @@ class Coder {
       d = w;
     }
   }
-  static void copyRows(auto&& d, Wire<double>* w) {
+  static void copyRows(auto&& d, auto* w) {
     for (Eigen::Index r = 0; r < d.rows(); ++r) {
       for (Eigen::Index c = 0; c < d.cols(); ++c) copy(d(r, c), *w++);
     }

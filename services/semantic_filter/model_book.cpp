@@ -20,6 +20,17 @@ std::string beyond(const Model& model, const Model& other, const std::string& ti
   return n == 0 ? "" : "; " + title + ": " + text;
 }
 
+/// Whether `now` is `before` with more classes: a file of detections lists classes as they appear.
+bool continues(const ModelInfo& now, const ModelInfo& before) {
+  const auto begins = [](const auto& longer, const auto& list) {
+    return list.size() <= longer.size() && std::equal(list.begin(), list.end(), longer.begin());
+  };
+  return now.name == before.name && now.classes.size() > before.classes.size() &&
+         begins(now.classes, before.classes) && begins(now.side_insets, before.side_insets) &&
+         now.input_width == before.input_width && now.input_height == before.input_height &&
+         now.box_sigma == before.box_sigma && now.boxes == before.boxes;
+}
+
 }  // namespace
 
 Result<void> ModelBook::add(const ModelInfo& info) {
@@ -29,15 +40,13 @@ Result<void> ModelBook::add(const ModelInfo& info) {
   }
   Model model = makeModel(info, priors_);
   const auto earlier = std::find_if(order_.rbegin(), order_.rend(), [&](std::uint64_t hash) {
-    return entries_.at(hash).name == info.name;
+    return entries_.at(hash).info.name == info.name;
   });
   if (earlier != order_.rend()) {
-    const Model& before = *entries_.at(*earlier).model;
-    const auto &old = before.classes, &now = info.classes;
-    if (old.size() < now.size() && std::equal(old.begin(), old.end(), now.begin()))
-      model.network = before.network;
+    const Entry& before = entries_.at(*earlier);
+    if (continues(info, before.info)) model.network = before.model->network;
   }
-  entries_.emplace(info.hash, Entry{info.name, std::make_shared<const Model>(std::move(model))});
+  entries_.emplace(info.hash, Entry{info, std::make_shared<const Model>(std::move(model))});
   order_.push_back(info.hash);
   if (order_.size() <= kMaxModels) return {};
   if (order_.front() == used_) {  // keep the model in use
@@ -63,7 +72,7 @@ std::optional<std::string> ModelBook::use(std::uint64_t hash, TimePoint time) {
   const auto from = entries_.find(before);
   if (first || from == entries_.end()) return std::nullopt;
   const Entry& to = entries_.at(hash);
-  return to.name + " instead of " + from->second.name +
+  return to.info.name + " instead of " + from->second.info.name +
          beyond(*to.model, *from->second.model, "new classes") +
          beyond(*from->second.model, *to.model, "kept without new evidence");
 }

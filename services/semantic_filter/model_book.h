@@ -21,7 +21,7 @@ class ModelBook {
   const ClassPriors& priors() const { return priors_; }
 
   /// Reason of failure: "model_contradicts_its_hash". The first model of a hash remains valid. A
-  /// model whose classes continue the list of the newest one of its name is of the same network.
+  /// model that only adds classes to the newest one of its name is of the same network.
   Result<void> add(const ModelInfo& info);
   /// Returns nullptr if no model of this hash was added, or if too many were added since.
   std::shared_ptr<const Model> find(std::uint64_t hash) const;
@@ -33,7 +33,7 @@ class ModelBook {
 
  private:
   struct Entry {
-    std::string name;
+    ModelInfo info;
     std::shared_ptr<const Model> model;
   };
   ClassPriors priors_;

@@ -32,6 +32,7 @@ ObjectBelief turned(const RigidTransform& T_AB, ObjectBelief belief) {
     c.cross_pose.rightCols<3>() = (c.cross_pose.rightCols<3>() * R.transpose()).eval();
   }
   belief.velocity = R * belief.velocity;
+  belief.seen_from = turnedBy(belief.seen_from, yawOf(R));
   return belief;
 }
 

@@ -108,6 +108,7 @@ ObjectBelief fused(const ObjectBelief& host, const ObjectBelief& guest) {
   result.last_seen = std::max(host.last_seen, guest.last_seen);
   result.as_of = std::max(host.as_of, guest.as_of);
   result.hits = std::max(host.hits, guest.hits);
+  result.seen_from = host.seen_from.cwiseMax(guest.seen_from);
   enterMerge(result);
   return result;
 }

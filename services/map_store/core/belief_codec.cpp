@@ -36,6 +36,7 @@ constexpr auto beliefFields = [](auto& io, auto& belief, std::uint16_t version =
   io(belief.recalled);
   io.list(belief.classes, kMostClasses, classFields);
   if (version >= 2) ledgerFields(io, belief.why);
+  if (version >= 4) io(belief.seen_from);
 };
 
 constexpr auto headerFields = [](auto& io, auto& objects, std::uint16_t version = kBeliefFormat) {

@@ -13,7 +13,7 @@ namespace perdure::map_store {
 
 /// The first two bytes of every blob. A reader refuses unknown versions. Version 1 has no ledger;
 /// version 2 has no pose error in the header.
-inline constexpr std::uint16_t kBeliefFormat = 3;
+inline constexpr std::uint16_t kBeliefFormat = 4;
 
 Bytes encodeBelief(const ObjectBelief& belief);
 /// Refuses ("belief_malformed") bytes that are truncated, too long, of another version or without a

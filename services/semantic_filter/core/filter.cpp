@@ -53,6 +53,7 @@ FrameContext contextOf(const Belief& belief, const FrameInput& input, const Para
                                                 priors, parameters.ground),
           &belief.learned.movers,
           input.styles().get(),
+          belief.learned.sizes.scale(input.model->network),
           input.model->outline_styles && !belief.learned.extents.decided(input.model->network)};
 }
 
@@ -264,7 +265,9 @@ StepReport SemanticFilter::step(Belief& belief, const FrameInput& heard, IdBook&
   for (Track& t : belief.tracks) {
     const bool visible = t.visibility.fraction > 0.0, detected = t.life.last_seen == step.now;
     t.history.add(visible, visible && detected);
-    if (detected) belief.learned.movers.learn(t, parameters_.motion.min_speed);
+    if (!detected) continue;
+    belief.learned.movers.learn(t, parameters_.motion.min_speed);
+    belief.learned.sizes.learn(input.model->network, std::exchange(t.detectability.proven, {}));
   }
   step.resolveIdentities(report);
   return report;

@@ -186,6 +186,7 @@ class Examples {
     b.velocity = matrix<Eigen::Vector3d>();
     b.memory = coin() ? Memory::kWorking : Memory::kLongTerm;
     b.recalled = coin();
+    for (float& metres : b.seen_from) metres = static_cast<float>(below(99));
     b.why = ledger();
     b.track = coin() ? 1 + below(99) : 0;
     return b;

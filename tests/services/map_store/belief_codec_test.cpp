@@ -15,6 +15,7 @@ TEST(BeliefCodec, GivesBackEveryBitOfABelief) {
   belief.visibility = Visibility::kBehind;
   belief.memory = Memory::kLongTerm;
   belief.recalled = true;
+  belief.seen_from[15] = 12.5F;
   belief.moving = 0.2;
   belief.velocity = {0.1, -7.0, 3.0};
   belief.visible_misses = 3;
@@ -26,6 +27,7 @@ TEST(BeliefCodec, GivesBackEveryBitOfABelief) {
   EXPECT_EQ(back->blocked_by, 5u);
   EXPECT_EQ(back->memory, Memory::kLongTerm);
   EXPECT_TRUE(back->recalled);
+  EXPECT_EQ(back->seen_from, belief.seen_from);
   EXPECT_EQ(back->velocity, belief.velocity);
   EXPECT_EQ(back->last_seen, belief.last_seen);
   ASSERT_EQ(back->classes.size(), 2u);
@@ -41,7 +43,8 @@ TEST(BeliefCodec, ReadsTheFormatWithoutLedgers) {
   belief.why = {};
   Bytes bytes = encodeBelief(belief);
   bytes[0] = 1;
-  bytes.resize(bytes.size() - 3 * sizeof(std::uint32_t));  // three empty lists
+  bytes.resize(bytes.size() - 3 * sizeof(std::uint32_t) -
+               16 * sizeof(float));  // three empty lists, directions
   const auto back = decodeBelief(bytes);
   ASSERT_TRUE(back.has_value()) << back.error().detail;
   EXPECT_TRUE(back->why.empty());
@@ -66,20 +69,25 @@ TEST(BeliefCodec, ReadsHeadersWithoutThePoseError) {
   EXPECT_FALSE(decodeHeader(header).has_value());
 }
 
-TEST(BeliefCodec, ReadsBeliefsOfTheSecondFormatAsTheyAre) {
+TEST(BeliefCodec, ReadsBeliefsOfFormatsWithoutDirections) {
   const ObjectBelief belief = carAt(4, {1, 2, 3});
   Bytes bytes = encodeBelief(belief);
-  bytes[0] = 2;
-  const auto back = decodeBelief(bytes);
-  ASSERT_TRUE(back.has_value()) << back.error().detail;
-  EXPECT_EQ(encodeBelief(*back), encodeBelief(belief));
+  bytes.resize(bytes.size() - 16 * sizeof(float));
+  for (const std::uint8_t version : {2, 3}) {
+    bytes[0] = version;
+    const auto back = decodeBelief(bytes);
+    ASSERT_TRUE(back.has_value()) << back.error().detail;
+    EXPECT_EQ(encodeBelief(*back), encodeBelief(belief));
+    EXPECT_TRUE(back->seen_from.isZero(0.0F));
+  }
 }
 
 TEST(BeliefCodec, RefusesALedgerThatClaimsMoreThanThereIs) {
   ObjectBelief belief = carAt(4, {1, 2, 3});
   belief.why = {};
   Bytes bytes = encodeBelief(belief);
-  for (int i = 1; i <= 4; ++i) bytes[bytes.size() - 8 - static_cast<std::size_t>(i)] = 0xff;
+  for (int i = 1; i <= 4; ++i)
+    bytes[bytes.size() - 8 - 16 * sizeof(float) - static_cast<std::size_t>(i)] = 0xff;
   EXPECT_EQ(decodeBelief(bytes).error().code, "belief_malformed");
 }
 

@@ -22,6 +22,7 @@ struct Learned {
   GroundRoughness roughness_scale = {};
   MoverShares movers = {};
   BoxExtents extents = {};
+  DetectionSizes sizes = {};
 };
 
 struct Belief {

@@ -87,6 +87,23 @@ void BoxExtents::learn(std::uint64_t model, double nats) {
   if (std::abs(odds.nats) > kClear) odds.outlines = odds.nats > 0.0;
 }
 
+double DetectionSizes::scale(std::uint64_t model) const {
+  for (const auto& [of, estimate] : estimates_) {
+    if (of == model) return std::exp(estimate.log);
+  }
+  return 1.0;
+}
+
+void DetectionSizes::learn(std::uint64_t model, const SizeEvidence& evidence) {
+  constexpr double kAssumed = 4.0;       // its deviation is .5, a factor of 1.6
+  constexpr double kRemembered = 400.0;  // on another road, other things hide what is far away
+  constexpr double kMost = 1.8;          // a factor of 6
+  if (!(evidence.information > 0.0) || !std::isfinite(evidence.gradient)) return;
+  Estimate& e = entryOf(estimates_, model);
+  e.information = std::min(e.information + evidence.information, kRemembered);
+  e.log = std::clamp(e.log + evidence.gradient / (kAssumed + e.information), -kMost, kMost);
+}
+
 void MoverShares::learn(const Track& track, double min_speed) {
   constexpr std::uint32_t kJudgedAt =
       20;  // detections; after 10, one in eight parked cars of KITTI 00 seems to move

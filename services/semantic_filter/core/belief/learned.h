@@ -88,6 +88,21 @@ class BoxExtents {
   std::vector<std::pair<std::uint64_t, Odds>> odds_;  ///< a list, because networks are few
 };
 
+/// For each network, the size at which P_D is halved, relative to the assumed one. By Fisher
+/// scoring from the observations of confirmed objects at rest. Derivation:
+/// tools/docs/maths/detectability.md.
+class DetectionSizes {
+ public:
+  double scale(std::uint64_t model) const;
+  void learn(std::uint64_t model, const SizeEvidence& evidence);
+
+ private:
+  struct Estimate {
+    double log = 0.0, information = 0.0;  ///< of all observations, without the assumption
+  };
+  std::vector<std::pair<std::uint64_t, Estimate>> estimates_;  ///< a list, because networks are few
+};
+
 /// Share of the instances of a class that move, learned from the objects of this drive beside the
 /// prior, each once and when it can be judged. Derivation: tools/docs/maths/state_and_mixture.md.
 class MoverShares {

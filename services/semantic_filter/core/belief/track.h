@@ -73,11 +73,22 @@ struct Viewpoints {
   void merge(const Viewpoints& other);
 };
 
+/// Evidence about the logarithm of the size at which P_D is halved, at the value that was used.
+struct SizeEvidence {
+  double gradient = 0.0, information = 0.0;  ///< of the log likelihood; Fisher's
+
+  SizeEvidence& operator+=(const SizeEvidence& more);
+};
+
 /// What makes P_D of this track differ from that of its class.
 struct Detectability {
   double unmapped_occluder = 0.0;  ///< probability that something not on the map hides the object
   double hard_to_detect = 0.0;  ///< that nothing does, and the network seldom detects it from here
-  DetectionRate rate;           ///< how often earlier visits detected it, by view
+  Directions seen_from = Directions::Zero();  ///< in W, on earlier visits
+  Directions seen_now = Directions::Zero();   ///< in W, on this visit
+  SizeEvidence missed;  ///< of the misses since the last detection; the object may be gone
+  SizeEvidence proven;  ///< of the detections, and of misses before them; not learned from yet
+  DetectionRate rate;   ///< how often earlier visits detected it, by view
 };
 
 /// Evidence that the network reports an object of no known class as a known class.

@@ -102,6 +102,7 @@ void toBelief(const Track& track, const ClassPriors& priors, double min_speed,
   belief.velocity = moves ? Eigen::Vector3d(track.best().x.tail<3>()) : Eigen::Vector3d::Zero();
   belief.memory = Memory::kWorking;
   belief.recalled = track.life.recalled;
+  belief.seen_from = track.detectability.seen_from.cwiseMax(track.detectability.seen_now);
   const auto& entries = track.existence.entries();
   belief.why.existence.assign(entries.begin(), entries.end());
   track.classes.publish(belief.why);
@@ -145,6 +146,7 @@ Track fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product, Exist
   track.visibility.fraction = belief.visible_fraction;
   track.visibility.blocked_by = belief.blocked_by;
   track.life.recalled = true;
+  track.detectability.seen_from = belief.seen_from;
   track.batch.complete = false;
   normalise(track, ClassEvidence::kRestore);
   return track;

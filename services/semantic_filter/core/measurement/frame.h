@@ -115,6 +115,7 @@ struct FrameContext {
   const MoverShares* movers = nullptr;               ///< null: the shares of the class priors
   /// Box styles of the present network, also used for its earlier keyframes. Null: as declared.
   const BoxStyles* styles = nullptr;
+  double size_scale = 1.0;        ///< of the size at which P_D is halved: learned over assumed
   bool estimates_extent = false;  ///< true while the extent of the boxes is estimated
 
   Projector projector() const;

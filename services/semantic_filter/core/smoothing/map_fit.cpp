@@ -282,8 +282,10 @@ SideEvidence MapFit::sideEvidence() const {
   constexpr double kShareAfterWeights = 0.83;
   constexpr double kMost = 9.0;  // times the expected squares; one fit must not decide alone
   const BatchProblem model = modelOf();
-  const Fit& fit = *fit_;
-  const SideRows::ConstColsBlockXpr J = fit.whitened.leftCols(model.dim());
+  Fit fit = *fit_;
+  // At another state, other sides count, and the parts would not add up to R.
+  if (fit.covariance_at != fit.x && !factorise(model, fit, true)) return {};
+  const SideRows J = fit.whitened.leftCols(model.dim());
   const Cholesky G(model.quadratic(fit.x, gramOf(fit.whitened)).G);
   if (!G.positive()) return {};
   const SideRows r = fit.whitened.rightCols<1>();

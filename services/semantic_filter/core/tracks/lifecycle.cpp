@@ -34,9 +34,8 @@ void withdrawLostMovers(std::vector<Track>& tracks, const FrameInput& frame,
                         const Parameters& parameters) {
   const TimePoint now = frame.stamp.time;
   for (auto& o : tracks) {
-    const auto moves = [](const Hypothesis& h) { return h.moving; };
     if (!o.life.confirmed || o.as_of >= now) continue;
-    if (std::none_of(o.hypotheses.begin(), o.hypotheses.end(), moves)) continue;
+    if (movingProbability(o, parameters.motion.min_speed) <= 0.5) continue;
     const Track then = extrapolated(o, now, parameters.motion);
     const double sigma = placeSigma(then, frame.pose_error.covariance);
     if (sigma > kWithdrawn * parameters.tracks.confirm_sigma_m) o.life.confirmed = false;

@@ -96,6 +96,8 @@ void absorb(Track& a, Track& b, const FrameContext& frame) {
                      ExistenceEvidence::kMerge, a.as_of);
   a.history.merge(b.history);
   a.views.merge(b.views);
+  a.detectability.seen_now = a.detectability.seen_now.cwiseMax(b.detectability.seen_now);
+  a.detectability.seen_from = a.detectability.seen_from.cwiseMax(b.detectability.seen_from);
   a.detectability.rate.join(b.detectability.rate,
                             detectabilityScales(frame.parameters->visibility));
   mergeBatches(a, b, biasScales(frame.parameters->box), frame.parameters->smoothing);

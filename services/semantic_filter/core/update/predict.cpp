@@ -98,6 +98,9 @@ void predict(Track& track, TimePoint now, const PoseError& pose_error,
       track.unused.occluded.count == 0) {
     track.life.visit_began = now;
     track.detectability.rate.beginVisit(walk.detectability);
+    track.detectability.seen_from =
+        track.detectability.seen_from.cwiseMax(track.detectability.seen_now);
+    track.detectability.seen_now.setZero();
   }
   track.existence.note(ExistenceEvidence::kHidden, std::exchange(track.unused.occluded, {}));
   track.existence.note(ExistenceEvidence::kAway, std::exchange(track.unused.out_of_view, {}));

@@ -107,6 +107,37 @@ void countForDetectionRate(Track& track, const TrackScore& score, bool is_detect
                                detectabilityScales(frame.parameters->visibility));
 }
 
+/// Adds the direction of a detection; those of a moving object are forgotten.
+void countDirection(Track& track, const RigidTransform& T_WC) {
+  Directions& seen_from = track.detectability.seen_now;
+  const Hypothesis& best = track.best();
+  const Eigen::Vector3d ray = best.x.head<3>() - T_WC.p;
+  if (best.moving) {
+    seen_from.setZero();
+    track.detectability.seen_from.setZero();
+  } else {
+    addDirection(seen_from, std::atan2(ray.y(), ray.x()), ray.norm());
+  }
+}
+
+/// Counts an observation of a confirmed object at rest for the size at which P_D is halved. A miss
+/// counts when the object is detected later.
+void countForDetectionSize(Track& track, const TrackScore& score, bool detected, double exponent,
+                           const FrameContext& frame) {
+  const auto& predicted = score.hypotheses.front().predicted;
+  const double whole = frame.parameters->visibility.full;
+  if (!track.life.once_confirmed || track.best().moving || !predicted) return;
+  if (score.visibility.fraction < whole) return;
+  const Eigen::Vector4d& sides = predicted->box.sides;
+  const double size = std::sqrt((sides[2] - sides[0]) * (sides[3] - sides[1]));
+  SizeEvidence evidence =
+      sizeEvidence(frame.priors->of(track.best().class_name), size, detected, frame);
+  evidence.gradient *= exponent, evidence.information *= exponent;
+  Detectability& d = track.detectability;
+  d.missed += evidence;
+  if (detected) d.proven += std::exchange(d.missed, {});
+}
+
 /// Returns the factor on the noise of a box whose noise repeats that of the last detection. It is
 /// that of a stationary first-order process whose correlation falls with the view change.
 double noiseRepetition(const Track& track, const FrameContext& frame) {
@@ -282,6 +313,8 @@ std::optional<std::size_t> update(Track& track, const TrackScore& score, const E
   bookExistence(track, next, reasons);
   if (!score.top_down && !track.best().moving)
     countForDetectionRate(track, score, detected >= 0.5, frame);
+  if (!score.top_down)
+    countForDetectionSize(track, score, detected >= 0.5, tempering.exponent, frame);
   updateAzimuths(track, shares, tempering.exponent, score.boxes, boxes, frame);
   if (assigned) {
     const BoxDetection& box = boxes[score.boxes[*assigned]];
@@ -289,8 +322,10 @@ std::optional<std::size_t> update(Track& track, const TrackScore& score, const E
     track.lookalike.nats += tempering.exponent * box.log_ratio_best;
     track.lookalike.class_name = classSeenIn(box, *frame.model);
   }
-  if (detected >= 0.5)
+  if (detected >= 0.5) {
     track.views.detected_from = {frame.view.T_WC(), 1.0 + tempering.observations};
+    countDirection(track, frame.view.T_WC());
+  }
   if (detected >= 0.5 || !score.top_down) {  // a top-down answer is no observation
     track.views.observed_from = {frame.view.T_WC(),
                                  tempering.observations + std::min(1.0, score.visibility.fraction)};

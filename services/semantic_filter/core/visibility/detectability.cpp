@@ -9,18 +9,49 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// Returns the stationary probability, at this view, that an unmapped static object hides the
-/// track. Keyframes of earlier visits lower it near their views.
-double stationaryOccluder(const Track& track, const Eigen::Vector3d& place, const ViewWalk& walk) {
-  double unmapped_occluder = walk.unmapped_occluder;
-  for (const auto& k : track.batch.keyframes.read()) {
-    if (k->from->time >= track.life.visit_began) break;  // keyframes are in order of time
-    unmapped_occluder *= 1.0 - viewCorrelation(place, k->from->T_WC, walk.T_WC, walk.occluder);
+/// Returns the stationary probability that an unmapped static object hides the track from this
+/// camera. Where it was detected from this direction, nothing does up to that distance.
+double stationaryOccluder(const Track& track, const RigidTransform& T_WC, const ViewWalk& walk) {
+  const Eigen::Vector3d ray = track.best().x.head<3>() - T_WC.p;
+  const double azimuth = std::atan2(ray.y(), ray.x()), distance = ray.norm();
+  double free = 0.0;
+  for (int k = 0; k < kDirections; ++k) {
+    const double seen = track.detectability.seen_from[k];
+    if (seen <= 0.0) continue;
+    const double beyond = std::max(0.0, std::log(distance / seen));
+    free = std::max(free, std::exp(-angleToSector(k, azimuth) / walk.occluder.angle -
+                                   beyond / walk.detectability.log_distance));
   }
-  return unmapped_occluder;
+  return walk.unmapped_occluder * (1.0 - free);
+}
+
+/// Moves the probability `s` of an occluder to a view in which its stationary value is `now` and
+/// not `before`: on the way along one ray, occluders are only passed, or only come between.
+double alongTheRay(double s, double before, double now) {
+  return now <= before ? (before > 0.0 ? s * now / before : s)
+                       : s + (1.0 - s) * (now - before) / (1.0 - before);
+}
+
+constexpr double kSizeSpread = 0.2;  // of the sizes at which single objects are detected, relative
+
+/// Returns how many spreads a size is above the one at which P_D is halved.
+double overHalfSize(double size_px, const FrameContext& frame) {
+  const BoxParameters& box = frame.parameters->box;
+  double half = box.min_size_px;
+  if (frame.model && frame.model->input_width > 0.0) {
+    half = box.min_network_px * frame.view.camera->width() / frame.model->input_width;
+  }
+  half *= frame.size_scale;
+  return (size_px - half) / (kSizeSpread * half);
 }
 
 }  // namespace
+
+SizeEvidence& SizeEvidence::operator+=(const SizeEvidence& more) {
+  gradient += more.gradient;
+  information += more.information;
+  return *this;
+}
 
 double detectableShare(const Track& track, double hard_detection_share) {
   return 1.0 - track.detectability.unmapped_occluder -
@@ -28,12 +59,17 @@ double detectableShare(const Track& track, double hard_detection_share) {
 }
 
 double detectionProbability(const ClassPrior& prior, double size_px, const FrameContext& frame) {
-  const BoxParameters& box = frame.parameters->box;
-  double half = box.min_size_px;
-  if (frame.model && frame.model->input_width > 0.0) {
-    half = box.min_network_px * frame.view.camera->width() / frame.model->input_width;
-  }
-  return prior.detection_probability / (1.0 + std::exp(-(size_px - half) / (0.2 * half)));
+  return prior.detection_probability / (1.0 + std::exp(-overHalfSize(size_px, frame)));
+}
+
+SizeEvidence sizeEvidence(const ClassPrior& prior, double size_px, bool detected,
+                          const FrameContext& frame) {
+  const double x = overHalfSize(size_px, frame);
+  const double share = 1.0 / (1.0 + std::exp(-x));
+  const double P = std::clamp(prior.detection_probability * share, 0.02, 0.98);
+  const double slope = -P * (1.0 - share) * (x + 1.0 / kSizeSpread);  // dP / dlog of the half size
+  const double variance = P * (1.0 - P);
+  return {((detected ? 1.0 : 0.0) - P) * slope / variance, slope * slope / variance};
 }
 
 double detectionProbabilityOf(const Hypothesis& hypothesis, const Track& track, double size_px,
@@ -62,9 +98,11 @@ void predictDetectability(Track& track, const ViewWalk& walk) {
     const auto& before = track.views.predicted_from;
     return before ? viewCorrelation(place, *before, walk.T_WC, scales) : 0.0;
   };
-  const double stationary = stationaryOccluder(track, place, walk);
-  track.detectability.unmapped_occluder =
-      stationary + keepWith(walk.occluder) * (track.detectability.unmapped_occluder - stationary);
+  const double stationary = stationaryOccluder(track, walk.T_WC, walk);
+  double& occluder = track.detectability.unmapped_occluder;
+  if (const auto& before = track.views.predicted_from)
+    occluder = alongTheRay(occluder, stationaryOccluder(track, *before, walk), stationary);
+  occluder = stationary + keepWith(walk.occluder) * (occluder - stationary);
   const double keep = keepWith(walk.detectability);
   // A moving undetected track is lost rather than hard to detect: it would take other boxes.
   track.detectability.hard_to_detect =

@@ -14,6 +14,10 @@ double detectableShare(const Track& track, double hard_detection_share);
 /// Returns P_D of a class for a fully visible object. `size_px`: root of its box's area.
 double detectionProbability(const ClassPrior& prior, double size_px, const FrameContext& frame);
 
+/// Returns what one observation says about the size at which P_D is halved.
+SizeEvidence sizeEvidence(const ClassPrior& prior, double size_px, bool detected,
+                          const FrameContext& frame);
+
 /// Returns P_D of a hypothesis. *Other* is detected as far as it resembles a class.
 double detectionProbabilityOf(const Hypothesis& hypothesis, const Track& track, double size_px,
                               const FrameContext& frame);

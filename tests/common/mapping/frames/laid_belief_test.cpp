@@ -28,6 +28,7 @@ ObjectBelief car(std::uint32_t seed) {
   ObjectBelief belief;
   belief.id = 7;
   belief.velocity = {3.0, -1.0, 0.0};
+  belief.seen_from[0] = 10.0F, belief.seen_from[15] = 30.0F;
   for (const double probability : {0.7, 0.3}) {
     ClassBelief c;
     c.name = probability > 0.5 ? "car" : kOtherClass;
@@ -61,6 +62,9 @@ TEST(LaidBelief, IsTurnedAndTurnedBack) {
   const ObjectBelief there = turned(kTurn, before);
   const ObjectBelief back = turned(kTurn.inverse(), there);
   EXPECT_LT((back.velocity - before.velocity).norm(), 1e-12);
+  EXPECT_EQ(there.seen_from[3], 10.0F) << "1.1 rad are three sectors, rounded";
+  EXPECT_EQ(there.seen_from[2], 30.0F);
+  EXPECT_EQ(back.seen_from, before.seen_from);
   for (std::size_t i = 0; i < 2; ++i) {
     const ClassBelief &a = before.classes[i], &b = back.classes[i], &t = there.classes[i];
     EXPECT_LT((a.mean - b.mean).norm(), 1e-12);

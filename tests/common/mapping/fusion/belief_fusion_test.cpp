@@ -79,12 +79,15 @@ TEST(BeliefFusion, TakesTheEarlierTheLaterAndTheLarger) {
   b.first_seen = fromNanoseconds(100);
   b.last_seen = fromNanoseconds(5'000);
   b.hits = 40;
+  a.seen_from[1] = 20.0F, b.seen_from[1] = 10.0F, b.seen_from[2] = 5.0F;
   b.existence = 0.99;
   const ObjectBelief both = fused(a, b);
   EXPECT_EQ(both.id, a.id);
   EXPECT_EQ(both.first_seen, b.first_seen);
   EXPECT_EQ(both.last_seen, a.last_seen);
   EXPECT_EQ(both.hits, 40u);
+  EXPECT_EQ(both.seen_from[1], 20.0F);
+  EXPECT_EQ(both.seen_from[2], 5.0F);
   EXPECT_GE(both.existence, a.existence - 1e-12);
   EXPECT_LE(both.existence, b.existence + 1e-12);
   expectLedgerSums(both);

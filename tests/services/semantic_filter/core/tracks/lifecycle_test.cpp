@@ -58,13 +58,19 @@ TEST_F(Lifecycle, AnInvisibleTrackOfOneHitIsDeletedAndAConfirmedOneIsKept) {
 }
 
 TEST_F(Lifecycle, AnUnseenMoverIsConfirmedOnlyWhileItsPlaceIsKnown) {
-  const auto confirmedAfter = [&](double seconds, bool moving) {
+  const auto confirmedAfter = [&](double seconds, bool moving, double probability = 1.0) {
     Track o = makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
     o.life.confirmed = o.life.once_confirmed = true;
     o.visibility.fraction = 0.0;
     Hypothesis& h = o.hypotheses[0];
     h.moving = moving;
     if (moving) h.P.bottomRightCorner<3, 3>().diagonal().setConstant(0.25);
+    h.weight = probability;
+    if (probability < 1.0) {
+      o.hypotheses.push_back(h);
+      o.hypotheses.back().moving = !moving;
+      o.hypotheses.back().weight = 1.0 - probability;
+    }
     FrameInput later;
     later.stamp.time = o.as_of + Duration(static_cast<std::int64_t>(1e9 * seconds));
     std::vector<Track> tracks{o};
@@ -74,6 +80,7 @@ TEST_F(Lifecycle, AnUnseenMoverIsConfirmedOnlyWhileItsPlaceIsKnown) {
   EXPECT_TRUE(confirmedAfter(0.3, true));
   EXPECT_FALSE(confirmedAfter(20.0, true));
   EXPECT_TRUE(confirmedAfter(20.0, false));
+  EXPECT_TRUE(confirmedAfter(20.0, true, 0.05)) << "it most probably stands";
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "services/semantic_filter/core/smoothing/keyframes.h"
+#include "common/math/so3.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
@@ -82,32 +82,31 @@ TEST(PredictBias, ADetectorWithoutLastingErrorHasNoBias) {
   EXPECT_EQ((h.P.block<4, 4>(kBias, kBias).norm()), 0.0);
 }
 
-/// An unmapped object at rest cannot hide it from a viewpoint from which an earlier visit detected
-/// it.
-TEST(Predict, KeyframesOfAnEarlierVisitExcludeAnUnmappedOccluder) {
+/// An unmapped object at rest cannot hide it where it was detected from this direction, up to the
+/// distance of that detection.
+TEST(Predict, DirectionsOfDetectionsExcludeAnUnmappedOccluder) {
   ViewWalk walk = walkWith({});
   walk.unmapped_occluder = 0.2;
   walk.occluder = {0.15, 1e9, 1e9};
-  const CameraModel camera{testing::makeCamera()};
-  View view;
-  view.camera = &camera;
-  const auto occludedAt = [&](double metres_aside) {
-    Track object = biasedCar(walk);
-    Keyframe seen;
-    seen.from = std::make_shared<const FrameView>(view, PoseError{}, fromNanoseconds(1), nullptr);
-    object.batch.keyframes.assign(3, std::make_shared<const Keyframe>(seen));
-    object.as_of = fromNanoseconds(2);
-    object.unused.out_of_view.count = 20;  // frames in which it was out of view
+  walk.detectability = {0.15, 0.3, 1e9};
+  const Track car = biasedCar(walk);
+  const Eigen::Vector3d place = car.best().x.head<3>(), ray = place - walk.T_WC.p;
+  const auto occludedAt = [&](double turn, double metres, double seen_at) {
+    Track object = car;
+    if (seen_at > 0.0) {
+      addDirection(object.detectability.seen_from, std::atan2(ray.y(), ray.x()), seen_at);
+    }
     object.views.predicted_from.reset();
     ViewWalk now = walk;
-    now.T_WC = seen.from->T_WC;
-    now.T_WC.p += now.T_WC.R() * Eigen::Vector3d(metres_aside, 0, 0);
+    now.T_WC.p = place - rotationAboutZ(turn) * ray.normalized() * metres;
     predict(object, object.as_of + std::chrono::seconds(5), PoseError{}, MotionParameters{}, now);
     return object.detectability.unmapped_occluder;
   };
-  EXPECT_LT(occludedAt(0.0), 1e-6);
-  EXPECT_LT(occludedAt(0.5), 0.01);
-  EXPECT_GT(occludedAt(40.0), 0.19);
+  EXPECT_LT(occludedAt(0.0, 20.0, 20.0), 1e-6);
+  EXPECT_LT(occludedAt(0.0, 8.0, 20.0), 1e-6) << "nearer, fewer things are between";
+  EXPECT_NEAR(occludedAt(0.0, 40.0, 20.0), 0.2 * (1.0 - std::pow(0.5, 1.0 / 0.3)), 1e-3);
+  EXPECT_NEAR(occludedAt(M_PI, 20.0, 20.0), 0.2, 1e-6);
+  EXPECT_NEAR(occludedAt(0.0, 20.0, 0.0), 0.2, 1e-6) << "nothing is known of any direction";
 }
 
 /// A hedge that hides an object hides it from a whole side, at any distance.
