@@ -197,22 +197,31 @@ bool sameSpace(const Track& a, const Track& b, const FrameContext& frame) {
 struct Ball {
   Eigen::Vector3d centre;
   double radius;
-  bool visible;
+  bool visible, recalled;
 };
 
 Ball ballOf(const Track& track) {
   const State& x = track.best().x;
   return {x.head<3>(), 0.5 * x.segment<3>(kSize).array().exp().matrix().norm(),
-          track.visibility.fraction > 0.0};
+          track.visibility.fraction > 0.0, track.life.recalled};
 }
 
 bool touch(const Ball& a, const Ball& b) {
   const double reach = a.radius + b.radius;
-  return (a.visible || b.visible) && (a.centre - b.centre).squaredNorm() <= reach * reach;
+  return (a.visible || b.visible || a.recalled != b.recalled) && (a.centre - b.centre).squaredNorm() <= reach * reach;
 }
 
-bool bothVisibleOrOccluded(const Track& a, const Track& b) {
-  return bothVisible(a, b) || occludes(a, b) || occludes(b, a);
+/// Whether one is an object of the map that was not detected since, the other one was, and their
+/// relative position is known better than half the width of the narrower one.
+bool metOnTheMap(const Track& a, const Track& b) {
+  if (a.life.recalled == b.life.recalled) return false;
+  const Hypothesis &x = a.best(), &y = b.best();
+  const double variance = 0.5 * (x.P.topLeftCorner<2, 2>() + y.P.topLeftCorner<2, 2>()).trace();
+  return std::sqrt(variance) < 0.5 * std::exp(std::min(x.x[kSize + 1], y.x[kSize + 1]));
+}
+
+bool mayMerge(const Track& a, const Track& b) {
+  return bothVisible(a, b) || occludes(a, b) || occludes(b, a) || metOnTheMap(a, b);
 }
 
 }  // namespace
@@ -280,7 +289,7 @@ std::vector<MergeRecord> mergeObjects(std::vector<Track>& tracks, const FrameCon
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     for (std::size_t j = i + 1; j < tracks.size();) {
       Track &a = tracks[i], &b = tracks[j];
-      if (!touch(balls[i], balls[j]) || !bothVisibleOrOccluded(a, b) || !sameKind(a, b) ||
+      if (!touch(balls[i], balls[j]) || !mayMerge(a, b) || !sameKind(a, b) ||
           !sameSpace(a, b, frame)) {
         ++j;
         continue;
