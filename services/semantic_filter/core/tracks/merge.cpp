@@ -208,7 +208,8 @@ Ball ballOf(const Track& track) {
 
 bool touch(const Ball& a, const Ball& b) {
   const double reach = a.radius + b.radius;
-  return (a.visible || b.visible || a.recalled != b.recalled) && (a.centre - b.centre).squaredNorm() <= reach * reach;
+  return (a.visible || b.visible || a.recalled != b.recalled) &&
+         (a.centre - b.centre).squaredNorm() <= reach * reach;
 }
 
 /// Whether one is an object of the map that was not detected since, the other one was, and their

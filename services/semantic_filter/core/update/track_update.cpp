@@ -279,6 +279,15 @@ double updateClassAndExistence(Track& track, const AllShares& shares, const Expo
   return existenceAfter(track, mean_A, existenceCeiling(track, parameters.tracks));
 }
 
+/// Whether a box fits the best hypothesis.
+bool fitsABox(const TrackScore& score) {
+  constexpr double kFits = 2.37;  // normalised innovation of four sides, 95 %
+  const auto& matches = score.hypotheses.front().matches;
+  return std::any_of(matches.begin(), matches.end(), [](const BoxMatch& match) {
+    return match.likelihood > 0.0 && match.nis < kFits;
+  });
+}
+
 }  // namespace
 
 std::optional<std::size_t> update(Track& track, const TrackScore& score, const EtaRow& eta,
@@ -289,6 +298,9 @@ std::optional<std::size_t> update(Track& track, const TrackScore& score, const E
   shares.reserve(score.hypotheses.size());
   for (const auto& h : score.hypotheses) shares.push_back(sharesOf(h, score.boxes, eta));
   const double detected = probabilityDetected(track, shares);
+  // A box at the place of an object of the map belongs to another track. Two objects cannot stand
+  // in one place, so it is no evidence against this one; merging decides.
+  if (track.life.recalled && detected < 0.5 && fitsABox(score)) return std::nullopt;
   const Tempering tempering =
       temperingOf(track, score, shares, frame.parameters->tempering.correlation);
   const auto assigned = assignedBox(track, shares);
