@@ -8,7 +8,6 @@
 #include <bit>
 #include <concepts>
 #include <cstddef>
-#include <cstring>
 #include <memory>
 #include <span>
 #include <string>

@@ -2,7 +2,6 @@
 // counts problems, each with its fix. Times `now_ns` are arrival times on CLOCK_MONOTONIC.
 #pragma once
 
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <opencv2/core/utility.hpp>
-#include <optional>
 
 #include "common/base/errors.h"
 #include "common/replay/data_check.h"

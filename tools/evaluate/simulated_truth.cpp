@@ -1,7 +1,6 @@
 #include "tools/evaluate/simulated_truth.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "common/base/errors.h"

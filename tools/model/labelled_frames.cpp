@@ -1,7 +1,6 @@
 #include "tools/model/labelled_frames.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "common/base/errors.h"

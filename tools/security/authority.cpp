@@ -1,6 +1,5 @@
 #include "tools/security/authority.h"
 
-#include <fmt/format.h>
 #include <sys/stat.h>
 
 #include <algorithm>

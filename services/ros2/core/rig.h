@@ -2,7 +2,6 @@
 // between their frames. A rig file takes precedence over both.
 #pragma once
 
-#include <array>
 #include <optional>
 #include <string>
 #include <vector>

@@ -1,9 +1,7 @@
 #include "tools/calibrate/motion/track_windows.h"
 
 #include <algorithm>
-#include <cmath>
 #include <future>
-#include <optional>
 
 #include "common/replay/data_check.h"
 #include "tools/data_check/image_turn.h"

@@ -2,7 +2,6 @@
 // and read noise, random-walk gain, gamma and quantisation.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 

@@ -1,7 +1,6 @@
 #include "common/sim/scenes/parts/builder.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "common/base/check.h"
 #include "common/math/so3.h"

@@ -1,7 +1,6 @@
 // Pairs images of two cameras that were taken at the same time.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <deque>
 #include <optional>
