@@ -82,8 +82,7 @@ class ObjectReader {
   Eigen::Vector3d vector(const Json& parent, const char* key) const {
     const Json& value = member(parent, key);
     const auto isNumber = [](const Json& one) { return one.is_number(); };
-    if (!value.is_array() || value.size() != 3 ||
-        !std::all_of(value.begin(), value.end(), isNumber)) {
+    if (!value.is_array() || value.size() != 3 || !std::ranges::all_of(value, isNumber)) {
       refuse(where_, std::string(key) + " has not 3 numbers");
     }
     return Eigen::Vector3d(value[0].get<double>(), value[1].get<double>(), value[2].get<double>());
@@ -214,8 +213,8 @@ void readInside(const fs::path& file, std::map<std::uint64_t, std::vector<TruthV
     const auto& [x1, y1, x2, y2] = row.numbers;
     const auto frame = views.find(row.frame);
     if (frame == views.end()) refuse(where, "its frame is not in visibility_truth.csv");
-    const auto view = std::find_if(frame->second.begin(), frame->second.end(),
-                                   [&](const auto& v) { return v.object_id == row.object; });
+    const auto view = std::ranges::find_if(
+        frame->second, [&](const auto& v) { return v.object_id == row.object; });
     if (view == frame->second.end()) refuse(where, "its object is not in visibility_truth.csv");
     if (x1 > x2 || y1 > y2) refuse(where, "its box is inside out");
     view->inside = Box{x1, y1, x2, y2};

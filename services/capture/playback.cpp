@@ -65,9 +65,7 @@ void Playback::begin() {
   }
   node_ = std::make_unique<Node>(config_, period_, resume_, outputs_);
   const auto isThere = [&](const std::string& name) {
-    const auto in = [&](const auto& list) {
-      return std::find(list.begin(), list.end(), name) != list.end();
-    };
+    const auto in = [&](const auto& list) { return std::ranges::find(list, name) != list.end(); };
     return in(config_.start.readers) && !in(gate_.missing());
   };
   if (isThere("vio")) node_->expect("odometry");

@@ -129,8 +129,8 @@ class Readers {
  private:
   service::OnDemand::Wanted any(gateway::Channels channels) const {
     return [this, channels = std::move(channels)] {
-      return std::any_of(channels.begin(), channels.end(),
-                         [this](std::uint32_t channel) { return wanted_.contains(channel); });
+      return std::ranges::any_of(
+          channels, [this](std::uint32_t channel) { return wanted_.contains(channel); });
     };
   }
   template <class T>

@@ -29,8 +29,8 @@ ModelInfo modelOf(const DetectionsInput& d, InstanceId instance) {
   model.instance = instance;
   model.name = "ros2:" + d.topic;
   for (std::string name : d.classes) {
-    std::transform(name.begin(), name.end(), name.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    std::ranges::transform(name, name.begin(),
+                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     model.classes.push_back(name);
   }
   model.box_sigma = d.box_sigma;

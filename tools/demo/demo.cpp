@@ -217,7 +217,7 @@ void Demo::checkServices() {
     throw StartupError(ExitCode::kFailure,
                        "supervisord has ended; see " + (folders_.run / "supervisord.log").string());
   }
-  const bool all_well = std::all_of(states->begin(), states->end(), [](const auto& one) {
+  const bool all_well = std::ranges::all_of(*states, [](const auto& one) {
     return one.second.state != "BACKOFF" && one.second.state != "FATAL";
   });
   if (all_well) return;

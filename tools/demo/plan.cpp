@@ -97,8 +97,8 @@ ServicePlan planOf(const std::string& name, const DemoOptions& options, const De
 std::string escaped(const std::string& text) {
   std::string result;
   for (const char c : text) {
-    const auto found = std::find_if(kSupervisorEnvironment.begin(), kSupervisorEnvironment.end(),
-                                    [&](const auto& entry) { return entry.second[0] == c; });
+    const auto found = std::ranges::find_if(
+        kSupervisorEnvironment, [&](const auto& entry) { return entry.second[0] == c; });
     if (found != kSupervisorEnvironment.end()) {
       result += "%(ENV_" + found->first + ")s";
     } else {

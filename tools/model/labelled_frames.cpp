@@ -52,8 +52,8 @@ LabelledData readSimulated(const LabelRequest& request, const replay::ClassAlias
     }
     for (const auto& view : views->second) {
       const auto& all = truth.truth.objects;
-      const auto object = std::find_if(all.begin(), all.end(),
-                                       [&](const auto& o) { return o.id == view.object_id; });
+      const auto object =
+          std::ranges::find_if(all, [&](const auto& o) { return o.id == view.object_id; });
       auto label = labelOf(view, truth.camera, least_px);
       if (object == all.end() || !label) continue;
       label->class_name = aliases.canonical(object->looks_like);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -85,8 +86,7 @@ Look lookAt(const fs::path& network, const Frame* frame, double threshold) {
   }
   // Duplicate detections of one object lose evidence after the threshold.
   std::erase_if(look.sights, [&](const Sight& s) { return s.score < threshold; });
-  std::stable_sort(look.sights.begin(), look.sights.end(),
-                   [](const Sight& a, const Sight& b) { return a.score > b.score; });
+  std::ranges::stable_sort(look.sights, std::greater{}, &Sight::score);
   return look;
 }
 

@@ -66,7 +66,7 @@ std::vector<Staging::Move> Staging::moves() const {
     }
     moves.push_back({file.path(), to, fs::exists(there) ? file.path().string() + ".former" : ""});
   }
-  std::sort(moves.begin(), moves.end(), [](const Move& a, const Move& b) { return a.to < b.to; });
+  std::ranges::sort(moves, {}, &Move::to);
   return moves;
 }
 

@@ -115,7 +115,7 @@ std::vector<fs::path> filesOf(const fs::path& path) {
   for (const auto& entry : fs::directory_iterator(path)) {
     if (entry.path().extension() == ".mcap") files.push_back(entry.path());
   }
-  std::sort(files.begin(), files.end());
+  std::ranges::sort(files);
   return files;
 }
 

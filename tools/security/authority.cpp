@@ -49,7 +49,7 @@ void narrow(Permissions& permissions, bus::Role role, const std::vector<std::str
   for (const std::string& topic : topics) {
     const std::string row = topic.starts_with("frame/") ? "frame/*" : topic;
     const auto& all = permissions.writes;
-    if (std::find(all.begin(), all.end(), row) != all.end()) continue;
+    if (std::ranges::find(all, row) != all.end()) continue;
     throw StartupError(ExitCode::kUsage, "a ros2_driver stands for no " + topic);
   }
   permissions.writes = topics;

@@ -41,9 +41,8 @@ const char* wordOf(Verdict verdict) {
 }
 
 void stopIfFailed(const Findings& findings, int status = 1) {
-  const bool failed = std::any_of(findings.begin(), findings.end(), [](const Finding& finding) {
-    return finding.verdict == Verdict::kFail;
-  });
+  const bool failed = std::ranges::any_of(
+      findings, [](const Finding& finding) { return finding.verdict == Verdict::kFail; });
   if (failed) throw CLI::RuntimeError(status);
 }
 

@@ -69,8 +69,7 @@ void dropUnlike(Pairs& pairs) {
   const auto unlike = [](const auto& pair) {
     return std::abs(pair.first.norm() - pair.second.norm());
   };
-  std::sort(pairs.begin(), pairs.end(),
-            [&](const auto& a, const auto& b) { return unlike(a) < unlike(b); });
+  std::ranges::sort(pairs, [&](const auto& a, const auto& b) { return unlike(a) < unlike(b); });
   pairs.resize(pairs.size() - pairs.size() / 10);
 }
 

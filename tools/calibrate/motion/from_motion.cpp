@@ -63,8 +63,8 @@ bool isMirrored(const TrackWindows& tracks, const replay::Recording& recording,
 
 Result<FirstGuess> guessOf(const TrackWindows& tracks, const replay::Recording& recording) {
   constexpr double kLeast_px = 0.4, kApart = 0.5;
-  const bool dead = std::all_of(recording.imu.begin(), recording.imu.end(),
-                                [](const ImuSample& sample) { return sample.gyro.isZero(); });
+  const bool dead = std::ranges::all_of(
+      recording.imu, [](const ImuSample& sample) { return sample.gyro.isZero(); });
   if (dead) {
     return fail("motion_gyro_dead",
                 "all angular rates of the gyroscope are 0; see its driver or its columns");
@@ -77,10 +77,11 @@ Result<FirstGuess> guessOf(const TrackWindows& tracks, const replay::Recording& 
                             guess.turning_px, kMotion));
   }
   if (isMirrored(tracks, recording, guess)) {
-    return fail("motion_mirrored",
-                "the gyroscope turns as the mirror image of the images, which no mounting explains: "
-                "one of its axes, or all three, have the wrong sign; see the driver's axes, or "
-                "negate one of the columns w_x, w_y, w_z");
+    return fail(
+        "motion_mirrored",
+        "the gyroscope turns as the mirror image of the images, which no mounting explains: "
+        "one of its axes, or all three, have the wrong sign; see the driver's axes, or "
+        "negate one of the columns w_x, w_y, w_z");
   }
   if (guess.unexplained > kApart) {
     return fail("motion_apart",

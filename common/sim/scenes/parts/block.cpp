@@ -93,11 +93,10 @@ bool Block::fits(const Solid& solid, double margin) const {
   const auto meets = [&](const Solid& other) { return meet(solid, other, margin); };
   for (const Scenery& prop : scenery_) {
     const auto solids = solidsOf(Prop{prop.kind, 0, prop.size, poseOf(prop.place, prop.size.z())});
-    if (std::any_of(solids.begin(), solids.end(), meets)) return false;
+    if (std::ranges::any_of(solids, meets)) return false;
   }
-  return std::none_of(things_.begin(), things_.end(), [&](const Thing& thing) {
-    return meets(solidAt(thing.place, thing.object.size));
-  });
+  return std::ranges::none_of(
+      things_, [&](const Thing& thing) { return meets(solidAt(thing.place, thing.object.size)); });
 }
 
 bool Block::add(SceneObject object, const Place& place, double margin) {
@@ -109,7 +108,7 @@ bool Block::add(SceneObject object, const Place& place, double margin) {
 bool Block::add(PropKind kind, const Eigen::Vector3d& size, const Place& place) {
   const auto solids = solidsOf(Prop{kind, 0, size, poseOf(place, size.z())});
   const auto fit = [&](const Solid& solid) { return fits(solid, 0.02); };
-  if (!std::all_of(solids.begin(), solids.end(), fit)) return false;
+  if (!std::ranges::all_of(solids, fit)) return false;
   scenery_.push_back({kind, size, place});
   return true;
 }

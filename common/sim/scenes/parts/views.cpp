@@ -100,11 +100,10 @@ bool ViewFinder::sees(const Eigen::Vector3d& eye, const SceneObject& object) con
     const Eigen::Vector3d target = T_WO * part.cwiseProduct(object.size);
     const auto hides = [&](const Solid& solid) { return blocks(solid, eye, target); };
     const bool by_object =
-        std::any_of(builder_.scene().objects.begin(), builder_.scene().objects.end(),
-                    [&](const SceneObject& other) {
-                      return other.id != object.id && hides(solidOf(other, 0.0));
-                    });
-    if (!by_object && std::none_of(scenery_.begin(), scenery_.end(), hides)) ++seen;
+        std::ranges::any_of(builder_.scene().objects, [&](const SceneObject& other) {
+          return other.id != object.id && hides(solidOf(other, 0.0));
+        });
+    if (!by_object && std::ranges::none_of(scenery_, hides)) ++seen;
   }
   return seen >= 2;
 }

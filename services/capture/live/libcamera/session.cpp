@@ -115,7 +115,7 @@ void Session::chooseFormat(libcamera::StreamConfiguration& wanted) const {
   const auto offered = wanted.formats().pixelformats();
   for (const auto& [format, layout] : knownFormats()) {
     const bool named = settings_.format == "auto" || settings_.format == format.toString();
-    if (!named || std::find(offered.begin(), offered.end(), format) == offered.end()) continue;
+    if (!named || std::ranges::find(offered, format) == offered.end()) continue;
     wanted.pixelFormat = format;
     return;
   }
@@ -133,9 +133,8 @@ Result<void> Session::configure() {
   askFlip(*configuration_, settings_.flip);
   const bool valid = configuration_->validate() != libcamera::CameraConfiguration::Invalid;
   const auto formats = knownFormats();
-  const auto known = std::find_if(formats.begin(), formats.end(), [&](const auto& entry) {
-    return entry.first == wanted.pixelFormat;
-  });
+  const auto known = std::ranges::find_if(
+      formats, [&](const auto& entry) { return entry.first == wanted.pixelFormat; });
   const bool sized = wanted.size.width == settings_.width && wanted.size.height == settings_.height;
   if (!valid || known == formats.end() || !sized ||
       running_->camera().configure(configuration_.get()) < 0) {
