@@ -13,8 +13,6 @@
 #include "common/replay/recordings/recorded_messages.h"
 #include "common/replay/recordings/recording_writer.h"
 #include "common/replay/recordings/ros_messages.h"
-#include "tools/record/repair.h"
-#include "tools/record/ros_export.h"
 
 namespace perdure::tools {
 namespace {

@@ -1,5 +1,4 @@
-#include "tools/record/repair.h"
-
+// `perdure record repair`.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
@@ -13,6 +12,7 @@
 #include "common/base/errors.h"
 #include "common/replay/recordings/mcap_reader.h"
 #include "common/replay/recordings/unpacked_file.h"
+#include "tools/record/files.h"
 
 namespace perdure::tools {
 namespace {

@@ -1,5 +1,4 @@
-#include "tools/record/ros_export.h"
-
+// `perdure record export --ros2`.
 #include <utility>
 
 #include "common/base/errors.h"
