@@ -184,12 +184,9 @@ void Playback::updateHealth() {
 }
 
 void Playback::report(ReasonCounts& counts) const {
-  const auto add = [&](const ReasonCounts& more) {
-    for (const auto& [reason, n] : more.all()) counts.add(reason, n);
-  };
-  add(reasons_);
-  if (node_) add(node_->reasons());
-  if (loader_) add(loader_->reasons());
+  counts.add(reasons_);
+  if (node_) counts.add(node_->reasons());
+  if (loader_) counts.add(loader_->reasons());
 }
 
 }  // namespace perdure::capture

@@ -306,8 +306,7 @@ void serve(service::Context& context, const gateway::Config& config, const std::
       [&] { return beginning.lookedAt() || node.waits(); });
   context.countReasons([&]() -> const ReasonCounts& { return node.reasons(); });
   context.countReasons([&](ReasonCounts& counts) {
-    const web::Stats stats = server.stats();
-    for (const auto& [reason, n] : stats.reasons.all()) counts.add(reason, n);
+    counts.add(server.stats().reasons);
   });
   bus::Discovery discovery(context.participant());
   const std::string address = addressOf(config, server.port());

@@ -124,7 +124,7 @@ ReasonCounts exportPlain(const fs::path& from, const fs::path& to) {
     }
     reasons.add(message->topic + "_" + added.error().code);
   }
-  for (const auto& [reason, n] : recording.reasons().all()) reasons.add(reason, n);
+  reasons.add(recording.reasons());
   if (exported == 0) refuseForeign(from, reasons);
   if (const auto finished = file.finish(); !finished) {
     throw StartupError(ExitCode::kInputOutput, finished.error().detail);

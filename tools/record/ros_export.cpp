@@ -98,7 +98,7 @@ class Export {
       now_ns_ = message->log_ns;
       take(*message);
     }
-    for (const auto& [reason, n] : recording_.reasons().all()) reasons_.add(reason, n);
+    reasons_.add(recording_.reasons());
     return reasons_;
   }
 
