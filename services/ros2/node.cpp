@@ -48,9 +48,8 @@ Result<Frame> unpacked(const ros::CompressedImage& image, int bits) {
                                image.data->size());
   const auto pixels = vision::decodeImage(bytes, std::nullopt, bits);
   if (!pixels) {
-    return fail(pixels.error().code,
-                "an image (" + image.format.substr(0, 64) +
-                    ") cannot be unpacked; JPEG and PNG are read: " + pixels.error().detail);
+    return fail(pixels.error().code, "an image ({}) cannot be unpacked; JPEG and PNG are read: {}",
+                image.format.substr(0, 64), pixels.error().detail);
   }
   Frame frame;
   const auto set = vision::setPixels(frame, *pixels);

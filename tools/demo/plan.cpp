@@ -22,9 +22,8 @@ namespace fs = std::filesystem;
 constexpr char kMark[] = "capture.log";
 
 [[noreturn]] void cannotUse(const fs::path& folder, const std::string& why) {
-  throw StartupError(
-      ExitCode::kUnavailable,
-      fmt::format("{} cannot be used: {}; give --out another folder", folder.string(), why));
+  throw StartupError(ExitCode::kUnavailable, "{} cannot be used: {}; give --out another folder",
+                     folder.string(), why);
 }
 
 /// "--set" arguments that give capture the pace of --rate.

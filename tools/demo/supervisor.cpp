@@ -33,10 +33,9 @@ bool meansCannotStart(int status) {
 
 [[noreturn]] void refuse(const ServicePlan& service, int status) {
   const std::string words = lastWords(service.log);
-  throw StartupError(
-      status == 0 ? ExitCode::kFailure : static_cast<ExitCode>(status),
-      fmt::format("{} does not start: {} (its log: {})", service.name,
-                  words.empty() ? "it ends in its first second" : words, service.log));
+  throw StartupError(status == 0 ? ExitCode::kFailure : static_cast<ExitCode>(status),
+                     "{} does not start: {} (its log: {})", service.name,
+                     words.empty() ? "it ends in its first second" : words, service.log);
 }
 
 }  // namespace

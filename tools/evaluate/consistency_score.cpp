@@ -80,8 +80,7 @@ std::vector<MapBelief> readBeliefs(const std::filesystem::path& file) {
   constexpr char kMend[] = "`perdure pipeline` writes it";
   std::ifstream stream(file);
   if (!stream) {
-    throw StartupError(ExitCode::kUnavailable,
-                       fmt::format("{} cannot be read; {}", file.string(), kMend));
+    throw StartupError(ExitCode::kUnavailable, "{} cannot be read; {}", file.string(), kMend);
   }
   std::vector<MapBelief> beliefs;
   try {

@@ -231,11 +231,10 @@ void Study::requireTheSameFrames() const {
   const bool by_map =
       std::ranges::any_of(frames_, [](const Seen& frame) { return !frame.sides_known; });
   if (!by_map || 2 * result_.targets_found >= result_.targets) return;
-  throw StartupError(
-      ExitCode::kUnavailable,
-      "of " + std::to_string(result_.targets) + " objects that --labels expects " +
-          std::to_string(result_.targets_found) +
-          " are seen in --frames: is it a run over these frames, with this network?");
+  throw StartupError(ExitCode::kUnavailable,
+                     "of {} objects that --labels expects {} are seen in --frames: is it a run "
+                     "over these frames, with this network?",
+                     result_.targets, result_.targets_found);
 }
 
 void Study::measureSides(const Calibration& calibration) {

@@ -75,10 +75,9 @@ fs::path labelFile(const LabelRequest& request, replay::DatasetKind kind) {
   }
   throw StartupError(
       ExitCode::kUnavailable,
-      request.data.string() +
-          " has no labels of its own; give --labels OUT of a run of `perdure pipeline` "
-          "over it, --labels label_02/SEQUENCE.txt, or a folder that `perdure "
-          "simulate --out` made");
+      "{} has no labels of its own; give --labels OUT of a run of `perdure pipeline` over it, "
+      "--labels label_02/SEQUENCE.txt, or a folder that `perdure simulate --out` made",
+      request.data.string());
 }
 
 TrueBox labelOf(const replay::KittiLabel& label, const replay::ClassAliases& aliases,

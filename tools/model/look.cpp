@@ -77,9 +77,8 @@ Look lookAt(const fs::path& network, const Frame* frame, double threshold) {
   const auto answer =
       node.infer(frame != nullptr ? *frame : greyRamp(look.input_width, look.input_height));
   if (!answer) {
-    throw StartupError(ExitCode::kConfiguration,
-                       network.string() + " fails on the picture: " + answer.error().detail + " (" +
-                           answer.error().code + ")");
+    throw StartupError(ExitCode::kConfiguration, "{} fails on the picture: {} ({})",
+                       network.string(), answer.error().detail, answer.error().code);
   }
   for (const Detection& detection : answer->detections) {
     look.sights.push_back(sightOf(detection, node.model(), description.calibration));

@@ -34,9 +34,8 @@ TemporaryFolder temporaryFolder(const fs::path& parent, const std::string& prefi
   return {parent / prefix, [&](const std::string&) {
             const int why = errno;
             if (why == ENOSPC || why == EDQUOT) throwUnwritten(parent, std::strerror(why));
-            throw StartupError(ExitCode::kUnavailable, "nothing can be written into " +
-                                                           parent.string() + " (" +
-                                                           std::strerror(why) + "); " + mend);
+            throw StartupError(ExitCode::kUnavailable, "nothing can be written into {} ({}); {}",
+                               parent.string(), std::strerror(why), mend);
           }};
 }
 

@@ -99,10 +99,9 @@ void refuseForeign(const fs::path& path, const ReasonCounts& reasons) {
   std::string why;
   for (const auto& [reason, n] : reasons.all()) why += fmt::format("; {}: {}", reason, n);
   throw StartupError(ExitCode::kData,
-                     fmt::format("{} holds no message that can be exported{}; recordings of "
-                                 "`perdure record` are, and `perdure record info` tells what it "
-                                 "holds",
-                                 path.string(), why));
+                     "{} holds no message that can be exported{}; recordings of `perdure record` "
+                     "are, and `perdure record info` tells what it holds",
+                     path.string(), why);
 }
 
 ReasonCounts exportPlain(const fs::path& from, const fs::path& to) {

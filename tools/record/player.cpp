@@ -25,9 +25,8 @@ const std::map<std::string, std::set<std::string>> kInputs{
 bool isHeardBy(const std::string& service, const std::string& topic) {
   const auto inputs = kInputs.find(service);
   if (inputs == kInputs.end()) {
-    throw StartupError(ExitCode::kUsage, "--for " + service +
-                                             ": is none of vio, inference, semantic_filter, "
-                                             "map_store");
+    throw StartupError(ExitCode::kUsage,
+                       "--for {}: is none of vio, inference, semantic_filter, map_store", service);
   }
   return inputs->second.contains(topic.starts_with("frame/") ? "frame/" : topic);
 }

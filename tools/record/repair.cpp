@@ -57,9 +57,8 @@ void refuseDamaged(const fs::path& file, const mcap::Reader& reader) {
   if (reader.damage().empty()) return;
   throw StartupError(
       ExitCode::kData,
-      fmt::format("{}; repair cannot mend that, and the file stays as it is: {} "
-                  "messages of it are read",
-                  mcap::sentenceOfDamage(file, reader), reader.statistics().messages));
+      "{}; repair cannot mend that, and the file stays as it is: {} messages of it are read",
+      mcap::sentenceOfDamage(file, reader), reader.statistics().messages);
 }
 
 void finish(const fs::path& file, mcap::Reader& reader) {

@@ -107,10 +107,9 @@ Authority::Authority(const fs::path& folder) : folder_(folder) {
   const auto json = nlohmann::json::parse(textOf(own / kRegister), nullptr, false);
   if (!key_ || !certificate_ || !revoked_ || !json.is_object()) {
     throw StartupError(ExitCode::kUnavailable,
-                       own.string() +
-                           " holds no authority that this user can read; "
-                           "`perdure security init` makes one, --dir names another "
-                           "folder");
+                       "{} holds no authority that this user can read; `perdure security init` "
+                       "makes one, --dir names another folder",
+                       own.string());
   }
   vehicle_ = json.value("vehicle", "ego");
   const auto identities = json.value("identities", nlohmann::json::object());

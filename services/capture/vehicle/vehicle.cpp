@@ -26,8 +26,7 @@ bool isAddress(const std::string& text) {
 
 void requireAddress(const char* key, const std::string& text) {
   if (isAddress(text)) return;
-  throw StartupError(ExitCode::kConfiguration,
-                     fmt::format("{}: \"{}\" is not HOST:PORT.", key, text));
+  throw StartupError(ExitCode::kConfiguration, "{}: \"{}\" is not HOST:PORT.", key, text);
 }
 
 std::uint32_t kernelId(const CanSignal& signal) {

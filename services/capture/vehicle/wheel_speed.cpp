@@ -15,8 +15,7 @@ namespace {
 constexpr std::int64_t kReverseSilence_ns = 3'000'000'000;
 
 [[noreturn]] void refuse(const char* key, const std::string& text, const std::string& why) {
-  throw StartupError(ExitCode::kConfiguration,
-                     fmt::format("{}: \"{}\" cannot be used: {}.", key, text, why));
+  throw StartupError(ExitCode::kConfiguration, "{}: \"{}\" cannot be used: {}.", key, text, why);
 }
 
 CanSignal signalOf(const char* key, const std::string& text) {

@@ -316,8 +316,7 @@ Result<Intrinsics> estimateIntrinsics(const Board& board, const std::vector<View
   const auto chosen = mostDifferent(board, views, camera.width, options.most_views);
   const std::string few = "; take at least 20 pictures of the board from different sides";
   if (chosen.size() < kLeastViews) {
-    return fail("calibrate_few_views",
-                fmt::format("{} views show enough of the board", chosen.size()) + few);
+    return fail("calibrate_few_views", "{} views show enough of the board{}", chosen.size(), few);
   }
   CameraCalibration guess = camera;
   guess.distortion = options.model;

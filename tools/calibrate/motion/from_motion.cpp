@@ -72,9 +72,8 @@ Result<FirstGuess> guessOf(const TrackWindows& tracks, const replay::Recording& 
   const auto guess =
       guessFromTurns(tracks.windows, recording.imu, recording.calibration.cameras.front());
   if (guess.pairs == 0 || guess.turning_px < kLeast_px) {
-    return fail("motion_no_rotation",
-                fmt::format("the camera hardly turns ({:.2f} px from image to image); {}",
-                            guess.turning_px, kMotion));
+    return fail("motion_no_rotation", "the camera hardly turns ({:.2f} px from image to image); {}",
+                guess.turning_px, kMotion);
   }
   if (isMirrored(tracks, recording, guess)) {
     return fail(
@@ -85,12 +84,11 @@ Result<FirstGuess> guessOf(const TrackWindows& tracks, const replay::Recording& 
   }
   if (guess.unexplained > kApart) {
     return fail("motion_apart",
-                fmt::format("the gyroscope does not turn as the images do, with any focal length, "
-                            "mounting and offset within half a second ({:.0f} % of the turning "
-                            "disagrees): see that both are of one recording and of one clock, "
-                            "that columns have their order and signs, and that the images show "
-                            "more than moving things",
-                            100.0 * guess.unexplained));
+                "the gyroscope does not turn as the images do, with any focal length, mounting and "
+                "offset within half a second ({:.0f} % of the turning disagrees): see that both "
+                "are of one recording and of one clock, that columns have their order and signs, "
+                "and that the images show more than moving things",
+                100.0 * guess.unexplained);
   }
   if (guess.second_px < kLeast_px) {
     return fail("motion_no_rotation",
@@ -188,10 +186,8 @@ std::vector<std::string> writeMotionRig(const replay::DatasetOptions& drive,
   const replay::Recording& recording = dataset->recording();
   const std::string where = drive.path.string() + ": ";
   if (recording.imu.empty() || recording.calibration.cameras.empty()) {
-    throw StartupError(ExitCode::kData,
-                       where +
-                           (recording.imu.empty() ? "has no inertial samples" : "has no camera") +
-                           "; record images and IMU together");
+    throw StartupError(ExitCode::kData, "{}{}; record images and IMU together", where,
+                       recording.imu.empty() ? "has no inertial samples" : "has no camera");
   }
   replay::refuseFatal(replay::checkData(recording, {}), drive.path.string());
   const auto found = rigFromMotion(recording, options);

@@ -138,12 +138,11 @@ Result<void> Session::configure() {
   const bool sized = wanted.size.width == settings_.width && wanted.size.height == settings_.height;
   if (!valid || known == formats.end() || !sized ||
       running_->camera().configure(configuration_.get()) < 0) {
-    return fail(
-        "camera_absent",
-        fmt::format("the camera {} gives {} of {}x{} where {} of {}x{} is wanted; set "
-                    "camera.format, or calibrate it at a size that it has.",
-                    id(), wanted.pixelFormat.toString(), wanted.size.width, wanted.size.height,
-                    settings_.format, settings_.width, settings_.height));
+    return fail("camera_absent",
+                "the camera {} gives {} of {}x{} where {} of {}x{} is wanted; set camera.format, "
+                "or calibrate it at a size that it has.",
+                id(), wanted.pixelFormat.toString(), wanted.size.width, wanted.size.height,
+                settings_.format, settings_.width, settings_.height);
   }
   layout_ = known->second;
   const std::string refused = flipRefused(*configuration_, settings_.flip);
