@@ -124,7 +124,6 @@ struct PlaybackState {
   bool did_seek = false;
   std::string id;  ///< id of the answered request; empty: none
 };
-/// Time range of a recording.
 struct TimeRange {
   TimePoint first, last;
 };

@@ -13,7 +13,6 @@
 
 namespace perdure::ros2 {
 
-/// A camera of the rig.
 struct RigCamera {
   std::string name;        ///< name in Perdure
   std::string info_topic;  ///< topic named in messages

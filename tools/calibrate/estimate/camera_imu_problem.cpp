@@ -43,7 +43,6 @@ double wideningOf(const Eigen::MatrixXd& influence, const std::vector<double>& r
   return solver.solve(sums.transpose() * sums).trace() / solver.solve(single).trace();
 }
 
-/// Converts a row-major Jacobian of Ceres to Eigen.
 Eigen::SparseMatrix<double> toEigen(const ceres::CRSMatrix& m) {
   using Rows = Eigen::SparseMatrix<double, Eigen::RowMajor>;
   return Eigen::Map<const Rows>(m.num_rows, m.num_cols, static_cast<Eigen::Index>(m.values.size()),

@@ -12,7 +12,6 @@
 
 namespace perdure::tools {
 
-/// State of a sensor between images.
 struct SensorState {
   std::uint64_t frames = 0;   ///< number of images so far
   double log_exposure = 0.0;  ///< logarithm of the factor to the desired brightness
