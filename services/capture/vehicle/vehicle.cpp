@@ -242,15 +242,12 @@ std::string Vehicle::name() const {
 }
 
 void Vehicle::report(ReasonCounts& counts) const {
-  const auto add = [&counts](const ReasonCounts& more) {
-    for (const auto& [reason, n] : more.all()) counts.add(reason, n);
-  };
   for (const auto* stream : {speed_stream_.get(), gnss_stream_.get()}) {
-    if (stream) add(stream->state().reasons());
+    if (stream) counts.add(stream->state().reasons());
   }
   const std::lock_guard lock(mutex_);
-  add(reasons_);
-  if (wheels_) add(wheels_->reasons());
+  counts.add(reasons_);
+  if (wheels_) counts.add(wheels_->reasons());
 }
 
 }  // namespace perdure::capture
