@@ -55,8 +55,7 @@ std::optional<std::uint64_t> multipleOfTenth(TimePoint time) {
 std::optional<std::uint64_t> frameOf(std::size_t i, const std::vector<replay::StampedPose>& poses,
                                      const Ties& ties) {
   if (ties.empty()) return multipleOfTenth(poses[i].time).value_or(i);
-  const auto after = std::ranges::lower_bound(
-      ties, i, [](const auto& tie, std::size_t line) { return tie.first < line; });
+  const auto after = std::ranges::lower_bound(ties, i, {}, &Ties::value_type::first);
   if (after != ties.end() && after->first == i) return after->second;
   const auto& b = after == ties.end() ? ties.back() : *after;
   const auto& a = after == ties.begin() ? b : *(after - 1);
