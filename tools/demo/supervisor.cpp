@@ -43,7 +43,10 @@ bool meansCannotStart(int status) {
 Supervisor::Supervisor(const std::vector<ServicePlan>& services,
                        const std::filesystem::path& folder)
     : folder_(folder) {
-  for (const ServicePlan& service : services) start(programs_.emplace_back(Program{service}));
+  for (const ServicePlan& service : services) {
+    programs_.emplace_back().plan = service;
+    start(programs_.back());
+  }
 }
 
 Supervisor::~Supervisor() {
