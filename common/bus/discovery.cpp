@@ -61,7 +61,7 @@ bool standsIn(std::string_view service, std::string_view topic, std::string_view
   constexpr std::string_view kOurs[] = {"capture", "vio", "inference", "semantic_filter",
                                         "map_store"};  // services do not replace each other
   if (essential.empty() || process.empty()) return false;
-  if (std::find(std::begin(kOurs), std::end(kOurs), process) != std::end(kOurs)) return false;
+  if (std::ranges::find(kOurs, process) != std::end(kOurs)) return false;
   return essential.ends_with('/') ? topic.starts_with(essential) : topic == essential;
 }
 

@@ -1,7 +1,6 @@
 // The participants on the bus, and the readers and writers of each topic.
 #pragma once
 
-#include <chrono>
 #include <optional>
 #include <string>
 #include <string_view>

@@ -154,9 +154,8 @@ std::int32_t createDomain(std::int64_t id, const Options& options, const std::st
   const dds_entity_t domain =
       dds_create_domain(static_cast<dds_domainid_t>(id), configuration.c_str());
   if (domain >= 0) return domain;
-  throw StartupError(ExitCode::kUnavailable,
-                     "DDS cannot open domain " + std::to_string(options.domain) + " on interface " +
-                         options.interface + " (" + dds_strretcode(-domain) + "); " + fix);
+  throw StartupError(ExitCode::kUnavailable, "DDS cannot open domain {} on interface {} ({}); {}",
+                     options.domain, options.interface, dds_strretcode(-domain), fix);
 }
 
 std::int32_t createDomain(const Options& options, const std::string& locator) {
@@ -186,11 +185,10 @@ Identity secure(dds_qos_t& qos, const std::string& folder) {
   const std::string refused =
       std::string("DDS cannot create a participant (") + dds_strretcode(-code) + ")";
   if (identity && code != DDS_RETCODE_OUT_OF_RESOURCES) {
-    throw StartupError(
-        ExitCode::kUnavailable,
-        refused + "; " + securityLog().own() + "; is the identity " + identity->name +
-            " for this bus.domain? `perdure security renew` makes it anew; Cyclone's "
-            "plugins are in Debian's libddsc0debian");
+    throw StartupError(ExitCode::kUnavailable,
+                       "{}; {}; is the identity {} for this bus.domain? `perdure security renew` "
+                       "makes it anew; Cyclone's plugins are in Debian's libddsc0debian",
+                       refused, securityLog().own(), identity->name);
   }
   throw StartupError(ExitCode::kUnavailable, refused + "; are more than " +
                                                  std::to_string(kMaxParticipantIndex) +

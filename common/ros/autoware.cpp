@@ -33,8 +33,8 @@ std::vector<ObjectClassification> classificationOf(const ObjectBelief& object) {
   for (const ClassBelief& belief : object.classes) sums[labelOf(belief.name)] += belief.probability;
   std::vector<ObjectClassification> all;
   for (const auto& [label, sum] : sums) all.push_back({label, static_cast<float>(sum)});
-  std::stable_sort(all.begin(), all.end(),
-                   [](const auto& a, const auto& b) { return a.probability > b.probability; });
+  std::ranges::stable_sort(
+      all, [](const auto& a, const auto& b) { return a.probability > b.probability; });
   return all;
 }
 

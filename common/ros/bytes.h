@@ -8,7 +8,6 @@
 #include <bit>
 #include <concepts>
 #include <cstddef>
-#include <cstring>
 #include <memory>
 #include <span>
 #include <string>
@@ -83,7 +82,7 @@ class BytesReader {
   void operator()(const char*, X& x) {
     std::array<std::uint8_t, sizeof(X)> raw{};
     if (!take(raw.data(), sizeof(X), sizeof(X))) return;
-    if (swapped_) std::reverse(raw.begin(), raw.end());
+    if (swapped_) std::ranges::reverse(raw);
     if constexpr (std::same_as<X, bool>) {
       x = raw[0] != 0;
     } else {

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <utility>
 #include <vector>
 
 #include "common/ros/autoware.h"
@@ -37,7 +36,7 @@ class Walk {
   template <Struct M>
   void visit() {
     const auto known = [](const Definition& one) { return one.type == M::kType; };
-    if (std::any_of(all_.begin(), all_.end(), known)) return;
+    if (std::ranges::any_of(all_, known)) return;
     Walk inside(all_);
     const M example{};
     M::fields(example, inside);

@@ -53,8 +53,7 @@ Result<const PixelForm*> encodingOf(const Image& image) {
   for (const PixelForm& one : kEncodings) {
     if (image.encoding == one.name) return &one;
   }
-  return fail("image_encoding",
-              fmt::format("images are `{}`; {} are read", image.encoding, knownEncodings()));
+  return fail("image_encoding", "images are `{}`; {} are read", image.encoding, knownEncodings());
 }
 
 /// A view of the message's rows.
@@ -66,10 +65,9 @@ Result<cv::Mat> rowsOf(const Image& image, const PixelForm& encoding) {
                      image.step % CV_ELEM_SIZE1(encoding.type) == 0;
   const bool halves = CV_MAT_CN(encoding.type) != 2 || image.width % 2 == 0;
   if (!sized || !halves || image.data == nullptr || image.data->size() < bytes) {
-    return fail("image_malformed", fmt::format("an image of {}x{} ({}), {} bytes a row, does not "
-                                               "fit its {} bytes",
-                                               image.width, image.height, image.encoding,
-                                               image.step, image.data->size()));
+    return fail("image_malformed",
+                "an image of {}x{} ({}), {} bytes a row, does not fit its {} bytes", image.width,
+                image.height, image.encoding, image.step, image.data->size());
   }
   auto* pixels = const_cast<std::uint8_t*>(image.data->data());
   return cv::Mat(static_cast<int>(image.height), static_cast<int>(image.width), encoding.type,

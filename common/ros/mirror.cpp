@@ -1,7 +1,6 @@
 #include "common/ros/mirror.h"
 
 #include <algorithm>
-#include <type_traits>
 
 #include "common/ros/autoware.h"
 #include "common/ros/bytes.h"

@@ -46,7 +46,7 @@ std::string classOf(std::size_t k, const ModelInfo* model) {
 std::vector<ObjectHypothesis> hypothesesOf(const Detection& detection, const ModelInfo* model) {
   const auto& activations = detection.activations;
   if (activations.size() < 2) return {};
-  const double most = *std::max_element(activations.begin(), activations.end());
+  const double most = *std::ranges::max_element(activations);
   double sum = 0.0;
   for (const float activation : activations) sum += std::exp(activation - most);
   std::vector<ObjectHypothesis> all;
@@ -54,8 +54,7 @@ std::vector<ObjectHypothesis> hypothesesOf(const Detection& detection, const Mod
     const double score = std::exp(activations[k] - most) / sum;
     if (score >= kLeastScore) all.push_back({classOf(k - 1, model), score});
   }
-  std::stable_sort(all.begin(), all.end(),
-                   [](const auto& a, const auto& b) { return a.score > b.score; });
+  std::ranges::stable_sort(all, [](const auto& a, const auto& b) { return a.score > b.score; });
   return all;
 }
 

@@ -70,7 +70,7 @@ Result<CameraCalibration> cameraOf(const CameraInfo& info, bool rectified) {
   camera.cx = (camera.cx - (cut ? info.roi.x_offset : 0)) / bx, camera.fx /= bx;
   camera.cy = (camera.cy - (cut ? info.roi.y_offset : 0)) / by, camera.fy /= by;
   if (rectified) return camera;
-  const bool straight = std::all_of(info.d.begin(), info.d.end(), [](double d) { return d == 0; });
+  const bool straight = std::ranges::all_of(info.d, [](double d) { return d == 0; });
   if (straight) return camera;
   const auto set = setLens(camera, info.distortion_model, info.d);
   if (!set) {

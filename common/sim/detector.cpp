@@ -59,7 +59,7 @@ Eigen::MatrixXd classDirections(const DetectorModel& model) {
   const auto count = static_cast<Eigen::Index>(model.classes.size());
   Eigen::MatrixXd cosines = Eigen::MatrixXd::Identity(count, count);
   const auto indexOf = [&](const std::string& name) {
-    const auto found = std::find(model.classes.begin(), model.classes.end(), name);
+    const auto found = std::ranges::find(model.classes, name);
     if (found == model.classes.end()) refuse("confusion names " + name + ", which is no class");
     return found - model.classes.begin();
   };
@@ -188,8 +188,7 @@ Box SimulatedDetector::extentOf(const TruthView& view, const TruthObject& object
 const TruthView* SimulatedDetector::viewOf(std::uint64_t frame, std::uint64_t object) const {
   const auto views = truth_.views.find(frame);
   if (views == truth_.views.end()) return nullptr;
-  const auto view = std::find_if(views->second.begin(), views->second.end(),
-                                 [&](const TruthView& one) { return one.object_id == object; });
+  const auto view = std::ranges::find(views->second, object, &TruthView::object_id);
   return view == views->second.end() ? nullptr : &*view;
 }
 
@@ -229,11 +228,9 @@ std::vector<SimulatedDetector::Sight> SimulatedDetector::sights(std::uint64_t fr
   const auto views = truth_.views.find(frame);
   if (views == truth_.views.end()) return result;
   for (const TruthView& view : views->second) {
-    const auto object =
-        std::find_if(truth_.objects.begin(), truth_.objects.end(),
-                     [&](const TruthObject& one) { return one.id == view.object_id; });
+    const auto object = std::ranges::find(truth_.objects, view.object_id, &TruthObject::id);
     if (object == truth_.objects.end() || !object->presentAt(time)) continue;
-    const auto like = std::find(model_.classes.begin(), model_.classes.end(), object->looks_like);
+    const auto like = std::ranges::find(model_.classes, object->looks_like);
     Sight sight;
     sight.view = view;
     sight.time_s = toSeconds(time);
@@ -271,10 +268,9 @@ Detections SimulatedDetector::detect(std::uint64_t frame, const FrameStamp& stam
     found.detections.push_back(falseAlarm(dice));
   }
   // Sort, so that the order contains no information about identities.
-  std::sort(
-      found.detections.begin(), found.detections.end(), [](const Detection& a, const Detection& b) {
-        return std::tie(a.box.x1, a.box.y1, a.box.x2) < std::tie(b.box.x1, b.box.y1, b.box.x2);
-      });
+  std::ranges::sort(found.detections, [](const Detection& a, const Detection& b) {
+    return std::tie(a.box.x1, a.box.y1, a.box.x2) < std::tie(b.box.x1, b.box.y1, b.box.x2);
+  });
   return found;
 }
 

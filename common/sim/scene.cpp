@@ -1,7 +1,6 @@
 #include "common/sim/scene.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "common/base/errors.h"
 #include "common/sim/scenes/scenes.h"

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <memory>
 #include <vector>
 
 #include "common/math/rigid_transform.h"

@@ -81,8 +81,7 @@ nlohmann::ordered_json jsonOf(const TruthObject& object) {
 }  // namespace
 
 TruthKey TruthObject::at(TimePoint t) const {
-  const auto after = std::upper_bound(
-      keys.begin(), keys.end(), t, [](TimePoint time, const TruthKey& k) { return time < k.time; });
+  const auto after = std::ranges::upper_bound(keys, t, {}, &TruthKey::time);
   if (after == keys.begin()) return keys.front();
   const TruthKey& before = *(after - 1);
   if (!moves || after == keys.end()) return before;

@@ -2,6 +2,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <concepts>
 #include <fstream>
 #include <functional>
 #include <iterator>
@@ -31,83 +32,58 @@ std::ifstream open(const fs::path& file) {
   return stream;
 }
 
-/// Reads one object of objects_truth.json; errors name the object and the cause.
-class ObjectReader {
- public:
-  ObjectReader(const Json& json, std::string where) : json_(json), where_(std::move(where)) {
-    if (!json_.is_object()) refuse(where_, "is not an object with keys");
+/// A member of a JSON object; `kind` says what it has to be.
+template <class T>
+T member(const Json& parent, const char* key, const std::string& where, const char* kind) {
+  const auto found = parent.find(key);
+  if (found == parent.end()) refuse(where, std::string(key) + " is missing");
+  try {
+    if (!std::integral<T> || found->is_number_integer() || found->is_boolean()) return *found;
+  } catch (const Json::exception&) {
   }
+  refuse(where, std::string(key) + " is not " + kind);
+}
 
-  TruthObject read() const {
-    TruthObject object;
-    object.id = static_cast<std::uint64_t>(integer(json_, "id"));
-    if (integer(json_, "id") < 1) refuse(where_, "id is not above 0");
-    object.class_name = text("class");
-    object.looks_like = text("looks_like");
-    object.size = vector(json_, "size");
-    if (object.size.minCoeff() <= 0) refuse(where_, "size is not above 0");
-    object.moves = boolean("moves");
-    object.present_from = fromNanoseconds(integer(json_, "present_from_ns"));
-    object.present_until = fromNanoseconds(integer(json_, "present_until_ns"));
-    if (object.present_until <= object.present_from) {
-      refuse(where_, "present_until_ns is not after present_from_ns");
-    }
-    object.keys = keys();
-    return object;
-  }
+std::int64_t integer(const Json& parent, const char* key, const std::string& where) {
+  return member<std::int64_t>(parent, key, where, "an integer");
+}
 
- private:
-  const Json& member(const Json& parent, const char* key) const {
-    const auto found = parent.find(key);
-    if (found == parent.end()) refuse(where_, std::string(key) + " is missing");
-    return *found;
-  }
-  std::int64_t integer(const Json& parent, const char* key) const {
-    const Json& value = member(parent, key);
-    const bool fits = value.is_number_integer() &&
-                      (!value.is_number_unsigned() || value.get<std::uint64_t>() <= INT64_MAX);
-    if (!fits) refuse(where_, std::string(key) + " is not an integer of 64 bits");
-    return value.get<std::int64_t>();
-  }
-  std::string text(const char* key) const {
-    const Json& value = member(json_, key);
-    if (!value.is_string() || value == "") refuse(where_, std::string(key) + " is not a name");
-    return value;
-  }
-  bool boolean(const char* key) const {
-    const Json& value = member(json_, key);
-    if (!value.is_boolean()) refuse(where_, std::string(key) + " is neither true nor false");
-    return value;
-  }
-  Eigen::Vector3d vector(const Json& parent, const char* key) const {
-    const Json& value = member(parent, key);
-    const auto isNumber = [](const Json& one) { return one.is_number(); };
-    if (!value.is_array() || value.size() != 3 ||
-        !std::all_of(value.begin(), value.end(), isNumber)) {
-      refuse(where_, std::string(key) + " has not 3 numbers");
-    }
-    return Eigen::Vector3d(value[0].get<double>(), value[1].get<double>(), value[2].get<double>());
-  }
-  std::vector<TruthKey> keys() const {
-    const Json& list = member(json_, "keys");
-    if (!list.is_array() || list.empty()) refuse(where_, "keys is not a list with at least one");
-    std::vector<TruthKey> keys;
-    for (const Json& item : list) {
-      if (!item.is_object()) refuse(where_, "a key is not an object");
-      const Json& yaw = member(item, "yaw");
-      if (!yaw.is_number()) refuse(where_, "yaw is not a number");
-      keys.push_back(
-          {fromNanoseconds(integer(item, "time_ns")), vector(item, "centre"), yaw.get<double>()});
-      if (keys.size() > 1 && keys.back().time <= keys[keys.size() - 2].time) {
-        refuse(where_, "keys are not in the order of time");
-      }
-    }
-    return keys;
-  }
+Eigen::Vector3d vector(const Json& parent, const char* key, const std::string& where) {
+  const auto numbers = member<std::vector<double>>(parent, key, where, "3 numbers");
+  if (numbers.size() != 3) refuse(where, std::string(key) + " has not 3 numbers");
+  return Eigen::Vector3d(numbers.data());
+}
 
-  const Json& json_;
-  std::string where_;
-};
+std::vector<TruthKey> keysOf(const Json& list, const std::string& where) {
+  if (!list.is_array() || list.empty()) refuse(where, "keys is not a list with at least one");
+  std::vector<TruthKey> keys;
+  for (const Json& item : list) {
+    keys.push_back({fromNanoseconds(integer(item, "time_ns", where)), vector(item, "centre", where),
+                    member<double>(item, "yaw", where, "a number")});
+    if (keys.size() > 1 && keys.back().time <= keys[keys.size() - 2].time) {
+      refuse(where, "keys are not in the order of time");
+    }
+  }
+  return keys;
+}
+
+TruthObject objectOf(const Json& json, const std::string& where) {
+  TruthObject object;
+  object.id = static_cast<std::uint64_t>(integer(json, "id", where));
+  if (integer(json, "id", where) < 1) refuse(where, "id is not above 0");
+  object.class_name = member<std::string>(json, "class", where, "a name");
+  object.looks_like = member<std::string>(json, "looks_like", where, "a name");
+  object.size = vector(json, "size", where);
+  if (object.size.minCoeff() <= 0) refuse(where, "size is not above 0");
+  object.moves = member<bool>(json, "moves", where, "true or false");
+  object.present_from = fromNanoseconds(integer(json, "present_from_ns", where));
+  object.present_until = fromNanoseconds(integer(json, "present_until_ns", where));
+  if (object.present_until <= object.present_from) {
+    refuse(where, "present_until_ns is not after present_from_ns");
+  }
+  object.keys = keysOf(member<Json>(json, "keys", where, "a list"), where);
+  return object;
+}
 
 std::vector<TruthObject> readObjects(const fs::path& file) {
   std::ifstream stream = open(file);
@@ -125,7 +101,7 @@ std::vector<TruthObject> readObjects(const fs::path& file) {
   std::set<std::uint64_t> ids;
   for (const Json& item : root["objects"]) {
     const std::string where = file.string() + ": objects[" + std::to_string(objects.size()) + "]";
-    objects.push_back(ObjectReader(item, where).read());
+    objects.push_back(objectOf(item, where));
     if (!ids.insert(objects.back().id).second) refuse(where, "its id was there before");
   }
   return objects;
@@ -214,8 +190,8 @@ void readInside(const fs::path& file, std::map<std::uint64_t, std::vector<TruthV
     const auto& [x1, y1, x2, y2] = row.numbers;
     const auto frame = views.find(row.frame);
     if (frame == views.end()) refuse(where, "its frame is not in visibility_truth.csv");
-    const auto view = std::find_if(frame->second.begin(), frame->second.end(),
-                                   [&](const auto& v) { return v.object_id == row.object; });
+    const auto view = std::ranges::find_if(
+        frame->second, [&](const auto& v) { return v.object_id == row.object; });
     if (view == frame->second.end()) refuse(where, "its object is not in visibility_truth.csv");
     if (x1 > x2 || y1 > y2) refuse(where, "its box is inside out");
     view->inside = Box{x1, y1, x2, y2};

@@ -206,7 +206,7 @@ void requireSensors(const Config& config) {
            "`perdure-capture --list` does, or leave camera.second empty.");
   const auto& crop = config.camera.crop;
   const bool whole =
-      std::all_of(crop.begin(), crop.end(), [](double c) { return c >= 0 && c == std::floor(c); });
+      std::ranges::all_of(crop, [](double c) { return c >= 0 && c == std::floor(c); });
   refuseIf(!crop.empty() && (crop.size() != 4 || crop[2] < 1 || crop[3] < 1 || !whole),
            "camera.crop is not [x, y, width, height] in whole pixels with a width and height "
            "above 0; give these four, or none.");

@@ -55,7 +55,7 @@ SeenCamera seenOf(libcamera::Camera& camera) {
   for (const auto& format : formats.pixelformats()) {
     SeenCamera::Mode mode{format.toString(), {}};
     for (const auto& size : formats.sizes(format)) mode.sizes.emplace_back(size.width, size.height);
-    std::sort(mode.sizes.begin(), mode.sizes.end());
+    std::ranges::sort(mode.sizes);
     seen.modes.push_back(std::move(mode));
   }
   return seen;
@@ -172,8 +172,8 @@ std::string textOf(const SeenImu& imu) {
 }
 
 bool hasSize(const SeenCamera& camera, const std::pair<std::uint32_t, std::uint32_t>& size) {
-  return std::any_of(camera.modes.begin(), camera.modes.end(), [&](const auto& mode) {
-    return std::find(mode.sizes.begin(), mode.sizes.end(), size) != mode.sizes.end();
+  return std::ranges::any_of(camera.modes, [&](const auto& mode) {
+    return std::ranges::find(mode.sizes, size) != mode.sizes.end();
   });
 }
 
@@ -225,15 +225,13 @@ std::string configurationFor(const Seen& seen, const std::string& uri) {
     }
     text += fmt::format("  rate_hz: {:.4g}\n", rateFor(camera, other));
   }
-  const auto gyro = std::find_if(seen.imus.begin(), seen.imus.end(),
-                                 [](const SeenImu& imu) { return imu.gyro && imu.accel; });
-  const auto alone =
-      std::find_if(seen.imus.begin(), seen.imus.end(), [](const SeenImu& imu) { return imu.gyro; });
+  const auto gyro =
+      std::ranges::find_if(seen.imus, [](const SeenImu& imu) { return imu.gyro && imu.accel; });
+  const auto alone = std::ranges::find_if(seen.imus, &SeenImu::gyro);
   const auto first = gyro != seen.imus.end() ? gyro : alone;
   if (first == seen.imus.end()) return text + "# no gyroscope was found\n";
   text += fmt::format("imu:\n  uri: {}\n  gyro: {}\n", quoted(uri), quoted(nameOf(*first)));
-  const auto accel = std::find_if(seen.imus.begin(), seen.imus.end(),
-                                  [](const SeenImu& imu) { return imu.accel; });
+  const auto accel = std::ranges::find_if(seen.imus, &SeenImu::accel);
   if (!first->accel && accel != seen.imus.end()) {
     text += fmt::format("  accel: {}\n", quoted(nameOf(*accel)));
   }

@@ -210,15 +210,12 @@ void Live::updateHealth() {
 }
 
 void Live::report(ReasonCounts& counts) const {
-  const auto add = [&](const ReasonCounts& more) {
-    for (const auto& [reason, n] : more.all()) counts.add(reason, n);
-  };
-  add(reasons_);
+  counts.add(reasons_);
   cameras_->report(counts);
   vehicle_.report(counts);
-  for (const auto& imu : imus_) add(imu->state().reasons());
+  for (const auto& imu : imus_) counts.add(imu->state().reasons());
   const std::lock_guard lock(pairing_mutex_);
-  add(pairing_.reasons());
+  counts.add(pairing_.reasons());
 }
 
 }  // namespace perdure::capture

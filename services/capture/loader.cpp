@@ -175,7 +175,7 @@ bool Loader::ended() const {
 ReasonCounts Loader::reasons() const {
   const std::lock_guard lock(mutex_);
   ReasonCounts all = reasons_;
-  for (const auto& [reason, n] : uncompressed_.all()) all.add(reason, n);
+  all.add(uncompressed_);
   return all;
 }
 

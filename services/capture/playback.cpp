@@ -18,6 +18,41 @@ Duration periodOf(const Calibration& calibration) {
 
 }  // namespace
 
+StartGate::StartGate(const bus::Participant& participant, const StartConfig& config,
+                     Clock::time_point now)
+    : discovery_(participant),
+      frames_(participant.wireName("frame/cam0")),
+      config_(config),
+      since_(now),
+      missing_(config.readers),
+      open_(config.readers.empty()) {}
+
+std::set<std::string> StartGate::present() {
+  std::set<std::string> names;
+  for (const bus::RemoteEndpoint& endpoint : discovery_.endpoints()) {
+    const bool wants_frames = endpoint.process == "vio" || endpoint.process == "inference";
+    if (endpoint.writer || (wants_frames && endpoint.wire_name != frames_)) continue;
+    names.insert(endpoint.process);
+  }
+  return names;
+}
+
+bool StartGate::open(Clock::time_point now) {
+  if (open_) return true;
+  constexpr std::chrono::milliseconds kSettle{500};
+  const std::set<std::string> names = present();
+  missing_.clear();
+  for (const std::string& reader : config_.readers) {
+    if (!names.contains(reader)) missing_.push_back(reader);
+  }
+  if (!missing_.empty()) complete_since_ = Clock::time_point::max();
+  if (missing_.empty() && complete_since_ == Clock::time_point::max()) complete_since_ = now;
+  const bool settled =
+      complete_since_ != Clock::time_point::max() && now - complete_since_ >= kSettle;
+  open_ = settled || now - since_ >= durationFromSeconds(config_.timeout_s);
+  return open_;
+}
+
 Playback::Playback(service::Context& context, const Config& config)
     : context_(context),
       config_(config),
@@ -65,9 +100,7 @@ void Playback::begin() {
   }
   node_ = std::make_unique<Node>(config_, period_, resume_, outputs_);
   const auto isThere = [&](const std::string& name) {
-    const auto in = [&](const auto& list) {
-      return std::find(list.begin(), list.end(), name) != list.end();
-    };
+    const auto in = [&](const auto& list) { return std::ranges::find(list, name) != list.end(); };
     return in(config_.start.readers) && !in(gate_.missing());
   };
   if (isThere("vio")) node_->expect("odometry");
@@ -151,12 +184,9 @@ void Playback::updateHealth() {
 }
 
 void Playback::report(ReasonCounts& counts) const {
-  const auto add = [&](const ReasonCounts& more) {
-    for (const auto& [reason, n] : more.all()) counts.add(reason, n);
-  };
-  add(reasons_);
-  if (node_) add(node_->reasons());
-  if (loader_) add(loader_->reasons());
+  counts.add(reasons_);
+  if (node_) counts.add(node_->reasons());
+  if (loader_) counts.add(loader_->reasons());
 }
 
 }  // namespace perdure::capture

@@ -2,16 +2,44 @@
 // saves the state of the run, and reports progress in Health.
 #pragma once
 
+#include <chrono>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
+#include <vector>
 
+#include "common/bus/discovery.h"
 #include "common/service/service.h"
 #include "services/capture/loader.h"
 #include "services/capture/node.h"
-#include "services/capture/start_gate.h"
 
 namespace perdure::capture {
+
+/// Waits for the readers that must receive the first frame. A process counts as present if it reads
+/// frame/cam0 (vio, inference), or any topic (others).
+class StartGate {
+ public:
+  using Clock = std::chrono::steady_clock;
+  StartGate(const bus::Participant& participant, const StartConfig& config, Clock::time_point now);
+
+  /// Opens half a second after all readers are present, so that they discover this process too, or
+  /// after the timeout. It then stays open.
+  bool open(Clock::time_point now);
+  /// Names of the absent readers.
+  const std::vector<std::string>& missing() const { return missing_; }
+
+ private:
+  std::set<std::string> present();
+
+  bus::Discovery discovery_;
+  const std::string frames_;
+  const StartConfig config_;
+  const Clock::time_point since_;
+  Clock::time_point complete_since_ = Clock::time_point::max();
+  std::vector<std::string> missing_;
+  bool open_ = false;
+};
 
 class Playback {
  public:

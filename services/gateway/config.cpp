@@ -44,10 +44,9 @@ void verify(const Config& config) {
   if (config.web.token.empty() && !web::isLoopback(config.web.address)) {
     throw StartupError(
         ExitCode::kConfiguration,
-        "http.address " + config.web.address +
-            " can be reached from elsewhere, and http.token is empty: set a token, "
-            "or listen on 127.0.0.1 and forward the port (ssh -L 8765:localhost:8765 "
-            "VEHICLE)");
+        "http.address {} can be reached from elsewhere, and http.token is empty: set a token, or "
+        "listen on 127.0.0.1 and forward the port (ssh -L 8765:localhost:8765 VEHICLE)",
+        config.web.address);
   }
 }
 

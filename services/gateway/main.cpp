@@ -6,7 +6,6 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <span>
 #include <vector>
 
 #include "common/bus/discovery.h"
@@ -130,8 +129,8 @@ class Readers {
  private:
   service::OnDemand::Wanted any(gateway::Channels channels) const {
     return [this, channels = std::move(channels)] {
-      return std::any_of(channels.begin(), channels.end(),
-                         [this](std::uint32_t channel) { return wanted_.contains(channel); });
+      return std::ranges::any_of(
+          channels, [this](std::uint32_t channel) { return wanted_.contains(channel); });
     };
   }
   template <class T>
@@ -307,8 +306,7 @@ void serve(service::Context& context, const gateway::Config& config, const std::
       [&] { return beginning.lookedAt() || node.waits(); });
   context.countReasons([&]() -> const ReasonCounts& { return node.reasons(); });
   context.countReasons([&](ReasonCounts& counts) {
-    const web::Stats stats = server.stats();
-    for (const auto& [reason, n] : stats.reasons.all()) counts.add(reason, n);
+    counts.add(server.stats().reasons);
   });
   bus::Discovery discovery(context.participant());
   const std::string address = addressOf(config, server.port());

@@ -256,9 +256,8 @@ void Node::sendAnnotations(std::size_t camera, bool now) {
   awaited_.erase(camera);
   if (!cameras_[camera] || !wanted) return;
   const auto& frames = detections_[config_.cameras[camera]];
-  const auto same = std::find_if(frames.begin(), frames.end(), [&](const Detections& one) {
-    return one.stamp.sameFrame(objects_->stamp);
-  });
+  const auto same = std::ranges::find_if(
+      frames, [&](const Detections& one) { return one.stamp.sameFrame(objects_->stamp); });
   constexpr std::chrono::milliseconds kLately{500};
   const bool may_come = !frames.empty() && same == frames.end() &&
                         frames.back().stamp.time < objects_->stamp.time &&

@@ -70,7 +70,6 @@ class Node {
   }
   const VitalSigns& vitalSigns() const { return vital_signs_; }
   std::size_t objects() const { return objects_ ? objects_->objects.size() : 0; }
-  /// Time of the objects that are shown.
   std::optional<TimePoint> shownTime() const {
     return objects_ ? std::optional(objects_->stamp.time) : std::nullopt;
   }

@@ -1,5 +1,4 @@
 // Graph of the map: queried from map_store and sent while there are viewers.
-#include <utility>
 
 #include "services/gateway/node.h"
 

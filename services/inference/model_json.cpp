@@ -2,7 +2,6 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <set>
 
 #include "common/base/errors.h"

@@ -1,6 +1,5 @@
 #include "services/ros2/config.h"
 
-#include <algorithm>
 
 #include "common/base/errors.h"
 

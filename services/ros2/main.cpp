@@ -64,8 +64,8 @@ class Outwards {
     followers_.emplace_back(
         context_, topic,
         [this, outlets = std::move(outlets)] {
-          return std::any_of(outlets.begin(), outlets.end(),
-                             [this](const std::string& one) { return ros_.wants(one); });
+          return std::ranges::any_of(outlets,
+                                     [this](const std::string& one) { return ros_.wants(one); });
         },
         std::move(handler));
   }

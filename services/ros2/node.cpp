@@ -29,8 +29,8 @@ ModelInfo modelOf(const DetectionsInput& d, InstanceId instance) {
   model.instance = instance;
   model.name = "ros2:" + d.topic;
   for (std::string name : d.classes) {
-    std::transform(name.begin(), name.end(), name.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    std::ranges::transform(name, name.begin(),
+                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     model.classes.push_back(name);
   }
   model.box_sigma = d.box_sigma;
@@ -48,9 +48,8 @@ Result<Frame> unpacked(const ros::CompressedImage& image, int bits) {
                                image.data->size());
   const auto pixels = vision::decodeImage(bytes, std::nullopt, bits);
   if (!pixels) {
-    return fail(pixels.error().code,
-                "an image (" + image.format.substr(0, 64) +
-                    ") cannot be unpacked; JPEG and PNG are read: " + pixels.error().detail);
+    return fail(pixels.error().code, "an image ({}) cannot be unpacked; JPEG and PNG are read: {}",
+                image.format.substr(0, 64), pixels.error().detail);
   }
   Frame frame;
   const auto set = vision::setPixels(frame, *pixels);

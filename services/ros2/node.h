@@ -2,7 +2,6 @@
 // counts problems, each with its fix. Times `now_ns` are arrival times on CLOCK_MONOTONIC.
 #pragma once
 
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -56,7 +55,6 @@ class Node {
   void onOwnFrame(const Frame& frame, std::int64_t now_ns);
 
   const Troubles& troubles() const { return troubles_; }
-  /// State and message for Health.
   std::pair<HealthState, std::string> health(std::int64_t now_ns) const;
 
  private:

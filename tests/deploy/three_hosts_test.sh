@@ -9,7 +9,7 @@ cd "$PERDURE_SOURCE"
 
 skip() { echo "$1: skipped"; exit 77; }
 [ "$(id -u)" -eq 0 ] || skip "not root, no network namespaces"
-for program in ip nsenter supervisord python3; do
+for program in ip nsenter python3; do
   command -v "$program" > /dev/null || skip "$program is not here"
 done
 if [ -z "${PERDURE_THREE_HOSTS:-}" ]; then

@@ -71,9 +71,6 @@ class Demo : public ::testing::Test {
     if (drive_.empty() || model_.empty()) {
       GTEST_SKIP() << "the drive and the network are not beside the sources (../shared/data)";
     }
-    if (!findProgram("supervisord")) {
-      GTEST_SKIP() << "supervisord is not installed: deploy/install --runtime";
-    }
     (void)ownNetwork();
   }
 

@@ -1,7 +1,6 @@
 // Shared by the subcommands: bus options, and a loop that ends after a time or on a signal.
 #pragma once
 
-#include <functional>
 #include <string>
 
 #include "common/bus/wait_loop.h"

@@ -160,12 +160,27 @@ ForeignRig ofOrbSlam(const SensorFile& file) {
     imu["accelerometer_random_walk"] = file.number("IMU.AccWalk", 0.0);
     rig.sections["imu0"] = imu;
   }
-  file.noteUnknownKeys(
-      rig.without_effect,
-      {"File.", "ORBextractor.", "Viewer.", "System.", "RGBD.", "LEFT.", "RIGHT.", "loopClosing",
-       "DepthMapFactor", "ThDepth", "Stereo.ThDepth", "Stereo.b", "Camera.bf", "Camera.RGB",
-       "Camera.new", "Camera.lapping", "Camera2.lapping", "Camera1.overlapping",
-       "Camera2.overlapping", "IMU.InsertKFsWhenLost", "IMU.fastInit"});
+  file.noteUnknownKeys(rig.without_effect, {"File.",
+                                            "ORBextractor.",
+                                            "Viewer.",
+                                            "System.",
+                                            "RGBD.",
+                                            "LEFT.",
+                                            "RIGHT.",
+                                            "loopClosing",
+                                            "DepthMapFactor",
+                                            "ThDepth",
+                                            "Stereo.ThDepth",
+                                            "Stereo.b",
+                                            "Camera.bf",
+                                            "Camera.RGB",
+                                            "Camera.new",
+                                            "Camera.lapping",
+                                            "Camera2.lapping",
+                                            "Camera1.overlapping",
+                                            "Camera2.overlapping",
+                                            "IMU.InsertKFsWhenLost",
+                                            "IMU.fastInit"});
   return rig;
 }
 
@@ -207,7 +222,7 @@ RigidTransform basaltPose(const SensorFile& pose) {
 double basaltNoise(const SensorFile& file, const char* key) {
   if (file.has(key) && file.root()[key].IsScalar()) return file.number(key, 0.0);
   const auto values = file.numbers(key, 3);
-  return *std::max_element(values.begin(), values.end());
+  return *std::ranges::max_element(values);
 }
 
 /// Scale and misalignment follow the three biases.

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <opencv2/core/utility.hpp>
-#include <optional>
 
 #include "common/base/errors.h"
 #include "common/replay/data_check.h"
@@ -69,7 +68,7 @@ std::vector<fs::path> picturesIn(const fs::path& folder) {
   for (const auto& entry : fs::directory_iterator(folder)) {
     if (entry.is_regular_file() && isPicture(entry.path())) files.push_back(entry.path());
   }
-  std::sort(files.begin(), files.end());
+  std::ranges::sort(files);
   return files;
 }
 

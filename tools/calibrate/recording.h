@@ -10,7 +10,6 @@
 
 namespace perdure::calibrate {
 
-/// Views of one camera.
 struct CameraViews {
   CameraCalibration
       prior;               ///< source: the drive or the rig file; for pictures, name and size only.

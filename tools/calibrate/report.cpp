@@ -1,5 +1,4 @@
 // Writes calibration.json: all estimates, their uncertainty and their judgements.
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "tools/calibrate/calibrate.h"

@@ -1,5 +1,4 @@
 // Implements drawResiduals of calibrate.h.
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>

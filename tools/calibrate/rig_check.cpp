@@ -164,7 +164,7 @@ constexpr double kFewAgainst = 0.05, kManyAgainst = 0.2;
 /// meaningless.
 void judgeAllAtOnce(const Judgements& place, const Judgement& gravity, Judgements& all) {
   const auto isOff = [](const Judgement& one) { return one.grade != Grade::kGood; };
-  const auto off = std::count_if(place.begin(), place.end(), isOff) + (isOff(gravity) ? 1 : 0);
+  const auto off = std::ranges::count_if(place, isOff) + (isOff(gravity) ? 1 : 0);
   all.push_back({off > 2 ? Grade::kBad : Grade::kDoubtful,
                  "the camera's place, its time and gravity are not explained together, which one "
                  "cause does: the order, signs and units of the IMU's columns, T_BS by many "
@@ -316,8 +316,8 @@ Judgements judgeBelief(const RigCheck& check) {
                                    "{:.2f} of the expected",
                                    ratio),
                        "the rig contradicts the recording: calibrate again"));
-  const auto gated = std::count_if(check.innovations.begin(), check.innovations.end(),
-                                   [](const auto& i) { return !i.used; });
+  const auto gated =
+      std::ranges::count_if(check.innovations, [](const auto& i) { return !i.used; });
   const double left_out =
       static_cast<double>(gated) / static_cast<double>(check.innovations.size());
   all.push_back(judged(gradeOf(left_out, 0.15, 0.35),
@@ -330,8 +330,8 @@ Judgements judgeBelief(const RigCheck& check) {
   const bool many_against = againstOf(check) > kManyAgainst;
   const Judgement gravity = judgeGravity(check);
   auto place = judgePlaceOf(check, lens == Grade::kGood, !many_against);
-  const auto off = std::count_if(place.begin(), place.end(),
-                                 [](const auto& one) { return one.grade != Grade::kGood; });
+  const auto off =
+      std::ranges::count_if(place, [](const auto& one) { return one.grade != Grade::kGood; });
   const bool at_once = lens == Grade::kGood && off > 0 && off + (gravity.grade > Grade::kGood) > 1;
   if (at_once && !many_against) {
     judgeAllAtOnce(place, gravity, all);

@@ -33,7 +33,7 @@ Judgement coverageOf(const std::vector<Cell>& cells) {
     }
     const auto place =
         placeIn(static_cast<int>(i) % kCellColumns, static_cast<int>(i) / kCellColumns);
-    if (std::find(missing.begin(), missing.end(), place) == missing.end()) missing.push_back(place);
+    if (std::ranges::find(missing, place) == missing.end()) missing.push_back(place);
   }
   const double share = static_cast<double>(seen) / static_cast<double>(cells.size());
   const Grade grade = share >= 0.85 ? Grade::kGood : share >= 0.6 ? Grade::kDoubtful : Grade::kBad;

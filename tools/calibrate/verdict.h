@@ -25,7 +25,6 @@ Judgement judged(Grade grade, std::string text, const std::string& remedy);
 Grade worstOf(const Judgements& judgements);
 /// "good", "doubtful", "bad".
 const char* wordOf(Grade grade);
-/// Summarises all judgements in one sentence.
 std::string summaryOf(const Judgements& judgements);
 
 /// Cells of the image over which residuals are averaged, as in the pictures.

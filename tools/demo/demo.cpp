@@ -10,16 +10,13 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <iostream>
-#include <sstream>
 
 #include "common/base/errors.h"
 #include "common/base/ids.h"
 #include "common/base/subprocess.h"
 #include "common/replay/ros_topics.h"
 #include "common/types/end_of_drive.h"
-#include "tools/base/files.h"
 #include "tools/data_check/data_check.h"
 #include "tools/evaluate/object_report.h"
 #include "tools/evaluate/simulated_truth.h"
@@ -63,24 +60,6 @@ bus::Options busOptions(const fs::path& root) {
   return options;
 }
 
-/// The last line of a service's log that is not an info line.
-std::string lastWords(const std::string& log_file) {
-  std::istringstream lines(textOf(log_file));
-  std::string last, line;
-  while (std::getline(lines, line)) {
-    if (!line.empty() && line.find(" info: ") == std::string::npos) last = line;
-  }
-  return last;
-}
-
-bool meansCannotStart(const ServiceState& state, int exit_status) {
-  if (state.state == "FATAL") return true;
-  const bool said_why = exit_status == static_cast<int>(ExitCode::kUsage) ||
-                        exit_status == static_cast<int>(ExitCode::kUnavailable) ||
-                        exit_status == static_cast<int>(ExitCode::kConfiguration);
-  return state.state == "BACKOFF" && said_why;
-}
-
 }  // namespace
 
 Demo::Demo(const DemoOptions& options, const std::atomic<bool>& interrupted)
@@ -97,18 +76,7 @@ Demo::Demo(const DemoOptions& options, const std::atomic<bool>& interrupted)
   participant_ = std::make_unique<bus::Participant>(*domain_, "demo");
   loop_ = std::make_unique<bus::WaitLoop>(*participant_);
   reporter_ = std::make_unique<Reporter>(*participant_, *loop_, *outputs_, shapesFor(options_));
-
-  // A short path, because the path of a Unix socket has at most 107 bytes.
-  const fs::path place = fs::temp_directory_path();
-  socket_folder_.emplace(place / "perdure-demo-", [&](const std::string&) {
-    throw StartupError(ExitCode::kUnavailable, "no folder can be made in " + place.string() +
-                                                   "; set TMPDIR to one that can be written");
-  });
-  const std::string socket = (socket_folder_->path() / "supervisor.sock").string();
-  const fs::path config = folders_.run / "supervisord.conf";
-  std::ofstream(config) << supervisorConfig(services_, folders_, socket, options_.root);
-  supervisor_ = std::make_unique<Supervisor>(config.string(), socket,
-                                             (folders_.run / "supervisord.out").string());
+  supervisor_ = std::make_unique<Supervisor>(services_, fs::absolute(options_.root));
   std::cerr << fmt::format(
       "demo: {} frames, services on DDS domain {}; listen with: "
       "PERDURE_DOMAIN={} {}/perdure topics\n",
@@ -179,20 +147,14 @@ void Demo::keep() {
                            address_.empty() ? "" : " at " + address_);
   while (!interrupted_) {
     loop_->runOnce(50ms);
-    const std::int64_t now = monotonicNs();
-    if (now - checked_ns_ < kSecond / 2) continue;
-    checked_ns_ = now;
-    checkServices();
+    supervisor_->watch();
   }
   endInOrder();
 }
 
 void Demo::watch() {
+  supervisor_->watch();
   const std::int64_t now = monotonicNs();
-  if (now - checked_ns_ > kSecond / 2) {
-    checked_ns_ = now;
-    checkServices();
-  }
   const bool terminal = isatty(STDERR_FILENO) == 1;
   if (now - shown_ns_ > (terminal ? kSecond / 4 : 2 * kSecond)) {
     shown_ns_ = now;
@@ -210,29 +172,6 @@ bool Demo::over() {
   return quiet > (reporter_->drained() ? kSecond : 5 * kSecond);
 }
 
-void Demo::checkServices() {
-  const auto states = supervisor_->states();
-  if (!states) {
-    if (supervisor_->alive()) return;  // busy; retried at the next check
-    throw StartupError(ExitCode::kFailure,
-                       "supervisord has ended; see " + (folders_.run / "supervisord.log").string());
-  }
-  const bool all_well = std::all_of(states->begin(), states->end(), [](const auto& one) {
-    return one.second.state != "BACKOFF" && one.second.state != "FATAL";
-  });
-  if (all_well) return;
-  auto exits = lastExits(textOf(folders_.run / "supervisord.log"));
-  for (const ServicePlan& service : services_) {
-    const auto found = states->find(service.name);
-    const int status = exits[service.name];
-    if (found == states->end() || !meansCannotStart(found->second, status)) continue;
-    const std::string words = lastWords(service.log);
-    throw StartupError(status == 0 ? ExitCode::kFailure : static_cast<ExitCode>(status),
-                       fmt::format("{} does not start: {} (its log: {})", service.name,
-                                   words.empty() ? found->second.spawn_error : words, service.log));
-  }
-}
-
 void Demo::showProgress(bool last) {
   const bool terminal = isatty(STDERR_FILENO) == 1;
   const std::string line = reporter_->progressLine(frames_);
@@ -248,14 +187,10 @@ void Demo::endInOrder() {
 void Demo::endOne(const std::string& service) {
   supervisor_->stop(service);
   const std::int64_t end = monotonicNs() + 6 * kSecond;
-  while (monotonicNs() < end) {
-    loop_->runOnce(50ms);
-    const auto states = supervisor_->states();
-    if (!states || !states->contains(service) || states->at(service).ended()) return;
-  }
+  while (supervisor_->runs(service) && monotonicNs() < end) loop_->runOnce(50ms);
 }
 
-/// Ends the processes that `perdure inference swap` started, which supervisord does not know.
+/// Ends the processes that `perdure inference swap` started, which the supervisor does not know.
 void Demo::endSwappedIn() const {
   const auto isInference = [](pid_t pid) {
     std::error_code gone;
@@ -310,9 +245,8 @@ void Demo::write() {
   report["doubts"] = toJson(doubts);
   printWarnings(doubts);
   end_of_line_ = tools::endOfLine(doubts);
-  const auto spawns = countSpawns(textOf(folders_.run / "supervisord.log"));
-  for (const auto& [service, count] : spawns) {
-    report["services"][service]["restarts"] = count - 1;
+  for (const ServicePlan& service : services_) {
+    report["services"][service.name]["restarts"] = supervisor_->starts(service.name) - 1;
   }
   if (truth_ && reporter_->odometryFrames() > 0) {
     report["objects"] = scoreAgainst(*truth_, folders_.out);

@@ -7,7 +7,6 @@
 #include <string>
 
 #include "common/replay/dataset.h"
-#include "tools/base/files.h"
 #include "tools/demo/plan.h"
 #include "tools/demo/reporter.h"
 #include "tools/demo/supervisor.h"
@@ -38,7 +37,6 @@ class Demo {
   void checkConfigurations();
   void watch();
   bool over();
-  void checkServices();
   void showProgress(bool last);
   void addGateway();
   void endInOrder();
@@ -62,9 +60,8 @@ class Demo {
   std::unique_ptr<bus::Participant> participant_;
   std::unique_ptr<bus::WaitLoop> loop_;
   std::unique_ptr<Reporter> reporter_;
-  std::optional<TemporaryFolder> socket_folder_;
   std::unique_ptr<Supervisor> supervisor_;
-  std::int64_t shown_ns_ = 0, checked_ns_ = 0;
+  std::int64_t shown_ns_ = 0;
 };
 
 }  // namespace perdure::tools

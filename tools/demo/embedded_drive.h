@@ -1,7 +1,6 @@
 // Default data of the demo: a rendered drive, and the network in models/ that was trained for it.
 #pragma once
 
-#include <cstddef>
 #include <filesystem>
 #include <functional>
 #include <string>

@@ -5,7 +5,6 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <charconv>
 #include <fstream>
 
@@ -20,12 +19,11 @@ namespace {
 namespace fs = std::filesystem;
 
 // File that marks a run folder of the demo, which may be emptied.
-constexpr char kMark[] = "supervisord.conf";
+constexpr char kMark[] = "capture.log";
 
 [[noreturn]] void cannotUse(const fs::path& folder, const std::string& why) {
-  throw StartupError(
-      ExitCode::kUnavailable,
-      fmt::format("{} cannot be used: {}; give --out another folder", folder.string(), why));
+  throw StartupError(ExitCode::kUnavailable, "{} cannot be used: {}; give --out another folder",
+                     folder.string(), why);
 }
 
 /// "--set" arguments that give capture the pace of --rate.
@@ -90,32 +88,6 @@ ServicePlan planOf(const std::string& name, const DemoOptions& options, const De
     plan.command.insert(plan.command.end(), {"--set", setting});
   }
   return plan;
-}
-
-/// A text that supervisord expands to `text`. It has no other escape for the characters that begin
-/// a comment or end a line.
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text) {
-    const auto found = std::find_if(kSupervisorEnvironment.begin(), kSupervisorEnvironment.end(),
-                                    [&](const auto& entry) { return entry.second[0] == c; });
-    if (found != kSupervisorEnvironment.end()) {
-      result += "%(ENV_" + found->first + ")s";
-    } else {
-      result += c == '%' ? "%%" : std::string(1, c);
-    }
-  }
-  return result;
-}
-
-/// Quotes a word for a command of supervisord.
-std::string quoted(const std::string& word) {
-  std::string text = "\"";
-  for (const char c : word) {
-    if (c == '"' || c == '\\') text += '\\';
-    text += c;
-  }
-  return escaped(text + "\"");
 }
 
 }  // namespace
@@ -187,32 +159,6 @@ std::uint16_t freePort() {
     if (free) return ntohs(address.sin_port);
   }
   return kUsual;
-}
-
-std::string supervisorConfig(const std::vector<ServicePlan>& services, const DemoFolders& folders,
-                             const std::string& socket, const fs::path& root) {
-  std::string text = fmt::format(
-      "[unix_http_server]\nfile={}\nchmod=0700\n\n"
-      "[supervisord]\nnodaemon=true\nlogfile={}\nlogfile_maxbytes=0\npidfile={}\n\n"
-      "[rpcinterface:supervisor]\n"
-      "supervisor.rpcinterface_factory=supervisor.rpcinterface:make_main_rpcinterface\n",
-      escaped(socket), escaped((folders.run / "supervisord.log").string()),
-      escaped((folders.run / "supervisord.pid").string()));
-  int priority = 100;
-  for (const ServicePlan& service : services) {
-    std::string command;
-    for (const std::string& word : service.command) command += quoted(word) + " ";
-    // supervisord expands stdout_logfile twice and everything else once. A program that fails after
-    // its first second is restarted immediately, without a limit. One that fails to start is tried
-    // five times, with pauses of 1, 2, 3 and 4 seconds.
-    text += fmt::format(
-        "\n[program:{}]\ncommand={}\ndirectory={}\npriority={}\nautorestart=unexpected\n"
-        "exitcodes=0\nstartsecs=1\nstartretries=4\nstopsignal=TERM\nstopwaitsecs=5\n"
-        "redirect_stderr=true\nstdout_logfile={}\nstdout_logfile_maxbytes=0\n",
-        service.name, command, escaped(fs::absolute(root).string()), priority--,
-        escaped(escaped(service.log)));
-  }
-  return text;
 }
 
 }  // namespace perdure::tools

@@ -62,12 +62,4 @@ std::optional<ServicePlan> planGateway(const DemoOptions& options, const DemoFol
 /// Returns port 8765 if it is free, otherwise any free port.
 std::uint16_t freePort();
 
-/// Variables that supervisord needs: the characters that its configuration cannot contain.
-inline const std::map<std::string, std::string> kSupervisorEnvironment{
-    {"PERDURE_SEMICOLON", ";"}, {"PERDURE_HASH", "#"}, {"PERDURE_LINE_END", "\n"}};
-
-/// The configuration of supervisord, which immediately restarts a service that fails.
-std::string supervisorConfig(const std::vector<ServicePlan>& services, const DemoFolders& folders,
-                             const std::string& socket, const std::filesystem::path& root);
-
 }  // namespace perdure::tools

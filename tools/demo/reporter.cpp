@@ -129,7 +129,7 @@ std::vector<pid_t> Reporter::pidsOf(const std::string& process) const {
 bool Reporter::drained() const {
   const Health* capture = healthOf("capture");
   if (capture == nullptr || capture->message != kEndOfDrive) return false;
-  return std::includes(objects_.begin(), objects_.end(), odometry_.begin(), odometry_.end());
+  return std::ranges::includes(objects_, odometry_);
 }
 
 std::string Reporter::progressLine(std::size_t frames_in_all) const {

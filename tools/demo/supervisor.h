@@ -1,55 +1,52 @@
-// Runs supervisord as a child process: starts it, controls it by XML-RPC over its Unix socket, and
-// ends it.
+// Keeps the services of the demo running: starts them, and starts again those that fail.
 #pragma once
 
-#include <map>
+#include <chrono>
+#include <list>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "common/base/result.h"
 #include "common/base/subprocess.h"
+#include "tools/demo/plan.h"
 
 namespace perdure::tools {
 
-struct ServiceState {
-  std::string state;  ///< STOPPED, STARTING, RUNNING, BACKOFF, STOPPING, EXITED, FATAL, UNKNOWN
-  std::string spawn_error;
-  bool ended() const { return state == "STOPPED" || state == "EXITED" || state == "FATAL"; }
-};
-
-/// The processes in a response of supervisor.getAllProcessInfo. Empty if the response is malformed.
-std::map<std::string, ServiceState> readProcessInfo(const std::string& xml);
-
-/// Counts the starts of each program in the log of supervisord.
-std::map<std::string, int> countSpawns(const std::string& log);
-
-/// The last exit status of each program, from the log of supervisord. Its responses lack the status
-/// of a program that ended too quickly.
-std::map<std::string, int> lastExits(const std::string& log);
-
-/// The error in the output of supervisord if it ended at once; empty if there is none.
-std::string complaintIn(const std::string& output);
-
 class Supervisor {
  public:
-  /// Throws StartupError if supervisord is not installed, ends at once or does not respond.
-  Supervisor(const std::string& config_file, const std::string& socket, const std::string& log);
-  /// Ends supervisord and the programs that still run.
+  /// Starts all services in `folder`. Throws StartupError if a program cannot be run.
+  Supervisor(const std::vector<ServicePlan>& services, const std::filesystem::path& folder);
+  /// Ends the services that still run, with SIGTERM, or with SIGKILL after five seconds.
   ~Supervisor();
   Supervisor(const Supervisor&) = delete;
   Supervisor& operator=(const Supervisor&) = delete;
 
-  Result<std::map<std::string, ServiceState>> states() const;
-  /// Requests the end with SIGTERM and returns at once.
-  void stop(const std::string& service) const;
-  bool alive();
+  /// Starts failed services again; call it often. A service that failed after its first second is
+  /// started at once, without a limit. One that failed earlier is tried five times, with pauses of
+  /// 1, 2, 3 and 4 seconds. Throws StartupError with the last line of its log if all tries failed,
+  /// or if its exit status says that it cannot start.
+  void watch();
+  /// Requests the end with SIGTERM and returns at once; it is not started again.
+  void stop(const std::string& service);
+  bool runs(const std::string& service);
+  /// Number of starts of a service; 0 for an unknown one.
+  int starts(const std::string& service) const;
 
  private:
-  Result<std::string> call(const std::string& method, const std::string& parameters) const;
+  using Clock = std::chrono::steady_clock;
+  struct Program {
+    ServicePlan plan;
+    std::optional<Subprocess> process = {};
+    Clock::time_point started = {};
+    std::optional<Clock::time_point> again = {};  ///< time of the next start after a failure
+    int starts = 0, failures = 0;                 ///< failures: successive ones in the first second
+    bool stopped = false;
+  };
+  void start(Program& program);
+  Program& named(const std::string& service);
 
-  std::string socket_;
-  std::optional<Subprocess> process_;
+  const std::filesystem::path folder_;
+  std::list<Program> programs_;
 };
 
 }  // namespace perdure::tools

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <limits>
-#include <map>
 #include <vector>
 
 #include "common/base/algorithms/median.h"
@@ -57,9 +56,8 @@ Json parkedCars(const std::vector<replay::KittiLabel>& labels, const std::set<st
                 const std::vector<EstimateRow>& rows) {
   Json cars = Json::array();
   for (const std::int64_t track : tracks) {
-    const bool car = std::any_of(labels.begin(), labels.end(), [&](const auto& label) {
-      return label.track == track && label.type == "Car";
-    });
+    const bool car = std::ranges::any_of(
+        labels, [&](const auto& label) { return label.track == track && label.type == "Car"; });
     if (!car) continue;
     const Eigen::Vector3d truth = middleOf(labels, track, poses, T_RI);
     double nearest = std::numeric_limits<double>::infinity();

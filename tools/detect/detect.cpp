@@ -28,7 +28,7 @@ void writeDetection(std::ostream& out, const ModelInfo& model, std::uint64_t fra
                     const Detection& detection) {
   const auto& a = detection.activations;
   const auto best = std::max_element(a.begin() + 1, a.end());
-  const double highest = *std::max_element(a.begin(), a.end());
+  const double highest = *std::ranges::max_element(a);
   double sum = 0.0;
   for (const float value : a) sum += std::exp(value - highest);
   const auto k = static_cast<std::size_t>(best - a.begin()) - 1;

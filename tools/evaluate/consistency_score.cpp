@@ -80,8 +80,7 @@ std::vector<MapBelief> readBeliefs(const std::filesystem::path& file) {
   constexpr char kMend[] = "`perdure pipeline` writes it";
   std::ifstream stream(file);
   if (!stream) {
-    throw StartupError(ExitCode::kUnavailable,
-                       fmt::format("{} cannot be read; {}", file.string(), kMend));
+    throw StartupError(ExitCode::kUnavailable, "{} cannot be read; {}", file.string(), kMend);
   }
   std::vector<MapBelief> beliefs;
   try {
@@ -170,8 +169,7 @@ double Anees::median() const { return medianOf(nees); }
 double Anees::within3Sigma() const {
   constexpr double kShare = 0.9973;
   const double limit = chi2Quantile(kShare, dof);
-  const auto inside =
-      std::count_if(nees.begin(), nees.end(), [&](double value) { return value <= limit; });
+  const auto inside = std::ranges::count_if(nees, [&](double value) { return value <= limit; });
   return nees.empty() ? 1.0 : static_cast<double>(inside) / static_cast<double>(nees.size());
 }
 

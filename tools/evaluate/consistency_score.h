@@ -56,7 +56,6 @@ struct RunAnees {
   std::pair<double, double> band() const;  ///< 95 % band of mean(), one object in each run
 };
 
-/// A row of odometry.csv.
 struct OdometryRow {
   TimePoint time;
   std::uint64_t epoch = 0;

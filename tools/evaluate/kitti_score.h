@@ -2,7 +2,6 @@
 // camera 0.
 #pragma once
 
-#include <filesystem>
 #include <optional>
 
 #include "tools/evaluate/object_rows.h"

@@ -55,9 +55,7 @@ std::optional<std::uint64_t> multipleOfTenth(TimePoint time) {
 std::optional<std::uint64_t> frameOf(std::size_t i, const std::vector<replay::StampedPose>& poses,
                                      const Ties& ties) {
   if (ties.empty()) return multipleOfTenth(poses[i].time).value_or(i);
-  const auto after =
-      std::lower_bound(ties.begin(), ties.end(), i,
-                       [](const auto& tie, std::size_t line) { return tie.first < line; });
+  const auto after = std::ranges::lower_bound(ties, i, {}, &Ties::value_type::first);
   if (after != ties.end() && after->first == i) return after->second;
   const auto& b = after == ties.end() ? ties.back() : *after;
   const auto& a = after == ties.begin() ? b : *(after - 1);
@@ -107,7 +105,7 @@ std::map<std::uint64_t, RigidTransform> posesByFrame(
     numbers.assign(used->begin(), used->end());
     std::erase_if(ties, [&](const auto& tie) { return !used->contains(tie.second); });
     for (auto& tie : ties) {
-      const auto at = std::lower_bound(numbers.begin(), numbers.end(), tie.second);
+      const auto at = std::ranges::lower_bound(numbers, tie.second);
       tie.second = static_cast<std::uint64_t>(at - numbers.begin());
     }
   }

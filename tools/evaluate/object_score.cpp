@@ -35,8 +35,7 @@ std::vector<Match> matchGreedily(const std::vector<TruthLabel>& truth,
       if (distance < d && close_in_angle) pairs.push_back({t, e, distance});
     }
   }
-  std::stable_sort(pairs.begin(), pairs.end(),
-                   [](const Match& a, const Match& b) { return a.distance < b.distance; });
+  std::ranges::stable_sort(pairs, {}, &Match::distance);
   std::vector<bool> truth_used(truth.size()), estimate_used(estimates.size());
   std::vector<Match> matches;
   for (const Match& pair : pairs) {

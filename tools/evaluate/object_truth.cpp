@@ -26,8 +26,7 @@ bool standsStill(const Points& points) {
   const Eigen::Vector3d last = median(points.end() - fifth, points.end());
   const Eigen::Vector3d middle = median(points.begin(), points.end());
   return (first - last).norm() < kDrift &&
-         std::all_of(points.begin(), points.end(),
-                     [&](const auto& p) { return (p - middle).norm() <= kStray; });
+         std::ranges::all_of(points, [&](const auto& p) { return (p - middle).norm() <= kStray; });
 }
 
 }  // namespace

@@ -72,7 +72,7 @@ Evaluated evaluateKitti(ObjectsOptions options) {
            !poses.contains(frame.first);
   };
   const bool told = used || poses.empty();
-  const auto untold = told ? 0 : std::count_if(truth.begin(), truth.end(), unposed);
+  const auto untold = told ? 0 : std::ranges::count_if(truth, unposed);
   return {scoreObjects(rows, truth, poses, calibration, options.score),
           rows.size(),
           poses.size(),

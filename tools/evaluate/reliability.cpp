@@ -55,9 +55,8 @@ double Reliability::skill() const {
 Reliability ClassReliability::best() const {
   Reliability result{what, {}};
   for (const ClassClaim& claim : claims) {
-    const auto top =
-        std::max_element(claim.believed.begin(), claim.believed.end(),
-                         [](const auto& a, const auto& b) { return a.second < b.second; });
+    const auto top = std::ranges::max_element(
+        claim.believed, [](const auto& a, const auto& b) { return a.second < b.second; });
     if (top == claim.believed.end()) continue;
     result.claims.push_back({top->second, top->first == claim.is});
   }

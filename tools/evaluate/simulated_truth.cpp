@@ -1,7 +1,6 @@
 #include "tools/evaluate/simulated_truth.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "common/base/errors.h"
@@ -75,8 +74,7 @@ TruthFrame labelsOf(const SimulatedTruth& truth, std::uint64_t frame,
   const Eye eye(*body, truth.camera);
   for (const auto& view : views->second) {
     const auto object =
-        std::find_if(truth.truth.objects.begin(), truth.truth.objects.end(),
-                     [&](const sim::TruthObject& one) { return one.id == view.object_id; });
+        std::ranges::find(truth.truth.objects, view.object_id, &sim::TruthObject::id);
     if (object == truth.truth.objects.end() || object->class_name == kToy) continue;
     const sim::TruthKey key = object->at(time);
     const bool counts = (class_name.empty() || object->class_name == class_name) &&

@@ -23,7 +23,6 @@ std::vector<double> travelled(const std::vector<PosePair>& pairs) {
   return distance;
 }
 
-/// Error of the motion from pair a to pair b.
 RigidTransform motionError(const PosePair& a, const PosePair& b) {
   const RigidTransform truth = a.truth.inverse() * b.truth;
   const RigidTransform estimate = a.estimate.inverse() * b.estimate;

@@ -3,7 +3,6 @@
 // Geiger et al., "Are we ready for autonomous driving?" (CVPR 2012) for t_err and r_err.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "common/base/time.h"

@@ -72,11 +72,10 @@ std::size_t withoutPose(const std::vector<TimePoint>& frames,
   if (poses.empty()) return 0;
   const auto unposed = [&](TimePoint frame) {
     if (frame < poses.front().time || frame > poses.back().time) return false;
-    const auto at = std::lower_bound(poses.begin(), poses.end(), frame - kSame,
-                                     [](const auto& pose, TimePoint t) { return pose.time < t; });
+    const auto at = std::ranges::lower_bound(poses, frame - kSame, {}, &replay::StampedPose::time);
     return at == poses.end() || at->time - frame > kSame;
   };
-  return static_cast<std::size_t>(std::count_if(frames.begin(), frames.end(), unposed));
+  return static_cast<std::size_t>(std::ranges::count_if(frames, unposed));
 }
 
 std::string noteOfUntold(std::size_t frames) {

@@ -42,11 +42,10 @@ MapReply askOverDds(const Request& request) {
   const bus::Options& bus = domain.options();
   throw StartupError(
       ExitCode::kUnavailable,
-      fmt::format(
-          "{} on domain {}, interface {}, vehicle {} within {} s; start perdure-map-store "
-          "there, or read its file with --db",
-          reply.error().code == "no_answer" ? "map_store does not answer" : "there is no map_store",
-          bus.domain, bus.interface, bus.vehicle, request.patience_s));
+      "{} on domain {}, interface {}, vehicle {} within {} s; start perdure-map-store there, or "
+      "read its file with --db",
+      reply.error().code == "no_answer" ? "map_store does not answer" : "there is no map_store",
+      bus.domain, bus.interface, bus.vehicle, request.patience_s);
 }
 
 MapReply askFile(const Request& request) {
@@ -63,11 +62,11 @@ MapReply ask(const Request& request) {
   MapReply reply = request.db.empty() ? askOverDds(request) : askFile(request);
   if (!reply.ok) throw StartupError(ExitCode::kUsage, reply.error);
   if (reply.truncated) {
-    std::cerr
-        << "perdure map: there are more than these " << reply.objects.size()
-        << " objects; raise --limit"
-        << (request.db.empty() ? " and map_store's query.limit, or read the file with --db" : "")
-        << "\n";
+    std::cerr << "perdure map: there are more than these " << reply.objects.size()
+              << " objects; raise --limit"
+              << (request.db.empty() ? " and map_store's query.limit, or read the file with --db"
+                                     : "")
+              << "\n";
   }
   return reply;
 }

@@ -55,7 +55,7 @@ std::vector<GivenMap> readAll(const FuseRequest& request, FuseOutcome& outcome) 
       maps.push_back({path, std::move(map)});
     }
   }
-  std::stable_sort(maps.begin(), maps.end(), [](const GivenMap& a, const GivenMap& b) {
+  std::ranges::stable_sort(maps, [](const GivenMap& a, const GivenMap& b) {
     return mapping::comesFirst(a.map.contents, b.map.contents);
   });
   return maps;

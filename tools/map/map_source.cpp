@@ -5,7 +5,6 @@
 #include <optional>
 #include <sstream>
 
-#include "common/base/errors.h"
 #include "common/bus/topics.h"
 #include "common/bus/wait_loop.h"
 #include "services/map_store/core/graph/graph_answer.h"

@@ -3,7 +3,6 @@
 
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "common/base/result.h"
 #include "common/bus/domain.h"

@@ -176,7 +176,7 @@ Seen Study::seenIn(const Frame& frame, const LabelledFrame& labels) {
                                     static_cast<int>(frame.height));
   seen.width = fit.width, seen.height = fit.height;
   for (const TrueBox& label : labels.boxes) {
-    const auto name = std::find(names_.begin(), names_.end(), label.class_name);
+    const auto name = std::ranges::find(names_, label.class_name);
     Target target{fit.toInput(label.box), 0, label.ignored, {}};
     if (name != names_.end()) target.k = static_cast<std::size_t>(name - names_.begin()) + 1;
     if (label.hull) target.hull = fit.toInput(*label.hull);
@@ -221,22 +221,20 @@ void Study::countTargets(const Calibration& calibration) {
     for (const int taken : match(reported(frame, calibration), frame.targets)) {
       result_.targets_found += taken >= 0 ? 1 : 0;
     }
-    result_.targets += static_cast<std::size_t>(
-        std::count_if(frame.targets.begin(), frame.targets.end(),
-                      [](const Target& t) { return !t.ignored && t.k > 0; }));
+    result_.targets += static_cast<std::size_t>(std::ranges::count_if(
+        frame.targets, [](const Target& t) { return !t.ignored && t.k > 0; }));
   }
 }
 
 /// Throws if most objects of a map are not detected, because the map's run detected all of them.
 void Study::requireTheSameFrames() const {
-  const bool by_map = std::any_of(frames_.begin(), frames_.end(),
-                                  [](const Seen& frame) { return !frame.sides_known; });
+  const bool by_map =
+      std::ranges::any_of(frames_, [](const Seen& frame) { return !frame.sides_known; });
   if (!by_map || 2 * result_.targets_found >= result_.targets) return;
-  throw StartupError(
-      ExitCode::kUnavailable,
-      "of " + std::to_string(result_.targets) + " objects that --labels expects " +
-          std::to_string(result_.targets_found) +
-          " are seen in --frames: is it a run over these frames, with this network?");
+  throw StartupError(ExitCode::kUnavailable,
+                     "of {} objects that --labels expects {} are seen in --frames: is it a run "
+                     "over these frames, with this network?",
+                     result_.targets, result_.targets_found);
 }
 
 void Study::measureSides(const Calibration& calibration) {
@@ -305,9 +303,9 @@ std::vector<PrimedOutcome> Study::askAround(const Calibration& calibration) cons
     for (const std::size_t other : {(f + n / 3) % n, (f + 2 * n / 3) % n}) {
       for (const Target& t : frames_[other].targets) {
         if (t.ignored || t.k == 0 || other == f) continue;
-        const bool free = std::none_of(
-            frame.targets.begin(), frame.targets.end(),
-            [&](const Target& mine) { return intersectionOverUnion(mine.box, t.box) >= kApart; });
+        const bool free = std::ranges::none_of(frame.targets, [&](const Target& mine) {
+          return intersectionOverUnion(mine.box, t.box) >= kApart;
+        });
         if (free) expected.push_back(expectationAt(t, random));
       }
     }
@@ -354,8 +352,7 @@ void Study::fit() {
   countTargets(calibration);
   requireTheSameFrames();
   boxes = outcomes(calibration);
-  const auto right =
-      std::count_if(boxes.begin(), boxes.end(), [](const auto& b) { return b.label > 0; });
+  const auto right = std::ranges::count_if(boxes, [](const auto& b) { return b.label > 0; });
   if (right < 20 || static_cast<std::size_t>(right) + 20 > boxes.size()) {
     throw StartupError(ExitCode::kUnavailable,
                        "the labelled frames hold " + std::to_string(right) + " right boxes of " +

@@ -2,7 +2,6 @@
 // top-down likelihoods, and the accuracy of boxes (services/inference/README.md).
 #pragma once
 
-#include <filesystem>
 #include <functional>
 #include <map>
 #include <string>

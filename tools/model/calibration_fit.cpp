@@ -86,8 +86,7 @@ Eigen::Vector2d minimise(const std::vector<BoxOutcome>& boxes, bool with_bias) {
 
 bool bothKinds(const std::vector<BoxOutcome>& boxes) {
   const auto clutter = [](const BoxOutcome& b) { return b.label == 0; };
-  return std::any_of(boxes.begin(), boxes.end(), clutter) &&
-         !std::all_of(boxes.begin(), boxes.end(), clutter);
+  return std::ranges::any_of(boxes, clutter) && !std::ranges::all_of(boxes, clutter);
 }
 
 }  // namespace
@@ -135,8 +134,8 @@ std::vector<Softening> crossValidated(const std::vector<BoxOutcome>& boxes, std:
   std::vector<Softening> folds;
   for (std::size_t fold = 0; fold < kFolds; ++fold) {
     std::vector<BoxOutcome> others;
-    std::copy_if(boxes.begin(), boxes.end(), std::back_inserter(others),
-                 [&](const BoxOutcome& b) { return foldOf(b) != fold; });
+    std::ranges::copy_if(boxes, std::back_inserter(others),
+                         [&](const BoxOutcome& b) { return foldOf(b) != fold; });
     folds.push_back(fitSoftening(others));
   }
   std::vector<Softening> result;
@@ -147,8 +146,7 @@ std::vector<Softening> crossValidated(const std::vector<BoxOutcome>& boxes, std:
 
 double clutterRateOf(const std::vector<BoxOutcome>& boxes) {
   if (boxes.empty()) return 0.5;
-  const auto clutter =
-      std::count_if(boxes.begin(), boxes.end(), [](const BoxOutcome& b) { return b.label == 0; });
+  const auto clutter = std::ranges::count(boxes, 0, &BoxOutcome::label);
   return std::clamp(static_cast<double>(clutter) / static_cast<double>(boxes.size()), 0.01, 0.99);
 }
 

@@ -58,12 +58,11 @@ void compare(const fs::path& network, const fs::path& reference) {
   if (!fs::exists(reference / "input.f32")) return;  // the import has reported the reason
   const Answers answers = checkAnswers(network, reference);
   if (answers.difference > kMostDifference) {
-    throw StartupError(
-        ExitCode::kConfiguration,
-        fmt::format("{} computes {} of {} otherwise than the file says (by {:.2g} of its "
-                    "largest value), so that its boxes would be wrong; export it with another "
-                    "opset (11 to 13), or a plainer network of the family",
-                    answers.by, answers.tensor, network.string(), answers.difference));
+    throw StartupError(ExitCode::kConfiguration,
+                       "{} computes {} of {} otherwise than the file says (by {:.2g} of its "
+                       "largest value), so that its boxes would be wrong; export it with another "
+                       "opset (11 to 13), or a plainer network of the family",
+                       answers.by, answers.tensor, network.string(), answers.difference);
   }
   std::printf("%-11s answers as the file says (within %.0e)\n", answers.by.c_str(),
               answers.difference);

@@ -2,7 +2,6 @@
 #include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <memory>
@@ -78,11 +77,10 @@ std::string byHand(const KnownFile& file, const fs::path& path) {
 
 [[noreturn]] void throwNotTaken(const KnownFile& file, const fs::path& path,
                                 const std::string& why) {
-  throw StartupError(
-      ExitCode::kUnavailable,
-      fmt::format("{} cannot be taken ({}). On a machine with a network do this, put the file to "
-                  "{}, and give the same command again:\n{}",
-                  file.url, why, path.string(), byHand(file, path)));
+  throw StartupError(ExitCode::kUnavailable,
+                     "{} cannot be taken ({}). On a machine with a network do this, put the file "
+                     "to {}, and give the same command again:\n{}",
+                     file.url, why, path.string(), byHand(file, path));
 }
 
 void take(const KnownFile& file, const fs::path& path) {
@@ -113,9 +111,8 @@ void take(const KnownFile& file, const fs::path& path) {
   if (const auto other = difference(part, file)) {
     fs::remove(part, error);
     throw StartupError(ExitCode::kData,
-                       fmt::format("what {} gives {}: it was changed there, or on the way; nothing "
-                                   "was kept",
-                                   file.url, *other));
+                       "what {} gives {}: it was changed there, or on the way; nothing was kept",
+                       file.url, *other);
   }
   fs::rename(part, path);
   std::printf("checked     %s (%llu bytes, sha256 as known)\n", path.c_str(),

@@ -1,6 +1,5 @@
 #include "tools/model/importer.h"
 
-#include <cstdlib>
 #include <optional>
 
 #include "common/base/errors.h"

@@ -1,7 +1,6 @@
 #include "tools/model/labelled_frames.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "common/base/errors.h"
@@ -53,8 +52,8 @@ LabelledData readSimulated(const LabelRequest& request, const replay::ClassAlias
     }
     for (const auto& view : views->second) {
       const auto& all = truth.truth.objects;
-      const auto object = std::find_if(all.begin(), all.end(),
-                                       [&](const auto& o) { return o.id == view.object_id; });
+      const auto object =
+          std::ranges::find_if(all, [&](const auto& o) { return o.id == view.object_id; });
       auto label = labelOf(view, truth.camera, least_px);
       if (object == all.end() || !label) continue;
       label->class_name = aliases.canonical(object->looks_like);
@@ -76,10 +75,9 @@ fs::path labelFile(const LabelRequest& request, replay::DatasetKind kind) {
   }
   throw StartupError(
       ExitCode::kUnavailable,
-      request.data.string() +
-          " has no labels of its own; give --labels OUT of a run of `perdure pipeline` "
-          "over it, --labels label_02/SEQUENCE.txt, or a folder that `perdure "
-          "simulate --out` made");
+      "{} has no labels of its own; give --labels OUT of a run of `perdure pipeline` over it, "
+      "--labels label_02/SEQUENCE.txt, or a folder that `perdure simulate --out` made",
+      request.data.string());
 }
 
 TrueBox labelOf(const replay::KittiLabel& label, const replay::ClassAliases& aliases,

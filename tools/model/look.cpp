@@ -3,14 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <functional>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "common/base/check.h"
 #include "common/base/checked_file.h"
 #include "common/base/errors.h"
 #include "common/replay/files/text_file.h"
 #include "common/vision/decode.h"
+#include "common/vision/image.h"
 #include "services/inference/core/decode/evidence.h"
 #include "services/inference/node.h"
 #include "tools/outputs/pictures/drawing.h"
@@ -30,20 +32,10 @@ Sight sightOf(const Detection& detection, const ModelInfo& model,
   return {detection.box, model.classes.at(k), inference::sigmoid(log_odds)};
 }
 
-cv::Mat pixelsOf(const Frame& frame) {
-  auto* data = const_cast<std::uint8_t*>(frame.data->data());  // the pixels are only read
-  return cv::Mat(static_cast<int>(frame.height), static_cast<int>(frame.width), CV_8UC3, data)
-      .clone();
-}
-
 Frame frameOf(const cv::Mat& pixels) {
   Frame frame;
   frame.camera = "cam0";
-  frame.width = static_cast<std::uint32_t>(pixels.cols);
-  frame.height = static_cast<std::uint32_t>(pixels.rows);
-  frame.encoding = ImageEncoding::kBgr8;
-  frame.data = std::make_shared<const std::vector<std::uint8_t>>(pixels.data,
-                                                                 pixels.data + pixels.total() * 3);
+  check(vision::setPixels(frame, pixels).has_value(), "a picture has pixels of eight bits");
   return frame;
 }
 
@@ -77,17 +69,15 @@ Look lookAt(const fs::path& network, const Frame* frame, double threshold) {
   const auto answer =
       node.infer(frame != nullptr ? *frame : greyRamp(look.input_width, look.input_height));
   if (!answer) {
-    throw StartupError(ExitCode::kConfiguration,
-                       network.string() + " fails on the picture: " + answer.error().detail + " (" +
-                           answer.error().code + ")");
+    throw StartupError(ExitCode::kConfiguration, "{} fails on the picture: {} ({})",
+                       network.string(), answer.error().detail, answer.error().code);
   }
   for (const Detection& detection : answer->detections) {
     look.sights.push_back(sightOf(detection, node.model(), description.calibration));
   }
   // Duplicate detections of one object lose evidence after the threshold.
   std::erase_if(look.sights, [&](const Sight& s) { return s.score < threshold; });
-  std::stable_sort(look.sights.begin(), look.sights.end(),
-                   [](const Sight& a, const Sight& b) { return a.score > b.score; });
+  std::ranges::stable_sort(look.sights, std::greater{}, &Sight::score);
   return look;
 }
 
@@ -101,7 +91,7 @@ void checkDrawing(const fs::path& file) {
 
 void drawSights(const Frame& frame, const std::vector<Sight>& sights, const fs::path& file) {
   checkDrawing(file);
-  cv::Mat image = pixelsOf(frame);
+  cv::Mat image = vision::viewOf(frame)->clone();
   const cv::Rect all({}, image.size());
   std::vector<cv::Rect> taken;
   for (const Sight& sight : sights) {

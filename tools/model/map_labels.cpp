@@ -88,7 +88,7 @@ std::set<std::string> judgedIn(const std::vector<LabelledFrame>& frames) {
 
 void requireSameFrames(const std::vector<EstimateRow>& rows, const replay::Dataset& dataset,
                        const std::filesystem::path& run) {
-  const auto strange = std::count_if(rows.begin(), rows.end(), [&](const EstimateRow& row) {
+  const auto strange = std::ranges::count_if(rows, [&](const EstimateRow& row) {
     const auto time = dataset.frameTime(row.frame);
     return !time || std::abs(toSeconds(*time - row.time)) > kSameTime_s;
   });

@@ -34,9 +34,8 @@ TemporaryFolder temporaryFolder(const fs::path& parent, const std::string& prefi
   return {parent / prefix, [&](const std::string&) {
             const int why = errno;
             if (why == ENOSPC || why == EDQUOT) throwUnwritten(parent, std::strerror(why));
-            throw StartupError(ExitCode::kUnavailable, "nothing can be written into " +
-                                                           parent.string() + " (" +
-                                                           std::strerror(why) + "); " + mend);
+            throw StartupError(ExitCode::kUnavailable, "nothing can be written into {} ({}); {}",
+                               parent.string(), std::strerror(why), mend);
           }};
 }
 
@@ -66,7 +65,7 @@ std::vector<Staging::Move> Staging::moves() const {
     }
     moves.push_back({file.path(), to, fs::exists(there) ? file.path().string() + ".former" : ""});
   }
-  std::sort(moves.begin(), moves.end(), [](const Move& a, const Move& b) { return a.to < b.to; });
+  std::ranges::sort(moves, {}, &Move::to);
   return moves;
 }
 

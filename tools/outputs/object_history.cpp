@@ -59,10 +59,10 @@ std::optional<Outline> outlineOf(const ObjectRow& row, const ShapePoints* shape,
     if (at) points.emplace_back(static_cast<float>(at->x()), static_cast<float>(at->y()));
   }
   if (!shape) {
-    const auto [left, right] = std::minmax_element(
-        points.begin(), points.end(), [](const auto& p, const auto& q) { return p.x < q.x; });
-    const auto [top, bottom] = std::minmax_element(
-        points.begin(), points.end(), [](const auto& p, const auto& q) { return p.y < q.y; });
+    const auto [left, right] =
+        std::ranges::minmax_element(points, [](const auto& p, const auto& q) { return p.x < q.x; });
+    const auto [top, bottom] =
+        std::ranges::minmax_element(points, [](const auto& p, const auto& q) { return p.y < q.y; });
     points = {{left->x, top->y}, {right->x, top->y}, {right->x, bottom->y}, {left->x, bottom->y}};
   }
   Outline outline{{}, centre.z()};
@@ -84,7 +84,7 @@ double visibleShare(const Outline& outline, const std::vector<Outline>& all) {
                          box.y + (static_cast<float>(i / kCells) + 0.5F) / kCells * box.height);
     if (!covers(outline, at)) continue;
     ++own;
-    const bool covered = std::any_of(all.begin(), all.end(), [&](const Outline& other) {
+    const bool covered = std::ranges::any_of(all, [&](const Outline& other) {
       return other.depth < outline.depth && covers(other, at);
     });
     open += covered ? 0 : 1;

@@ -8,9 +8,9 @@
 
 #include "common/base/checked_file.h"
 #include "common/base/errors.h"
+#include "common/earth/geodesy.h"
 #include "common/mapping/frames/laid_belief.h"
 #include "common/math/so3.h"
-#include "common/earth/geodesy.h"
 #include "tools/outputs/ledger_json.h"
 #include "tools/outputs/pictures/evolution_picture.h"
 #include "tools/outputs/pictures/map_picture.h"
@@ -107,9 +107,8 @@ OutputWriter::OutputWriter(std::filesystem::path folder, std::string sequence)
   std::error_code error;
   std::filesystem::create_directories(folder_, error);
   if (error) {
-    throw StartupError(ExitCode::kUnavailable,
-                       fmt::format("{}: cannot be made: {}; give --out another folder",
-                                   folder_.string(), error.message()));
+    throw StartupError(ExitCode::kUnavailable, "{}: cannot be made: {}; give --out another folder",
+                       folder_.string(), error.message());
   }
   open(events_, "events.jsonl");
   open(odometry_, "odometry.csv");

@@ -23,10 +23,9 @@ void removeAll(const fs::path& path) {
   std::error_code error;
   fs::remove_all(path, error);
   if (!error) return;
-  throw StartupError(
-      ExitCode::kUnavailable,
-      fmt::format("{}: cannot be removed: {}; give --out a folder that you may write",
-                  path.string(), error.message()));
+  throw StartupError(ExitCode::kUnavailable,
+                     "{}: cannot be removed: {}; give --out a folder that you may write",
+                     path.string(), error.message());
 }
 
 }  // namespace

@@ -16,7 +16,6 @@ class ResultsFolder {
   ResultsFolder& operator=(const ResultsFolder&) = delete;
   ~ResultsFolder();
 
-  /// The folder to write to.
   const std::filesystem::path& folder() const { return written_; }
   /// Replaces the earlier results; no file in the folder may be open. Throws
   /// StartupError(kInputOutput) on failure.

@@ -72,9 +72,8 @@ Doubts doubtsOfRun(const RunFacts& facts) {
       {"boxes_beyond", "boxes of other frames were left out"},
       {"poses_", "the poses contradict the drive"}};
   for (const auto& finding : facts.findings) {
-    const auto kind = std::find_if(std::begin(kFindings), std::end(kFindings), [&](const auto& one) {
-      return finding.code.starts_with(one.first);
-    });
+    const auto kind = std::ranges::find_if(
+        kFindings, [&](const auto& one) { return finding.code.starts_with(one.first); });
     if (kind != std::end(kFindings)) doubts.push_back({kind->second, finding.text});
   }
   return doubts;

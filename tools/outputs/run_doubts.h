@@ -16,7 +16,6 @@ struct Doubt {
 };
 using Doubts = std::vector<Doubt>;
 
-/// What a run counted.
 struct RunFacts {
   ReasonCounts vio = {};     ///< of vio, or, with given poses, of the node that computes landmarks
   std::uint64_t frames = 0;  ///< of the first camera

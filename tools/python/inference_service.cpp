@@ -127,7 +127,7 @@ class InferenceService {
     }
     context_.countReasons([this](ReasonCounts& counts) {
       const std::lock_guard lock(mutex_);
-      for (const auto& [reason, n] : reasons_.all()) counts.add(reason, n);
+      counts.add(reasons_);
     });
     context_.every(durationFromSeconds(options_.lease_s / 5), [this] { assertAlive(); });
     context_.watch([this] { return !busyFor(kHangs); });

@@ -1,6 +1,5 @@
 #include "tools/record/fault_watch.h"
 
-#include <algorithm>
 
 namespace perdure::tools {
 

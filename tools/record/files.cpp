@@ -13,8 +13,6 @@
 #include "common/replay/recordings/recorded_messages.h"
 #include "common/replay/recordings/recording_writer.h"
 #include "common/replay/recordings/ros_messages.h"
-#include "tools/record/repair.h"
-#include "tools/record/ros_export.h"
 
 namespace perdure::tools {
 namespace {
@@ -101,10 +99,9 @@ void refuseForeign(const fs::path& path, const ReasonCounts& reasons) {
   std::string why;
   for (const auto& [reason, n] : reasons.all()) why += fmt::format("; {}: {}", reason, n);
   throw StartupError(ExitCode::kData,
-                     fmt::format("{} holds no message that can be exported{}; recordings of "
-                                 "`perdure record` are, and `perdure record info` tells what it "
-                                 "holds",
-                                 path.string(), why));
+                     "{} holds no message that can be exported{}; recordings of `perdure record` "
+                     "are, and `perdure record info` tells what it holds",
+                     path.string(), why);
 }
 
 ReasonCounts exportPlain(const fs::path& from, const fs::path& to) {
@@ -126,7 +123,7 @@ ReasonCounts exportPlain(const fs::path& from, const fs::path& to) {
     }
     reasons.add(message->topic + "_" + added.error().code);
   }
-  for (const auto& [reason, n] : recording.reasons().all()) reasons.add(reason, n);
+  reasons.add(recording.reasons());
   if (exported == 0) refuseForeign(from, reasons);
   if (const auto finished = file.finish(); !finished) {
     throw StartupError(ExitCode::kInputOutput, finished.error().detail);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <vector>
 
 #include "common/base/result.h"
 #include "common/replay/recordings/recorded_messages.h"
@@ -17,6 +18,15 @@ void addFileCommands(CLI::App& record);
 /// Copies a recording, or a folder of recordings, with every message as plain XCDR1 (final types),
 /// for readers without delimited XCDR2. Counts messages that cannot be read. Throws StartupError.
 ReasonCounts exportPlain(const std::filesystem::path& from, const std::filesystem::path& to);
+
+/// Converts it to ROS 2 for viewers and `ros2 bag play`: MCAP with profile ros2; the topics are
+/// those of common/ros/mirror.h. As exportPlain otherwise.
+ReasonCounts exportRos2(const std::filesystem::path& from, const std::filesystem::path& to);
+
+/// Completes unfinished recordings, or folders of them, without losing a byte. If bytes are cut
+/// off, the original stays beside it as FILE.before-repair. All files are processed before the
+/// failures are thrown as a StartupError.
+void repairAll(const std::vector<std::filesystem::path>& paths);
 
 /// Throws StartupError(kData) for a recording without messages, with the reason.
 [[noreturn]] void refuseNothing(const replay::RecordedMessages& recording,

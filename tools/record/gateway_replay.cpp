@@ -119,8 +119,7 @@ void GatewayReplay::measure() {
 void GatewayReplay::refuseAfterTheEnd(double start_s) const {
   const double all = toSeconds(last_.time - first_.time);
   if (start_s <= all) return;
-  throw StartupError(ExitCode::kUsage,
-                     fmt::format("--start {:g}: the recording has {:.1f} s", start_s, all));
+  throw StartupError(ExitCode::kUsage, "--start {:g}: the recording has {:.1f} s", start_s, all);
 }
 
 TimePoint GatewayReplay::sensorTime(std::uint64_t log_ns) const {

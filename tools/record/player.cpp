@@ -25,9 +25,8 @@ const std::map<std::string, std::set<std::string>> kInputs{
 bool isHeardBy(const std::string& service, const std::string& topic) {
   const auto inputs = kInputs.find(service);
   if (inputs == kInputs.end()) {
-    throw StartupError(ExitCode::kUsage, "--for " + service +
-                                             ": is none of vio, inference, semantic_filter, "
-                                             "map_store");
+    throw StartupError(ExitCode::kUsage,
+                       "--for {}: is none of vio, inference, semantic_filter, map_store", service);
   }
   return inputs->second.contains(topic.starts_with("frame/") ? "frame/" : topic);
 }
@@ -106,14 +105,13 @@ void Player::settleEvents(Writers& others) {
 /// Omits the outputs of a service that reads this recording, because it publishes them again.
 void Player::leaveToListeners(Writers& others) {
   const auto hears = [&](const std::string& process) {
-    return kInputs.contains(process) &&
-           std::any_of(topics_.begin(), topics_.end(), [&](const std::string& topic) {
+    return kInputs.contains(process) && std::ranges::any_of(topics_, [&](const std::string& topic) {
              return !others.contains(topic) && isHeardBy(process, topic);
            });
   };
   const Writers all = others;
   for (const auto& [topic, processes] : all) {
-    if (!std::all_of(processes.begin(), processes.end(), hears)) continue;
+    if (!std::ranges::all_of(processes, hears)) continue;
     left_out_.insert(topic + " (" + listOf(processes) + ")");
     topics_.erase(topic);
     others.erase(topic);
@@ -162,8 +160,8 @@ void Player::waitForReaders() {
   const auto until = std::chrono::steady_clock::now() +
                      std::chrono::nanoseconds(static_cast<std::int64_t>(options_.wait_s * 1e9));
   const auto unheard = [&] {
-    return std::any_of(voices_.begin(), voices_.end(),
-                       [](const auto& voice) { return voice.second.writer->matched() == 0; });
+    return std::ranges::any_of(
+        voices_, [](const auto& voice) { return voice.second.writer->matched() == 0; });
   };
   while (!loop_.stopped() && unheard() && std::chrono::steady_clock::now() < until) {
     loop_.runOnce(20ms);

@@ -1,5 +1,4 @@
-#include "tools/record/repair.h"
-
+// `perdure record repair`.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
@@ -13,6 +12,7 @@
 #include "common/base/errors.h"
 #include "common/replay/recordings/mcap_reader.h"
 #include "common/replay/recordings/unpacked_file.h"
+#include "tools/record/files.h"
 
 namespace perdure::tools {
 namespace {
@@ -57,9 +57,8 @@ void refuseDamaged(const fs::path& file, const mcap::Reader& reader) {
   if (reader.damage().empty()) return;
   throw StartupError(
       ExitCode::kData,
-      fmt::format("{}; repair cannot mend that, and the file stays as it is: {} "
-                  "messages of it are read",
-                  mcap::sentenceOfDamage(file, reader), reader.statistics().messages));
+      "{}; repair cannot mend that, and the file stays as it is: {} messages of it are read",
+      mcap::sentenceOfDamage(file, reader), reader.statistics().messages);
 }
 
 void finish(const fs::path& file, mcap::Reader& reader) {
@@ -115,7 +114,7 @@ std::vector<fs::path> filesOf(const fs::path& path) {
   for (const auto& entry : fs::directory_iterator(path)) {
     if (entry.path().extension() == ".mcap") files.push_back(entry.path());
   }
-  std::sort(files.begin(), files.end());
+  std::ranges::sort(files);
   return files;
 }
 

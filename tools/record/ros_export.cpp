@@ -1,5 +1,4 @@
-#include "tools/record/ros_export.h"
-
+// `perdure record export --ros2`.
 #include <utility>
 
 #include "common/base/errors.h"
@@ -99,7 +98,7 @@ class Export {
       now_ns_ = message->log_ns;
       take(*message);
     }
-    for (const auto& [reason, n] : recording_.reasons().all()) reasons_.add(reason, n);
+    reasons_.add(recording_.reasons());
     return reasons_;
   }
 

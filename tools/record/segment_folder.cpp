@@ -47,16 +47,10 @@ SegmentFolder::SegmentFolder(const fs::path& folder, std::uint64_t quota, std::u
   findFiles();
 }
 
-SegmentFolder::~SegmentFolder() {
-  if (lock_ >= 0) close(lock_);
-}
-
 void SegmentFolder::lock() {
-  lock_ = open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (lock_ >= 0 && flock(lock_, LOCK_EX | LOCK_NB) == 0 && access(folder_.c_str(), W_OK) == 0)
-    return;
-  const bool taken = lock_ >= 0 && access(folder_.c_str(), W_OK) == 0;
-  if (lock_ >= 0) close(lock_);
+  lock_ = Descriptor(open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  const bool taken = lock_.open() && access(folder_.c_str(), W_OK) == 0;
+  if (taken && flock(lock_.get(), LOCK_EX | LOCK_NB) == 0) return;
   throw StartupError(ExitCode::kUnavailable,
                      folder_.string() + (taken ? " is another recorder's; give each its own --out"
                                                : " cannot be written; give --out another folder, "

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "common/base/process/descriptor.h"
+
 namespace perdure::tools {
 
 class SegmentFolder {
@@ -15,9 +17,6 @@ class SegmentFolder {
   /// `keep_free` are in bytes; quota 0: none. Throws StartupError if the folder cannot be written,
   /// or if another recorder uses it.
   SegmentFolder(const std::filesystem::path& folder, std::uint64_t quota, std::uint64_t keep_free);
-  ~SegmentFolder();
-  SegmentFolder(const SegmentFolder&) = delete;
-  SegmentFolder& operator=(const SegmentFolder&) = delete;
 
   /// "FOLDER/perdure-000124-20261122T091658Z.mcap". The number increases independent of the clock.
   /// `word` is appended after the time: "-fault".
@@ -43,7 +42,7 @@ class SegmentFolder {
 
   std::filesystem::path folder_;
   std::uint64_t quota_, keep_free_, removed_ = 0, next_number_ = 1;
-  int lock_ = -1;
+  Descriptor lock_;
   std::map<std::filesystem::path, std::uint64_t> sizes_;  // order by name is order by time
   std::vector<std::string> repaired_;
 };

@@ -1,6 +1,5 @@
 #include "tools/security/authority.h"
 
-#include <fmt/format.h>
 #include <sys/stat.h>
 
 #include <algorithm>
@@ -50,7 +49,7 @@ void narrow(Permissions& permissions, bus::Role role, const std::vector<std::str
   for (const std::string& topic : topics) {
     const std::string row = topic.starts_with("frame/") ? "frame/*" : topic;
     const auto& all = permissions.writes;
-    if (std::find(all.begin(), all.end(), row) != all.end()) continue;
+    if (std::ranges::find(all, row) != all.end()) continue;
     throw StartupError(ExitCode::kUsage, "a ros2_driver stands for no " + topic);
   }
   permissions.writes = topics;
@@ -108,10 +107,9 @@ Authority::Authority(const fs::path& folder) : folder_(folder) {
   const auto json = nlohmann::json::parse(textOf(own / kRegister), nullptr, false);
   if (!key_ || !certificate_ || !revoked_ || !json.is_object()) {
     throw StartupError(ExitCode::kUnavailable,
-                       own.string() +
-                           " holds no authority that this user can read; "
-                           "`perdure security init` makes one, --dir names another "
-                           "folder");
+                       "{} holds no authority that this user can read; `perdure security init` "
+                       "makes one, --dir names another folder",
+                       own.string());
   }
   vehicle_ = json.value("vehicle", "ego");
   const auto identities = json.value("identities", nlohmann::json::object());

@@ -32,9 +32,8 @@ void readSize(const std::string& text, sim::SceneOptions& world) {
   const auto fits = [](std::uint32_t n) { return n >= 16 && n <= 4096; };
   if (!has_x || height.ec != std::errc() || height.ptr != end || !fits(world.width) ||
       !fits(world.height)) {
-    throw StartupError(
-        ExitCode::kUsage,
-        "--size is `" + text + "`; give width and height, 16 to 4096, such as 640x480");
+    throw StartupError(ExitCode::kUsage,
+                       "--size is `{}`; give width and height, 16 to 4096, such as 640x480", text);
   }
 }
 

@@ -2,7 +2,6 @@
 // produces the same bytes. It has a line of JSON for each frame; its numbers are exact.
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <functional>

@@ -1,6 +1,5 @@
 #include "tools/simulate/scene_digest.h"
 
-#include <algorithm>
 #include <bit>
 #include <string>
 

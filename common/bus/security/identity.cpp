@@ -27,11 +27,10 @@ Result<void> requireFiles(const std::string& folder) {
     const std::string path = pathOf(folder, file);
     if (access(path.c_str(), R_OK) == 0) continue;
     if (errno == EACCES) {
-      return fail(
-          "file_unreadable",
-          fmt::format("{} cannot be read by this user; run as its owner (sudo), or give the "
-                      "identity to this one: chown -R USER {}",
-                      path, folder));
+      return fail("file_unreadable",
+                  "{} cannot be read by this user; run as its owner (sudo), or give the identity "
+                  "to this one: chown -R USER {}",
+                  path, folder);
     }
     return fail("file_missing",
                 fmt::format("{} is missing; `perdure security init` makes the identities of the "
@@ -135,9 +134,8 @@ Result<Identity> readIdentity(const std::string& folder) {
   const auto key = readKey(pathOf(folder, kKey));
   if (!certificate || !authority || !revoked || !key) {
     const char* file = !certificate ? kCertificate : !authority ? kCa : !revoked ? kRevoked : kKey;
-    return fail("file_malformed",
-                fmt::format("{} is no PEM of its kind; copy the folder again, or {}",
-                            pathOf(folder, file), kRenew));
+    return fail("file_malformed", "{} is no PEM of its kind; copy the folder again, or {}",
+                pathOf(folder, file), kRenew);
   }
   Identity identity{subjectPart(certificate.get(), NID_commonName),
                     subjectPart(certificate.get(), NID_organizationalUnitName),

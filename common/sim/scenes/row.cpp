@@ -1,5 +1,4 @@
 // Ten cars parked in a row, 0.8 m apart.
-#include <limits>
 
 #include "common/sim/path.h"
 #include "common/sim/scenes/parts/rigs.h"

@@ -1,6 +1,5 @@
 // A long street, driven at constant speed after a start from rest.
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "common/sim/path.h"

@@ -89,9 +89,8 @@ Scene makeSuburb(std::uint64_t seed, const SceneOptions& options) {
   putOnWheels(builder, way, driven, seconds, options);
   Streets(builder, gridOfRoads(kSuburbColumns, kSuburbRows), furnishingOfSuburb()).furnish();
   const auto& objects = builder.scene().objects;
-  const auto vehicles = std::count_if(objects.begin(), objects.end(), [](const SceneObject& o) {
-    return o.class_name == "car" || o.class_name == "van";
-  });
+  const auto vehicles = std::ranges::count_if(
+      objects, [](const SceneObject& o) { return o.class_name == "car" || o.class_name == "van"; });
   addOncoming(builder, static_cast<std::size_t>(kShareMoving * static_cast<double>(vehicles) + 0.5),
               planned);
   return builder.take();

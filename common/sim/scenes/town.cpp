@@ -43,7 +43,7 @@ void thinOut(SceneBuilder& builder) {
   const auto isVehicle = [](const SceneObject& o) {
     return o.class_name == "car" || o.class_name == "van";
   };
-  auto count = static_cast<std::size_t>(std::count_if(objects.begin(), objects.end(), isVehicle));
+  auto count = static_cast<std::size_t>(std::ranges::count_if(objects, isVehicle));
   while (count > kVehicles) {
     const std::size_t i = builder.dice().below(objects.size());
     if (!isVehicle(objects[i])) continue;

@@ -80,9 +80,8 @@ void ClockMap::observe(std::int64_t theirs_ns, std::int64_t ours_ns) {
     if (buckets_.size() > kRemembered_s) buckets_.pop_front();
   }
   buckets_.back().least = std::min(buckets_.back().least, lateness);
-  const auto least = std::min_element(buckets_.begin(), buckets_.end(), [](auto& a, auto& b) {
-                       return a.least < b.least;
-                     })->least;
+  const auto least =
+      std::ranges::min_element(buckets_, [](auto& a, auto& b) { return a.least < b.least; })->least;
   const double target = static_cast<double>(least);
   if (!settled_) {
     offset_ = target;

@@ -242,9 +242,8 @@ class IioStream::Device {
     if (!buffer_) {
       return fail(
           "imu_absent",
-          fmt::format("{} gives no buffer: {}; it needs a trigger (imu.trigger), or another "
-                      "program reads it.",
-                      name(), sayError(-errno)));
+          "{} gives no buffer: {}; it needs a trigger (imu.trigger), or another program reads it.",
+          name(), sayError(-errno));
     }
     return {};
   }

@@ -2,10 +2,8 @@
 // it, and reopens it after a loss.
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <functional>
-#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>

@@ -27,8 +27,7 @@ constexpr OnePlane kOnePlane[] = {
 
 /// nullptr for the layouts with halved colours.
 const OnePlane* onePlaneOf(PixelLayout layout) {
-  const auto* found = std::find_if(std::begin(kOnePlane), std::end(kOnePlane),
-                                   [&](const OnePlane& one) { return one.layout == layout; });
+  const auto* found = std::ranges::find(kOnePlane, layout, &OnePlane::layout);
   return found == std::end(kOnePlane) ? nullptr : found;
 }
 

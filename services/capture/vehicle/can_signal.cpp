@@ -44,9 +44,8 @@ Result<CanSignal> parseCanSignal(const std::string& text) {
       R"re((\d{1,3})\|(\d{1,3})@([01])([+-])\s*\(\s*([-+.\deE]+)\s*,\s*([-+.\deE]+)\s*\))re"
       R"re(\s*(?:\[\s*([-+.\deE]+)\s*\|\s*([-+.\deE]+)\s*\])?\s*(?:"([^"]*)")?.*)re");
   if (text.size() > kLongestDbcLine) {
-    return fail(
-        "can_signal",
-        fmt::format("it is longer than {} characters; leave out its receivers", kLongestDbcLine));
+    return fail("can_signal", "it is longer than {} characters; leave out its receivers",
+                kLongestDbcLine);
   }
   std::smatch m;
   if (!std::regex_match(text, m, kLine)) {

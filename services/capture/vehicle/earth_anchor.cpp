@@ -46,9 +46,8 @@ bool EarthAnchor::straight() const {
     return false;
   }
   const double now = *drive_.back().course;
-  return std::all_of(drive_.begin(), drive_.end(), [&](const GnssFix& fix) {
-    return std::abs(turnedBy(now, *fix.course)) <= kBend;
-  });
+  return std::ranges::all_of(
+      drive_, [&](const GnssFix& fix) { return std::abs(turnedBy(now, *fix.course)) <= kBend; });
 }
 
 EarthPlace EarthAnchor::placeOf(const GnssFix& fix, double yaw) const {

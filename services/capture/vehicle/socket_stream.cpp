@@ -4,12 +4,12 @@
 #include <poll.h>
 #include <sys/socket.h>
 #include <time.h>
-#include <unistd.h>
 
 #include <array>
 #include <cerrno>
 #include <cstring>
 
+#include "common/base/process/descriptor.h"
 #include "services/capture/live/clocks.h"
 
 namespace perdure::capture {
@@ -28,14 +28,6 @@ std::int64_t arrivalOf(msghdr& message) {
   }
   return HostClock::nowNs();
 }
-
-struct Socket {
-  explicit Socket(int of) : number(of) {}
-  ~Socket() { ::close(number); }
-  Socket(const Socket&) = delete;
-  Socket& operator=(const Socket&) = delete;
-  const int number;
-};
 
 /// Whether the socket is a stream. A stream returns zero bytes at its end, but a datagram may be
 /// empty.
@@ -70,20 +62,20 @@ bool SocketStream::fails(const char* what, const std::string& why) {
 void SocketStream::flow() {
   const auto opened = open_();
   if (!opened) return void(fails("absent", opened.error().detail));
-  const Socket socket(*opened);
+  const Descriptor socket(*opened);
   const int on = 1;
-  (void)::setsockopt(socket.number, SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on);
+  (void)::setsockopt(socket.get(), SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on);
   heard_ns_ = HostClock::nowNs();
   bool silent = false;
   while (!stopping_) {
-    pollfd wait{socket.number, POLLIN, 0};
+    pollfd wait{socket.get(), POLLIN, 0};
     const int ready = ::poll(&wait, 1, kPoll_ms);
-    if (ready > 0 && !readOne(socket.number)) return;
+    if (ready > 0 && !readOne(socket.get())) return;
     const bool now_silent = HostClock::nowNs() - heard_ns_ > silence_.count();
     if (now_silent && !silent) {
       fails("silent",
             fmt::format("{} is open and says nothing; is the sender on, and set to it?", name_));
-      if (isStream(socket.number)) return;  // the other side may have vanished without closing
+      if (isStream(socket.get())) return;  // the other side may have vanished without closing
     }
     silent = now_silent;
   }

@@ -26,7 +26,6 @@ using OpenSocket = std::function<Result<int>()>;
 /// Raw frames with these ids on a CAN interface (SocketCAN), classic and FD. A packet is the
 /// kernel's `can_frame` or `canfd_frame`. An extended id has the kernel's flag CAN_EFF_FLAG.
 OpenSocket canSocket(std::string interface, std::vector<std::uint32_t> ids);
-/// Datagrams sent to HOST:PORT.
 OpenSocket udpSocket(std::string address);
 /// Connection to HOST:PORT; `greeting` is sent once. A packet is any piece of the received data.
 OpenSocket tcpSocket(std::string address, std::string greeting);

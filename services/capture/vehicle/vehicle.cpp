@@ -26,8 +26,7 @@ bool isAddress(const std::string& text) {
 
 void requireAddress(const char* key, const std::string& text) {
   if (isAddress(text)) return;
-  throw StartupError(ExitCode::kConfiguration,
-                     fmt::format("{}: \"{}\" is not HOST:PORT.", key, text));
+  throw StartupError(ExitCode::kConfiguration, "{}: \"{}\" is not HOST:PORT.", key, text);
 }
 
 std::uint32_t kernelId(const CanSignal& signal) {
@@ -243,15 +242,12 @@ std::string Vehicle::name() const {
 }
 
 void Vehicle::report(ReasonCounts& counts) const {
-  const auto add = [&counts](const ReasonCounts& more) {
-    for (const auto& [reason, n] : more.all()) counts.add(reason, n);
-  };
   for (const auto* stream : {speed_stream_.get(), gnss_stream_.get()}) {
-    if (stream) add(stream->state().reasons());
+    if (stream) counts.add(stream->state().reasons());
   }
   const std::lock_guard lock(mutex_);
-  add(reasons_);
-  if (wheels_) add(wheels_->reasons());
+  counts.add(reasons_);
+  if (wheels_) counts.add(wheels_->reasons());
 }
 
 }  // namespace perdure::capture

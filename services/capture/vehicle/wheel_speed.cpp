@@ -15,8 +15,7 @@ namespace {
 constexpr std::int64_t kReverseSilence_ns = 3'000'000'000;
 
 [[noreturn]] void refuse(const char* key, const std::string& text, const std::string& why) {
-  throw StartupError(ExitCode::kConfiguration,
-                     fmt::format("{}: \"{}\" cannot be used: {}.", key, text, why));
+  throw StartupError(ExitCode::kConfiguration, "{}: \"{}\" cannot be used: {}.", key, text, why);
 }
 
 CanSignal signalOf(const char* key, const std::string& text) {
@@ -37,7 +36,7 @@ Result<double> metresPerSecond(const std::string& unit) {
       {"kph", 1 / 3.6},      {"km/hr", 1 / 3.6},    {"mph", 0.44704},        {"mi/h", 0.44704},
       {"kn", 1852 / 3600.0}, {"kt", 1852 / 3600.0}, {"knots", 1852 / 3600.0}};
   std::string small = unit;
-  std::transform(small.begin(), small.end(), small.begin(), [](char c) {
+  std::ranges::transform(small, small.begin(), [](char c) {
     return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
   });
   const auto it = kUnits.find(small);
@@ -84,9 +83,8 @@ std::optional<SpeedReading> WheelSpeed::frame(std::uint32_t id, bool extended,
                                               std::int64_t time_ns) {
   hearReverse(id, extended, data, time_ns);
   std::optional<SpeedReading> early;
-  const bool again = std::any_of(wheels_.begin(), wheels_.end(), [&](const Wheel& w) {
-    return isOf(w.signal, id, extended) && w.speed;
-  });
+  const bool again = std::ranges::any_of(
+      wheels_, [&](const Wheel& w) { return isOf(w.signal, id, extended) && w.speed; });
   if (again) {
     reasons_.add("speed_can_partial");
     early = reading();
@@ -95,8 +93,8 @@ std::optional<SpeedReading> WheelSpeed::frame(std::uint32_t id, bool extended,
   for (Wheel& wheel : wheels_) {
     if (isOf(wheel.signal, id, extended)) taken |= take(wheel, data, time_ns);
   }
-  const bool all = std::all_of(wheels_.begin(), wheels_.end(),
-                               [](const Wheel& wheel) { return wheel.speed.has_value(); });
+  const bool all =
+      std::ranges::all_of(wheels_, [](const Wheel& wheel) { return wheel.speed.has_value(); });
   if (!early && taken && all) early = reading();
   if (early && settings_.reverse && time_ns - reverse_ns_ > kReverseSilence_ns) {
     reasons_.add("speed_can_no_reverse");

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -109,7 +110,7 @@ void putDetection(JsonWriter& json, TimePoint time, const Detection& detection) 
 
 /// Andrew's monotone chain.
 std::vector<Point> convexHull(std::vector<Point> points) {
-  std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) {
+  std::ranges::sort(points, [](const Point& a, const Point& b) {
     return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
   });
   std::vector<Point> hull;
@@ -146,7 +147,7 @@ struct Said {
 std::optional<Said> saidOf(const ObjectBelief& object, const Box& region,
                            const Detections& detections, const ModelInfo& model) {
   constexpr double kLeastOverlap = 0.3;
-  const auto name = std::find(model.classes.begin(), model.classes.end(), object.best().name);
+  const auto name = std::ranges::find(model.classes, object.best().name);
   const auto k = static_cast<std::size_t>(name - model.classes.begin()) + 1;
   const Detection* of = nullptr;
   double best = kLeastOverlap;
@@ -203,8 +204,7 @@ std::string likelihoodRegions(const Objects& objects, const CameraModel& camera,
       regions.push_back(*std::move(region));
   }
   // Nearer regions are drawn over farther ones.
-  std::sort(regions.begin(), regions.end(),
-            [](const Region& a, const Region& b) { return a.distance > b.distance; });
+  std::ranges::sort(regions, std::greater{}, &Region::distance);
   JsonWriter json(1024 + 2048 * regions.size());
   json.begin('{').with("timestamp", objects.stamp.time).key("circles").begin('[').end(']');
   json.key("points").begin('[');

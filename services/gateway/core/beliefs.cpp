@@ -124,7 +124,6 @@ constexpr std::pair<EventKind, const char*> kSentences[] = {
     {EventKind::kLoopWithdrawn, "the map took a loop back"},
     {EventKind::kRelocalised, "this session is found on the map of before"}};
 
-/// Describes an event in a sentence.
 std::string sentenceOf(const Event& e) {
   const std::string name = e.class_name.empty() ? "object" : e.class_name;
   const std::string what = e.object_id == 0 ? "" : fmt::format("{} {}", name, e.object_id);

@@ -1,9 +1,19 @@
 #include "services/gateway/core/channels.h"
 
-#include "services/gateway/core/schemas.h"
-
 namespace perdure::gateway {
 namespace {
+
+/// Sent as CDR, because its bytes then need no base64.
+constexpr char kCompressedImageIdl[] =
+    "module foxglove {\n"
+    "struct Time { unsigned long sec; unsigned long nsec; };\n"
+    "struct CompressedImage {\n"
+    "  Time timestamp;\n"
+    "  string frame_id;\n"
+    "  sequence<octet> data;\n"
+    "  string format;\n"
+    "};\n"
+    "};\n";
 
 ChannelInfo json(std::uint32_t id, std::string topic, const char* schema_name,
                  Delivery delivery = Delivery::kNewest) {
@@ -14,7 +24,7 @@ ChannelInfo json(std::uint32_t id, std::string topic, const char* schema_name,
 void addCamera(std::size_t index, const std::string& camera, std::vector<ChannelInfo>& table) {
   const std::string prefix = "/camera/" + camera;
   table.push_back({cameraChannel(index, kImage), prefix + "/image", "cdr",
-                   "foxglove::CompressedImage", "omgidl", compressedImageIdl(), Delivery::kNewest});
+                   "foxglove::CompressedImage", "omgidl", kCompressedImageIdl, Delivery::kNewest});
   table.push_back(json(cameraChannel(index, kCalibration), prefix + "/calibration",
                        "foxglove.CameraCalibration"));
   table.push_back(json(cameraChannel(index, kAnnotations), prefix + "/annotations",

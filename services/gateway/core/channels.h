@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/base/time.h"
@@ -59,6 +60,10 @@ struct ChannelInfo {
   std::string encoding, schema_name, schema_encoding, schema;
   Delivery delivery = Delivery::kNewest;
 };
+
+/// JSON schema of this name, which must exist: Foxglove's well-known schemas, from their public
+/// field lists, and Perdure's own, for example "foxglove.Log".
+std::string jsonSchema(std::string_view name);
 
 std::vector<ChannelInfo> channelTable(const std::vector<std::string>& cameras);
 /// A topic of the bus that is passed on unchanged, as CDR with its IDL: "/raw/imu". Only for @final
@@ -119,7 +124,6 @@ struct PlaybackState {
   bool did_seek = false;
   std::string id;  ///< id of the answered request; empty: none
 };
-/// Time range of a recording.
 struct TimeRange {
   TimePoint first, last;
 };

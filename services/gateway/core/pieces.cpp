@@ -1,6 +1,5 @@
 #include "services/gateway/core/pieces.h"
 
-#include <cmath>
 
 namespace perdure::gateway {
 

@@ -28,7 +28,6 @@ void put(JsonWriter& json, const Colour& colour);
 enum class DeletionType { kMatching = 0, kAll = 1 };
 enum class LineType { kStrip = 0, kLoop = 1, kSegments = 2 };
 void putDeletion(JsonWriter& json, TimePoint time, DeletionType type, const std::string& id);
-/// Begins a scene entity, up to its metadata.
 void beginEntity(JsonWriter& json, TimePoint time, const char* frame, const std::string& id);
 /// Ends a scene entity. `without`: primitive types that it does not contain.
 void endEntity(JsonWriter& json, std::initializer_list<const char*> without);

@@ -1,10 +1,9 @@
-#include "services/gateway/core/schemas.h"
-
 #include <map>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "common/base/check.h"
+#include "services/gateway/core/channels.h"
 
 namespace perdure::gateway {
 namespace {
@@ -268,18 +267,6 @@ Types readTypes() {
 std::string jsonSchema(std::string_view name) {
   static const Types kKnown = readTypes();
   return typeOf(name, kKnown).dump();
-}
-
-std::string compressedImageIdl() {
-  return "module foxglove {\n"
-         "struct Time { unsigned long sec; unsigned long nsec; };\n"
-         "struct CompressedImage {\n"
-         "  Time timestamp;\n"
-         "  string frame_id;\n"
-         "  sequence<octet> data;\n"
-         "  string format;\n"
-         "};\n"
-         "};\n";
 }
 
 }  // namespace perdure::gateway

@@ -38,8 +38,7 @@ Result<const Json*> listOf(const Json& message, const char* name) {
   const auto found = message.find(name);
   if (found == message.end() || !found->is_array()) return malformed(name, "a list");
   if (found->size() > kMostSubscriptions) {
-    return fail("too_many_subscriptions",
-                "one message may name " + std::to_string(kMostSubscriptions) + " at most");
+    return fail("too_many_subscriptions", "one message may name {} at most", kMostSubscriptions);
   }
   return &*found;
 }

@@ -150,7 +150,7 @@ MessageHead messageHead(std::uint32_t subscription, TimePoint time) {
   putLittle(bytes, subscription, 4);
   putLittle(bytes, nanoseconds(time), 8);
   MessageHead head{};
-  std::copy(bytes.begin(), bytes.end(), head.begin());
+  std::ranges::copy(bytes, head.begin());
   return head;
 }
 

@@ -11,7 +11,7 @@ char lowered(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' +
 
 std::string lower(std::string_view text) {
   std::string result(text);
-  std::transform(result.begin(), result.end(), result.begin(), lowered);
+  std::ranges::transform(result, result.begin(), lowered);
   return result;
 }
 
@@ -61,8 +61,8 @@ std::string_view pathOf(std::string_view target) { return target.substr(0, targe
 Result<void> Guard::checkHost(std::string_view host) const {
   const std::string name = hostName(host);
   const auto& allowed = options_.allowed_hosts;
-  const bool listed = std::any_of(allowed.begin(), allowed.end(),
-                                  [&](const auto& one) { return lower(one) == name; });
+  const bool listed =
+      std::ranges::any_of(allowed, [&](const auto& one) { return lower(one) == name; });
   // A foreign page whose name resolves to this host does not have the token.
   const bool guarded = !options_.token.empty() && !name.empty();
   if (guarded || isLoopback(name) || name == options_.address || listed) return {};
@@ -73,8 +73,8 @@ Result<void> Guard::checkHost(std::string_view host) const {
 Result<void> Guard::checkOrigin(std::string_view origin, std::string_view host) const {
   if (origin.empty()) return {};
   const auto& allowed = options_.allowed_origins;
-  const bool listed = std::any_of(allowed.begin(), allowed.end(),
-                                  [&](const auto& one) { return lower(one) == lower(origin); });
+  const bool listed =
+      std::ranges::any_of(allowed, [&](const auto& one) { return lower(one) == lower(origin); });
   const std::size_t scheme = origin.find("://");
   const bool ours = scheme != std::string_view::npos && !host.empty() &&
                     (origin.starts_with("http://") || origin.starts_with("https://")) &&

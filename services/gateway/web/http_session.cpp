@@ -1,5 +1,4 @@
 // Processes the requests of one connection in order. A WebSocket upgrade ends the HTTP session.
-#include <functional>
 #include <optional>
 
 #include "services/gateway/protocol/server_message.h"

@@ -171,8 +171,8 @@ void Hub::tellWanted() {
 }
 
 void Hub::callService(Viewer& viewer, const protocol::ServiceCall& call) {
-  const bool known = std::any_of(services_.begin(), services_.end(),
-                                 [&](const auto& one) { return one.id == call.service; });
+  const bool known =
+      std::ranges::any_of(services_, [&](const auto& one) { return one.id == call.service; });
   if (!known || call.encoding != "json") {
     const std::string why = known ? "a request is JSON" : "there is no such service";
     say(viewer, protocol::serviceFailure(call.service, call.call, why));

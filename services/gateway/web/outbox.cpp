@@ -6,7 +6,7 @@
 namespace perdure::gateway::web {
 
 Outbox::Waiting* Outbox::find(Kind kind, std::uint32_t subscription) {
-  const auto found = std::find_if(waiting_.begin(), waiting_.end(), [&](const Waiting& one) {
+  const auto found = std::ranges::find_if(waiting_, [&](const Waiting& one) {
     return one.kind == kind && one.message.subscription == subscription;
   });
   return found == waiting_.end() ? nullptr : &*found;
@@ -30,7 +30,7 @@ void Outbox::put(const Encoded& message, std::uint32_t subscription, Delivery de
   }
   std::size_t& waiting = events_[subscription];
   if (waiting >= most_events_) {
-    const auto oldest = std::find_if(waiting_.begin(), waiting_.end(), [&](const Waiting& one) {
+    const auto oldest = std::ranges::find_if(waiting_, [&](const Waiting& one) {
       return one.kind == Kind::kEvent && one.message.subscription == subscription;
     });
     waiting_.erase(oldest);

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -46,7 +45,6 @@ class Server {
   void tellTime(TimePoint time);
   void answer(Answer answer);
   void tellPlayback(PlaybackState state);
-  /// Sets the answers of /healthz and /metrics.
   void setTexts(std::string healthz, std::string metrics);
   Stats stats() const;
   /// False if its thread has not run for some seconds.

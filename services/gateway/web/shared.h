@@ -1,18 +1,32 @@
 // Data that all connections of the server share; used by its one thread.
 #pragma once
 
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket.hpp>
 #include <cstdint>
 #include <memory>
 #include <set>
 #include <string>
+#include <utility>  // Boost 1.74 does not include it for std::exchange
 
-#include "services/gateway/web/asio.h"
 #include "services/gateway/web/files.h"
 #include "services/gateway/web/guard.h"
 #include "services/gateway/web/hub.h"
 #include "services/gateway/web/options.h"
 
 namespace perdure::gateway::web {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+namespace websocket = beast::websocket;
+using tcp = asio::ip::tcp;
+using Request = http::request<http::empty_body>;
 
 /// A connection, closed when the server ends.
 class Connection {

@@ -13,13 +13,13 @@ constexpr std::size_t kFramesKept = 64;
 constexpr Duration kTolerance = std::chrono::milliseconds(1);
 
 std::string lowerCase(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::ranges::transform(text, text.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return text;
 }
 
 std::optional<std::size_t> classOf(const std::string& id, const std::vector<std::string>& classes) {
-  const auto named = std::find(classes.begin(), classes.end(), lowerCase(id));
+  const auto named = std::ranges::find(classes, lowerCase(id));
   if (named != classes.end()) return static_cast<std::size_t>(named - classes.begin());
   std::size_t number = 0;
   const auto [end, error] = std::from_chars(id.data(), id.data() + id.size(), number);

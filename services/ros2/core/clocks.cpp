@@ -32,8 +32,8 @@ void LeastDelay::observe(std::int64_t stamp_ns, std::int64_t now_ns) {
     if (seconds_.size() > kSeconds) seconds_.pop_front();
   }
   seconds_.back().least = std::min(seconds_.back().least, delay);
-  const auto least = std::min_element(seconds_.begin(), seconds_.end(),
-                                      [](auto& a, auto& b) { return a.least < b.least; });
+  const auto least =
+      std::ranges::min_element(seconds_, [](auto& a, auto& b) { return a.least < b.least; });
   if (settled_) {
     // The offset changes slowly, so that the times of one input keep increasing.
     constexpr double kSlew = 1e-3;
@@ -109,11 +109,11 @@ Result<void> Clocks::requireCommon(const std::string& name, std::int64_t offset_
     return {};
   }
   const std::vector<std::string> keepers = keepersOf(offset_ns, now_ns);
-  const bool kept_long = std::any_of(keepers.begin(), keepers.end(), [&](const std::string& one) {
+  const bool kept_long = std::ranges::any_of(keepers, [&](const std::string& one) {
     return now_ns - inputs_.at(one).kept_since_ns >= kSecond / 2;
   });
-  const bool nobody_else = std::count_if(inputs_.begin(), inputs_.end(),
-                                         [](const auto& one) { return one.second.shared; }) == 1;
+  const bool nobody_else =
+      std::ranges::count_if(inputs_, [](const auto& one) { return one.second.shared; }) == 1;
   const std::size_t before = common_ns_ ? keepersOf(*common_ns_, now_ns).size() : 0;
   if ((keepers.size() > 1 || kept_long || nobody_else) && keepers.size() > before) {
     common_ns_ = offset_ns;
@@ -133,8 +133,8 @@ Result<std::int64_t> Clocks::onCommon(const std::string& name, Input& input, std
     return stamp_ns;
   }
   input.delay.observe(stamp_ns, now_ns);
-  const bool others = std::any_of(inputs_.begin(), inputs_.end(),
-                                  [](const auto& one) { return one.second.shared; });
+  const bool others =
+      std::ranges::any_of(inputs_, [](const auto& one) { return one.second.shared; });
   if (!others && reference_.empty()) reference_ = name;
   if (reference_ == name) return stamp_ns;
   const auto own = input.delay.offset();

@@ -40,8 +40,8 @@ Result<void> PoseTrack::onOdometry(const ros::Odometry& message, TimePoint time,
   const Eigen::Vector3d v = vectorOf(message.twist.twist.linear),
                         w = vectorOf(message.twist.twist.angular);
   const std::array<double, 7> numbers{p.x, p.y, p.z, q.x, q.y, q.z, q.w};
-  if (!std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); }) ||
-      !v.allFinite() || !w.allFinite()) {
+  if (!std::ranges::all_of(numbers, [](double x) { return std::isfinite(x); }) || !v.allFinite() ||
+      !w.allFinite()) {
     return fail("not_finite", "odometry has numbers that are none; it is left out");
   }
   const double norm = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
@@ -106,8 +106,7 @@ Result<void> PoseTrack::onFrame(const FrameStamp& stamp) {
 }
 
 std::optional<Odometry> PoseTrack::at(TimePoint time) const {
-  const auto after = std::lower_bound(knots_.begin(), knots_.end(), time,
-                                      [](const Knot& k, TimePoint t) { return k.time < t; });
+  const auto after = std::ranges::lower_bound(knots_, time, {}, &Knot::time);
   if (after == knots_.end()) return std::nullopt;
   if (after->time == time) return after->odometry;
   if (after == knots_.begin()) return std::nullopt;

@@ -24,8 +24,7 @@ bool sameLens(const ros::CameraInfo& a, const ros::CameraInfo& b) {
 bool finite(const CameraCalibration& camera) {
   const auto fine = [](double x) { return std::isfinite(x); };
   return fine(camera.fx) && fine(camera.fy) && fine(camera.cx) && fine(camera.cy) &&
-         std::all_of(camera.distortion_coefficients.begin(), camera.distortion_coefficients.end(),
-                     fine);
+         std::ranges::all_of(camera.distortion_coefficients, fine);
 }
 
 }  // namespace

@@ -2,7 +2,6 @@
 // between their frames. A rig file takes precedence over both.
 #pragma once
 
-#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,7 +13,6 @@
 
 namespace perdure::ros2 {
 
-/// A camera of the rig.
 struct RigCamera {
   std::string name;        ///< name in Perdure
   std::string info_topic;  ///< topic named in messages

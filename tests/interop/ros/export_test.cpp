@@ -10,7 +10,7 @@
 
 #include "common/replay/recordings/recording_writer.h"
 #include "tests/interop/ros/strangers.h"
-#include "tools/record/ros_export.h"
+#include "tools/record/files.h"
 
 namespace perdure::test {
 namespace {

@@ -137,26 +137,5 @@ TEST_F(DemoPlan, EmptiesAnEarlierRunButNoFolderOfSomeoneElse) {
   EXPECT_TRUE(fs::exists(folder_ / "other" / "run" / "precious"));
 }
 
-TEST_F(DemoPlan, QuotesWordsForSupervisord) {
-  options_.model = "/odd \"name\" 100% ;a #b/net.onnx";
-  const auto folders = prepareFolders(options_);
-  const std::string config =
-      supervisorConfig(planServices(options_, folders), folders, "/tmp/s.sock", options_.root);
-  EXPECT_THAT(config, HasSubstr(R"("model.path=/odd \"name\" 100%% %(ENV_PERDURE_SEMICOLON)sa )"
-                                R"(%(ENV_PERDURE_HASH)sb/net.onnx")"));
-  EXPECT_THAT(config, HasSubstr("[program:semantic_filter]"));
-  EXPECT_THAT(config, HasSubstr("file=/tmp/s.sock"));
-}
-
-TEST_F(DemoPlan, DoublesPercentSignsOfFoldersAsOftenAsTheyAreExpanded) {
-  options_.out = (folder_ / "50% off").string();
-  const auto folders = prepareFolders(options_);
-  const std::string config =
-      supervisorConfig(planServices(options_, folders), folders, "/tmp/s.sock", options_.root);
-  const std::string run = (folder_ / "50%").string();
-  EXPECT_THAT(config, HasSubstr("\nlogfile=" + run + "% off/run/supervisord.log\n"));
-  EXPECT_THAT(config, HasSubstr("\nstdout_logfile=" + run + "%%% off/run/vio.log\n"));
-}
-
 }  // namespace
 }  // namespace perdure::tools

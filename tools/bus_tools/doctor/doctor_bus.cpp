@@ -15,7 +15,7 @@ Findings checkUsualServices(const std::vector<std::string>& participants,
                             const std::string& prefix) {
   Findings findings;
   for (const char* service : kUsualServices) {
-    const auto n = std::count(participants.begin(), participants.end(), service);
+    const auto n = std::ranges::count(participants, service);
     if (n > 0) {
       findings.push_back({Verdict::kOk, std::string(service) + " is on the bus" +
                                             (n > 1 ? " " + std::to_string(n) + " times" : "")});

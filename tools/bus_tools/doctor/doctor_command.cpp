@@ -41,30 +41,16 @@ const char* wordOf(Verdict verdict) {
 }
 
 void stopIfFailed(const Findings& findings, int status = 1) {
-  const bool failed = std::any_of(findings.begin(), findings.end(), [](const Finding& finding) {
-    return finding.verdict == Verdict::kFail;
-  });
+  const bool failed = std::ranges::any_of(
+      findings, [](const Finding& finding) { return finding.verdict == Verdict::kFail; });
   if (failed) throw CLI::RuntimeError(status);
 }
 
 void runDoctor(const DoctorOptions& given) {
-  if (!given.drive.rig.empty() && given.drive.data.empty()) {
-    throw StartupError(ExitCode::kUsage,
-                       "--rig is judged by a recording; give --data DRIVE (with images) as well");
-  }
-  if (!given.drive.sequence.empty() && given.drive.data.empty()) {
-    throw StartupError(ExitCode::kUsage, "--sequence is of a recording; give --data DRIVE as well");
-  }
-  if (!given.drive.poses.empty() && given.drive.data.empty()) {
-    throw StartupError(ExitCode::kUsage, "--poses are of a recording; give --data DRIVE as well");
-  }
   if (!given.drive.poses.empty() && !given.copy.empty()) {
     throw StartupError(ExitCode::kUsage,
                        "--poses are not looked at beside --fix; give them in a second call, with "
                        "--data COPY");
-  }
-  if (!given.copy.empty() && given.drive.data.empty()) {
-    throw StartupError(ExitCode::kUsage, "--fix mends a recording; give --data DRIVE as well");
   }
   if (!given.drive.data.empty()) {
     keepFreedMemory();
@@ -154,19 +140,24 @@ void setUpDoctor(CLI::App& command) {
       .add_option("--sequence", options->drive.sequence,
                   "of a KITTI tracking folder, for example 0000, or a 7-Scenes one, for example "
                   "seq-01")
+      ->needs("--data")
       ->type_name("NAME");
-  command.add_option("--rig", options->drive.rig,
-                     "the rig file to judge; the recording's own calibration where not given");
+  command
+      .add_option("--rig", options->drive.rig,
+                  "with --data: the rig file to judge, instead of the recording's own calibration")
+      ->needs("--data");
   command
       .add_option("--poses", options->drive.poses,
                   "with --data: a file of another program's poses, as --odometry of perdure "
                   "pipeline takes it, compared with images and inertial samples")
+      ->needs("--data")
       ->check(not_empty)
       ->type_name("FILE");
   command
       .add_option("--fix", options->copy,
                   "with --data: a new folder for a copy with what is sure mended (units, columns "
                   "exchanged, T_BS the wrong way round, order and stamps, the rig of --rig)")
+      ->needs("--data")
       ->check(not_empty)
       ->type_name("FOLDER");
   command

@@ -10,25 +10,13 @@
 #include <filesystem>
 #include <fstream>
 
+#include "common/base/process/descriptor.h"
 #include "tools/bus_tools/doctor/doctor.h"
 
 namespace perdure::tools {
 namespace {
 
-/// Closes the socket in its destructor.
-class Socket {
- public:
-  Socket() : fd_(socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {}
-  ~Socket() {
-    if (fd_ >= 0) close(fd_);
-  }
-  Socket(const Socket&) = delete;
-  Socket& operator=(const Socket&) = delete;
-  int fd() const { return fd_; }
-
- private:
-  int fd_;
-};
+Descriptor datagramSocket() { return Descriptor(socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)); }
 
 Finding checkReceiveBuffer() {
   constexpr long kEnough = 4 << 20;  // size of three colour images
@@ -42,10 +30,10 @@ Finding checkReceiveBuffer() {
 }
 
 Finding checkInterface(const std::string& name) {
-  const Socket s;
+  const Descriptor s = datagramSocket();
   ifreq request{};
   std::strncpy(request.ifr_name, name.c_str(), IFNAMSIZ - 1);
-  if (ioctl(s.fd(), SIOCGIFFLAGS, &request) != 0) {
+  if (ioctl(s.get(), SIOCGIFFLAGS, &request) != 0) {
     return {Verdict::kFail, "there is no interface " + name + "; `ip link` lists them"};
   }
   if ((request.ifr_flags & IFF_UP) == 0) {
@@ -55,19 +43,19 @@ Finding checkInterface(const std::string& name) {
 }
 
 bool datagramPasses(std::size_t size) {
-  const Socket receiver, sender;
+  const Descriptor receiver = datagramSocket(), sender = datagramSocket();
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   socklen_t length = sizeof(address);
   auto* generic = reinterpret_cast<sockaddr*>(&address);
-  if (bind(receiver.fd(), generic, sizeof(address)) != 0) return false;
-  if (getsockname(receiver.fd(), generic, &length) != 0) return false;
+  if (bind(receiver.get(), generic, sizeof(address)) != 0) return false;
+  if (getsockname(receiver.get(), generic, &length) != 0) return false;
   const timeval patience{1, 0};
-  setsockopt(receiver.fd(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
+  setsockopt(receiver.get(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
   std::vector<char> bytes(size);
-  if (sendto(sender.fd(), bytes.data(), size, 0, generic, sizeof(address)) < 0) return false;
-  return recv(receiver.fd(), bytes.data(), size, 0) == static_cast<ssize_t>(size);
+  if (sendto(sender.get(), bytes.data(), size, 0, generic, sizeof(address)) < 0) return false;
+  return recv(receiver.get(), bytes.data(), size, 0) == static_cast<ssize_t>(size);
 }
 
 Finding checkDatagrams() {

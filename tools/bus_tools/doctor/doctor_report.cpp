@@ -1,11 +1,12 @@
-#include <fmt/format.h>
 
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <opencv2/imgcodecs.hpp>
 
 #include "common/base/errors.h"
 #include "common/base/subprocess.h"
+#include "common/vision/image.h"
 #include "common/vision/jpeg.h"
 #include "common/wire/json.h"
 #include "tools/base/files.h"
@@ -56,20 +57,8 @@ void copyConfiguration(const std::string& from, const fs::path& to) {
   }
 }
 
-const char* const kPnmKind[] = {"P5", "P6"};
-
-/// Writes grey images as PGM and colour images as PPM.
-void writePnm(const Frame& frame, const fs::path& file) {
-  const bool grey = frame.encoding == ImageEncoding::kMono8;
-  std::ofstream out(file, std::ios::binary);
-  out << kPnmKind[grey ? 0 : 1] << '\n' << frame.width << ' ' << frame.height << "\n255\n";
-  std::string pixels(reinterpret_cast<const char*>(frame.data->data()), frame.data->size());
-  for (std::size_t i = 0; !grey && i + 2 < pixels.size(); i += 3)
-    std::swap(pixels[i], pixels[i + 2]);
-  out << pixels;
-}
-
-/// Writes one image of each calibrated camera, as far as they arrive within two seconds.
+/// Writes one image of each calibrated camera as PGM or PPM, as far as they arrive within two
+/// seconds.
 void writeImages(const bus::Options& options, const StatusSeen& seen, const fs::path& folder) {
   if (!seen.calibration) return;
   for (const CameraCalibration& camera : seen.calibration->cameras) {
@@ -80,9 +69,9 @@ void writeImages(const bus::Options& options, const StatusSeen& seen, const fs::
     loop.on(reader, [&](const Frame& compressed) {
       const auto pixels = vision::decompressed(compressed);
       if (!pixels) return;
-      const Frame& frame = *pixels;
-      writePnm(frame, folder / (camera.name +
-                                (frame.encoding == ImageEncoding::kMono8 ? ".pgm" : ".ppm")));
+      const auto image = vision::viewOf(*pixels);
+      if (!image) return;
+      cv::imwrite(folder / (camera.name + (image->channels() == 1 ? ".pgm" : ".ppm")), *image);
       loop.stop();
     });
     runLoop(loop, 2.0);

@@ -21,7 +21,7 @@ bool isFatal(const replay::DataFinding& finding) {
 
 /// Whether vio can run on the recording.
 bool isUsable(const replay::DataFindings& of_data) {
-  return std::none_of(of_data.begin(), of_data.end(), isFatal);
+  return std::ranges::none_of(of_data, isFatal);
 }
 
 void addFindings(const replay::DataFindings& of_data, Findings& findings) {
@@ -45,7 +45,7 @@ void checkMotionOf(const replay::Recording& recording, replay::DataFindings& of_
   const auto is_coarse = [](const replay::DataFinding& finding) {
     return finding.code == "time_offset" || finding.code == "gyro_factor";
   };
-  if (!std::all_of(of_data.begin(), of_data.end(), is_coarse)) return;
+  if (!std::ranges::all_of(of_data, is_coarse)) return;
   if (recording.imu.empty() || recording.calibration.cameras.empty()) return;
   const auto check = calibrate::checkMotion(recording);
   if (!check.findings.empty()) of_data = check.findings;

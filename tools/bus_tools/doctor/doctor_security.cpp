@@ -40,7 +40,7 @@ std::vector<IdentitySeen> lookAtIdentities(const std::string& folder) {
     if (!ours || entry.path().filename() == "authority") continue;
     seen.push_back(lookAt(folder, entry.path().filename()));
   }
-  std::sort(seen.begin(), seen.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
+  std::ranges::sort(seen, [](const auto& a, const auto& b) { return a.name < b.name; });
   return seen;
 }
 

@@ -155,8 +155,7 @@ StatusNode judgeServices(const StatusSeen& seen, const Source& source) {
     }
   }
   for (const auto& [name, service] : seen.services) {
-    const bool usual = std::find(std::begin(kUsualServices), std::end(kUsualServices), name) !=
-                       std::end(kUsualServices);
+    const bool usual = std::ranges::find(kUsualServices, name) != std::end(kUsualServices);
     if (!usual) node.add(judgeService(name, &service, source));
   }
   return node;

@@ -69,8 +69,7 @@ void dropUnlike(Pairs& pairs) {
   const auto unlike = [](const auto& pair) {
     return std::abs(pair.first.norm() - pair.second.norm());
   };
-  std::sort(pairs.begin(), pairs.end(),
-            [&](const auto& a, const auto& b) { return unlike(a) < unlike(b); });
+  std::ranges::sort(pairs, [&](const auto& a, const auto& b) { return unlike(a) < unlike(b); });
   pairs.resize(pairs.size() - pairs.size() / 10);
 }
 
@@ -138,10 +137,9 @@ Result<Alignment> alignRates(const std::vector<CameraPose>& poses,
   const double moved = best->rate_rms_B.norm();
   if (best->rms > 0.5 * moved || std::abs(best->time_offset_s) > widest_s - 1.5 * kTimeStep) {
     return fail("calibrate_time_offset",
-                fmt::format("the gyroscope does not turn as the camera does at any offset within "
-                            "±{} s; check the clocks and that both are on one rigid body, or widen "
-                            "--max-offset",
-                            widest_s));
+                "the gyroscope does not turn as the camera does at any offset within ±{} s; check "
+                "the clocks and that both are on one rigid body, or widen --max-offset",
+                widest_s);
   }
   return *best;
 }

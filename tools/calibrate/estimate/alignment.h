@@ -3,8 +3,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <optional>
-#include <string>
 #include <vector>
 
 #include "common/base/result.h"

@@ -6,7 +6,6 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <string>
-#include <vector>
 
 namespace perdure::calibrate {
 

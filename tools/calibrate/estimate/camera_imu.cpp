@@ -288,7 +288,7 @@ class CameraImuRun {
     out.imu_residuals = problem_.imuResiduals();
     out.corners = out.residuals.size();
     for (const auto& s : problem_.sightings) {
-      out.outliers += static_cast<std::size_t>(std::count(s.good.begin(), s.good.end(), false));
+      out.outliers += static_cast<std::size_t>(std::ranges::count(s.good, false));
     }
     checkNoise(out);
     measureMotion(out);

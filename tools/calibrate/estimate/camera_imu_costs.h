@@ -4,7 +4,6 @@
 
 #include <ceres/manifold.h>
 
-#include <utility>
 #include <vector>
 
 #include "common/math/so3.h"

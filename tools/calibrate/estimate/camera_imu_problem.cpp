@@ -31,7 +31,7 @@ std::vector<double*> controlsOf(Spline& spline, std::size_t k, bool with_places)
 /// 1986). `influence`: effect of each row's unit residual on the estimate.
 double wideningOf(const Eigen::MatrixXd& influence, const std::vector<double>& residuals,
                   const std::vector<int>& clusters, const Eigen::MatrixXd& covariance) {
-  const int last = *std::max_element(clusters.begin(), clusters.end());
+  const int last = *std::ranges::max_element(clusters);
   Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(last + 1, influence.cols());
   Eigen::MatrixXd single = Eigen::MatrixXd::Zero(influence.cols(), influence.cols());
   for (std::size_t i = 0; i < clusters.size(); ++i) {
@@ -43,7 +43,6 @@ double wideningOf(const Eigen::MatrixXd& influence, const std::vector<double>& r
   return solver.solve(sums.transpose() * sums).trace() / solver.solve(single).trace();
 }
 
-/// Converts a row-major Jacobian of Ceres to Eigen.
 Eigen::SparseMatrix<double> toEigen(const ceres::CRSMatrix& m) {
   using Rows = Eigen::SparseMatrix<double, Eigen::RowMajor>;
   return Eigen::Map<const Rows>(m.num_rows, m.num_cols, static_cast<Eigen::Index>(m.values.size()),
@@ -59,7 +58,7 @@ Eigen::SparseMatrix<double> jacobianWithLast(ceres::Problem& problem,
   std::vector<double*> blocks;
   problem.GetParameterBlocks(&blocks);
   for (double* block : blocks) {
-    const bool is_last = std::find(last.begin(), last.end(), block) != last.end();
+    const bool is_last = std::ranges::find(last, block) != last.end();
     if (is_last || problem.IsParameterBlockConstant(block)) continue;
     options.parameter_blocks.push_back(block);
   }
@@ -244,7 +243,7 @@ std::vector<int> CameraImuProblem::clusterOfRows() const {
     clusters.insert(clusters.end(), rows, cluster);
   };
   for (const Sighting& sighting : sightings) {
-    const auto good = std::count(sighting.good.begin(), sighting.good.end(), true);
+    const auto good = std::ranges::count(sighting.good, true);
     add(sighting.time_s + x.time_offset_s, 2 * static_cast<std::size_t>(good));
   }
   for (const ImuReading& reading : readings) add(reading.time_s, 6);

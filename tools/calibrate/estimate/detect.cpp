@@ -86,7 +86,7 @@ std::vector<Corner> findChessboard(const Board& board, const cv::Mat& grey) {
   const int half = std::clamp(static_cast<int>(0.3 * side), 2, 6);
   cv::cornerSubPix(grey, found, {half, half}, {-1, -1}, kRefinement);
   if (!areCrossings(board, grey, found)) return {};
-  if (isUpsideDown(board, grey, found)) std::reverse(found.begin(), found.end());
+  if (isUpsideDown(board, grey, found)) std::ranges::reverse(found);
   std::vector<Corner> corners;
   for (std::size_t i = 0; i < found.size(); ++i) {
     corners.push_back({i, {found[i].x, found[i].y}});
@@ -155,11 +155,9 @@ std::vector<Corner> findAprilGrid(const Board& board, const cv::Mat& grey) {
 std::vector<Corner> findCorners(const Board& board, const cv::Mat& grey) {
   auto corners = board.kind == BoardKind::kChessboard ? findChessboard(board, grey)
                                                       : findAprilGrid(board, grey);
-  std::sort(corners.begin(), corners.end(),
-            [](const Corner& a, const Corner& b) { return a.id < b.id; });
-  const auto twice =
-      std::adjacent_find(corners.begin(), corners.end(),
-                         [](const Corner& a, const Corner& b) { return a.id == b.id; });
+  std::ranges::sort(corners, {}, &Corner::id);
+  const auto twice = std::ranges::adjacent_find(
+      corners, [](const Corner& a, const Corner& b) { return a.id == b.id; });
   return twice == corners.end() ? corners : std::vector<Corner>();
 }
 

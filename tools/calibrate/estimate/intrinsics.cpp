@@ -77,8 +77,7 @@ std::vector<const View*> mostDifferent(const Board& board, const std::vector<Vie
       distance[i] = std::min(distance[i], (all[i].second - all[next].second).norm());
     }
     distance[next] = -1.0;
-    next = static_cast<std::size_t>(std::max_element(distance.begin(), distance.end()) -
-                                    distance.begin());
+    next = static_cast<std::size_t>(std::ranges::max_element(distance) - distance.begin());
   }
   return taken;
 }
@@ -195,8 +194,7 @@ class Bundle {
     for (const auto& r : out.residuals) sum += r.residual.squaredNorm();
     for (const auto& state : states_) {
       out.T_CT.push_back(state.T_CT);
-      out.outliers +=
-          static_cast<std::size_t>(std::count(state.good.begin(), state.good.end(), false));
+      out.outliers += static_cast<std::size_t>(std::ranges::count(state.good, false));
     }
     const double unknowns = static_cast<double>(coefficients() + 4 + 6 * states_.size());
     const double freedom = 2.0 * static_cast<double>(out.corners) - unknowns;
@@ -318,8 +316,7 @@ Result<Intrinsics> estimateIntrinsics(const Board& board, const std::vector<View
   const auto chosen = mostDifferent(board, views, camera.width, options.most_views);
   const std::string few = "; take at least 20 pictures of the board from different sides";
   if (chosen.size() < kLeastViews) {
-    return fail("calibrate_few_views",
-                fmt::format("{} views show enough of the board", chosen.size()) + few);
+    return fail("calibrate_few_views", "{} views show enough of the board{}", chosen.size(), few);
   }
   CameraCalibration guess = camera;
   guess.distortion = options.model;

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
-#include <string>
 #include <vector>
 
 #include "common/base/time.h"

@@ -1,7 +1,6 @@
 #include "tools/calibrate/motion/first_guess.h"
 
 #include <Eigen/SVD>
-#include <algorithm>
 #include <cmath>
 
 #include "tools/data_check/image_turn.h"

@@ -3,7 +3,6 @@
 // (Wahba's problem, Kabsch).
 #pragma once
 
-#include <optional>
 
 #include "tools/calibrate/motion/track_windows.h"
 

@@ -63,8 +63,8 @@ bool isMirrored(const TrackWindows& tracks, const replay::Recording& recording,
 
 Result<FirstGuess> guessOf(const TrackWindows& tracks, const replay::Recording& recording) {
   constexpr double kLeast_px = 0.4, kApart = 0.5;
-  const bool dead = std::all_of(recording.imu.begin(), recording.imu.end(),
-                                [](const ImuSample& sample) { return sample.gyro.isZero(); });
+  const bool dead = std::ranges::all_of(
+      recording.imu, [](const ImuSample& sample) { return sample.gyro.isZero(); });
   if (dead) {
     return fail("motion_gyro_dead",
                 "all angular rates of the gyroscope are 0; see its driver or its columns");
@@ -72,24 +72,23 @@ Result<FirstGuess> guessOf(const TrackWindows& tracks, const replay::Recording& 
   const auto guess =
       guessFromTurns(tracks.windows, recording.imu, recording.calibration.cameras.front());
   if (guess.pairs == 0 || guess.turning_px < kLeast_px) {
-    return fail("motion_no_rotation",
-                fmt::format("the camera hardly turns ({:.2f} px from image to image); {}",
-                            guess.turning_px, kMotion));
+    return fail("motion_no_rotation", "the camera hardly turns ({:.2f} px from image to image); {}",
+                guess.turning_px, kMotion);
   }
   if (isMirrored(tracks, recording, guess)) {
-    return fail("motion_mirrored",
-                "the gyroscope turns as the mirror image of the images, which no mounting explains: "
-                "one of its axes, or all three, have the wrong sign; see the driver's axes, or "
-                "negate one of the columns w_x, w_y, w_z");
+    return fail(
+        "motion_mirrored",
+        "the gyroscope turns as the mirror image of the images, which no mounting explains: "
+        "one of its axes, or all three, have the wrong sign; see the driver's axes, or "
+        "negate one of the columns w_x, w_y, w_z");
   }
   if (guess.unexplained > kApart) {
     return fail("motion_apart",
-                fmt::format("the gyroscope does not turn as the images do, with any focal length, "
-                            "mounting and offset within half a second ({:.0f} % of the turning "
-                            "disagrees): see that both are of one recording and of one clock, "
-                            "that columns have their order and signs, and that the images show "
-                            "more than moving things",
-                            100.0 * guess.unexplained));
+                "the gyroscope does not turn as the images do, with any focal length, mounting and "
+                "offset within half a second ({:.0f} % of the turning disagrees): see that both "
+                "are of one recording and of one clock, that columns have their order and signs, "
+                "and that the images show more than moving things",
+                100.0 * guess.unexplained);
   }
   if (guess.second_px < kLeast_px) {
     return fail("motion_no_rotation",
@@ -187,10 +186,8 @@ std::vector<std::string> writeMotionRig(const replay::DatasetOptions& drive,
   const replay::Recording& recording = dataset->recording();
   const std::string where = drive.path.string() + ": ";
   if (recording.imu.empty() || recording.calibration.cameras.empty()) {
-    throw StartupError(ExitCode::kData,
-                       where +
-                           (recording.imu.empty() ? "has no inertial samples" : "has no camera") +
-                           "; record images and IMU together");
+    throw StartupError(ExitCode::kData, "{}{}; record images and IMU together", where,
+                       recording.imu.empty() ? "has no inertial samples" : "has no camera");
   }
   replay::refuseFatal(replay::checkData(recording, {}), drive.path.string());
   const auto found = rigFromMotion(recording, options);

@@ -8,8 +8,7 @@ namespace perdure::calibrate {
 
 InertialPath::InertialPath(const std::vector<ImuSample>& samples, const Eigen::Vector3d& gyro_bias,
                            TimePoint from, TimePoint to) {
-  const auto time = [](TimePoint t, const ImuSample& sample) { return t < sample.time; };
-  auto next = std::upper_bound(samples.begin(), samples.end(), from, time);
+  auto next = std::ranges::upper_bound(samples, from, {}, &ImuSample::time);
   next = std::clamp(next, samples.begin() + 1, samples.end() - 1);
   Step step{toSeconds((next - 1)->time - from), {}, {}};
   step.start.q.setIdentity();

@@ -297,9 +297,9 @@ JointEstimate Problem::solve() {
   const auto all = allSquares();
   out.residuals = all.size();
   const double limit = 9.0 * residual_px_ * residual_px_;
-  out.inliers = static_cast<double>(
-                    std::count_if(all.begin(), all.end(), [&](double s) { return s < limit; })) /
-                static_cast<double>(all.size());
+  out.inliers =
+      static_cast<double>(std::ranges::count_if(all, [&](double s) { return s < limit; })) /
+      static_cast<double>(all.size());
   return out;
 }
 

@@ -1,9 +1,7 @@
 #include "tools/calibrate/motion/track_windows.h"
 
 #include <algorithm>
-#include <cmath>
 #include <future>
-#include <optional>
 
 #include "common/replay/data_check.h"
 #include "tools/data_check/image_turn.h"
@@ -56,12 +54,11 @@ std::vector<Run> runsOf(const Frames& frames, const std::vector<ImuSample>& samp
     begin = whole ? end : begin + 1;
   }
   const auto score = [&](const auto& one) { return one.second.cwiseQuotient(mean).sum(); };
-  std::stable_sort(all.begin(), all.end(),
-                   [&](const auto& a, const auto& b) { return score(a) > score(b); });
+  std::ranges::stable_sort(all, [&](const auto& a, const auto& b) { return score(a) > score(b); });
   all.resize(std::min(all.size(), options.most));
   std::vector<Run> runs;
   for (const auto& one : all) runs.push_back(one.first);
-  std::sort(runs.begin(), runs.end());
+  std::ranges::sort(runs);
   return runs;
 }
 
@@ -110,8 +107,8 @@ TrackWindow windowOf(const Frames& frames, const Run& run, const CameraCalibrati
   }
   thin(window);
   // The longest tracks constrain most.
-  std::stable_sort(window.tracks.begin(), window.tracks.end(),
-                   [](const Track& a, const Track& b) { return a.size() > b.size(); });
+  std::ranges::stable_sort(window.tracks,
+                           [](const Track& a, const Track& b) { return a.size() > b.size(); });
   window.tracks.resize(std::min(window.tracks.size(), kMostTracks));
   std::erase_if(window.tracks, [](const Track& track) { return track.size() < 2; });
   return window;
@@ -148,8 +145,8 @@ TrackWindows trackWindows(const replay::Recording& recording, const WindowOption
       }
     }
   }
-  std::sort(result.windows.begin(), result.windows.end(),
-            [](const auto& a, const auto& b) { return a.times.front() < b.times.front(); });
+  std::ranges::sort(result.windows,
+                    [](const auto& a, const auto& b) { return a.times.front() < b.times.front(); });
   return result;
 }
 

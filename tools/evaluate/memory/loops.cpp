@@ -74,9 +74,7 @@ std::map<std::size_t, std::set<std::uint64_t>> seenAgain(const std::vector<Memor
 
 /// Distance travelled when the body passed an anchor.
 double wayAt(const std::vector<MemoryFrame>& frames, TimePoint time) {
-  const auto after =
-      std::lower_bound(frames.begin(), frames.end(), time,
-                       [](const MemoryFrame& frame, TimePoint t) { return frame.time < t; });
+  const auto after = std::ranges::lower_bound(frames, time, {}, &MemoryFrame::time);
   return after == frames.end() ? frames.back().way_m : after->way_m;
 }
 
@@ -97,7 +95,7 @@ std::optional<double> closedAfter(const ReturnVisit& visit, const std::vector<Me
 
 template <class Predicate>
 std::uint64_t countIf(const std::vector<JudgedLoop>& loops, const Predicate& predicate) {
-  return static_cast<std::uint64_t>(std::count_if(loops.begin(), loops.end(), predicate));
+  return static_cast<std::uint64_t>(std::ranges::count_if(loops, predicate));
 }
 
 }  // namespace
@@ -184,9 +182,8 @@ std::vector<ReturnVisit> returnVisits(const std::vector<MemoryFrame>& frames,
 }
 
 std::uint64_t LoopScore::missed() const {
-  return static_cast<std::uint64_t>(
-      std::count_if(returns.begin(), returns.end(),
-                    [](const ReturnVisit& visit) { return !visit.closed_after_m; }));
+  return static_cast<std::uint64_t>(std::ranges::count_if(
+      returns, [](const ReturnVisit& visit) { return !visit.closed_after_m; }));
 }
 
 std::optional<double> LoopScore::wayToClose() const {

@@ -23,15 +23,14 @@ std::string addRow(const std::string& text, Places& places) {
   }
   const auto p = replay::parseNumbers({fields.begin() + 2, fields.begin() + 5});
   constexpr double kFar_m = 1e7;
-  const bool near =
-      p && std::all_of(p->begin(), p->end(), [](double x) { return std::abs(x) < kFar_m; });
+  const bool near = p && std::ranges::all_of(*p, [](double x) { return std::abs(x) < kFar_m; });
   if (!near) return "x, y and z are numbers within 1e7 m, with decimal points";
   PlaceVisit row{Eigen::Vector3d(p->data()), {}};
   for (const auto field : replay::split(fields[5], ' ')) {
     const auto frame = replay::parseInteger(field);
     if (!frame || *frame < 0) return "frames are whole numbers from 0 with blanks between them";
     const auto number = static_cast<std::uint64_t>(*frame);
-    if (std::find(row.frames.begin(), row.frames.end(), number) != row.frames.end()) {
+    if (std::ranges::find(row.frames, number) != row.frames.end()) {
       return "frame " + std::to_string(number) + " is named twice";
     }
     row.frames.push_back(number);

@@ -148,9 +148,8 @@ Json judge(const fs::path& run, const std::string& poses, const PlacesCommand& c
 void refuseLimits(const char* name, const std::vector<double>& limits) {
   if (limits[0] < limits[1] && std::isfinite(limits[0] - limits[1])) return;
   throw StartupError(ExitCode::kUsage,
-                     fmt::format("{}: the limits are {:g} and {:g}; the second must be larger, and "
-                                 "both finite",
-                                 name, limits[0], limits[1]));
+                     "{}: the limits are {:g} and {:g}; the second must be larger, and both finite",
+                     name, limits[0], limits[1]);
 }
 
 }  // namespace

@@ -20,9 +20,8 @@ double share(std::uint64_t part, std::uint64_t whole) {
 }
 
 std::optional<std::uint64_t> mostOften(const Counts& counts) {
-  const auto most =
-      std::max_element(counts.begin(), counts.end(),
-                       [](const auto& a, const auto& b) { return a.second < b.second; });
+  const auto most = std::ranges::max_element(
+      counts, [](const auto& a, const auto& b) { return a.second < b.second; });
   if (most == counts.end()) return std::nullopt;
   return most->first;
 }
@@ -75,8 +74,7 @@ std::vector<Sighting> matched(const std::vector<SeenObject>& visible,
         pairs.push_back({distance, o, r});
     }
   }
-  std::stable_sort(pairs.begin(), pairs.end(),
-                   [](const Pair& a, const Pair& b) { return a.distance < b.distance; });
+  std::ranges::stable_sort(pairs, {}, &Pair::distance);
   std::vector<Sighting> sightings;
   for (const auto& object : visible) sightings.push_back({object.id, std::nullopt});
   std::vector<bool> used(rows.size());
@@ -155,9 +153,9 @@ std::set<std::uint64_t> idsOf(const std::vector<MemoryFrame>& frames) {
 /// The first frame with an id of `known`, or the end.
 std::size_t firstWith(const std::set<std::uint64_t>& known,
                       const std::vector<MemoryFrame>& frames) {
-  const auto found = std::find_if(frames.begin(), frames.end(), [&](const MemoryFrame& frame) {
-    return std::any_of(frame.reported.begin(), frame.reported.end(),
-                       [&](std::uint64_t id) { return known.contains(id); });
+  const auto found = std::ranges::find_if(frames, [&](const MemoryFrame& frame) {
+    return std::ranges::any_of(frame.reported,
+                               [&](std::uint64_t id) { return known.contains(id); });
   });
   return static_cast<std::size_t>(found - frames.begin());
 }

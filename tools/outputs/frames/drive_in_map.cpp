@@ -8,8 +8,7 @@ namespace {
 using Along = std::vector<std::pair<TimePoint, RigidTransform>>;
 
 Along::const_iterator firstAfter(const Along& along, TimePoint time) {
-  return std::upper_bound(along.begin(), along.end(), time,
-                          [](TimePoint t, const auto& entry) { return t < entry.first; });
+  return std::ranges::upper_bound(along, time, {}, &Along::value_type::first);
 }
 
 }  // namespace

@@ -150,8 +150,8 @@ cv::Rect placeFor(const cv::Size& size, const cv::Point& at, const cv::Rect& are
                     size.height);
   };
   const auto isFree = [&](const cv::Rect& place) {
-    return std::none_of(taken.begin(), taken.end(),
-                        [&](const cv::Rect& other) { return (place & other).area() > 0; });
+    return std::ranges::none_of(taken,
+                                [&](const cv::Rect& other) { return (place & other).area() > 0; });
   };
   const cv::Rect wanted = inside(at.x, at.y - size.height);
   constexpr int kTries = 12;

@@ -18,7 +18,6 @@ inline const Colour kTruthColour(150, 0, 220);
 
 /// The same colour for a name in each picture; common classes differ clearly.
 Colour classColour(const std::string& name);
-/// `from` mixed with a share of `to`.
 Colour mixed(const Colour& from, const Colour& to, double share);
 
 struct Stroke {

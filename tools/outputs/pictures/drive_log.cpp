@@ -12,7 +12,7 @@ namespace {
 /// Soft-max of the best class; 0 without activations.
 double bestProbability(const std::vector<float>& activations) {
   if (activations.size() < 2) return 0.0;
-  const double top = *std::max_element(activations.begin(), activations.end());
+  const double top = *std::ranges::max_element(activations);
   double sum = 0.0;
   for (const float a : activations) sum += std::exp(a - top);
   return std::exp(*std::max_element(activations.begin() + 1, activations.end()) - top) / sum;

@@ -52,8 +52,8 @@ std::map<ObjectId, Candidate> candidatesOf(const DriveLog& log) {
 std::vector<const Candidate*> chosen(const std::map<ObjectId, Candidate>& all, std::size_t most) {
   std::vector<const Candidate*> by_length, firsts, rest;
   for (const auto& [id, one] : all) by_length.push_back(&one);
-  std::stable_sort(by_length.begin(), by_length.end(),
-                   [](const auto* a, const auto* b) { return a->seen.size() > b->seen.size(); });
+  std::ranges::stable_sort(
+      by_length, [](const auto* a, const auto* b) { return a->seen.size() > b->seen.size(); });
   std::set<std::string> classes;
   for (const Candidate* one : by_length) {
     const std::string& name = one->evolution.class_name;
@@ -91,8 +91,7 @@ std::map<ObjectId, const TruthTrack*> pairs(const std::map<ObjectId, Candidate>&
       if (distance && *distance < kSameThing) near.push_back({*distance, id, &track});
     }
   }
-  std::stable_sort(near.begin(), near.end(),
-                   [](const Pair& a, const Pair& b) { return a.distance < b.distance; });
+  std::ranges::stable_sort(near, {}, &Pair::distance);
   std::map<ObjectId, const TruthTrack*> matched;
   std::set<const TruthTrack*> used;
   for (const Pair& pair : near) {
@@ -104,8 +103,7 @@ std::map<ObjectId, const TruthTrack*> pairs(const std::map<ObjectId, Candidate>&
 
 void fillPoints(const DriveLog& log, Evolution& evolution, const TruthTrack* track) {
   for (const auto& [index, frame] : log.frames()) {
-    const auto object = std::find_if(frame.objects.begin(), frame.objects.end(),
-                                     [&](const ObjectGlance& o) { return o.id == evolution.id; });
+    const auto object = std::ranges::find(frame.objects, evolution.id, &ObjectGlance::id);
     if (object == frame.objects.end()) continue;
     EvolutionPoint point{index, std::sqrt(std::max(0.0, object->p_covariance.trace())),
                          std::nullopt, object->existence, phaseOf(*object)};

@@ -81,8 +81,7 @@ class LegendLine {
 void drawLegend(cv::Mat& picture, const cv::Rect& area, const BodyErrors& errors) {
   LegendLine legend(picture, area);
   const auto has = [&](EventKind kind) {
-    return std::any_of(errors.marks.begin(), errors.marks.end(),
-                       [&](const auto& mark) { return mark.kind == kind; });
+    return std::ranges::any_of(errors.marks, [&](const auto& mark) { return mark.kind == kind; });
   };
   if (has(EventKind::kLoopWithdrawn)) legend.tip("withdrawn", kBackColour);
   if (has(EventKind::kRelocalised)) legend.tip("found on the map", kFoundColour);

@@ -22,8 +22,7 @@ std::map<std::string, int> countsOf(const MapContent& content) {
 }
 
 std::ptrdiff_t loopsOf(const MapContent& content, bool believed) {
-  return std::count_if(content.loops.begin(), content.loops.end(),
-                       [&](const LoopLine& loop) { return loop.believed == believed; });
+  return std::ranges::count(content.loops, believed, &LoopLine::believed);
 }
 
 /// Draws entries in a column; sizes are in units of view.text.
@@ -159,10 +158,9 @@ void drawMapLegend(cv::Mat& picture, const MapContent& content, const MapView& v
   for (const auto& [name, count] : countsOf(content)) {
     legend.box(fmt::format("{}: {}", name, count), {classColour(name), 2}, 0.65);
   }
-  const auto beyond = std::count_if(
-      content.objects.begin(), content.objects.end(), [&](const ObjectGlance& object) {
-        return !view.area.contains(cv::Point(view.at(object.p_W.head<2>())));
-      });
+  const auto beyond = std::ranges::count_if(content.objects, [&](const ObjectGlance& object) {
+    return !view.area.contains(cv::Point(view.at(object.p_W.head<2>())));
+  });
   if (beyond > 0) legend.entry(fmt::format("{} beyond the border", beyond));
   legend.skip(0.4);
   if (content.truth) legend.box("truth", {kTruthColour, 1}, 0.0);

@@ -31,7 +31,7 @@ void straighten(Polyline& line) {
   if (line.size() < 3) return;
   const cv::Point2d way = line.back() - line.front();
   const double length = std::max(1e-9, cv::norm(way));
-  const bool straight = std::all_of(line.begin(), line.end(), [&](const cv::Point2d& p) {
+  const bool straight = std::ranges::all_of(line, [&](const cv::Point2d& p) {
     return std::abs(way.cross(p - line.front())) < 0.3 * length;
   });
   if (straight) line = {line.front(), line.back()};
@@ -58,8 +58,8 @@ cv::Rect drawBox(cv::Mat& image, const ObjectGlance& object, const RigidTransfor
                  const CameraModel& camera, double scale) {
   const auto corners_W = cornersOf(object);
   std::array<Eigen::Vector3d, 8> corners;
-  std::transform(corners_W.begin(), corners_W.end(), corners.begin(),
-                 [&](const Eigen::Vector3d& p) { return T_CW * p; });
+  std::ranges::transform(corners_W, corners.begin(),
+                         [&](const Eigen::Vector3d& p) { return T_CW * p; });
   const Stroke stroke{brightColour(object), 2, object.hidden(), 8.0, 7.0};
   const cv::Rect all({}, image.size());
   std::vector<cv::Point> covered;
@@ -98,9 +98,9 @@ void drawLabel(cv::Mat& image, const ObjectGlance& object, const cv::Rect& box,
 
 std::vector<ObjectGlance> fartherFirst(const FrameGlance& frame) {
   std::vector<ObjectGlance> objects;
-  std::copy_if(frame.objects.begin(), frame.objects.end(), std::back_inserter(objects),
-               [](const auto& o) { return o.confirmed && (o.inSight() || o.hidden()); });
-  std::stable_sort(objects.begin(), objects.end(), [&](const auto& a, const auto& b) {
+  std::ranges::copy_if(frame.objects, std::back_inserter(objects),
+                       [](const auto& o) { return o.confirmed && (o.inSight() || o.hidden()); });
+  std::ranges::stable_sort(objects, [&](const auto& a, const auto& b) {
     return (a.p_W - frame.T_WB.p).squaredNorm() > (b.p_W - frame.T_WB.p).squaredNorm();
   });
   return objects;
@@ -117,8 +117,8 @@ void drawDetections(cv::Mat& image, const FrameGlance& frame, double scale) {
 
 void drawHeader(cv::Mat& header, const FrameGlance& frame, TimePoint start) {
   const auto known = [&](auto which) {
-    return std::count_if(frame.objects.begin(), frame.objects.end(),
-                         [&](const auto& o) { return o.confirmed && which(o); });
+    return std::ranges::count_if(frame.objects,
+                                 [&](const auto& o) { return o.confirmed && which(o); });
   };
   header.setTo(kNight);
   const TextStyle style{0.5};

@@ -8,8 +8,7 @@ namespace perdure::tools {
 
 std::optional<TruthTrack::Key> TruthTrack::at(TimePoint time) const {
   if (time < present_from || time >= present_until) return std::nullopt;
-  const auto after =
-      std::find_if(keys.begin(), keys.end(), [time](const Key& key) { return key.time > time; });
+  const auto after = std::ranges::find_if(keys, [time](const Key& key) { return key.time > time; });
   if (!moves) return after == keys.begin() ? keys.front() : *(after - 1);
   if (after == keys.begin()) return std::nullopt;
   const Key& before = *(after - 1);

@@ -30,8 +30,8 @@ TruthTrack inWorld(const sim::TruthObject& object, const RigidTransform& T_WT) {
 std::string classOf(const std::string& type) {
   if (type == "Pedestrian" || type == "Person" || type == "Person_sitting") return "person";
   std::string name = type;
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](char c) { return static_cast<char>(std::tolower(c)); });
+  std::ranges::transform(name, name.begin(),
+                         [](char c) { return static_cast<char>(std::tolower(c)); });
   return name;
 }
 

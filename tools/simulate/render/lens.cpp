@@ -1,6 +1,5 @@
 #include "tools/simulate/render/lens.h"
 
-#include <algorithm>
 #include <cmath>
 
 namespace perdure::tools {

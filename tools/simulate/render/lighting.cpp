@@ -59,7 +59,7 @@ void Lighting::setTime(const World& world) {
         touched.push_back(cellOf(x, y));
       }
     }
-    std::sort(touched.begin(), touched.end());
+    std::ranges::sort(touched);
     touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
     for (const auto cell : touched) {
       cells_[cell].push_back(static_cast<std::uint32_t>(footprints_.size()));

@@ -50,7 +50,7 @@ class Raster {
     for (int row = first; row <= last; ++row) drawRow(p, row);
   }
   double area() const {
-    const auto filled = std::count(cells_.begin(), cells_.end(), 1);
+    const auto filled = std::ranges::count(cells_, 1);
     return static_cast<double>(filled) * cell_ * cell_;
   }
 
@@ -230,8 +230,7 @@ std::vector<sim::TruthView> viewsOf(const World& world, const Lens& lens, const 
   for (const auto& view : found) {
     if (view) views.push_back(*view);
   }
-  std::sort(views.begin(), views.end(),
-            [](const auto& a, const auto& b) { return a.object_id < b.object_id; });
+  std::ranges::sort(views, [](const auto& a, const auto& b) { return a.object_id < b.object_id; });
   return views;
 }
 

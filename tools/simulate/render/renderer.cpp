@@ -1,7 +1,6 @@
 #include "tools/simulate/render/renderer.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "common/math/so3.h"

@@ -2,7 +2,6 @@
 // and read noise, random-walk gain, gamma and quantisation.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -13,7 +12,6 @@
 
 namespace perdure::tools {
 
-/// State of a sensor between images.
 struct SensorState {
   std::uint64_t frames = 0;   ///< number of images so far
   double log_exposure = 0.0;  ///< logarithm of the factor to the desired brightness

@@ -2,47 +2,56 @@
 // that the image does not depend on the number of threads.
 #pragma once
 
-#include <condition_variable>
+#include <atomic>
 #include <cstddef>
 #include <deque>
-#include <exception>
 #include <functional>
-#include <mutex>
-#include <thread>
+#include <future>
 #include <vector>
+
+#include "common/base/check.h"
 
 namespace perdure::tools {
 
 class Workers {
  public:
   /// `threads` >= 1, including the caller of run().
-  explicit Workers(int threads);
-  ~Workers();
-  Workers(const Workers&) = delete;
-  Workers& operator=(const Workers&) = delete;
+  explicit Workers(int threads) : threads_(threads) {
+    check(threads >= 1, "there is at least one thread");
+  }
 
-  /// Calls task(0) … task(count - 1) and returns when all are done. Rethrows the first exception.
-  void run(std::size_t count, const std::function<void(std::size_t)>& task);
-  /// Runs `job` in parallel to the following code; waits while two jobs are running. With one
-  /// thread, runs it at once.
-  void post(std::function<void()> job);
+  /// Calls task(0) … task(count - 1) and returns when all are done. Rethrows an exception.
+  void run(std::size_t count, const auto& task) const {
+    std::atomic<std::size_t> next = 0;
+    const auto work = [&] {
+      for (std::size_t i = next++; i < count; i = next++) task(i);
+    };
+    std::vector<std::future<void>> others;
+    for (int i = 1; i < threads_; ++i) others.push_back(std::async(std::launch::async, work));
+    work();
+    for (auto& other : others) other.get();
+  }
+  /// Runs `job` in parallel to the following code; waits while two jobs are running, and rethrows
+  /// the exception of the one for which it waited. With one thread, runs it at once.
+  void post(std::function<void()> job) {
+    if (threads_ == 1) return job();
+    if (jobs_.size() == 2) finishFirst();
+    jobs_.push_back(std::async(std::launch::async, std::move(job)));
+  }
   /// Waits for the posted jobs and rethrows their first exception.
-  void drain();
+  void drain() {
+    while (!jobs_.empty()) finishFirst();
+  }
 
  private:
-  void work();
-  void takeTasks(std::unique_lock<std::mutex>& lock);
-  void keep(std::exception_ptr error);
-  void rethrow(std::unique_lock<std::mutex>& lock);
+  void finishFirst() {
+    auto job = std::move(jobs_.front());
+    jobs_.pop_front();
+    job.get();
+  }
 
-  std::mutex mutex_;
-  std::condition_variable wake_, done_;
-  const std::function<void(std::size_t)>* task_ = nullptr;
-  std::size_t next_ = 0, count_ = 0, running_ = 0, posted_ = 0;
-  std::deque<std::function<void()>> jobs_;
-  std::exception_ptr error_;
-  bool stop_ = false;
-  std::vector<std::thread> threads_;
+  int threads_;
+  std::deque<std::future<void>> jobs_;
 };
 
 }  // namespace perdure::tools

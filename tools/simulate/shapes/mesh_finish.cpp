@@ -1,9 +1,7 @@
 #include "tools/simulate/shapes/mesh_finish.h"
 
 #include <cmath>
-#include <cstring>
 #include <numbers>
-#include <string>
 #include <string_view>
 #include <unordered_map>
 

@@ -1,7 +1,6 @@
 #include "common/sim/scenes/parts/builder.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "common/base/check.h"
 #include "common/math/so3.h"
@@ -49,7 +48,7 @@ void SceneBuilder::reserveWay(const SceneObject& object, double until_s, double 
 bool SceneBuilder::inBodysWay(const Solid& solid) const {
   if (solid.low > body_height_) return false;
   const double far = solid.half.norm() + clearance_;
-  return std::any_of(way_.begin(), way_.end(), [&](const Eigen::Vector2d& point) {
+  return std::ranges::any_of(way_, [&](const Eigen::Vector2d& point) {
     return (point - solid.centre).squaredNorm() < far * far &&
            distanceTo(solid, point) < clearance_;
   });
@@ -61,8 +60,8 @@ bool SceneBuilder::isFree(const Solid& solid, double margin) const {
     const bool apart_in_height = std::max(other.low - solid.high, solid.low - other.high) > -1e-6;
     return !apart_in_height && meet(solid, other, margin);
   };
-  return std::none_of(solids_.begin(), solids_.end(), meets) &&
-         std::none_of(reserved_.begin(), reserved_.end(), meets) && !inBodysWay(solid);
+  return std::ranges::none_of(solids_, meets) && std::ranges::none_of(reserved_, meets) &&
+         !inBodysWay(solid);
 }
 
 bool SceneBuilder::put(SceneObject object, const Place& place, double margin) {

@@ -59,7 +59,7 @@ Place Streets::placeAt(const Road& road, int side, double along, double across, 
 }
 
 bool Streets::onAnotherRoad(const Road& road, const Solid& solid, double margin) const {
-  return std::any_of(roads_.begin(), roads_.end(), [&](const Road& other) {
+  return std::ranges::any_of(roads_, [&](const Road& other) {
     const bool same = other.from == road.from && other.to == road.to;
     return !same && meet(areaOf(other), solid, margin);
   });

@@ -70,8 +70,7 @@ void LiveCameras::report(ReasonCounts& counts) const {
     const ReasonCounts its = camera.state().reasons();
     for (const auto& [reason, n] : its.all()) counts.add(reason + of, n);
   }
-  if (!pairing_) return;
-  for (const auto& [reason, n] : pairing_->reasons().all()) counts.add(reason, n);
+  if (pairing_) counts.add(pairing_->reasons());
 }
 
 }  // namespace perdure::capture

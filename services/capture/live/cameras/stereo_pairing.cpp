@@ -74,9 +74,8 @@ std::vector<CameraImage> StereoPairing::second(CameraImage image, std::int64_t n
 
 StereoPairing::Seconds::iterator StereoPairing::nearest(std::int64_t time_ns) {
   const auto apart = [&](const CameraImage& s) { return std::abs(s.time_ns - time_ns); };
-  const auto best =
-      std::min_element(seconds_.begin(), seconds_.end(),
-                       [&](const auto& a, const auto& b) { return apart(a) < apart(b); });
+  const auto best = std::ranges::min_element(
+      seconds_, [&](const auto& a, const auto& b) { return apart(a) < apart(b); });
   return best != seconds_.end() && apart(*best) > toleranceNs() ? seconds_.end() : best;
 }
 

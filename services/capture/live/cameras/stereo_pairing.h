@@ -1,7 +1,6 @@
 // Pairs images of two cameras that were taken at the same time.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -36,7 +35,6 @@ class CameraTimeline {
 /// cam1 wait until later images of cam0 arrive, and are then dropped.
 class StereoPairing {
  public:
-  /// `rate_hz`: requested rate.
   explicit StereoPairing(double rate_hz);
 
   /// Takes an image of cam0 or cam1 and returns the images to publish: cam0 first, then cam1 with

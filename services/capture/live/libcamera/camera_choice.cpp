@@ -10,11 +10,11 @@ namespace perdure::capture {
 Result<std::size_t> chooseCamera(const std::vector<std::string>& ids, const std::string& wanted,
                                  bool alone) {
   const auto place = [&](auto found) { return static_cast<std::size_t>(found - ids.begin()); };
-  const auto exact = std::find(ids.begin(), ids.end(), wanted);
+  const auto exact = std::ranges::find(ids, wanted);
   if (exact != ids.end()) return place(exact);
   const auto has = [&](const std::string& id) { return id.find(wanted) != std::string::npos; };
-  const auto first = std::find_if(ids.begin(), ids.end(), has);
-  const auto n = std::count_if(ids.begin(), ids.end(), has);
+  const auto first = std::ranges::find_if(ids, has);
+  const auto n = std::ranges::count_if(ids, has);
   if (n == 0) {
     return fail("camera_absent",
                 fmt::format("libcamera sees no camera{} (there are: {}); is it plugged in, and may "

@@ -3,7 +3,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <system_error>
 #include <utility>
 
@@ -21,7 +20,7 @@ void RestartRule::started(std::set<std::string> nodes) {
 }
 
 bool RestartRule::missed(const std::set<std::string>& nodes) {
-  const bool more = !std::includes(known_.begin(), known_.end(), nodes.begin(), nodes.end());
+  const bool more = !std::ranges::includes(known_, nodes);
   misses_ = more ? misses_ + 1 : 0;
   if (misses_ < kMisses && unplugged_ < kMostUnplugged) return false;
   started(nodes);

@@ -80,9 +80,8 @@ bool RunningCamera::begin() {
                       std::back_inserter(nodes_));
   asking_ = requests_.front().get();
   requests_.front()->controls().merge(asked_);
-  return std::all_of(requests_.begin(), requests_.end(), [&](const auto& request) {
-    return camera_->queueRequest(request.get()) == 0;
-  });
+  return std::ranges::all_of(
+      requests_, [&](const auto& request) { return camera_->queueRequest(request.get()) == 0; });
 }
 
 void RunningCamera::queue(Request* request) {
@@ -136,7 +135,7 @@ void RunningCamera::giveBack(Request* request) {
 void RunningCamera::takeTheRest() {
   invokeMethod(&RunningCamera::settle, libcamera::ConnectionTypeBlocking);
   while (const auto more = done_.tryPop()) in_hand_.push_back(*more);
-  std::sort(in_hand_.begin(), in_hand_.end(), [](const Request* a, const Request* b) {
+  std::ranges::sort(in_hand_, [](const Request* a, const Request* b) {
     return isEarlier(sequenceOf(*a), sequenceOf(*b));
   });
 }

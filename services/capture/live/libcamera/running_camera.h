@@ -12,7 +12,7 @@
 #include "common/base/bounded_queue.h"
 #include "common/base/result.h"
 #include "services/capture/live/frame_count.h"
-#include "services/capture/live/libcamera/unended.h"
+#include "services/capture/live/libcamera/shared_manager.h"
 
 namespace perdure::capture {
 

@@ -115,7 +115,7 @@ void Session::chooseFormat(libcamera::StreamConfiguration& wanted) const {
   const auto offered = wanted.formats().pixelformats();
   for (const auto& [format, layout] : knownFormats()) {
     const bool named = settings_.format == "auto" || settings_.format == format.toString();
-    if (!named || std::find(offered.begin(), offered.end(), format) == offered.end()) continue;
+    if (!named || std::ranges::find(offered, format) == offered.end()) continue;
     wanted.pixelFormat = format;
     return;
   }
@@ -133,18 +133,16 @@ Result<void> Session::configure() {
   askFlip(*configuration_, settings_.flip);
   const bool valid = configuration_->validate() != libcamera::CameraConfiguration::Invalid;
   const auto formats = knownFormats();
-  const auto known = std::find_if(formats.begin(), formats.end(), [&](const auto& entry) {
-    return entry.first == wanted.pixelFormat;
-  });
+  const auto known = std::ranges::find_if(
+      formats, [&](const auto& entry) { return entry.first == wanted.pixelFormat; });
   const bool sized = wanted.size.width == settings_.width && wanted.size.height == settings_.height;
   if (!valid || known == formats.end() || !sized ||
       running_->camera().configure(configuration_.get()) < 0) {
-    return fail(
-        "camera_absent",
-        fmt::format("the camera {} gives {} of {}x{} where {} of {}x{} is wanted; set "
-                    "camera.format, or calibrate it at a size that it has.",
-                    id(), wanted.pixelFormat.toString(), wanted.size.width, wanted.size.height,
-                    settings_.format, settings_.width, settings_.height));
+    return fail("camera_absent",
+                "the camera {} gives {} of {}x{} where {} of {}x{} is wanted; set camera.format, "
+                "or calibrate it at a size that it has.",
+                id(), wanted.pixelFormat.toString(), wanted.size.width, wanted.size.height,
+                settings_.format, settings_.width, settings_.height);
   }
   layout_ = known->second;
   const std::string refused = flipRefused(*configuration_, settings_.flip);

@@ -44,8 +44,7 @@ Result<std::shared_ptr<libcamera::CameraManager>> SharedManager::manager() {
   unplugged_ = 0;
   rule_.started(readableVideoNodes(devices_));
   if (const int code = manager->start(); code < 0) {
-    return fail("camera_absent",
-                fmt::format("libcamera does not start: {}.", std::strerror(-code)));
+    return fail("camera_absent", "libcamera does not start: {}.", std::strerror(-code));
   }
   manager_ = std::move(manager);
   return manager_;

@@ -14,9 +14,16 @@
 #include "common/base/result.h"
 #include "services/capture/live/libcamera/log.h"
 #include "services/capture/live/libcamera/restart_rule.h"
-#include "services/capture/live/libcamera/unended.h"
 
 namespace perdure::capture {
+
+/// An object that libcamera still references.
+class Unended {
+ public:
+  virtual ~Unended() = default;
+  /// Tries to end the object. It may be destroyed only after this returns true.
+  virtual bool over() = 0;
+};
 
 class SharedManager {
  public:

@@ -48,7 +48,7 @@ bool hasBuffers(int node) {
 
 bool openVideoNodeVanished(const std::filesystem::path& descriptors) {
   const auto nodes = openVideoNodes(descriptors);
-  return std::any_of(nodes.begin(), nodes.end(), [](const auto& node) {
+  return std::ranges::any_of(nodes, [](const auto& node) {
     v4l2_capability unused{};
     return node.second.ends_with(" (deleted)") ||
            (ioctl(node.first, VIDIOC_QUERYCAP, &unused) != 0 && errno == ENODEV);

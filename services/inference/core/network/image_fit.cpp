@@ -1,7 +1,6 @@
 #include "services/inference/core/network/image_fit.h"
 
 #include <algorithm>
-#include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 

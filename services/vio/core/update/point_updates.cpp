@@ -3,7 +3,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 #include "common/base/check.h"
 #include "services/vio/core/update/triangulation.h"

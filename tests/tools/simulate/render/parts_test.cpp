@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
-#include <numeric>
 #include <stdexcept>
 
 #include "tests/tools/simulate/render/small_world.h"
@@ -44,15 +43,13 @@ TEST(Workers, HandOnTheFirstFailure) {
   EXPECT_EQ(count, 10);
 }
 
-TEST(Workers, FinishWhatWasPostedInOrderAndSayWhenItFailed) {
+TEST(Workers, FinishWhatWasPostedAndSayWhenItFailed) {
   for (const int threads : {1, 2}) {
     Workers workers(threads);
-    std::vector<int> order;
-    for (int i = 0; i < 20; ++i) workers.post([&order, i] { order.push_back(i); });
+    std::atomic<int> done = 0;
+    for (int i = 0; i < 20; ++i) workers.post([&done] { ++done; });
     workers.drain();
-    std::vector<int> wanted(20);
-    std::iota(wanted.begin(), wanted.end(), 0);
-    EXPECT_EQ(order, wanted);
+    EXPECT_EQ(done, 20);
   }
   Workers workers(2);
   workers.post([] { throw std::runtime_error("the disk is full"); });

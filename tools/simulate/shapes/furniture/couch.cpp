@@ -1,4 +1,3 @@
-#include <array>
 
 #include "tools/simulate/shapes/dice.h"
 #include "tools/simulate/shapes/furniture/cushion.h"

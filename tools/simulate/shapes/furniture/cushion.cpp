@@ -1,7 +1,6 @@
 #include "tools/simulate/shapes/furniture/cushion.h"
 
 #include <algorithm>
-#include <array>
 #include <utility>
 #include <vector>
 

@@ -117,7 +117,7 @@ class Street {
 
   bool crossing(const Lane& own, float s, float t) const {
     const Vec3 p = own.at(s, t, 0.0F);
-    return std::any_of(lanes_.begin(), lanes_.end(), [&](const Lane& other) {
+    return std::ranges::any_of(lanes_, [&](const Lane& other) {
       return &other != &own && other.holds({p.x(), p.y()}, 0.3F);
     });
   }

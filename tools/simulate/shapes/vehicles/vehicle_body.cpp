@@ -47,7 +47,7 @@ class Body {
       xs.insert(xs.end(), {axle, axle - outside, axle + outside});
     }
     std::erase_if(xs, [](float x) { return x < 0.0F || x > 1.0F; });
-    std::sort(xs.begin(), xs.end());
+    std::ranges::sort(xs);
     // Merges stations closer than a few millimetres; seams are wider.
     xs.erase(std::unique(xs.begin(), xs.end(), [](float a, float c) { return c - a < 1.2e-3F; }),
              xs.end());
@@ -113,9 +113,9 @@ class Body {
   int materialAt(float x, float width, std::size_t segment) const {
     if (segment == 0) return m_.dark;
     if (segment == 1) return m_.trim;
-    const bool seam =
-        width < 1.2F * kSeam && std::any_of(p_.seams.begin(), p_.seams.end(),
-                                            [&](float s) { return std::abs(s - x) < kSeam; });
+    const bool seam = width < 1.2F * kSeam && std::ranges::any_of(p_.seams, [&](float s) {
+                        return std::abs(s - x) < kSeam;
+                      });
     if (seam && segment < 5) return m_.dark;
     if (segment == 3 && x < 0.035F) return m_.headlight;
     if (segment == 3 && x > 0.975F) return m_.taillight;

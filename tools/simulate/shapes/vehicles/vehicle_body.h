@@ -2,7 +2,6 @@
 // and rear. Wheel arches are cut out; glass, lights, seams and plates are added.
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "tools/simulate/shapes/dice.h"
