@@ -8,9 +8,9 @@
 
 #include "common/base/checked_file.h"
 #include "common/base/errors.h"
+#include "common/earth/geodesy.h"
 #include "common/mapping/frames/laid_belief.h"
 #include "common/math/so3.h"
-#include "common/earth/geodesy.h"
 #include "tools/outputs/ledger_json.h"
 #include "tools/outputs/pictures/evolution_picture.h"
 #include "tools/outputs/pictures/map_picture.h"
