@@ -21,12 +21,19 @@ namespace {
 
 constexpr char kTransforms[] = "/tf_static";
 
+/// A message of a sensor.
+struct Arrival {
+  TimePoint time;  ///< of its header; at the end corrected (files/stamp_order.h)
+  std::uint64_t log_ns = 0, place = 0;  ///< as of RosMessage
+};
+
 /// Reference to one image in the recording; its pixels are read on request.
-struct RosImage {
-  TimePoint time;   ///< corrected (files/stamp_order.h)
-  TimePoint stamp;  ///< as in its header
-  std::uint64_t log_ns = 0;
-  std::uint64_t number = 0;  ///< position in the order of the recording
+struct RosImage : Arrival {
+  std::uint64_t number = 0;  ///< position by the time of recording
+};
+
+struct RosSample : Arrival {
+  ImuSample sample;
 };
 
 std::string_view textOf(const SharedBytes& bytes) {
@@ -41,13 +48,21 @@ Result<Frame> unpacked(const ros::CompressedImage& image, int bits) {
   return set ? Result<Frame>(frame) : tl::unexpected(set.error());
 }
 
-TimePoint stampOf(const ros::Header& header, std::uint64_t log_ns) {
-  const TimePoint time = ros::timeOf(header.stamp);
-  return time == TimePoint() ? fromNanoseconds(static_cast<std::int64_t>(log_ns)) : time;
+/// Restores the order in which the messages were written, since the recorder's clock may have been
+/// set, too. Most stamps are 0: all get the time of recording. Returns how many.
+template <class A>
+std::size_t orderArrivals(std::vector<A>& arrivals) {
+  std::sort(arrivals.begin(), arrivals.end(),
+            [](const A& a, const A& b) { return a.place < b.place; });
+  const auto unstamped = std::count_if(arrivals.begin(), arrivals.end(),
+                                       [](const A& one) { return one.time == TimePoint(); });
+  if (2 * static_cast<std::size_t>(unstamped) <= arrivals.size()) return 0;
+  for (A& one : arrivals) one.time = fromNanoseconds(static_cast<std::int64_t>(one.log_ns));
+  return arrivals.size();
 }
 
-/// Reads one camera's images quickly in the order of the recording, even if many have the same
-/// recording time. Any other order requires a rewind.
+/// Reads one camera's images quickly by the time of recording, even if many have the same one. Any
+/// other order requires a rewind.
 class RosImages {
  public:
   RosImages(const std::filesystem::path& path, CameraTopics topics, int bits)
@@ -58,32 +73,22 @@ class RosImages {
   Result<Frame> at(const RosImage& wanted) {
     if (next_ > wanted.number) rewind(wanted.log_ns);
     while (const auto message = messages_.next()) {
-      if (message->log_ns < wanted.log_ns) continue;
       if (message->log_ns > wanted.log_ns) break;
-      const auto [time, frame] =
-          topics_.compressed ? take<ros::CompressedImage>(*message) : take<ros::Image>(*message);
-      if (time != wanted.stamp) continue;
+      if (message->place != wanted.place) continue;
       next_ = wanted.number + 1;
-      return frame;
+      if (topics_.compressed) {
+        return messages_.valueOf<ros::CompressedImage>(*message).and_then(
+            [this](const auto& image) { return unpacked(image, bits_); });
+      }
+      return messages_.valueOf<ros::Image>(*message).and_then(
+          [this](const auto& image) { return ros::frameOf(image, bits_); });
     }
     next_ = UINT64_MAX;
     return fail("image_missing", topics_.image + " has no image of " +
-                                     std::to_string(toNanoseconds(wanted.stamp)) + " ns any more");
+                                     std::to_string(toNanoseconds(wanted.time)) + " ns any more");
   }
 
  private:
-  template <class M>
-  std::pair<TimePoint, Result<Frame>> take(const RosMessage& message) {
-    const auto image = messages_.valueOf<M>(message);
-    if (!image) return {TimePoint::min(), tl::unexpected(image.error())};
-    const TimePoint time = stampOf(image->header, message.log_ns);
-    if constexpr (std::same_as<M, ros::Image>) {
-      return {time, ros::frameOf(*image, bits_)};
-    } else {
-      return {time, unpacked(*image, bits_)};
-    }
-  }
-
   void rewind(std::uint64_t from_ns) {
     messages_.rewind({topics_.image}, from_ns);
     next_ = 0;
@@ -119,6 +124,7 @@ class RosDriveReader {
     imu_ = chosen.imu;
     readMessages();
     requireImages();
+    useArrivals();
     orderImu(recording_, imu_);
     for (std::size_t i = 0; i < cameras_.size(); ++i) addFrames(i);
     sortFrames(recording_);
@@ -179,8 +185,18 @@ class RosDriveReader {
     while (const auto message = messages_.next()) take(*message);
     recording_.reasons.add(messages_.reasons());
     if (!messages_.lastProblem().empty()) recording_.notes.push_back(messages_.lastProblem());
-    if (unstamped_ == 0) return;
-    recording_.notes.push_back(file_ + ": " + std::to_string(unstamped_) +
+  }
+
+  void useArrivals() {
+    std::size_t unstamped = orderArrivals(samples_);
+    for (RosSample& one : samples_) {
+      one.sample.time = one.time;
+      recording_.imu.push_back(one.sample);
+    }
+    samples_ = {};
+    for (RosCamera& camera : cameras_) unstamped += orderArrivals(camera.images);
+    if (unstamped == 0) return;
+    recording_.notes.push_back(file_ + ": " + std::to_string(unstamped) +
                                " messages have no stamp in their header and got the time at which "
                                "they were recorded");
   }
@@ -198,7 +214,7 @@ class RosDriveReader {
       if (messages_.topics().at(message.topic).type != ros::TFMessage::kType) return;
       if (const auto value = valueIn<ros::TFMessage>(message, "tf_static")) tree_.add(*value);
     } else if (message.topic == imu_) {
-      if (const auto value = valueIn<ros::Imu>(message, "imu")) takeImu(*value, message.log_ns);
+      if (const auto value = valueIn<ros::Imu>(message, "imu")) takeImu(*value, message);
     }
     for (RosCamera& camera : cameras_) {
       if (message.topic == camera.topics.info) takeInfo(camera, message);
@@ -223,11 +239,9 @@ class RosDriveReader {
         info->width, info->height));
   }
 
-  void takeImu(const ros::Imu& imu, std::uint64_t log_ns) {
+  void takeImu(const ros::Imu& imu, const RosMessage& message) {
     if (imu_frame_.empty()) imu_frame_ = imu.header.frame_id;
-    ImuSample sample = ros::sampleOf(imu);
-    sample.time = stamp(imu.header, log_ns);
-    recording_.imu.push_back(sample);
+    samples_.push_back({arrivalOf(imu.header, message), ros::sampleOf(imu)});
   }
 
   void takeImage(RosCamera& camera, const RosMessage& message) {
@@ -238,22 +252,20 @@ class RosDriveReader {
       const std::uint64_t all = messages_.topics().at(message.topic).messages;
       if (camera.bits < 16 && camera.images.size() % std::max<std::uint64_t>(all / kLooks, 1) == 0)
         camera.bits = std::max(camera.bits, vision::usedBitsIn(textOf(image->data)));
-      addImage(camera, image->header, message.log_ns);
+      addImage(camera, image->header, message);
     } else if (const auto image = valueIn<ros::Image>(message, "frame")) {
-      addImage(camera, image->header, message.log_ns);
+      addImage(camera, image->header, message);
       if (camera.bits < 16) camera.bits = std::max(camera.bits, ros::usedBits(*image));
     }
   }
 
-  void addImage(RosCamera& camera, const ros::Header& header, std::uint64_t log_ns) {
+  void addImage(RosCamera& camera, const ros::Header& header, const RosMessage& message) {
     if (camera.frame_id.empty()) camera.frame_id = header.frame_id;
-    const TimePoint time = stamp(header, log_ns);
-    camera.images.push_back({time, time, log_ns, camera.images.size()});
+    camera.images.push_back({arrivalOf(header, message), camera.images.size()});
   }
 
-  TimePoint stamp(const ros::Header& header, std::uint64_t log_ns) {
-    if (ros::timeOf(header.stamp) == TimePoint()) ++unstamped_;
-    return stampOf(header, log_ns);
+  static Arrival arrivalOf(const ros::Header& header, const RosMessage& message) {
+    return {ros::timeOf(header.stamp), message.log_ns, message.place};
   }
 
   void requireImages() const {
@@ -354,7 +366,7 @@ class RosDriveReader {
   std::vector<RosCamera> cameras_;
   std::string imu_, imu_frame_;
   ros::FrameTree tree_;
-  std::size_t unstamped_ = 0;
+  std::vector<RosSample> samples_;
 };
 
 }  // namespace

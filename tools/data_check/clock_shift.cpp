@@ -58,14 +58,43 @@ struct CellTurn {
   Eigen::Vector3d of_images;
 };
 
-/// Share of the images' turning that the gyroscope does not explain at a shift in cells, without
-/// the means; 1 if it covers less than half of them.
-double unexplainedAt(const std::vector<CellTurn>& turns, const TurnGrid& gyro, std::int64_t shift) {
+using CellTurns = std::vector<CellTurn>;
+
+/// Returns nothing if the turns are too few, or too small to be compared.
+CellTurns cellsOf(const std::vector<Turn>& turns, const TurnGrid& gyro,
+                  const CameraCalibration& camera) {
+  constexpr std::size_t kFewest = 24;
+  constexpr double kEnough_px = 2.0;
+  if (turns.size() < kFewest) return {};
+  CellTurns cells;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double squared = 0.0;
+  for (const Turn& turn : turns) {
+    cells.push_back({gyro.cellOf(turn.from), gyro.cellOf(turn.to), camera.T_BC.q * turn.of_images});
+    sum += turn.of_images, squared += turn.of_images.squaredNorm();
+  }
+  const auto n = static_cast<double>(turns.size());
+  const double turning = std::sqrt(std::max(0.0, squared - sum.squaredNorm() / n) / n);
+  return turning * camera.fx < kEnough_px ? CellTurns() : cells;
+}
+
+/// t_imu = t_image + shift + rate (t_image − centre), in cells.
+struct ClockLine {
+  std::int64_t shift = 0, centre = 0;
+  double rate = 0.0;
+  std::int64_t of(std::int64_t cell) const {
+    return cell + shift + std::llround(rate * static_cast<double>(cell - centre));
+  }
+};
+
+/// Share of the images' turning that the gyroscope does not explain, without the means; 1 if it
+/// covers less than half of them.
+double unexplainedAt(const CellTurns& turns, const TurnGrid& gyro, const ClockLine& line) {
   Eigen::Vector3d images = Eigen::Vector3d::Zero(), off = Eigen::Vector3d::Zero();
   double images_squared = 0.0, off_squared = 0.0;
   std::size_t count = 0;
   for (const CellTurn& turn : turns) {
-    const auto given = gyro.between(turn.from + shift, turn.to + shift);
+    const auto given = gyro.between(line.of(turn.from), line.of(turn.to));
     if (!given) continue;
     const Eigen::Vector3d error = turn.of_images - *given;
     images += turn.of_images, images_squared += turn.of_images.squaredNorm();
@@ -78,29 +107,23 @@ double unexplainedAt(const std::vector<CellTurn>& turns, const TurnGrid& gyro, s
   return std::min(1.0, (off_squared - off.squaredNorm() / n) / std::max(1e-18, all));
 }
 
+/// Largest unexplained share of a match, and how many times that of the second best is larger.
+constexpr double kMostLeft = 0.3, kTimesLeft = 2.0;
+
 }  // namespace
 
 std::optional<double> shiftOfTurns(const std::vector<Turn>& turns,
                                    const std::vector<ImuSample>& samples,
                                    const CameraCalibration& camera) {
-  constexpr std::size_t kFewest = 24;
-  constexpr double kEnough_px = 2.0, kExplained = 0.3, kClearly = 2.0, kApart_s = 0.5;
-  if (turns.size() < kFewest || samples.size() < 2) return std::nullopt;
+  constexpr double kApart_s = 0.5;
+  if (samples.size() < 2) return std::nullopt;
   const TurnGrid gyro(samples);
-  std::vector<CellTurn> cells;
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  double squared = 0.0;
-  for (const Turn& turn : turns) {
-    cells.push_back({gyro.cellOf(turn.from), gyro.cellOf(turn.to), camera.T_BC.q * turn.of_images});
-    sum += turn.of_images, squared += turn.of_images.squaredNorm();
-  }
-  const auto n = static_cast<double>(turns.size());
-  if (std::sqrt((squared - sum.squaredNorm() / n) / n) * camera.fx < kEnough_px)
-    return std::nullopt;
+  const CellTurns cells = cellsOf(turns, gyro, camera);
+  if (cells.empty()) return std::nullopt;
   const std::int64_t least = -cells.back().to, most = gyro.cells() - cells.front().from;
   std::vector<double> left;
   for (std::int64_t shift = least; shift <= most; ++shift) {
-    left.push_back(unexplainedAt(cells, gyro, shift));
+    left.push_back(unexplainedAt(cells, gyro, {.shift = shift}));
   }
   const auto best = std::min_element(left.begin(), left.end());
   const auto apart = static_cast<std::ptrdiff_t>(kApart_s / kStep_s);
@@ -108,21 +131,72 @@ std::optional<double> shiftOfTurns(const std::vector<Turn>& turns,
   for (auto other = left.begin(); other != left.end(); ++other) {
     if (std::abs(other - best) > apart) second = std::min(second, *other);
   }
-  if (*best > kExplained || kClearly * *best > second) return std::nullopt;
+  fprintf(stderr, "shift best %g at %g second %g\n", *best,
+          kStep_s * static_cast<double>(least + (best - left.begin())), second);
+  if (*best > kMostLeft || kTimesLeft * *best > second) return std::nullopt;
   return kStep_s * static_cast<double>(least + (best - left.begin()));
 }
 
-std::optional<double> shiftOfClocks(const Recording& recording) {
-  if (recording.calibration.cameras.empty()) return std::nullopt;
-  const CameraCalibration& camera = recording.calibration.cameras.front();
+std::optional<double> rateOfTurns(const std::vector<Turn>& turns,
+                                  const std::vector<ImuSample>& samples,
+                                  const CameraCalibration& camera) {
+  constexpr double kMostRate = 0.25;
+  constexpr std::int64_t kMost = 400, kStep = 4;  // cells, of the shift at both ends
+  if (samples.size() < 2) return std::nullopt;
+  const TurnGrid gyro(samples);
+  const CellTurns cells = cellsOf(turns, gyro, camera);
+  if (cells.empty()) return std::nullopt;
+  const std::int64_t centre = (cells.front().from + cells.back().to) / 2;
+  const std::int64_t given = std::llround(camera.time_offset_s / kStep_s);
+  const auto half = static_cast<double>(cells.back().to - centre);
+  const auto most_rates = std::min(kMost, static_cast<std::int64_t>(kMostRate * half)) / kStep;
+  double best = 1.0, straight = 1.0, rate = 0.0;
+  for (std::int64_t k = -most_rates; k <= most_rates; ++k) {
+    ClockLine line{.centre = centre, .rate = static_cast<double>(kStep * k) / half};
+    for (line.shift = given - kMost; line.shift <= given + kMost; line.shift += kStep) {
+      const double left = unexplainedAt(cells, gyro, line);
+      if (k == 0) straight = std::min(straight, left);
+      if (left < best) best = left, rate = line.rate;
+    }
+  }
+  if (best > kMostLeft || kTimesLeft * best > straight) return std::nullopt;
+  return rate;
+}
+
+replay::DataFindings rateFinding(double rate, const CameraCalibration& camera) {
+  return {{DataFinding::Grade::kWarning, "clock_rate",
+           fmt::format("the clock of {} runs {:.2g} % too {} for that of the IMU by their turning: "
+                       "see which of them has stamps that are counted or computed by a wrong rate",
+                       camera.name, 100.0 * std::abs(rate), rate < 0.0 ? "fast" : "slow")}};
+}
+
+namespace {
+
+/// A shift of over a second; one with a name is whole seconds, the rest is the camera's own delay.
+std::optional<double> longShift(const std::vector<Turn>& along, const Recording& recording) {
   constexpr double kLeast_s = 1.0;
-  auto shift = shiftOfTurns(turnsAlong(recording), recording.imu, camera);
+  const CameraCalibration& camera = recording.calibration.cameras.front();
+  auto shift = shiftOfTurns(along, recording.imu, camera);
   if (!shift) return std::nullopt;
   *shift -= camera.time_offset_s;
   if (std::abs(*shift) < kLeast_s) return std::nullopt;
-  // A difference with a name is whole seconds; the rest is the camera's own delay.
-  const bool named = !replay::causeOfShift(*shift).empty();
-  return named ? std::round(*shift) : *shift;
+  return replay::causeOfShift(*shift).empty() ? *shift : std::round(*shift);
+}
+
+}  // namespace
+
+std::optional<double> shiftOfClocks(const Recording& recording) {
+  if (recording.calibration.cameras.empty()) return std::nullopt;
+  return longShift(turnsAlong(recording), recording);
+}
+
+replay::DataFindings checkClockLine(const Recording& recording) {
+  const CameraCalibration& camera = recording.calibration.cameras.front();
+  const auto along = turnsAlong(recording);
+  if (const auto shift = longShift(along, recording)) return shiftFinding(*shift, camera);
+  if (const auto rate = rateOfTurns(along, recording.imu, camera))
+    return rateFinding(*rate, camera);
+  return {};
 }
 
 replay::DataFindings shiftFinding(double shift_s, const CameraCalibration& camera) {

@@ -1,5 +1,5 @@
-// Finds the difference of two clocks of camera and IMU of any size: the turning of images from the
-// whole drive is compared with that of the gyroscope at every shift.
+// Finds the difference of two clocks of camera and IMU of any size, and of their rates: the turning
+// of images from the whole drive is compared with that of the gyroscope at every shift.
 #pragma once
 
 #include <optional>
@@ -15,9 +15,22 @@ std::optional<double> shiftOfTurns(const std::vector<Turn>& turns,
                                    const std::vector<ImuSample>& samples,
                                    const CameraCalibration& camera);
 
+/// By how much the clock of the IMU runs faster than that of the camera, as a share, if the
+/// gyroscope explains the turning of the images then, and twice as well as with any constant
+/// shift.
+std::optional<double> rateOfTurns(const std::vector<Turn>& turns,
+                                  const std::vector<ImuSample>& samples,
+                                  const CameraCalibration& camera);
+
+/// Code: clock_rate.
+replay::DataFindings rateFinding(double rate, const CameraCalibration& camera);
+
 /// Reads images from places all over the drive, and returns what to add to their stamps. Returns
 /// nothing if no shift of over a second is certain.
 std::optional<double> shiftOfClocks(const replay::Recording& recording);
+
+/// Reads images from places all over the drive. Codes: clock_shift, clock_rate.
+replay::DataFindings checkClockLine(const replay::Recording& recording);
 
 /// Code: clock_shift.
 replay::DataFindings shiftFinding(double shift_s, const CameraCalibration& camera);

@@ -46,8 +46,8 @@ bool offsetExplainsAxes(const std::vector<Turn>& turns, const std::vector<ImuSam
 replay::DataFindings checkTurns(const replay::Recording& recording) {
   const CameraCalibration& camera = recording.calibration.cameras.front();
   const auto turns = turnsOfImages(recording, recording.imu);
-  if (haveNothingInCommon(turns, recording.imu, camera)) {
-    if (const auto shift = shiftOfClocks(recording)) return shiftFinding(*shift, camera);
+  if (disagree(turns, recording.imu, camera)) {
+    if (auto clocks = checkClockLine(recording); !clocks.empty()) return clocks;
   }
   const auto findings = judgeTurns(turns, recording.imu, camera);
   const bool unit = !findings.empty() && (findings.front().code.starts_with("gyro_") ||

@@ -212,9 +212,9 @@ std::optional<double> betterOffset(const std::vector<Turn>& turns, const TurnInt
   return inside ? offset : std::nullopt;
 }
 
-/// Judges rates that are too large or too small by some tenths, if both sides agree otherwise.
+/// Judges rates that are too large or too small by some percent, if both sides agree otherwise.
 replay::DataFindings judgeFactor(const TurnPairs& pairs, const CameraCalibration& camera) {
-  constexpr double kLeast = 0.1, kSurely = 3.0, kAgreed = 0.05;
+  constexpr double kLeast = 0.04, kSurely = 3.0, kAgreed = 0.05;
   const Eigen::Matrix3Xd said = camera.T_BC.R().transpose() * pairs.given;
   const double all = std::max(1e-18, said.squaredNorm());
   const double shown = (pairs.reference.array() * said.array()).sum() / all;
@@ -293,12 +293,13 @@ std::vector<Turn> turnsAlong(const Recording& recording) {
   return turnsOfRuns(frames, recording.calibration.cameras.front(), chosen);
 }
 
-bool haveNothingInCommon(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,
-                         const CameraCalibration& camera) {
+bool disagree(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,
+              const CameraCalibration& camera) {
+  constexpr double kMuch = 0.1;
   const TurnPairs pairs = pairsOf(turns, TurnIntegral(samples), camera.time_offset_s);
   if (2 * pairs.count() < turns.size()) return true;
   if (std::max(pairs.turning(), pairs.turningOfGiven()) * camera.fx < kEnough_px) return false;
-  return pairs.unexplained(camera.T_BC.R().transpose()) > kUnexplained;
+  return pairs.unexplained(camera.T_BC.R().transpose()) > kMuch;
 }
 
 replay::DataFindings judgeTurns(const std::vector<Turn>& turns,

@@ -27,9 +27,9 @@ std::vector<Turn> turnsOfImages(const replay::Recording& recording,
 /// Rotations of image pairs of cam0 from places all over the drive, whatever any sensor measured.
 std::vector<Turn> turnsAlong(const replay::Recording& recording);
 
-/// Whether images or gyroscope turn enough for a judgement and have nothing in common.
-bool haveNothingInCommon(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,
-                         const CameraCalibration& camera);
+/// Whether images or gyroscope turn enough for a judgement and do not fit.
+bool disagree(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,
+              const CameraCalibration& camera);
 
 /// Codes: gyro_in_degrees, images_still, gyro_too_small, gyro_constant, gyro_factor, T_BS_inverted,
 /// T_BS_turned, time_offset. Returns nothing if images or gyroscope rotate too little.

@@ -168,9 +168,11 @@ RunFacts Reporter::facts(const replay::DataFindings& before) const {
                  .boxes = boxes_,
                  .objects = outputs_.history().lastBeliefs().size(),
                  .findings = before};
-  const auto vio = services_.find("vio");
-  if (vio == services_.end()) return facts;
-  for (const auto& [code, times] : vio->second.reasons()) facts.vio.add(code, times);
+  for (const auto& [name, counts] : {std::pair("vio", &facts.vio), {"capture", &facts.capture}}) {
+    const auto service = services_.find(name);
+    if (service == services_.end()) continue;
+    for (const auto& [code, times] : service->second.reasons()) counts->add(code, times);
+  }
   return facts;
 }
 

@@ -40,6 +40,14 @@ std::string sentenceOf(const Doubt& doubt) { return doubt.what + ": " + doubt.me
 
 }  // namespace
 
+std::uint64_t imagesLost(const ReasonCounts& capture) {
+  std::uint64_t count = capture.of("frame_malformed") + capture.of("frame_stray");
+  for (const auto& [code, times] : capture.all()) {
+    if (code.starts_with("image_")) count += times;
+  }
+  return count;
+}
+
 Doubts doubtsOfRun(const RunFacts& facts) {
   Doubts doubts;
   for (const Rule& rule : kRules) {
@@ -52,6 +60,13 @@ Doubts doubtsOfRun(const RunFacts& facts) {
     doubts.push_back({fmt::format("vio lost its way {} times and began anew", times),
                       "what came before and after is not in one frame of reference; perdure doctor "
                       "--data says why"});
+  }
+  constexpr std::uint64_t kOneLost = 20;  // recordings always lose some
+  const std::uint64_t lost = imagesLost(facts.capture), all = facts.frames + lost;
+  if (kOneLost * lost > all) {
+    doubts.push_back(
+        {fmt::format("{} of {} images are missing or cannot be read", lost, all),
+         "the reasons of capture in report.json count why; fetch or copy the drive again"});
   }
   if (4 * facts.without_pose > facts.frames) {
     doubts.push_back({fmt::format("{} of {} frames have no pose and were left out",
@@ -66,6 +81,7 @@ Doubts doubtsOfRun(const RunFacts& facts) {
   constexpr std::pair<const char*, const char*> kFindings[] = {
       {"clock_wrapped", "stamps were changed"},
       {"clock_set", "stamps were changed"},
+      {"clock_rate", "the clocks of camera and IMU run at different rates"},
       {"clock_", "stamps pause or jump"},
       {"imu_covers_part", "images lie outside of the inertial samples"},
       {"lines_lost", "lines of the recording were left out"},

@@ -19,10 +19,14 @@ using Doubts = std::vector<Doubt>;
 struct RunFacts {
   ReasonCounts vio = {};     ///< of vio, or, with given poses, of the node that computes landmarks
   std::uint64_t frames = 0;  ///< of the first camera
+  ReasonCounts capture = {};
   std::uint64_t without_pose = 0;  ///< those without a given pose
   std::uint64_t boxes = 0, objects = 0;
   replay::DataFindings findings = {};  ///< before the run
 };
+
+/// Number of images that are missing, cannot be read, or have a line that cannot be used.
+std::uint64_t imagesLost(const ReasonCounts& capture);
 
 /// Doubts about a run, whatever its input was: frames without a visual update, an empty map, clocks
 /// that were changed, contradictions.

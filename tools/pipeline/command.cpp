@@ -46,7 +46,8 @@ void addOptions(CLI::App& app, PipelineOptions& options) {
                  "rad/√m; .03,.0005 if not given");
   app.add_flag("--landmarks", options.landmarks,
                "Where the poses are given: points from the images too, as vio has them");
-  app.add_option("--detections", options.detections, "model, none, simulated, a file (CSV, COCO's JSON, MOT's lines), or recorded")
+  app.add_option("--detections", options.detections,
+                 "model, none, simulated, a file (CSV, COCO's JSON, MOT's lines), or recorded")
       ->required();
   app.add_option("--model", options.model, "Network for --detections model (.onnx, .cfg)");
   app.add_option("--class", options.class_name, "Class of a file that names none, for example Car");

@@ -109,10 +109,12 @@ void Pipeline::checkDetectionFile() {
         options_.detections, detection_file_->rows(), first, last, detection_file_->firstFrame(),
         detection_file_->lastFrame()));
   }
-  if (first == 0 && detection_file_->firstFrame() == 1 && detection_file_->lastFrame() == last + 1) {
-    refuse(fmt::format("{}: its frames are 1 … {}, those of the drive 0 … {}: they count from 1; "
-                       "subtract 1 from each",
-                       options_.detections, last + 1, last));
+  if (first == 0 && detection_file_->firstFrame() == 1 &&
+      detection_file_->lastFrame() == last + 1) {
+    refuse(
+        fmt::format("{}: its frames are 1 … {}, those of the drive 0 … {}: they count from 1; "
+                    "subtract 1 from each",
+                    options_.detections, last + 1, last));
   }
   const auto warn = [&](const char* code, const std::string& text) {
     findings_.push_back(
@@ -145,6 +147,7 @@ Doubts Pipeline::doubts() const {
                                              : ReasonCounts();
   auto doubts = doubtsOfRun({.vio = of_vio,
                              .frames = counts_.frames,
+                             .capture = dataset_->reasons(),
                              .without_pose = reasons_.of("frame_without_pose"),
                              .boxes = counts_.detections,
                              .objects = outputs_->history().lastBeliefs().size(),

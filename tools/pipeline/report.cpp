@@ -20,18 +20,10 @@ Json serviceCounts(std::uint64_t in, std::uint64_t out, std::uint64_t dropped) {
   return {{"frames_in", in}, {"frames_out", out}, {"dropped", dropped}, {"restarts", 0}};
 }
 
-std::uint64_t unreadable(const ReasonCounts& reasons) {
-  std::uint64_t count = 0;
-  for (const auto& [code, times] : reasons.all()) {
-    if (code.starts_with("image_")) count += times;
-  }
-  return count;
-}
-
 Json services(const Pipeline& pipeline, const std::map<std::string, ReasonCounts>& reasons) {
   const PipelineCounts& counts = pipeline.counts();
   Json json;
-  const std::uint64_t lost = unreadable(reasons.at("capture"));
+  const std::uint64_t lost = imagesLost(reasons.at("capture"));
   json["capture"] = serviceCounts(counts.frames + lost, counts.frames, lost);
   json["vio"] = serviceCounts(counts.frames, counts.odometry,
                               counts.frames - std::min(counts.frames, counts.odometry));

@@ -73,7 +73,7 @@ std::string whyNot(const fs::path& file, int code, const char* of_sqlite) {
         "may write; copy both files to one",
         file.string(), suffix);
   }
-  return of_sqlite;
+  return file.string() + ": " + of_sqlite;
 }
 
 /// SQLite keeps `-wal` beside the file that a link leads to.

@@ -52,9 +52,10 @@ using AreSame = std::function<bool(std::size_t, std::size_t)>;
 /// show.
 ///
 /// Other stamps out of order are strays if they are few, far outside their neighbours' stamps, and
-/// do not fill a gap elsewhere. Few means a fiftieth or three, if at most a fifth is out of order. With more of them the list is unsorted, and no stamp is left out.
-/// Up to three stamps at either end are strays as well, if they are separated by a pause longer
-/// than ten seconds and a thousand usual intervals.
+/// do not fill a gap elsewhere. Few means a fiftieth or three, if at most a fifth is out of order.
+/// With more of them the list is unsorted, and no stamp is left out. Up to three stamps at either
+/// end are strays as well, if they are separated by a pause longer than ten seconds and a thousand
+/// usual intervals.
 StampOrder orderOf(
     const std::vector<TimePoint>& stamps, const AreSame& same = [](auto, auto) { return true; },
     const std::vector<ClockChange>& known = {});

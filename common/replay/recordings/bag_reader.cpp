@@ -69,6 +69,7 @@ struct ChunkPlace {
   std::string compression = {};
   std::uint64_t start_ns = UINT64_MAX, end_ns = 0;
   std::set<std::uint32_t> connections = {};
+  std::uint64_t number = 0;  ///< in the order of the file
 };
 
 class Bag : public RosSource {
@@ -90,6 +91,7 @@ class Bag : public RosSource {
       topic.encoding = ros::Encoding::kRos1;
       topic.messages += n;
     }
+    for (std::size_t i = 0; i < chunks_.size(); ++i) chunks_[i].number = i;
     std::stable_sort(chunks_.begin(), chunks_.end(),
                      [](const auto& a, const auto& b) { return a.start_ns < b.start_ns; });
   }
@@ -293,9 +295,12 @@ class Bag : public RosSource {
     const auto records = unpack(chunk);
     if (!records) return count(records.error());
     hold(*records);
+    constexpr int kMessageBits = 24;
+    std::uint64_t place = chunk.number << kMessageBits;
     forEachMessage(**records, [&](std::uint32_t connection, std::uint64_t log_ns, Bytes data) {
+      ++place;
       if (!isWanted(connection)) return;
-      pending_.push({{connections_.at(connection).first, log_ns, data, *records}, order_++});
+      pending_.push({{connections_.at(connection).first, log_ns, place, data, *records}, order_++});
     });
   }
 

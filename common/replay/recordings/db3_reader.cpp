@@ -30,7 +30,9 @@ class Db3 : public RosSource {
     database_.reset(opened.connection);
     std::error_code ignored;
     if (std::filesystem::file_size(path, ignored) == 0) refuse("it is empty, 0 bytes");
-    if (opened.code != SQLITE_OK) refuse(opened.why);
+    const int kind = opened.code & 0xff;
+    if (kind == SQLITE_NOTADB || kind == SQLITE_CORRUPT) refuse(opened.why);
+    if (kind != SQLITE_OK) throw StartupError(ExitCode::kUnavailable, opened.why);
     readTopics();
     countMessages();
     if (end_ns_ == 0) refuseLeftBehind();
@@ -41,7 +43,7 @@ class Db3 : public RosSource {
     for (const auto& [id, name] : names_) {
       if (wanted.contains(name)) ids += (ids.empty() ? "" : ",") + std::to_string(id);
     }
-    chosen_ = "SELECT topic_id, timestamp, data FROM messages WHERE timestamp >= " +
+    chosen_ = "SELECT topic_id, timestamp, data, id FROM messages WHERE timestamp >= " +
               std::to_string(static_cast<sqlite3_int64>(from_ns)) + " AND topic_id IN (" + ids +
               ") ORDER BY ";
     rows_ = prepared(chosen_ + "timestamp, id");
@@ -94,7 +96,7 @@ class Db3 : public RosSource {
     const auto size = static_cast<std::size_t>(sqlite3_column_bytes(rows_.get(), 2));
     const auto data = std::make_shared<const std::vector<std::uint8_t>>(bytes, bytes + size);
     return {names_.at(sqlite3_column_int64(rows_.get(), 0)), static_cast<std::uint64_t>(last_ns_),
-            *data, data};
+            static_cast<std::uint64_t>(sqlite3_column_int64(rows_.get(), 3)), *data, data};
   }
 
   /// The recorder writes to FILE-wal first. Without it a file of a killed recorder is empty.

@@ -27,6 +27,12 @@ std::vector<fs::path> plainFilesIn(const fs::path& path) {
 /// Returns true for topics that a recorder repeats at the start of each segment.
 bool isLatchedAlone(const std::string& topic) { return topic == "calibration" || topic == "model"; }
 
+std::uint64_t startOf(const mcap::Reader& file) {
+  std::uint64_t start = UINT64_MAX;
+  for (const auto& chunk : file.chunks()) start = std::min(start, chunk.start_ns);
+  return start;
+}
+
 }  // namespace
 
 std::string topicOf(const std::string& channel) {
@@ -51,8 +57,11 @@ RecordedMessages::RecordedMessages(const fs::path& path, Chunks look)
   std::vector<RecordingPart> parts;
   for (const fs::path& file : files) openFile(file, look, parts);
   notes_ = joinParts(std::move(parts));
+  // Numbers in file names sort 10 before 2.
+  std::stable_sort(files_.begin(), files_.end(),
+                   [](const auto& a, const auto& b) { return startOf(a) < startOf(b); });
   for (std::size_t i = 0; i < files_.size(); ++i) {
-    for (const auto& chunk : files_[i].chunks()) chunks_.push_back({i, &chunk});
+    for (const auto& chunk : files_[i].chunks()) chunks_.push_back({i, &chunk, chunks_.size()});
   }
   if (chunks_.empty()) {
     throw StartupError(ExitCode::kUnavailable,
@@ -165,7 +174,8 @@ void RecordedMessages::load(const ChunkPlace& place) {
   const auto records = file.unpack(*place.index);
   if (!records) return count(records.error());
   mcap::Catalogue catalogue = file.catalogue();
-  const auto visit = [&](const mcap::Message& message, std::uint64_t) {
+  constexpr int kOffsetBits = 32;
+  const auto visit = [&](const mcap::Message& message, std::uint64_t offset) {
     const auto channel = catalogue.channels.find(message.channel);
     if (channel == catalogue.channels.end()) {
       return count({"channel_unknown", file.path().string() + " has a message of no channel"});
@@ -176,6 +186,7 @@ void RecordedMessages::load(const ChunkPlace& place) {
     const auto schema = catalogue.schemas.find(channel->second.schema);
     if (schema != catalogue.schemas.end()) recorded.type = schema->second.name;
     recorded.log_ns = message.log_ns;
+    recorded.place = (place.number << kOffsetBits) + offset;
     recorded.data = message.data;
     recorded.keeper = *records;
     pending_.push({std::move(recorded), order_++});

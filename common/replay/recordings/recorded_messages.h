@@ -22,6 +22,7 @@ struct RecordedMessage {
   std::string topic;                   ///< "odometry": without the prefix perdure/<vehicle>/
   std::string type;                    ///< "perdure::msg::Odometry"
   std::uint64_t log_ns = 0;            ///< time of arrival at the recorder; never decreases
+  std::uint64_t place = 0;             ///< increases in the order of the file
   mcap::Bytes data;                    ///< format: common/wire/cdr.h
   std::shared_ptr<const void> keeper;  ///< owner of the memory of `data`
 };
@@ -71,6 +72,7 @@ class RecordedMessages {
   struct ChunkPlace {
     std::size_t file = 0;
     const mcap::ChunkIndex* index = nullptr;
+    std::uint64_t number = 0;  ///< in the order of the files
   };
   struct Pending {
     RecordedMessage message;

@@ -45,7 +45,8 @@ class McapSource : public RosSource {
     reasons_ = messages_.reasons();
     last_problem_ = messages_.lastProblem();
     if (!message) return std::nullopt;
-    return RosMessage{std::move(message->topic), message->log_ns, message->data, message->keeper};
+    return RosMessage{std::move(message->topic), message->log_ns, message->place, message->data,
+                      message->keeper};
   }
   std::vector<std::string> notes() const override { return messages_.notes(); }
 
@@ -87,6 +88,8 @@ RosMessages::RosMessages(const fs::path& path) : unpacked_(unpackedFiles(path, "
   for (const auto& file : filesWith(path, ".bag")) add(openBag(file), file);
   for (const auto& file : filesWith(path, ".db3")) add(openDb3(file), file);
   for (const auto& file : unpacked_) add(openDb3(file->path()), file->packed());
+  std::stable_sort(sources_.begin(), sources_.end(),
+                   [](const auto& a, const auto& b) { return a->startNs() < b->startNs(); });
   notes_ = joinParts(std::move(parts));
   const auto others = filesWith(path, ".mcap");
   if (sources_.empty()) {
@@ -175,6 +178,8 @@ std::optional<RosMessage> RosMessages::nextRecorded() {
   }
   if (first == heads_.size()) return std::nullopt;
   auto message = std::move(heads_[first]);
+  constexpr int kPlaceBits = 48;  // of the place in one file
+  message->place |= std::uint64_t{first} << kPlaceBits;
   heads_[first] = sources_[first]->next();
   return message;
 }

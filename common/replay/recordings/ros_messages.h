@@ -20,6 +20,7 @@ namespace perdure::replay {
 struct RosMessage {
   std::string topic;         ///< "/cam0/image_raw"
   std::uint64_t log_ns = 0;  ///< time of recording; never decreases
+  std::uint64_t place = 0;   ///< increases in the order in which messages were written
   std::span<const std::uint8_t> data;
   std::shared_ptr<const void> keeper;  ///< owner of the memory of `data`
 };

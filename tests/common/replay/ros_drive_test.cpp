@@ -112,6 +112,40 @@ TEST(RosDrive, ImagesThatWereRecordedAtOneMomentAreReadInOrderAndOutOfTurn) {
   }
 }
 
+/// A drive of 40 images, without its pixels.
+fs::path longerDrive(const std::string& name) {
+  const auto mav0 = tinyEuroc(name) / "mav0";
+  std::string images, samples;
+  for (int i = 0; i < 40; ++i) {
+    const std::string stamp = std::to_string(1'000'000'000 + 50'000'000 * i);
+    if (i > 4)
+      fs::copy_file(mav0 / "cam0/data/1000000000.png", mav0 / "cam0/data" / (stamp + ".png"));
+    images += stamp + "," + stamp + ".png\n";
+  }
+  for (int i = 0; i < 420; ++i) {
+    samples += std::to_string(950'000'000 + 5'000'000 * i) + "," + std::to_string(i) +
+               ",.2,.3,9.7,.5,-.5\n";
+  }
+  writeText(mav0 / "cam0/data.csv", images);
+  writeText(mav0 / "imu0/data.csv", samples);
+  return mav0.parent_path();
+}
+
+TEST(RosDrive, OfAClockThatWasSetBackTheOrderOfTheFileCounts) {
+  const auto folder = Dataset::open({.path = longerDrive("ros_set_source")});
+  const auto file = freshFolder("ros_set") / "run_0.db3",
+             rig = freshFolder("ros_set_rig") / "r.yaml";
+  test::writeDb3(*folder, file, {.set_ns = 2'000'000'000, .set_back_ns = 700'000'000});
+  test::writeImuRig(*folder, rig);
+  const auto drive = Dataset::open({.path = file, .rig = rig});
+  folder->seek(0);
+  const auto whole = test::allOf(*folder), read = test::allOf(*drive);
+  EXPECT_EQ(read.order, whole.order);
+  EXPECT_EQ(read.pixels, whole.pixels);
+  ASSERT_EQ(drive->recording().clock_changes.size(), 2u);
+  EXPECT_TRUE(drive->recording().clock_changes.front().common);
+}
+
 TEST(RosDrive, MessagesWithoutStampsGetTheTimeOfTheirRecordingAndThatIsSaid) {
   const Twin twin = twinOf("ros_unstamped", {.stamps = false});
   const auto dataset = Dataset::open({.path = twin.file, .rig = twin.rig});

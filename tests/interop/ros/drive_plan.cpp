@@ -224,7 +224,8 @@ void writeDb3(replay::Dataset& dataset, const fs::path& file, const PlanOptions&
     const auto* imu = std::get_if<ImuSample>(&*message);
     const auto* frame = std::get_if<Frame>(&*message);
     if (imu == nullptr && frame == nullptr) continue;
-    const std::int64_t ns = toNanoseconds(imu ? imu->time : frame->stamp.time);
+    std::int64_t ns = toNanoseconds(imu ? imu->time : frame->stamp.time);
+    if (ns >= options.set_ns) ns -= options.set_back_ns;
     const std::int64_t log_ns = (options.one_log_time ? 0 : ns) + kLogDelay;
     if (!begun && options.transforms)
       database.add("/tf_static", log_ns, transformsOf(dataset.calibration(), options));

@@ -2,6 +2,7 @@
 // a bag or an MCAP file. Writes rosbag2's SQLite directly.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -20,6 +21,8 @@ struct PlanOptions {
   bool one_log_time = false;       ///< writeDb3 only: all messages have the same log time
   /// writeDb3 only: 16 bits per pixel, of which 12 are used; the first `dark` images are dark.
   std::optional<std::size_t> dark = {};
+  /// writeDb3 only: messages from this time on have earlier times, as after a clock was set back.
+  std::int64_t set_ns = INT64_MAX, set_back_ns = 0;
   std::string suffix = {};  ///< suffix of cam0's namespace: "/cam0SUFFIX/image_raw"
 };
 

@@ -85,6 +85,26 @@ TEST(ClockShift, IsNotCertainWhereTheTurningComesAgain) {
   EXPECT_FALSE(shiftOfTurns(turnsOf(samples, seconds(3)), samples, camera()));
 }
 
+TEST(ClockRate, IsFoundAndAConstantShiftIsNone) {
+  const auto samples = randomTurning(1);
+  for (const double rate : {-0.05, -0.01, 0.01, 0.03}) {
+    auto turns = turnsOf(samples, milliseconds(200));
+    for (Turn& turn : turns) {
+      for (TimePoint* time : {&turn.from, &turn.to}) {
+        *time = kStart + durationFromSeconds(toSeconds(*time - kStart) / (1.0 + rate));
+      }
+    }
+    // A shift of over 1.5 s at the ends is not searched.
+    turns.resize(std::abs(rate) > 0.02 ? 60 : turns.size());
+    const auto found = rateOfTurns(turns, samples, camera());
+    ASSERT_TRUE(found) << rate;
+    EXPECT_NEAR(*found, rate, 0.002);
+  }
+  for (const double ahead : {0.0, 0.3, 5.0}) {
+    EXPECT_FALSE(rateOfTurns(turnsOf(samples, durationFromSeconds(ahead)), samples, camera()));
+  }
+}
+
 TEST(ClockShift, IsNamedWithItsCauseAndItsMend) {
   const auto textOf = [](double shift) { return shiftFinding(shift, camera()).front().text; };
   EXPECT_THAT(textOf(-37.0), HasSubstr("37 s ahead of that of the IMU by their turning, as TAI"));

@@ -36,13 +36,21 @@ TEST(Doubts, ContradictionsOfATenthOfTheRunAreTold) {
 }
 
 TEST(Doubts, AnUncertainPositionIsTold) {
-  EXPECT_THAT(doubtsAt("position_uncertain", 24),
-              ElementsAre(HasSubstr("turn less on the spot")));
+  EXPECT_THAT(doubtsAt("position_uncertain", 24), ElementsAre(HasSubstr("turn less on the spot")));
   EXPECT_THAT(doubtsAt("position_uncertain", 12), IsEmpty());
 }
 
 TEST(Doubts, ASpeedThatIsRefusedIsTold) {
   EXPECT_THAT(doubtsAt("speed_gated", 200), ElementsAre(HasSubstr("its unit (m/s)")));
+}
+
+TEST(Doubts, ImagesThatCannotBeReadAreTold) {
+  ReasonCounts capture;
+  capture.add("image_truncated", 9);
+  EXPECT_THAT(sentences({.frames = 231, .capture = capture}), IsEmpty());
+  capture.add("frame_stray", 9);
+  EXPECT_THAT(sentences({.frames = 222, .capture = capture}),
+              ElementsAre(HasSubstr("18 of 240 images are missing or cannot be read")));
 }
 
 TEST(Doubts, TwoFramesOfReferenceAreTold) {

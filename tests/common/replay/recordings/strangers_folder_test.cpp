@@ -22,6 +22,7 @@ using test::twinOf;
 using testing::AllOf;
 using testing::Contains;
 using testing::HasSubstr;
+using testing::Not;
 
 void run(sqlite3* database, const std::string& query) {
   EXPECT_EQ(sqlite3_exec(database, query.c_str(), nullptr, nullptr, nullptr), SQLITE_OK)
@@ -95,6 +96,8 @@ TEST(StrangersFolder, ALockedDatabaseIsNamed) {
   run(writer, "BEGIN EXCLUSIVE");
   const OpenedSqlite opened = openSqliteToRead(twin.file);
   EXPECT_THAT(opened.why, HasSubstr("run_0.db3 is locked by another program"));
+  EXPECT_THAT(errorOf(twin, twin.file),
+              AllOf(HasSubstr("locked by another"), Not(HasSubstr("no recording"))));
   sqlite3_close(opened.connection);
   sqlite3_close(writer);
 }
