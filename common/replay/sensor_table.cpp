@@ -40,7 +40,7 @@ SensorTable::SensorTable(const std::filesystem::path& file, const std::string& k
     row.time = *time;
     rows_.push_back(std::move(row));
   }
-  if (first_negative && negative > kFewNegative) {
+  if (first_negative && negative > kFewNegative && 20 * negative > lines_) {
     throw StartupError(ExitCode::kData,
                        "{}:{}: {} of {} stamps are negative, the first is `{}`; add the same number "
                        "to the stamps of all sensors",

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "common/math/so3.h"
 #include "tests/scenario/scenario.h"
 #include "tests/scenario/topdown_run.h"
 
@@ -70,7 +71,7 @@ TEST(LongTopDown, FindsMoreOfWhatIsSmallOrHalfHiddenAtTheSameRateOfFalseAlarms) 
 }
 
 ObjectBelief ghost(ObjectId id, const std::string& name, const Eigen::Vector3d& centre,
-                   const Eigen::Vector3d& size, TimePoint now) {
+                   const Eigen::Vector3d& size, double azimuth, TimePoint now) {
   ObjectBelief belief;
   belief.id = id;
   belief.existence = 0.98;
@@ -83,6 +84,7 @@ ObjectBelief ghost(ObjectId id, const std::string& name, const Eigen::Vector3d& 
   belief.classes = {in_class};
   belief.first_seen = belief.last_seen = belief.as_of = now;
   belief.hits = 20;
+  addDirection(belief.seen_from, azimuth, 40.0);
   return belief;
 }
 
@@ -107,7 +109,8 @@ TEST(LongTopDown, AGhostThatIsPlantedInTheMapStillDies) {
     const auto& [name, size] = kinds[id % kinds.size()];
     Eigen::Vector3d centre = T_WB * Eigen::Vector3d(ahead, id % 2 == 0 ? 1.0 : -1.0, 0.0);
     centre.z() = 0.5 * size.z();
-    setting.planted.push_back(ghost(id++, name, centre, size, truth.frames[kAt]));
+    const double azimuth = yawOf(T_WB.R());  // the street was driven in this direction before
+    setting.planted.push_back(ghost(id++, name, centre, size, azimuth, truth.frames[kAt]));
   }
   setting.plant_at = kAt;
   for (const bool prime : {true, false}) {

@@ -90,7 +90,9 @@ class CocoReader {
     std::uint64_t last = 0;
     for (const auto& [name, number] : numbers_) last = std::max(last, number);
     const bool beyond = !numbers_.empty() && *frames.rbegin() == last + 1;
-    if (!beyond && !(result_.frames && *frames.rbegin() == frames.size())) {
+    const bool ends_with_drive = !numbers_.empty() && *frames.rbegin() == last;
+    const bool complete = result_.frames && *frames.rbegin() == frames.size();
+    if (!beyond && (!complete || ends_with_drive)) {
       result_.note = "its frames begin at 1 and are taken as counted from 0; if they count from 1, "
                      "subtract 1 from each";
       return;

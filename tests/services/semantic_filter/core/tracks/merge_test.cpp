@@ -167,6 +167,22 @@ TEST_F(Merge, InvisibleTracksAreNotMerged) {
   EXPECT_TRUE(mergeObjects(objects, frame).empty());
 }
 
+/// A loop closure brings an object back to where a new track of it was left behind.
+TEST_F(Merge, ATrackAndAnObjectOfTheMapInOnePlaceAreOneAlsoUnseen) {
+  const auto merged = [&](bool recalled, double aside_m, double sigma_m) {
+    std::vector<Track> objects = {
+        makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), sigma_m * sigma_m),
+        makeObject(2, "car", makeState(10, aside_m, 0.7, 0, 4, 1.8, 1.5), 0.01)};
+    for (Track& o : objects) o.visibility.fraction = 0.0;
+    objects[0].life.recalled = recalled;
+    return mergeObjects(objects, frame).size() == 1;
+  };
+  EXPECT_TRUE(merged(true, 0.4, 0.3));
+  EXPECT_FALSE(merged(false, 0.4, 0.3));
+  EXPECT_FALSE(merged(true, 1.9, 0.3)) << "they stand beside each other";
+  EXPECT_FALSE(merged(true, 0.4, 2.0)) << "it may be the car beside it";
+}
+
 TEST_F(Merge, FusionCountsThePriorOnSizeOnce) {
   // Each belief is the size prior plus one observation with variance 0.02 in each dimension.
   const ClassPrior prior = priors.of("car");

@@ -224,6 +224,39 @@ TEST_F(TrackUpdate, UsesTheDetectionRateOfThisViewpoint) {
   EXPECT_NEAR(object.detectability.hard_to_detect, 0.1 * (1.0 - 0.3 * P_D) / A, 1e-12);
 }
 
+TEST_F(TrackUpdate, ABoxAtThePlaceOfAnObjectOfTheMapIsNoMiss) {
+  const std::vector<BoxDetection> boxes{evidenceOf(object.best().x)};
+  const TrackScore seen = scoreHypothesis(boxes, 1.0);
+  for (const bool recalled : {true, false}) {
+    Track taken = object;
+    taken.life.recalled = recalled;
+    update(taken, seen, Eigen::VectorXd::Zero(1), boxes, frame);  // another track has the box
+    EXPECT_EQ(sameBits(taken, object), recalled);
+  }
+  Track missed = object;
+  missed.life.recalled = true;
+  update(missed, scoreHypothesis({}, 1.0), Eigen::VectorXd(), {}, frame);
+  EXPECT_LT(missed.existence, object.existence);
+}
+
+TEST_F(TrackUpdate, ADetectionNotesItsDirectionAndDistance) {
+  const std::vector<BoxDetection> boxes{evidenceOf(object.best().x)};
+  update(object, scoreHypothesis(boxes, 1.0), Eigen::VectorXd::Ones(1), boxes, frame);
+  EXPECT_NEAR(object.detectability.seen_now[0], 15.0F, 0.5F);
+  EXPECT_EQ(object.detectability.seen_now.count(), 1);
+}
+
+TEST_F(TrackUpdate, MissesSayHowSmallIsTooSmallOnceTheObjectIsDetectedAgain) {
+  object.life.once_confirmed = true;
+  const std::vector<BoxDetection> boxes{evidenceOf(object.best().x)};
+  update(object, scoreHypothesis({}, 1.0), Eigen::VectorXd(), {}, frame);
+  EXPECT_EQ(object.detectability.proven.information, 0.0);
+  EXPECT_GT(object.detectability.missed.gradient, 0.0);
+  update(object, scoreHypothesis(boxes, 1.0), Eigen::VectorXd::Ones(1), boxes, frame);
+  EXPECT_GT(object.detectability.proven.gradient, 0.0);
+  EXPECT_EQ(object.detectability.missed.information, 0.0);
+}
+
 /// One miss in five observations, from a camera at rest.
 TEST_F(TrackUpdate, AnObservationWhoseBoxIsRefusedIsAMiss) {
   const std::vector<BoxDetection> boxes{evidenceOf(object.best().x)};
@@ -283,7 +316,8 @@ TEST_F(TrackUpdate, BetweenRestAndMotionABoxCountsByTheTimeSinceTheLastOne) {
   const Track before = object;
   for (const auto& [seconds, exponent] : {std::pair{0.1, 0.271}, std::pair{5.0, 1.0}}) {
     object = before;
-    object.life.last_seen = object.as_of - std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
+    object.life.last_seen =
+        object.as_of - std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
     update(object, l, Eigen::VectorXd::Ones(1), boxes, frame);
     double still = 0.0, moving = 0.0;
     for (const auto& h : object.hypotheses) {
