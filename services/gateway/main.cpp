@@ -305,9 +305,7 @@ void serve(service::Context& context, const gateway::Config& config, const std::
       },
       [&] { return beginning.lookedAt() || node.waits(); });
   context.countReasons([&]() -> const ReasonCounts& { return node.reasons(); });
-  context.countReasons([&](ReasonCounts& counts) {
-    counts.add(server.stats().reasons);
-  });
+  context.countReasons([&](ReasonCounts& counts) { counts.add(server.stats().reasons); });
   bus::Discovery discovery(context.participant());
   const std::string address = addressOf(config, server.port());
   context.onHealth([&] {

@@ -1,6 +1,5 @@
 #include "services/ros2/config.h"
 
-
 #include "common/base/errors.h"
 
 namespace perdure::ros2 {

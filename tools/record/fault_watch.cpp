@@ -1,6 +1,5 @@
 #include "tools/record/fault_watch.h"
 
-
 namespace perdure::tools {
 
 std::optional<std::string> FaultWatch::onHealth(const Health& health, Time now) {

@@ -1,6 +1,5 @@
 #include "services/gateway/core/pieces.h"
 
-
 namespace perdure::gateway {
 
 std::string opticalFrame(const std::string& camera) { return camera + "_optical"; }

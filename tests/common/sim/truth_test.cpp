@@ -167,7 +167,8 @@ TEST_F(TruthFolder, WhoseObjectsAreWrongSaysWhichAndWhat) {
   EXPECT_THAT(complaintOf("\"class\":\"car\"", "\"class\":7"), HasSubstr("class is not a name"));
   EXPECT_THAT(complaintOf("\"id\":1", "\"id\":0"), HasSubstr("id is not above 0"));
   EXPECT_THAT(complaintOf("\"id\":1", "\"id\":1.5"), HasSubstr("id is not an integer"));
-  EXPECT_THAT(complaintOf("\"id\":1", "\"id\":18446744073709551615"), HasSubstr("id is not above 0"));
+  EXPECT_THAT(complaintOf("\"id\":1", "\"id\":18446744073709551615"),
+              HasSubstr("id is not above 0"));
   EXPECT_THAT(complaintOf("\"moves\":false,", ""), HasSubstr("moves is missing"));
   EXPECT_THAT(complaintOf("_until_ns\":9", "_until_ns\":0"), HasSubstr("present_until_ns"));
   EXPECT_THAT(complaintOf("{\"time_ns\":0,\"centre\":[1,2,3],\"yaw\":0}", ""),

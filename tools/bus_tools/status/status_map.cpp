@@ -1,7 +1,6 @@
 // Judges the map and its graph by the latched topics of map_store.
 #include <fmt/format.h>
 
-
 #include "common/types/map_graph.h"
 #include "tools/bus_tools/status/status.h"
 

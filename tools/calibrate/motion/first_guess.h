@@ -3,7 +3,6 @@
 // (Wahba's problem, Kabsch).
 #pragma once
 
-
 #include "tools/calibrate/motion/track_windows.h"
 
 namespace perdure::calibrate {

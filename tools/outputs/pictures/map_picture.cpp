@@ -1,6 +1,5 @@
 #include "tools/outputs/pictures/map_picture.h"
 
-
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
