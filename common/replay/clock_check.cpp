@@ -116,7 +116,7 @@ void checkShared(const Recording& recording, DataFindings& findings) {
       std::count_if(recording.frames.begin(), recording.frames.end(),
                     [&](const auto& frame) { return frame.time >= from && frame.time <= to; });
   const auto all = static_cast<std::ptrdiff_t>(recording.frames.size());
-  if (10 * covered >= 9 * all) return;
+  if (20 * covered >= 19 * all) return;
   findings.push_back(
       {StampGrade::kWarning, "imu_covers_part",
        fmt::format("only {} of {} images lie within the time of the inertial samples: "

@@ -107,6 +107,15 @@ TEST(ClockCheck, AShortJumpAheadOfOneClockIsSaidAndLostImagesAreNot) {
   }
 }
 
+TEST(ClockCheck, ATwentiethOfTheImagesOutsideOfTheSamplesIsTold) {
+  const auto warningOf = [](Duration late) {
+    const Stamp images = [=](Duration time) { return time + late; };
+    return finding(readWith(kSame, images), DataFinding::Grade::kWarning, "imu_covers_part");
+  };
+  EXPECT_EQ(warningOf(milliseconds(700)), "none");
+  EXPECT_THAT(warningOf(milliseconds(1500)), HasSubstr("only 185 of 200 images"));
+}
+
 TEST(ClockCheck, ACounterThatOneSensorDoesNotHaveIsContinuedInBoth) {
   const Duration length = Duration(4'294'967'296'000);
   const auto round = [&](Duration time) { return (length - seconds(110) + time) % length; };
