@@ -41,8 +41,8 @@ class Vandal {
     w = random_.below(4) == 0 ? nullptr : texts_.back().data();
   }
   void name(const char* field, std::string& d, char*& w) { text(field, d, w, 0); }
-  template <class M, std::size_t N>
-  void matrix(const char*, M&, double (&w)[N], const Limits&) {
+  template <class M, class W, std::size_t N>
+  void matrix(const char*, M&, W (&w)[N], const Limits&) {
     damage(w[random_.below(N)]);
   }
   template <class M, std::size_t N>

@@ -205,7 +205,8 @@ class Taker : public EachField<Taker> {
                        shapeText(array));
     }
     for (int r = 0; r < kRows; ++r) {
-      for (int c = 0; c < kCols; ++c) d(r, c) = array.data()[r * kCols + c];
+      for (int c = 0; c < kCols; ++c)
+        d(r, c) = static_cast<typename M::Scalar>(array.data()[r * kCols + c]);
     }
   }
 

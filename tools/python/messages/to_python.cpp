@@ -21,10 +21,10 @@ py::object objectOf(const TimePoint& time) { return py::int_(toNanoseconds(time)
 template <class M>
 requires(M::RowsAtCompileTime > 0) py::object objectOf(const M& m) {
   constexpr int kRows = M::RowsAtCompileTime, kCols = M::ColsAtCompileTime;
+  using X = typename M::Scalar;
   using RowMajor =
-      Eigen::Matrix<double, kRows, kCols, kCols == 1 ? int{Eigen::ColMajor} : int{Eigen::RowMajor}>;
-  py::array_t<double> array =
-      kCols == 1 ? py::array_t<double>(kRows) : py::array_t<double>({kRows, kCols});
+      Eigen::Matrix<X, kRows, kCols, kCols == 1 ? int{Eigen::ColMajor} : int{Eigen::RowMajor}>;
+  py::array_t<X> array = kCols == 1 ? py::array_t<X>(kRows) : py::array_t<X>({kRows, kCols});
   Eigen::Map<RowMajor>(array.mutable_data()) = m;
   return array;
 }
