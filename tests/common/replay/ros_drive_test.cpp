@@ -142,8 +142,7 @@ TEST(RosDrive, OfAClockThatWasSetBackTheOrderOfTheFileCounts) {
   const auto whole = test::allOf(*folder), read = test::allOf(*drive);
   EXPECT_EQ(read.order, whole.order);
   EXPECT_EQ(read.pixels, whole.pixels);
-  ASSERT_EQ(drive->recording().clock_changes.size(), 2u);
-  EXPECT_TRUE(drive->recording().clock_changes.front().common);
+  EXPECT_EQ(drive->recording().clock_changes.size(), 2u);
 }
 
 TEST(RosDrive, MessagesWithoutStampsGetTheTimeOfTheirRecordingAndThatIsSaid) {
