@@ -131,8 +131,6 @@ std::optional<double> shiftOfTurns(const std::vector<Turn>& turns,
   for (auto other = left.begin(); other != left.end(); ++other) {
     if (std::abs(other - best) > apart) second = std::min(second, *other);
   }
-  fprintf(stderr, "shift best %g at %g second %g\n", *best,
-          kStep_s * static_cast<double>(least + (best - left.begin())), second);
   if (*best > kMostLeft || kTimesLeft * *best > second) return std::nullopt;
   return kStep_s * static_cast<double>(least + (best - left.begin()));
 }
