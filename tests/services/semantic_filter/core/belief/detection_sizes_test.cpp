@@ -9,7 +9,7 @@
 namespace perdure::semantic_filter {
 namespace {
 
-constexpr std::uint64_t kNetwork = 5;
+constexpr std::uint64_t kDetector = 5;
 
 /// Learns from `count` observations of a detector that finds half of the objects of `half_px`.
 double learned(double half_px, int count) {
@@ -27,10 +27,10 @@ double learned(double half_px, int count) {
     const double size = size_px(random);
     frame.size_scale = half_px / parameters.box.min_size_px;
     const bool detected = dice(random) < detectionProbability(car, size, frame);
-    frame.size_scale = sizes.scale(kNetwork);
-    sizes.learn(kNetwork, sizeEvidence(car, size, detected, frame));
+    frame.size_scale = sizes.scale(kDetector);
+    sizes.learn(kDetector, sizeEvidence(car, size, detected, frame));
   }
-  return sizes.scale(kNetwork) * parameters.box.min_size_px;
+  return sizes.scale(kDetector) * parameters.box.min_size_px;
 }
 
 TEST(DetectionSizes, AreThoseOfTheDetector) {
@@ -46,12 +46,12 @@ TEST(DetectionSizes, BeginWithTheAssumption) {
 
 TEST(DetectionSizes, BelongToANetwork) {
   DetectionSizes sizes;
-  sizes.learn(kNetwork, {5.0, 10.0});
-  EXPECT_GT(sizes.scale(kNetwork), 1.2);
-  EXPECT_EQ(sizes.scale(kNetwork + 1), 1.0);
-  const double before = sizes.scale(kNetwork);
-  sizes.learn(kNetwork, {std::nan(""), 1.0});
-  EXPECT_EQ(sizes.scale(kNetwork), before);
+  sizes.learn(kDetector, {5.0, 10.0});
+  EXPECT_GT(sizes.scale(kDetector), 1.2);
+  EXPECT_EQ(sizes.scale(kDetector + 1), 1.0);
+  const double before = sizes.scale(kDetector);
+  sizes.learn(kDetector, {std::nan(""), 1.0});
+  EXPECT_EQ(sizes.scale(kDetector), before);
 }
 
 }  // namespace
