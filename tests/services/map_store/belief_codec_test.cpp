@@ -112,7 +112,7 @@ TEST(BeliefCodec, GivesBackEveryBitOfAHeader) {
 TEST(BeliefCodec, WritesItsVersionAndIdLittleEndian) {
   const Bytes bytes = encodeBelief(carAt(0x0102030405060708u, {0, 0, 0}));
   const Bytes head(bytes.begin(), bytes.begin() + 10);
-  EXPECT_EQ(head, (Bytes{3, 0, 8, 7, 6, 5, 4, 3, 2, 1}));
+  EXPECT_EQ(head, (Bytes{4, 0, 8, 7, 6, 5, 4, 3, 2, 1}));
 }
 
 TEST(BeliefCodec, RefusesEveryTruncation) {
@@ -129,7 +129,7 @@ TEST(BeliefCodec, RefusesLeftOverBytesOtherVersionsAndNoClass) {
   longer.push_back(0);
   EXPECT_FALSE(decodeBelief(longer).has_value());
   Bytes newer = encodeBelief(carAt(3, {1, 2, 3}));
-  newer[0] = 4;
+  newer[0] = 5;
   EXPECT_FALSE(decodeBelief(newer).has_value());
   ObjectBelief nothing = carAt(3, {1, 2, 3});
   nothing.classes.clear();
