@@ -228,6 +228,7 @@ class ObjectBelief(Message):
     recalled: bool  # bool
     why: Ledger  # Ledger, the evidence for it, in nats
     track: int  # int
+    seen_from: npt.NDArray[np.float64]  # (16,)
     @property
     def position(self) -> Array: ...  # (3,) centre, m.
     @property

@@ -64,7 +64,10 @@ TEST_F(Lifecycle, AnUnseenMoverIsConfirmedOnlyWhileItsPlaceIsKnown) {
     o.visibility.fraction = 0.0;
     Hypothesis& h = o.hypotheses[0];
     h.moving = moving;
-    if (moving) h.P.bottomRightCorner<3, 3>().diagonal().setConstant(0.25);
+    if (moving) {
+      h.x[kVelocity] = 3.0;
+      h.P.bottomRightCorner<3, 3>().diagonal().setConstant(0.25);
+    }
     h.weight = probability;
     if (probability < 1.0) {
       o.hypotheses.push_back(h);

@@ -90,15 +90,16 @@ TEST(Predict, DirectionsOfDetectionsExcludeAnUnmappedOccluder) {
   walk.occluder = {0.15, 1e9, 1e9};
   walk.detectability = {0.15, 0.3, 1e9};
   const Track car = biasedCar(walk);
-  const Eigen::Vector3d place = car.best().x.head<3>(), ray = place - walk.T_WC.p;
+  const Eigen::Vector3d place = car.best().x.head<3>();
+  constexpr double kAzimuth = 0.1;
   const auto occludedAt = [&](double turn, double metres, double seen_at) {
     Track object = car;
     if (seen_at > 0.0) {
-      addDirection(object.detectability.seen_from, std::atan2(ray.y(), ray.x()), seen_at);
+      addDirection(object.detectability.seen_from, kAzimuth, seen_at);
     }
     object.views.predicted_from.reset();
     ViewWalk now = walk;
-    now.T_WC.p = place - rotationAboutZ(turn) * ray.normalized() * metres;
+    now.T_WC.p = place - rotationAboutZ(kAzimuth + turn) * Eigen::Vector3d(metres, 0.0, 0.0);
     predict(object, object.as_of + std::chrono::seconds(5), PoseError{}, MotionParameters{}, now);
     return object.detectability.unmapped_occluder;
   };

@@ -248,6 +248,7 @@ TEST_F(TrackUpdate, ADetectionNotesItsDirectionAndDistance) {
 
 TEST_F(TrackUpdate, MissesSayHowSmallIsTooSmallOnceTheObjectIsDetectedAgain) {
   object.life.once_confirmed = true;
+  frame.size_scale = 5.0;  // the car is about as small as what is found half of the time
   const std::vector<BoxDetection> boxes{evidenceOf(object.best().x)};
   update(object, scoreHypothesis({}, 1.0), Eigen::VectorXd(), {}, frame);
   EXPECT_EQ(object.detectability.proven.information, 0.0);
