@@ -14,8 +14,7 @@
 
 namespace perdure::semantic_filter {
 
-/// Learned noise scales, ground roughness and shares of movers. They are kept when a new `world`
-/// begins.
+/// What the filter learns of networks, ground and classes. It is kept when a new `world` begins.
 struct Learned {
   SideVariances sides;
   NoiseScales azimuths{200.0};  ///< scales of the variances of azimuths

@@ -32,4 +32,10 @@ double existenceCeiling(const Track& track, const TrackParameters& parameters) {
   return track.life.detected_on_revisit ? parameters.certain_again : parameters.certain;
 }
 
+SizeEvidence& SizeEvidence::operator+=(const SizeEvidence& more) {
+  gradient += more.gradient;
+  information += more.information;
+  return *this;
+}
+
 }  // namespace perdure::semantic_filter

@@ -336,7 +336,7 @@ std::optional<std::size_t> update(Track& track, const TrackScore& score, const E
   }
   if (detected >= 0.5) {
     track.views.detected_from = {frame.view.T_WC(), 1.0 + tempering.observations};
-    countDirection(track, frame.view.T_WC());
+    if (sound(track)) countDirection(track, frame.view.T_WC());
   }
   if (detected >= 0.5 || !score.top_down) {  // a top-down answer is no observation
     track.views.observed_from = {frame.view.T_WC(),

@@ -47,12 +47,6 @@ double overHalfSize(double size_px, const FrameContext& frame) {
 
 }  // namespace
 
-SizeEvidence& SizeEvidence::operator+=(const SizeEvidence& more) {
-  gradient += more.gradient;
-  information += more.information;
-  return *this;
-}
-
 double detectableShare(const Track& track, double hard_detection_share) {
   return 1.0 - track.detectability.unmapped_occluder -
          (1.0 - hard_detection_share) * track.detectability.hard_to_detect;
