@@ -1,11 +1,14 @@
 #include "services/semantic_filter/core/belief/track.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace perdure::semantic_filter {
 
 void Lifecycle::merge(const Lifecycle& other) {
-  detected_on_revisit = detected_on_revisit || other.detected_on_revisit;
+  const bool met_on_revisit = recalled != other.recalled &&
+                              std::abs(toSeconds(last_seen - other.last_seen)) > kAnotherVisit_s;
+  detected_on_revisit = detected_on_revisit || other.detected_on_revisit || met_on_revisit;
   hits += other.hits;
   confirmed = confirmed || other.confirmed;
   once_confirmed = once_confirmed || other.once_confirmed;

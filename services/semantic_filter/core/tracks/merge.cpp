@@ -98,6 +98,7 @@ void absorb(Track& a, Track& b, const FrameContext& frame) {
   a.views.merge(b.views);
   a.detectability.seen_now = a.detectability.seen_now.cwiseMax(b.detectability.seen_now);
   a.detectability.seen_from = a.detectability.seen_from.cwiseMax(b.detectability.seen_from);
+  a.detectability.missed = {};  // a copy had its boxes
   a.detectability.rate.join(b.detectability.rate,
                             detectabilityScales(frame.parameters->visibility));
   mergeBatches(a, b, biasScales(frame.parameters->box), frame.parameters->smoothing);

@@ -279,13 +279,16 @@ double updateClassAndExistence(Track& track, const AllShares& shares, const Expo
   return existenceAfter(track, mean_A, existenceCeiling(track, parameters.tracks));
 }
 
-/// Whether a box fits the best hypothesis.
-bool fitsABox(const TrackScore& score) {
+/// Whether a box that another track most probably has fits the best hypothesis, also by its class.
+bool anotherHasItsBox(const TrackScore& score, const EtaRow& eta) {
   constexpr double kFits = 2.37;  // normalised innovation of four sides, 95 %
+  constexpr double kOthers = 0.5;
   const auto& matches = score.hypotheses.front().matches;
-  return std::any_of(matches.begin(), matches.end(), [](const BoxMatch& match) {
-    return match.likelihood > 0.0 && match.nis < kFits;
-  });
+  for (std::size_t z = 0; z < score.boxes.size(); ++z) {
+    const double free = eta[static_cast<Eigen::Index>(score.boxes[z])];
+    if (free < kOthers && matches[z].likelihood > 1.0 && matches[z].nis < kFits) return true;
+  }
+  return false;
 }
 
 }  // namespace
@@ -300,7 +303,7 @@ std::optional<std::size_t> update(Track& track, const TrackScore& score, const E
   const double detected = probabilityDetected(track, shares);
   // A box at the place of an object of the map belongs to another track. Two objects cannot stand
   // in one place, so it is no evidence against this one; merging decides.
-  if (track.life.recalled && detected < 0.5 && fitsABox(score)) return std::nullopt;
+  if (track.life.recalled && detected < 0.5 && anotherHasItsBox(score, eta)) return std::nullopt;
   const Tempering tempering =
       temperingOf(track, score, shares, frame.parameters->tempering.correlation);
   const auto assigned = assignedBox(track, shares);
