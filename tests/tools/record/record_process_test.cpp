@@ -291,9 +291,10 @@ TEST(PlayProcess, DoesNotWaitForHoursInWhichNothingWasRecorded) {
 }
 
 /// Records the messages of vio and inference for a street with two cars: odometry, and its
-/// detections half a period later. Frames are .1 s apart for the filter, and .2 s in log time.
+/// detections half a period later. Frames are .1 s apart for the filter, and .2 s in log time. The
+/// first is a second after the calibration, so that all programs have found each other by then.
 void recordStreet(const std::string& file) {
-  constexpr std::uint64_t kPeriod = 200'000'000, kFrames = 20;
+  constexpr std::uint64_t kPeriod = 200'000'000, kFrames = 20, kStart = 1'000'000'000;
   const std::vector<scene::TrueObject> cars = {
       {scene::makeState(25, 4, .7, .1, 4.1, 1.7, 1.5), "car"},
       {scene::makeState(34, -4, .7, 3., 4.3, 1.8, 1.5), "car"}};
@@ -312,8 +313,9 @@ void recordStreet(const std::string& file) {
       const auto box = scene::detect(car, view, semantic_filter::BoxParameters(), 1.0, 4.0, random);
       if (box) boxes.push_back(*box);
     }
-    recording.add("odometry", scene::odometryAt(k, T_WB), (k + 1) * kPeriod);
-    recording.add("detections", scene::detectionsAt(k, boxes), (k + 1) * kPeriod + kPeriod / 2);
+    const std::uint64_t at = kStart + k * kPeriod;
+    recording.add("odometry", scene::odometryAt(k, T_WB), at);
+    recording.add("detections", scene::detectionsAt(k, boxes), at + kPeriod / 2);
     if (k % 5 == 4) recording.cut();
   }
   recording.finish();
@@ -333,36 +335,28 @@ std::vector<Objects> runPipeline(const std::string& recording, const std::string
   return objects;
 }
 
-std::vector<Objects> objectsIn(const std::string& recording) {
-  replay::RecordedMessages messages(recording);
-  messages.rewind([](const std::string& topic) { return topic == "objects"; });
-  std::vector<Objects> objects;
-  while (const auto message = messages.next()) {
-    objects.push_back(*replay::valueOf<Objects>(*message));
-  }
-  return objects;
-}
-
 TEST(PlayProcess, GivesTheFilterServiceTheObjectsThatThePipelineHas) {
   const test::Folder place;
   recordStreet(place.file("run.mcap"));
   const auto expected = runPipeline(place.file("run.mcap"), place.file("out"));
   ASSERT_EQ(expected.size(), 20u);
   ASSERT_GE(expected.back().objects.size(), 2u);
-  (void)test::ownNetwork();
+  const bus::Domain domain(test::ownNetwork());
   test::Child filter({(test::programs() / "perdure-semantic-filter").string(), "--config",
                       (test::sources() / "config/semantic_filter.yaml").string(), "--set",
                       "restore.timeout_s=0.2"},
                      place.file("filter.log"));
-  test::Child recorder({perdure(), "record", "--out", place.file("rec"), "--topics", "objects"},
-                       place.file("record.log"));
+  const bus::Participant participant(domain, "test");
+  bus::Reader<Objects> reader(participant, bus::kTopic<Objects>);
+  ASSERT_TRUE(test::eventually(20s, [&] { return reader.matched() == 1; })) << filter.log();
   test::Child player({perdure(), "play", place.file("run.mcap"), "--wait", "20"},
                      place.file("play.log"));
-  ASSERT_EQ(player.wait(60s), 0) << player.log();
-  std::this_thread::sleep_for(300ms);
-  recorder.signal(SIGTERM);
-  ASSERT_EQ(recorder.wait(5s), 0);
-  const auto heard = objectsIn(place.file("rec"));
+  std::vector<Objects> heard;
+  EXPECT_TRUE(test::eventually(60s, [&] {
+    reader.drain([&](const Objects& m) { heard.push_back(m); });
+    return heard.size() == expected.size();
+  })) << player.log();
+  EXPECT_EQ(player.wait(10s), 0) << player.log();
   ASSERT_EQ(heard.size(), expected.size());
   for (std::size_t k = 0; k < expected.size(); ++k) {
     ASSERT_TRUE(heard[k].stamp.sameFrame(expected[k].stamp)) << k;
