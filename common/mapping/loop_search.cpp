@@ -89,6 +89,12 @@ bool isOneVisit(const MapState& state, AnchorId a, AnchorId b, double visit_m) {
   return x.session == y.session && std::abs(x.way_m - y.way_m) < visit_m;
 }
 
+std::optional<LevelGaussian> Whereabouts::to(AnchorId anchor) const {
+  auto T_ba = relative.to(anchor);
+  if (T_ba) T_ba->covariance *= widening * widening;
+  return T_ba;
+}
+
 bool Whereabouts::asks(AnchorId anchor) const {
   return !others_only || state.anchors().at(anchor).session != here().session;
 }
@@ -164,8 +170,8 @@ std::vector<PlacedObject> LoopSearch::seenOfLate(const Whereabouts& body) const 
   for (const ObjectId id : body.objectsOfVisit(parameters_.loop.visit_m)) {
     const ObjectRecord& record = body.state.records().at(id);
     const Sighting* before = record.earlier ? &*record.earlier : nullptr;
-    if (before && body.asks(before->anchor) && body.relative.to(before->anchor)) continue;
-    const auto T_bA = body.relative.to(record.sighting.anchor);
+    if (before && body.asks(before->anchor) && body.to(before->anchor)) continue;
+    const auto T_bA = body.to(record.sighting.anchor);
     if (!T_bA) continue;
     seen.push_back(laid(*T_bA, record.sighting.in_anchor));
     fresh = fresh || std::abs(body.way.way_m() - record.way_m) < parameters_.loop.fresh_m;
@@ -191,7 +197,7 @@ LoopSearch::Around LoopSearch::mapAround(const Whereabouts& body) const {
   double nearest_m = std::numeric_limits<double>::infinity();
   std::set<ObjectId> ids;
   for (const auto& [distance, id] : anchorsOfBefore(body, parameters_)) {
-    const auto T_ba = body.relative.to(id);
+    const auto T_ba = body.to(id);
     if (!T_ba) continue;
     const double sigma = planeSigma(T_ba->covariance);
     if (distance > loop.view_m + parameters_.place.gate_sigmas * sigma) continue;
@@ -207,7 +213,7 @@ LoopSearch::Around LoopSearch::mapAround(const Whereabouts& body) const {
     const Sighting& known = *sightingOfBefore(record, body, loop.visit_m);
     around.objects.push_back(inM(body.state, known));
     around.homes[known.in_anchor.id] = known.anchor;
-    const double beyond = varianceBeyond(*body.relative.to(known.anchor), *around.nearest);
+    const double beyond = varianceBeyond(*body.to(known.anchor), *around.nearest);
     around.objects.back().covariance.diagonal().head<2>().array() += beyond;
   }
   return around;
@@ -242,15 +248,14 @@ bool LoopSearch::isBelieved(const PlaceMatch& match, double sigma_m) const {
 std::optional<LoopSearch::Found> LoopSearch::nearLast(const Whereabouts& body,
                                                       const LastPlace& last) const {
   auto seen = seenOfLate(body);
-  const auto T_bF = body.relative.to(last.begins);
+  const auto T_bF = body.to(last.begins);
   if (seen.size() < parameters_.loop.least_elsewhere || !T_bF) return std::nullopt;
   const LevelPose T_Fb = T_bF->mean.inverse();
   for (PlacedObject& object : seen) object = transformed(T_Fb, std::move(object));
   const auto components = componentsOf(body.state.graph());
   const Eigen::Vector2d place = last.T_MF.mean.p.head<2>();
-  const double far_m =
-      parameters_.loop.view_m + T_Fb.p.norm() +
-      parameters_.place.gate_sigmas * planeSigma(last.T_MF.covariance);
+  const double far_m = parameters_.loop.view_m + T_Fb.p.norm() +
+                       parameters_.place.gate_sigmas * planeSigma(last.T_MF.covariance);
   std::vector<PlacedObject> objects;
   std::vector<Eigen::Vector2d> driven;
   std::map<ObjectId, AnchorId> homes;

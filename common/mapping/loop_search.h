@@ -21,10 +21,13 @@ struct Whereabouts {
   const MapState& state;
   const AnchorBuilder& way;
   const Marginals& relative;  ///< transforms relative to the body's newest anchor
+  double widening = 1.0;      ///< factor on the standard deviations of these transforms
   double deviation_m = 0.0;   ///< in the plane, from the first anchor of its component
   bool others_only = false;   ///< search only among objects of other sessions
 
   const Anchor& here() const { return *way.last(); }
+  /// T_body,anchor; nothing if no path leads to the anchor.
+  std::optional<LevelGaussian> to(AnchorId anchor) const;
   /// Whether the search includes objects that were detected from the anchor.
   bool asks(AnchorId anchor) const;
   /// Whether the object is of another session, or was not detected within the last `visit_m`

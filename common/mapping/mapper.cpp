@@ -24,8 +24,7 @@ Mapper::Mapper(const Parameters& parameters, SavedMap saved)
       loop_search_(parameters),
       view_search_(parameters),
       tracked_ties_(parameters),
-      loop_book_(parameters.loop),
-      drift_scale_(parameters.drift_scale) {}
+      loop_book_(parameters.loop) {}
 
 /// Records the last position. The body may have moved since then, as far as its speed and the gap
 /// allow.
@@ -59,8 +58,8 @@ void Mapper::begin(const Odometry& odometry) {
   dropTentativeLoops();
   builder_ = AnchorBuilder(parameters_.anchor);
   if (const auto last = state_.newestOf(odometry.world)) builder_.resume(*last);
-  learnAnew(odometry.world);
-  searched_at_m_ = searched_elsewhere_at_m_ = builder_.way_m();
+  continueDrift(odometry.world);
+  searched_at_m_ = searched_widely_at_m_ = searched_elsewhere_at_m_ = builder_.way_m();
   seen_ = searched_with_ = 0;
   active_.reset();
   tentative_.reset();
@@ -77,13 +76,11 @@ void Mapper::dropTentativeLoops() {
   }
 }
 
-/// Restarts learning the scale of the session's odometry errors. The learned scale stays in use
-/// until then.
-void Mapper::learnAnew(const WorldId& session) {
-  drift_scale_ = DriftScale(parameters_.drift_scale);
+/// Takes the scale of the session's odometry errors from its anchors.
+void Mapper::continueDrift(const WorldId& session) {
   const auto last = state_.newestOf(session);
   odometry_variance_ = last ? last->scale : DriftVariance();
-  learned_at_m_ = last ? -std::numeric_limits<double>::infinity() : 0.0;
+  learnDrift();
 }
 
 void Mapper::stand(const Anchor& anchor) {
@@ -103,10 +100,9 @@ void Mapper::replay(const WorldId& session) {
   dropTentativeLoops();
   active_.reset();
   tentative_.reset();
-  learnAnew(session);
+  continueDrift(session);
   tracked_ties_.begin();
   searched_elsewhere_at_m_ = -parameters_.loop.elsewhere_each_m;
-  learned_at_m_ = std::numeric_limits<double>::infinity();  // it was learned during the drive
   loop_search_.forget();
   replays_ = true;
   for (const AnchorId id : way) {
@@ -114,7 +110,7 @@ void Mapper::replay(const WorldId& session) {
     search();
   }
   replays_ = false;
-  searched_at_m_ = learned_at_m_ = builder_.way_m();
+  searched_at_m_ = builder_.way_m();
 }
 
 void Mapper::onOdometry(const Odometry& odometry) {
@@ -136,10 +132,10 @@ void Mapper::onOdometry(const Odometry& odometry) {
   marginals_.reset();
 }
 
-Whereabouts Mapper::body() {
+Whereabouts Mapper::body(double widening) {
   const auto to_first = marginals().to(marginals().first());
-  const double deviation_m = to_first ? planeSigma(to_first->covariance) : 0.0;
-  return {state_, builder_, marginals(), deviation_m, replays_};
+  const double deviation_m = to_first ? widening * planeSigma(to_first->covariance) : 0.0;
+  return {state_, builder_, marginals(), widening, deviation_m, replays_};
 }
 
 bool Mapper::isOld(const ObjectRecord& record) const {

@@ -150,12 +150,12 @@ class Mapper {
  private:
   void begin(const Odometry& odometry);
   void dropTentativeLoops();
-  Whereabouts body();
+  Whereabouts body(double widening = 1.0);
   void see(const ObjectBelief& belief, const Objects& objects);
   PlacedObject placedOf(const ObjectBelief& belief, const Matrix6d& pose_error);
   bool isOld(const ObjectRecord& record) const;
   void forgetUnconfirmed();
-  void learnAnew(const WorldId& session);
+  void continueDrift(const WorldId& session);
   void stand(const Anchor& anchor);
   void tie();
   void search();
@@ -174,7 +174,7 @@ class Mapper {
   Recallable withRecord(Recallable there, ObjectId id, const ObjectRecord& record) const;
   bool isAgreedOn(const LoopSearch::Found& found);
   void close(const LoopSearch::Found& found);
-  void learnDrift(const PlaceMatch& match, const LevelGaussian& prior);
+  void learnDrift();
   Edge edgeFrom(AnchorId a, AnchorId b, const LevelGaussian& T_Mb, EdgeKind kind) const;
   void bringTogether(const Edge& edge);
   const Marginals& marginals();
@@ -187,8 +187,9 @@ class Mapper {
   ViewSearch view_search_;
   TrackedTies tracked_ties_;
   LoopBook loop_book_;
-  DriftScale drift_scale_;
   DriftVariance odometry_variance_;  ///< factor on the covariances of the session's odometry edges
+  /// The largest plausible deviation of the odometry, as a multiple of that in use.
+  double widening_ = 1.0;
   std::optional<WorldId> session_;
   std::unique_ptr<Marginals> marginals_;  ///< relative to the newest anchor
   MapChange change_;
@@ -223,7 +224,7 @@ class Mapper {
   AnchorId looked_from_ = 0;                  ///< the anchor whose view was searched last
   std::size_t seen_ = 0, searched_with_ = 0;  ///< number of objects of the session, now and at the
                                               ///< last search
-  double searched_at_m_ = 0.0, searched_elsewhere_at_m_ = 0.0, learned_at_m_ = 0.0;
+  double searched_at_m_ = 0.0, searched_widely_at_m_ = 0.0, searched_elsewhere_at_m_ = 0.0;
   std::uint64_t revision_ = 0;
 };
 

@@ -97,9 +97,16 @@ View Mapper::viewOfNow() const {
   return view_builder_.viewFrom(here.T_WA, builder_.way_m(), kBack_m);
 }
 
-/// Searches by objects. If they give no match, searches by appearance, once for each anchor.
+/// Searches by objects. If they give no match, searches by objects in a wider region, because the
+/// odometry may err more than is assumed, and by appearance, once for each anchor.
 std::optional<LoopSearch::Found> Mapper::searchNearby(const Whereabouts& here, bool new_view) {
   auto found = loop_search_.nearby(here);
+  constexpr double kWider = 1.5;
+  const double since_m = builder_.way_m() - searched_widely_at_m_;
+  if (!found && widening_ > kWider && since_m >= parameters_.loop.elsewhere_each_m) {
+    searched_widely_at_m_ = builder_.way_m();
+    found = loop_search_.nearby(body(widening_));
+  }
   if (found && view_search_.contradicts(*found, here, viewOfNow())) return std::nullopt;
   if (!found && new_view) found = view_search_.nearby(here, viewOfNow());
   return found;
@@ -132,16 +139,26 @@ void Mapper::search() {
   close(*found);
 }
 
-void Mapper::learnDrift(const PlaceMatch& match, const LevelGaussian& prior) {
-  if (builder_.way_m() - learned_at_m_ < parameters_.loop.view_m) return;
-  learned_at_m_ = builder_.way_m();
-  Eigen::Matrix4d measured = match.T_MB.covariance;
-  addFloor(measured, parameters_.loop.floor_m, parameters_.loop.floor_rad);
-  drift_scale_.add(difference(match.T_MB.mean, prior.mean), measured,
-                   DriftVariance().over(odometry_variance_).of(prior.covariance));
-  const DriftVariance factor = drift_scale_.variance().over(odometry_variance_);
-  state_.scaleOdometry(factor, *session_);
-  odometry_variance_ = odometry_variance_.times(factor);
+/// Learns the scale of the session's odometry errors from its loops, and applies it.
+void Mapper::learnDrift() {
+  std::vector<Anchor> way;
+  for (const auto& [id, anchor] : state_.anchors()) {
+    if (anchor.session == session_) way.push_back(anchor);
+  }
+  std::vector<Edge> loops;
+  for (const auto& [id, edge] : state_.graph().edges()) {
+    const bool believed = state_.graph().weight(id) >= kBelieved;
+    if (edge.kind == EdgeKind::kLoop && believed) loops.push_back(edge);
+  }
+  DriftScale drift(parameters_.drift_scale, way);
+  const bool learned = drift.use(loops, parameters_.loop.view_m);
+  const DriftVariance now = drift.variance(parameters_.drift_scale.quantile);
+  if (learned && !replays_ && now != odometry_variance_) {
+    state_.scaleOdometry(now.over(odometry_variance_), *session_);
+    odometry_variance_ = now;
+  }
+  const DriftVariance most = drift.variance(parameters_.drift_scale.most);
+  widening_ = std::sqrt(most.over(odometry_variance_).plane);
 }
 
 /// In similar streets one search may find the wrong street. A second search uses more objects.
@@ -164,7 +181,6 @@ bool Mapper::isAgreedOn(const LoopSearch::Found& found) {
 
 void Mapper::close(const LoopSearch::Found& found) {
   const PlaceMatch& match = found.match;
-  if (found.prior) learnDrift(match, *found.prior);
   const AnchorId a = found.home, b = builder_.last()->id;
   const Edge edge = edgeFrom(a, b, match.T_MB, EdgeKind::kLoop);
   const LevelPose before = state_.graph().pose(b);
@@ -184,6 +200,7 @@ void Mapper::close(const LoopSearch::Found& found) {
   }
   if (!match.pairs.empty()) active_ = {id, pairsOf(match)};
   loop_book_.add({id, a, b, match, !found.prior, 0.0}, before, builder_.way_m());
+  learnDrift();
   graphMoved();
 }
 

@@ -65,8 +65,8 @@ std::optional<TrackedTies::Tie> TrackedTies::find(const Whereabouts& body) const
     const ObjectRecord& record = body.state.records().at(id);
     if (!record.confirmed || !record.earlier || isUsed(id, way_m)) continue;
     if (record.earlier->in_anchor.id != record.sighting.in_anchor.id) continue;
-    const auto T_ba = body.relative.to(record.earlier->anchor);
-    const auto T_bA = body.relative.to(record.sighting.anchor);
+    const auto T_ba = body.to(record.earlier->anchor);
+    const auto T_bA = body.to(record.sighting.anchor);
     if (!T_ba || !T_bA) continue;
     PlacedObject seen = laid(*T_bA, record.sighting.in_anchor);
     const double share =
@@ -81,7 +81,7 @@ std::optional<TrackedTies::Tie> TrackedTies::find(const Whereabouts& body) const
   tie.home = keepOneVisit(pairs, body.state, loop.visit_m);
   if (pairs.size() < loop.least_tracked) return std::nullopt;
   for (const Pair& pair : pairs) tie.objects.push_back(pair.id);
-  LevelGaussian by_graph = bodyByGraph(body, *body.relative.to(tie.home));
+  LevelGaussian by_graph = bodyByGraph(body, *body.to(tie.home));
   addFloor(by_graph.covariance, loop.floor_m, loop.floor_rad);
   const Eigen::Vector4d step = equationsAt(x, pairs).stepNear(inverseSymmetric(by_graph.covariance),
                                                               Eigen::Vector4d::Zero());

@@ -67,7 +67,7 @@ std::optional<LoopSearch::Found> ViewSearch::nearby(const Whereabouts& body,
   std::vector<Way> ways;
   std::size_t asked = 0;
   for (const auto& [distance, id] : anchorsOfBefore(body, parameters_)) {
-    const auto T_ba = body.relative.to(id);
+    const auto T_ba = body.to(id);
     if (!T_ba || body.state.viewFrom(id).empty()) continue;
     ++asked;
     const auto way = wayTo(id, body, seen);
@@ -83,7 +83,7 @@ std::optional<LoopSearch::Found> ViewSearch::nearby(const Whereabouts& body,
   auto match = bestOf(ways, home);
   if (!match) return std::nullopt;
   match->cells = static_cast<double>(asked);
-  const auto T_ba = body.relative.to(home);
+  const auto T_ba = body.to(home);
   LevelGaussian prior = bodyByGraph(body, *T_ba);
   const double sigma_m = planeSigma(prior.covariance);
   const bool gains = planeSigma(match->T_MB.covariance) < parameters_.loop.tracked_gain * sigma_m;

@@ -216,9 +216,9 @@ TEST(AnchorBuilder, TakesTheWalkWhereAnIncrementIsMissing) {
     if (i < 10 || i > 14) broken.add(errors.drive[i], 1);
   }
   const Eigen::Matrix4d a = whole.sinceLast()->covariance, b = broken.sinceLast()->covariance;
-  const double metres = 6 * 0.4;
+  const double metres = 6 * 0.4, walk = AnchorParameters().walk_yaw;
   EXPECT_TRUE(isCovariance(b));
-  EXPECT_NEAR(b(3, 3), 13.0 / 19.0 * a(3, 3) + metres * 0.0005 * 0.0005, 1e-3 * b(3, 3));
+  EXPECT_NEAR(b(3, 3), 13.0 / 19.0 * a(3, 3) + metres * walk * walk, 1e-3 * b(3, 3));
 }
 
 }  // namespace
