@@ -92,7 +92,7 @@ class Domain {
 
   Options options_;
   SharedMemory shared_memory_;
-  std::int64_t id_;  ///< in this process
+  std::int64_t id_;  ///< number of the domain in this process
   std::shared_ptr<const Entity> domain_;
 };
 

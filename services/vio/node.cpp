@@ -227,7 +227,7 @@ TrackedFrame Node::trackImages(const cv::Mat& first, const cv::Mat& second, Time
   }
   const Eigen::Vector3d turn = cameras_->estimator.turnOfReadout(imu_, now);
   if (!started()) {
-    // Traffic before a body at rest cannot outvote points at rest with a known rotation.
+    // With a known rotation, a minority of points at rest is sufficient in front of traffic.
     const auto motion = cameras_->tracker.motionSince(1, 0.8);
     constexpr std::chrono::milliseconds kEven{500};
     if (motion && *motion > config_.core.rest.disparity_px &&

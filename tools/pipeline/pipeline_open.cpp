@@ -206,7 +206,7 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
   sinks.innovations = [this](const std::vector<vio::Innovation>& all) {
     rig_watch_->onInnovations(all);
   };
-  constexpr double kWatched_s = 60.0;  // the same time as in perdure doctor
+  constexpr double kWatched_s = 60.0;  // equals the limit of perdure doctor
   rig_watch_.emplace(dataset_->calibration().cameras.front(), kWatched_s);
   sinks.landmarks = [this](const Landmarks& landmarks) {
     landmarks_[landmarks.stamp.sequence] = landmarks;

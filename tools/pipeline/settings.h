@@ -45,7 +45,7 @@ struct ServiceConfigs {
   vio::Config vio;
   semantic_filter::Config semantic_filter;
   inference::Config inference;
-  map_store::Config map_store;  ///< its path is always OUT/map.sqlite
+  map_store::Config map_store;  ///< the path of the file is always OUT/map.sqlite
   DetectorConfig detector;      ///< for --detections simulated; service `detector`
   DriftConfig drifting;         ///< for --odometry drifting
   std::uint64_t digest = 0;     ///< digest of all values

@@ -67,7 +67,7 @@ class Store {
   std::optional<BlackBox> black_box_;
   std::optional<std::int64_t> dump_until_ns_;
   std::atomic<bool> fault_ = false;
-  StoreReport now_;  // only for the recorder's thread
+  StoreReport now_;  // used in the recorder's thread only
   mutable std::mutex mutex_;
   StoreReport report_;
   BoundedQueue<Job> queue_;

@@ -62,7 +62,7 @@ std::optional<double> askRate(const iio_channel* channel, double wanted) {
   return is && *is > 0.0 ? is : std::nullopt;
 }
 
-/// One axis, with the conversion of its integers.
+/// One axis, with the conversion of its integer readings.
 struct Axis {
   iio_channel* channel = nullptr;
   double scale = 1.0, offset = 0.0;

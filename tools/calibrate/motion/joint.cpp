@@ -18,7 +18,7 @@ using namespace joint;
 struct Reduced {
   SharedMatrix H = SharedMatrix::Zero();
   Shared g = Shared::Zero();                         ///< gradient of half the cost
-  std::vector<Eigen::Matrix<double, kAll, 1>> rows;  ///< of each corner: coupling, information
+  std::vector<Eigen::Matrix<double, kAll, 1>> rows;  ///< for each corner: coupling, information
   std::vector<double> pulls;                         ///< gradients of the inverse depths
   JointMatrix H_joint = JointMatrix::Zero();
   JointVector g_joint = JointVector::Zero();

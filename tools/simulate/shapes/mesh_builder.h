@@ -55,7 +55,7 @@ class MeshBuilder {
   /// A closed part: a skin with fans at its ends (open without a material for them).
   void loft(const std::vector<Ring>& rings, const MaterialOf& material_of,
             std::optional<int> first_cap, std::optional<int> last_cap, float crease_deg = 40.0F);
-  /// The same of one material, with both ends.
+  /// Adds such a surface of one material, with both ends.
   void loft(const std::vector<Ring>& rings, int material, float crease_deg);
 
   /// Transform of all faces that are added while it is set. A mirror reverses the order of corners.

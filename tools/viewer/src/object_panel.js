@@ -45,7 +45,7 @@ export class ObjectPanel {
     this.note = '';
     this.shown = performance.now();
     if (id === 0) return this.clear();
-    this.render(); // shows the known data at once
+    this.render(); // shows the data that are already available
     this.ask();
   }
 

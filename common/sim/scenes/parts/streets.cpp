@@ -143,7 +143,7 @@ bool Streets::plot(const Road& road, int side, double from, double length) {
       !builder_.put(PropKind::kFacade, house, at)) {
     return false;
   }
-  const double enclosed = dice.unit();  // of the two fences: the first, the second, both or none
+  const double enclosed = dice.unit();  // decides which of the two fences exist
   if (enclosed < 0.6) fence(road, placeAt(road, side, middle, line + 0.3, M_PI), rest - 0.2);
   const double border = drive_first ? from + 0.2 : from + length - 0.2;
   if (enclosed > 0.4 && enclosed < 0.9) {

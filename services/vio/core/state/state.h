@@ -161,7 +161,7 @@ class State {
   /// with "update_not_positive" or "update_not_finite" and then does not change the state.
   Result<void> update(const Eigen::MatrixXd& H, const std::vector<Block>& blocks,
                       const Eigen::VectorXd& r);
-  /// The same with measurements that each depend on few blocks, without their zero columns.
+  /// Updates with measurements that each depend on few blocks, without their zero columns.
   Result<void> update(std::span<const Measurement> measurements);
   /// Returns H P Hᵀ for an H with the columns of `blocks`.
   Eigen::MatrixXd project(const MatrixView& H, std::span<const Block> blocks) const;

@@ -20,7 +20,7 @@ struct RestExpectation {
   double rate_sigma = 0.0, force_sigma = 0.0;       ///< standard deviations of one axis
 };
 
-/// From the filter's attitude and biases, with their covariance.
+/// Computes the expectation from the filter's attitude and biases, with their covariance.
 RestExpectation restExpectation(const State& state, double gravity);
 
 /// Whether the means over `window` before `now` agree with the expectation, taken `age` ago. False
