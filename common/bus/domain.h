@@ -35,7 +35,8 @@ struct Options {
   std::int64_t shared_memory_mb = 0;    ///< largest image sent through shared memory; 0: not used
   std::string security = {};            ///< folder of the identities; empty: no security
   std::string identity = {};            ///< a folder in `security`; empty: by process name
-  std::vector<std::string> peers = {};  ///< the other hosts; empty: found by multicast
+  /// Addresses of the other hosts; empty: hosts are found by multicast.
+  std::vector<std::string> peers = {};
 };
 /// Describes bus.interface, bus.peers, bus.domain, bus.vehicle, bus.shared_memory_mb, bus.security
 /// and bus.identity. The variable PERDURE_DOMAIN takes precedence over bus.domain.

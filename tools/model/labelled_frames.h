@@ -21,7 +21,8 @@ struct TrueBox {
   Box box;                  ///< complete outline in pixels, clipped to the image
   std::string class_name;   ///< canonical; empty: an unlabelled region
   bool ignored = false;     ///< neither a miss nor a false alarm
-  std::optional<Box> hull;  ///< box of the cuboid's image, if fully visible and known
+  /// Box of the cuboid's image; empty if the object is partly hidden or the box is unknown.
+  std::optional<Box> hull;
 };
 
 struct LabelledFrame {

@@ -13,7 +13,8 @@ namespace perdure::bench {
 struct StartRow {
   std::string clip, variant;
   double cut_s = 0.0;
-  double moving_s = -1.0;  ///< from the cut to the first output; −1: no output within five seconds
+  /// Time from the cut to the first output; −1: no output within five seconds.
+  double moving_s = -1.0;
   double scale = 0.0;      ///< scale over the three seconds after the first output
   double error_m = 0.0;    ///< position error, three seconds after the first output
   NeesAt nees;             ///< errors one second after the first output

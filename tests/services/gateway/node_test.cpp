@@ -76,7 +76,7 @@ TEST_F(GatewayNode, TellsWhoComesWhatIsKnownAlready) {
 
 TEST_F(GatewayNode, ShowsImagesAtTheRateThatIsSetAndAsJpeg) {
   node_.setWanted({cameraChannel(0, kImage)});
-  for (std::uint64_t i = 0; i < 20; ++i) node_.onFrame(0, grey(i));  // at 20 Hz
+  for (std::uint64_t i = 0; i < 20; ++i) node_.onFrame(0, grey(i));  // sends frames at 20 Hz
   EXPECT_EQ(said_.size(), 10u);
   EXPECT_THAT(*said_[0].payload, HasSubstr("\xff\xd8\xff"));
   Frame broken = grey(40);

@@ -25,7 +25,8 @@ const TrueObject kChair = {makeState(9, -2.0, 0.45, 0.3, 0.5, 0.5, 0.9), "chair"
 /// resembles.
 struct Network {
   ModelInfo info;
-  std::map<std::string, std::string> says;  ///< for objects of classes that it does not have
+  /// Reported class for objects of classes that the network does not have.
+  std::map<std::string, std::string> says;
 
   Network(std::uint64_t hash, const std::string& name, std::vector<std::string> classes,
           std::map<std::string, std::string> lookalike_class = {})

@@ -90,7 +90,7 @@ template <class T>
 struct BodyAt {
   Eigen::Quaterniond q;
   Vec3<T> turn;      ///< small rotation on the right of q
-  Vec3<T> position;  ///< in the window's frame
+  Vec3<T> position;  ///< position in the window's frame
 
   Vec3<T> toWindow(const Vec3<T>& v) const { return q.cast<T>() * Vec3<T>(v + turn.cross(v)); }
   Vec3<T> fromWindow(const Vec3<T>& v) const {

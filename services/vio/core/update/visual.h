@@ -14,9 +14,9 @@
 namespace perdure::vio {
 
 struct ProjectionJacobians {
-  Eigen::Matrix<double, 2, 6> pose;       ///< by [θ, p] of T_WB
-  Eigen::Matrix<double, 2, 6> extrinsic;  ///< by [θ, p] of T_BC
-  Eigen::Matrix<double, 2, 3> point;      ///< by p_W
+  Eigen::Matrix<double, 2, 6> pose;       ///< derivative by [θ, p] of T_WB
+  Eigen::Matrix<double, 2, 6> extrinsic;  ///< derivative by [θ, p] of T_BC
+  Eigen::Matrix<double, 2, 3> point;      ///< derivative by p_W
 };
 
 /// Projects p_W to the normalised image. False if p_W is not in front of the camera.

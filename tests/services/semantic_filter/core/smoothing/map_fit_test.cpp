@@ -204,7 +204,7 @@ TEST(MapFit, DistinguishesMotionFromRest) {
   }
 }
 
-/// The last two boxes of a parked car are bad in the way that a motion would explain.
+/// The last two boxes of a parked car are bad, with errors that a motion would explain.
 TEST(MapFit, BadBoxesAreNoMotion) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     Passing scene(seed);

@@ -116,7 +116,7 @@ TEST_F(UpdateWithGround, KeepsWhatTheBoxesAloneSay) {
   EXPECT_GT(h.ground_contact.variance, 0.0);
 }
 
-/// Its underside differs from the one in the boxes.
+/// The underside of this hypothesis differs from that in the boxes.
 TEST_F(UpdateWithGround, AnotherHypothesisOfTheTrackDoesNotInheritIt) {
   Track o = testing::makeObject(1, "car", testing::makeState(20, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
   o.life.hits = 3;
