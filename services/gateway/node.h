@@ -47,7 +47,8 @@ class Node {
   void onDetections(const Detections& detections);
   void onModel(const ModelInfo& model);
   void onObjects(const Objects& objects, std::int64_t now_ns);
-  /// Takes the newest message from before the first viewer, for example the last of an ended drive.
+  /// Takes the newest message that was sent before the first viewer, for example at the end of a
+  /// drive.
   void onObjectsOfBefore(const Objects& objects);
   void onFrameOfBefore(std::size_t camera, const Frame& frame);
   void onEvent(const Event& event);

@@ -82,7 +82,7 @@ class Node {
   const ModelDescription& at() const { return sizes_[size_].description; }
 
   Config config_;
-  ModelDescription description_;  ///< description at its own size
+  ModelDescription description_;  ///< description at the network's own size
   /// The network's own size first, then smaller sizes if there is a budget.
   std::vector<Size> sizes_;
   std::size_t size_ = 0;

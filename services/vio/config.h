@@ -25,7 +25,8 @@ struct Config {
   double pair_tolerance_s = 0.01;   ///< largest difference between the two cameras' stamps
   double speed_wait_s = 0.12;       ///< longest wait of a frame for its speed sample
   double longest_gap_s = 2.0;       ///< a longer IMU gap ends the frame of reference
-  double longest_blackout_s = 0.8;  ///< a longer gap without frames also ends it
+  /// A longer gap without frames also ends the frame of reference.
+  double longest_blackout_s = 0.8;
   std::int64_t max_pending = 40;    ///< frames that wait for their IMU samples
   double position_growth_m = 2.0;   ///< growth of the deviation in 10 s that is degraded
   double restore_age_s = 10.0;      ///< an older saved state is not resumed

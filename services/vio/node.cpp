@@ -187,7 +187,7 @@ bool Node::waitsForPair() const {
 bool Node::ready() const {
   TimePoint now = imuTime(waiting_.front().first.stamp.time);
   if (imu_.empty()) return false;
-  // Up to the last row, because an image arrives only after its read-out.
+  // The time is that of the last row, because an image arrives only after its read-out.
   now += durationFromSeconds(0.5 * std::max(0.0, std::ranges::max(readouts(cameras_->models))));
   // The last sample may be extrapolated by a quarter of a period. A capture that waits for this
   // frame's answer sends no sample beyond the next frame.

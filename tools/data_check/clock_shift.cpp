@@ -140,7 +140,7 @@ std::optional<double> rateOfTurns(const std::vector<Turn>& turns,
                                   const std::vector<ImuSample>& samples,
                                   const CameraCalibration& camera) {
   constexpr double kMostRate = 0.25;
-  constexpr std::int64_t kMost = 400, kStep = 4;  // cells, of the shift at both ends
+  constexpr std::int64_t kMost = 400, kStep = 4;  // limits of the shift at both ends, in cells
   if (samples.size() < 2) return std::nullopt;
   const TurnGrid gyro(samples);
   const CellTurns cells = cellsOf(turns, gyro, camera);

@@ -78,7 +78,7 @@ replay::DataFindings checkDrive(const replay::Recording& recording, const replay
   if (!use.images || recording.calibration.cameras.empty()) return findings;
   const auto fatal = std::find_if(findings.begin(), findings.end(),
                                   [](const auto& one) { return one.grade == Grade::kFatal; });
-  if (fatal != findings.end()) {  // rotations would fail as well
+  if (fatal != findings.end()) {  // checks of rotations would fail as well
     const auto shift =
         fatal->code == "clocks_apart" ? shiftOfClocks(recording) : std::optional<double>();
     if (shift) *fatal = shiftFinding(*shift, recording.calibration.cameras.front()).front();

@@ -178,7 +178,7 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
     accuracy = isSimulated(options.data) ? ofExactTruth() : ofMeasuredTruth();
   }
   if (pose_file_) {
-    const bool knows_up = accuracy.z_up;  // other poses assume it
+    const bool knows_up = accuracy.z_up;  // the vertical of other poses is assumed
     const auto serve = [this, knows_up](auto source) {
       pose_at_ = [this, knows_up, source](const FrameStamp& stamp) mutable {
         auto odometry = source.at(stamp);

@@ -46,7 +46,7 @@ void putCars(SceneBuilder& builder) {
   builder.mustPut(std::move(toy), {point, near_bearing + yaw, top});
 }
 
-/// Back and forth across the view, with a small motion along it.
+/// Motion back and forth across the view, with a small part along it.
 Trajectory sideways(double seconds) {
   std::vector<Look> looks;
   for (double t = 0.0; t < seconds + 2.0; t += kToyInterval) {

@@ -165,7 +165,7 @@ std::vector<double> posterior(const Detection& d) {
 /// Uses objects of all classes, each as often as one false alarm.
 TEST(SimulatedDetector, ItsActivationsAreCalibrated) {
   DetectorModel model = independent();
-  model.separation = 2.5;  // so that classification errors are frequent
+  model.separation = 2.5;  // a small separation makes classification errors frequent
   model.found = 1.0;
   model.half_size_px = 10.0;
   std::vector<std::pair<std::size_t, Detection>> looks;

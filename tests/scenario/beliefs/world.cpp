@@ -395,7 +395,8 @@ WorldFrame World::next() {
   }
   if (options_.clutter) addClutter(boxes);
   std::sort(boxes.begin(), boxes.end(), [](const auto& a, const auto& b) {
-    return a.first.box.x1 < b.first.box.x1;  // so that the order does not depend on the origins
+    // sorted, so that the order does not depend on the origins
+    return a.first.box.x1 < b.first.box.x1;
   });
   for (auto& [box, origin] : boxes) {
     frame.detections.detections.push_back(std::move(box));

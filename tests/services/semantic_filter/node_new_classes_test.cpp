@@ -97,7 +97,7 @@ TEST(NodeNewClasses, EnterATrackAtTheirPriorWhenItIsNextDetected) {
   const auto van = std::find_if(ledger.begin(), ledger.end(),
                                 [](const ClassLedger& c) { return c.name == "van"; });
   ASSERT_NE(van, ledger.end());
-  // Between car and van, which are equally frequent. Differences to other classes have other
+  // Compares car and van, which are equally frequent. Differences to other classes have other
   // causes.
   const double prior = van->log_odds[static_cast<std::size_t>(ClassEvidence::kPrior)];
   EXPECT_NEAR(prior, std::log(0.5 * (1.0 - ClutterParameters{}.other_prior)), 0.1);

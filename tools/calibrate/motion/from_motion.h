@@ -38,7 +38,7 @@ std::vector<std::string> writeMotionRig(const replay::DatasetOptions& drive,
 /// Comparison of a recording's own calibration with the motion.
 struct MotionCheck {
   replay::DataFindings findings;  ///< codes: focal_length, time_offset, readout
-  /// The motion that it is based on, or why no comparison is possible.
+  /// The motion that the comparison is based on, or why no comparison is possible.
   std::string basis;
 };
 /// Uses a few short runs of images. The rest of the calibration is taken as nearly right.

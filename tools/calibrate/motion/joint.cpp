@@ -80,7 +80,7 @@ class Problem {
   JointState state_;
   std::vector<Window> windows_;
   double residual_px_ = 0.0;
-  double scale_ = 3.0;  ///< px, of the robust loss
+  double scale_ = 3.0;  ///< scale of the robust loss, px
   /// Variance of a window's gradient, as a multiple of that of independent residuals.
   double excess_ = 1.0;
 };

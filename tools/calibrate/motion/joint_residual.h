@@ -23,7 +23,8 @@ inline constexpr double kGravity = 9.81,
                         kGravitySigma = 0.3;  // m/s²; includes the accelerometer's bias
 inline constexpr double kUsualInverse = 0.3, kInverseSigma = 1.0;  // 1/m
 inline constexpr double kLeastScale_px = 0.3;
-inline constexpr Duration kMargin = std::chrono::milliseconds(100);  // the offset may change by it
+// largest change of the time offset
+inline constexpr Duration kMargin = std::chrono::milliseconds(100);
 
 using Jet = ceres::Jet<double, kAll>;
 template <class T>

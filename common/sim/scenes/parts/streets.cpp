@@ -220,7 +220,7 @@ void Streets::plant(const Road& road, int side) {
   }
   for (double along = 3.0; along < lengthOf(road) - 6.0; along += 9.0) {
     if (!dice.chance(furnishing_.hedge_share)) continue;
-    // Between the cars and the pavement, or in front of the houses.
+    // A hedge stands between the cars and the pavement, or in front of the houses.
     const bool at_kerb = dice.chance(0.4);
     const Eigen::Vector3d size(dice.uniform(2.5, 6.0), dice.uniform(0.5, 0.7),
                                dice.uniform(0.7, 1.5));

@@ -45,8 +45,8 @@ class Standstill {
 
  private:
   std::optional<TimePoint> confirmed_;    ///< when the images last confirmed the standstill
-  std::optional<TimePoint> interrupted_;  ///< time since which the IMU contradicts it
-  TimePoint begun_;                       ///< when the images first confirmed it
+  std::optional<TimePoint> interrupted_;  ///< time since which the IMU contradicts the rest
+  TimePoint begun_;                       ///< time at which the images first confirmed the rest
   /// Expectation with its time, older than a slow acceleration, which the filter takes for a bias.
   struct Reference {
     TimePoint time;

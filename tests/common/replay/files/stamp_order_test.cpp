@@ -206,7 +206,7 @@ TEST(Clocks, BlocksOfLinesAtAnotherPlaceAreSorted) {
   expectSorted(stamps, 600);  // two blocks have changed places
   stamps = every(kInterval, 600);
   stamps.insert(stamps.end(), stamps.begin() + 500, stamps.begin() + 550);
-  expectSorted(stamps, 600);  // lines are there twice
+  expectSorted(stamps, 600);  // some lines occur twice
 }
 
 TEST(Clocks, OverlappingBatchesAreNoClockThatWasSet) {

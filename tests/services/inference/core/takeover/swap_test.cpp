@@ -1,5 +1,5 @@
 // Runs the new and the old process as two state machines on one simulated topic. Tests the
-// messages of each, the owner of the topic, and that no frame is lost whatever the new process does.
+// messages of each, the owner of the topic, and that no frame is lost, whatever happens.
 #include "services/inference/core/takeover/swap.h"
 
 #include <gmock/gmock.h>
