@@ -113,7 +113,7 @@ class Line {
   }
 
   const Times& stamps_;
-  std::vector<std::size_t> indices_;  // increasing, as are their stamps
+  std::vector<std::size_t> indices_;  // indices in increasing order, with increasing stamps
   Times sorted_;
   Duration usual_{0};
 };

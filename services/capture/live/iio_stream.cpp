@@ -253,7 +253,7 @@ class IioStream::Device {
     std::int64_t stamp = 0;
     if (stamp_) {
       iio_channel_convert(stamp_, &stamp, at(stamp_, i));
-    } else {  // time by counting, at the rate that the device reports
+    } else {  // the time follows from the number of samples and the device's rate
       stamp = std::llround(1e9 * static_cast<double>(counted_ + i) / rate_hz_);
     }
     if (!stamp_ || clock_ == StampClock::kElsewhere) {

@@ -167,7 +167,7 @@ TEST_F(GatewayNode, PassesTheMapsAnswerToWhoAsked) {
   reply.objects.resize(1);
   reply.objects[0].id = 31;
   node_.onMapReply(reply);
-  node_.onMapReply(reply);  // ignored, because it was answered
+  node_.onMapReply(reply);  // ignored, because the request was already answered
   reply.client = 6;
   node_.onMapReply(reply);  // the reply to another client
   ASSERT_EQ(answers_.size(), 2u);
