@@ -32,9 +32,9 @@ struct Options {
   std::string interface = "lo";
   std::int64_t domain = 0;
   std::string vehicle = "ego";
-  std::int64_t shared_memory_mb = 0;    ///< largest image sent through shared memory; 0: not used
-  std::string security = {};            ///< folder of the identities; empty: no security
-  std::string identity = {};            ///< a folder in `security`; empty: by process name
+  std::int64_t shared_memory_mb = 0;  ///< largest image sent through shared memory; 0: not used
+  std::string security = {};          ///< folder of the identities; empty: no security
+  std::string identity = {};          ///< a folder in `security`; empty: by process name
   /// Addresses of the other hosts; empty: hosts are found by multicast.
   std::vector<std::string> peers = {};
 };

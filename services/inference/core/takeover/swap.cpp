@@ -6,8 +6,8 @@
 namespace perdure::inference {
 namespace {
 
-constexpr std::size_t kRemembered = 32;     // stored results of each side
-constexpr std::size_t kHeard = 128;         // stored frames
+constexpr std::size_t kRemembered = 32;  // stored results of each side
+constexpr std::size_t kHeard = 128;      // stored frames
 // leases, and own results, after which a new process counts as silent
 constexpr int kSilence = 3;
 constexpr int kWorth = 4;  // leases for which a result is repeated
