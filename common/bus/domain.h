@@ -75,7 +75,7 @@ class Domain {
   /// Its interfaces are separated by commas, or empty: all that are up. Shared memory and security
   /// are off. Throws StartupError (69, 78).
   static Domain foreign(Options options);
-  /// The same domain, for participants of another vehicle or with another identity.
+  /// Returns this domain for participants of another vehicle or with another identity.
   Domain as(std::string vehicle, std::string security, std::string identity) const;
   const Options& options() const { return options_; }
   const SharedMemory& sharedMemory() const { return shared_memory_; }

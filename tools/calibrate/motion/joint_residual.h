@@ -33,7 +33,7 @@ using Shared = Eigen::Matrix<double, kShared, 1>;
 using SharedMatrix = Eigen::Matrix<double, kShared, kShared>;
 using Own = Eigen::Matrix<double, kOwn, 1>;
 
-/// What belongs to one window: unknowns, and the quantities of the last linearisation.
+/// Data of one window: unknowns, and the quantities of the last linearisation.
 struct Window {
   const TrackWindow* tracks;
   TimePoint from;               ///< start of its inertial path, before the first image

@@ -33,7 +33,7 @@ class MeshBuilder {
   /// Adds a triangle, counter-clockwise seen from outside. Omits faces without area.
   void triangle(const Vec3& a, const Vec3& b, const Vec3& c, int material);
   void quad(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d, int material);
-  /// The same with texture coordinates: a (0, 0), b (1, 0), c (1, 1), d (0, 1), times `repeats`.
+  /// Adds a face with texture coordinates: a (0, 0), b (1, 0), c (1, 1), d (0, 1), times `repeats`.
   void picture(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d, int material,
                const Vec2& repeats = Vec2::Ones());
 

@@ -80,7 +80,7 @@ void dropPoint(PointSystem& system);
 /// True if rᵀ S⁻¹ r is below the χ² quantile; S = H P Hᵀ + I.
 bool passesGate(const VectorView& r, const MatrixView& S, double probability);
 
-/// The same with S = P + I. P is evaluated only if rᵀ r, an upper bound, reaches the quantile.
+/// Gate with S = P + I. P is evaluated only if rᵀ r, an upper bound, reaches the quantile.
 bool passesGateWith(const VectorView& r, const std::function<Eigen::MatrixXd()>& P,
                     double probability);
 
