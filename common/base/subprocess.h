@@ -58,7 +58,7 @@ class Subprocess {
 
 struct ProgramAnswer {
   int status = 0;      ///< exit status, like Subprocess::ended
-  std::string output;  ///< both streams, in the order in which they were written
+  std::string output;  ///< text of both streams, in the order in which it was written
   bool too_late = false;
 };
 

@@ -58,8 +58,9 @@ std::string_view essentialTopicOf(std::string_view service) {
 
 bool standsIn(std::string_view service, std::string_view topic, std::string_view process) {
   const std::string_view essential = essentialTopicOf(service);
+  // services do not replace each other
   constexpr std::string_view kOurs[] = {"capture", "vio", "inference", "semantic_filter",
-                                        "map_store"};  // services do not replace each other
+                                        "map_store"};
   if (essential.empty() || process.empty()) return false;
   if (std::ranges::find(kOurs, process) != std::end(kOurs)) return false;
   return essential.ends_with('/') ? topic.starts_with(essential) : topic == essential;

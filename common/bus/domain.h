@@ -32,10 +32,11 @@ struct Options {
   std::string interface = "lo";
   std::int64_t domain = 0;
   std::string vehicle = "ego";
-  std::int64_t shared_memory_mb = 0;    ///< largest image sent through shared memory; 0: not used
-  std::string security = {};            ///< folder of the identities; empty: no security
-  std::string identity = {};            ///< a folder in `security`; empty: by process name
-  std::vector<std::string> peers = {};  ///< the other hosts; empty: found by multicast
+  std::int64_t shared_memory_mb = 0;  ///< largest image sent through shared memory; 0: not used
+  std::string security = {};          ///< folder of the identities; empty: no security
+  std::string identity = {};          ///< a folder in `security`; empty: by process name
+  /// Addresses of the other hosts; empty: hosts are found by multicast.
+  std::vector<std::string> peers = {};
 };
 /// Describes bus.interface, bus.peers, bus.domain, bus.vehicle, bus.shared_memory_mb, bus.security
 /// and bus.identity. The variable PERDURE_DOMAIN takes precedence over bus.domain.
@@ -74,7 +75,7 @@ class Domain {
   /// Its interfaces are separated by commas, or empty: all that are up. Shared memory and security
   /// are off. Throws StartupError (69, 78).
   static Domain foreign(Options options);
-  /// The same domain, for participants of another vehicle or with another identity.
+  /// Returns this domain for participants of another vehicle or with another identity.
   Domain as(std::string vehicle, std::string security, std::string identity) const;
   const Options& options() const { return options_; }
   const SharedMemory& sharedMemory() const { return shared_memory_; }
@@ -92,7 +93,7 @@ class Domain {
 
   Options options_;
   SharedMemory shared_memory_;
-  std::int64_t id_;  ///< in this process
+  std::int64_t id_;  ///< number of the domain in this process
   std::shared_ptr<const Entity> domain_;
 };
 

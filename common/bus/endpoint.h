@@ -19,8 +19,9 @@
 namespace perdure::bus {
 
 struct WriterOptions {
-  std::int32_t strength = 0;  ///< for exclusive topics; the highest live strength is received
-  double lease_s = 0.0;       ///< lease of the liveliness; 0: as in the topic table
+  /// For exclusive topics: readers receive the running writer of the highest strength.
+  std::int32_t strength = 0;
+  double lease_s = 0.0;  ///< lease of the liveliness; 0: as in the topic table
 };
 
 /// Common base of readers and writers: a DDS entity, a name for its counts, and refusals.
@@ -80,9 +81,10 @@ class RawWriter;
 
 /// The earlier messages that a reader receives.
 enum class ReadFrom {
-  kNow,   ///< none; those of a latched topic
-  kNew,   ///< none, of a latched topic either
-  kKept,  ///< the newest message, from writers that store it (Qos::kept); no others match
+  kNow,  ///< no stored messages, except those of a latched topic
+  kNew,  ///< no stored messages, not even those of a latched topic
+  /// The newest message, from writers that store it (Qos::kept); other writers do not match.
+  kKept,
 };
 
 class RawReader : public AnyReader {

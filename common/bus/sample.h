@@ -20,7 +20,7 @@ struct RawSample {
   std::shared_ptr<const void> keeper;  ///< owner of `cdr` and of its reader
 };
 
-/// At most `most` samples. The result is empty if none is available.
+/// Takes at most `most` samples. The result is empty if no sample is available.
 std::vector<RawSample> takeInPlace(const std::shared_ptr<const Entity>& reader, std::size_t most);
 
 }  // namespace perdure::bus

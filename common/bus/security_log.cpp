@@ -53,7 +53,7 @@ void takeLog(void* log, const dds_log_data_t* data) {
 
 void takeTrace(void* log, const dds_log_data_t* data) {
   constexpr std::uint32_t kLogged = DDS_LC_FATAL | DDS_LC_ERROR | DDS_LC_WARNING | DDS_LC_INFO;
-  if ((data->priority & kLogged) != 0) return;  // the other sink receives it
+  if ((data->priority & kLogged) != 0) return;  // the other log sink receives this message
   (void)static_cast<SecurityLog*>(log)->take({data->message, data->size});
 }
 

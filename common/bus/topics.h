@@ -19,7 +19,8 @@ struct TopicInfo {
   Qos qos;
   double rate_hz = 0.0;  ///< nominal, for a 10 Hz camera and a 100 Hz IMU; 0: on change
   bool recorded = true;
-  Roles writers = {}, readers = {};  ///< with the roles that read or write every topic
+  /// Roles of the topic, with those that read or write every topic.
+  Roles writers = {}, readers = {};
 
   std::string typeName() const;
 };

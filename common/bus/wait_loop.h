@@ -42,7 +42,7 @@ class WaitLoop {
   /// Removes a reader, which may be destroyed afterwards. Must not be called from a handler of
   /// messages or ticks, because the loop is iterating over the readers then.
   void off(const Endpoint& reader);
-  /// The first tick comes after one period; missed ticks are not repeated.
+  /// The first tick comes after one period; missed ticks are dropped.
   /// The tick is suspended while `wanted` returns false; the loop's thread calls `wanted`.
   void every(std::chrono::nanoseconds period, std::function<void()> tick,
              std::function<bool()> wanted = {});

@@ -14,7 +14,7 @@ namespace perdure::config {
 /// Documentation of a field for users. `mend` states the fix at the end of the error message: "…;
 /// <mend>".
 struct Doc {
-  std::string text;       ///< one line
+  std::string text;       ///< text in one line
   std::string unit = {};  ///< "rad/s/√Hz", "px", "" for none
   std::string mend = {};
 };

@@ -42,7 +42,7 @@ PERDURE_INLINE void reduceTile(double* S, long stride, long i, long j, const Fou
   }
 }
 
-/// The same for one row and `width` columns.
+/// As above, for one row and `width` columns.
 PERDURE_INLINE void reduceRow(double* S, long stride, long i, long j, long width,
                               const Four& inverse) {
   for (long c = 0; c < width; ++c) {

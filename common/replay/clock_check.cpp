@@ -205,7 +205,7 @@ void settleSet(Recording& recording) {
   }
 }
 
-/// Continues a sensor that began after the counter of the other one had come round.
+/// Continues the stamps of a sensor that began after the counter of the other sensor had wrapped.
 void settleCounters(Recording& recording) {
   if (recording.imu.empty() || recording.frames.empty()) return;
   const TimePoint imu = recording.imu.front().time, images = recording.frames.front().time;
@@ -322,7 +322,7 @@ void checkClockChanges(const Recording& recording, const DataUse& use, DataFindi
              other.common == first->common;
     };
     if (std::any_of(all.begin(), first, isSame)) continue;
-    // One sentence for a clock of all sensors.
+    // If all sensors share the clock, one sentence reports the change.
     const auto isAlso = [&](const ClockChange& other) {
       return other.common && first->common && other.kind == first->kind;
     };
@@ -383,7 +383,7 @@ DataFindings checkClocks(const Recording& recording, const DataUse& use) {
   // Frames without IMU may be numbered if there are no other times, as in KITTI tracking.
   if (!of_imu || images.empty()) return findings;
   const auto factor = factorOfStamps(imu, images);
-  if (factor == 1) {  // also detects 1 kHz samples in whole ms
+  if (factor == 1) {  // also true for 1 kHz samples with stamps in whole ms
     checkCount("images", images, findings);
     checkCount("samples of the IMU", imu, findings);
   } else {

@@ -8,7 +8,7 @@ namespace perdure::replay {
 
 /// Continues the streams of a recording alike, after they were read one by one
 /// (files/stamp_order.h): a clock that was set by the same amount for IMU and images gets the
-/// IMU's amount in both, and a counter that came round in one of them only is continued in the
+/// IMU's amount in both, and a counter that wrapped in one of them only is continued in the
 /// other.
 void settleClocks(Recording& recording);
 

@@ -91,7 +91,7 @@ void checkUpright(const Recording& recording, DataFindings& findings) {
 
 /// Lines that were left out are otherwise only counted.
 void checkLost(const Recording& recording, const DataUse& use, DataFindings& findings) {
-  constexpr std::uint64_t kFew = 20;  // one in so many
+  constexpr std::uint64_t kFew = 20;  // at most one lost line per this number
   const std::uint64_t images = recording.frames.size(), samples = recording.imu.size();
   for (const auto& [kind, kept] : {std::pair("imu", use.imu ? samples : 0), {"frame", images}}) {
     std::uint64_t lost = 0;

@@ -74,7 +74,7 @@ struct Recording {
   std::vector<ClockChange> clock_changes = {};
   ReasonCounts reasons;  ///< counts of data left out while reading
   std::vector<std::string> notes =
-      {};  ///< for users: data that were repaired or are not known, a sentence each
+      {};  ///< for users: one sentence for each repaired or unknown item
 };
 
 class Dataset {

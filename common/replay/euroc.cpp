@@ -95,7 +95,7 @@ void readSpeed(const fs::path& folder, Recording& recording) {
 /// The list of a camera's frames, with the paths of its images.
 class FrameList {
  public:
-  /// `look`: whether the images must exist.
+  /// `look`: whether to check that the images exist.
   FrameList(const fs::path& folder, bool look)
       : folder_(folder), look_(look), images_(look ? folder / "data" : fs::path()) {}
 
@@ -299,7 +299,7 @@ class EurocCalibration {
 
  private:
   fs::path mav0_;
-  std::vector<fs::path> chains_;  ///< the first of these is rig_
+  std::vector<fs::path> chains_;  ///< the first file is also rig_
   std::optional<Calibration> rig_;
   RigidTransform T_BI_;           ///< IMU in EuRoC's body, from which all data are transformed
   RigidTransform T_I_reference_;  ///< Kalibr's reference IMU in the IMU, if there are several

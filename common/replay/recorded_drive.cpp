@@ -20,7 +20,7 @@ constexpr std::string_view kFramePrefix = "frame/";
 /// Reference to one image in the recording; its pixels are read on request.
 struct Seen {
   TimePoint time;    ///< corrected (files/stamp_order.h)
-  FrameStamp stamp;  ///< as recorded
+  FrameStamp stamp;  ///< stamp as recorded
   std::string camera;
   std::uint64_t log_ns = 0;
 };

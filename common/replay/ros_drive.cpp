@@ -23,8 +23,8 @@ constexpr char kTransforms[] = "/tf_static";
 
 /// A message of a sensor.
 struct Arrival {
-  TimePoint time;  ///< of its header; at the end corrected (files/stamp_order.h)
-  std::uint64_t log_ns = 0, place = 0;  ///< as of RosMessage
+  TimePoint time;  ///< stamp of the header; corrected at the end (files/stamp_order.h)
+  std::uint64_t log_ns = 0, place = 0;  ///< as in RosMessage
 };
 
 /// Reference to one image in the recording; its pixels are read on request.
@@ -104,7 +104,7 @@ class RosImages {
 struct RosCamera {
   CameraTopics topics;
   std::vector<RosImage> images = {};
-  std::optional<ros::CameraInfo> info = {};  ///< the first
+  std::optional<ros::CameraInfo> info = {};  ///< the first message
   bool info_changes = false;
   std::string frame_id = {};
   int bits = 8;  ///< used bits of 16, from the brightest image

@@ -16,7 +16,7 @@ constexpr std::string_view kPacked = "/compressed";
 
 std::string parentOf(const std::string& topic) { return topic.substr(0, topic.rfind('/')); }
 
-/// The common name "/cam0/image_raw" of that topic and of "/cam0/image_raw/compressed".
+/// The common name of the topics "/cam0/image_raw" and "/cam0/image_raw/compressed".
 std::string streamOf(const std::string& topic) {
   return topic.ends_with(kPacked) ? topic.substr(0, topic.size() - kPacked.size()) : topic;
 }

@@ -17,7 +17,7 @@ struct CameraTopics {
 };
 struct ChosenTopics {
   std::vector<CameraTopics> cameras;  ///< cam0, and cam1 of a pair
-  std::string imu;                    ///< empty if there is none
+  std::string imu;                    ///< topic of the IMU; empty if the recording has no IMU
 };
 
 /// Parses "cam0=/left/image_raw", … into topics by cam0, cam1, imu. Throws StartupError(kUsage)

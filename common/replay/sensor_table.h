@@ -39,7 +39,7 @@ class SensorTable {
   /// StartupError(kData) with the first wrong line.
   SensorTable(const std::filesystem::path& file, const std::string& kind, Recording& recording,
               const Judge& judge);
-  SensorTable(const SensorTable&) = delete;  // rows refer to its text
+  SensorTable(const SensorTable&) = delete;  // not copyable, because rows refer to the text
   SensorTable& operator=(const SensorTable&) = delete;
 
   /// Names of the columns in lower case. The result is empty if the file has no header.

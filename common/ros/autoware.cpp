@@ -27,7 +27,7 @@ std::uint8_t labelOf(const std::string& class_name) {
   return found == kLabels.end() ? Label::kUnknown : found->second;
 }
 
-/// One entry per label, the most probable first.
+/// Returns one entry per label, the most probable first.
 std::vector<ObjectClassification> classificationOf(const ObjectBelief& object) {
   std::map<std::uint8_t, double> sums;
   for (const ClassBelief& belief : object.classes) sums[labelOf(belief.name)] += belief.probability;

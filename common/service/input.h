@@ -7,7 +7,7 @@
 
 namespace perdure::service {
 
-/// To be used in the loop's thread only.
+/// Use it in the loop's thread only.
 class Input {
  public:
   using Clock = std::chrono::steady_clock;

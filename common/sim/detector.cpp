@@ -94,7 +94,8 @@ struct SimulatedDetector::Sight {
 /// the viewpoint changes.
 class SimulatedDetector::Errors {
  public:
-  /// `time` is in units of the time constant of sides; none: they are drawn for each frame.
+  /// `time` is in units of the time constant of sides; empty: errors of sides are drawn for each
+  /// frame.
   Errors(std::uint64_t seed, std::uint64_t frame, std::uint64_t object, double persistent,
          double bearing, double log_distance, std::optional<double> time = {})
       : fresh_(seedOf("look", {seed, frame, object})),
@@ -259,7 +260,8 @@ Detections SimulatedDetector::detect(std::uint64_t frame, const FrameStamp& stam
   found.model_hash = info_.hash;
   const std::vector<Sight> all = sights(frame, stamp.time, T_WB * camera_.T_BC());
   for (const Sight& sight : all) {
-    if (sight.looks_like == model_.classes.size()) continue;  // not a class of the detector
+    // the detector has no such class
+    if (sight.looks_like == model_.classes.size()) continue;
     if (auto detection = look(sight, all, frame)) found.detections.push_back(std::move(*detection));
   }
   Dice dice(seedOf("false alarms", {model_.seed, frame}));

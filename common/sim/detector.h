@@ -46,13 +46,14 @@ struct DetectorModel {
   double shrink_below = 0.6;      ///< fraction below which boxes enclose the visible part only
   /// Share of sides whose deviation is tail_scale times larger.
   double tail_share = 0.0, tail_scale = 5.0;
-  /// Time constant of the sides' errors, apart from their persistent share; 0: each frame anew.
+  /// Time constant of the sides' errors, apart from their persistent share; 0: drawn again for each
+  /// frame.
   double error_time_s = 0.0;
   /// A tracker continues the box of an object that becomes hidden for so long, at constant velocity
   /// in the image.
   double coast_s = 0.0;
   BoxExtent boxes = BoxExtent::kOutline;
-  bool declare_boxes = true;  ///< false: ModelInfo says that it is unknown
+  bool declare_boxes = true;  ///< false: ModelInfo states that the extent of boxes is unknown
 
   double false_per_frame = 0.5, false_smallest_px = 8.0;  ///< sizes are log-uniform up to the image
 

@@ -192,7 +192,7 @@ Drive drive(const GroundPath& path, const SpeedLimits& limits, double from, doub
   const std::vector<double> speed = speedProfile(path, limits, from, length, stops);
   Drive result;
   double t = rest_s;
-  std::size_t i = 0;  // index in the profile
+  std::size_t i = 0;  // index in the speed profile
   const auto count = static_cast<std::size_t>(std::ceil(until_s / result.interval_s)) + 1;
   while (result.distance.size() < count) {
     const double now = result.interval_s * static_cast<double>(result.distance.size());

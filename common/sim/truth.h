@@ -29,7 +29,7 @@ struct TruthObject {
   Eigen::Vector3d size = Eigen::Vector3d::Ones();  ///< length, width, height
   bool moves = false;
   TimePoint present_from, present_until;
-  std::vector<TruthKey> keys;  ///< at least one, sorted by time
+  std::vector<TruthKey> keys;  ///< keys, sorted by time; at least one
 
   bool presentAt(TimePoint t) const { return t >= present_from && t < present_until; }
   TruthKey at(TimePoint t) const;

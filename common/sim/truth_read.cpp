@@ -32,7 +32,7 @@ std::ifstream open(const fs::path& file) {
   return stream;
 }
 
-/// A member of a JSON object; `kind` says what it has to be.
+/// A member of a JSON object; `kind` names the required type.
 template <class T>
 T member(const Json& parent, const char* key, const std::string& where, const char* kind) {
   const auto found = parent.find(key);

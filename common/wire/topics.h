@@ -77,8 +77,9 @@ constexpr Qos bestEffort(int depth) { return {.reliable = false, .depth = depth}
 constexpr Qos latched(int depth, double lease_s = 0.0) {
   return {.depth = depth, .latched = true, .lease_s = lease_s};
 }
-/// A sensor whose gaps cost the pose: for a reader that stops, 10 s at 400 Hz are kept (then DDS
-/// itself gives it up), for one that begins, what the start of vio needs.
+/// A sensor whose gaps end the frame of reference: 10 s at 400 Hz are stored for a stopped reader
+/// (then DDS itself gives it up), and for a reader that begins, as many samples as the start of vio
+/// needs.
 constexpr Qos kSensor{.depth = 4096, .latched = true, .late = 512};
 constexpr Qos exclusive(int depth, double rate_hz) {
   return {.depth = depth, .exclusive = true, .lease_s = leaseFor(rate_hz)};

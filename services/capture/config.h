@@ -47,7 +47,7 @@ struct CameraConfig {
   std::string format = "auto";  ///< libcamera's name, for example "YUYV"; auto: the best available
   double rate_hz = 20.0;
   double exposure_ms = 0.0, gain = 0.0;  ///< 0: automatic
-  std::string flip = "none";             ///< none, horizontal, vertical, both
+  std::string flip = "none";             ///< "none", "horizontal", "vertical" or "both"
   std::string focus = "as_is";           ///< as_is, auto, or manual (at lens_dioptres)
   double lens_dioptres = 0.0;            ///< 1/m; 0: infinity
   std::vector<double> crop;              ///< x, y, width, height, pixels of the sensor; empty: all

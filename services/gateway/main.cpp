@@ -140,8 +140,7 @@ class Readers {
                           std::move(on_gone));
   }
   /// Delivers the newest earlier message, which writers store (bus::Qos::kept), to new viewers. The
-  /// reader is closed after the first message. From writers without stored messages, it receives
-  /// none.
+  /// reader is closed after the first message. Writers without stored messages send nothing.
   template <class T>
   void addNewestOfBefore(const bus::Topic<T>& topic, gateway::Channels channels,
                          std::type_identity_t<Sink<T>> handler) {

@@ -69,7 +69,7 @@ void Node::setWanted(const Channels& wanted) {
   lookAtGraph(looked_at_graph);
   away_ = away_ || wanted.empty();
   if (before.empty() && !wanted.empty() && time_ != TimePoint{}) outputs_.time(time_);
-  if (!wantsTiles()) map_.clear();  // their reader is closed
+  if (!wantsTiles()) map_.clear();  // the reader of tiles is closed, so stored tiles become old
   if (!before.contains(kScene)) scene_ = Scene();
   for (const std::uint32_t channel : wanted) {
     if (!before.contains(channel)) sendNow(channel);
@@ -153,7 +153,7 @@ void Node::onFrame(std::size_t camera, const Frame& frame) {
        frame.stamp.time);
 }
 
-/// Ignored if a live frame is newer.
+/// A stored frame is ignored if a live frame is newer.
 void Node::onFrameOfBefore(std::size_t camera, const Frame& frame) {
   const auto& last = image_pace_[camera].last;
   if (!last || frame.stamp.time > *last) onFrame(camera, frame);
@@ -246,7 +246,8 @@ void Node::take(const Objects& objects) {
 void Node::sendObjects() {
   sendWanted({kObjects, kScene});
   for (std::size_t i = 0; i < config_.cameras.size(); ++i) sendAnnotations(i, false);
-  if (!odometry_) sendPose(objects_->stamp.time);  // otherwise odometry messages send it
+  // otherwise the pose is sent with each odometry message
+  if (!odometry_) sendPose(objects_->stamp.time);
 }
 
 /// The detections of a frame may arrive after the objects, so the annotations wait for them.

@@ -47,7 +47,8 @@ class Node {
   void onDetections(const Detections& detections);
   void onModel(const ModelInfo& model);
   void onObjects(const Objects& objects, std::int64_t now_ns);
-  /// Takes the newest message from before the first viewer, for example the last of an ended drive.
+  /// Takes the newest message that was sent before the first viewer, for example at the end of a
+  /// drive.
   void onObjectsOfBefore(const Objects& objects);
   void onFrameOfBefore(std::size_t camera, const Frame& frame);
   void onEvent(const Event& event);
@@ -73,7 +74,7 @@ class Node {
   std::optional<TimePoint> shownTime() const {
     return objects_ ? std::optional(objects_->stamp.time) : std::nullopt;
   }
-  /// Whether the last objects and odometry are older than `longest_ns`, or there were none.
+  /// Whether the last objects and odometry are older than `longest_ns`, or do not exist.
   bool hearsNothing(std::int64_t now_ns, std::int64_t longest_ns) const;
   const ReasonCounts& reasons() const { return reasons_; }
 
@@ -149,7 +150,8 @@ class Node {
   std::optional<Odometry> odometry_;
   std::optional<Objects> objects_;
   std::optional<ModelInfo> model_;
-  std::map<std::string, std::deque<Detections>> detections_;  ///< of the newest frames, by camera
+  /// Detections of the newest frames, by camera.
+  std::map<std::string, std::deque<Detections>> detections_;
   std::set<std::size_t> awaited_;  ///< cameras whose annotations wait for the detections of
                                    ///< objects_' frame
   bool unplaced_ = false;          ///< an event of the whole map was received before the first pose

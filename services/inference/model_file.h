@@ -24,7 +24,7 @@ struct ModelFile {
 ModelFile readModelFile(const std::string& path, const std::string& description,
                         const std::vector<std::string>& folders);
 
-/// What a file is that is recognised as no network, with the fix: a pointer of Git LFS, HTML,
+/// Describes a file that is recognised as no network, with the fix: a pointer of Git LFS, HTML,
 /// another format. Empty for other files.
 std::string whyNoNetwork(std::string_view bytes);
 

@@ -14,7 +14,7 @@ std::vector<std::string> linesOf(const ListFile& list, JsonReader& reader) {
   namespace fs = std::filesystem;
   std::vector<std::string> lines;
   std::error_code error;
-  // Devices and pipes have no known end.
+  // Only regular files are read, because devices and pipes may have no end.
   const bool regular = fs::is_regular_file(list.path, error);
   const auto bytes = regular ? fs::file_size(list.path, error) : 0;
   if (!error && bytes > list.most_bytes) {
@@ -208,7 +208,7 @@ void readWhole(JsonReader& reader, const std::string& file, ModelDescription& mo
 void readHeads(JsonReader& reader, const std::string& file, ModelDescription& model) {
   const bool distances = model.family == Family::kYolov8 || model.family == Family::kNanoDet;
   if (model.family == Family::kPerdure) {
-    model.class_softmax = true;  // over background and classes; not configurable
+    model.class_softmax = true;  // soft-max over background and classes; not configurable
     model.background = Background::kFirst;
     if (const Json* azimuth = reader.find("azimuth")) readAzimuth(*azimuth, reader, model);
     reader.number("reach", model.reach, 0, 10);

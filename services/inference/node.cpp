@@ -162,7 +162,8 @@ void Node::addSmallerSizes(const ModelFile& file) {
     size_ = sizes_.size() - 1;
     const Frame image = testImage(input);
     bool works = true;
-    for (int round = 0; round < 2 && works; ++round) {  // the first round allocates
+    // two rounds, because the first one allocates memory
+    for (int round = 0; round < 2 && works; ++round) {
       works = candidatesIn(image, options_.score_threshold).has_value();
     }
     size_ = 0;
@@ -207,7 +208,7 @@ void Node::chooseClasses() {
 
 void Node::testItself() {
   const Frame image = testImage(description_.input);
-  for (int round = 0; round < 2; ++round) {  // the first round allocates
+  for (int round = 0; round < 2; ++round) {  // two rounds, because the first one allocates memory
     if (const auto result = candidatesIn(image, options_.score_threshold); !result) {
       throw StartupError(
           ExitCode::kConfiguration,

@@ -33,7 +33,7 @@ class Node {
   /// Backend of the network, for people.
   std::string backend() const;
 
-  /// These give the turn that makes the next frames upright (core/upright.h).
+  /// Calibration and odometry determine the turn of the next frames (core/upright.h).
   void onCalibration(const perdure::Calibration& calibration) { calibration_ = calibration; }
   void onOdometry(const Odometry& odometry);
 
@@ -82,8 +82,9 @@ class Node {
   const ModelDescription& at() const { return sizes_[size_].description; }
 
   Config config_;
-  ModelDescription description_;  ///< description at its own size
-  std::vector<Size> sizes_;       ///< its own first, then smaller ones if there is a budget
+  ModelDescription description_;  ///< description at the network's own size
+  /// The network's own size first, then smaller sizes if there is a budget.
+  std::vector<Size> sizes_;
   std::size_t size_ = 0;
   int quarters_ = 0;  ///< clockwise turn of the images
   perdure::Calibration calibration_;
@@ -91,7 +92,7 @@ class Node {
   std::function<double()> clock_s_;
   double forward_s_ = 0.0;  ///< time of the forward pass for the last frame
   DecodeOptions options_;
-  std::string identity_;  ///< of the network, without a turn
+  std::string identity_;  ///< identity of the network, without a turn
   ModelInfo info_;
 };
 

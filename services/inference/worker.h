@@ -1,6 +1,6 @@
 // Thread that runs the network, behind a queue of one frame, and the rules for writing results. The
 // newest frame replaces a waiting one, results carry the current strength of this process, and a
-// newcomer may take over.
+// new process may take over.
 #pragma once
 
 #include <atomic>
@@ -44,7 +44,7 @@ class Worker {
 
   /// Adds a frame. A frame that still waits is dropped and counted.
   void offer(const Frame& frame);
-  /// These make the following frames upright.
+  /// Calibration and odometry determine the turn of the following frames.
   void onCalibration(const perdure::Calibration& calibration);
   void onOdometry(const Odometry& odometry);
   /// Sets the predicted objects for the following frames.
@@ -101,7 +101,8 @@ class Worker {
   std::string failure_, last_problem_;
   ReasonCounts reasons_;
   Predictions expected_;
-  std::optional<perdure::Calibration> calibration_;  ///< not yet given to the node, as `odometry_`
+  /// Like `odometry_`: received, but not yet given to the node.
+  std::optional<perdure::Calibration> calibration_;
   std::optional<Odometry> odometry_;
   double scale_ = 1.0;   ///< width of the input relative to its own size
   double age_ms_ = 0.0;  ///< age of the last result when it was ready

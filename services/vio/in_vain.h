@@ -14,7 +14,7 @@ class InVain {
   }
   /// Adds a frame with a result.
   void clear() { frames_ = 0, why_.clear(); }
-  /// Empty if there is no problem, or during its first frames.
+  /// The problem as a sentence; empty if there is no problem, or during the first frames.
   const std::string& sentence() const { return why_; }
 
  private:

@@ -42,7 +42,7 @@ class KnownPoseNode {
   HealthState health() const;
   /// One sentence: what the node waits for, or what is wrong. Empty if there is no problem.
   std::string status() const;
-  /// The same for the poses alone: a sentence if they contradict the images.
+  /// Status of the poses alone: a sentence if they contradict the images.
   std::string statusOfPoses() const;
 
  private:

@@ -187,7 +187,7 @@ bool Node::waitsForPair() const {
 bool Node::ready() const {
   TimePoint now = imuTime(waiting_.front().first.stamp.time);
   if (imu_.empty()) return false;
-  // Up to the last row, because an image arrives only after its read-out.
+  // The time is that of the last row, because an image arrives only after its read-out.
   now += durationFromSeconds(0.5 * std::max(0.0, std::ranges::max(readouts(cameras_->models))));
   // The last sample may be extrapolated by a quarter of a period. A capture that waits for this
   // frame's answer sends no sample beyond the next frame.
@@ -227,7 +227,7 @@ TrackedFrame Node::trackImages(const cv::Mat& first, const cv::Mat& second, Time
   }
   const Eigen::Vector3d turn = cameras_->estimator.turnOfReadout(imu_, now);
   if (!started()) {
-    // Traffic before a body at rest cannot outvote points at rest with a known rotation.
+    // With a known rotation, a minority of points at rest is sufficient in front of traffic.
     const auto motion = cameras_->tracker.motionSince(1, 0.8);
     constexpr std::chrono::milliseconds kEven{500};
     if (motion && *motion > config_.core.rest.disparity_px &&

@@ -93,7 +93,7 @@ class Node {
   WaitingFrames waiting_;
   MovingMask moving_;
   InVain in_vain_;
-  Agreement agreement_;  ///< not reset at a start, because a wrong rig causes repeated losses
+  Agreement agreement_;  ///< not reset at a start, because a wrong rig causes repeated restarts
   SpeedDoubt speed_doubt_;
   PositionDoubt position_doubt_;
   MotionInitialiser motion_initialiser_;

@@ -1,5 +1,6 @@
 // Detects that the position has become uncertain: its standard deviation has grown by more than a
-// limit over the last ten seconds, beyond what the error of the heading adds with the way.
+// limit over the last ten seconds, not counting the effect of the heading's error over the distance
+// travelled.
 #pragma once
 
 #include <Eigen/Core>

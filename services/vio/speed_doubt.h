@@ -17,7 +17,7 @@ class SpeedDoubt {
     const double forgets = std::clamp(passed_s / kMemory_s, 0.0, 1.0);
     share_ += forgets * ((refused.value_or(false) ? 1.0 : 0.0) - share_);
   }
-  /// Empty if there is no problem.
+  /// The problem as a sentence; empty if there is no problem.
   const char* sentence() const {
     if (share_ < kMost) return "";
     return "the speed contradicts camera and IMU and is refused: see its unit (m/s), its sign "

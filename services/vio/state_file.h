@@ -12,7 +12,7 @@ class StateFile {
  public:
   /// Creates the directory or throws StartupError. With an empty `directory` nothing is saved.
   explicit StateFile(const std::string& directory);
-  /// Empty if there is no file.
+  /// Returns the text of the file; empty if there is no file.
   std::optional<std::string> read() const;
   /// Writes a temporary file and renames it. Fails with "state_not_written".
   Result<void> write(const std::string& text) const;

@@ -46,10 +46,10 @@ class WaitingFrames {
   bool isLate(const Frame& second);
   Duration tolerance_;
   std::deque<FramePair> pairs_;
-  std::deque<Frame> seconds_;       ///< not paired yet
+  std::deque<Frame> seconds_;       ///< frames of the second camera without a partner yet
   std::optional<TimePoint> taken_;  ///< stamp of the last frame taken
   int alone_ = 0;                   ///< frames taken in a row without a partner
-  std::deque<TimePoint> missed_;    ///< their stamps, since the second camera served one of them
+  std::deque<TimePoint> missed_;    ///< stamps of frames without a partner, since the last pair
   std::string trouble_;             ///< problem of the second camera's last image; empty: none
 };
 

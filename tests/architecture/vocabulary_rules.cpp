@@ -8,8 +8,8 @@
 namespace perdure::tests {
 namespace {
 
-/// Former words of tools/docs/glossary.md and their replacements, without words that plain
-/// sentences need.
+/// Earlier words of the project and their replacements in tools/docs/glossary.md, without words
+/// that plain sentences need.
 const std::map<std::string, std::string> kFormer{{"footing", "ground contact"},
                                                  {"facing", "heading"},
                                                  {"screened", "unmapped occluder"},

@@ -1,4 +1,4 @@
-// Rule for the filter's core: it does not use the former words of tools/docs/glossary.md.
+// Rule for the filter's core: it uses the words of tools/docs/glossary.md, not earlier ones.
 #pragma once
 
 #include <string>
@@ -6,8 +6,8 @@
 
 namespace perdure::tests {
 
-/// Returns one sentence for each word of the glossary's column "formerly" in `content` (code or
-/// comments). Only whole words count. `path` is relative to the project's root.
+/// Returns one sentence for each earlier word of the project in `content` (code or comments). Only
+/// whole words count. `path` is relative to the project's root.
 std::vector<std::string> formerWords(const std::string& path, const std::string& content);
 
 }  // namespace perdure::tests

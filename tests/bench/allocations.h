@@ -8,8 +8,8 @@ namespace perdure::tests {
 
 /// Calls of malloc, calloc, realloc, aligned allocation and operator new. Frees are not counted.
 struct Allocations {
-  std::uint64_t own = 0;     ///< by code outside OpenCV's libraries
-  std::uint64_t opencv = 0;  ///< by code inside OpenCV's libraries
+  std::uint64_t own = 0;     ///< allocations by code outside OpenCV's libraries
+  std::uint64_t opencv = 0;  ///< allocations by code inside OpenCV's libraries
 };
 
 /// Returns the counts since the start of the process, over all threads.

@@ -60,7 +60,7 @@ int main(int argc, char** argv) {
            " all numbers in view with 0; keys as in config/semantic_filter.yaml)\n";
     return 64;
   }
-  perdure::keepFreedMemory();  // as in perdure-semantic-filter
+  perdure::keepFreedMemory();  // perdure-semantic-filter does this too
   try {
     const Config config = bench::configure({argv + std::min(argc, 3), argv + argc});
     std::cout << " in view  objects    boxes  median ms     p99 ms  allocations\n";

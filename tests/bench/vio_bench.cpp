@@ -49,7 +49,7 @@ void measure(benchmark::State& loop, const Work& work) {
       loop, [] {}, work);
 }
 
-/// With one camera, or with two (argument 1).
+/// Returns a filter with one camera, or with two (argument 1).
 const RunningFilter& filter(const benchmark::State& loop) {
   static const RunningFilter one(false), two(true);
   return loop.range(0) == 0 ? one : two;
@@ -237,7 +237,7 @@ void registerStages() {
 }  // namespace perdure::vio::bench
 
 int main(int argc, char** argv) {
-  cv::setNumThreads(1);  // as in vio
+  cv::setNumThreads(1);  // vio also uses one thread
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 64;
   perdure::vio::bench::registerStages();

@@ -44,7 +44,7 @@ std::vector<Bytes> headers() {
   return {encodeHeader(objects)};
 }
 
-/// The first byte says whether it is an anchor, an edge, a sighting or a view.
+/// The first byte selects the kind: an anchor, an edge, a sighting or a view.
 bool takePart(View bytes) {
   if (bytes.empty()) return false;
   const View blob = bytes.subspan(1);

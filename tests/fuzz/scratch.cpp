@@ -18,7 +18,8 @@ constexpr std::string_view kMark = "=== ";
 class Folder {
  public:
   Folder() {
-    // In memory if possible, because a disk is slow for repeated writes of small files.
+    // The folder is in memory if possible, because a disk is slow for repeated writes of small
+    // files.
     const bool memory = std::getenv("TMPDIR") == nullptr && access("/dev/shm", W_OK) == 0;
     const fs::path base = memory ? "/dev/shm" : fs::temp_directory_path();
     std::string name = (base / "perdure-fuzz-XXXXXX").string();

@@ -10,7 +10,7 @@ namespace perdure::test {
 
 /// Returns "x86_64-gcc12.2.0-O-<digest>", for runs with numbers as inputs.
 std::string arithmeticOfNumbers();
-/// The same, with OpenCV's results on images and on small systems of equations.
+/// As above, with OpenCV's results on images and on small systems of equations.
 std::string arithmeticOfPictures();
 
 }  // namespace perdure::test

@@ -9,7 +9,7 @@
 
 namespace perdure::test {
 
-/// Digests by file.
+/// Digests of the output files, by file name.
 using Digests = std::map<std::string, std::string>;
 
 class DigestTable {
@@ -24,7 +24,7 @@ class DigestTable {
   void put(const std::string& arithmetic, const std::string& run, const Digests& digests);
 
  private:
-  std::map<std::pair<std::string, std::string>, Digests> rows_;  // by arithmetic and run
+  std::map<std::pair<std::string, std::string>, Digests> rows_;  // digests by arithmetic and run
 };
 
 /// Returns the first difference of two texts, "line 12: `…`, was `…`", or "" if they are equal.

@@ -23,7 +23,8 @@ namespace {
 using namespace std::chrono_literals;
 
 enum class Victim { kStore, kFilter, kBoth };
-using Kills = std::map<std::size_t, Victim>;  ///< by the number of loops closed before the kill
+/// Killed runs by the number of loops closed before the kill.
+using Kills = std::map<std::size_t, Victim>;
 
 /// Records two laps of a street, with drifting odometry and simulated detections.
 std::string recordTheStreet(const Folder& folder) {
@@ -43,8 +44,8 @@ std::string recordTheStreet(const Folder& folder) {
 
 struct Outcome {
   map_store::WholeMap map;
-  std::set<mapping::SameObject> facts;  ///< that the file holds
-  std::string integrity;                ///< what SQLite says of the file
+  std::set<mapping::SameObject> facts;  ///< facts in the file
+  std::string integrity;                ///< result of SQLite's integrity check
   std::size_t loops = 0;
   std::map<ObjectId, std::size_t> born;  ///< how often each id was given to a new object
 };

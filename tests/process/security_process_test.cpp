@@ -128,7 +128,8 @@ Uses granted() {
       if (info.readers.has(role.role)) uses.insert(name + " reads " + topic);
     }
   }
-  uses.erase("vio reads odometry");  // only if another program gives the poses: KnownPosesProcess
+  // vio reads odometry only with given poses (see KnownPosesProcess)
+  uses.erase("vio reads odometry");
   return uses;
 }
 

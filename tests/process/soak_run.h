@@ -19,10 +19,10 @@
 namespace perdure::test {
 
 struct SoakPoint {
-  double s = 0.0;                           ///< since the first frame was published
+  double s = 0.0;                           ///< time since the first frame was published
   std::map<std::string, double> memory_mb;  ///< resident memory, by service
   std::size_t held = 0, confirmed = 0;      ///< objects of the working set
-  std::uint64_t on_map = 0;                 ///< from map/header
+  std::uint64_t on_map = 0;                 ///< number of objects in map/header
 };
 
 /// A line of a log with at least warning level; its numbers are replaced by "#".
@@ -93,8 +93,8 @@ class SoakRun {
   std::map<std::string, std::unique_ptr<Child>> children_;
   std::map<std::string, Health> health_;
   std::set<std::uint64_t> odometry_, detections_, objects_;
-  std::vector<std::set<ObjectId>> confirmed_;   ///< by lap
-  std::map<std::size_t, RigidTransform> T_WB_;  ///< at the start of a lap
+  std::vector<std::set<ObjectId>> confirmed_;   ///< confirmed objects by lap
+  std::map<std::size_t, RigidTransform> T_WB_;  ///< pose at the start of each lap
   tools::LatencyMeter latency_;
   SoakPoint now_;
   std::vector<SoakPoint> points_;

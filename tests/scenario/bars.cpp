@@ -42,7 +42,7 @@ struct Merges {
 Merges mergesOf(const Outcome& run) {
   Merges merges;
   std::set<std::uint64_t> absorbed;
-  std::map<std::uint64_t, std::uint64_t> claimed_at;  // the first frame, by id
+  std::map<std::uint64_t, std::uint64_t> claimed_at;  // first frame of each id
   for (const JournalFrame& f : run.journal.frames) {
     for (const Glance& g : f.objects) {
       if (g.confirmed) claimed_at.try_emplace(g.id, f.frame);

@@ -141,7 +141,7 @@ double keptIds(const Outcome& run) {
 /// Counts interruptions of the confirmation of fully visible objects.
 double flicker(const Outcome& run) {
   double toggles = 0.0;
-  std::map<ObjectId, bool> lost;  // by id, for objects that were confirmed in view
+  std::map<ObjectId, bool> lost;  // whether an id was lost, for objects that were confirmed in view
   for (const JournalFrame& f : run.journal.frames) {
     for (const Glance& g : f.objects) {
       if (g.visibility != Visibility::kVisible) {

@@ -12,9 +12,9 @@ namespace perdure::test {
 struct KnownFailure {
   std::string scene;
   std::string run;  ///< "seeds" 1 to 3 with true poses, "vio", or "recalled"
-  std::string bar;  ///< its name
+  std::string bar;  ///< name of the bar
   double tolerated = 0.0;
-  std::string why;  ///< with the figures of the time of writing
+  std::string why;  ///< reason, with the figures at the time of writing
 };
 
 /// Throws std::runtime_error with "file:line: cause" for an invalid header, number of fields, or

@@ -33,7 +33,7 @@ struct MapObject {
   std::uint64_t id = 0;
   std::string class_name;
   double existence = 0.0, moving = 0.0;
-  bool working = true;  ///< in the working set, not in long-term memory
+  bool working = true;  ///< true if the object is in the working set, not in long-term memory
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  ///< covariance of the centre
 };

@@ -8,7 +8,7 @@
 
 namespace perdure::test {
 
-/// A scene of its own length (`seconds` 0) or another.
+/// A scene; `seconds` is its duration, 0: the scene's own.
 struct SceneName {
   std::string scene;
   std::uint64_t seed = 1;

@@ -22,7 +22,7 @@ TEST(Scene, Roll) { holdScene("roll"); }
 TEST(Scene, Traffic) { holdScene("traffic"); }
 TEST(Scene, Street) { holdScene("street"); }
 
-/// The same street with a smaller working set, so that most objects leave it on each lap.
+/// Scene `street` with a smaller working set, so that most objects leave it on each lap.
 TEST(Scene, StreetRecalled) {
   const Outcome run = runScene(
       {.scene = "street",

@@ -36,7 +36,7 @@ Bars operator+(Bars bars, const Bars& more);
 
 /// A bar over several seeds.
 struct Verdict {
-  Bar bar;  ///< with the combined value; NaN if the value of a seed is NaN
+  Bar bar;  ///< bar with the combined value; NaN if the value of a seed is NaN
   std::vector<double> by_seed;
   bool meets(double limit) const;
   bool meets() const { return meets(bar.limit); }

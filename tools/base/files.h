@@ -21,7 +21,8 @@ inline std::string textOf(const std::filesystem::path& file) {
 /// A folder that its destructor removes with its content.
 class TemporaryFolder {
  public:
-  /// Its path starts with `start`. If it cannot be made, fail(its name) throws; errno says why.
+  /// Creates a folder whose path starts with `start`. On failure, fail(its name) throws; errno has
+  /// the reason.
   template <class Fail>
   TemporaryFolder(const std::filesystem::path& start, Fail&& fail) {
     std::string name = start.string() + "XXXXXX";

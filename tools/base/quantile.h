@@ -7,7 +7,7 @@
 
 namespace perdure::tools {
 
-/// The sample below which a share of the others lies; the lower one of two. `values` is not empty.
+/// The quantile of `values`, which must not be empty; between two samples, the lower one.
 inline double sampleAt(std::vector<double> values, double share) {
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * (values.size() - 1.0));
   std::nth_element(values.begin(), at, values.end());

@@ -14,7 +14,7 @@ std::string configurationFolder();
 /// The options in bus.yaml of that folder, or in the file that PERDURE_BUS names. Throws
 /// StartupError.
 bus::Options servicesOptions();
-/// The same options for readers: without shared memory and without the services' identity.
+/// Returns these options for readers: without shared memory and without the services' identity.
 bus::Options listenersOptions();
 
 /// The existing topic names, for the error message about an unknown topic.

@@ -16,8 +16,8 @@ struct ForeignRig {
   std::vector<std::string> without_effect;
 };
 
-/// Converts the file; returns nothing if it is of another program. A camera whose file does not say
-/// where it is has no transform. Throws StartupError with the key and the fix.
+/// Converts the file; returns nothing if it is of another program. A camera whose file does not
+/// contain its pose has no transform. Throws StartupError with the key and the fix.
 std::optional<ForeignRig> sectionsOf(const replay::SensorFile& file,
                                      const std::filesystem::path& path);
 

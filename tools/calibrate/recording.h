@@ -21,7 +21,7 @@ struct CalibrationDrive {
   std::vector<CameraViews> cameras;
   std::vector<ImuSample> samples;
   std::optional<ImuCalibration> imu;
-  std::string problem;  ///< the last read error
+  std::string problem;  ///< error of the last read; empty: no error
 };
 
 struct ReadOptions {

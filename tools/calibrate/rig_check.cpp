@@ -37,7 +37,7 @@ class Watched {
   }
 
   void run(replay::Dataset& dataset, const RigCheckOptions& options) {
-    constexpr std::size_t kEvery = 20;  // every so many images
+    constexpr std::size_t kEvery = 20;  // interval of the checks, in images
     std::optional<TimePoint> first;
     std::size_t images = 0;
     replay::ReadAhead ahead(dataset);

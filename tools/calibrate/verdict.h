@@ -33,7 +33,7 @@ struct Cell {
   std::size_t corners = 0;
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();  ///< mean residual, px
 };
-/// Row by row.
+/// Returns the cells row by row.
 std::vector<Cell> cellsOf(const CameraCalibration& camera,
                           const std::vector<CornerResidual>& residuals);
 

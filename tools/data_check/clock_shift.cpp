@@ -13,7 +13,8 @@ namespace {
 using replay::DataFinding;
 using replay::Recording;
 
-constexpr double kStep_s = 0.01;  ///< of the shifts; a turn of a carried camera takes much longer
+/// Step of the shifts; a rotation of a carried camera takes much longer.
+constexpr double kStep_s = 0.01;
 
 /// Integral of the rates on a grid. Turns between two images are small, so that rates add up.
 class TurnGrid {
@@ -38,7 +39,7 @@ class TurnGrid {
   std::int64_t cellOf(TimePoint time) const {
     return std::llround(toSeconds(time - start_) / kStep_s);
   }
-  /// Nothing if samples are missing between the two cells.
+  /// Returns nothing if samples are missing between the two cells.
   std::optional<Eigen::Vector3d> between(std::int64_t from, std::int64_t to) const {
     if (from < 0 || to >= cells()) return std::nullopt;
     const auto a = static_cast<std::size_t>(from), b = static_cast<std::size_t>(to);
@@ -139,7 +140,7 @@ std::optional<double> rateOfTurns(const std::vector<Turn>& turns,
                                   const std::vector<ImuSample>& samples,
                                   const CameraCalibration& camera) {
   constexpr double kMostRate = 0.25;
-  constexpr std::int64_t kMost = 400, kStep = 4;  // cells, of the shift at both ends
+  constexpr std::int64_t kMost = 400, kStep = 4;  // limits of the shift at both ends, in cells
   if (samples.size() < 2) return std::nullopt;
   const TurnGrid gyro(samples);
   const CellTurns cells = cellsOf(turns, gyro, camera);

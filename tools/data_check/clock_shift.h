@@ -10,7 +10,7 @@
 namespace perdure::tools {
 
 /// t_imu − t_image in s, if the gyroscope explains the turning of the images at this shift, and
-/// twice as well as at any other one. `turns`: from places all over the drive.
+/// twice as well as at any other one. `turns`: rotations from all parts of the drive.
 std::optional<double> shiftOfTurns(const std::vector<Turn>& turns,
                                    const std::vector<ImuSample>& samples,
                                    const CameraCalibration& camera);
@@ -22,7 +22,7 @@ std::optional<double> rateOfTurns(const std::vector<Turn>& turns,
                                   const std::vector<ImuSample>& samples,
                                   const CameraCalibration& camera);
 
-/// Code: clock_rate.
+/// Returns the finding with code clock_rate.
 replay::DataFindings rateFinding(double rate, const CameraCalibration& camera);
 
 /// Reads images from places all over the drive, and returns what to add to their stamps. Returns
@@ -32,7 +32,7 @@ std::optional<double> shiftOfClocks(const replay::Recording& recording);
 /// Reads images from places all over the drive. Codes: clock_shift, clock_rate.
 replay::DataFindings checkClockLine(const replay::Recording& recording);
 
-/// Code: clock_shift.
+/// Returns the finding with code clock_shift.
 replay::DataFindings shiftFinding(double shift_s, const CameraCalibration& camera);
 
 /// Adds the shift to the stamps of all images.

@@ -53,7 +53,7 @@ replay::DataFindings checkTurns(const replay::Recording& recording) {
   const bool unit = !findings.empty() && (findings.front().code.starts_with("gyro_") ||
                                           findings.front().code == "images_still");
   if (unit && findings.front().code != "gyro_factor") return findings;
-  // Checked first, because mirrored axes also look like a rotated or inverted T_BS.
+  // Axes are checked first, because mirrored axes also resemble a rotated or inverted T_BS.
   auto axes = judgeAxes(turns, recording.imu, camera);
   if (!axes.empty()) {
     const bool offset = !findings.empty() && findings.front().code == "time_offset";
@@ -78,7 +78,7 @@ replay::DataFindings checkDrive(const replay::Recording& recording, const replay
   if (!use.images || recording.calibration.cameras.empty()) return findings;
   const auto fatal = std::find_if(findings.begin(), findings.end(),
                                   [](const auto& one) { return one.grade == Grade::kFatal; });
-  if (fatal != findings.end()) {  // rotations would fail as well
+  if (fatal != findings.end()) {  // checks of rotations would fail as well
     const auto shift =
         fatal->code == "clocks_apart" ? shiftOfClocks(recording) : std::optional<double>();
     if (shift) *fatal = shiftFinding(*shift, recording.calibration.cameras.front()).front();
@@ -96,7 +96,7 @@ replay::DataFindings checkPoses(const replay::Recording& recording, const replay
   auto findings = judgePoseTimes(file, recording);
   if (!findings.empty()) return findings;
   const auto poses = timedPoses(file, recording);
-  // After one of these all other checks would fail too.
+  // After one of these findings, all other checks would fail too.
   findings = judgePosesOfCamera(poses, recording);
   if (findings.empty()) findings = judgePosesFrozen(poses, recording, use.images);
   if (findings.empty()) findings = judgePoseJumps(poses);

@@ -29,7 +29,7 @@ class Demo {
   void run();
   /// Keeps everything running after the drive if --keep is given, until interrupted; then ends it.
   void keep();
-  /// What the last line says of doubts about the run.
+  /// Doubts about the run, for the end of the last line.
   const std::string& endOfLine() const { return end_of_line_; }
 
  private:
@@ -53,7 +53,7 @@ class Demo {
   std::vector<ServicePlan> services_;
   std::optional<TruthFiles> truth_;
   std::size_t frames_ = 0;
-  replay::DataFindings findings_;  ///< before the run
+  replay::DataFindings findings_;  ///< findings before the run
   std::string configurations_, address_, end_of_line_;
   std::unique_ptr<OutputWriter> outputs_;
   std::unique_ptr<bus::Domain> domain_;

@@ -55,7 +55,7 @@ class Reporter {
   /// Arrival of the last message about a frame, by CLOCK_MONOTONIC.
   std::int64_t lastMessageNs() const { return last_message_ns_; }
   const Health* healthOf(const std::string& process) const;
-  /// The processes that were heard under this name.
+  /// The processes that sent Health under this name.
   std::vector<pid_t> pidsOf(const std::string& process) const;
 
   /// Progress text such as "frame 57/154  10.0 Hz  objects 9  latency 83 ms".

@@ -40,7 +40,7 @@ struct ObjectScore {
   std::uint64_t duplicates = 0;     ///< unmatched estimates close to a counted true object
   std::uint64_t interruptions = 0;  ///< counted frames without match between matched frames
   std::uint64_t ids_matched = 0;    ///< distinct ids, summed over true objects
-  std::uint64_t ids_near = 0;       ///< the same, including the ids of duplicates
+  std::uint64_t ids_near = 0;       ///< ids near the object, with those of duplicates
   double minutes = 0.0;             ///< duration of counted ground truth, summed over objects
   double position_error_m = 0.0;    ///< mean over the matches
   double mean_object_recall = 0.0;

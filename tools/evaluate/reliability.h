@@ -29,7 +29,7 @@ struct Reliability {
   /// Expected calibration error: Σ |believed − observed| of the bins, weighted by their share of
   /// the claims.
   double calibrationError(std::size_t bins = 10) const;
-  double brier() const;  ///< mean of (believed − so)²
+  double brier() const;  ///< mean of (stated probability − outcome)²
   /// 1 − brier() divided by the score of a constant forecast of the observed share; 0 if all claims
   /// are true or all are false.
   double skill() const;

@@ -24,7 +24,7 @@ std::string hypotheses(std::uint32_t n) {
 }
 std::string times(std::uint32_t n) { return n == 1 ? "once" : fmt::format("{} times", n); }
 
-/// Text for an object that came back; a note if it has evidence from before this ledger.
+/// Text for an object that returned; a note if it has evidence from before this ledger.
 std::string backFrom(const char* where, const LedgerEntry& entry) {
   return fmt::format(
       "back from {} {}{}", where, times(entry.count),
@@ -94,7 +94,7 @@ std::string line(double nats, const std::string& what) {
   return fmt::format("  {:>+8.2f}  {}\n", std::abs(nats) < kNothing ? 0.0 : nats, what);
 }
 
-/// Time span of observations; other evidence has no times.
+/// Time span of the evidence; only observations have times.
 std::string span(ExistenceEvidence kind, const LedgerEntry& entry) {
   switch (kind) {
     case ExistenceEvidence::kHit:

@@ -18,10 +18,11 @@
 namespace perdure::tools {
 
 struct TrueBox {
-  Box box;                  ///< complete outline in pixels, clipped to the image
-  std::string class_name;   ///< canonical; empty: an unlabelled region
-  bool ignored = false;     ///< neither a miss nor a false alarm
-  std::optional<Box> hull;  ///< box of the cuboid's image, if fully visible and known
+  Box box;                 ///< complete outline in pixels, clipped to the image
+  std::string class_name;  ///< canonical; empty: an unlabelled region
+  bool ignored = false;    ///< neither a miss nor a false alarm
+  /// Box of the cuboid's image; empty if the object is partly hidden or the box is unknown.
+  std::optional<Box> hull;
 };
 
 struct LabelledFrame {

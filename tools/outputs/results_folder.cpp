@@ -39,7 +39,7 @@ ResultsFolder::ResultsFolder(fs::path out)
 ResultsFolder::~ResultsFolder() {
   std::error_code none;
   if (written_ != out_) fs::remove_all(written_, none);
-  if (is_new_) fs::remove(out_, none);  // does nothing if it is not empty
+  if (is_new_) fs::remove(out_, none);  // does nothing if the folder is not empty
 }
 
 void ResultsFolder::keep() {

@@ -11,18 +11,19 @@
 namespace perdure::tools {
 
 struct Doubt {
-  std::string what;  ///< for the last line
+  std::string what;  ///< short text for the last line
   std::string mend;  ///< causes and fixes
 };
 using Doubts = std::vector<Doubt>;
 
 struct RunFacts {
-  ReasonCounts vio = {};     ///< of vio, or, with given poses, of the node that computes landmarks
-  std::uint64_t frames = 0;  ///< of the first camera
+  /// Counts of vio, or, with given poses, of the node that computes landmarks.
+  ReasonCounts vio = {};
+  std::uint64_t frames = 0;  ///< frames of the first camera
   ReasonCounts capture = {};
   std::uint64_t without_pose = 0;  ///< those without a given pose
   std::uint64_t boxes = 0, objects = 0;
-  replay::DataFindings findings = {};  ///< before the run
+  replay::DataFindings findings = {};  ///< findings before the run
 };
 
 /// Number of images that are missing, cannot be read, or have a line that cannot be used.

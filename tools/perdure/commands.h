@@ -19,7 +19,7 @@ struct CommandEntry {
 /// In the order of `perdure --help`.
 std::span<const CommandEntry> commands();
 
-/// Each adds the options of its subcommand, and nested subcommands.
+/// Each function adds the options of its subcommand, and nested subcommands.
 void setUpCalibrate(CLI::App& command);
 void setUpDemo(CLI::App& command);
 void setUpDetect(CLI::App& command);

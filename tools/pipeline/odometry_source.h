@@ -23,7 +23,7 @@ struct PoseAccuracy {
 /// Deviations added in each frame, so that the increments of a body at rest have a covariance. An
 /// increment without one means an exact pose.
 inline constexpr double kLeastStepRotation = 1e-7, kLeastStepPosition = 1e-6;
-/// For measured truth (EuRoC's motion capture, KITTI's OXTS): the same, but bounded.
+/// For measured truth (EuRoC's motion capture, KITTI's OXTS): the same accuracy, but bounded.
 inline PoseAccuracy ofMeasuredTruth() { return {.bounded = true, .z_up = true}; }
 /// For the states of a simulated folder, which are exact. The values are not zero, because
 /// covariances are inverted.

@@ -149,7 +149,7 @@ void Pipeline::releasePoses() {
   held_.erase(held_.begin(), released);
 }
 
-/// From the decoded frame to its `objects`.
+/// The latency is the time from the decoded frame to its `objects`.
 void Pipeline::noteLatency(const FrameStamp& stamp) {
   const auto started = started_ms_.find(stamp.sequence);
   if (started == started_ms_.end()) return;

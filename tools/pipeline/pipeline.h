@@ -79,7 +79,7 @@ class Pipeline {
   std::map<std::string, ReasonCounts> reasons() const;
 
  private:
-  // These are in pipeline_open.cpp.
+  // These functions are in pipeline_open.cpp.
   void openOdometry(const PipelineOptions& options);
   void checkWalk() const;
   void turnPosesToBody();
@@ -91,17 +91,17 @@ class Pipeline {
   void openFilter();
   void openRun();
   replay::DatasetOptions dataOptions() const;
-  // These are in pipeline.cpp.
+  // These functions are in pipeline.cpp.
   void learn(const ModelInfo& model);
   void hear(const ModelInfo& model);
   void remember();
   void keepMap(const MapFrame& frame);
   void askForGraph();
-  // These are in pipeline_checks.cpp.
+  // These functions are in pipeline_checks.cpp.
   void checkData();
   void checkDetectionFile();
   void refuseUnwritten() const;
-  // These are in pipeline_recorded.cpp.
+  // These functions are in pipeline_recorded.cpp.
   void checkRecorded();
   void runRecorded(const std::function<void(const PipelineCounts&)>& progress);
   void handleRecorded(const replay::RecordedMessage& message);
@@ -136,10 +136,9 @@ class Pipeline {
   std::int64_t run_ns_ = 0;
   std::optional<TimePoint> graph_kept_;  ///< time of the last graph in run.mcap
   std::uint64_t graphs_asked_ = 0;
-  bool graph_waits_ = false;                                           ///< the graph has changed
-                                                                       ///< since
-  std::function<std::optional<Odometry>(const FrameStamp&)> pose_at_;  ///< none: vio gives the
-                                                                       ///< poses
+  bool graph_waits_ = false;  ///< the graph has changed since
+  /// Empty: vio gives the poses.
+  std::function<std::optional<Odometry>(const FrameStamp&)> pose_at_;
   std::optional<replay::PoseFile> pose_file_;
   std::optional<replay::DetectionFile> detection_file_;
   std::unique_ptr<inference::Node> inference_;
@@ -154,13 +153,14 @@ class Pipeline {
   bus::Once odometry_once_;  // detects repeated messages in the recording, as the service does
   std::uint64_t model_hash_ = 0;
   std::optional<TimePoint> first_frame_;
-  std::uint64_t first_index_ = 0;  ///< in the data, from --from
+  std::uint64_t first_index_ = 0;  ///< index in the data of the first frame after --from
   std::optional<std::uint64_t> end_index_;
   std::optional<std::set<std::uint64_t>> heard_frames_;
-  double frames_seconds_ = 0.0;                   // seconds since the first frame of the recording
-  std::vector<Odometry> new_odometry_;            // from vio, not yet delivered
-  std::vector<Odometry> held_;                    // given poses that wait for their landmarks
-  std::map<std::uint64_t, Landmarks> landmarks_;  // by frame, until the filter gets them
+  double frames_seconds_ = 0.0;         // seconds since the first frame of the recording
+  std::vector<Odometry> new_odometry_;  // odometry of vio that is not yet delivered
+  std::vector<Odometry> held_;          // given poses that wait for their landmarks
+  // landmarks by frame, until they are given to the filter
+  std::map<std::uint64_t, Landmarks> landmarks_;
   std::map<std::uint64_t, Detections> waiting_;   // detections whose odometry has not arrived
   std::set<std::uint64_t> waits_for_detections_;  // frames whose odometry has arrived
   std::map<std::uint64_t, double> started_ms_;    // wall clock, by frame

@@ -16,7 +16,7 @@
 namespace perdure::tools {
 namespace {
 
-/// Largest distance from the first pose, m.
+/// Returns the largest distance from the first pose in m.
 double wayOf(const std::map<std::uint64_t, replay::StampedPose>& poses) {
   double farthest = 0.0;
   for (const auto& [frame, pose] : poses) {
@@ -74,7 +74,7 @@ void Pipeline::checkData() {
     return checkPoses(dataset_->recording(), file, {.images = data.decode});
   };
   auto of_poses = judge(*pose_file_);
-  for (auto& finding : of_poses) {  // the user knows it better
+  for (auto& finding : of_poses) {  // the user declared the frame of the poses
     if (options_.odometry_of == "body" && finding.code == "poses_of_camera")
       finding.grade = replay::DataFinding::Grade::kWarning;
   }

@@ -178,7 +178,7 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
     accuracy = isSimulated(options.data) ? ofExactTruth() : ofMeasuredTruth();
   }
   if (pose_file_) {
-    const bool knows_up = accuracy.z_up;  // other poses assume it
+    const bool knows_up = accuracy.z_up;  // the vertical of other poses is assumed
     const auto serve = [this, knows_up](auto source) {
       pose_at_ = [this, knows_up, source](const FrameStamp& stamp) mutable {
         auto odometry = source.at(stamp);
@@ -206,7 +206,7 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
   sinks.innovations = [this](const std::vector<vio::Innovation>& all) {
     rig_watch_->onInnovations(all);
   };
-  constexpr double kWatched_s = 60.0;  // the same time as in perdure doctor
+  constexpr double kWatched_s = 60.0;  // equals the limit of perdure doctor
   rig_watch_.emplace(dataset_->calibration().cameras.front(), kWatched_s);
   sinks.landmarks = [this](const Landmarks& landmarks) {
     landmarks_[landmarks.stamp.sequence] = landmarks;

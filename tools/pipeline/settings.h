@@ -22,7 +22,7 @@ struct PipelineOptions {
   std::string odometry;       ///< vio, truth, drifting, recorded, or a pose file
   std::string odometry_of;    ///< frame of a pose file: "body", "camera"; empty: body, checked
   std::string odometry_walk;  ///< of a pose file: "m/√m,rad/√m"; empty: the map store's keys
-  std::string detections;     ///< model, simulated, recorded, none, or a CSV
+  std::string detections;     ///< "model", "simulated", "recorded", "none", or a CSV file
   std::string model, class_name;
   std::vector<std::uint32_t> image_size;
   std::vector<std::string> topics;  ///< topics of a ROS recording: "cam0=/left/image_raw"
@@ -45,7 +45,7 @@ struct ServiceConfigs {
   vio::Config vio;
   semantic_filter::Config semantic_filter;
   inference::Config inference;
-  map_store::Config map_store;  ///< its path is always OUT/map.sqlite
+  map_store::Config map_store;  ///< the path of the file is always OUT/map.sqlite
   DetectorConfig detector;      ///< for --detections simulated; service `detector`
   DriftConfig drifting;         ///< for --odometry drifting
   std::uint64_t digest = 0;     ///< digest of all values

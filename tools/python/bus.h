@@ -32,7 +32,7 @@ class Bus {
 
   const bus::Participant& participant() const { return participant_; }
   const bus::Options& options() const { return domain_.options(); }
-  /// For example "domain 0, interface lo, vehicle ego".
+  /// Describes the connection, for example "domain 0, interface lo, vehicle ego".
   std::string place() const;
   /// Explains why no message arrived on a topic, with the fix.
   std::string whySilent(const std::string& topic, std::size_t matched) const;

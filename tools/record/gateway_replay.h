@@ -40,7 +40,8 @@ class GatewayReplay {
     TimePoint time;
   };
   struct Mail {
-    std::vector<gateway::Channels> wanted;  ///< every change, so that returning clients are updated
+    /// Every change of the wanted channels, so that returning clients are updated.
+    std::vector<gateway::Channels> wanted;
     std::deque<gateway::Call> calls;
     std::deque<gateway::PlaybackRequest> requests;
     bool stop = false;

@@ -12,7 +12,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Conversations between processes, and the state of processes that do not run any more.
+/// Topics with queries and answers of processes, and with the state of processes that have ended.
 const std::set<std::string> kNotByItself{"health", "map/query", "map/near", "map/reply"};
 
 const std::map<std::string, std::set<std::string>> kInputs{

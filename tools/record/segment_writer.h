@@ -41,7 +41,7 @@ class SegmentWriter {
   /// Finishes the current file.
   void finish();
 
-  /// Empty if there is no problem.
+  /// The problem as a sentence; empty if there is no problem.
   const std::string& problem() const { return problem_; }
   bool diskFull() const { return disk_full_; }
   std::uint64_t bytes() const { return bytes_; }

@@ -29,7 +29,7 @@ struct StoreReport {
   std::uint64_t bytes = 0, files = 0, removed = 0, folder_bytes = 0, dumps = 0;
   std::uint64_t overrun = 0;    ///< chunks lost to a slow disk
   std::uint64_t cut_short = 0;  ///< chunks dropped because the black box was full
-  std::string problem;          ///< empty if there is none
+  std::string problem;          ///< problem of the recording; empty if there is none
   bool disk_full = false;       ///< the problem is a full disk
   std::string lost_to;          ///< the problem that last caused lost messages
 };
@@ -67,7 +67,7 @@ class Store {
   std::optional<BlackBox> black_box_;
   std::optional<std::int64_t> dump_until_ns_;
   std::atomic<bool> fault_ = false;
-  StoreReport now_;  // only for the recorder's thread
+  StoreReport now_;  // used in the recorder's thread only
   mutable std::mutex mutex_;
   StoreReport report_;
   BoundedQueue<Job> queue_;

@@ -95,7 +95,8 @@ Authority Authority::create(const fs::path& folder, const std::string& vehicle, 
   writePrivate(own / kRevoked, toPem(made.revoked_.get()), kForOwner);
   writePrivate(own / kGovernance, signedDocument(made.signer(), governanceXml()), kForOwner);
   made.save();
-  writePrivate(own / kKey, toPem(made.key_.get()), kForOwner);  // last, because it marks completion
+  // written last, because this file marks completion
+  writePrivate(own / kKey, toPem(made.key_.get()), kForOwner);
   return made;
 }
 
@@ -165,7 +166,7 @@ void Authority::write(const std::string& name, const Known& known, const Validit
   const auto put = [&](const char* file, const std::string& text) {
     writePrivate(folder / file, text, kForOwner, owner);
   };
-  // Recorded first, so that every issued certificate can be revoked.
+  // The certificate is recorded first, so that every issued certificate can be revoked.
   const fs::path record = own / kIssued / (name + ".pem");
   writePrivate(record, textOf(record) + pem, kForOwner);
   put(kCa, toPem(certificate_.get()));

@@ -32,7 +32,7 @@ struct SimulateProgress {
 /// unknown scene, or a folder with other content. `report` may be empty.
 bool simulate(const SimulateOptions& options,
               const std::function<void(const SimulateProgress&)>& report);
-/// The same for a given scene. Ignores options.scene and options.seed; options.world must be that
+/// Renders a given scene. Ignores options.scene and options.seed; options.world must be that
 /// of the scene.
 bool simulate(const sim::Scene& scene, const SimulateOptions& options,
               const std::function<void(const SimulateProgress&)>& report);

@@ -11,7 +11,8 @@ namespace perdure {
 /// file, or if there is none.
 std::string whyUnreadable(const std::filesystem::path& file);
 
-/// The same of a folder or of the first entry in it, at any depth, that may not be read.
+/// Returns this text for a folder, or for the first entry in it, at any depth, that may not be
+/// read.
 std::string whyUnreadableIn(const std::filesystem::path& folder);
 
 }  // namespace perdure

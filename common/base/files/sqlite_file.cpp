@@ -100,7 +100,7 @@ OpenedSqlite openSqliteToRead(const fs::path& link) {
 
 bool lacksWriteAheadLog(const fs::path& link) {
   const fs::path file = targetOf(link);
-  constexpr std::size_t kWriteVersion = 18;  // in the header; 2: WAL mode
+  constexpr std::size_t kWriteVersion = 18;  // offset in the header; the value 2 is WAL mode
   std::array<char, kWriteVersion + 1> head{};
   std::ifstream(file, std::ios::binary).read(head.data(), head.size());
   return head[kWriteVersion] == 2 && !holds(file, "-wal");

@@ -10,7 +10,7 @@ namespace perdure {
 
 struct OpenedSqlite {
   sqlite3* connection = nullptr;  ///< to be closed by the caller, also after a failure
-  int code = 0;                   ///< of SQLite; 0: the file can be read
+  int code = 0;                   ///< SQLite's error code; 0: the file can be read
   std::string why;                ///< after a failure: the cause and its fix
 };
 

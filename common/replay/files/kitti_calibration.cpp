@@ -62,7 +62,7 @@ class Entries {
   RigidTransform rotationAndTranslation() const {
     return RigidTransform(rotation({"R"}), Eigen::Vector3d(get({"T"}, 3).data()));
   }
-  /// Of an image in pixels.
+  /// Returns one number of the image size, in pixels.
   std::uint32_t size(const std::string& name, std::size_t index) const {
     const double pixels = get({name}, 2)[index];
     if (!(pixels >= 1.0 && pixels <= 65535.0)) wrong(name, "is no size of an image");

@@ -11,7 +11,7 @@ namespace perdure::replay {
 namespace {
 
 constexpr std::string_view kStep = "step_";
-constexpr double kMost = 1e4;  // of an entry: 100 m or 100 rad in a step
+constexpr double kMost = 1e4;  // largest entry: a deviation of 100 m or 100 rad in a step
 
 /// Row and column of "step_A_B" in the order [θ, p], the lower one first.
 std::optional<std::pair<int, int>> entryOf(std::string_view name) {

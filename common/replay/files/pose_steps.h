@@ -30,7 +30,7 @@ class PoseSteps {
   std::string entriesOf(const std::vector<std::string_view>& names);
   bool withoutSteps(std::vector<std::string_view>& fields) const;  ///< leaves the pose; true
   std::string addCovariance(const std::vector<std::string_view>& fields);
-  std::vector<Entry> entries_;  ///< by columns of the file
+  std::vector<Entry> entries_;  ///< entries of the covariance, in the order of the file's columns
 };
 
 }  // namespace perdure::replay

@@ -18,7 +18,7 @@ using Times = std::vector<TimePoint>;
 using Kind = ClockChange::Kind;
 
 constexpr std::size_t kFew = 3;        ///< number of strays accepted for any number of stamps
-constexpr std::size_t kFewShare = 50;  ///< one stray per this number of stamps
+constexpr std::size_t kFewShare = 50;  ///< at most one stray stamp per this number of stamps
 constexpr int kFarIntervals = 32;      ///< distance from the neighbours' stamps, in intervals
 
 struct Counter {
@@ -113,7 +113,7 @@ class Line {
   }
 
   const Times& stamps_;
-  std::vector<std::size_t> indices_;  // increasing, as are their stamps
+  std::vector<std::size_t> indices_;  // indices in increasing order, with increasing stamps
   Times sorted_;
   Duration usual_{0};
 };
@@ -177,8 +177,9 @@ class ClockWalk {
  private:
   static constexpr std::size_t kMostSet =
       8;  ///< clocks that were set; overlapping batches are more
-  static constexpr std::size_t kOrdered = 20;  ///< one step back per this number is a list in order
-  static constexpr int kLost = 20;             ///< intervals in which samples may be missing
+  /// A list with fewer steps back than one per this number is in order.
+  static constexpr std::size_t kOrdered = 20;
+  static constexpr int kLost = 20;  ///< intervals in which samples may be missing
 
   /// Returns false if the stamps are no clock that was set.
   bool walk() {
@@ -210,7 +211,8 @@ class ClockWalk {
     const bool regular = i > kFew && goesOn(i - kFew - 1, kFew + 1) && goesOn(i, kFew + 1);
     if (step < Duration{0} && goesOn(i, behind) && findCounter(change, regular)) return change;
     if (!regular || kOrdered * back_ > stamps_.size()) return std::nullopt;
-    if (step > Duration{0} && step <= hours(24)) return change;  // a pause
+    // a step forward of up to a day is a pause
+    if (step > Duration{0} && step <= hours(24)) return change;
     if (step < Duration{0} && (isSwap(i) || isMoved(i))) return std::nullopt;
     change.kind = Kind::kSet, change.added = between(TimePoint(usual_), TimePoint(step));
     return change;
@@ -258,7 +260,7 @@ class ClockWalk {
     return after > before && between(after, before) <= multipleOf(kLost, usual_);
   }
 
-  /// The counter that came round, if the step back has its length: to about a sample between
+  /// The counter that wrapped, if the step back has its length: to about a sample between
   /// regular stamps, or more roughly if all stamps lie inside of it.
   bool findCounter(ClockChange& change, bool regular) const {
     static const std::vector<Counter> kCounters = counters();

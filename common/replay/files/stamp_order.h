@@ -1,4 +1,4 @@
-// Decides about the stamps of each sensor in a recording: their order, counters that came round,
+// Decides about the stamps of each sensor in a recording: their order, counters that wrapped,
 // and clocks that were set. Readers deliver whole streams in the order of their files (orderByTime
 // in recording.h); clock_check.h judges the result.
 #pragma once
@@ -15,14 +15,15 @@ namespace perdure::replay {
 /// A place where the stamps of a sensor do not go on.
 struct ClockChange {
   enum class Kind {
-    kCounter,  ///< a counter came round: `added` continues it exactly
+    kCounter,  ///< a counter wrapped: `added` continues it exactly
     kSet,      ///< the clock was set: `added` continues it after a usual interval
     kPause     ///< a pause, or a clock that was set forward; nothing is added
   };
   Kind kind = Kind::kPause;
-  std::size_t index = 0;     ///< of the first stamp behind it, in the order of the file
+  /// Index of the first stamp after the change, in the order of the file.
+  std::size_t index = 0;
   TimePoint before, after;   ///< the stamps on both sides, as written
-  Duration added{0};         ///< to `after` and all later stamps
+  Duration added{0};         ///< offset that is added to `after` and all later stamps
   Duration usual{0};         ///< median interval of the sensor
   std::string counter = {};  ///< kCounter: "32 bits of µs", "a day"
   std::string sensor = {};   ///< "imu", "frame", "stereo", "speed", "truth"
@@ -34,7 +35,7 @@ struct ClockChange {
 /// The stamps to keep, as indices in increasing order of their corrected times.
 struct StampOrder {
   std::vector<std::size_t> kept;
-  std::vector<TimePoint> times;  ///< of all stamps, continued over the changes
+  std::vector<TimePoint> times;  ///< times of all stamps, continued over the changes
   std::vector<ClockChange> changes;
   std::size_t moved = 0;     ///< out of order; sorted
   std::size_t strays = 0;    ///< removed: a few stamps far from their neighbours

@@ -69,7 +69,7 @@ struct ChunkPlace {
   std::string compression = {};
   std::uint64_t start_ns = UINT64_MAX, end_ns = 0;
   std::set<std::uint32_t> connections = {};
-  std::uint64_t number = 0;  ///< in the order of the file
+  std::uint64_t number = 0;  ///< number of the chunk in the order of the file
 };
 
 class Bag : public RosSource {

@@ -72,7 +72,7 @@ class RecordedMessages {
   struct ChunkPlace {
     std::size_t file = 0;
     const mcap::ChunkIndex* index = nullptr;
-    std::uint64_t number = 0;  ///< in the order of the files
+    std::uint64_t number = 0;  ///< number of the message in the order of the files
   };
   struct Pending {
     RecordedMessage message;

@@ -20,7 +20,7 @@ bool shareTopic(const RecordingPart& a, const RecordingPart& b) {
 
 /// The parts of one recording follow each other; only a step of the clock makes them overlap.
 bool overlap(const RecordingPart& a, const RecordingPart& b) {
-  constexpr double kMost = 0.1;  // of the shorter one
+  constexpr double kMost = 0.1;  // largest overlap, as a share of the shorter recording
   const double common = secondsBetween(b.start_ns, std::min(a.end_ns, b.end_ns));
   return common > kMost * std::min(secondsBetween(a.start_ns, a.end_ns),
                                    secondsBetween(b.start_ns, b.end_ns));
@@ -36,7 +36,7 @@ std::vector<std::string> joinParts(std::vector<RecordingPart> parts) {
             [](const auto& a, const auto& b) { return a.start_ns < b.start_ns; });
   for (std::size_t i = 1; i < parts.size(); ++i) {
     const RecordingPart& later = parts[i];
-    const RecordingPart* before = nullptr;  // the last one with a common topic
+    const RecordingPart* before = nullptr;  // the last earlier part that has a topic in common
     for (std::size_t k = 0; k < i; ++k) {
       if (!shareTopic(parts[k], later)) continue;
       if (overlap(parts[k], later)) {

@@ -178,7 +178,7 @@ std::optional<RosMessage> RosMessages::nextRecorded() {
   }
   if (first == heads_.size()) return std::nullopt;
   auto message = std::move(heads_[first]);
-  constexpr int kPlaceBits = 48;  // of the place in one file
+  constexpr int kPlaceBits = 48;  // bits for the place within a file
   message->place |= std::uint64_t{first} << kPlaceBits;
   heads_[first] = sources_[first]->next();
   return message;

@@ -108,7 +108,7 @@ void UnpackedFile::unpack() {
   }
   const auto size = ZSTD_getFrameContentSize(packed.data(), filled.size);
   const bool known = size != ZSTD_CONTENTSIZE_UNKNOWN && size != ZSTD_CONTENTSIZE_ERROR;
-  const std::uint64_t stated = known ? size : 0;  // of the first frame
+  const std::uint64_t stated = known ? size : 0;  // stated size of the first compressed frame
   std::error_code unknown;
   const auto space = fs::space(path_.parent_path(), unknown);
   if (!unknown && stated > space.available) throwFull(packed_, path_, stated, 0);

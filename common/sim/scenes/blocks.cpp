@@ -46,7 +46,7 @@ class Block {
     Eigen::Vector3d size;
     Place place;
   };
-  /// One of its four sides.
+  /// One of the four sides of a block.
   struct Side;
 
   static std::vector<Side> sidesOf(const Eigen::Vector2d& half);

@@ -50,7 +50,7 @@ Trajectory handheldMotion(const GroundPath& path, const Drive& drive, double hei
     const auto wave = [&](double period) { return wanders * std::sin(2.0 * M_PI * t / period); };
     Look look;
     look.point = p.position;
-    look.yaw = p.heading + wave(13.0) + 0.18 * wave(4.7);  // to each side
+    look.yaw = p.heading + wave(13.0) + 0.18 * wave(4.7);  // the camera turns to each side
     look.pitch_down = 0.12 + 0.07 * wave(2.9);
     look.roll = 0.05 * wave(4.3);
     looks.push_back(look);

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kSuburbSeconds = 305.0;
 constexpr int kSuburbColumns = 4, kSuburbRows = 4;
-constexpr double kShareMoving = 0.02;  ///< of vehicles; drive 00 of KITTI: 7 of 440
+constexpr double kShareMoving = 0.02;  ///< share of moving vehicles; drive 00 of KITTI: 7 of 440
 constexpr double kPassing_s = 4.0;     ///< an oncoming car is present for so long before and after
 
 /// Rows 0 and 3 are driven twice in one direction; rows 0 and 2 and the outer columns also in the

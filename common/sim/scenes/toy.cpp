@@ -35,7 +35,7 @@ void putCars(SceneBuilder& builder) {
   builder.mustPut(car, {polar(kScale * kToyDistance, far_bearing), far_bearing + yaw, 0.0});
   builder.mustPut(carOf(builder, 4.2), {polar(29.0, -0.13), dice.uniform(-1.0, 1.0), 0.0});
   builder.mustPut(carOf(builder, 4.2), {polar(40.0, 0.02), dice.uniform(-1.0, 1.0), 0.0});
-  // The same image: all distances between camera and car are fourteen times smaller.
+  // The image is the same, because all distances between camera and toy are fourteen times smaller.
   SceneObject toy = builder.draw("toy");
   toy.shape = "hatchback";
   toy.size = car.size / kScale;
@@ -46,7 +46,7 @@ void putCars(SceneBuilder& builder) {
   builder.mustPut(std::move(toy), {point, near_bearing + yaw, top});
 }
 
-/// Back and forth across the view, with a small motion along it.
+/// Motion back and forth across the view, with a small part along it.
 Trajectory sideways(double seconds) {
   std::vector<Look> looks;
   for (double t = 0.0; t < seconds + 2.0; t += kToyInterval) {

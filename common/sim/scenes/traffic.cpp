@@ -1,5 +1,5 @@
 // A street with traffic: a car ahead, oncoming and crossing cars, two cars that leave parking
-// places, one that arrives and parks, and pedestrians.
+// places, one car that arrives and parks, and pedestrians.
 #include <algorithm>
 #include <cmath>
 #include <limits>

@@ -48,7 +48,7 @@ class ClockMap {
  public:
   /// Adds a message with stamp `theirs_ns` that arrived at `ours_ns`.
   void observe(std::int64_t theirs_ns, std::int64_t ours_ns);
-  /// Empty in the first half second.
+  /// Converts a remote time; empty in the first half second.
   std::optional<std::int64_t> toOurs(std::int64_t theirs_ns) const;
   /// Number of clock jumps, which are changes larger than drift.
   std::uint64_t jumps() const { return jumps_; }

@@ -62,7 +62,7 @@ std::optional<double> askRate(const iio_channel* channel, double wanted) {
   return is && *is > 0.0 ? is : std::nullopt;
 }
 
-/// One axis, with the conversion of its integers.
+/// One axis, with the conversion of its integer readings.
 struct Axis {
   iio_channel* channel = nullptr;
   double scale = 1.0, offset = 0.0;
@@ -253,7 +253,7 @@ class IioStream::Device {
     std::int64_t stamp = 0;
     if (stamp_) {
       iio_channel_convert(stamp_, &stamp, at(stamp_, i));
-    } else {  // time by counting, at the rate that the device reports
+    } else {  // the time follows from the number of samples and the device's rate
       stamp = std::llround(1e9 * static_cast<double>(counted_ + i) / rate_hz_);
     }
     if (!stamp_ || clock_ == StampClock::kElsewhere) {

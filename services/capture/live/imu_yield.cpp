@@ -7,7 +7,8 @@
 namespace perdure::capture {
 
 std::string ImuYield::look(std::uint64_t read, std::uint64_t given) {
-  constexpr std::uint64_t kFew = 10;  // one or two blocks may be in transit
+  // fewer samples are not judged, because one or two blocks may be in transit
+  constexpr std::uint64_t kFew = 10;
   const std::uint64_t more_read = read - std::exchange(read_, read);
   const std::uint64_t more_given = given - std::exchange(given_, given);
   if (more_read < kFew || 2 * more_given >= more_read) return {};

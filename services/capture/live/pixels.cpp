@@ -10,10 +10,10 @@
 namespace perdure::capture {
 namespace {
 
-/// A layout with one plane, and OpenCV's conversions of it; -1: none is needed.
+/// A layout with one plane, and OpenCV's conversions of it; -1: no conversion is needed.
 struct OnePlane {
   PixelLayout layout;
-  int bytes;  ///< of a pixel
+  int bytes;  ///< bytes of a pixel
   int to_grey, to_colour;
 };
 constexpr OnePlane kOnePlane[] = {

@@ -139,8 +139,8 @@ Box boundsOf(const std::vector<Point>& points, const CameraModel& camera) {
 
 struct Said {
   double likelihood = 0.0;
-  bool asked = false;  ///< the likelihood comes from the answer to a prediction, not from a
-                       ///< reported box
+  /// True if the likelihood comes from an answer to a prediction, not from a reported box.
+  bool asked = false;
 };
 
 /// Probability from the detections that `object` exists rather than clutter, with even prior odds.

@@ -3,7 +3,7 @@
 namespace perdure::gateway {
 namespace {
 
-/// Sent as CDR, because its bytes then need no base64.
+/// Images are sent as CDR, because their bytes then need no base64.
 constexpr char kCompressedImageIdl[] =
     "module foxglove {\n"
     "struct Time { unsigned long sec; unsigned long nsec; };\n"

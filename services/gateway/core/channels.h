@@ -81,7 +81,7 @@ struct Encoded {
 
 /// Services for clients (in the protocol's sense), with JSON in both directions.
 enum Service : std::uint32_t {
-  kGraphOfTheMap = 0,  ///< not a service: a query of the gateway itself
+  kGraphOfTheMap = 0,  ///< a query of the gateway itself; clients cannot call it
   kObjectService = 1,
   kMapQueryService,
   kNextEventService

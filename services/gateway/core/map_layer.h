@@ -33,7 +33,7 @@ class MapLayer {
   WorldId mapOf(const WorldId& world) const;
 
   struct View {
-    std::vector<MapObject> here;  ///< in the M of this W
+    std::vector<MapObject> here;  ///< objects in the M of this W
     std::size_t elsewhere = 0;    ///< number of objects of maps whose transform to this M is
                                   ///< unknown
   };

@@ -45,7 +45,7 @@ class VitalSigns {
     std::int64_t heard_ns = 0;
     double cpu = -1.0;  ///< share of one core between the last two messages; below 0: not known
   };
-  /// The Health as people and monitors should see it: without the faults of an ended drive.
+  /// Returns Health for display, without the faults that follow from the end of a drive.
   Health shown(const Health& health, std::int64_t now_ns) const;
   const std::string vehicle_;
   std::map<std::string, Service> services_;

@@ -27,7 +27,7 @@ struct Unsubscribe {
   std::vector<std::uint32_t> ids;
 };
 struct GetParameters {
-  std::string id;  ///< empty: none
+  std::string id;  ///< empty: the message has no id
 };
 struct FetchAsset {
   std::uint32_t request = 0;

@@ -72,7 +72,7 @@ void Files::replaceIn(const std::string& path, const std::string& from, const st
   for (auto at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size())) {
     text.replace(at, from.size(), to);
   }
-  changed->packed.clear();  // was compressed from the previous content
+  changed->packed.clear();  // the compressed copy belongs to the previous content
   changed->tag = '"' + toHex(digest(text)) + '"';
   found->second = std::move(changed);
 }

@@ -47,7 +47,7 @@ class Hub {
   struct Told {
     std::function<void(const Channels&)> wanted;  ///< channels with viewers; called on change
     std::function<void(Call)> call;
-    std::function<void(PlaybackRequest)> playback = {};  ///< empty for live data
+    std::function<void(PlaybackRequest)> playback = {};  ///< controls playback; empty for live data
   };
   Hub(std::string name, std::string session, std::size_t most_events, Told told);
 

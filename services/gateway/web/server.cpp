@@ -108,7 +108,7 @@ class Server::Impl {
     acceptor_.async_accept([this](beast::error_code error, tcp::socket socket) {
       if (!acceptor_.is_open()) return;
       if (error) {
-        // Without free descriptors, other connections must end first.
+        // If the process has no free descriptors, other connections must end first.
         shared_->hub.reasons().add("accept_failed");
         constexpr std::chrono::milliseconds kPause{100};
         auto pause = std::make_shared<asio::steady_timer>(io_, kPause);

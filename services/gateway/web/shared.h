@@ -12,7 +12,7 @@
 #include <memory>
 #include <set>
 #include <string>
-#include <utility>  // Boost 1.74 does not include it for std::exchange
+#include <utility>  // needed for std::exchange in Boost 1.74, which does not include this header
 
 #include "services/gateway/web/files.h"
 #include "services/gateway/web/guard.h"

@@ -17,8 +17,8 @@ enum class Family {
   kYoloFastest,
   kFastestDet,
   kPerdure,
-  kYolov5,   ///< also v7
-  kYolov8,   ///< also v9 to v12, YOLO26, RTMDet
+  kYolov5,   ///< also YOLOv7
+  kYolov8,   ///< also YOLOv9 to v12, YOLO26, RTMDet
   kNanoDet,  ///< also PicoDet
   kSsd,
   kDetr,  ///< also related networks with sigmoids (RT-DETR)
@@ -111,7 +111,7 @@ struct Azimuth {
 
 struct ModelDescription {
   std::string name;
-  std::string digest;  ///< of the network and its weights; empty: not known
+  std::string digest;  ///< digest of the network and its weights; empty: not known
   Family family = Family::kYolox;
   Input input;
   std::vector<std::string> classes;  ///< lower-case, unique, in the order of the network
@@ -135,7 +135,8 @@ struct ModelDescription {
   double box_sigma = 0.0;  ///< standard deviation of a side relative to the box's size; 0: unknown
   BoxExtent boxes = BoxExtent::kUnknown;
   bool upright = true;  ///< images may be turned upright (core/upright.h)
-  std::map<std::string, std::array<double, 4>> side_insets;  ///< by class; see ModelInfo
+  /// Insets of the sides by class; see ModelInfo.
+  std::map<std::string, std::array<double, 4>> side_insets;
   Calibration calibration;
 };
 

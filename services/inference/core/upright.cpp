@@ -7,7 +7,7 @@ namespace perdure::inference {
 
 int uprightQuarters(const Eigen::Vector3d& up_C, int present) {
   constexpr double kQuarter = std::numbers::pi / 2;
-  constexpr double kMargin = std::numbers::pi / 18;  // beyond half a quarter
+  constexpr double kMargin = std::numbers::pi / 18;  // the turn changes at 45° plus this margin
   constexpr double kLeast = 0.5;                     // share of `up_C` in the image plane
   if (!(up_C.head<2>().norm() > kLeast)) return present;
   // Clockwise turn after which `up_C` points to the top, that is against y.

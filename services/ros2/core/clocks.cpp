@@ -121,7 +121,7 @@ Result<void> Clocks::requireCommon(const std::string& name, std::int64_t offset_
     return {};
   }
   if (common_ns_) return tl::unexpected(elsewhere(name, offset_ns, now_ns));
-  return fail("clock_unknown");  // temporary, so without a sentence
+  return fail("clock_unknown");  // the state is temporary, so no message explains it
 }
 
 Result<std::int64_t> Clocks::onCommon(const std::string& name, Input& input, std::int64_t stamp_ns,

@@ -12,7 +12,8 @@
 namespace perdure::ros2 {
 
 struct PoseTrackOptions {
-  double sigma_position = 0.05, sigma_rotation = 0.01;  ///< used if messages have none; m, rad
+  /// Used if messages have no covariance; m, rad.
+  double sigma_position = 0.05, sigma_rotation = 0.01;
   double jump_m = 3.0;
 };
 

@@ -13,7 +13,8 @@ namespace perdure::ros2 {
 
 class Stereo {
  public:
-  static constexpr Duration kTolerance = std::chrono::milliseconds(10);  ///< as in vio
+  /// Equals vio's tolerance for pairs.
+  static constexpr Duration kTolerance = std::chrono::milliseconds(10);
 
   /// Adds a frame of the first camera, and returns the waiting frames of the second that match it.
   std::vector<Frame> onFirst(const FrameStamp& stamp) {

@@ -8,7 +8,7 @@ constexpr double kForgets = 1.0 / 40;  // weight of each new image
 constexpr std::size_t kFewest = 40;    // images before the first verdict
 constexpr double kTracks = 2.0;        // mean number of tracks in an image that a verdict needs
 constexpr double kMisfit = 15.0;       // limit of the scale; inaccurate poses reach up to 8
-constexpr double kFewTracks = 0.5;     // the same if nearly all tracks contradict
+constexpr double kFewTracks = 0.5;     // limit if nearly all tracks contradict
 constexpr double kNearlyAll = 10.0;    // ratio of contradicting to agreeing tracks
 
 void Agreement::add(const Mapped& mapped, double scale, bool moved) {

@@ -48,7 +48,8 @@ struct FrameEstimate {
   std::uint64_t increment_from = 0;
   Matrix6d transition = Matrix6d::Identity(), increment_covariance = Matrix6d::Zero();
   bool at_rest = false;
-  std::optional<bool> speed_refused;    ///< by the gate; empty without a speed
+  /// Whether the gate refused the speed; empty without a speed.
+  std::optional<bool> speed_refused;
   int points_used = 0;                  ///< points of this image used by all updates
   int points_refused = 0;               ///< points that the gate or the triangulation refused
   std::vector<Innovation> innovations;  ///< filled after keepInnovations()
@@ -122,8 +123,9 @@ class Estimator {
   Standstill standstill_;
   FeatureDatabase database_;
   TrackedFrame newest_;
-  std::vector<ImuReading> readings_;  ///< of one interval; a member so that its memory is reused
-  std::vector<ImuReading> rows_;      ///< readings around one image; a member for the same reason
+  /// Readings of one interval; a member so that its memory is reused.
+  std::vector<ImuReading> readings_;
+  std::vector<ImuReading> rows_;  ///< readings around one image; a member for the same reason
   ReasonCounts reasons_;
   bool agreed_ = false;      ///< most points of the last image agreed with their predictions
   double supposed_m_ = 0.0;  ///< length of the path whose points had the depth of the scene

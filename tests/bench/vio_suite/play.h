@@ -21,7 +21,7 @@ struct Variant {
 
 struct Outcome {
   Accuracy accuracy;
-  double first_s = 0.0;                   ///< from the first frame to the first usable output
+  double first_s = 0.0;                   ///< time from the first frame to the first usable output
   double ms = 0.0, ms_p99 = 0.0;          ///< CPU time of this thread per frame, without decoding
   double klt_ms = 0.0, klt_ms_p99 = 0.0;  ///< OpenCV's Lucas-Kanade with 200 points; 0: not
                                           ///< measured
@@ -32,7 +32,7 @@ struct Outcome {
 };
 
 struct PlayOptions {
-  double from_s = 0.0, until_s = 1e9;  ///< in the clip's time
+  double from_s = 0.0, until_s = 1e9;  ///< limits in the clip's time
   bool klt = true, innovations = false;
   std::optional<double> readout_s = {};  ///< overrides the read-out time in the cameras'
                                          ///< calibration

@@ -16,7 +16,7 @@ inline constexpr std::array<double, 4> kDistances{2.0, 5.0, 10.0, 50.0};  ///< m
 /// Squared normalised errors per dimension at one time. W is aligned with the truth by position and
 /// yaw at the first output.
 struct NeesAt {
-  double seconds = 0.0;  ///< since the first output
+  double seconds = 0.0;  ///< time since the first output
   double position = 0.0, yaw = 0.0, velocity = 0.0;
   double position_error = 0.0, yaw_error = 0.0;  ///< m, rad
 };

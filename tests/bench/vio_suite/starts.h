@@ -13,10 +13,11 @@ namespace perdure::bench {
 struct StartRow {
   std::string clip, variant;
   double cut_s = 0.0;
-  double moving_s = -1.0;  ///< from the cut to the first output; −1: no output within five seconds
-  double scale = 0.0;      ///< scale over the three seconds after the first output
-  double error_m = 0.0;    ///< position error, three seconds after the first output
-  NeesAt nees;             ///< errors one second after the first output
+  /// Time from the cut to the first output; −1: no output within five seconds.
+  double moving_s = -1.0;
+  double scale = 0.0;    ///< scale over the three seconds after the first output
+  double error_m = 0.0;  ///< position error, three seconds after the first output
+  NeesAt nees;           ///< errors one second after the first output
   double velocity_error = 0.0, velocity_sigma = 0.0;  ///< errors at the first output, m/s
   bool reset = false;
   /// True if the start is wrong but its covariance is small: after three seconds the error exceeds

@@ -138,7 +138,7 @@ TEST_F(SharedMemory, RouDiIsKilledAndStartedAnewAndNoProcessLosesAFrame) {
   std::this_thread::sleep_for(300ms);
   broker->signal(SIGKILL);
   EXPECT_EQ(broker->wait(5s), 128 + SIGKILL);
-  auto between = peer("look", 30);  // while RouDi is not running
+  auto between = peer("look", 30);  // this reader starts while RouDi is not running
   broker = roudi();
   auto after = peer("look", 30);
   for (Child* child : {between.get(), after.get(), old_reader.get(), writer.get()}) {

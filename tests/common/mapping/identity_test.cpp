@@ -60,7 +60,7 @@ TEST(Identity, TheSameFactsInAnyOrderGiveTheSameObjects) {
   forSeeds([](std::mt19937& random, std::uint32_t seed) {
     auto facts = anyFacts(random);
     const Identity identity = of(facts);
-    facts.insert(facts.end(), facts.begin(), facts.end());  // each fact twice
+    facts.insert(facts.end(), facts.begin(), facts.end());  // each fact occurs twice
     std::shuffle(facts.begin(), facts.end(), random);
     expectSameIdentity(of(facts), identity, seed);
     expectSameIdentity(Identity(identity.facts()), identity, seed);
@@ -141,7 +141,7 @@ TEST(Identity, FactsOfTheFilterStayWhateverLoopsEnd) {
   });
 }
 
-// Records.
+// Tests of the records of objects.
 
 constexpr EdgeId kOneLoop = 50;
 const WorldId kSessions[] = {{1, 0}, {2, 0}};
@@ -226,7 +226,7 @@ TEST_F(JoinedTracks, TheRecordOfAnObjectIsThatOfItsNewestTrack) {
   EXPECT_EQ(state_.records().at(1).earlier->in_anchor.id, 2u);
 }
 
-/// The first track came back on this visit before the second one was joined with it.
+/// The first track was detected again on this visit before the second one was joined with it.
 TEST_F(JoinedTracks, TheEarlierSightingIsOfAnotherVisit) {
   MapState state = emptyMap();
   ObjectRecord first = now(10.0);

@@ -85,7 +85,7 @@ TEST(MapFrame, ItsCovarianceIsThatOfDrawnErrors) {
     drawn += error * error.transpose() / kRuns;
     nees += squaredMahalanobis(error, told) / kRuns;
   }
-  // The covariance is far from isotropic, so its direction matters.
+  // The covariance is far from isotropic, so the test depends on its direction.
   EXPECT_GT(eigenvalues(told.topLeftCorner<2, 2>()).maxCoeff(),
             3.0 * eigenvalues(told.topLeftCorner<2, 2>()).minCoeff());
   EXPECT_NEAR(nees, 4.0, 0.3) << "told\n" << told << "\ndrawn\n" << drawn;

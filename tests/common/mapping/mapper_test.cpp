@@ -105,7 +105,7 @@ TEST(Mapper, AnObjectThatIsGoneIsNotRecalled) {
   const auto after = drive.mapper().near(drive.odometry().p, 40.0);
   EXPECT_EQ(after.size() + 1, before.size());
   for (const Recallable& there : after) EXPECT_NE(there.id, gone);
-  // Nor is it matched with an object that is detected later.
+  // The object is not matched with an object that is detected later, either.
   const std::size_t wrong = drive.wrong();
   drive.to(drive.way_m() + 60.0);
   EXPECT_EQ(drive.wrong(), wrong);

@@ -68,7 +68,7 @@ class Replay : public ::testing::Test {
 
   Replay() : one_(first()) {
     one_.toTheEnd();
-    // The other vehicle, which has no map of the first one.
+    // Archive of the second vehicle, which has no map of the first vehicle.
     auto archive = std::make_shared<Archive>();
     archive->next_id = one_.archive()->next_id;
     alone_ = std::make_unique<Drive>(second(), SavedMap(), archive);

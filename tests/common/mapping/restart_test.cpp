@@ -113,8 +113,8 @@ TEST(Restart, DoesNotScaleTheOdometryTwice) {
   whole.toTheEnd();
   broken.toTheEnd();
   ASSERT_GT(broken.loops().size(), loops);
-  // The scale learned after it also applies to the trajectory before it. Both together are reported
-  // as one scale.
+  // The scale learned after the restart also applies to the trajectory before it. Both together are
+  // reported as one scale.
   const auto scale = broken.mapper().anchors().rbegin()->second.scale;
   for (const auto& [id, anchor] : broken.mapper().anchors()) EXPECT_EQ(anchor.scale, scale) << id;
   EXPECT_NE(share(broken, 5), before) << "a loop came after it";

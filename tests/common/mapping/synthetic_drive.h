@@ -62,15 +62,15 @@ inline std::vector<Thing> thingsAlong(std::mt19937& random) {
 }
 
 struct Settings {
-  std::uint32_t seed = 1;      ///< for the objects and the noise
+  std::uint32_t seed = 1;      ///< seed of the objects and the noise
   double yaw_walk = 0.0;       ///< true, rad/√m
   double told_yaw_walk = 0.0;  ///< declared; 0: the true value
   double way_m = 1.4 * kLap_m;
   std::uint32_t noise = 0;  ///< seed of the noise only; 0: continues from `seed`
   WorldId world = kWorld;
   double from_m = 0.0;       ///< start on the lap
-  LevelPose T_WB = {};       ///< at the start
-  double clock_s = 0.0;      ///< at the start
+  LevelPose T_WB = {};       ///< pose of the body at the start
+  double clock_s = 0.0;      ///< time at the start
   std::size_t tracked = 99;  ///< `least_tracked`, unless it is 99
 };
 
@@ -80,7 +80,7 @@ inline const Settings kDrifting{.seed = 4, .yaw_walk = 0.002};
 struct Archive {
   struct Stored {
     WorldId world;
-    ObjectBelief belief;  ///< in the W of `world`
+    ObjectBelief belief;  ///< belief in the W of `world`
   };
   std::map<TrackId, Stored> stored;
   std::map<TrackId, std::size_t> thing_of;
@@ -134,7 +134,7 @@ class Drive {
     apply(mapper_->unsaved(), map);
     return map;
   }
-  /// The same with another map.
+  /// Restarts with another map.
   void restartOn(SavedMap map) {
     begun_with_ = std::move(map);
     mapper_ = std::make_unique<Mapper>(parametersOf(settings_), begun_with_);

@@ -223,7 +223,7 @@ TEST(TrackedTies, OfWhatWasNotSeenOfLateAreNone) {
   EXPECT_FALSE(TrackedTies(back.parameters()).find(back.body()));
 }
 
-/// One lap and a part of the next.
+/// Settings of a drive of one lap and a part of the next.
 Settings again(std::uint32_t seed) {
   return {.seed = seed, .yaw_walk = 0.002, .way_m = 1.75 * kLap_m};
 }

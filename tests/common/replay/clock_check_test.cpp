@@ -14,7 +14,7 @@ using Stamp = std::function<Duration(Duration)>;
 
 constexpr Duration kSame(Duration time) { return time; }
 
-/// A drive of 20 s whose sensors write their stamps so; read and settled.
+/// Reads a drive of 20 s whose sensors write the given stamps, and settles the clocks.
 Recording readWith(const Stamp& imu, const Stamp& images) {
   Recording recording;
   for (int i = 0; i < 2000; ++i) {

@@ -59,7 +59,7 @@ TEST(ReadAhead, GivesWhatTheDriveHasInItsOrderAndMayEndEarly) {
     EXPECT_FALSE(ahead.next());
   }
   const auto again = Dataset::open({.path = root});
-  ReadAhead unread(*again, 1);  // its thread waits for room when it is destroyed
+  ReadAhead unread(*again, 1);  // the object is destroyed while its thread waits for space
   EXPECT_TRUE(unread.next());
 }
 

@@ -180,7 +180,7 @@ TEST(RecordedMessages, JoinsTheSegmentsOfAFolderAndGivesLatchedOnesOnce) {
       sample.sequence = 4 * static_cast<std::uint64_t>(segment) + i;
       recording.add("imu", sample, at + i);
     }
-    if (segment == 2) recording.cut();  // as a killed recorder leaves it
+    if (segment == 2) recording.cut();  // a killed recorder leaves such a file
     if (segment < 2) recording.finish();
   }
   RecordedMessages messages(folder);

@@ -67,7 +67,7 @@ TEST(SevenScenes, GravityOfSensorYamlGoesBeforeThePlanes) {
   EXPECT_EQ(dataset->calibration().cameras.front().fx, 525.0);
   writeText(folder / "sensor.yaml", "up: [0, 0, 0]\n");
   EXPECT_THAT(errorOfScene({.path = folder}), HasSubstr("is no direction"));
-  writeText(folder / "sensor.yaml", "up: [0, -1e200, 0]\n");  // its square overflows
+  writeText(folder / "sensor.yaml", "up: [0, -1e200, 0]\n");  // the square of this number overflows
   EXPECT_NEAR(Dataset::open({.path = folder})->truth()->poses().front().T_WB.q.norm(), 1.0, 1e-9);
   writeText(folder / "sensor.yaml",
             text + "resolution: [640, 480]\nintrinsics: [500, 501, 310, 230]\n");

@@ -165,7 +165,7 @@ std::vector<double> posterior(const Detection& d) {
 /// Uses objects of all classes, each as often as one false alarm.
 TEST(SimulatedDetector, ItsActivationsAreCalibrated) {
   DetectorModel model = independent();
-  model.separation = 2.5;  // so that classification errors are frequent
+  model.separation = 2.5;  // a small separation makes classification errors frequent
   model.found = 1.0;
   model.half_size_px = 10.0;
   std::vector<std::pair<std::size_t, Detection>> looks;
@@ -289,7 +289,8 @@ TEST(SimulatedDetector, ErrorsOfSidesLastForTheirTimeConstant) {
   model.half_size_px = 2.0;
   model.error_time_s = 0.3;
   constexpr std::uint64_t kRuns = 6000;
-  std::array<double, 20> product{};  // with the first frame, by frames of 50 ms
+  // product with the first frame's error, by distance in frames of 50 ms
+  std::array<double, 20> product{};
   const Truth truth = sameView(kLarge, 1.0, "car", product.size());
   for (model.seed = 1; model.seed <= kRuns; ++model.seed) {
     const auto found = collect(SimulatedDetector(model, truth, camera()), product.size());

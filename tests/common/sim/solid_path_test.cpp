@@ -20,10 +20,10 @@ TEST(Solid, MeetsWhatItReachesIntoAndNothingElse) {
   EXPECT_TRUE(meet(box(0, 0, 0), box(4.1, 0, 0), 0.2));
   EXPECT_FALSE(meet(box(0, 0, 0), box(0, 2.1, 0)));
   EXPECT_TRUE(meet(box(0, 0, 0), box(0, 2.1, M_PI_2)));
-  // Corner to corner: only the rotated axes separate them.
+  // The boxes face each other with a corner, so only the rotated axes separate them.
   EXPECT_FALSE(meet(box(0, 0, 0), box(3.2, 2.7, M_PI_4)));
   EXPECT_TRUE(meet(box(0, 0, 0), box(3.0, 2.6, M_PI_4)));
-  // One box on top of the other.
+  // One box stands on top of the other.
   EXPECT_FALSE(meet(box(0, 0, 0), box(0, 0, 0.3, 1.5), -1e-9));
   EXPECT_TRUE(meet(box(0, 0, 0), box(0, 0, 0.3, 1.4)));
 }

@@ -85,7 +85,7 @@ TEST(Decode, ATruncatedImageIsRefusedHoweverMuchOfItIsThere) {
   }
 }
 
-/// A JPEG with a segment of EXIF that asks to turn it, and with a thumbnail of its own end mark.
+/// A JPEG with an EXIF orientation tag, and with a thumbnail that has its own end mark.
 std::string tagged(const std::string& jpeg, char orientation) {
   std::string exif("Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0", 28);
   exif += std::string({orientation, 0, 0, 0, 0, 0, 0, 0}) + "\xFF\xD8\xFF\xD9";

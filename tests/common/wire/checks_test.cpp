@@ -20,10 +20,10 @@ TEST(Checks, TextIsUtf8WithoutNul) {
   EXPECT_FALSE(isText(std::string_view("a\0b", 3)));
   EXPECT_FALSE(isText("\xff"));
   EXPECT_FALSE(isText("\xc3"));              // truncated
-  EXPECT_FALSE(isText("\xc0\xaf"));          // over-long
-  EXPECT_FALSE(isText("\xe0\x80\xaf"));      // over-long
+  EXPECT_FALSE(isText("\xc0\xaf"));          // over-long encoding
+  EXPECT_FALSE(isText("\xe0\x80\xaf"));      // over-long encoding
   EXPECT_FALSE(isText("\xed\xa0\x80"));      // a surrogate
-  EXPECT_FALSE(isText("\xf4\x90\x80\x80"));  // beyond U+10FFFF
+  EXPECT_FALSE(isText("\xf4\x90\x80\x80"));  // a code point beyond U+10FFFF
 }
 
 TEST(Checks, DefinitenessDoesNotDependOnUnits) {

@@ -154,7 +154,7 @@ TEST(Refusals, OfPoseErrorsThatAreNone) {
   Objects objects = example<Objects>();
   objects.pose_error(2, 2) = -1;
   EXPECT_EQ(refusal(objects), "bad_covariance pose_error");
-  objects.pose_error.setZero();  // not known
+  objects.pose_error.setZero();  // zero means that the covariance is not known
   EXPECT_EQ(refusal(objects), "");
 }
 

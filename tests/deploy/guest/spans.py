@@ -16,7 +16,7 @@ class Comeback:
         def all_nodes(times):
             of = [t for t in times if plug <= t < self.until]
             return of[-1] if len(of) == run.nodes else None
-        # The first image after a plug comes later than all reports of udev about its nodes.
+        # The first image after a plug is published after all reports of udev about the nodes.
         image = next((f for f in run.frames if plug <= f.stamp - run.wall and f.heard < self.until), None)
         self.made, self.told = all_nodes(run.kernel_added), all_nodes(run.udev_added)
         self.opened = first(run.opened, self.told)

@@ -79,7 +79,7 @@ TEST(RosStrangers, AnMcapOfNpmIsTheDriveRawAndPacked) {
   for (const Tiny* tiny : {&raw, &png}) {
     Npm::one().run({"write_mcap.mjs", tiny->plan.string(), (tiny->out / "run.mcap").string()});
     expectTheFolders(tiny->folder, tiny->out / "run.mcap", tiny->rig);
-    expectTheFolders(tiny->folder, tiny->out, tiny->rig);  // as rosbag2 leaves it
+    expectTheFolders(tiny->folder, tiny->out, tiny->rig);  // the folder is as rosbag2 writes it
   }
 }
 

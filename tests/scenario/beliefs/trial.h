@@ -26,7 +26,7 @@ struct BeliefScores {
   /// at the end.
   tools::RunAnees position{"position", 3, {}}, half_yaw{"yaw mod 180 deg", 1, {}},
       size{"log size", 3, {}};
-  /// The same errors, over single objects.
+  /// The errors of single objects.
   tools::Anees all_position{"position", 3, {}}, all_half_yaw{"yaw mod 180 deg", 1, {}},
       all_size{"log size", 3, {}};
   /// One sample of each object's belief, at an age drawn at its initiation. Later events must not

@@ -19,9 +19,9 @@ using namespace semantic_filter;  // NOLINT: most names here are the filter's
 
 // Indices of the errors that observations from one place share; they follow one error per class.
 constexpr Eigen::Index kAlike = 0, kAzimuth = 1, kBlindAzimuth = 2, kMoreErrors = 3;
-constexpr double kNever = 1e9;  // as in core/measurement/frame.cpp: a change of view that has no
-                                // effect
-constexpr double kBlindShare = 0.2, kFlipShare = 0.1;  // as in core/update/azimuth_update.cpp
+// a change of view that has no effect, as in core/measurement/frame.cpp
+constexpr double kNever = 1e9;
+constexpr double kBlindShare = 0.2, kFlipShare = 0.1;  // values of core/update/azimuth_update.cpp
 
 double normalCdf(double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); }
 
@@ -395,7 +395,8 @@ WorldFrame World::next() {
   }
   if (options_.clutter) addClutter(boxes);
   std::sort(boxes.begin(), boxes.end(), [](const auto& a, const auto& b) {
-    return a.first.box.x1 < b.first.box.x1;  // so that the order does not depend on the origins
+    // sorted, so that the order does not depend on the origins
+    return a.first.box.x1 < b.first.box.x1;
   });
   for (auto& [box, origin] : boxes) {
     frame.detections.detections.push_back(std::move(box));

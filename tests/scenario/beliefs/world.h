@@ -48,7 +48,7 @@ struct WorldOptions {
 
 struct Thing {
   std::string class_name;
-  semantic_filter::State x = semantic_filter::State::Zero();  ///< at t = 0, with velocity
+  semantic_filter::State x = semantic_filter::State::Zero();  ///< state at t = 0, with velocity
   double present_until_s = 1e9;
   /// The object becomes visible (as from round a corner) when its image has this size. Sizes are
   /// log-uniform, as those of false boxes are, because `initiation.odds` applies to boxes of any
@@ -63,7 +63,7 @@ struct WorldFrame {
   double t_s = 0.0;
   Odometry odometry;
   Detections detections;
-  semantic_filter::View true_view;                               ///< with the true pose
+  semantic_filter::View true_view;                               ///< view with the true pose
   ScratchVector<semantic_filter::TrackVisibility> visibilities;  ///< visibility of each object
   std::vector<std::optional<Box>> outlines;  ///< the part within the image, even if occluded
   std::vector<int> origins;                  ///< true object of each box, or -1

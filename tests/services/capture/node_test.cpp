@@ -125,8 +125,8 @@ TEST_F(NodeTest, AnInstantRestartLosesAndDoublesNothing) {
   run(first, 320 * kMs);
   const auto state = runStateFrom(toText(first.state()));
   ASSERT_TRUE(state);
-  drive_.assign(whole.begin() + 7, whole.end());  // from the sample of frame 3 on, as after a seek
-                                                  // to 4
+  // the drive begins with the sample of frame 3, as after a seek to 4
+  drive_.assign(whole.begin() + 7, whole.end());
   Node second(config_, Duration(100 * kMs), state, outputs());
   run(second, 320 * kMs);
   run(second, 910 * kMs);

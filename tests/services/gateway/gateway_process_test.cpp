@@ -290,7 +290,8 @@ TEST_F(Gateway, GoesOnThroughFramesThatLieOrMakeNoSense) {
     giant.send(std::string("\x82\xff\x7f\xff\xff\xff\xff\xff\xff\xff\0\0\0\0", 14));  // 8 exabytes
   });
   isCut([](RawClient& large) { large.sendFrame(std::string(100'000, ' ')); });
-  isCut([](RawClient& bare) { bare.send(std::string("\x81\x02{}", 4)); });  // without a mask
+  // a frame without a mask
+  isCut([](RawClient& bare) { bare.send(std::string("\x81\x02{}", 4)); });
   isCut([](RawClient& reserved) { reserved.sendFrame("x", 5); });
   isCut([](RawClient& latin) { latin.sendFrame("\xff\xfe"); });
   EXPECT_TRUE(eventually(20s, [&] {

@@ -76,7 +76,7 @@ TEST_F(GatewayNode, TellsWhoComesWhatIsKnownAlready) {
 
 TEST_F(GatewayNode, ShowsImagesAtTheRateThatIsSetAndAsJpeg) {
   node_.setWanted({cameraChannel(0, kImage)});
-  for (std::uint64_t i = 0; i < 20; ++i) node_.onFrame(0, grey(i));  // at 20 Hz
+  for (std::uint64_t i = 0; i < 20; ++i) node_.onFrame(0, grey(i));  // sends frames at 20 Hz
   EXPECT_EQ(said_.size(), 10u);
   EXPECT_THAT(*said_[0].payload, HasSubstr("\xff\xd8\xff"));
   Frame broken = grey(40);
@@ -167,7 +167,7 @@ TEST_F(GatewayNode, PassesTheMapsAnswerToWhoAsked) {
   reply.objects.resize(1);
   reply.objects[0].id = 31;
   node_.onMapReply(reply);
-  node_.onMapReply(reply);  // ignored, because it was answered
+  node_.onMapReply(reply);  // ignored, because the request was already answered
   reply.client = 6;
   node_.onMapReply(reply);  // the reply to another client
   ASSERT_EQ(answers_.size(), 2u);

@@ -43,7 +43,7 @@ TEST(ModelFile, ADamagedNetworkIsRefusedByTheDigestOfItsDescription) {
     std::ofstream(described) << "{" << key << tiny.json().substr(1);
     return readModelFile(network, "", {});
   };
-  const ModelFile file = read();  // without a digest
+  const ModelFile file = read();  // the description has no digest
   digest_of_network = toHex(digest(file.network + file.darknet_weights));
   EXPECT_NO_THROW(read());
   std::fstream weights(folder / "tiny.weights", std::ios::in | std::ios::out | std::ios::binary);

@@ -42,7 +42,7 @@ class ServiceRig {
         std::size_t{width} * height, static_cast<std::uint8_t>(40 + 10 * (sent % 20)));
     ASSERT_TRUE(frames_.write(frame));
   }
-  /// Of a level camera that is mounted upside down.
+  /// Sends the calibration of a level camera that is mounted upside down.
   void sendUpsideDown() {
     perdure::Calibration rig;
     CameraCalibration& camera = rig.cameras.emplace_back();

@@ -31,7 +31,7 @@ struct Drive {
     rig.sendFrames(kSettled);
     owner_id = rig.heard();
   }
-  /// Ends the newcomer that a command started, because no other program ends it after the command.
+  /// Ends the process that a command started, because no other program ends it after the command.
   void endNewcomers() {
     for (const auto& [instance, h] : rig.healths()) {
       if (h.process == "inference" && static_cast<pid_t>(h.pid) != owner->pid()) {

@@ -132,7 +132,7 @@ TEST_F(GraphSession, TheFrameIsToldWhereItChangesAndNotEachSecond) {
   EXPECT_EQ(frames_.back().instance, 5u);
   EXPECT_EQ(frames_.back().anchors, 1u);
   EXPECT_LT(frames_.back().T_MW.p.norm(), 1e-9);
-  // At rest, with objects that change.
+  // The body is at rest, and its objects change.
   for (int i = 0; i < 60; ++i) {
     ++sequence_;
     for (auto& [id, belief] : working_) belief.hits += 1;
@@ -140,7 +140,7 @@ TEST_F(GraphSession, TheFrameIsToldWhereItChangesAndNotEachSecond) {
   }
   node_->flush();
   EXPECT_EQ(frames_.size(), 1u);
-  // While driving, with the anchors.
+  // The body drives, so anchors are stored too.
   driveTo(0.5 * kLap_m);
   node_->flush();
   EXPECT_GE(frames_.size(), 5u);

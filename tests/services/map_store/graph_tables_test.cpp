@@ -187,7 +187,7 @@ TEST_F(GraphTables, AnswerWhereObjectsLieInTheMap) {
   EXPECT_NEAR(row->real(3), 22.0, 1e-12);
   EXPECT_NEAR(row->real(4), 30.5, 1e-12);
   EXPECT_NEAR(row->real(5), 0.25 - std::numbers::pi / 2, 1e-12);
-  EXPECT_FALSE(row->step().value());  // the others are not objects of the map
+  EXPECT_FALSE(row->step().value());  // no other object is on the map
 }
 
 TEST_F(GraphTables, LeaveOutDamagedBlobsOfEdgesAndSightingsAlone) {
@@ -216,7 +216,8 @@ TEST_F(GraphTables, LeaveOutWhatHangsOnADamagedAnchor) {
     const auto map = writeSome();
     change(damage);
     const auto graph = read();
-    EXPECT_EQ(graph.map.anchors.size(), 29u) << damage;  // 1 … 9 and the other session
+    // anchors 1 … 9 and those of the other session remain
+    EXPECT_EQ(graph.map.anchors.size(), 29u) << damage;
     EXPECT_FALSE(graph.map.anchors.contains(20));
     expectConsistent(graph);
     std::size_t records = 0, shortened = 0, edges = 0;
@@ -270,7 +271,8 @@ TEST_F(GraphTables, LeaveOutASuccessorOfAnotherSession) {
   more.changed.anchors[30].anchor.session.epoch += 1;
   write(more);
   const auto graph = read();
-  EXPECT_EQ(graph.map.anchors.size(), 29u);  // 30 … 40 and the parts that depend on them
+  // anchors 30 … 40 and the parts that depend on them are missing
+  EXPECT_EQ(graph.map.anchors.size(), 29u);
   expectConsistent(graph);
 }
 

@@ -328,7 +328,7 @@ class LapDrive : public ::testing::Test {
     query.request = ++request_;
     query.kind = MapQueryKind::kById;
     query.object_id = id;
-    query.world = world_;  // as stored, each object in its own W
+    query.world = world_;  // objects as stored, each in its own W
     query.limit = 1;
     node_->onQuery(query);
     EXPECT_EQ(replies_.back().beliefs.size(), 1u) << id;
@@ -391,7 +391,7 @@ class LapDrive : public ::testing::Test {
   Config config_;
   InstanceId store_ = 4, filter_ = 11;
   std::unique_ptr<Node> node_;
-  std::map<std::array<std::int32_t, 3>, MapTile> tiles_;  ///< as a late joiner receives them
+  std::map<std::array<std::int32_t, 3>, MapTile> tiles_;  ///< tiles as a late joiner receives them
   std::vector<MapReply> replies_;
   std::vector<MapNear> nears_;   ///< all messages so far
   std::vector<MapNear> coming_;  ///< those that the filter has not used yet

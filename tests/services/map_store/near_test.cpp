@@ -79,7 +79,7 @@ TEST_F(Near, GivesWhatIsInNoWorkingSetNearestFirstBitForBit) {
   EXPECT_EQ(near.world, (WorldId{77, 1}));
   EXPECT_TRUE(near.stamp.sameFrame(set(2, {}).stamp));
   EXPECT_EQ(near.as_published[0].track, 4u);
-  ObjectBelief expected = nearer;  // except its memory and visibility
+  ObjectBelief expected = nearer;  // the belief is equal except its memory and visibility
   expected.memory = Memory::kLongTerm;
   expected.visibility = Visibility::kOutOfView;
   EXPECT_EQ(encodeBelief(near.as_published[0]), encodeBelief(expected));

@@ -110,7 +110,7 @@ struct Pair {
     for (const auto& message : std::exchange(to_map, {})) message();
     if (!deaf) map->tick(stampOf(frame).time.time_since_epoch());
   }
-  /// The pose of the frame, to both.
+  /// Sends the pose of the frame to filter and map store.
   void move() {
     Odometry odometry = odometryAt(frame, T_W * bodyAt(x));
     odometry.world = world;
@@ -122,7 +122,7 @@ struct Pair {
     if (!deaf) to_map.push_back([this, odometry] { map->onOdometry(odometry); });
     filter.onOdometry(odometry);
   }
-  /// Drives to `until`, so many metres per frame. What the camera views is detected.
+  /// Drives to `until` with `step` metres per frame. All objects in view are detected.
   void driveTo(double until, double step = 0.4) {
     const double way = until > x ? step : -step;
     for (; std::abs(until - x) > 0.5 * step; x += way, ++frame) {

@@ -169,7 +169,7 @@ class Restless {
   std::vector<Objects> published_;
   std::size_t audited_ = 0;
   std::unique_ptr<Node> node_;
-  std::optional<MapNear> near_;  ///< for the next frame
+  std::optional<MapNear> near_;  ///< message for the next frame
 };
 
 TEST(NodeLedger, SumsAreTheBeliefInEveryFrame) {

@@ -205,7 +205,7 @@ TEST(NodeMalformedDetections, InventedStampsDoNotDisplaceDetectionsThatWaitForOd
   drive(clean);
   for (std::uint64_t k = 0; k < kFrameCount; ++k) {
     if (k > 0) {
-      attacked.send(truthAt(k));  // before its odometry
+      attacked.send(truthAt(k));  // detections are sent before their odometry
       for (std::uint64_t i = 0; i < 40; ++i) {
         Detections d = detectionsAt(k + 1 + i, {});
         d.stamp.source = 4711;

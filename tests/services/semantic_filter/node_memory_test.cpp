@@ -16,7 +16,7 @@ namespace {
 
 using namespace testing;  // NOLINT(google-build-using-namespace)
 
-/// The graph neither moves what is on the map nor doubts where it is.
+/// The graph does not move objects of the map, and their places are certain.
 struct PrecisePair : Pair {
   explicit PrecisePair(bool graph = true) : Pair(configWith(kMemory), kStreet, graph) {
     precise = true;

@@ -25,7 +25,8 @@ const TrueObject kChair = {makeState(9, -2.0, 0.45, 0.3, 0.5, 0.5, 0.9), "chair"
 /// resembles.
 struct Network {
   ModelInfo info;
-  std::map<std::string, std::string> says;  ///< for objects of classes that it does not have
+  /// Reported class for objects of classes that the network does not have.
+  std::map<std::string, std::string> says;
 
   Network(std::uint64_t hash, const std::string& name, std::vector<std::string> classes,
           std::map<std::string, std::string> lookalike_class = {})
@@ -96,7 +97,7 @@ TEST(NodeNewClasses, EnterATrackAtTheirPriorWhenItIsNextDetected) {
   const auto van = std::find_if(ledger.begin(), ledger.end(),
                                 [](const ClassLedger& c) { return c.name == "van"; });
   ASSERT_NE(van, ledger.end());
-  // Between car and van, which are equally frequent. Differences to other classes have other
+  // Compares car and van, which are equally frequent. Differences to other classes have other
   // causes.
   const double prior = van->log_odds[static_cast<std::size_t>(ClassEvidence::kPrior)];
   EXPECT_NEAR(prior, std::log(0.5 * (1.0 - ClutterParameters{}.other_prior)), 0.1);

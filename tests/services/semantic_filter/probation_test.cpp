@@ -23,7 +23,7 @@ const std::vector<TrueObject> kParked = {{makeState(14, 3.5, 0.75, 0.1, 4.3, 1.7
                                          {makeState(16, -4.0, 0.75, 3.0, 4.0, 1.7, 1.45), "car"},
                                          {makeState(24, 5.0, 0.75, 0.0, 4.4, 1.8, 1.5), "car"}};
 
-/// Slower after the swap, so that all objects stay in view.
+/// The body is slower after the swap, so that all objects stay in view.
 RigidTransform bodyAt(std::uint64_t k) {
   const auto fast = static_cast<double>(std::min(k, kSwapAt));
   return driveTo(1, 0.3 * fast + 0.1 * (static_cast<double>(k) - fast));

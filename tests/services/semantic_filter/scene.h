@@ -90,7 +90,7 @@ std::optional<Detection> detect(const TrueObject& object, const View& view,
   return d;
 }
 
-/// Detected four times, with the same variance in each of its seven numbers.
+/// A track that was detected four times, with the same variance in each of its seven numbers.
 inline Track makeObject(ObjectId id, const std::string& name, const State& x, double variance) {
   Track o;
   o.id = id;

@@ -185,7 +185,7 @@ TEST_F(KnownPoses, WhatDoesNotFitIsCounted) {
 
 TEST_F(KnownPoses, AClockThatJumpsBackBeginsAnew) {
   play(0, 20);
-  // The same drive again, with continued sequence numbers. In the first lap the frame comes first,
+  // The drive is repeated with continued sequence numbers. In the first lap the frame comes first,
   // in the second the pose.
   for (const std::uint64_t lap : {1, 2}) {
     for (std::uint64_t i = 0; i < 20; ++i) {

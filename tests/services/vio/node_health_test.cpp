@@ -174,7 +174,7 @@ TEST(VioNodeHealth, SaysThatTheAccelerationsAreInAnotherUnit) {
   Node node(Config{}, 5, {});
   node.onCalibration(calibration());
   Player player(3.0, 0.0);
-  std::string status;  // at the first attempt that detects it
+  std::string status;  // status at the first attempt that detects the fault
   player.play(node, 0.0, 3.0, [&](ImuSample& sample, double) {
     sample.accel /= 9.80665;
     if (status.empty() && node.reasons().of("start_force_not_gravity") > 0) status = node.status();

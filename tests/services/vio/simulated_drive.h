@@ -30,9 +30,9 @@ struct DriveOptions {
   double time_offset_s = 0.0;   ///< true t_imu − t_image
   double readout_s = 0.0;       ///< true, of a rolling shutter: first to last row
   double rest_s = 0.0;          ///< time at rest at the start
-  double spot_radius_m = 0.0;   ///< on the spot: of the circle that the body moves on
-  double spot_pace = 1.0;       ///< on the spot: factor on the rates
-  int points = 600;             ///< on a street: per 150 m
+  double spot_radius_m = 0.0;   ///< motion on the spot: radius of the body's circle
+  double spot_pace = 1.0;       ///< motion on the spot: factor on the angular rates
+  int points = 600;             ///< motion on a street: number of points per 150 m
   int points_per_image = 100;
   /// Motion of the world that the cameras see, during this interval of their clock.
   RigidTransform jump;
@@ -77,7 +77,7 @@ class SimulatedDrive {
   Eigen::Vector3d noise(double sigma);
 
   DriveOptions options_;
-  std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> biases_;  ///< at each sample
+  std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> biases_;  ///< biases at each sample
   std::mt19937 random_;
   std::normal_distribution<double> normal_;
   std::vector<CameraModel> cameras_;

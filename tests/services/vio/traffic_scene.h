@@ -17,7 +17,7 @@ struct TrafficOptions {
   double speed_px_s = 80.0;     ///< speed of the traffic
   double engine = 0.0;          ///< vibration at 27 Hz in m/s²; a hundredth of it in rad/s
   double wall_m = 8.0;          ///< distance of the static part, m
-  bool far_background = false;  ///< as if at infinity: it does not move with the body
+  bool far_background = false;  ///< the background is at infinity: it does not move with the body
   /// Distance that the body has slid to its left in m, with velocity and acceleration; empty: it
   /// stands.
   std::function<Eigen::Vector3d(double)> slide = {};  ///< (p, v, a) at a time

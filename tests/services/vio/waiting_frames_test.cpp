@@ -22,7 +22,7 @@ std::string codeOf(const Result<void>& result) { return result ? "" : result.err
 
 TEST(WaitingFrames, AreTakenInOrderWithTheirPartners) {
   WaitingFrames waiting(0.01);
-  EXPECT_EQ(codeOf(waiting.addSecond(frameAt(104))), "");  // before its partner
+  EXPECT_EQ(codeOf(waiting.addSecond(frameAt(104))), "");  // this frame arrives before its partner
   EXPECT_EQ(codeOf(waiting.addFirst(frameAt(100))), "");
   EXPECT_EQ(codeOf(waiting.addFirst(frameAt(200))), "");
   EXPECT_EQ(codeOf(waiting.addFirst(frameAt(150))), "frame_reordered");

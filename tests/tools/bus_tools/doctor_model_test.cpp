@@ -65,7 +65,8 @@ TEST(DoctorOfRecordings, TakesOneSequenceOfSeveral) {
   const fs::path root = replay::tinyKittiTracking("doctor_tracking");
   EXPECT_THAT(replay::startupErrorOf([&] { checkRigBy({.data = root}, 10.0); }),
               HasSubstr("name one with --sequence (0000, 0001)"));
-  for (const char* sequence : {"0000", "0001"}) {  // with images; with labels only
+  // a sequence with images, and one with labels only
+  for (const char* sequence : {"0000", "0001"}) {
     const Findings found = checkRigBy({.data = root, .sequence = sequence}, 10.0);
     ASSERT_FALSE(found.empty());
     EXPECT_THAT(found.back().text, HasSubstr("as always in KITTI tracking")) << sequence;

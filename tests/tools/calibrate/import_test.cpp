@@ -57,7 +57,7 @@ const std::string kNative =
     "  gyroscope_random_walk: 1.9393e-05\n  accelerometer_noise_density: 2.0e-3\n"
     "  accelerometer_random_walk: 3.0e-3\n";
 
-// The same calibration: T_cam_imu is the inverse of T_BS.
+// The calibration in Kalibr's form: T_cam_imu is the inverse of T_BS.
 const std::string kChain =
     "cam0:\n  T_cam_imu:\n  - [0.0, -1.0, 0.0, 0.01]\n  - [0.0, 0.0, -1.0, -0.02]\n"
     "  - [1.0, 0.0, 0.0, -0.07]\n  - [0.0, 0.0, 0.0, 1.0]\n  cam_overlaps: []\n"
@@ -109,7 +109,7 @@ TEST_F(RigImport, KalibrsFilesAreTheNativeRig) {
   expectSame(replay::readRig(file("rig.yaml", replay::rigText(imported.rig, "imported"))), native);
 }
 
-// The same calibration in the words of other programs.
+// The calibration in the formats of other programs.
 const std::string kVinsLens =
     "%YAML:1.0\n---\nmodel_type: PINHOLE\ncamera_name: camera\nimage_width: 752\n"
     "image_height: 480\ndistortion_parameters:\n   k1: -0.28340811\n   k2: 0.07395907\n"
@@ -153,7 +153,7 @@ TEST_F(RigImport, CalibrationsOfVinsAndOrbSlamAreTheNativeRig) {
               testing::ElementsAre(HasSubstr("`Camera1.k4`"), HasSubstr("`IMU.Tbc`")));
   Calibration orb = importRig({file("orb.yaml", kOrbSlam)}).rig;
   EXPECT_EQ(orb.cameras[0].rate_hz, 20.0);
-  orb.cameras[0].time_offset_s = 0.0031;  // ORB-SLAM3 knows no offset
+  orb.cameras[0].time_offset_s = 0.0031;  // ORB-SLAM3 has no time offset
   expectSame(orb, native);
 }
 

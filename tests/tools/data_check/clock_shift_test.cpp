@@ -41,7 +41,7 @@ CameraCalibration camera() {
   return calibration;
 }
 
-/// What the camera shows of the turning in eight parts of the drive, with its noise; its stamps are
+/// Rotations that the camera shows in eight parts of the drive, with its noise; the stamps are
 /// `ahead`.
 std::vector<Turn> turnsOf(const std::vector<ImuSample>& samples, Duration ahead) {
   const TurnIntegral gyro(samples);

@@ -30,7 +30,7 @@ std::vector<std::string> codesIn(const replay::DataFindings& findings) {
 /// 20 s of rotation about all axes, or about z only like a vehicle, and of acceleration.
 struct Way {
   replay::Recording recording;
-  Poses poses;  ///< at 200 Hz
+  Poses poses;  ///< poses at 200 Hz
 };
 
 Way wayOf(const Eigen::Vector3d& turning) {

@@ -19,7 +19,7 @@ struct TurningDrive {
   Eigen::Vector3d gyro_bias{0.01, -0.02, 0.015};
   /// Applied to each IMU sample before it is written.
   std::function<void(ImuSample&)> change = [](ImuSample&) {};
-  RigidTransform written_T_BC;  ///< in sensor.yaml; the true pose by default
+  RigidTransform written_T_BC;  ///< camera pose in sensor.yaml; the true pose by default
   TurningDrive();
 };
 

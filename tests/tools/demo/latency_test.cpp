@@ -38,8 +38,8 @@ TEST(Latency, CountsAFrameOnceAndLeavesOutWhatIsNotKnown) {
   meter.onObjects(objectsOf(1, 0), 12'000'000);
   meter.onObjects(objectsOf(1, 0), 99'000'000);  // repeated by a new owner
   meter.onDetections(detectionsOf(1, 0.001));    // repeated as well
-  meter.onObjects(objectsOf(2, 0), 20'000'000);  // without detections
-  meter.onDetections(detectionsOf(3, 0.010));    // without objects
+  meter.onObjects(objectsOf(2, 0), 20'000'000);  // a frame without detections
+  meter.onDetections(detectionsOf(3, 0.010));    // a frame without objects
   meter.onDetections(detectionsOf(4, 0.0));      // an older inference, which does not state the
                                                  // time
   meter.onObjects(objectsOf(4, 0), 16'000'000);

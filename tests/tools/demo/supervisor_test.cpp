@@ -68,7 +68,8 @@ TEST_F(Supervision, StartsAKilledProgramAgainHoweverOften) {
       std::ifstream(folder_ / "pid") >> pid;
       return pid > 1 && pid != last && supervisor->starts("worker") == round;
     })) << round;
-    std::this_thread::sleep_for(1050ms);  // it has started, so its end is no failed start
+    // the service runs for over a second, so its end is no failed start
+    std::this_thread::sleep_for(1050ms);
     kill(pid, SIGKILL);
     last = pid;
   }

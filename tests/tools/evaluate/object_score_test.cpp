@@ -59,7 +59,7 @@ TEST(ObjectScore, DistanceDecidesTheCell) {
 TEST(ObjectScore, AngleIsModuloAFullTurnAndAnyMeansAny) {
   auto label = labelAt(0, 20);
   for (const double turn : {0.0, 2 * std::numbers::pi - 0.4}) {
-    label.heading = turn;  // the estimate has 0
+    label.heading = turn;  // the estimate has a heading of 0
     const auto s = score({rowAt(0, 20)}, {{.counted = {label}, .ignored = {}, .dont_care = {}}});
     EXPECT_EQ(s.cells[2][0].matched, 1U) << turn;
   }

@@ -43,7 +43,7 @@ class FuseFiles : public ::testing::Test {
   std::string write(const std::string& name, const mapping::test::DriveSettings& settings) {
     map_store::WholeMap map;
     map.contents = drivenOnce(name, settings);
-    // As after a drive: some objects are still in the working set.
+    // Some objects are still in the working set, as after a drive.
     for (auto& [id, object] : map.contents.objects) {
       object.belief.visibility = id % 3 == 0 ? Visibility::kVisible : Visibility::kOutOfView;
       object.belief.visible_fraction = id % 3 == 0 ? 0.5 : 0.0;

@@ -22,7 +22,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::SizeIs;
 
-const WorldId kWorld{77, 1};  // as in workingSet
+const WorldId kWorld{77, 1};  // the world of workingSet
 constexpr double kShift_m = 8.0;
 
 /// Three anchors, 100 m apart. The graph has moved the third by 8 m and rotated it by 90°.

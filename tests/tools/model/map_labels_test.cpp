@@ -83,7 +83,7 @@ TEST_F(MapLabels, IgnoresWhatIsDoubtfulCutHiddenOrSmall) {
   auto things = kFour;
   things.push_back({"car", 0.6, 16, 12, 40, 3});      // uncertain
   things.push_back({"car", 0.99, 32, 12, 40, 3});     // cut by the border
-  things.push_back({"car", 0.99, 6.3, 6, 50, 3});     // behind the first
+  things.push_back({"car", 0.99, 6.3, 6, 50, 3});     // behind the first object
   things.push_back({"car", 0.99, 16, 20, 400, 1.5});  // small
   things.push_back({"dog", 0.99, 16, 4, 40, 2.5});    // the only one: too few views to be judged
   runFound(things);

@@ -169,7 +169,7 @@ TEST(ObjectHistory, FinalDropsWhatIsLargelyBehindANearerObject) {
   ObjectHistory history;
   history.setCamera(tests::cameraAhead(640, 480, 500));
   ObjectBelief behind = carAt(2, 20), beside = carAt(3, 20);
-  behind.classes[0].mean[1] = 4.0;  // in line with the car at x = 10, y = 2
+  behind.classes[0].mean[1] = 4.0;  // this object is behind the car at x = 10, y = 2
   beside.classes[0].mean[1] = -4.0;
   history.add(messageAt(0, {carAt(1, 10), behind, beside}));
   const auto rows = history.finalRows();

@@ -89,7 +89,7 @@ TEST(StoredMap, OfThisRunItselfIsRefusedAndStays) {
   options.map = own.string();
   EXPECT_THAT(errorOf(options), AllOf(HasSubstr("this run's own map"), HasSubstr("--out")));
   EXPECT_EQ(readText(own), kept);
-  // The same file under another name.
+  // The link gives the file another name.
   const fs::path link = fs::path(options.data) / "link.sqlite";
   fs::create_symlink(own, link);
   options.map = link.string();

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The same camera, mounted so that its images are upright after clockwise turns.
+/// Mounts the camera so that its images are upright after clockwise turns.
 void mount(CameraCalibration& camera, int quarters) {
   const Eigen::Quaterniond quarter(Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()));
   camera.distortion_coefficients = {-0.12, 0.02, 0.0, 0.0};
@@ -46,7 +46,7 @@ fs::path render(int quarters) {
 
 struct Score {
   Cell boxes;    ///< boxes that are no clutter, IoU 0.5
-  Cell objects;  ///< of the map at each frame, within 1.5 m
+  Cell objects;  ///< score of the map's objects at each frame, within 1.5 m
 };
 
 void count(const std::vector<sim::TruthView>& views, const CameraModel& camera,

@@ -132,7 +132,8 @@ TEST(RecordProcess, KilledLosesLessThanASecondAndTheNextOneMakesTheFileWhole) {
   std::uint64_t calibrations = 0;
   const auto [first, last] = imuSpan(out, &calibrations);
   EXPECT_EQ(calibrations, 1u);
-  EXPECT_GT(last, static_cast<std::int64_t>(before) - 200);  // at most one second is missing
+  // at most one second of the messages is missing
+  EXPECT_GT(last, static_cast<std::int64_t>(before) - 200);
   EXPECT_GT(last - first, 150);
   test::Child next({perdure(), "record", "--out", out, "--seconds", "0.3"}, place.file("next.log"));
   EXPECT_EQ(next.wait(20s), 0);

@@ -41,7 +41,7 @@ struct Drive {
   std::string poses = {};     ///< file with poses of another program, to be checked too
 };
 
-/// Accepts a camera that hangs upside down if vio, which measures gravity, agrees.
+/// Accepts a camera that is mounted upside down if vio, which measures gravity, agrees.
 void settleUpsideDown(bool vio_agrees, Findings& findings);
 /// Checks the time stamps, units, images and axes of a recording. If these are usable, checks the
 /// rig by the innovations of vio over `seconds`, or until the rig is certainly good.

@@ -39,7 +39,8 @@ void checkPosesOf(const Drive& drive, const replay::Recording& recording, Findin
   }
 }
 
-/// Adds what the motion says about the rig. It is more exact than coarse findings about the same.
+/// Adds findings about the rig from the motion. They are more exact than the other findings about
+/// it.
 void checkMotionOf(const replay::Recording& recording, replay::DataFindings& of_data,
                    Findings& findings) {
   const auto is_coarse = [](const replay::DataFinding& finding) {

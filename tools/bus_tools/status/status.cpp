@@ -228,8 +228,10 @@ StatusNode judgeTopics(const StatusSeen& seen, const Source& source) {
   StatusNode node{"topics"};
   const std::string foreign_odometry = standInFor(seen, "vio");
   for (const auto& [name, topic] : seen.topics) {
-    if (name.starts_with("frame/") || name == "imu" || name == "speed") continue;  // a sensor
-    if (name == "health") continue;                                                // a service
+    // judged as a sensor
+    if (name.starts_with("frame/") || name == "imu" || name == "speed") continue;
+    // judged as a service
+    if (name == "health") continue;
     const bool none = name == "landmarks" && topic.writers == 0 && !foreign_odometry.empty();
     node.add(judgeTopic(name, topic, none ? 0.0 : expectedOf(seen, name), source));
     if (none)

@@ -26,7 +26,7 @@ struct StatusNode {
   Level level = Level::kOk;
   std::string text = {};  ///< for people: figures; the fault and its fix
   nlohmann::ordered_json data =
-      nullptr;  ///< the same figures, for programs; null if there are none
+      nullptr;  ///< the figures of `text`, for programs; null if there are none
   std::vector<StatusNode> children = {};
 
   /// Appends a child and raises the level of this node to the child's level if that is worse.

@@ -80,7 +80,7 @@ class CameraImuRun {
   }
 
  private:
-  /// Computes the camera poses, the stretch, and the readings of its time.
+  /// Computes the camera poses and the time interval, and selects the IMU readings in it.
   Result<void> prepare() {
     if (input_.views.empty()) {
       return fail("calibrate_few_views", "no image shows the board; see --board");

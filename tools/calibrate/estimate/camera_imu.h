@@ -55,7 +55,8 @@ struct CameraImu {
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = gyro_bias;  ///< mean biases
   Eigen::Vector3d gyro_bias_sigma = gyro_bias, accel_bias_sigma = gyro_bias;
   Eigen::Vector3d gravity_T = gyro_bias;  ///< m/s², in the board's frame
-  double from_s = 0.0, to_s = 0.0;        ///< limits of the stretch, since the first view
+  /// Limits of the used time interval, since the first view.
+  double from_s = 0.0, to_s = 0.0;
   double knot_interval_s = 0.0;
   Eigen::Vector3d rate_rms_B = gyro_bias, accel_rms_B = gyro_bias;  ///< RMS motion along each axis
   double sigma_px = 0.0;                                            ///< estimated from residuals

@@ -35,10 +35,11 @@ std::vector<std::string> writeMotionRig(const replay::DatasetOptions& drive,
                                         const WindowOptions& options,
                                         const std::filesystem::path& file);
 
-/// What the motion says about a recording's own calibration.
+/// Comparison of a recording's own calibration with the motion.
 struct MotionCheck {
   replay::DataFindings findings;  ///< codes: focal_length, time_offset, readout
-  std::string basis;              ///< the motion that it is based on, or why it says nothing
+  /// The motion that the comparison is based on, or why no comparison is possible.
+  std::string basis;
 };
 /// Uses a few short runs of images. The rest of the calibration is taken as nearly right.
 MotionCheck checkMotion(const replay::Recording& recording);

@@ -15,7 +15,7 @@ struct InertialState {
   Eigen::Quaterniond q;      ///< q_SB
   Eigen::Vector3d rate;      ///< w_SB_B, rad/s
   Eigen::Vector3d position;  ///< twofold integral of the specific force, m
-  Eigen::Vector3d velocity;  ///< its derivative
+  Eigen::Vector3d velocity;  ///< derivative of the position
   /// A change d of the gyroscope's bias rotates the body by Exp(-by_bias d) on the right.
   Eigen::Matrix3d by_bias;
 };
@@ -25,7 +25,7 @@ class InertialPath {
   /// The samples cover [from, to], and are sorted by time; rates are constant between them.
   InertialPath(const std::vector<ImuSample>& samples, const Eigen::Vector3d& gyro_bias,
                TimePoint from, TimePoint to);
-  /// `seconds` after `from`. Outside the path the last rate goes on.
+  /// `seconds` after `from`. Outside the path the last rate is used.
   InertialState at(double seconds) const;
 
  private:

@@ -18,7 +18,7 @@ using namespace joint;
 struct Reduced {
   SharedMatrix H = SharedMatrix::Zero();
   Shared g = Shared::Zero();                         ///< gradient of half the cost
-  std::vector<Eigen::Matrix<double, kAll, 1>> rows;  ///< of each corner: coupling, information
+  std::vector<Eigen::Matrix<double, kAll, 1>> rows;  ///< for each corner: coupling, information
   std::vector<double> pulls;                         ///< gradients of the inverse depths
   JointMatrix H_joint = JointMatrix::Zero();
   JointVector g_joint = JointVector::Zero();
@@ -80,7 +80,7 @@ class Problem {
   JointState state_;
   std::vector<Window> windows_;
   double residual_px_ = 0.0;
-  double scale_ = 3.0;  ///< px, of the robust loss
+  double scale_ = 3.0;  ///< scale of the robust loss, px
   /// Variance of a window's gradient, as a multiple of that of independent residuals.
   double excess_ = 1.0;
 };

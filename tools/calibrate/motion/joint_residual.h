@@ -23,7 +23,8 @@ inline constexpr double kGravity = 9.81,
                         kGravitySigma = 0.3;  // m/s²; includes the accelerometer's bias
 inline constexpr double kUsualInverse = 0.3, kInverseSigma = 1.0;  // 1/m
 inline constexpr double kLeastScale_px = 0.3;
-inline constexpr Duration kMargin = std::chrono::milliseconds(100);  // the offset may change by it
+// largest change of the time offset
+inline constexpr Duration kMargin = std::chrono::milliseconds(100);
 
 using Jet = ceres::Jet<double, kAll>;
 template <class T>
@@ -32,7 +33,7 @@ using Shared = Eigen::Matrix<double, kShared, 1>;
 using SharedMatrix = Eigen::Matrix<double, kShared, kShared>;
 using Own = Eigen::Matrix<double, kOwn, 1>;
 
-/// What belongs to one window: unknowns, and the quantities of the last linearisation.
+/// Data of one window: unknowns, and the quantities of the last linearisation.
 struct Window {
   const TrackWindow* tracks;
   TimePoint from;               ///< start of its inertial path, before the first image
@@ -90,7 +91,7 @@ template <class T>
 struct BodyAt {
   Eigen::Quaterniond q;
   Vec3<T> turn;      ///< small rotation on the right of q
-  Vec3<T> position;  ///< in the window's frame
+  Vec3<T> position;  ///< position in the window's frame
 
   Vec3<T> toWindow(const Vec3<T>& v) const { return q.cast<T>() * Vec3<T>(v + turn.cross(v)); }
   Vec3<T> fromWindow(const Vec3<T>& v) const {

@@ -25,7 +25,8 @@ JointVector narrowPriors(const CameraCalibration& camera) {
 }
 
 replay::DataFindings judge(const CameraCalibration& given, const JointEstimate& joint) {
-  constexpr double kLeastShare = 0.025, kLater_s = 0.008, kReadout_s = 0.01;  // least errors
+  // smallest reported errors
+  constexpr double kLeastShare = 0.025, kLater_s = 0.008, kReadout_s = 0.01;
   const CameraCalibration& found = joint.state.camera;
   const JointVector& s = joint.sigma;
   replay::DataFindings findings;

@@ -17,7 +17,7 @@ struct TrackWindow {
 };
 
 struct WindowOptions {
-  std::size_t most = 40;  ///< windows
+  std::size_t most = 40;  ///< largest number of windows
   double seconds = 0.7;   ///< length of a window, at least three images; shorter ones do not
                           ///< separate slow translation from rotation
   double until_s = 1e9;   ///< since the first image; later images are not used

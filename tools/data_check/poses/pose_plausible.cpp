@@ -106,7 +106,7 @@ std::vector<SignedAxes> allSignedAxes() {
   return all;
 }
 
-/// Correlation of the accelerations after the positions are rotated by `axes`; 0: none.
+/// Correlation of the accelerations after the positions are rotated by `axes`; 0: no correlation.
 double commonOf(std::vector<Push> pushes, const SignedAxes& axes) {
   for (Push& push : pushes) push.by_poses = axes * push.by_poses;
   const auto scale = scaleOf(pushes);

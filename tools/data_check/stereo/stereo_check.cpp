@@ -247,7 +247,8 @@ class StereoJudge {
 DataFindings checkStereo(const Recording& recording) {
   const auto& cameras = recording.calibration.cameras;
   if (cameras.size() < 2) return {};
-  if (hasPlaceInMm(cameras[0]) || hasPlaceInMm(cameras[1])) return {};  // has its own finding
+  // this fault has its own finding
+  if (hasPlaceInMm(cameras[0]) || hasPlaceInMm(cameras[1])) return {};
   const auto pairs = someStereoImages(recording);
   if (pairs.empty()) return {};
   if (areSameImages(pairs)) {

@@ -60,7 +60,7 @@ struct AnchorErrors {
 };
 AnchorErrors scoreAnchors(const mapping::SavedMap& map, const replay::PoseFile& truth);
 
-/// A section of the trajectory among objects that an earlier visit saw.
+/// A section of the trajectory among objects of an earlier visit.
 struct ReturnVisit {
   std::size_t first = 0, last = 0;  ///< frame indices
   std::uint64_t objects = 0;        ///< visible objects of earlier visits

@@ -109,7 +109,7 @@ Places readPlaces(const std::filesystem::path& file) {
   return places;
 }
 
-/// A chain of merges may close: merged, split, and merged the other way round.
+/// Merges can form a cycle: two ids were merged, split, and merged in the other direction.
 std::uint64_t RunEvents::finalId(std::uint64_t id) const {
   std::set<std::uint64_t> seen;
   for (auto at = merged.find(id); at != merged.end() && seen.insert(id).second;

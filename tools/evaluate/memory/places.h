@@ -12,7 +12,8 @@ namespace perdure::tools {
 /// A row of the places' file: where an object is by the sensors of one visit.
 struct PlaceVisit {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< in the frame of the true poses
-  std::vector<std::uint64_t> frames;                   ///< in which the detector sees the object
+  /// Frames in which the detector detects the object.
+  std::vector<std::uint64_t> frames;
 };
 using Places = std::map<std::uint64_t, std::map<std::uint64_t, PlaceVisit>>;  ///< by place, visit
 
@@ -26,8 +27,8 @@ struct PlaceOptions {
   std::vector<double> along_m{-1.5, 3.5};
   double across_m = 1.2;
   std::vector<double> range_m{5.0, 25.0};  ///< distances of the place from the body for the recall
-  std::uint64_t least_frames = 8;          ///< of a visit that is compared with others
-  std::string class_name;                  ///< of the objects; empty: all
+  std::uint64_t least_frames = 8;          ///< least number of frames of a visit that is compared
+  std::string class_name;                  ///< class of the objects; empty: all classes
 };
 
 /// A frame of the run with a true pose.
@@ -38,8 +39,8 @@ struct PlaceFrame {
 };
 
 struct RunEvents {
-  std::map<std::string, std::uint64_t> counts;    ///< by name
-  std::map<std::uint64_t, std::uint64_t> merged;  ///< from an id to the one that replaces it
+  std::map<std::string, std::uint64_t> counts;    ///< number of events by name
+  std::map<std::uint64_t, std::uint64_t> merged;  ///< the id that replaces each merged id
 
   std::uint64_t finalId(std::uint64_t id) const;
 };
@@ -47,12 +48,12 @@ RunEvents readRunEvents(const std::filesystem::path& file);
 
 struct PlaceScore {
   std::uint64_t visited_twice = 0;  ///< places with at least two visits that are long enough
-  /// Of these: places whose first and last visit have the same object, after all merges or already
-  /// during the visit, and places with one of these visits without an object.
+  /// Places with several visits: those whose first and last visit have the same object, after all
+  /// merges or already during the visit, and places with one of these visits without an object.
   std::uint64_t kept = 0, kept_in_visit = 0, without = 0;
   std::uint64_t first_asked = 0, first_found = 0;  ///< frames of visit 0 within range
   std::uint64_t later_asked = 0, later_found = 0;
-  std::vector<double> along_m, across_m;  ///< from each place to its object
+  std::vector<double> along_m, across_m;  ///< offset from each place to its object
 };
 PlaceScore scorePlaces(const Places& places, const std::map<std::uint64_t, PlaceFrame>& frames,
                        const RunEvents& events, const PlaceOptions& options);

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-# As in the authors' own code.
+# Input of each family as in the authors' own code.
 INPUTS = {
     "yolov5": {"fit": "letterbox_centre", "pad": 114, "colour": "rgb", "scale": 1 / 255, "mean": [0, 0, 0]},
     "yolox": {"fit": "letterbox_top_left", "pad": 114, "colour": "bgr", "scale": 1.0, "mean": [0, 0, 0]},

@@ -66,7 +66,7 @@ class Repair:
         if shape is None:
             return False
         axis = node.attributes.get("axis", -1 if newer else 1) % len(shape)
-        if not newer and axis != len(shape) - 1:  # covers all axes from this one on
+        if not newer and axis != len(shape) - 1:  # Softmax covers all axes from this one on
             flat = self.emit("Reshape", [node.inputs[0], np.array([int(np.prod(shape[:axis])), -1], np.int64)])
             self.emit("Reshape", [self.emit("Softmax", [flat], axis=1), np.array(shape, np.int64)], node.outputs)
             return self.note("Softmax over several axes")

@@ -12,7 +12,7 @@ namespace perdure::tools {
 std::vector<double> ticksOf(double low, double high, int most);
 /// 1, 2 or 5 times a power of ten: the largest one up to `value` > 0.
 double roundBelow(double value);
-/// With as few digits as necessary; never "-0".
+/// Formats a number with as few digits as necessary; never "-0".
 std::string numberText(double value);
 
 class Chart {

@@ -16,7 +16,7 @@ inline const Colour kInk(60, 50, 40), kPaper(252, 250, 248), kGrid(228, 226, 222
 /// Only ground truth has this colour.
 inline const Colour kTruthColour(150, 0, 220);
 
-/// The same colour for a name in each picture; common classes differ clearly.
+/// A class has the same colour in all pictures; colours of common classes differ clearly.
 Colour classColour(const std::string& name);
 Colour mixed(const Colour& from, const Colour& to, double share);
 

@@ -31,7 +31,7 @@ std::optional<PictureTruth> pictureTruth(const replay::Dataset& dataset,
                                          const replay::DatasetOptions& data,
                                          const StampedPoses& poses);
 
-/// The same from files of KITTI tracking that belong to the drive.
+/// Reads truth from files of KITTI tracking that belong to the drive.
 std::optional<PictureTruth> pictureTruthOfLabels(const std::filesystem::path& labels,
                                                  const std::filesystem::path& calibration,
                                                  const StampedPoses& poses);

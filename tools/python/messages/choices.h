@@ -36,7 +36,7 @@ inline constexpr std::array<std::string_view, 8> kWords<MapQueryKind>{
 template <>
 inline constexpr std::array<std::string_view, 2> kWords<MapLoopKind>{"loop", "tie"};
 
-/// For example "visible"; empty if the value has no word.
+/// Returns the word of a value, for example "visible"; empty if it has no word.
 template <class E>
 std::string_view wordOf(E value) {
   const auto place = static_cast<std::size_t>(value);

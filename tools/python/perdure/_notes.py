@@ -1,6 +1,6 @@
-"""What the description of the wire does not say of structs and fields, for their docstrings.
+"""Notes on structs and fields for their docstrings, in addition to the description of the wire.
 
-One that begins with "=" stands in place of the unit.
+A note that begins with "=" replaces the unit.
 """
 
 _STATE = "=centre [m], yaw [rad], log of length, width, height [log m]"

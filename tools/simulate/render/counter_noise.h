@@ -13,7 +13,7 @@ constexpr std::uint64_t mixBits(std::uint64_t a, std::uint64_t b) {
   return mixBits(mixBits(a) ^ b);
 }
 
-/// In [0, 1).
+/// Returns a number in [0, 1).
 constexpr float uniformOf(std::uint64_t bits) {
   return static_cast<float>(bits >> 40) * (1.0F / 16777216.0F);
 }

@@ -21,7 +21,7 @@ class Lens {
   const Eigen::Vector3f& direction(int column, int row) const {
     return rays_[indexOf(column, row)];
   }
-  /// The same, at an offset within the pixel.
+  /// Returns the direction at an offset within the pixel.
   Eigen::Vector3f direction(int column, int row, float dx, float dy) const;
   /// Angle between neighbouring pixels at the image centre, radians.
   float pixelAngle() const { return pixel_angle_; }

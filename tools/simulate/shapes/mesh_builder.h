@@ -33,7 +33,7 @@ class MeshBuilder {
   /// Adds a triangle, counter-clockwise seen from outside. Omits faces without area.
   void triangle(const Vec3& a, const Vec3& b, const Vec3& c, int material);
   void quad(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d, int material);
-  /// The same with texture coordinates: a (0, 0), b (1, 0), c (1, 1), d (0, 1), times `repeats`.
+  /// Adds a face with texture coordinates: a (0, 0), b (1, 0), c (1, 1), d (0, 1), times `repeats`.
   void picture(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d, int material,
                const Vec2& repeats = Vec2::Ones());
 
@@ -55,7 +55,7 @@ class MeshBuilder {
   /// A closed part: a skin with fans at its ends (open without a material for them).
   void loft(const std::vector<Ring>& rings, const MaterialOf& material_of,
             std::optional<int> first_cap, std::optional<int> last_cap, float crease_deg = 40.0F);
-  /// The same of one material, with both ends.
+  /// Adds such a surface of one material, with both ends.
   void loft(const std::vector<Ring>& rings, int material, float crease_deg);
 
   /// Transform of all faces that are added while it is set. A mirror reverses the order of corners.

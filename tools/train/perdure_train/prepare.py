@@ -11,7 +11,7 @@ from .progress import Progress
 from .simulated import read_folder
 
 VIEWS = 40  # views of one random scene
-SETS = {  # look set and first seed; the sets are disjoint
+SETS = {  # appearance set and first seed; the sets are disjoint
     "train": ("train", 1000),
     "calibration": ("train", 500_000),
     "test": ("test", 900_000),

@@ -45,7 +45,7 @@ export class ObjectPanel {
     this.note = '';
     this.shown = performance.now();
     if (id === 0) return this.clear();
-    this.render(); // shows the known data at once
+    this.render(); // shows the data that are already available
     this.ask();
   }
 
@@ -133,7 +133,7 @@ export class ObjectPanel {
     const t0 = samples[0][0], t1 = samples.at(-1)[0], span = Math.max(0.1, t1 - t0);
     const x = (t) => (100 * (t - t0)) / span, y = (p) => 37 - 34 * p;
     const path = (k) => samples.map((s, i) => `${i ? 'L' : 'M'}${x(s[0]).toFixed(2)} ${y(s[k]).toFixed(2)}`).join('');
-    // Darker while it was not visible.
+    // The background is darker while the object was not visible.
     const gaps = [];
     for (let i = 1; i < samples.length; ++i) {
       if ((samples[i][3] ?? 1) > 0.05) continue;

@@ -12,7 +12,7 @@ export class World {
   constructor(canvas, labels, onPick, onPart) {
     this.canvas = canvas;
     this.labels = labels;
-    this.toolbar = document.getElementById('tools'); // obstacle for the names
+    this.toolbar = document.getElementById('tools'); // labels of objects avoid this toolbar
     this.onPick = onPick;
     this.onPart = onPart;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: 'low-power' });
@@ -64,7 +64,7 @@ export class World {
     lines.setAttribute('position', new THREE.Float32BufferAttribute(points, 3));
     this.grid = new THREE.LineSegments(lines, new THREE.LineBasicMaterial({ color: '#2d3d4d', depthWrite: false }));
     const plane = new THREE.Mesh(new THREE.PlaneGeometry(2 * half, 2 * half), new THREE.MeshBasicMaterial({ color: '#121b24', depthWrite: false }));
-    plane.renderOrder = -2; // before the lines, which lie in it
+    plane.renderOrder = -2; // drawn before the lines, which lie in this plane
     this.grid.renderOrder = -1;
     this.grid.add(plane);
     this.scene.add(this.grid);

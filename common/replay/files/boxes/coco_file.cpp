@@ -37,7 +37,7 @@ class CocoReader {
     throw StartupError(code, file_.string() + " " + why);
   }
 
-  /// Null if there is none.
+  /// Returns a null value if the member is missing.
   static const Json& memberOf(const Json& object, const char* name) {
     static const Json kNone;
     const auto found = object.is_object() ? object.find(name) : object.end();
@@ -153,11 +153,12 @@ class CocoReader {
 
   const std::filesystem::path& file_;
   const std::string& class_name_;
-  const std::map<std::string, std::uint64_t>& numbers_;  ///< of the drive's frames
-  bool named_ = false;                                   ///< the images are named as the drive's
-  std::map<std::string, std::string> names_;     ///< of categories
-  std::map<std::string, std::uint64_t> frames_;  ///< of images
-  std::set<std::string> unnamed_;                ///< categories
+  /// Frame numbers of the drive, by image name.
+  const std::map<std::string, std::uint64_t>& numbers_;
+  bool named_ = false;                           ///< the images are named as the drive's
+  std::map<std::string, std::string> names_;     ///< category id to class name
+  std::map<std::string, std::uint64_t> frames_;  ///< image id to frame
+  std::set<std::string> unnamed_;                ///< categories without a name
   CocoBoxes result_;
 };
 

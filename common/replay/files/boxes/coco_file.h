@@ -22,13 +22,13 @@ struct CocoBox {
   std::uint64_t frame = 0;
   std::string class_name;
   Box box;
-  double score = 1.0;  ///< annotations may have none
+  double score = 1.0;  ///< 1 for annotations without a score
 };
 
 struct CocoBoxes {
   std::vector<CocoBox> boxes;
   std::optional<std::set<std::uint64_t>> frames;  ///< the `images`, if there are any
-  std::string note;  ///< a sentence if they count from 1, or may do so
+  std::string note;  ///< a sentence if the frame numbers count from 1, or may count from 1
 };
 
 /// The frame of an image that the drive does not have.

@@ -143,7 +143,7 @@ bool Streets::plot(const Road& road, int side, double from, double length) {
       !builder_.put(PropKind::kFacade, house, at)) {
     return false;
   }
-  const double enclosed = dice.unit();  // of the two fences: the first, the second, both or none
+  const double enclosed = dice.unit();  // decides which of the two fences exist
   if (enclosed < 0.6) fence(road, placeAt(road, side, middle, line + 0.3, M_PI), rest - 0.2);
   const double border = drive_first ? from + 0.2 : from + length - 0.2;
   if (enclosed > 0.4 && enclosed < 0.9) {
@@ -220,7 +220,7 @@ void Streets::plant(const Road& road, int side) {
   }
   for (double along = 3.0; along < lengthOf(road) - 6.0; along += 9.0) {
     if (!dice.chance(furnishing_.hedge_share)) continue;
-    // Between the cars and the pavement, or in front of the houses.
+    // A hedge stands between the cars and the pavement, or in front of the houses.
     const bool at_kerb = dice.chance(0.4);
     const Eigen::Vector3d size(dice.uniform(2.5, 6.0), dice.uniform(0.5, 0.7),
                                dice.uniform(0.7, 1.5));

@@ -71,7 +71,8 @@ class RunningCamera final : public Unended, public libcamera::Object {
   std::vector<std::unique_ptr<libcamera::Request>> requests_;
   std::vector<int> nodes_;  ///< descriptors of the camera's video nodes, which libcamera opened
   libcamera::ControlList asked_;
-  const libcamera::Request* asking_ = nullptr;  ///< carries the controls, until it completes
+  /// Request with the controls, until it is completed.
+  const libcamera::Request* asking_ = nullptr;
   BoundedQueue<libcamera::Request*> done_{2 * kBuffers, Overflow::kDropOldest};  // never full
   std::deque<libcamera::Request*> in_hand_;  ///< taken from done_, in the driver's order
   SequenceWatch watch_;

@@ -48,7 +48,7 @@ class SharedManager {
   /// Keeps a camera whose removal udev has not reported yet. A later manager() destroys it once
   /// over() is true. The destructor waits for it for two seconds, and otherwise leaks it.
   void keepUntilOver(std::unique_ptr<Unended> camera);
-  /// Whether a camera is kept.
+  /// Returns whether a removed camera is still stored.
   bool keeps() const;
   /// Increases if the open cameras must be closed briefly.
   unsigned restarts() const { return restarts_; }

@@ -8,7 +8,7 @@
 namespace perdure::inference {
 namespace {
 
-/// Weighted mean of the boxes merged into a kept one.
+/// Weighted mean of a kept box and the boxes that were merged into it.
 struct Vote {
   Box first;  ///< box of the kept candidate
   Box sum;

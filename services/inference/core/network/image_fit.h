@@ -27,7 +27,7 @@ struct ImageFit {
 
   Box toImage(const Box& b) const;
   Box toInput(const Box& b) const;
-  /// The same for lengths at the sides.
+  /// Converts lengths at the sides to the image.
   std::array<double, 4> toImage(const std::array<double, 4>& sides) const;
   std::array<double, 4> toInput(const std::array<double, 4>& sides) const;
 };

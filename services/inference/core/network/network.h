@@ -28,7 +28,7 @@ bool hasOnnxRuntime();
 struct NetworkFile {
   std::string bytes;              ///< contents of an .onnx, or of a Darknet .cfg
   std::string darknet_weights;    ///< contents of its .weights; empty: ONNX
-  bool for_onnx_runtime = false;  ///< set by its description
+  bool for_onnx_runtime = false;  ///< whether the description requires ONNX Runtime
 };
 
 class Network {

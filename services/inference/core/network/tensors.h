@@ -23,7 +23,7 @@ inline constexpr int kAnyLength = -1;
 /// A tensor of one level of the heads.
 struct LevelTensor {
   const char* key;           ///< key in model.json
-  std::string Level::*name;  ///< its name in the network
+  std::string Level::*name;  ///< member with the tensor's name in the network
   int channels;
 };
 /// Tensors of a level, in the order of tensorNames(). For YOLOv8 and NanoDet, `level.tensor` must

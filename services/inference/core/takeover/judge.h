@@ -1,5 +1,5 @@
-// Compares a newcomer's detections with those of the process that it follows, on the same frames.
-// It detects implausible detections, but does not judge which process is better.
+// Compares detections of a new process with those of the process that it replaces, on the same
+// frames. It detects implausible detections, but does not judge which process is better.
 #pragma once
 
 #include <cstdint>
@@ -21,10 +21,11 @@ class Judge {
 
   /// Stores the meaning of a model's activations; call it before comparing its detections.
   void learn(const ModelInfo& model);
-  /// Compares one frame. Certain boxes of the elder count if the newcomer has their class.
+  /// Compares one frame. Certain boxes of the old process count if the new network has their class.
   void compare(const Detections& elder, const Detections& newcomer);
-  /// Returns "unknown_model", "empty" (no boxes although the elder has certain ones), "elsewhere"
-  /// (boxes, but very few at the elder's certain ones) or "flood" (ten times the boxes).
+  /// Returns "unknown_model", "empty" (no boxes although the old process has certain ones),
+  /// "elsewhere" (boxes, but very few at the certain boxes of the old process) or "flood" (ten
+  /// times the boxes).
   std::optional<Reason> complaint() const;
   /// Clears the comparison.
   void reset();
@@ -36,9 +37,9 @@ class Judge {
  private:
   struct Row {
     std::size_t elder = 0, newcomer = 0;  ///< number of boxes
-    std::size_t sure = 0, found = 0;      ///< certain boxes of the elder, and how many of them the
-                                          ///< newcomer found
-    bool told = true;                     ///< the newcomer's model is known
+    /// Certain boxes of the old process, and how many of them the new process found.
+    std::size_t sure = 0, found = 0;
+    bool told = true;  ///< the model of the new process is known
   };
   std::map<std::uint64_t, std::vector<std::string>> classes_;  ///< class names by model hash
   std::deque<Row> rows_;

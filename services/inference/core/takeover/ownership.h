@@ -41,7 +41,7 @@ class Ownership {
     } else if (!in_form_) {
       in_form_ = ++good_ >= kGoodResults && now - lost_at_ >= kLeases * lease_;
     }
-    // While out of form, a process that just resumed may not yet have received any other writer.
+    // An unfit process that just resumed may not yet have received messages of other writers.
     if (in_form_ && alone) spare_ = false;
     return strength();
   }
@@ -60,7 +60,7 @@ class Ownership {
     return in_form_ && !spare_ ? full_ : full_ < kOutOfForm ? full_ : kOutOfForm;
   }
   bool inForm() const { return in_form_; }
-  /// In form, but another process writes and continues to do so.
+  /// The process is fit, but another process writes and continues to write.
   bool spare() const { return spare_; }
 
  private:

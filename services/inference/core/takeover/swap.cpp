@@ -6,15 +6,15 @@
 namespace perdure::inference {
 namespace {
 
-constexpr std::size_t kRemembered = 32;     // stored results of each side
-constexpr std::size_t kHeard = 128;         // stored frames
-constexpr int kSilence = 3;                 // leases, and own results, after which a newcomer
-                                            // counts as silent
-constexpr int kWorth = 4;                   // leases for which a result is repeated
-constexpr std::chrono::seconds kNobody{3};  // time without others after which a newcomer assumes
-                                            // that it is alone
-constexpr std::chrono::seconds kGrace{10};  // added to the probation, for the newcomer's last
-                                            // notice
+constexpr std::size_t kRemembered = 32;  // stored results of each side
+constexpr std::size_t kHeard = 128;      // stored frames
+// leases, and own results, after which a new process counts as silent
+constexpr int kSilence = 3;
+constexpr int kWorth = 4;  // leases for which a result is repeated
+// time without other processes after which a new process takes over
+constexpr std::chrono::seconds kNobody{3};
+// added to the probation, for the last notice of the new process
+constexpr std::chrono::seconds kGrace{10};
 
 template <class T>
 void keep(std::deque<T>& list, T value, std::size_t most) {
@@ -149,7 +149,7 @@ void Swap::giveUp(const Reason& reason, bool tell) {
   if (tell) notify(SwapStep::kRolledBack, 0, reason);
 }
 
-/// Reasons received from outside are counted as "other" unless they are known.
+/// Unknown reasons from other processes are counted as "other".
 void Swap::countRollBack(const std::string& reason) {
   static const std::set<std::string> known = {
       "fails", "late", "slow", "silent", "empty", "flood", "elsewhere", "outbid", "unknown_model"};
@@ -163,7 +163,7 @@ void Swap::told(const SwapNotice& notice, Time now) {
   if (notice.step == SwapStep::kPassed && about_us) return retire(notice, now);
   if (notice.step != SwapStep::kRolledBack) return;
   if (about_us && role_ != Role::kPlain) giveUp({notice.reason, notice.detail}, false);
-  if (watch_ && notice.instance == watch_->newcomer) {  // the newcomer gave up by itself
+  if (watch_ && notice.instance == watch_->newcomer) {  // the new process gave up
     watch_.reset();
     message_ = notice.model + " was rolled back, " + notice.reason + ": " + notice.detail;
     countRollBack(notice.reason);
@@ -174,7 +174,7 @@ void Swap::watch(const SwapNotice& notice, Time now) {
   watch_ = Watch{notice.instance, notice.model,
                  now + durationFromSeconds(std::min(notice.probation_s, 1e6)) + kGrace};
   judge_.reset();
-  other_at_ = now;  // the newcomer has one lease to send a result
+  other_at_ = now;  // the new process has one lease to send a result
   message_ = "watches " + notice.model + ", which took over";
 }
 

@@ -1,10 +1,10 @@
 // Takeover of one inference process by another while frames arrive, seen from each of the two. It
 // is a state machine over own results, received results and received notices. It has no clock: each
-// call passes the time. No third process is needed; the process that started the newcomer may have
+// call passes the time. No third process is needed; the process that started the new one may have
 // ended.
 //
-//   newcomer:  rehearsing ──► on probation ──► plain          gives up: silent, and ends
-//   old one:   plain ──► watches ──► retires                  takes back: outbids the newcomer
+//   new one:   rehearsing ──► on probation ──► plain          gives up: silent, and ends
+//   old one:   plain ──► watches ──► retires                  takes back: outbids the new one
 #pragma once
 
 #include <chrono>
@@ -22,7 +22,7 @@ namespace perdure::inference {
 struct SwapOptions {
   InstanceId self = 0;
   std::string model;         ///< name of the model, for people
-  double probation_s = 0.0;  ///< above 0: a newcomer; 0: plain
+  double probation_s = 0.0;  ///< above 0: a new process that replaces another; 0: plain
   Duration lease{};
 };
 
@@ -75,7 +75,7 @@ class Swap {
     InstanceId newcomer = 0;
     std::string model;
     Time until;
-    int silent_results = 0;  ///< own results since the newcomer was last received
+    int silent_results = 0;  ///< own results since the last message of the new process
   };
 
   void rehearse(bool in_form, Time now);
@@ -107,7 +107,7 @@ class Swap {
   Time since_{};  ///< start of the role; while rehearsing, time of the first result
   std::size_t results_ = 0, good_ = 0;
   int failures_ = 0;
-  InstanceId follows_ = 0;  ///< process whose topic a newcomer took
+  InstanceId follows_ = 0;  ///< process that this new process replaces
   std::optional<Watch> watch_;
   std::vector<Detections> again_;
   Time again_at_{}, again_from_{};  ///< time of the repetition, and the start of the results to

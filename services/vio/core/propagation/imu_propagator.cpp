@@ -16,7 +16,7 @@ Vector3d turned(const Vector3d& w0, const Vector3d& w1, double dt) {
   return 0.5 * (w0 + w1) * dt + w0.cross(w1) * (dt * dt / 12.0);
 }
 
-/// That rotation, and its derivatives by bias and scale, which affect both rates.
+/// Rotation of one step, and its derivatives by bias and scale, which affect both rates.
 struct Turn {
   Matrix3d R, J_bias, J_scale;  ///< J: right tangent of R by the bias, by the scale
 };

@@ -34,7 +34,7 @@ ImuIncrement integrate(const std::vector<ImuReading>& readings, const Eigen::Vec
                        const Eigen::Vector3d& accel_bias, const ImuNoise& noise,
                        const Eigen::Vector3d& gyro_scale = Eigen::Vector3d::Ones());
 
-/// Only the dq of integrate(): R_B0_B1.
+/// Computes only the rotation of integrate(): R_B0_B1.
 Eigen::Quaterniond integrateRotation(const std::vector<ImuReading>& readings,
                                      const Eigen::Vector3d& gyro_bias,
                                      const Eigen::Vector3d& gyro_scale = Eigen::Vector3d::Ones());

@@ -18,7 +18,8 @@ struct Keyframe {
   Eigen::Matrix3d R;  ///< R_B0_Bi
   Eigen::Vector3d dp, dv;
   const TrackedFrame* tracked = nullptr;
-  Eigen::Vector3d rate = Eigen::Vector3d::Zero();  ///< of the body, for a rolling shutter
+  /// Angular rate of the body, for a rolling shutter.
+  Eigen::Vector3d rate = Eigen::Vector3d::Zero();
 };
 
 /// A point as one camera saw it from one keyframe.

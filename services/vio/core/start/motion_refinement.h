@@ -38,7 +38,8 @@ struct MotionWindow {
   std::vector<WindowPoint> points;
   Eigen::Vector3d gravity_B0 = Eigen::Vector3d::Zero();  ///< fixed length
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = Eigen::Vector3d::Zero();
-  double time_offset_s = 0.0;  ///< of the images, in addition to the one applied to `poses`
+  /// Time offset of the images, in addition to that applied to `poses`.
+  double time_offset_s = 0.0;
 };
 
 /// Error of the newest pose and of the window's parameters: [θ, v (B0), gravity (2), b_g, b_a].

@@ -33,8 +33,8 @@ void add(MotionWindow& window, const Eigen::VectorXd& error);
 /// its first view. Far points stay linear, and noise may make the inverse depth negative. All rays
 /// begin at the first pose, so that bearings do not depend on the window's scale.
 struct Ray {
-  Eigen::Vector3d origin;  // in B0, fixed
-  Eigen::Matrix3d R_B0_C;  // fixed
+  Eigen::Vector3d origin;  // position in B0; fixed
+  Eigen::Matrix3d R_B0_C;  // rotation of the camera; fixed
   Eigen::Vector3d abr;     // bearing x/z, y/z, and 1/z in 1/m
 };
 

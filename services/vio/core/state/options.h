@@ -56,10 +56,11 @@ struct VisionOptions {
 /// Standard deviations of the calibration's values.
 struct CalibrationOptions {
   bool estimate_extrinsics = true, estimate_time_offset = true;
-  bool estimate_readout = true;       ///< for a rolling shutter
+  bool estimate_readout = true;       ///< estimates the readout of a rolling shutter
   double extrinsic_rotation = 0.005;  ///< rad
   double extrinsic_position_m = 0.01;
-  double second_camera_factor = 0.1;  ///< on both: the pose within the pair is more precise
+  /// Factor on both deviations, because the pose within the pair is more precise.
+  double second_camera_factor = 0.1;
   double time_offset_s = 0.005;
   double readout_s = 0.005;  ///< deviation of the read-out time of a rolling shutter
   double gyro_scale = 0.0;   ///< deviation of each axis from 1; 0: exact, not estimated

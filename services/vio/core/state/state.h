@@ -102,7 +102,7 @@ class State {
   /// nav_linear: linearisation point with the predicted q, and p and v that updates do not change.
   Nav nav, nav_linear;
   TimePoint time;                    ///< IMU clock
-  std::vector<RigidTransform> T_BC;  ///< one for each camera
+  std::vector<RigidTransform> T_BC;  ///< camera pose of each camera
   double time_offset_s = 0.0;        ///< t_imu = t_image + time_offset_s
   std::vector<double> readout_s;     ///< s from first to last row of each camera; 0: global shutter
   /// Ratio of a reading without its bias to the true rate, for each axis.
@@ -161,7 +161,7 @@ class State {
   /// with "update_not_positive" or "update_not_finite" and then does not change the state.
   Result<void> update(const Eigen::MatrixXd& H, const std::vector<Block>& blocks,
                       const Eigen::VectorXd& r);
-  /// The same with measurements that each depend on few blocks, without their zero columns.
+  /// Updates with measurements that each depend on few blocks, without their zero columns.
   Result<void> update(std::span<const Measurement> measurements);
   /// Returns H P Hᵀ for an H with the columns of `blocks`.
   Eigen::MatrixXd project(const MatrixView& H, std::span<const Block> blocks) const;

@@ -35,7 +35,8 @@ class Patch {
   Eigen::Matrix<float, kPixels, 6> steepest_;  ///< derivatives by [x, y, a_xx, a_xy, a_yx, a_yy]
   Eigen::Matrix<float, 6, 6> inverse_hessian_;
   float norm_ = 0;
-  Eigen::Matrix2f warp_ = Eigen::Matrix2f::Identity();  ///< from the first to the current image
+  /// Warp from the first to the current image.
+  Eigen::Matrix2f warp_ = Eigen::Matrix2f::Identity();
 };
 
 }  // namespace perdure::vio

@@ -150,7 +150,7 @@ void Tracker::follow(const Images& now, const std::optional<Eigen::Matrix3d>& R)
     const bool grown = kept[i].patch->growth() > options_.growth;
     (grown ? renewed : points_).push_back(std::move(kept[i]));
   }
-  // Appended after the others, because points are in order of their ids.
+  // Renewed points are appended, because points are in order of their ids.
   for (Point& p : renewed) {
     const auto patch = Patch::cut(now.levels.front(), p.pixel);
     if (!patch) continue;

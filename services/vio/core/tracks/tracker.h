@@ -93,9 +93,10 @@ class Tracker {
     double scale;
     cv::Point2f shift;
   };
-  std::optional<Placed> as_first_;  ///< for pixels of the second camera; empty at equal sizes
+  /// Table for pixels of the second camera; empty if the images have equal sizes.
+  std::optional<Placed> as_first_;
   std::vector<Point> points_;
-  Eigen::Vector3d turn_ = Eigen::Vector3d::Zero();  ///< of camera 0 during read-out, in C
+  Eigen::Vector3d turn_ = Eigen::Vector3d::Zero();  ///< rotation of camera 0 during read-out, in C
   std::vector<cv::Mat> previous_;
   std::deque<std::vector<std::pair<std::uint64_t, cv::Point2f>>> history_;  ///< newest last
   std::uint64_t next_id_ = 1;

@@ -15,7 +15,7 @@ namespace perdure::vio {
 inline constexpr std::size_t kMaxCameras = 2;
 
 struct ImagePoint {
-  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();       ///< as seen, distorted
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();       ///< observed pixel, with distortion
   Eigen::Vector2d normalised = Eigen::Vector2d::Zero();  ///< x/z, y/z, undistorted
   double scale = 1.0;  ///< mean number of pixels per unit of the normalised image at this point
   Eigen::Matrix2d to_pixels = Eigen::Matrix2d::Identity();  ///< ∂pixel / ∂normalised at this point

@@ -15,7 +15,7 @@ namespace perdure::vio {
 
 struct UpdateCounts {
   int used = 0, gated = 0;
-  int supposed = 0;  ///< of those used: with the depth of the scene
+  int supposed = 0;  ///< number of used points that have the depth of the scene
   int behind = 0;    ///< not triangulated because the rays do not meet in front of the cameras
 };
 
@@ -25,7 +25,7 @@ Result<UpdateCounts> updateMsckf(State& state, const std::vector<const Track*>& 
 
 /// Innovation of a point of the state in the newest image.
 struct Innovation {
-  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();     ///< as seen by the first camera
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();     ///< pixel in the first camera
   Eigen::Vector2d residual = Eigen::Vector2d::Zero();  ///< observed minus predicted, px
   double nis = 0.0;                                    ///< rᵀ S⁻¹ r over all its views
   int rows = 0;                                        ///< degrees of freedom of nis

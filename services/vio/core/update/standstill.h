@@ -20,7 +20,7 @@ struct RestExpectation {
   double rate_sigma = 0.0, force_sigma = 0.0;       ///< standard deviations of one axis
 };
 
-/// From the filter's attitude and biases, with their covariance.
+/// Computes the expectation from the filter's attitude and biases, with their covariance.
 RestExpectation restExpectation(const State& state, double gravity);
 
 /// Whether the means over `window` before `now` agree with the expectation, taken `age` ago. False
@@ -45,8 +45,8 @@ class Standstill {
 
  private:
   std::optional<TimePoint> confirmed_;    ///< when the images last confirmed the standstill
-  std::optional<TimePoint> interrupted_;  ///< time since which the IMU contradicts it
-  TimePoint begun_;                       ///< when the images first confirmed it
+  std::optional<TimePoint> interrupted_;  ///< time since which the IMU contradicts the rest
+  TimePoint begun_;                       ///< time at which the images first confirmed the rest
   /// Expectation with its time, older than a slow acceleration, which the filter takes for a bias.
   struct Reference {
     TimePoint time;

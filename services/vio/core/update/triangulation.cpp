@@ -42,7 +42,7 @@ struct Normal {
   bool in_front = true;
 };
 
-/// Expected inverse depth, and 1 / σ; 0: none.
+/// Expected inverse depth, and 1 / σ; 0: no prior.
 struct Prior {
   double inverse_depth, weight;
 };

@@ -24,7 +24,7 @@ struct Ray {
 
 struct Triangulated {
   Eigen::Vector3d p_W;
-  Eigen::Matrix3d covariance;  ///< in W, from the pixel noise alone
+  Eigen::Matrix3d covariance;  ///< covariance in W, from the pixel noise alone
   double relative_sigma;       ///< σ / depth, from the newest view
   double rms;                  ///< RMS of the weighted residuals
 };

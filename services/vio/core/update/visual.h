@@ -14,9 +14,9 @@
 namespace perdure::vio {
 
 struct ProjectionJacobians {
-  Eigen::Matrix<double, 2, 6> pose;       ///< by [θ, p] of T_WB
-  Eigen::Matrix<double, 2, 6> extrinsic;  ///< by [θ, p] of T_BC
-  Eigen::Matrix<double, 2, 3> point;      ///< by p_W
+  Eigen::Matrix<double, 2, 6> pose;       ///< derivative by [θ, p] of T_WB
+  Eigen::Matrix<double, 2, 6> extrinsic;  ///< derivative by [θ, p] of T_BC
+  Eigen::Matrix<double, 2, 3> point;      ///< derivative by p_W
 };
 
 /// Projects p_W to the normalised image. False if p_W is not in front of the camera.
@@ -80,7 +80,7 @@ void dropPoint(PointSystem& system);
 /// True if rᵀ S⁻¹ r is below the χ² quantile; S = H P Hᵀ + I.
 bool passesGate(const VectorView& r, const MatrixView& S, double probability);
 
-/// The same with S = P + I. P is evaluated only if rᵀ r, an upper bound, reaches the quantile.
+/// Gate with S = P + I. P is evaluated only if rᵀ r, an upper bound, reaches the quantile.
 bool passesGateWith(const VectorView& r, const std::function<Eigen::MatrixXd()>& P,
                     double probability);
 

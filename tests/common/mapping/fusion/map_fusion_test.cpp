@@ -117,7 +117,7 @@ TEST(MapFusion, TwoVehiclesHaveOneObjectForEachThing) {
   EXPECT_GE(report.loops, 1u);
   EXPECT_GT(report.merges, 10u);
   EXPECT_EQ(partsOf(fused).size(), 1u);
-  // Each object becomes one track with its own id.
+  // Each object becomes one track, which has the object's id.
   EXPECT_TRUE(fused.graph.tracks.empty() && fused.graph.facts.empty());
   for (const auto& [id, record] : fused.graph.records) {
     EXPECT_EQ(record.sighting.in_anchor.id, id);

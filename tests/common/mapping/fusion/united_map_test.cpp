@@ -115,7 +115,7 @@ TEST(UnitedMap, IdsThatWereGivenAfterTwoMapsPartedAreOfDifferentObjects) {
         allThings(), {.seed = seed, .from_m = from_m, .to_m = from_m + 100.0, .clock_s = 50.0});
     MapContents renumbered = drive.map;
     (void)unite(map, renumbered);
-    map.origins.clear();  // as a filter with this map would have numbered them
+    map.origins.clear();  // ids as a filter with this map would have given them
     return map;
   };
   MapContents one = wentOn(2, 200.0);

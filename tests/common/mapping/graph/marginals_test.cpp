@@ -80,7 +80,7 @@ TEST(Marginals, VariancesOfAllAnchorsAreThoseOfEach) {
   PoseGraph graph = chain(40);
   for (const AnchorId a : {2, 5, 9, 11, 17}) graph.add(loopBetween(graph, a, 40 - a));
   const LevelPose elsewhere{{500.0, 0.0, 0.0}, -1.0};
-  graph.addFirst(50, elsewhere);  // another component
+  graph.addFirst(50, elsewhere);  // an anchor of another component
   graph.add(51, 50, kOnward);
   graph.holdFirstAnchors();
   const auto all = Marginals(graph, 7).variances();
@@ -133,7 +133,7 @@ TEST(Marginals, ComposeAlongAChainWithoutLoops) {
   ASSERT_TRUE(backward);
   EXPECT_LT(difference(backward->mean, inverse(expected).mean).norm(), 1e-9);
   EXPECT_LT(relative(backward->covariance, inverse(expected).covariance), 1e-9);
-  // Also between two ends of which neither is the fixed anchor.
+  // Compares also two anchors of which neither is the fixed one.
   LevelGaussian part;
   for (int i = 0; i < 3; ++i) part = compose(part, step);
   const auto middle = Marginals(graph, 4).to(7);

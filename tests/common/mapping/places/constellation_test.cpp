@@ -16,8 +16,8 @@ namespace {
 
 /// The detected objects and the prior of the pose.
 struct PlaceQuery {
-  std::vector<PlacedObject> seen;       ///< in the body's level frame B
-  std::vector<PlacedObject> map;        ///< in M
+  std::vector<PlacedObject> seen;       ///< observed objects in the body's level frame B
+  std::vector<PlacedObject> map;        ///< map objects in M
   std::vector<Eigen::Vector2d> driven;  ///< positions in M from which the map's objects were
                                         ///< detected
   LevelGaussian prior;
@@ -168,7 +168,7 @@ TEST(Constellation, AnotherTownOfTheSameKindIsNotTakenForIt) {
       if (match && isBelieved(*match)) ++taken;
     }
   }
-  // Their streets are similar once in 120 towns.
+  // One of 120 other towns has similar streets.
   EXPECT_LE(taken, 1u);
 }
 

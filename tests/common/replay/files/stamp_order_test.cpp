@@ -50,7 +50,7 @@ TEST(StampOrder, HoldsAnyStamps) {
 TEST(StampOrder, LeavesOutTheOneThatIsFarAndNotAllBehindIt) {
   for (const std::int64_t by : {3600ll * 1'000'000'000, -3600ll * 1'000'000'000, 2'000'000'000ll}) {
     for (const std::size_t at : {std::size_t{0}, std::size_t{40}, std::size_t{119}}) {
-      if (by == 2'000'000'000ll && at != 40) continue;  // at an end the stamp may be correct
+      if (by == 2'000'000'000ll && at != 40) continue;  // the first or last stamp may be correct
       auto stamps = every(kInterval, 120);
       stamps[at] += Duration(by);
       const auto order = orderOf(stamps);
@@ -200,13 +200,13 @@ TEST(Clocks, BlocksOfLinesAtAnotherPlaceAreSorted) {
   };
   auto stamps = every(kInterval, 600);
   std::rotate(stamps.begin(), stamps.begin() + 200, stamps.end());
-  expectSorted(stamps, 600);  // the first third is at the end
+  expectSorted(stamps, 600);  // the first third of the stamps is at the end
   stamps = every(kInterval, 600);
   std::rotate(stamps.begin() + 100, stamps.begin() + 300, stamps.begin() + 400);
   expectSorted(stamps, 600);  // two blocks have changed places
   stamps = every(kInterval, 600);
   stamps.insert(stamps.end(), stamps.begin() + 500, stamps.begin() + 550);
-  expectSorted(stamps, 600);  // lines are there twice
+  expectSorted(stamps, 600);  // some lines occur twice
 }
 
 TEST(Clocks, OverlappingBatchesAreNoClockThatWasSet) {

@@ -63,7 +63,7 @@ TEST(StrangersFolder, ARecordingWithoutItsLogIsNamed) {
   const Twin twin = twinOf("ros_left_behind");
   const fs::path killed = twin.file.parent_path() / "killed.db3",
                  copied = freshFolder("ros_copied") / "killed.db3";
-  sqlite3* database = nullptr;  // as of a recorder that was killed: nothing is in the file itself
+  sqlite3* database = nullptr;  // state after a killed recorder: the main file has no messages
   ASSERT_EQ(sqlite3_open(killed.c_str(), &database), SQLITE_OK);
   run(database, "PRAGMA journal_mode=WAL; PRAGMA wal_autocheckpoint=0; ATTACH '" +
                     twin.file.string() +

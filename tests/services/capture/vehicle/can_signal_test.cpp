@@ -63,7 +63,7 @@ TEST(CanSignal, TakesBitsOfBothOrders) {
   EXPECT_EQ(raw("7|64@0- (1,0)", {0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xfe}), -2);
   EXPECT_EQ(raw("0|64@1- (1,0)", {0xfe, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff}), -2);
   EXPECT_EQ(raw("3|4@0- (1,0)", {0x0a}), -6);
-  // Beyond the eight bytes of a classic frame.
+  // The signal is beyond the eight bytes of a classic frame.
   Bytes flexible(64);
   flexible[63] = 0x7f;
   EXPECT_EQ(raw("504|8@1+ (1,0)", flexible), 0x7f);

@@ -222,7 +222,7 @@ TEST_F(HubTest, PassesCallsOnAndAnswersWhoStillIsThere) {
   hub_.leave(viewer);
   hub_.answer({calls_[0].client, 1, 9, true, "{}"});
   EXPECT_THAT(viewer.read(), ElementsAre());
-  call[1] = 77;  // no such service
+  call[1] = 77;  // a service with this number does not exist
   TestViewer other(4);
   join(other);
   hub_.hear(other, call, false, now_);

@@ -24,7 +24,7 @@ class PostgresServer {
   std::string makeDatabase(bool with_postgis = false);
   void dropDatabase(const std::string& url);
   std::string url(const std::string& database) const;
-  /// The same URL with another port of 127.0.0.1, or with another passfile.
+  /// Returns the URL with another port of 127.0.0.1, or with another passfile.
   static std::string through(int port, const std::string& url);
   std::string passfile(const std::string& password) const;
   int port() const { return port_; }

@@ -98,7 +98,7 @@ TEST(FleetReplicator, WhatTheServerHasLeavesTheOutbox) {
   const std::int64_t in_one_commit = 8 + 1;  // eight cars that moved, and the working set
   EXPECT_LE(entriesOf(file), 2 * in_one_commit);
   const std::uint64_t rows = vehicle.fleet().progress().rows;
-  EXPECT_LE(rows, 36u + 8u + 8u);  // each changed car in each commit, once
+  EXPECT_LE(rows, 36u + 8u + 8u);  // each commit sends each changed car once
   vehicle.fleet().wake();
   ASSERT_TRUE(vehicle.fleet().finish(kLong));
   EXPECT_EQ(vehicle.fleet().progress().rows, rows);
@@ -191,7 +191,7 @@ class DrivingVehicle {
  private:
   [[noreturn]] static void drive(const Config& config, std::uint64_t from, int pipe) {
     auto pace = quick();
-    pace.most_rows = 7;  // many portions
+    pace.most_rows = 7;  // forces many portions
     Vehicle vehicle(config, pace);
     for (std::uint64_t n = from;; ++n) {
       vehicle.step(n);

@@ -217,7 +217,7 @@ TEST(FleetGeometry, WithoutAPlaceOnEarthThereAreLocalPlacesUntilItIsKnown) {
   EXPECT_EQ(server->number(url, "SELECT count(*) FROM perdure.objects_wgs84"), 4);
 }
 
-/// For the README's table; not a criterion for passing.
+/// Prints figures for the README; it has no criterion for passing.
 TEST(FleetFigures, DISABLED_OfThisMachine) {
   auto* server = PERDURE_SERVER_OR_SKIP();
   const TemporaryFolder folder;

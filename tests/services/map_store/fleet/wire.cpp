@@ -77,7 +77,7 @@ void Relay::carry(int client) {
   sockaddr_in address = local(to_port_);
   bool open = connect(server, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0;
   bool deaf = false;
-  std::string asked, answered;  // the last bytes of each side
+  std::string asked, answered;  // the last bytes from each side
   const auto take = [](int file, std::string& last) {
     std::array<char, 16384> buffer;
     const ssize_t got = recv(file, buffer.data(), buffer.size(), 0);

@@ -16,7 +16,7 @@ class SilentPort {
   int port() const { return port_; }
 
  private:
-  int port_ = 0, file_ = -1;  // in this order: the listener determines the port
+  int port_ = 0, file_ = -1;  // the order matters, because the listener determines the port
 };
 
 class Relay {

@@ -31,7 +31,7 @@ Matrix6d someCovariance(double variance) {
   return variance * (root * root.transpose() + Matrix6d::Identity());
 }
 
-/// As the map sends it: not detected on this visit.
+/// An object as the map sends it, not detected on this visit.
 ObjectBelief known(TrackId id, const State& x = kPlace, const std::string& name = "car") {
   Track track = makeObject(id, name, x, 0.04);
   track.life.confirmed = track.life.once_confirmed = true;

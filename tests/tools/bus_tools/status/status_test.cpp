@@ -138,7 +138,7 @@ TEST(Status, AServiceThatIsHeardIsJudgedItself) {
   seen.services["vio"] = sound().services.at("vio");
   seen.services["vio"].health.state = HealthState::kFailed;
   EXPECT_EQ(dominating(seen, "vio"), Level::kFailed);
-  seen.services["vio"].age_s = 60.0;  // it was stopped, and the bridge has replaced it
+  seen.services["vio"].age_s = 60.0;  // vio was stopped, and the bridge has replaced it
   EXPECT_EQ(judge(seen).level, Level::kOk);
 }
 

@@ -223,7 +223,7 @@ TEST(Loops, TheWayToCloseGoesToTheFirstTrueLoopThatIsBelieved) {
   doubted.believed = false;
   std::vector<JudgedLoop> loops{closedAt(46), closedAt(45), wrong, doubted, closedAt(20)};
   EXPECT_THAT(seen.returns(loops)[0].closed_after_m, Optional(DoubleNear(40.0, 1e-9)));
-  loops.push_back(closedAt(40));  // its anchor was set before the first object came into view
+  loops.push_back(closedAt(40));  // the loop's anchor was set before the first object was visible
   EXPECT_THAT(seen.returns(loops)[0].closed_after_m, Optional(DoubleNear(0.0, 1e-9)));
   EXPECT_EQ(seen.returns({closedAt(39)})[0].closed_after_m, std::nullopt);
 }

@@ -180,9 +180,10 @@ TEST(Memory, ARunThatStartsWithAMapIsComparedWithTheOneThatMadeIt) {
   now.truth.body = Drive(4).truth.body;
   now.truth.truth.views.clear();
   now.see(1, {0, 3}), now.see(2, {2}), now.see(3, {2, 3}), now.see(4, {2});
-  now.report(90, 0, 10, 5);                              // not recognised yet
+  // the object has a new id, because it is not recognised yet
+  now.report(90, 0, 10, 5);
   now.report(12, 2, 10, 10);                             // the same object
-  now.report(11, 2, 10, 15), now.report(11, 3, 10, 15);  // another object
+  now.report(11, 2, 10, 15), now.report(11, 3, 10, 15);  // reports of another object
   const auto score = scoreReturn(before.frames(), now.frames(), {});
   EXPECT_EQ(score.ids, 3U);
   EXPECT_EQ(score.known, 3U) << "the fourth was never reported";

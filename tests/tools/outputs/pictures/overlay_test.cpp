@@ -53,7 +53,8 @@ TEST(Overlay, AHiddenObjectIsSeenOverTheOneThatHidesIt) {
   ObjectGlance near = objectAt(1, {8.0, 0.0, 0.0}, Visibility::kVisible, "van");
   ObjectGlance behind = objectAt(2, {12.65, 0.0, 0.0}, Visibility::kOccluded);
   near.size = {0.5, 1.0, 1.0};
-  behind.size = {0.5, 1.6, 1.6};  // as large in the image, so that the lines coincide
+  // this object has the same size in the image, so that the lines coincide
+  behind.size = {0.5, 1.6, 1.6};
   const auto corners = cornersOf(behind);
   const cv::Mat image = drawn(frameOf(0, {behind, near}));
   EXPECT_GT(coverage(image, pixelOf(aheadCamera(), corners[0]), pixelOf(aheadCamera(), corners[2]),

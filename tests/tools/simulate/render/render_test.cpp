@@ -73,7 +73,7 @@ TEST(Renderer, DrawsAThingWhereTheCameraModelProjectsItsCorners) {
 TEST(Outline, SaysHowMuchOfAThingAWallLeavesToBeSeen) {
   sim::Scene scene = emptyWorld(320, 240);
   scene.objects = {thing(5, "couch", {0.9, 2.0, 0.9}, {6.0, 0.0, 1.2})};
-  // Its edge is in the plane y = 0, which contains the camera and the centre of the couch.
+  // The edge of the wall is in the plane y = 0, which contains the camera and the couch's centre.
   scene.props = {wall({0.02, 4.0, 4.0}, {3.0, -2.0, 1.2})};
   Drawn drawn(scene);
   ASSERT_EQ(drawn.views().size(), 1U);

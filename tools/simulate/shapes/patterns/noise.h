@@ -7,7 +7,7 @@
 
 namespace perdure::tools::shapes {
 
-/// In [0, 1), constant for a cell and a seed.
+/// Returns a number in [0, 1) that is constant for a cell and a seed.
 inline float cellNoise(int x, int y, std::uint32_t seed) {
   std::uint32_t h = static_cast<std::uint32_t>(x) * 0x8DA6B343U ^
                     static_cast<std::uint32_t>(y) * 0xD8163841U ^ seed * 0xCB1AB31FU;

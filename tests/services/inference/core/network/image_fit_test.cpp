@@ -96,7 +96,7 @@ TEST(ImageFit, TurnsPixelsBoxesAndSidesTogetherAndExactlyBack) {
   }
   image.data = std::make_shared<const std::vector<std::uint8_t>>(std::move(pixels));
   for (int quarters = 0; quarters < 4; ++quarters) {
-    Input in = input(Fit::kResize);  // without scaling
+    Input in = input(Fit::kResize);  // the input needs no scaling
     in.width = 8, in.height = 6;
     if (quarters % 2 == 1) std::swap(in.width, in.height);
     const Box shown = fitOf(in, 8, 6, quarters).toInput(bright);

@@ -1,4 +1,4 @@
-// Tests when the detections of a newcomer count as nonsense, compared with those of the current
+// Tests when detections of a new process count as implausible, compared with those of the current
 // process.
 #include "services/inference/core/takeover/judge.h"
 

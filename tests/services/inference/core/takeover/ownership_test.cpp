@@ -57,8 +57,8 @@ TEST(Ownership, AHeapOfOldFramesWorkedOffAtOnceDoesNotBringFormBack) {
 
 TEST(Ownership, OneThatIsInFormAgainTakesNothingFromAnotherThatIsHeard) {
   Ownership owner(10, false, kLease);
-  owner.strengthFor(at(0), kFresh, 1, kAlone);  // it has resumed and has not received other
-                                                // messages yet
+  // the owner has resumed and has not received other messages yet
+  owner.strengthFor(at(0), kFresh, 1, kAlone);
   for (int i = 1; i < 100; ++i) {
     EXPECT_EQ(owner.strengthFor(at(i * 100), kFresh, 1, kOthers), kLow) << i;
   }

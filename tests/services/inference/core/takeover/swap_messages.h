@@ -1,4 +1,4 @@
-// Messages of an old inference process and of a newcomer, for tests of swaps and of their judge.
+// Messages of an old and of a new inference process, for tests of swaps and of their judge.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
-// Runs a newcomer and the old process as two state machines on one simulated topic. Tests the
-// messages of each, the owner of the topic, and that no frame is lost whatever the newcomer does.
+// Runs the new and the old process as two state machines on one simulated topic. Tests the
+// messages of each, the owner of the topic, and that no frame is lost, whatever happens.
 #include "services/inference/core/takeover/swap.h"
 
 #include <gmock/gmock.h>
@@ -296,7 +296,7 @@ TEST(Swap, WhatASpareSaysWhileReadersLearnOfItIsSaidAgain) {
   for (std::uint64_t k = 0; k < 6; ++k, now += kPeriod) {
     spare.ownResult(listOf(kNew, k, kStreet), true, now);
     if (k < 2) spare.heard(listOf(kOld, k, kStreet), now);
-    if (k >= 4) spare.heard(listOf(kNew, k, kStreet), now);  // the owner died after frame 1
+    if (k >= 4) spare.heard(listOf(kNew, k, kStreet), now);  // the owner ended after frame 1
     const std::vector<std::uint64_t> missed = {2, 3};
     EXPECT_EQ(sequences(), k == 4 ? missed : std::vector<std::uint64_t>{}) << k;
   }
@@ -314,7 +314,7 @@ TEST(Swap, WhatASpareMadeBeforeItHeardItselfIsSaidAgainToo) {
   for (std::uint64_t k = 1; k < 4; ++k) {
     spare.ownResult(listOf(kNew, k, kStreet), true, now += kPeriod);
   }
-  spare.heard(listOf(kNew, 2, kStreet), now);  // it arrives after frame 3 was written
+  spare.heard(listOf(kNew, 2, kStreet), now);  // this result arrives after frame 3 was written
   (void)spare.take();
   spare.tick(now + kShortLease);
   const auto said = spare.take().again;

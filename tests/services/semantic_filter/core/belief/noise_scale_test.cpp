@@ -45,7 +45,7 @@ TEST(NoiseScales, StayWithinTheirLimits) {
   EXPECT_EQ(scales.ratio(kOther, kAssumed), before);
 }
 
-/// What the residuals of a fit tell if the true scales are `truth`: `noise` and `lasting` sides,
+/// Evidence of the residuals of a fit if the true scales are `truth`: `noise` and `lasting` sides,
 /// of which a part tells about both.
 SideEvidence evidenceOf(const SideVariances& learned, const SideScales& truth, double noise,
                         double lasting) {

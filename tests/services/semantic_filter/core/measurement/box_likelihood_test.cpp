@@ -234,7 +234,7 @@ double ratioOfChanceBoxes(const ProjectedBox& predicted, double sigma,
   return clutter.per_frame * sum / kBoxes;
 }
 
-// Otherwise false boxes would make non-existing objects certain.
+// If the mean ratio exceeded one, false boxes would make non-existing objects certain.
 TEST(BoxLikelihood, OverAllChanceBoxesTheRatioAveragesToOneAtMost) {
   EXPECT_NEAR(ratioOfChanceBoxes(predictedBox(500, 100, 800, 260), 25.0, {}), 1.0, 0.2);
   EXPECT_LT(ratioOfChanceBoxes(predictedBox(500, 100, 800, 260), 25.0, {false, false, true, false}),

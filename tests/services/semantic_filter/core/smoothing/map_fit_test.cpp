@@ -13,7 +13,7 @@ namespace {
 
 using testing::Passing;
 
-/// The same keyframes with variances `factor` times as large, recorded when the scales of their
+/// Returns the keyframes with variances `factor` times as large, recorded when the scales of their
 /// network were `then`.
 Keyframes lookedAs(const Keyframes& looks, const SideScales& factor, const NoiseScale& then) {
   Keyframes result;
@@ -64,7 +64,7 @@ TEST(MapFit, OldKeyframesUseThePresentScales) {
   EXPECT_GT(fits[2].P(0, 0), 1.2 * fits[0].P(0, 0));  // no scale was learned for this network
 }
 
-/// The same keyframes with boxes whose errors are drawn from the model, with its variances times
+/// Returns the keyframes with boxes whose errors are drawn from the model, with its variances times
 /// `truth`: b keeps the share viewCorrelation from one keyframe to the next.
 Keyframes drawnFrom(const Passing& scene, const SideScales& truth, unsigned seed) {
   std::mt19937 random(seed);
@@ -204,7 +204,7 @@ TEST(MapFit, DistinguishesMotionFromRest) {
   }
 }
 
-/// The last two boxes of a parked car are bad in the way that a motion would explain.
+/// The last two boxes of a parked car are bad, with errors that a motion would explain.
 TEST(MapFit, BadBoxesAreNoMotion) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     Passing scene(seed);
@@ -261,7 +261,7 @@ TEST(MapFit, RefusesAPlaceThatTheKeyframesDoNotDetermine) {
   EXPECT_FALSE(MapFit::make(scene.start(false), looks, frame));
 }
 
-/// The same keyframes with exact boxes of an object whose roof is behind its centre, and with
+/// Returns the keyframes with exact boxes of an object whose roof is behind its centre, and with
 /// azimuths if `with_azimuths`.
 Keyframes ofLeaning(const Keyframes& looks, const State& truth, bool with_azimuths) {
   auto styles = std::make_shared<BoxStyles>();

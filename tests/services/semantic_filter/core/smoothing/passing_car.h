@@ -37,7 +37,7 @@ class Passing {
   }
   const Keyframes& keyframes() const { return keyframes_; }
   Keyframes& keyframes() { return keyframes_; }
-  const State& truth() const { return truth_; }  ///< at the last keyframe
+  const State& truth() const { return truth_; }  ///< true state at the last keyframe
   Parameters& parameters() { return parameters_; }
 
   /// A hypothesis as after a bad first box.

@@ -107,7 +107,7 @@ TEST_F(UpdateWithGround, KeepsWhatTheBoxesAloneSay) {
   know(0.0);
   Hypothesis h = farCar(0.0);
   h.x[2] += 0.06;
-  h.P *= 0.04;  // deviation of 2 % of its distance
+  h.P *= 0.04;  // standard deviation of 2 % of the distance
   const double alone = h.x[2] - 0.5 * std::exp(h.x[kSize + 2]);
   updateWithGround(h, 99, usual_.frame);
   const double now = h.x[2] - 0.5 * std::exp(h.x[kSize + 2]);
@@ -116,7 +116,7 @@ TEST_F(UpdateWithGround, KeepsWhatTheBoxesAloneSay) {
   EXPECT_GT(h.ground_contact.variance, 0.0);
 }
 
-/// Its underside differs from the one in the boxes.
+/// The underside of this hypothesis differs from that in the boxes.
 TEST_F(UpdateWithGround, AnotherHypothesisOfTheTrackDoesNotInheritIt) {
   Track o = testing::makeObject(1, "car", testing::makeState(20, 0, 0.7, 0, 4, 1.8, 1.5), 0.04);
   o.life.hits = 3;

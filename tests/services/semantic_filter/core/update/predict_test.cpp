@@ -82,8 +82,8 @@ TEST(PredictBias, ADetectorWithoutLastingErrorHasNoBias) {
   EXPECT_EQ((h.P.block<4, 4>(kBias, kBias).norm()), 0.0);
 }
 
-/// An unmapped object at rest cannot hide it where it was detected from this direction, up to the
-/// distance of that detection.
+/// An unmapped object at rest cannot hide the track in directions from which it was detected, up to
+/// the distance of that detection.
 TEST(Predict, DirectionsOfDetectionsExcludeAnUnmappedOccluder) {
   ViewWalk walk = walkWith({});
   walk.unmapped_occluder = 0.2;

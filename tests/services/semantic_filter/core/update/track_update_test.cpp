@@ -301,7 +301,7 @@ TEST_F(TrackUpdate, MissesFromAViewpointThatDetectedItLowerExistenceAtOnce) {
 
 /// The error of a side lasts for some frames; a later box is a new observation.
 TEST_F(TrackUpdate, BetweenRestAndMotionABoxCountsByTheTimeSinceTheLastOne) {
-  Hypothesis astray = object.hypotheses[0];  // of the same class, away from the box
+  Hypothesis astray = object.hypotheses[0];  // a hypothesis of the same class, away from the box
   astray.moving = true;
   astray.x[1] += 0.8;
   object.hypotheses = {object.hypotheses[0], astray, object.hypotheses[1]};
@@ -383,7 +383,7 @@ TEST_F(TrackUpdate, ManyObservationsFromOneViewpointAddLittle) {
 
 TEST_F(TrackUpdate, ManyObservationsUnderOnePoseErrorDoNotBeatIt) {
   frame.pose_error.covariance.diagonal() << 1e-8, 1e-8, 1e-8, 0.04, 0.04, 0.04;
-  for (auto& h : object.hypotheses) {  // as at initiation: the position contains the pose error
+  for (auto& h : object.hypotheses) {  // the position contains the pose error, as at initiation
     h.C.topRightCorner<3, 3>() = 0.04 * Eigen::Matrix3d::Identity();
     h.P.diagonal().head<3>().array() += 0.04;
   }

@@ -179,7 +179,7 @@ TEST_F(ReturnTime, AnObjectThatShouldBeVisibleIsExpectedUntilItIsDetected) {
   oneFrame(0.1);
   ASSERT_EQ(said.size(), 1u);
   objects[1].visibility.state =
-      Visibility::kPartial;  // by its visible fraction, although there is no box
+      Visibility::kPartial;  // visibility by the visible fraction, although no box exists
   objects[1].visibility.fraction = 0.3;
   now.view.T_WB.p.y() = 3.0;
   said.clear();

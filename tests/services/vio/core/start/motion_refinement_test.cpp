@@ -22,7 +22,7 @@ constexpr double kPatience = 2.5;  // s
 
 struct Attempt {
   Result<Start> start = fail("start_waits");
-  Nav truth;  ///< at the time of the start, with yaw 0
+  Nav truth;  ///< true state at the time of the start, with yaw 0
 };
 
 /// Images and samples begin `from` seconds into the drive; biases are drawn from their priors.

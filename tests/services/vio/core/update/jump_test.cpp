@@ -21,7 +21,7 @@ constexpr double kJumpAt = 12.025, kSeconds = 20.0;
 struct AfterJump {
   double before_m = 0.0, after_m = 0.0;  ///< rms error over the seeds, before the jump and at the
                                          ///< end
-  double soon_m = 0.0;                   ///< one second after the jump
+  double soon_m = 0.0;                   ///< error one second after the jump
   double nees = 0.0;                     ///< NEES of position and rotation at the end, per
                                          ///< dimension
   double gated = 0.0;                    ///< gated points of the state from the jump on, per run
@@ -91,7 +91,7 @@ void expectRecovery(const AfterJump& after, const AfterJump& without) {
   EXPECT_LT(after.gated, without.gated + 60.0);
 }
 
-/// Without any jump.
+/// Errors of a drive without a jump.
 const AfterJump& undisturbed() {
   static const AfterJump without = run(RigidTransform(), 100.0, Options{});
   return without;
