@@ -10,8 +10,8 @@ struct AnchorParameters {
   double turn_rad = 0.5236;
   double yaw_sigma_rad = 0.0026;
   /// Random walk of poses without increments.
-  double walk_position = 0.01;  ///< m/√m
-  double walk_yaw = 0.0002;     ///< rad/√m
+  double walk_position = 0.03;  ///< m/√m
+  double walk_yaw = 0.0005;     ///< rad/√m
 };
 
 /// Search for the body among the objects of the map.
@@ -62,7 +62,9 @@ struct LoopParameters {
 };
 
 struct DriftScaleParameters {
-  double prior_sigma = 1.0;  ///< σ of the logarithm of the scale, before any loop
+  /// Median of the scale before any loop, and σ of its logarithm. The assumed walk is an upper
+  /// value, since one that is too small leads to wrong associations.
+  double prior_median = 1.0 / 3.0, prior_sigma = 1.0;
   /// Quantiles of the scale: of the one in use after a loop, and of the widest search.
   double quantile = 0.8, most = 0.98;
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "common/mapping/frames/level_errors.h"
 #include "common/math/gaussian.h"
@@ -13,13 +14,14 @@ namespace {
 constexpr double kLeast = 0.02, kMost = 32.0;
 constexpr int kSteps = 64;
 constexpr std::size_t kMostLoops = 20;
+const std::vector<int> kPlane = {0, 1, 3};  // of [p, yaw]
 
 }  // namespace
 
 DriftScale::DriftScale(const DriftScaleParameters& parameters, const std::vector<Anchor>& way) {
   for (int i = 0; i <= kSteps; ++i) {
     const double log_scale = std::log(kLeast) + (std::log(kMost) - std::log(kLeast)) * i / kSteps;
-    const double d = log_scale / parameters.prior_sigma;
+    const double d = (log_scale - std::log(parameters.prior_median)) / parameters.prior_sigma;
     log_scales_.push_back(log_scale);
     plane_.push_back(-0.5 * d * d);
   }
@@ -57,6 +59,70 @@ Eigen::Matrix4d DriftScale::sharedError(const Measured& x, const Measured& y) co
   return byFrame(poses_[x.b].p) * (sums_[to] - sums_[from]) * byFrame(poses_[y.b].p).transpose();
 }
 
+/// Loops as one Gaussian: their errors, the covariance of the measurements, and that of the
+/// odometry for a scale of 1.
+struct DriftScale::Joint {
+  Eigen::VectorXd e;
+  Eigen::MatrixXd Z, C;
+
+  double logLikelihood(double log_scale) const {
+    return logGaussian(e, Eigen::MatrixXd(Z + std::exp(2.0 * log_scale) * C));
+  }
+};
+
+DriftScale::Joint DriftScale::joint(const std::vector<Measured>& loops,
+                                    const std::vector<int>& parts) const {
+  const auto size = static_cast<Eigen::Index>(parts.size());
+  const auto n = static_cast<Eigen::Index>(loops.size()) * size;
+  Joint all{Eigen::VectorXd(n), Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd(n, n)};
+  for (Eigen::Index i = 0; i * size < n; ++i) {
+    const Measured& x = loops[static_cast<std::size_t>(i)];
+    all.e.segment(i * size, size) = x.error(parts);
+    all.Z.block(i * size, i * size, size, size) = x.covariance(parts, parts);
+    for (Eigen::Index j = 0; j * size < n; ++j) {
+      const Eigen::Matrix4d shared = sharedError(x, loops[static_cast<std::size_t>(j)]);
+      all.C.block(i * size, j * size, size, size) = shared(parts, parts);
+    }
+  }
+  return all;
+}
+
+/// Probability density of the loops for an unknown scale, as a logarithm.
+double DriftScale::logEvidence(const std::vector<Measured>& loops) const {
+  constexpr std::size_t kEach = 8;  // a coarse grid suffices here
+  const Joint all = joint(loops, kPlane);
+  std::vector<double> terms;
+  for (std::size_t k = 0; k < log_scales_.size(); k += kEach) {
+    terms.push_back(plane_[k] + all.logLikelihood(log_scales_[k]));
+  }
+  const double peak = *std::max_element(terms.begin(), terms.end());
+  double sum = 0.0;
+  for (const double term : terms) sum += std::exp(term - peak);
+  return peak + std::log(sum);
+}
+
+/// Removes loops that are more probably wrong, given the others.
+void DriftScale::dropWrong(std::vector<Measured>& loops) const {
+  // A wrong loop errs by anything within some metres and a tenth of a radian.
+  const double wrong = std::log(0.05 / 0.95) + std::log(1.0 / (10.0 * 10.0 * 0.2));
+  double evidence = logEvidence(loops);
+  while (loops.size() > 1) {
+    std::optional<std::size_t> worst;
+    double best = evidence;
+    for (std::size_t i = 0; i < loops.size(); ++i) {
+      std::vector<Measured> others = loops;
+      others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+      const double without = logEvidence(others) + wrong;
+      if (without <= best) continue;
+      best = without;
+      worst = i;
+    }
+    if (!worst) return;
+    loops.erase(loops.begin() + static_cast<std::ptrdiff_t>(*worst));
+    evidence = best - wrong;
+  }
+}
+
 bool DriftScale::use(const std::vector<Edge>& loops, double apart_m) {
   std::map<std::int64_t, Measured> best;
   for (const Edge& loop : loops) {
@@ -71,31 +137,13 @@ bool DriftScale::use(const std::vector<Edge>& loops, double apart_m) {
   }
   while (best.size() > kMostLoops) best.erase(best.begin());
   if (best.empty()) return false;
-  const auto n = static_cast<Eigen::Index>(best.size());
-  Eigen::VectorXd e_plane(3 * n), e_height(n);
-  Eigen::MatrixXd Q_plane(3 * n, 3 * n), Q_height(n, n);
-  Eigen::MatrixXd R_plane = Eigen::MatrixXd::Zero(3 * n, 3 * n),
-                  R_height = R_plane.topLeftCorner(n, n);
-  const Eigen::Vector3i plane(0, 1, 3);
-  Eigen::Index i = 0;
-  for (const auto& [at_i, x] : best) {
-    e_plane.segment<3>(3 * i) = x.error(plane);
-    e_height[i] = x.error[2];
-    R_plane.block<3, 3>(3 * i, 3 * i) = x.covariance(plane, plane);
-    R_height(i, i) = x.covariance(2, 2);
-    Eigen::Index j = 0;
-    for (const auto& [at_j, y] : best) {
-      const Eigen::Matrix4d shared = sharedError(x, y);
-      Q_plane.block<3, 3>(3 * i, 3 * j) = shared(plane, plane);
-      Q_height(i, j) = shared(2, 2);
-      ++j;
-    }
-    ++i;
-  }
+  std::vector<Measured> used;
+  for (auto& [stretch, measured] : best) used.push_back(std::move(measured));
+  dropWrong(used);
+  const Joint plane = joint(used, kPlane), height = joint(used, {2});
   for (std::size_t k = 0; k < log_scales_.size(); ++k) {
-    const double variance = std::exp(2.0 * log_scales_[k]);
-    plane_[k] += logGaussian(e_plane, Eigen::MatrixXd(R_plane + variance * Q_plane));
-    height_[k] += logGaussian(e_height, Eigen::MatrixXd(R_height + variance * Q_height));
+    plane_[k] += plane.logLikelihood(log_scales_[k]);
+    height_[k] += height.logLikelihood(log_scales_[k]);
   }
   return true;
 }

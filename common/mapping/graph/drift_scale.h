@@ -23,8 +23,8 @@ class DriftScale {
 
   /// Uses loops between anchors of the way, all at once: loops with common increments have common
   /// errors. Of the loops that end within one stretch of `apart_m`, the most accurate one is used,
-  /// and of the stretches the newest twenty. Other edges are left out. Returns whether one was
-  /// used.
+  /// and of the stretches the newest twenty. Loops that the others contradict, and
+  /// other edges, are left out. Returns whether one was used.
   bool use(const std::vector<Edge>& loops, double apart_m);
 
   /// The factors for covariances of the odometry at a quantile of the posterior, in (0, 1).
@@ -39,7 +39,12 @@ class DriftScale {
   };
   using LogPosterior = std::vector<double>;  ///< over log_scales_
 
+  struct Joint;
+
   Measured measuredBy(const Edge& loop) const;
+  Joint joint(const std::vector<Measured>& loops, const std::vector<int>& parts) const;
+  double logEvidence(const std::vector<Measured>& loops) const;
+  void dropWrong(std::vector<Measured>& loops) const;
   Eigen::Matrix4d sharedError(const Measured& x, const Measured& y) const;
   double varianceOf(const LogPosterior& log_posterior, double quantile) const;
 

@@ -21,7 +21,7 @@ using namespace test;
 /// determines its position.
 class Back {
  public:
-  Back() : parameters_(walking()), state_(parameters_, {}), way_(parameters_.anchor) {
+  Back() : state_(parameters_, {}), way_(parameters_.anchor) {
     for (int i = 0; i <= 300; ++i) drive(i <= 150 ? i : 300 - i, i <= 150 ? 0.0 : kPi);
     relative_ = std::make_unique<Marginals>(state_.graph(), way_.last()->id);
   }
@@ -64,13 +64,6 @@ class Back {
   }
 
  private:
-  /// Half a metre of uncertainty after 300 m.
-  static Parameters walking() {
-    Parameters parameters;
-    parameters.anchor.walk_position = 0.03;
-    parameters.anchor.walk_yaw = 0.0005;
-    return parameters;
-  }
   void drive(double x, double yaw) {
     x_ = x;
     Odometry o;
