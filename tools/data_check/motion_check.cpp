@@ -76,11 +76,13 @@ CameraCalibration reduced(CameraCalibration camera, int factor) {
 
 std::vector<Turn> turnsOfRun(const Frames& frames, const CameraCalibration& calibration,
                              const Run& run) {
-  constexpr std::uint32_t kEnough = 600;  // px of width
+  constexpr std::uint32_t kColumns = 360, kRows = 160;  // px, enough
+  const auto isEnough = [&](int factor) {
+    const auto n = static_cast<std::uint32_t>(factor);
+    return calibration.width / n >= kColumns && calibration.height / n >= kRows;
+  };
   int factor = 1;
-  while (factor < 8 && calibration.width / static_cast<std::uint32_t>(2 * factor) >= kEnough) {
-    factor *= 2;
-  }
+  while (factor < 8 && isEnough(2 * factor)) factor *= 2;
   const CameraModel camera(reduced(calibration, factor));
   std::vector<Turn> turns;
   FollowedImage before;

@@ -94,9 +94,10 @@ TEST(ClockCheck, AShortJumpAheadOfOneClockIsSaidAndLostImagesAreNot) {
                         "clock_set_alone"),
                 HasSubstr("images.csv, message 101: the stamps of the images jump ahead by"))
         << ms;
-    EXPECT_THAT(finding(readWith(setBy(milliseconds(ms)), setBy(milliseconds(ms))),
-                        DataFinding::Grade::kWarning, "clock_paused"),
-                HasSubstr("nothing from the IMU"));
+    const auto pause = finding(readWith(setBy(milliseconds(ms)), setBy(milliseconds(ms))),
+                               DataFinding::Grade::kWarning, "clock_paused");
+    EXPECT_THAT(pause, HasSubstr("nothing from the IMU"));
+    EXPECT_EQ(pause.ends_with("; vio starts again after it"), ms > 800) << pause;
     const auto lost = [&](Duration time) {  // repeated stamps are left out
       const bool inside = time >= seconds(110) && time < seconds(110) + milliseconds(ms);
       return inside ? seconds(110) - milliseconds(100) : time;

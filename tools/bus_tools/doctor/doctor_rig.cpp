@@ -30,6 +30,14 @@ void addFindings(const replay::DataFindings& of_data, Findings& findings) {
   }
 }
 
+std::unique_ptr<replay::Dataset> openGrey(const Drive& drive) {
+  return replay::Dataset::open({.path = drive.data,
+                                .sequence = drive.sequence,
+                                .encoding = ImageEncoding::kMono8,
+                                .second_encoding = ImageEncoding::kMono8,
+                                .rig = drive.rig});
+}
+
 void checkPosesOf(const Drive& drive, const replay::Recording& recording, Findings& findings) {
   if (drive.poses.empty()) return;
   const auto of_poses = checkPoses(recording, replay::PoseFile::read(drive.poses), {});
@@ -54,12 +62,10 @@ void checkMotionOf(const replay::Recording& recording, replay::DataFindings& of_
 
 /// Starts vio beside the checks of the motion, if `options` are given. Returns nothing if the rig
 /// cannot be judged by the recording.
-std::future<calibrate::RigCheck> checkRecording(const Drive& drive,
+std::future<calibrate::RigCheck> checkRecording(const Drive& drive, replay::Dataset& dataset,
                                                 const calibrate::RigCheckOptions* options,
                                                 Findings& findings) {
-  const auto dataset =
-      replay::Dataset::open({.path = drive.data, .sequence = drive.sequence, .rig = drive.rig});
-  const replay::Recording& recording = dataset->recording();
+  const replay::Recording& recording = dataset.recording();
   // The notes of 7-Scenes state what its layout leaves open; they are not faults of the data.
   const bool scenes = recording.kind == replay::DatasetKind::kSevenScenes;
   const bool of_layout = scenes || recording.kind == replay::DatasetKind::kKittiTracking;
@@ -73,7 +79,7 @@ std::future<calibrate::RigCheck> checkRecording(const Drive& drive,
   const bool usable = isUsable(of_data), without_imu = of_layout && !recording.calibration.imu;
   std::future<calibrate::RigCheck> vio;
   if (options && usable && !without_imu)
-    vio = std::async(std::launch::async, calibrate::checkRig, *options);
+    vio = std::async(std::launch::async, calibrate::checkRig, std::ref(dataset), *options);
   checkMotionOf(recording, of_data, findings);
   addFindings(of_data, findings);
   if (usable) checkPosesOf(drive, recording, findings);
@@ -109,17 +115,17 @@ void settleUpsideDown(bool vio_agrees, Findings& findings) {
 Findings checkRigBy(const Drive& drive, std::optional<double> seconds) {
   Findings findings;
   calibrate::RigCheckOptions options;
-  options.data = drive.data, options.rig = drive.rig, options.sequence = drive.sequence;
-  options.until_sure = !seconds;
+  options.data = drive.data, options.until_sure = !seconds;
   if (seconds) options.seconds = *seconds;
-  auto vio = checkRecording(drive, &options, findings);
+  const auto dataset = openGrey(drive);
+  auto vio = checkRecording(drive, *dataset, &options, findings);
   if (!vio.valid()) return findings;
   const auto check = vio.get();
   auto judgements = calibrate::judgeRig(check);
   settleUpsideDown(calibrate::worstOf(judgements) == calibrate::Grade::kGood, findings);
   if (check.cameras > 1 && calibrate::isSecondSuspect(check)) {
     options.vio.stereo = false;
-    const auto second = calibrate::judgeSecond(check, calibrate::checkRig(options));
+    const auto second = calibrate::judgeSecond(check, calibrate::checkRig(*dataset, options));
     judgements.insert(judgements.begin(), second.begin(), second.end());
   }
   for (const auto& judgement : judgements) {
@@ -158,7 +164,8 @@ Findings fixRecording(const Drive& given, const std::string& folder) {
         {Verdict::kWarn, std::to_string(left_out) + " images cannot be read and are left out"});
   }
   findings.push_back({Verdict::kOk, "written: " + folder});
-  checkRecording({.data = folder}, nullptr, findings);
+  const Drive copy{.data = folder};
+  checkRecording(copy, *openGrey(copy), nullptr, findings);
   return findings;
 }
 

@@ -55,6 +55,7 @@ std::vector<Run> runsOf(const Frames& frames, const std::vector<ImuSample>& samp
   }
   const auto score = [&](const auto& one) { return one.second.cwiseQuotient(mean).sum(); };
   std::ranges::stable_sort(all, [&](const auto& a, const auto& b) { return score(a) > score(b); });
+  all.erase(all.begin(), all.begin() + static_cast<long>(std::min(all.size(), options.skip)));
   all.resize(std::min(all.size(), options.most));
   std::vector<Run> runs;
   for (const auto& one : all) runs.push_back(one.first);
@@ -114,7 +115,17 @@ TrackWindow windowOf(const Frames& frames, const Run& run, const CameraCalibrati
   return window;
 }
 
+const auto kEarlier = [](const TrackWindow& a, const TrackWindow& b) {
+  return a.times.front() < b.times.front();
+};
+
 }  // namespace
+
+void TrackWindows::add(TrackWindows more) {
+  images += more.images, blank += more.blank;
+  std::ranges::move(more.windows, std::back_inserter(windows));
+  std::ranges::sort(windows, kEarlier);
+}
 
 TrackWindows trackWindows(const replay::Recording& recording, const WindowOptions& options) {
   TrackWindows result;
@@ -145,8 +156,7 @@ TrackWindows trackWindows(const replay::Recording& recording, const WindowOption
       }
     }
   }
-  std::ranges::sort(result.windows,
-                    [](const auto& a, const auto& b) { return a.times.front() < b.times.front(); });
+  std::ranges::sort(result.windows, kEarlier);
   return result;
 }
 
