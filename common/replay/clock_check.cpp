@@ -144,6 +144,26 @@ void checkRate(const Recording& recording, DataFindings& findings) {
                    rate, said)});
 }
 
+/// Both sensors differ from their declared rates by one factor: their common clock does.
+void checkCommonRate(const Recording& recording, const StampList& imu, const StampList& images,
+                     DataFindings& findings) {
+  constexpr double kLeast = 0.02, kAlike = 0.003;
+  const auto of_imu = intervalOf(imu), of_images = intervalOf(images);
+  if (!of_imu || !of_images || !recording.calibration.imu) return;
+  const double imu_hz = recording.calibration.imu->rate_hz,
+               images_hz = recording.calibration.cameras.front().rate_hz;
+  const double slower = *of_imu * 1e-9 * imu_hz, of_camera = *of_images * 1e-9 * images_hz;
+  if (std::abs(slower - 1.0) < kLeast || std::abs(of_camera / slower - 1.0) > kAlike) return;
+  findings.push_back(
+      {StampGrade::kWarning, "clock_rate",
+       fmt::format(
+           "images come at {:.4g} Hz and inertial samples at {:.4g}, both {:.1f} % {} often "
+           "than rate_hz says ({:.4g} and {:.4g}): their clock runs too {}, which changes "
+           "all distances, or both rate_hz are wrong",
+           1e9 / *of_images, 1e9 / *of_imu, 100.0 * std::abs(1.0 / slower - 1.0),
+           slower > 1.0 ? "less" : "more", images_hz, imu_hz, slower > 1.0 ? "fast" : "slow")});
+}
+
 using Kind = ClockChange::Kind;
 
 const char* nameOfSensor(const std::string& sensor) {
@@ -416,6 +436,7 @@ DataFindings checkClocks(const Recording& recording, const DataUse& use) {
   }
   checkShared(recording, findings);
   checkRate(recording, findings);
+  checkCommonRate(recording, imu, images, findings);
   return findings;
 }
 

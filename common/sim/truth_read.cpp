@@ -62,7 +62,8 @@ Eigen::Vector3d vector(const Json& parent, const char* key, const std::string& w
   if (!list.is_array() || list.size() != 3 || !std::ranges::all_of(list, isA<double>)) {
     refuse(where, std::string(key) + " has not 3 numbers");
   }
-  return {list[0], list[1], list[2]};
+  const auto numbers = list.get<std::vector<double>>();
+  return Eigen::Vector3d(numbers.data());
 }
 
 std::vector<TruthKey> keysOf(const Json& list, const std::string& where) {

@@ -45,6 +45,7 @@ class Watched {
       if (const auto* speed = std::get_if<SpeedSample>(&*message)) node_->onSpeed(*speed);
       const auto* frame = std::get_if<Frame>(&*message);
       if (!frame || !frame->data) continue;
+      if (options.cancelled()) break;
       if (!first) first = frame->stamp.time;
       if (toSeconds(frame->stamp.time - *first) > options.seconds) break;
       node_->onFrame(*frame);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,6 +20,7 @@ struct RigCheckOptions {
   std::filesystem::path data;  ///< the drive's name in messages
   double seconds = 60.0;       ///< largest duration of the drive that is used
   bool until_sure = false;     ///< ends when everything is good and vio is certain
+  std::function<bool()> cancelled = [] { return false; };  ///< ends the run; asked at each image
   vio::Config vio = {};
 };
 

@@ -108,6 +108,20 @@ TEST(ClockCheck, AShortJumpAheadOfOneClockIsSaidAndLostImagesAreNot) {
   }
 }
 
+TEST(ClockCheck, AClockOfAnotherRateIsSaidByTheDeclaredRatesOfBothSensors) {
+  const auto warningOf = [](double imu_hz, double images_hz) {
+    auto drive = readWith(kSame, kSame);  // 100 and 10 Hz
+    drive.calibration.imu.emplace().rate_hz = imu_hz;
+    drive.calibration.cameras.emplace_back().rate_hz = images_hz;
+    return finding(drive, DataFinding::Grade::kWarning, "clock_rate");
+  };
+  EXPECT_THAT(warningOf(105.0, 10.5), HasSubstr("both 4.8 % less often than rate_hz says (10.5 and "
+                                                "105): their clock runs too fast"));
+  EXPECT_THAT(warningOf(95.0, 9.5), HasSubstr("5.3 % more often"));
+  EXPECT_EQ(warningOf(105.0, 10.0), "none");
+  EXPECT_EQ(warningOf(101.0, 10.1), "none");
+}
+
 TEST(ClockCheck, ATwentiethOfTheImagesOutsideOfTheSamplesIsTold) {
   const auto warningOf = [](Duration late) {
     const Stamp images = [=](Duration time) { return time + late; };

@@ -42,6 +42,25 @@ TEST(DataCheck, ASoundDriveHasNoFinding) {
   EXPECT_THAT(codesOf(findingsOf("biased", biased)), ElementsAre());
 }
 
+TEST(DataCheck, AnImageThatIsRepeatedWhileTheBodyMovesIsToldWithTheTime) {
+  const auto freeze = [](const fs::path& root, std::size_t first, std::size_t last) {
+    std::vector<fs::path> files;
+    for (const auto& entry : fs::directory_iterator(root / "mav0/cam0/data"))
+      files.push_back(entry.path());
+    std::ranges::sort(files);
+    for (std::size_t i = first; i < last; ++i)
+      fs::copy_file(files[first], files[i], fs::copy_options::overwrite_existing);
+    return findingsIn(root);
+  };
+  const auto root = makeTurningDrive("frozen", {.seconds = 4.0});
+  const auto findings = freeze(root, 23, 50);
+  ASSERT_FALSE(findings.empty());
+  EXPECT_EQ(findings[0].code, "images_frozen");
+  EXPECT_THAT(findings[0].text, HasSubstr("(1.3 s, images 24 to 50) while the gyroscope turns"));
+  EXPECT_THAT(codesOf(freeze(makeTurningDrive("frozen_short", {.seconds = 4.0}), 23, 40)),
+              Not(testing::Contains("images_frozen")));
+}
+
 TEST(DataCheck, ImagesTurnAsTheGyroscopeSays) {
   const auto root = makeTurningDrive("turns");
   const auto recording = Dataset::open({.path = root})->recording();

@@ -76,20 +76,22 @@ void thin(TrackWindow& window) {
 }
 
 TrackWindow windowOf(const Frames& frames, const Run& run, const CameraCalibration& camera) {
+  constexpr std::uint32_t kColumns = 700;
+  const int factor = replay::reductionFor(camera, kColumns);
+  const auto whole = [&](const cv::Point2f& p) {
+    return Eigen::Vector2d((p.x + 0.5) * factor - 0.5, (p.y + 0.5) * factor - 0.5);
+  };
   TrackWindow window;
   tools::FollowedImage before;
   std::vector<cv::Point2f> last;
   std::vector<std::size_t> alive;
   for (std::size_t i = run.first; i < run.second; ++i) {
-    const auto image = replay::monoImageOf(*frames[i]);
-    if (!image || image->cols != static_cast<int>(camera.width) ||
-        image->rows != static_cast<int>(camera.height)) {
-      break;
-    }
+    const auto image = replay::monoImageOf(*frames[i], factor);
+    if (!image || !replay::isOfCamera(*image, factor, camera)) break;
     tools::FollowedImage now(*image);
     if (window.times.empty()) {
       last = tools::cornersOf(now);
-      for (const auto& corner : last) window.tracks.push_back({{corner.x, corner.y}});
+      for (const auto& corner : last) window.tracks.push_back({whole(corner)});
       for (std::size_t k = 0; k < last.size(); ++k) alive.push_back(k);
     } else {
       const auto followed = tools::follow(before, now, last);
@@ -98,7 +100,7 @@ TrackWindow windowOf(const Frames& frames, const Run& run, const CameraCalibrati
       for (std::size_t k = 0; k < last.size(); ++k) {
         if (!followed[k]) continue;
         found.push_back(*followed[k]), still.push_back(alive[k]);
-        window.tracks[alive[k]].emplace_back(followed[k]->x, followed[k]->y);
+        window.tracks[alive[k]].push_back(whole(*followed[k]));
       }
       last = std::move(found), alive = std::move(still);
     }
