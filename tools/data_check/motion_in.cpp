@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "common/base/algorithms/median.h"
+#include "common/replay/data_check.h"
 #include "tools/data_check/image_turn.h"
 #include "tools/data_check/turn_integral.h"
 

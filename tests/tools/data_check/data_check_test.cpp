@@ -52,13 +52,15 @@ TEST(DataCheck, AnImageThatIsRepeatedWhileTheBodyMovesIsToldWithTheTime) {
       fs::copy_file(files[first], files[i], fs::copy_options::overwrite_existing);
     return findingsIn(root);
   };
-  const auto root = makeTurningDrive("frozen", {.seconds = 4.0});
+  TurningDrive drive;
+  drive.seconds = 4.0;
+  const auto root = makeTurningDrive("frozen", drive);
   const auto findings = freeze(root, 23, 50);
   ASSERT_FALSE(findings.empty());
   EXPECT_EQ(findings[0].code, "images_frozen");
   EXPECT_THAT(findings[0].text, HasSubstr("(1.3 s, images 24 to 50) while the gyroscope turns"));
-  EXPECT_THAT(codesOf(freeze(makeTurningDrive("frozen_short", {.seconds = 4.0}), 23, 40)),
-              Not(testing::Contains("images_frozen")));
+  EXPECT_THAT(codesOf(freeze(makeTurningDrive("frozen_short", drive), 23, 40)),
+              testing::Not(testing::Contains("images_frozen")));
 }
 
 TEST(DataCheck, ImagesTurnAsTheGyroscopeSays) {
