@@ -28,6 +28,19 @@ double speedIn(const replay::Recording& recording, TimePoint from, TimePoint to)
   return medianOf(std::move(speeds));
 }
 
+double flowOf(const replay::Recording& recording, const replay::Recording::FrameFile& a,
+              const replay::Recording::FrameFile& b) {
+  const CameraCalibration& calibration = recording.calibration.cameras.front();
+  const auto first = replay::monoImageOf(a), second = replay::monoImageOf(b);
+  if (!first || !second || first->size() != second->size()) return 0.0;
+  std::vector<double> steps;
+  for (const Flow& flow :
+       flowBetween(CameraModel(calibration), FollowedImage(*first), FollowedImage(*second))) {
+    steps.push_back(calibration.fx * flow.step.norm());
+  }
+  return medianOf(std::move(steps));
+}
+
 double flowIn(const replay::Recording& recording, TimePoint from, TimePoint to) {
   std::vector<const replay::Recording::FrameFile*> frames;
   for (const auto& frame : recording.frames) {
@@ -35,17 +48,9 @@ double flowIn(const replay::Recording& recording, TimePoint from, TimePoint to) 
     if (inside && (frame.load || !frame.path.empty())) frames.push_back(&frame);
   }
   if (frames.size() < 4) return 0.0;
-  const CameraModel camera(recording.calibration.cameras.front());
   std::vector<double> flows;
   for (const std::size_t at : {frames.size() / 4, frames.size() / 2, frames.size() * 3 / 4}) {
-    const auto first = replay::monoImageOf(*frames[at - 1]),
-               second = replay::monoImageOf(*frames[at]);
-    if (!first || !second || first->size() != second->size()) continue;
-    std::vector<double> steps;
-    for (const Flow& flow : flowBetween(camera, FollowedImage(*first), FollowedImage(*second))) {
-      steps.push_back(recording.calibration.cameras.front().fx * flow.step.norm());
-    }
-    if (!steps.empty()) flows.push_back(medianOf(std::move(steps)));
+    flows.push_back(flowOf(recording, *frames[at - 1], *frames[at]));
   }
   return medianOf(std::move(flows));
 }

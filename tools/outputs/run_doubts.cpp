@@ -85,6 +85,7 @@ Doubts doubtsOfRun(const RunFacts& facts) {
       {"clock_", "stamps pause or jump"},
       {"imu_covers_part", "images lie outside of the inertial samples"},
       {"images_frozen", "the images stand still"},
+      {"images_repeated", "images are repeated"},
       {"lines_lost", "lines of the recording were left out"},
       {"boxes_beyond", "boxes of other frames were left out"},
       {"poses_", "the poses contradict the drive"}};
