@@ -155,7 +155,7 @@ void checkCommonRate(const Recording& recording, const StampList& imu, const Sta
   const double slower = *of_imu * 1e-9 * imu_hz, of_camera = *of_images * 1e-9 * images_hz;
   if (std::abs(slower - 1.0) < kLeast || std::abs(of_camera / slower - 1.0) > kAlike) return;
   findings.push_back(
-      {StampGrade::kWarning, "clock_rate",
+      {StampGrade::kWarning, "declared_rates",
        fmt::format(
            "images come at {:.4g} Hz and inertial samples at {:.4g}, both {:.1f} % {} often "
            "than rate_hz says ({:.4g} and {:.4g}): their clock runs too {}, which changes "

@@ -28,7 +28,7 @@ inline constexpr char kUpsideDown[] = "images upside down";
 
 /// Checks some images of each camera, the sizes of all files, and all stamps and samples. Codes:
 /// image_unreadable, images_unreadable, images_empty, image_size, image_flat, stamps_equal,
-/// stamps_count, stamps_unit, clocks_apart, clock_rate, imu_covers_part, imu_rate, accel_in_g,
+/// stamps_count, stamps_unit, clocks_apart, declared_rates, imu_covers_part, imu_rate, accel_in_g,
 /// accel_in_mg, accel_in_mm, accel_scale, accel_without_gravity, imu_columns_exchanged, gyro_scale,
 /// images_upside_down.
 DataFindings checkData(const Recording& recording, const DataUse& use);

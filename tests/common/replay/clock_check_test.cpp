@@ -113,7 +113,7 @@ TEST(ClockCheck, AClockOfAnotherRateIsSaidByTheDeclaredRatesOfBothSensors) {
     auto drive = readWith(kSame, kSame);  // 100 and 10 Hz
     drive.calibration.imu.emplace().rate_hz = imu_hz;
     drive.calibration.cameras.emplace_back().rate_hz = images_hz;
-    return finding(drive, DataFinding::Grade::kWarning, "clock_rate");
+    return finding(drive, DataFinding::Grade::kWarning, "declared_rates");
   };
   EXPECT_THAT(warningOf(105.0, 10.5), HasSubstr("both 4.8 % less often than rate_hz says (10.5 and "
                                                 "105): their clock runs too fast"));
