@@ -91,9 +91,10 @@ TEST(Simulate, CarriesOnWhereItWasCutAndEndsWithTheSameBytes) {
 TEST(Simulate, AFolderBelongsToOneProcessAndIsWholeAtTheEnd) {
   const auto options = roomInto(freshFolder("shared"));
   const auto refuses = [&](const std::function<void()>& during) {
+    fs::remove_all(options.out);
     try {
       simulate(options, [&](const SimulateProgress& progress) {
-        if (progress.frame == 3) during();
+        if (progress.frame == 5) during();
       });
     } catch (const StartupError& error) {
       return std::string(error.what());
