@@ -213,12 +213,16 @@ bool simulate(const sim::Scene& scene, const SimulateOptions& options,
   SimulateProgress progress{journal.entries().size(), run.stamps().size(),
                             journal.entries().size()};
   if (progress.resumed > 0) run.resume(journal.entries().back());
-  while (progress.frame < progress.frames) {
-    journal.append(run.draw(progress.frame));
-    ++progress.frame;
-    if (report) report(progress);
+  try {
+    while (progress.frame < progress.frames) {
+      journal.append(run.draw(progress.frame));
+      ++progress.frame;
+      if (report) report(progress);
+    }
+    run.finish();
+  } catch (const std::exception&) {
+    if (lock.holds()) throw;
   }
-  run.finish();
   if (!lock.holds() || !run.isWhole()) {
     throw StartupError(ExitCode::kInputOutput,
                        "{}: the folder, or images in it, were removed while it was written; run it "
