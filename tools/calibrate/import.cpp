@@ -27,6 +27,7 @@ class Import {
     const auto isIt = [&](const fs::path& other) { return fs::equivalent(path, other); };
     if (std::ranges::any_of(read_, isIt)) return;
     const SensorFile file(path);
+    read_.push_back(path);
     if (file.has("cam0") || file.has("imu0")) {
       takeSections(file, path);
     } else if (const auto foreign = sectionsOf(file, path)) {
@@ -125,7 +126,7 @@ class Import {
   void noteKeys(const SensorFile& file) { file.noteUnknownKeys(result_.ignored); }
 
   std::vector<RigidTransform> places_;
-  std::vector<fs::path> read_;  ///< files that another one names
+  std::vector<fs::path> read_;  ///< files that were given, or that another one names
   std::size_t given_ = 0;
   std::vector<bool> in_body_;  ///< one per camera: its file gives the pose in EuRoC's body
   /// In the IMU, which is our body: EuRoC's body, and the IMU that Kalibr's T_cam_imu is of.

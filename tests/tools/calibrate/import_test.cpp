@@ -147,7 +147,8 @@ TEST_F(RigImport, CalibrationsOfVinsAndOrbSlamAreTheNativeRig) {
                                "\"cam0_pinhole.yaml\"\nbody_T_cam0: " +
                                    kMatrix + kVinsNoise + "td: 0.0031\n");
   expectSame(importRig({fusion}).rig, without_imu);
-  expectSame(importRig({fusion.parent_path() / "cam0_pinhole.yaml", fusion}).rig, without_imu);
+  expectSame(importRig({fusion.parent_path() / "cam0_pinhole.yaml", fusion, fusion}).rig,
+             without_imu);
   expectSame(importRig({fusion, file("imu.yaml", kKalibrImu)}).rig, native);
   EXPECT_THAT(importRig({file("orb.yaml", kOrbSlam)}).ignored, testing::IsEmpty());
   EXPECT_THAT(importRig({file("orb.yaml", kOrbSlam + "Camera1.k4: .1\nIMU.Tbc: 1\n")}).ignored,
