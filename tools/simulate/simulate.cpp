@@ -225,8 +225,8 @@ bool simulate(const sim::Scene& scene, const SimulateOptions& options,
   }
   if (!lock.holds() || !run.isWhole()) {
     throw StartupError(ExitCode::kInputOutput,
-                       "{}: the folder, or images in it, were removed while it was written; run it "
-                       "again",
+                       "{}: the folder, or images in it, were removed while it was written; "
+                       "remove it and run it again",
                        options.out.string());
   }
   finishFolder(options.out, journal);
