@@ -152,10 +152,14 @@ void Mapper::learnDrift() {
   }
   DriftScale drift(parameters_.drift_scale, way);
   const bool learned = drift.use(loops, parameters_.loop.view_m);
-  const DriftVariance now = drift.variance(parameters_.drift_scale.quantile);
-  if (learned && !replays_ && now != odometry_variance_) {
-    state_.scaleOdometry(now.over(odometry_variance_), *session_);
-    odometry_variance_ = now;
+  const DriftVariance factor =
+      drift.variance(parameters_.drift_scale.quantile).over(odometry_variance_);
+  constexpr double kChanged = 1e-6;
+  const bool changed =
+      std::abs(factor.plane - 1.0) > kChanged || std::abs(factor.height - 1.0) > kChanged;
+  if (learned && !replays_ && changed) {
+    state_.scaleOdometry(factor, *session_);
+    odometry_variance_ = odometry_variance_.times(factor);  // as Anchor::scale, to the last bit
   }
   const DriftVariance most = drift.variance(parameters_.drift_scale.most);
   widening_ = std::sqrt(most.over(odometry_variance_).plane);

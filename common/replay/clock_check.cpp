@@ -144,6 +144,26 @@ void checkRate(const Recording& recording, DataFindings& findings) {
                    rate, said)});
 }
 
+/// Both sensors differ from their declared rates by one factor: their common clock does.
+void checkCommonRate(const Recording& recording, const StampList& imu, const StampList& images,
+                     DataFindings& findings) {
+  constexpr double kLeast = 0.02, kAlike = 0.003;
+  const auto of_imu = intervalOf(imu), of_images = intervalOf(images);
+  if (!of_imu || !of_images || !recording.calibration.imu) return;
+  const double imu_hz = recording.calibration.imu->rate_hz,
+               images_hz = recording.calibration.cameras.front().rate_hz;
+  const double slower = *of_imu * 1e-9 * imu_hz, of_camera = *of_images * 1e-9 * images_hz;
+  if (std::abs(slower - 1.0) < kLeast || std::abs(of_camera / slower - 1.0) > kAlike) return;
+  findings.push_back(
+      {StampGrade::kWarning, "declared_rates",
+       fmt::format(
+           "images come at {:.4g} Hz and inertial samples at {:.4g}, both {:.1f} % {} often "
+           "than rate_hz says ({:.4g} and {:.4g}): their clock runs too {}, which changes "
+           "all distances, or both rate_hz are wrong",
+           1e9 / *of_images, 1e9 / *of_imu, 100.0 * std::abs(1.0 / slower - 1.0),
+           slower > 1.0 ? "less" : "more", images_hz, imu_hz, slower > 1.0 ? "fast" : "slow")});
+}
+
 using Kind = ClockChange::Kind;
 
 const char* nameOfSensor(const std::string& sensor) {
@@ -223,8 +243,28 @@ std::string secondsText(Duration amount) {
   return fmt::format("{:.10g} s", std::abs(toSeconds(amount)));
 }
 
+Duration stepOf(const ClockChange& change) { return between(change.after, change.before); }
+
+/// A pause that both sensors have.
+bool isOfBoth(const ClockChange& pause, const std::vector<ClockChange>& all) {
+  constexpr Duration kAlike = std::chrono::milliseconds(100);
+  return std::any_of(all.begin(), all.end(), [&](const ClockChange& other) {
+    return other.kind == Kind::kPause && (other.sensor == "imu") != (pause.sensor == "imu") &&
+           std::chrono::abs(between(other.before, pause.before)) < kAlike &&
+           std::chrono::abs(stepOf(other) - stepOf(pause)) < kAlike;
+  });
+}
+
+/// Whether vio, as it is configured by default, starts again after a pause.
+bool endsVio(const ClockChange& pause, const std::vector<ClockChange>& all) {
+  constexpr Duration kBlackout = std::chrono::milliseconds(800), kImuGap = std::chrono::seconds(2);
+  return (pause.sensor == "imu" && stepOf(pause) > kImuGap) ||
+         (isOfBoth(pause, all) && stepOf(pause) > kBlackout);
+}
+
 /// The sentence about `count` changes of a kind, with the place and the amount of the first.
-DataFinding findingOf(const ClockChange& first, std::size_t count, const std::string& places) {
+DataFinding findingOf(const ClockChange& first, std::size_t count, const std::string& places,
+                      bool ends_vio) {
   using Grade = DataFinding::Grade;
   const std::string sensor = nameOfSensor(first.sensor);
   const bool back = first.after < first.before;
@@ -239,8 +279,8 @@ DataFinding findingOf(const ClockChange& first, std::size_t count, const std::st
   if (first.kind == Kind::kPause) {
     return {Grade::kWarning, "clock_paused",
             fmt::format("{}: nothing from {} for {}: the recording paused, or its clock was set "
-                        "ahead; vio begins again behind it",
-                        places, sensor, step)};
+                        "ahead{}",
+                        places, sensor, step, ends_vio ? "; vio starts again after it" : "")};
   }
   if (first.common) {
     return {Grade::kWarning, "clock_set",
@@ -257,8 +297,6 @@ DataFinding findingOf(const ClockChange& first, std::size_t count, const std::st
                                        : ", those of the other sensors show no such step (they "
                                          "come too seldom, or have another clock)")};
 }
-
-Duration stepOf(const ClockChange& change) { return between(change.after, change.before); }
 
 bool isShort(const ClockChange& pause) {
   return stepOf(pause) <= std::max<Duration>(std::chrono::seconds(1), multipleOf(20, pause.usual));
@@ -281,15 +319,10 @@ bool isSetAhead(const Recording& recording, const ClockChange& pause) {
 
 /// Lost samples make short pauses. Others are those of a clock that was set, or of all sensors.
 void dropShortPauses(Recording& recording) {
-  constexpr Duration kAlike = std::chrono::milliseconds(100);
   const std::vector<ClockChange> all = recording.clock_changes;
   std::erase_if(recording.clock_changes, [&](const ClockChange& pause) {
-    if (pause.kind != Kind::kPause || !isShort(pause) || isSetAhead(recording, pause)) return false;
-    return std::none_of(all.begin(), all.end(), [&](const ClockChange& other) {
-      return other.kind == Kind::kPause && (other.sensor == "imu") != (pause.sensor == "imu") &&
-             std::chrono::abs(between(other.before, pause.before)) < kAlike &&
-             std::chrono::abs(stepOf(other) - stepOf(pause)) < kAlike;
-    });
+    return pause.kind == Kind::kPause && isShort(pause) && !isSetAhead(recording, pause) &&
+           !isOfBoth(pause, all);
   });
 }
 
@@ -334,7 +367,10 @@ void checkClockChanges(const Recording& recording, const DataUse& use, DataFindi
       places += (places.empty() ? "" : ", ") + other.place;
     }
     const auto count = std::count_if(first, all.end(), isSame);
-    findings.push_back(findingOf(*first, static_cast<std::size_t>(count), places));
+    const bool ends_vio = std::any_of(first, all.end(), [&](const ClockChange& other) {
+      return isSame(other) && endsVio(other, all);
+    });
+    findings.push_back(findingOf(*first, static_cast<std::size_t>(count), places, ends_vio));
     if (first->kind == Kind::kPause) addSetAhead(recording, *first, findings.back());
   }
 }
@@ -400,6 +436,7 @@ DataFindings checkClocks(const Recording& recording, const DataUse& use) {
   }
   checkShared(recording, findings);
   checkRate(recording, findings);
+  checkCommonRate(recording, imu, images, findings);
   return findings;
 }
 

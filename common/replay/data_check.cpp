@@ -179,6 +179,23 @@ Result<cv::Mat> monoImageOf(const Recording::FrameFile& file, int reduce) {
   return copy;
 }
 
+int reductionFor(const CameraCalibration& camera, std::uint32_t columns) {
+  int factor = 1;
+  while (factor < 8) {
+    const auto next = static_cast<std::uint32_t>(2 * factor);
+    if (camera.width / next < columns || camera.height / next < columns / 2) break;
+    factor *= 2;
+  }
+  return factor;
+}
+
+bool isOfCamera(const cv::Mat& reduced, int factor, const CameraCalibration& camera) {
+  const auto isOf = [&](int px, std::uint32_t of_camera) {
+    return std::abs(px * factor - static_cast<int>(of_camera)) < factor;
+  };
+  return isOf(reduced.cols, camera.width) && isOf(reduced.rows, camera.height);
+}
+
 void refuseFatal(const DataFindings& findings, const std::string& where) {
   std::string text;
   for (const DataFinding& finding : findings) {

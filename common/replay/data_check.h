@@ -28,8 +28,8 @@ inline constexpr char kUpsideDown[] = "images upside down";
 
 /// Checks some images of each camera, the sizes of all files, and all stamps and samples. Codes:
 /// image_unreadable, images_unreadable, images_empty, image_size, image_flat, stamps_equal,
-/// stamps_count, stamps_unit, clocks_apart, imu_covers_part, imu_rate, accel_in_g, accel_in_mg,
-/// accel_in_mm, accel_scale, accel_without_gravity, imu_columns_exchanged, gyro_scale,
+/// stamps_count, stamps_unit, clocks_apart, declared_rates, imu_covers_part, imu_rate, accel_in_g,
+/// accel_in_mg, accel_in_mm, accel_scale, accel_without_gravity, imu_columns_exchanged, gyro_scale,
 /// images_upside_down.
 DataFindings checkData(const Recording& recording, const DataUse& use);
 
@@ -40,6 +40,11 @@ DataFindings checkImuUnits(const std::vector<ImuSample>& samples);
 /// Dataset.
 /// `reduce`: 1, 2, 4 or 8, the factor by which it is smaller.
 Result<cv::Mat> monoImageOf(const Recording::FrameFile& frame, int reduce = 1);
+
+/// The largest factor for monoImageOf that leaves this many columns, and half as many rows.
+int reductionFor(const CameraCalibration& camera, std::uint32_t columns);
+/// Whether a reduced image has the size of the camera's images, as far as it can be known.
+bool isOfCamera(const cv::Mat& reduced, int factor, const CameraCalibration& camera);
 
 /// Throws StartupError(kData) with all fatal findings; does nothing if there are none. The message
 /// begins with `where`.

@@ -97,6 +97,31 @@ Recording readMessages(const DatasetOptions& options) {
   throw StartupError(ExitCode::kData, why);
 }
 
+using Reader = Recording (*)(const DatasetOptions&);
+
+std::optional<Reader> readerOf(const std::filesystem::path& folder) {
+  if (looksLikeEuroc(folder)) return readEuroc;
+  if (looksLikeKittiTracking(folder)) return readKittiTracking;
+  if (looksLikeKittiRaw(folder)) return readKittiRaw;
+  if (looksLikeSevenScenes(folder)) return readSevenScenes;
+  return std::nullopt;
+}
+
+/// Refuses a dataset folder that holds a recording file too.
+[[noreturn]] void refuseBoth(const std::filesystem::path& folder) {
+  std::string file, part;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const std::string name = entry.path().filename();
+    const bool below = entry.is_directory();
+    if (!below && hasMessages(entry.path())) file = name;
+    if (below && (part.empty() || name < part)) part = name;
+  }
+  throw StartupError(ExitCode::kData,
+                     "{} holds two recordings, the folder {} and {}: give that file, or move it "
+                     "away for the folder",
+                     folder.string(), part, file);
+}
+
 Recording readRecording(const DatasetOptions& options) {
   const auto& path = options.path;
   if (!std::filesystem::is_directory(path)) {
@@ -107,11 +132,11 @@ Recording readRecording(const DatasetOptions& options) {
                  "--data takes a folder in EuRoC, KITTI raw, KITTI tracking or 7-Scenes layout, or "
                  "a recording (.mcap; of ROS also .db3 and .bag)");
   }
-  if (looksLikeEuroc(path)) return readEuroc(options);
-  if (looksLikeKittiTracking(path)) return readKittiTracking(options);
-  if (looksLikeKittiRaw(path)) return readKittiRaw(options);
-  if (looksLikeSevenScenes(path)) return readSevenScenes(options);
-  if (hasMessages(path)) return readMessages(options);
+  const auto folder = readerOf(path);
+  const bool messages = hasMessages(path);
+  if (folder && messages) refuseBoth(path);
+  if (folder) return (*folder)(options);
+  if (messages) return readMessages(options);
   throw StartupError(ExitCode::kUnavailable,
                      path.string() +
                          " is no dataset folder that is known: give a folder with "

@@ -129,21 +129,22 @@ struct Looked {
 };
 
 Looked lookAt(const FileList& some, const CameraCalibration& calibration) {
+  constexpr std::uint32_t kColumns = 340;
+  const int factor = reductionFor(calibration, kColumns);
   Looked looked;
   looked.tried = some.size();
   for (const auto* file : some) {
-    const auto image = monoImageOf(*file);
+    const auto image = monoImageOf(*file, factor);
     if (!image) {
       if (looked.unreadable++ > 0) continue;
       looked.first_unreadable = nameIn(*file);
       looked.why = whyUnreadable(*file, image.error().detail);
       continue;
     }
-    const auto width = static_cast<std::uint32_t>(image->cols),
-               height = static_cast<std::uint32_t>(image->rows);
-    if (width != calibration.width || height != calibration.height) {
+    if (!isOfCamera(*image, factor, calibration)) {
       ++looked.other_size;
-      looked.size = fmt::format("{}x{}", width, height);
+      const auto whole = monoImageOf(*file);
+      if (whole) looked.size = fmt::format("{}x{}", whole->cols, whole->rows);
     }
     looked.flat += isFlat(*image) ? 1 : 0;
   }

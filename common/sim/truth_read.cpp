@@ -32,13 +32,22 @@ std::ifstream open(const fs::path& file) {
   return stream;
 }
 
+/// Whether a value has the type of T; the library would also convert booleans and fractions.
+template <class T>
+bool isA(const Json& value) {
+  if (std::same_as<T, bool>) return value.is_boolean();
+  if (std::same_as<T, std::string>) return value.is_string() && value != "";
+  if (std::integral<T>) return value.is_number_integer();
+  return !std::floating_point<T> || value.is_number();
+}
+
 /// A member of a JSON object; `kind` names the required type.
 template <class T>
 T member(const Json& parent, const char* key, const std::string& where, const char* kind) {
   const auto found = parent.find(key);
   if (found == parent.end()) refuse(where, std::string(key) + " is missing");
   try {
-    if (!std::integral<T> || found->is_number_integer() || found->is_boolean()) return *found;
+    if (isA<T>(*found)) return *found;
   } catch (const Json::exception&) {
   }
   refuse(where, std::string(key) + " is not " + kind);
@@ -49,8 +58,11 @@ std::int64_t integer(const Json& parent, const char* key, const std::string& whe
 }
 
 Eigen::Vector3d vector(const Json& parent, const char* key, const std::string& where) {
-  const auto numbers = member<std::vector<double>>(parent, key, where, "3 numbers");
-  if (numbers.size() != 3) refuse(where, std::string(key) + " has not 3 numbers");
+  const Json list = member<Json>(parent, key, where, "3 numbers");
+  if (!list.is_array() || list.size() != 3 || !std::ranges::all_of(list, isA<double>)) {
+    refuse(where, std::string(key) + " has not 3 numbers");
+  }
+  const auto numbers = list.get<std::vector<double>>();
   return Eigen::Vector3d(numbers.data());
 }
 

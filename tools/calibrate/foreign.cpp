@@ -82,6 +82,7 @@ ForeignRig ofVins(const SensorFile& file, const fs::path& path) {
     if (!beside && (name == "cam1" || !file.has("projection_parameters"))) continue;
     const fs::path camera_file = path.parent_path() / file.text((name + "_calib").c_str());
     YAML::Node camera = vinsCamera(beside ? SensorFile(camera_file) : file);
+    if (beside) rig.beside.push_back(camera_file);
     auto place = file.transform(("body_T_" + name).c_str());
     if (!place && name == "cam0") place = vinsPlace(file);
     if (place) put(camera, "T_imu_cam", *place);

@@ -14,6 +14,7 @@ struct ForeignRig {
   YAML::Node sections;             ///< cam0, cam1 and imu0 with the keys of Kalibr
   std::vector<std::string> notes;  ///< for people
   std::vector<std::string> without_effect;
+  std::vector<std::filesystem::path> beside;  ///< other files that were read
 };
 
 /// Converts the file; returns nothing if it is of another program. A camera whose file does not

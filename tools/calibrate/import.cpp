@@ -24,11 +24,15 @@ class Import {
   explicit Import(std::vector<RigidTransform> places) : places_(std::move(places)) {}
 
   void take(const fs::path& path) {
+    const auto isIt = [&](const fs::path& other) { return fs::equivalent(path, other); };
+    if (std::ranges::any_of(read_, isIt)) return;
     const SensorFile file(path);
+    read_.push_back(path);
     if (file.has("cam0") || file.has("imu0")) {
       takeSections(file, path);
     } else if (const auto foreign = sectionsOf(file, path)) {
       append(result_.ignored, foreign->without_effect);
+      read_.insert(read_.end(), foreign->beside.begin(), foreign->beside.end());
       takeSections(SensorFile(path.string(), foreign->sections), path);
       append(result_.found, foreign->notes);
     } else if (file.has("gyroscope_noise_density")) {
@@ -122,6 +126,7 @@ class Import {
   void noteKeys(const SensorFile& file) { file.noteUnknownKeys(result_.ignored); }
 
   std::vector<RigidTransform> places_;
+  std::vector<fs::path> read_;  ///< files that were given, or that another one names
   std::size_t given_ = 0;
   std::vector<bool> in_body_;  ///< one per camera: its file gives the pose in EuRoC's body
   /// In the IMU, which is our body: EuRoC's body, and the IMU that Kalibr's T_cam_imu is of.
@@ -133,7 +138,10 @@ class Import {
 
 ImportedRig importRig(const std::vector<fs::path>& files, const std::vector<RigidTransform>& T_BC) {
   Import import(T_BC);
-  for (const fs::path& file : files) import.take(file);
+  std::vector<fs::path> ordered = files;
+  std::ranges::stable_partition(
+      ordered, [](const fs::path& file) { return SensorFile(file).has("cam0_calib"); });
+  for (const fs::path& file : ordered) import.take(file);
   return import.done();
 }
 

@@ -9,7 +9,6 @@
 #include "common/base/errors.h"
 #include "common/math/chi2.h"
 #include "common/math/so3.h"
-#include "common/replay/dataset.h"
 #include "common/replay/read_ahead.h"
 #include "services/vio/core/state/saved_state.h"
 #include "services/vio/node.h"
@@ -46,6 +45,7 @@ class Watched {
       if (const auto* speed = std::get_if<SpeedSample>(&*message)) node_->onSpeed(*speed);
       const auto* frame = std::get_if<Frame>(&*message);
       if (!frame || !frame->data) continue;
+      if (options.cancelled()) break;
       if (!first) first = frame->stamp.time;
       if (toSeconds(frame->stamp.time - *first) > options.seconds) break;
       node_->onFrame(*frame);
@@ -222,10 +222,10 @@ RigCheck RigWatch::check(const ReasonCounts& of_vio) const {
 }
 
 bool isSurelyGood(const RigCheck& check) {
-  constexpr double kHalf = 0.5;  // a bad value is then at least five deviations off
-  const bool sure = check.believed && check.sigma.head<3>().norm() < kHalf * kTurned.good &&
-                    check.sigma.segment<3>(3).norm() < kHalf * kShifted_m.good &&
-                    check.sigma[6] < kHalf * kLater_s.good;
+  constexpr double kFifth = 0.2;  // a bad value is then at least five deviations off
+  const bool sure = check.believed && check.sigma.head<3>().norm() < kFifth * kTurned.bad &&
+                    check.sigma.segment<3>(3).norm() < kFifth * kShifted_m.bad &&
+                    check.sigma[6] < kFifth * kLater_s.bad;
   return sure && worstOf(judgeRig(check)) == Grade::kGood;
 }
 
@@ -235,19 +235,16 @@ double innovationRatio(const std::vector<vio::Innovation>& innovations) {
   return medianOf(std::move(values));
 }
 
-RigCheck checkRig(const RigCheckOptions& options) {
-  replay::DatasetOptions wanted;
-  wanted.path = options.data, wanted.rig = options.rig, wanted.sequence = options.sequence;
-  wanted.encoding = wanted.second_encoding = ImageEncoding::kMono8;
-  const auto dataset = replay::Dataset::open(wanted);
-  if (!dataset->calibration().imu) {
+RigCheck checkRig(replay::Dataset& drive, const RigCheckOptions& options) {
+  if (!drive.calibration().imu) {
     throw StartupError(ExitCode::kUnavailable,
                        options.data.string() +
                            " has no inertial samples, by which alone a rig can "
                            "be judged; record imu along with the images");
   }
-  Watched watched(options, *dataset);
-  watched.run(*dataset, options);
+  drive.seek(0);
+  Watched watched(options, drive);
+  watched.run(drive, options);
   RigCheck check = watched.check();
   if (check.frames == 0 || watched.samples() == 0) {
     throw StartupError(ExitCode::kUnavailable,

@@ -3,10 +3,12 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "common/replay/dataset.h"
 #include "services/vio/config.h"
 #include "services/vio/core/update/point_updates.h"
 #include "services/vio/node.h"
@@ -15,10 +17,10 @@
 namespace perdure::calibrate {
 
 struct RigCheckOptions {
-  std::filesystem::path data, rig;  ///< rig: empty for the drive's own calibration
-  std::string sequence = {};        ///< sequence of KITTI tracking or 7-Scenes
-  double seconds = 60.0;            ///< largest duration of the drive that is used
-  bool until_sure = false;          ///< ends when everything is good and vio is certain
+  std::filesystem::path data;  ///< the drive's name in messages
+  double seconds = 60.0;       ///< largest duration of the drive that is used
+  bool until_sure = false;     ///< ends when everything is good and vio is certain
+  std::function<bool()> cancelled = [] { return false; };  ///< ends the run; asked at each image
   vio::Config vio = {};
 };
 
@@ -40,8 +42,8 @@ struct RigCheck {
   double gyro_bias_change = 0.0, accel_bias_change = 0.0;  ///< changes in the second half
 };
 
-/// Whether everything is good and vio is certain: standard deviations are at most half of the good
-/// limits, so that a bad value would be detected.
+/// Whether everything is good and vio is certain: standard deviations are at most a fifth of the
+/// bad limits, so that a bad value would be detected.
 bool isSurelyGood(const RigCheck& check);
 
 /// Observes a running vio.
@@ -66,8 +68,9 @@ class RigWatch {
   std::vector<Eigen::Vector3d> gyro_, accel_;
 };
 
-/// Throws StartupError if the recording or the rig cannot be read, or has no images or samples.
-RigCheck checkRig(const RigCheckOptions& options);
+/// Reads the drive, from its start on, as grey images. Throws StartupError if it has no images or
+/// samples that can be read.
+RigCheck checkRig(replay::Dataset& drive, const RigCheckOptions& options);
 
 /// Median of the normalised innovations squared, divided by its expected value (1 for a consistent
 /// filter).

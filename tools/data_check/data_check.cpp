@@ -9,6 +9,7 @@
 #include "tools/data_check/axes_check.h"
 #include "tools/data_check/axis_changes.h"
 #include "tools/data_check/clock_shift.h"
+#include "tools/data_check/frozen_images.h"
 #include "tools/data_check/motion_check.h"
 #include "tools/data_check/pair_check.h"
 #include "tools/data_check/poses/pose_check.h"
@@ -84,6 +85,7 @@ replay::DataFindings checkDrive(const replay::Recording& recording, const replay
     if (shift) *fatal = shiftFinding(*shift, recording.calibration.cameras.front()).front();
     return findings;
   }
+  add("repeated images", findings, [&] { return checkFrozenImages(recording); });
   add("what belongs together", findings, [&] { return checkPairs(recording); });
   add("the two cameras", findings, [&] { return checkStereo(recording); });
   if (use.imu) add("turning", findings, [&] { return checkTurns(recording); });

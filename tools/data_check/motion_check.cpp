@@ -76,21 +76,14 @@ CameraCalibration reduced(CameraCalibration camera, int factor) {
 
 std::vector<Turn> turnsOfRun(const Frames& frames, const CameraCalibration& calibration,
                              const Run& run) {
-  constexpr std::uint32_t kEnough = 600;  // px of width
-  int factor = 1;
-  while (factor < 8 && calibration.width / static_cast<std::uint32_t>(2 * factor) >= kEnough) {
-    factor *= 2;
-  }
+  constexpr std::uint32_t kColumns = 340;
+  const int factor = replay::reductionFor(calibration, kColumns);
   const CameraModel camera(reduced(calibration, factor));
   std::vector<Turn> turns;
   FollowedImage before;
   for (std::size_t i = run.first; i <= run.second; ++i) {
     const auto image = replay::monoImageOf(*frames[i], factor);
-    const auto isOf = [&](int reduced_px, std::uint32_t px) {
-      return std::abs(reduced_px * factor - static_cast<int>(px)) < factor;
-    };
-    const bool fits =
-        image && isOf(image->cols, calibration.width) && isOf(image->rows, calibration.height);
+    const bool fits = image && replay::isOfCamera(*image, factor, calibration);
     FollowedImage now = fits ? FollowedImage(*image) : FollowedImage();
     if (i > run.first && !before.empty() && !now.empty()) {
       const auto flow = flowBetween(camera, before, now);

@@ -105,6 +105,7 @@ replay::DatasetOptions Demo::dataOptions() const {
 void Demo::openData() {
   replay::DatasetOptions with_images = dataOptions();
   with_images.decode = true;
+  std::cerr << "demo: checks " << options_.data << '\n';
   const auto dataset = replay::Dataset::open(with_images);
   frames_ = dataset->frameCount();
   findings_ = checkDrive(dataset->recording(), {});

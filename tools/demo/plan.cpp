@@ -95,6 +95,7 @@ ServicePlan planOf(const std::string& name, const DemoOptions& options, const De
 DemoFolders prepareFolders(const DemoOptions& options) {
   DemoFolders folders;
   folders.out = fs::absolute(options.out);
+  folders.lock = std::make_unique<FolderLock>(folders.out);
   folders.run = folders.out / "run";
   folders.state = folders.run / "state";
   std::error_code error;

@@ -5,9 +5,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "common/base/files/folder_lock.h"
 
 namespace perdure::tools {
 
@@ -43,6 +46,7 @@ struct ServicePlan {
 /// Folders of a demo run, all absolute.
 struct DemoFolders {
   std::filesystem::path out, run, state;
+  std::unique_ptr<FolderLock> lock;  ///< of OUT
 };
 
 /// Creates OUT and empties OUT/run, which belongs to this command. Throws StartupError.

@@ -31,7 +31,7 @@ void removeAll(const fs::path& path) {
 }  // namespace
 
 ResultsFolder::ResultsFolder(fs::path out)
-    : out_(std::move(out)), written_(out_), is_new_(!fs::exists(out_)) {
+    : out_(std::move(out)), written_(out_), is_new_(!fs::exists(out_)), lock_(out_) {
   removeAll(out_ / "unfinished");
   if (holdsARun(out_)) written_ = out_ / "unfinished";
 }
@@ -43,6 +43,11 @@ ResultsFolder::~ResultsFolder() {
 }
 
 void ResultsFolder::keep() {
+  if (!lock_.holds()) {
+    throw StartupError(ExitCode::kInputOutput,
+                       "{}: the folder was removed or replaced during the run; run it again",
+                       out_.string());
+  }
   if (written_ == out_) return;
   std::error_code error;
   std::vector<fs::path> names;

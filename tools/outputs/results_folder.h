@@ -3,14 +3,18 @@
 
 #include <filesystem>
 
+#include "common/base/files/folder_lock.h"
+
 namespace perdure::tools {
 
 /// A folder without a run is written directly. Otherwise files are written to a subfolder
 /// `unfinished`, and replace the earlier ones when the run has ended. If the run fails, the
-/// subfolder is removed, and so is a new folder that stayed empty.
+/// subfolder is removed, and so is a new folder that stayed empty. Other processes cannot write to
+/// the folder meanwhile.
 class ResultsFolder {
  public:
-  /// Throws StartupError(kUnavailable) if the remains of a killed run cannot be removed.
+  /// Throws StartupError(kUnavailable) if another process writes to the folder, or if the remains
+  /// of a killed run cannot be removed.
   explicit ResultsFolder(std::filesystem::path out);
   ResultsFolder(const ResultsFolder&) = delete;
   ResultsFolder& operator=(const ResultsFolder&) = delete;
@@ -24,6 +28,7 @@ class ResultsFolder {
  private:
   std::filesystem::path out_, written_;
   bool is_new_;
+  FolderLock lock_;
 };
 
 }  // namespace perdure::tools

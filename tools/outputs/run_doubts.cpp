@@ -83,7 +83,10 @@ Doubts doubtsOfRun(const RunFacts& facts) {
       {"clock_set", "stamps were changed"},
       {"clock_rate", "the clocks of camera and IMU run at different rates"},
       {"clock_", "stamps pause or jump"},
+      {"declared_rates", "stamps come at other rates than declared"},
       {"imu_covers_part", "images lie outside of the inertial samples"},
+      {"images_frozen", "the images stand still"},
+      {"images_repeated", "images are repeated"},
       {"lines_lost", "lines of the recording were left out"},
       {"boxes_beyond", "boxes of other frames were left out"},
       {"poses_", "the poses contradict the drive"}};

@@ -1,6 +1,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -88,10 +89,14 @@ void addOptions(CLI::App& app, PipelineOptions& options) {
   app.add_flag("--quiet", options.quiet, "No progress");
 }
 
-/// Updates one line on a terminal; otherwise prints a line every 50 frames.
+/// Updates one line on a terminal; otherwise prints a line every 50 frames, or every two seconds.
 void showProgress(const Pipeline& pipeline, const PipelineCounts& counts) {
+  using Clock = std::chrono::steady_clock;
+  static Clock::time_point shown = Clock::now();
   const bool terminal = isatty(STDERR_FILENO) != 0;
-  if (!terminal && counts.frames % 50 != 0) return;
+  const bool late = Clock::now() - shown > std::chrono::seconds(2);
+  if (!terminal && !late && counts.frames % 50 != 0) return;
+  shown = Clock::now();
   std::fprintf(stderr, "%sframe %llu of %zu, %llu poses, %llu detections, %zu objects%s",
                terminal ? "\r" : "", static_cast<unsigned long long>(counts.frames),
                pipeline.dataset().frameCount(), static_cast<unsigned long long>(counts.odometry),
@@ -123,6 +128,7 @@ void printReasons(const Pipeline& pipeline) {
 /// Writes to options.out. If there are no results, returns the error to report after the outputs
 /// are stored.
 std::optional<StartupError> runInto(const PipelineOptions& options, const std::string& named) {
+  if (!options.quiet) std::fprintf(stderr, "checks %s\n", options.data.c_str());
   Pipeline pipeline(options);
   printDoubts(pipeline.dataset().recording(), pipeline.findings());
   pipeline.run([&](const PipelineCounts& counts) {

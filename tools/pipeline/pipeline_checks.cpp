@@ -96,8 +96,7 @@ void Pipeline::checkDetectionFile() {
       std::minmax_element(numbers.begin(), numbers.end(),
                           [](const auto& a, const auto& b) { return a.second < b.second; });
   const std::uint64_t first = first_frame->second, last = last_frame->second;
-  const CameraCalibration& camera = dataset_->calibration().cameras.front();
-  if (detection_file_->hasSizes(camera.width, camera.height)) {
+  if (detection_file_->hasSizes()) {
     refuse(options_.detections +
            ": x2 and y2 are the same in nearly all rows while x1 moves, so they are a width and a "
            "height; write x1 + width and y1 + height in their place");
@@ -115,6 +114,9 @@ void Pipeline::checkDetectionFile() {
         fmt::format("{}: its frames are 1 … {}, those of the drive 0 … {}: they count from 1; "
                     "subtract 1 from each",
                     options_.detections, last + 1, last));
+  }
+  if (const std::string why = detection_file_->whyOutside(); !why.empty()) {
+    refuse(options_.detections + ": " + why);
   }
   const auto warn = [&](const char* code, const std::string& text) {
     findings_.push_back(

@@ -277,6 +277,9 @@ void Pipeline::openDetections(const PipelineOptions& options) {
     file.class_name = options.class_name;
     file.box_origin = options.box_origin;
     file.numbers = dataset_->recording().numbers;
+    for (const auto& camera : dataset_->calibration().cameras) {
+      if (file.width == 0.0) file.width = camera.width, file.height = camera.height;
+    }
     if (options.outline_boxes) file.boxes = BoxExtent::kOutline;
     if (options.cuboid_boxes) file.boxes = BoxExtent::kCuboid;
     detection_file_ = replay::DetectionFile::read(file, aliases);

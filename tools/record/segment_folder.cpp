@@ -1,14 +1,11 @@
 #include "tools/record/segment_folder.h"
 
-#include <fcntl.h>
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <linux/magic.h>
-#include <sys/file.h>
 #include <sys/resource.h>
 #include <sys/statfs.h>
 #include <sys/statvfs.h>
-#include <unistd.h>
 
 #include <charconv>
 
@@ -35,26 +32,8 @@ std::uint64_t numberOf(const fs::path& file) {
 }  // namespace
 
 SegmentFolder::SegmentFolder(const fs::path& folder, std::uint64_t quota, std::uint64_t keep_free)
-    : folder_(folder), quota_(quota), keep_free_(keep_free) {
-  std::error_code error;
-  fs::create_directories(folder_, error);
-  if (!fs::is_directory(folder_)) {
-    throw StartupError(ExitCode::kUnavailable, folder_.string() + " cannot be made (" +
-                                                   error.message() +
-                                                   "); --out names a folder for recordings");
-  }
-  lock();
+    : folder_(folder), lock_(folder), quota_(quota), keep_free_(keep_free) {
   findFiles();
-}
-
-void SegmentFolder::lock() {
-  lock_ = Descriptor(open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  const bool taken = lock_.open() && access(folder_.c_str(), W_OK) == 0;
-  if (taken && flock(lock_.get(), LOCK_EX | LOCK_NB) == 0) return;
-  throw StartupError(ExitCode::kUnavailable,
-                     folder_.string() + (taken ? " is another recorder's; give each its own --out"
-                                               : " cannot be written; give --out another folder, "
-                                                 "or this user the right to write"));
 }
 
 void SegmentFolder::findFiles() {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "common/base/process/descriptor.h"
+#include "common/base/files/folder_lock.h"
 
 namespace perdure::tools {
 
@@ -37,12 +37,11 @@ class SegmentFolder {
   const std::vector<std::string>& repaired() const { return repaired_; }
 
  private:
-  void lock();
   void findFiles();
 
   std::filesystem::path folder_;
+  FolderLock lock_;
   std::uint64_t quota_, keep_free_, removed_ = 0, next_number_ = 1;
-  Descriptor lock_;
   std::map<std::filesystem::path, std::uint64_t> sizes_;  // order by name is order by time
   std::vector<std::string> repaired_;
 };

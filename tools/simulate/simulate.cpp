@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/errors.h"
+#include "common/base/files/folder_lock.h"
 #include "common/sim/truth_files.h"
 #include "tools/base/files.h"
 #include "tools/simulate/journal.h"
@@ -48,13 +49,8 @@ nlohmann::json descriptionOf(const SimulateOptions& options, const sim::Scene& s
 }
 
 /// Refuses a folder with other content than this run.
-void claim(const fs::path& out, const std::string& description) {
-  std::error_code error;
-  fs::create_directories(out, error);
-  if (!fs::is_directory(out)) {
-    throw StartupError(ExitCode::kUnavailable,
-                       out.string() + " cannot be made; give --out a folder that can be written");
-  }
+FolderLock claim(const fs::path& out, const std::string& description) {
+  FolderLock lock(out);
   const fs::path file = out / kSceneFile;
   if (!fs::exists(file) && !fs::is_empty(out)) {
     throw StartupError(ExitCode::kUsage, out.string() +
@@ -68,6 +64,7 @@ void claim(const fs::path& out, const std::string& description) {
                            "folder, or remove this one");
   }
   if (!fs::exists(file)) writeWhole(file, description);
+  return lock;
 }
 
 /// The cameras of a run, their pictures, and their progress.
@@ -112,6 +109,12 @@ class Run {
       if (options_.images && !fs::exists(fileOf(i, frame))) return false;
     }
     return frame < stamps_.size();
+  }
+  bool isWhole() const {
+    for (std::size_t frame = 0; frame < stamps_.size(); ++frame) {
+      if (!isWhole(frame)) return false;
+    }
+    return true;
   }
   void resume(const JournalEntry& last) {
     for (std::size_t i = 0; i < cameras(); ++i) sensors_[i].setState(last.sensors[i]);
@@ -199,21 +202,33 @@ bool simulate(const SimulateOptions& options,
 bool simulate(const sim::Scene& scene, const SimulateOptions& options,
               const std::function<void(const SimulateProgress&)>& report) {
   require(options);
-  claim(options.out, descriptionOf(options, scene).dump(2) + "\n");
-  if (fs::exists(options.out / sim::kVisibilityTruthFile)) return false;
+  const FolderLock lock = claim(options.out, descriptionOf(options, scene).dump(2) + "\n");
   Run run(options, scene);
+  const fs::path last = options.out / sim::kVisibilityTruthFile;
+  if (fs::exists(last) && run.isWhole()) return false;
+  fs::remove(last);  // images were removed since
   run.writeLists();
   Journal journal(options.out / kJournalFile, run.cameras(),
                   [&](std::size_t frame) { return run.isWhole(frame); });
   SimulateProgress progress{journal.entries().size(), run.stamps().size(),
                             journal.entries().size()};
   if (progress.resumed > 0) run.resume(journal.entries().back());
-  while (progress.frame < progress.frames) {
-    journal.append(run.draw(progress.frame));
-    ++progress.frame;
-    if (report) report(progress);
+  try {
+    while (progress.frame < progress.frames) {
+      journal.append(run.draw(progress.frame));
+      ++progress.frame;
+      if (report) report(progress);
+    }
+    run.finish();
+  } catch (const std::exception&) {
+    if (lock.holds()) throw;
   }
-  run.finish();
+  if (!lock.holds() || !run.isWhole()) {
+    throw StartupError(ExitCode::kInputOutput,
+                       "{}: the folder, or images in it, were removed while it was written; "
+                       "remove it and run it again",
+                       options.out.string());
+  }
   finishFolder(options.out, journal);
   return true;
 }

@@ -2,13 +2,12 @@
 
 #include <fmt/format.h>
 #include <sqlite3.h>
-#include <sys/stat.h>
 
 #include <array>
 #include <fstream>
-#include <sstream>
 
 #include "common/base/files/access.h"
+#include "common/base/files/folder_lock.h"
 
 namespace perdure {
 namespace {
@@ -39,23 +38,6 @@ bool holds(const fs::path& file, const char* suffix) {
   std::error_code missing;
   const auto size = fs::file_size(file.string() + suffix, missing);
   return !missing && size > 0;
-}
-
-/// " (process 12)": the one that locks the file, if the kernel names it. The file is not opened,
-/// because closing it would release locks of this process.
-std::string lockerOf(const fs::path& file) {
-  struct stat status {};
-  if (stat(file.c_str(), &status) != 0) return {};
-  const std::string inode = fmt::format(":{} ", status.st_ino);
-  std::ifstream locks("/proc/locks");
-  for (std::string line; std::getline(locks, line);) {
-    std::string number, kind, advisory, mode, process;
-    std::istringstream(line) >> number >> kind >> advisory >> mode >> process;
-    if (line.find(inode) != std::string::npos && mode == "WRITE" && process != "0") {
-      return " (process " + process + ")";
-    }
-  }
-  return {};
 }
 
 std::string whyNot(const fs::path& file, int code, const char* of_sqlite) {

@@ -48,9 +48,11 @@ std::string similarTo(const std::filesystem::path& path) {
 
 std::vector<TextLine> readLines(const std::filesystem::path& path, std::string_view mend) {
   std::ifstream file(path);
-  if (!file || std::filesystem::is_directory(path)) {
+  const bool folder = std::filesystem::is_directory(path);
+  if (!file || folder) {
     refuseUnreadable(path);
-    throw StartupError(ExitCode::kUnavailable, "{} cannot be read; {}", path.c_str(), mend);
+    throw StartupError(ExitCode::kUnavailable, "{} {}; {}", path.c_str(),
+                       folder ? "is a folder" : "cannot be read", mend);
   }
   std::vector<TextLine> lines;
   std::string text;

@@ -94,9 +94,10 @@ TEST(ClockCheck, AShortJumpAheadOfOneClockIsSaidAndLostImagesAreNot) {
                         "clock_set_alone"),
                 HasSubstr("images.csv, message 101: the stamps of the images jump ahead by"))
         << ms;
-    EXPECT_THAT(finding(readWith(setBy(milliseconds(ms)), setBy(milliseconds(ms))),
-                        DataFinding::Grade::kWarning, "clock_paused"),
-                HasSubstr("nothing from the IMU"));
+    const auto pause = finding(readWith(setBy(milliseconds(ms)), setBy(milliseconds(ms))),
+                               DataFinding::Grade::kWarning, "clock_paused");
+    EXPECT_THAT(pause, HasSubstr("nothing from the IMU"));
+    EXPECT_EQ(pause.ends_with("; vio starts again after it"), ms > 800) << pause;
     const auto lost = [&](Duration time) {  // repeated stamps are left out
       const bool inside = time >= seconds(110) && time < seconds(110) + milliseconds(ms);
       return inside ? seconds(110) - milliseconds(100) : time;
@@ -105,6 +106,20 @@ TEST(ClockCheck, AShortJumpAheadOfOneClockIsSaidAndLostImagesAreNot) {
     EXPECT_EQ(finding(drive, DataFinding::Grade::kWarning, "clock_set_alone"), "none");
     EXPECT_EQ(finding(drive, DataFinding::Grade::kWarning, "clock_paused"), "none");
   }
+}
+
+TEST(ClockCheck, AClockOfAnotherRateIsSaidByTheDeclaredRatesOfBothSensors) {
+  const auto warningOf = [](double imu_hz, double images_hz) {
+    auto drive = readWith(kSame, kSame);  // 100 and 10 Hz
+    drive.calibration.imu.emplace().rate_hz = imu_hz;
+    drive.calibration.cameras.emplace_back().rate_hz = images_hz;
+    return finding(drive, DataFinding::Grade::kWarning, "declared_rates");
+  };
+  EXPECT_THAT(warningOf(105.0, 10.5), HasSubstr("both 4.8 % less often than rate_hz says (10.5 and "
+                                                "105): their clock runs too fast"));
+  EXPECT_THAT(warningOf(95.0, 9.5), HasSubstr("5.3 % more often"));
+  EXPECT_EQ(warningOf(105.0, 10.0), "none");
+  EXPECT_EQ(warningOf(101.0, 10.1), "none");
 }
 
 TEST(ClockCheck, ATwentiethOfTheImagesOutsideOfTheSamplesIsTold) {

@@ -178,6 +178,14 @@ TEST(ForeignFolder, AHeadThatNamesAccelerationsFirstIsBelieved) {
   EXPECT_EQ(dataset->recording().imu[0].gyro, Eigen::Vector3d(0.1, 0.2, 0.3));
 }
 
+TEST(ForeignFolder, ARecordingBesideTheSensorsIsAnotherDrive) {
+  const auto root = tinyEuroc("beside");
+  writeText(root / "b.db3", "");
+  EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = root}); }),
+              HasSubstr("holds two recordings, the folder mav0 and b.db3"));
+  EXPECT_EQ(startupErrorOf([&] { Dataset::open({.path = root / "mav0"}); }), "");
+}
+
 TEST(ForeignFolder, ASlashBehindMav0ChangesNothing) { expectAll(tinyEuroc("slash") / "mav0/"); }
 
 TEST(ForeignFolder, ARigStandsForMissingSensorFiles) {

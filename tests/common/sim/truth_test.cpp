@@ -165,6 +165,11 @@ TEST_F(TruthFolder, WhoseObjectsAreWrongSaysWhichAndWhat) {
   EXPECT_THAT(complaintOf("[4,2,1.5]", "[4,0,1.5]"), HasSubstr("objects[0]: size is not above 0"));
   EXPECT_THAT(complaintOf("[4,2,1.5]", "[4,2]"), HasSubstr("size has not 3 numbers"));
   EXPECT_THAT(complaintOf("\"class\":\"car\"", "\"class\":7"), HasSubstr("class is not a name"));
+  EXPECT_THAT(complaintOf("\"class\":\"car\"", "\"class\":\"\""), HasSubstr("class is not a name"));
+  EXPECT_THAT(complaintOf("\"moves\":false", "\"moves\":0"), HasSubstr("is not true or false"));
+  EXPECT_THAT(complaintOf("\"yaw\":0", "\"yaw\":true"), HasSubstr("yaw is not a number"));
+  EXPECT_THAT(complaintOf("[4,2,1.5]", "[4,true,1.5]"), HasSubstr("size has not 3 numbers"));
+  EXPECT_THAT(complaintOf("\"id\":1", "\"id\":true"), HasSubstr("id is not an integer"));
   EXPECT_THAT(complaintOf("\"id\":1", "\"id\":0"), HasSubstr("id is not above 0"));
   EXPECT_THAT(complaintOf("\"id\":1", "\"id\":1.5"), HasSubstr("id is not an integer"));
   EXPECT_THAT(complaintOf("\"id\":1", "\"id\":18446744073709551615"),

@@ -147,6 +147,8 @@ TEST_F(RigImport, CalibrationsOfVinsAndOrbSlamAreTheNativeRig) {
                                "\"cam0_pinhole.yaml\"\nbody_T_cam0: " +
                                    kMatrix + kVinsNoise + "td: 0.0031\n");
   expectSame(importRig({fusion}).rig, without_imu);
+  expectSame(importRig({fusion.parent_path() / "cam0_pinhole.yaml", fusion, fusion}).rig,
+             without_imu);
   expectSame(importRig({fusion, file("imu.yaml", kKalibrImu)}).rig, native);
   EXPECT_THAT(importRig({file("orb.yaml", kOrbSlam)}).ignored, testing::IsEmpty());
   EXPECT_THAT(importRig({file("orb.yaml", kOrbSlam + "Camera1.k4: .1\nIMU.Tbc: 1\n")}).ignored,
@@ -252,8 +254,9 @@ TEST_F(RigImport, FilesOfOtherProgramsAreNamedAsARig) {
   EXPECT_THAT(why("basalt.json", basalt()), AllOf(HasSubstr("of Basalt"), HasSubstr(imports)));
   EXPECT_THAT(why("imu.yaml", kKalibrImu), AllOf(HasSubstr("an IMU's alone"), HasSubstr(imports)));
   EXPECT_THAT(why("ost.yaml", kCameraInfo), AllOf(HasSubstr("camera_info"), HasSubstr(imports)));
-  EXPECT_THAT(why("sai.json", "{\"cameras\": [{\"focalLengthX\": 500}]}"),
-              AllOf(HasSubstr("of Spectacular AI or OKVIS (not imported)"), Not(HasSubstr(imports))));
+  EXPECT_THAT(
+      why("sai.json", "{\"cameras\": [{\"focalLengthX\": 500}]}"),
+      AllOf(HasSubstr("of Spectacular AI or OKVIS (not imported)"), Not(HasSubstr(imports))));
   EXPECT_THAT(why("board.yaml", "target_type: aprilgrid\n"),
               HasSubstr("Kalibr's description of a"));
   EXPECT_THAT(why("other.yaml", "speed: 3\n"),

@@ -32,9 +32,12 @@ class RigCheckRun : public testing::Test {
   }
   static void TearDownTestSuite() { fs::remove_all(folder_); }
 
-  static RigCheck checkOf(const Calibration& rig) {
+  static RigCheck checkOf(const Calibration& rig, bool until_sure = false) {
     std::ofstream(folder_ / "rig.yaml") << replay::rigText(rig, "");
-    return checkRig({.data = folder_ / "drive", .rig = folder_ / "rig.yaml"});
+    const auto drive = replay::Dataset::open({.path = folder_ / "drive",
+                                              .encoding = ImageEncoding::kMono8,
+                                              .rig = folder_ / "rig.yaml"});
+    return checkRig(*drive, {.data = folder_ / "drive", .until_sure = until_sure});
   }
 
   inline static fs::path folder_;
@@ -49,10 +52,7 @@ TEST_F(RigCheckRun, ARightRigIsGood) {
 TEST_F(RigCheckRun, EndsEarlyOnlyWhereAllIsGood) {
   Calibration rig = rig_;
   rig.cameras[0].time_offset_s = 0.012;
-  std::ofstream(folder_ / "rig.yaml") << replay::rigText(rig, "");
-  const RigCheck late =
-      checkRig({.data = folder_ / "drive", .rig = folder_ / "rig.yaml", .until_sure = true});
-  EXPECT_EQ(late.frames, 300U);
+  EXPECT_EQ(checkOf(rig, true).frames, 300U);
 }
 
 TEST_F(RigCheckRun, ATurnedCameraIsFoundByHowFar) {

@@ -42,6 +42,31 @@ TEST(DataCheck, ASoundDriveHasNoFinding) {
   EXPECT_THAT(codesOf(findingsOf("biased", biased)), ElementsAre());
 }
 
+TEST(DataCheck, AnImageThatIsRepeatedWhileTheBodyMovesIsToldWithTheTime) {
+  const auto freeze = [](const fs::path& root, std::size_t first, std::size_t last) {
+    std::vector<fs::path> files;
+    for (const auto& entry : fs::directory_iterator(root / "mav0/cam0/data"))
+      files.push_back(entry.path());
+    std::ranges::sort(files);
+    for (std::size_t i = first + 1; i < last; ++i)
+      fs::copy_file(files[first], files[i], fs::copy_options::overwrite_existing);
+    return findingsIn(root);
+  };
+  TurningDrive drive;
+  drive.seconds = 4.0;
+  const auto root = makeTurningDrive("frozen", drive);
+  const auto findings = freeze(root, 23, 50);
+  ASSERT_FALSE(findings.empty());
+  EXPECT_EQ(findings[0].code, "images_frozen");
+  EXPECT_THAT(findings[0].text, HasSubstr("(1.3 s, images 24 to 50) while the gyroscope turns"));
+  EXPECT_THAT(codesOf(freeze(makeTurningDrive("frozen_short", drive), 23, 32)),
+              testing::Not(testing::Contains("images_frozen")));
+  auto twice = Dataset::open({.path = makeTurningDrive("twice", drive)})->recording();
+  for (std::size_t i = 0; i + 1 < twice.frames.size(); i += 2)
+    twice.frames[i + 1].path = twice.frames[i].path;
+  EXPECT_THAT(codesOf(checkDrive(twice, {})), testing::Contains("images_repeated"));
+}
+
 TEST(DataCheck, ImagesTurnAsTheGyroscopeSays) {
   const auto root = makeTurningDrive("turns");
   const auto recording = Dataset::open({.path = root})->recording();
@@ -79,8 +104,8 @@ TEST(DataCheck, ImagesThatStandStillAreNoMatterOfUnits) {
   auto recording = Dataset::open({.path = makeTurningDrive("frozen")})->recording();
   for (auto& frame : recording.frames) frame.path = recording.frames.front().path;
   auto findings = checkDrive(recording, {});
-  ASSERT_THAT(codesOf(findings), ElementsAre("images_still"));
-  EXPECT_THAT(findings[0].text, HasSubstr("stand still or come again"));
+  ASSERT_THAT(codesOf(findings), ElementsAre("images_frozen", "images_still"));
+  EXPECT_THAT(findings[1].text, HasSubstr("stand still or come again"));
   // An exception: a rate of turn that no carried device reaches.
   for (auto& sample : recording.imu) sample.gyro *= 180.0 / M_PI;
   findings = checkDrive(recording, {});

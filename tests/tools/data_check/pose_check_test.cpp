@@ -321,6 +321,14 @@ TEST(PoseCheck, PosesOfACameraAreToldByTheirDirectionOfMotion) {
   }
 }
 
+TEST(PoseCheck, PosesOfACameraOnAShortStraightWayAreToldByTheAccelerometer) {
+  Way way = wayOf({0.0, 0.0, 0.0});
+  EXPECT_THAT(codesIn(findingsOf(way, way.poses)), ElementsAre());
+  const auto findings = findingsOf(way, ofCamera(way.poses));
+  ASSERT_THAT(codesIn(findings), ElementsAre("poses_of_camera"));
+  EXPECT_EQ(findings[0].grade, DataFinding::Grade::kFatal);
+}
+
 TEST(PoseCheck, PosesThatStandStillWhileTheBodyMovesAreToldWithTheTime) {
   const Poses sound = eachOf(phone().poses, 10);
   for (const std::size_t last : {sound.size(), std::size_t{230}}) {

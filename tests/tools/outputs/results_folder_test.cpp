@@ -1,15 +1,20 @@
 #include "tools/outputs/results_folder.h"
 
-#include <gtest/gtest.h>
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <sstream>
 #include <string>
 
+#include "common/base/errors.h"
+
 namespace perdure::tools {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::HasSubstr;
 
 void writeTo(const fs::path& file, const std::string& text) {
   fs::create_directories(file.parent_path());
@@ -43,16 +48,27 @@ TEST(ResultsFolder, AnEmptyOneIsWrittenDirectly) {
   {
     ResultsFolder results(out);
     EXPECT_EQ(results.folder(), out);
-    EXPECT_FALSE(fs::exists(out)) << "nothing is made before there is something to write";
+    try {
+      const ResultsFolder second(out);
+      FAIL() << "two runs in one folder";
+    } catch (const StartupError& error) {
+      EXPECT_THAT(error.what(),
+                  HasSubstr(fmt::format("another process (process {}) writes", getpid())));
+    }
     writeTo(out / "events.jsonl", "of a run that fails");
   }
   EXPECT_TRUE(fs::exists(out / "events.jsonl"));
   const fs::path other = folderOf("results_never");
-  {
-    const ResultsFolder results(other);
-    fs::create_directories(other);
-  }
+  { const ResultsFolder results(other); }
   EXPECT_FALSE(fs::exists(other)) << "it was new and stayed empty";
+}
+
+TEST(ResultsFolder, OneThatWasReplacedDuringTheRunIsAFailure) {
+  const fs::path out = folderOf("results_replaced");
+  ResultsFolder results(out);
+  fs::rename(out, out.string() + "_old");
+  fs::create_directories(out);
+  EXPECT_THROW(results.keep(), StartupError);
 }
 
 TEST(ResultsFolder, AnEarlierRunStaysWhereTheNewOneFails) {

@@ -85,9 +85,15 @@ class Damage {
                               " of " + file.parent_path().filename().string();
     std::string what;
     switch (below(6)) {
-      case 0: all.erase(begin, end), what = "lost: "; break;
-      case 1: all.resize(first + 1), what = "cut behind: "; break;
-      case 2: std::shuffle(begin, end, random_), what = "shuffled: "; break;
+      case 0:
+        all.erase(begin, end), what = "lost: ";
+        break;
+      case 1:
+        all.resize(first + 1), what = "cut behind: ";
+        break;
+      case 2:
+        std::shuffle(begin, end, random_), what = "shuffled: ";
+        break;
       case 3: {
         const Lines copy(begin, end);
         all.insert(all.end(), copy.begin(), copy.end()), what = "copied: ";
@@ -97,7 +103,8 @@ class Damage {
         for (auto line = begin; line != end; ++line) line->resize(below(line->size()) + 1);
         what = "shortened: ";
         break;
-      default: std::rotate(all.begin() + 1, begin, all.end()), what = "rotated: ";
+      default:
+        std::rotate(all.begin() + 1, begin, all.end()), what = "rotated: ";
     }
     write(file, all);
     return what + where;
@@ -129,7 +136,7 @@ class Damage {
       of += std::string(" ") + sensor;
       change(mav0_ / sensor / "data.csv", kind, by, share);
     }
-    return std::array{"moved by ", "set by ",   "in µs, ", "faster, ",
+    return std::array{"moved by ", "set by ",   "in µs, ",      "faster, ",
                       "jitter, ",  "wrapped, ", "lost digits, "}[kind] +
            std::to_string(by) + " ns at " + std::to_string(share) + of;
   }
@@ -182,10 +189,24 @@ Outcome outcomeOf(const fs::path& drive) {
   return outcome;
 }
 
+/// Gives poses the numbers of the sound drive's frames if most of the times are still the same:
+/// after a lost line all frames have other numbers.
+Poses numberedAs(const Poses& sound, const Poses& poses) {
+  std::map<TimePoint, std::uint64_t> numbers;
+  for (const auto& [frame, pose] : sound) numbers[pose.time] = frame;
+  Poses numbered;
+  for (const auto& [frame, pose] : poses) {
+    const auto number = numbers.find(pose.time);
+    if (number != numbers.end()) numbered[number->second] = pose;
+  }
+  return 2 * numbered.size() > poses.size() ? numbered : poses;
+}
+
 /// The error of the steps of half a second, as a share of their length; or the share of the frames
 /// that have no pose, if it is larger.
-double errorOf(const Poses& poses, const Poses& sound) {
+double errorOf(const Poses& damaged, const Poses& sound) {
   constexpr std::uint64_t kStep = 10;
+  const Poses poses = numberedAs(sound, damaged);
   double error = 0.0, length = 0.0, missing = 0.0;
   for (const auto& [frame, from] : sound) {
     missing += poses.contains(frame) ? 0.0 : 1.0;

@@ -161,7 +161,7 @@ TEST(SegmentFolder, HasOneRecorderAtATime) {
     const SegmentFolder second(place.file("rec"), kNoLimit, kNoLimit);
     FAIL() << "two recorders in one folder";
   } catch (const StartupError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("is another recorder's; give each its own --out"));
+    EXPECT_THAT(error.what(), HasSubstr("writes to this folder; give --out another one"));
   }
 }
 

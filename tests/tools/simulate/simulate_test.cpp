@@ -2,7 +2,7 @@
 // input.
 #include "tools/simulate/simulate.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <filesystem>
 #include <fstream>
@@ -17,6 +17,7 @@ namespace perdure::tools {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::HasSubstr;
 
 fs::path freshFolder(const std::string& name) {
   const fs::path folder = fs::path(testing::TempDir()) / ("perdure_simulate_" + name);
@@ -82,6 +83,34 @@ TEST(Simulate, CarriesOnWhereItWasCutAndEndsWithTheSameBytes) {
   EXPECT_EQ(resumed, 2U);
   expectSameFolders(whole.out, cut.out);
   EXPECT_FALSE(simulate(cut, {})) << "it is complete";
+  fs::remove(cut.out / "mav0/cam0/data/1000200000000.png");
+  EXPECT_TRUE(simulate(cut, {})) << "an image is missing";
+  expectSameFolders(whole.out, cut.out);
+}
+
+TEST(Simulate, AFolderBelongsToOneProcessAndIsWholeAtTheEnd) {
+  const auto options = roomInto(freshFolder("shared"));
+  const auto refuses = [&](const std::function<void()>& during) {
+    fs::remove_all(options.out);
+    try {
+      simulate(options, [&](const SimulateProgress& progress) {
+        if (progress.frame == 5) during();
+      });
+    } catch (const StartupError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(refuses([&] { simulate(options, {}); }), HasSubstr("another process (process"));
+  EXPECT_THAT(refuses([&] {
+                while (!fs::remove(options.out / "mav0/cam0/data/1000000000000.png")) continue;
+              }),
+              HasSubstr("were removed while it was written"));
+  EXPECT_THAT(refuses([&] {
+                fs::remove_all(options.out);
+                simulate(options, {});
+              }),
+              HasSubstr("were removed while it was written"));
 }
 
 TEST(Simulate, WritesAFolderThatTheDatasetReaderReads) {

@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstdio>
 #include <future>
 
@@ -30,6 +31,14 @@ void addFindings(const replay::DataFindings& of_data, Findings& findings) {
   }
 }
 
+std::unique_ptr<replay::Dataset> openGrey(const Drive& drive) {
+  return replay::Dataset::open({.path = drive.data,
+                                .sequence = drive.sequence,
+                                .encoding = ImageEncoding::kMono8,
+                                .second_encoding = ImageEncoding::kMono8,
+                                .rig = drive.rig});
+}
+
 void checkPosesOf(const Drive& drive, const replay::Recording& recording, Findings& findings) {
   if (drive.poses.empty()) return;
   const auto of_poses = checkPoses(recording, replay::PoseFile::read(drive.poses), {});
@@ -53,14 +62,8 @@ void checkMotionOf(const replay::Recording& recording, replay::DataFindings& of_
   findings.push_back({Verdict::kOk, check.basis});
 }
 
-/// Starts vio beside the checks of the motion, if `options` are given. Returns nothing if the rig
-/// cannot be judged by the recording.
-std::future<calibrate::RigCheck> checkRecording(const Drive& drive,
-                                                const calibrate::RigCheckOptions* options,
-                                                Findings& findings) {
-  const auto dataset =
-      replay::Dataset::open({.path = drive.data, .sequence = drive.sequence, .rig = drive.rig});
-  const replay::Recording& recording = dataset->recording();
+/// Returns whether the rig can be judged by the recording.
+bool checkRecording(const Drive& drive, const replay::Recording& recording, Findings& findings) {
   // The notes of 7-Scenes state what its layout leaves open; they are not faults of the data.
   const bool scenes = recording.kind == replay::DatasetKind::kSevenScenes;
   const bool of_layout = scenes || recording.kind == replay::DatasetKind::kKittiTracking;
@@ -72,9 +75,6 @@ std::future<calibrate::RigCheck> checkRecording(const Drive& drive,
     findings.push_back({Verdict::kOk, "stamps, units, images and axes agree"});
   }
   const bool usable = isUsable(of_data), without_imu = of_layout && !recording.calibration.imu;
-  std::future<calibrate::RigCheck> vio;
-  if (options && usable && !without_imu)
-    vio = std::async(std::launch::async, calibrate::checkRig, *options);
   checkMotionOf(recording, of_data, findings);
   addFindings(of_data, findings);
   if (usable) checkPosesOf(drive, recording, findings);
@@ -86,8 +86,30 @@ std::future<calibrate::RigCheck> checkRecording(const Drive& drive,
                      scenes ? "7-Scenes" : "KITTI tracking",
                      scenes ? "truth takes the poses" : "takes a file of poses")});
   }
-  return vio;
+  return usable && !without_imu;
 }
+
+/// Runs vio in another thread; it ends early if its result is not wanted.
+class RunningVio {
+ public:
+  RunningVio(const Drive& drive, replay::Dataset& dataset, calibrate::RigCheckOptions options) {
+    // Only one thread may read images inside a recording file.
+    const auto& frames = dataset.recording().frames;
+    if (!frames.empty() && frames.front().load) own_ = openGrey(drive);
+    options.cancelled = [this] { return cancelled_.load(); };
+    result_ = std::async(std::launch::async, calibrate::checkRig, std::ref(own_ ? *own_ : dataset),
+                         options);
+  }
+  ~RunningVio() { cancelled_ = true; }
+  RunningVio(const RunningVio&) = delete;
+  RunningVio& operator=(const RunningVio&) = delete;
+  calibrate::RigCheck get() { return result_.get(); }
+
+ private:
+  std::unique_ptr<replay::Dataset> own_;
+  std::atomic<bool> cancelled_ = false;
+  std::future<calibrate::RigCheck> result_;  ///< its destructor waits
+};
 
 void showProgress(std::size_t done, std::size_t all) {
   constexpr std::size_t kEvery = 50;
@@ -110,17 +132,17 @@ void settleUpsideDown(bool vio_agrees, Findings& findings) {
 Findings checkRigBy(const Drive& drive, std::optional<double> seconds) {
   Findings findings;
   calibrate::RigCheckOptions options;
-  options.data = drive.data, options.rig = drive.rig, options.sequence = drive.sequence;
-  options.until_sure = !seconds;
+  options.data = drive.data, options.until_sure = !seconds;
   if (seconds) options.seconds = *seconds;
-  auto vio = checkRecording(drive, &options, findings);
-  if (!vio.valid()) return findings;
+  const auto dataset = openGrey(drive);
+  RunningVio vio(drive, *dataset, options);
+  if (!checkRecording(drive, dataset->recording(), findings)) return findings;
   const auto check = vio.get();
   auto judgements = calibrate::judgeRig(check);
   settleUpsideDown(calibrate::worstOf(judgements) == calibrate::Grade::kGood, findings);
   if (check.cameras > 1 && calibrate::isSecondSuspect(check)) {
     options.vio.stereo = false;
-    const auto second = calibrate::judgeSecond(check, calibrate::checkRig(options));
+    const auto second = calibrate::judgeSecond(check, calibrate::checkRig(*dataset, options));
     judgements.insert(judgements.begin(), second.begin(), second.end());
   }
   for (const auto& judgement : judgements) {
@@ -159,7 +181,8 @@ Findings fixRecording(const Drive& given, const std::string& folder) {
         {Verdict::kWarn, std::to_string(left_out) + " images cannot be read and are left out"});
   }
   findings.push_back({Verdict::kOk, "written: " + folder});
-  checkRecording({.data = folder}, nullptr, findings);
+  const Drive copy{.data = folder};
+  checkRecording(copy, openGrey(copy)->recording(), findings);
   return findings;
 }
 

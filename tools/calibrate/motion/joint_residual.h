@@ -86,16 +86,28 @@ Unknowns<T> unknownsOf(const JointState& state, const Own& own) {
   return u;
 }
 
+/// R v. Casting R to dual numbers would take several times as long.
+template <class T>
+Vec3<T> rotated(const Eigen::Matrix3d& R, const Vec3<T>& v) {
+  const auto row = [&](int i) { return R(i, 0) * v.x() + R(i, 1) * v.y() + R(i, 2) * v.z(); };
+  return {row(0), row(1), row(2)};
+}
+
+template <class T>
+Vec3<T> scaled(const Eigen::Vector3d& v, const T& factor) {
+  return {v.x() * factor, v.y() * factor, v.z() * factor};
+}
+
 /// Body at the exposure of a pixel. The time may change by a small offset.
 template <class T>
 struct BodyAt {
-  Eigen::Quaterniond q;
-  Vec3<T> turn;      ///< small rotation on the right of q
+  Eigen::Matrix3d R;
+  Vec3<T> turn;      ///< small rotation on the right of R
   Vec3<T> position;  ///< position in the window's frame
 
-  Vec3<T> toWindow(const Vec3<T>& v) const { return q.cast<T>() * Vec3<T>(v + turn.cross(v)); }
+  Vec3<T> toWindow(const Vec3<T>& v) const { return rotated<T>(R, v + turn.cross(v)); }
   Vec3<T> fromWindow(const Vec3<T>& v) const {
-    const Vec3<T> still = q.conjugate().cast<T>() * v;
+    const Vec3<T> still = rotated<T>(R.transpose(), v);
     return still - turn.cross(still);
   }
 };
@@ -112,9 +124,9 @@ BodyAt<T> bodyAt(const InertialPath& path, double stamp_s, const Eigen::Vector2d
   const InertialState inertial = path.at(t);
   const T dt = u.later + share * u.readout, at = T(t) + dt;
   BodyAt<T> body;
-  body.q = inertial.q;
-  body.turn = inertial.rate.cast<T>() * dt - inertial.by_bias.cast<T>() * u.bias;
-  body.position = inertial.position.cast<T>() + inertial.velocity.cast<T>() * dt + u.velocity * at +
+  body.R = inertial.q.toRotationMatrix();
+  body.turn = scaled(inertial.rate, dt) - rotated<T>(inertial.by_bias, u.bias);
+  body.position = inertial.position.cast<T>() + scaled(inertial.velocity, dt) + u.velocity * at +
                   u.gravity * (at * at * 0.5);
   return body;
 }
@@ -146,14 +158,14 @@ void forResiduals(const Window& window, std::size_t k, const InertialPath& path,
   const auto ray = rayOf<T>(lens, track.front(), u);
   if (!ray) return;
   const T rho = variable<T>(window.inverse[k], kShared);
-  const Eigen::Quaternion<T> q_BC = state.camera.T_BC.q.template cast<T>();
-  const Vec3<T> in_body = q_BC * Vec3<T>(*ray + u.turn.cross(*ray)) + rho * u.place;
+  const Eigen::Matrix3d R_BC = state.camera.T_BC.R(), R_CB = R_BC.transpose();
+  const Vec3<T> in_body = rotated<T>(R_BC, *ray + u.turn.cross(*ray)) + rho * u.place;
   const BodyAt<T> first = bodyAt<T>(path, stampOf(0), track.front(), state, u);
   const Vec3<T> in_window = first.toWindow(in_body) + rho * first.position;
   for (std::size_t i = 1; i < track.size(); ++i) {
     const BodyAt<T> body = bodyAt<T>(path, stampOf(i), track[i], state, u);
-    const Vec3<T> there = q_BC.conjugate() *
-                          Vec3<T>(body.fromWindow(in_window - rho * body.position) - rho * u.place);
+    const Vec3<T> there =
+        rotated<T>(R_CB, body.fromWindow(in_window - rho * body.position) - rho * u.place);
     const Vec3<T> seen = there - u.turn.cross(there);
     if (!(seen.z() > T(1e-2))) continue;
     each(Eigen::Matrix<T, 2, 1>(track[i].cast<T>() - projectPoint<T>(state.camera.distortion,

@@ -63,19 +63,40 @@ replay::DataFindings judge(const CameraCalibration& given, const JointEstimate& 
 
 }  // namespace
 
+namespace {
+
+/// Whether the deviations are at most `share` of those with which the motion judges.
+bool isSure(const JointEstimate& joint, double share) {
+  constexpr double kSureShare = 0.01, kSure_s = 0.004, kResidual_px = 2.0, kInliers = 0.6;
+  return joint.sigma[kFocal] < share * kSureShare && joint.sigma[kLater] < share * kSure_s &&
+         joint.residual_px < kResidual_px && joint.inliers >= kInliers;
+}
+
+}  // namespace
+
 MotionCheck checkMotion(const replay::Recording& recording) {
   constexpr std::size_t kWindows = 12, kFewest = 6;
-  constexpr double kSureShare = 0.01, kSure_s = 0.004, kResidual_px = 2.0, kInliers = 0.6;
   const CameraCalibration& given = recording.calibration.cameras.front();
   if (given.distortion == DistortionModel::kRational) {
     return {{}, "the motion is not compared with a lens of eight coefficients"};
   }
-  const TrackWindows tracks = trackWindows(recording, {.most = kWindows});
-  if (tracks.windows.size() < kFewest) {
-    return {{}, "too few images with corners to judge focal length, time offset and readout"};
-  }
   const JointOptions options{{given, Eigen::Vector3d::Zero()}, narrowPriors(given), 10};
-  const JointEstimate joint = estimateJointly(tracks.windows, recording.imu, options);
+  TrackWindows tracks = trackWindows(recording, {.most = kFewest});
+  JointEstimate joint;
+  const auto estimate = [&] {
+    const bool enough = tracks.windows.size() >= kFewest;
+    if (enough) joint = estimateJointly(tracks.windows, recording.imu, options);
+    return enough;
+  };
+  // Half of the windows is enough if they find nothing and are twice as certain as is necessary,
+  // or if they are so uncertain that others cannot change that.
+  const bool first = estimate(), sure = first && isSure(joint, 0.5) && judge(given, joint).empty();
+  if (!sure && (!first || isSure(joint, 2.0))) {
+    tracks.add(trackWindows(recording, {.most = kWindows - kFewest, .skip = kFewest}));
+    if (!estimate()) {
+      return {{}, "too few images with corners to judge focal length, time offset and readout"};
+    }
+  }
   const JointVector& s = joint.sigma;
   const CameraCalibration& found = joint.state.camera;
   const std::string shown = fmt::format(
@@ -83,8 +104,7 @@ MotionCheck checkMotion(const replay::Recording& recording) {
       "ms, readout {:.1f} ± {:.1f} ms",
       tracks.images, joint.windows, found.fx, 100.0 * s[kFocal], 1e3 * found.time_offset_s,
       1e3 * s[kLater], 1e3 * found.readout_s, 1e3 * s[kReadout]);
-  if (!(s[kFocal] < kSureShare) || !(s[kLater] < kSure_s) || !(joint.residual_px < kResidual_px) ||
-      joint.inliers < kInliers) {
+  if (!isSure(joint, 1.0)) {
     return {{}, "the motion is too little to judge the lens and the stamps (" + shown + ")"};
   }
   return {judge(given, joint), "the motion judges the lens and the stamps by " + shown};

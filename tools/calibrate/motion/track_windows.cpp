@@ -55,6 +55,7 @@ std::vector<Run> runsOf(const Frames& frames, const std::vector<ImuSample>& samp
   }
   const auto score = [&](const auto& one) { return one.second.cwiseQuotient(mean).sum(); };
   std::ranges::stable_sort(all, [&](const auto& a, const auto& b) { return score(a) > score(b); });
+  all.erase(all.begin(), all.begin() + static_cast<long>(std::min(all.size(), options.skip)));
   all.resize(std::min(all.size(), options.most));
   std::vector<Run> runs;
   for (const auto& one : all) runs.push_back(one.first);
@@ -75,20 +76,22 @@ void thin(TrackWindow& window) {
 }
 
 TrackWindow windowOf(const Frames& frames, const Run& run, const CameraCalibration& camera) {
+  constexpr std::uint32_t kColumns = 700;
+  const int factor = replay::reductionFor(camera, kColumns);
+  const auto whole = [&](const cv::Point2f& p) {
+    return Eigen::Vector2d((p.x + 0.5) * factor - 0.5, (p.y + 0.5) * factor - 0.5);
+  };
   TrackWindow window;
   tools::FollowedImage before;
   std::vector<cv::Point2f> last;
   std::vector<std::size_t> alive;
   for (std::size_t i = run.first; i < run.second; ++i) {
-    const auto image = replay::monoImageOf(*frames[i]);
-    if (!image || image->cols != static_cast<int>(camera.width) ||
-        image->rows != static_cast<int>(camera.height)) {
-      break;
-    }
+    const auto image = replay::monoImageOf(*frames[i], factor);
+    if (!image || !replay::isOfCamera(*image, factor, camera)) break;
     tools::FollowedImage now(*image);
     if (window.times.empty()) {
       last = tools::cornersOf(now);
-      for (const auto& corner : last) window.tracks.push_back({{corner.x, corner.y}});
+      for (const auto& corner : last) window.tracks.push_back({whole(corner)});
       for (std::size_t k = 0; k < last.size(); ++k) alive.push_back(k);
     } else {
       const auto followed = tools::follow(before, now, last);
@@ -97,7 +100,7 @@ TrackWindow windowOf(const Frames& frames, const Run& run, const CameraCalibrati
       for (std::size_t k = 0; k < last.size(); ++k) {
         if (!followed[k]) continue;
         found.push_back(*followed[k]), still.push_back(alive[k]);
-        window.tracks[alive[k]].emplace_back(followed[k]->x, followed[k]->y);
+        window.tracks[alive[k]].push_back(whole(*followed[k]));
       }
       last = std::move(found), alive = std::move(still);
     }
@@ -114,7 +117,17 @@ TrackWindow windowOf(const Frames& frames, const Run& run, const CameraCalibrati
   return window;
 }
 
+const auto kEarlier = [](const TrackWindow& a, const TrackWindow& b) {
+  return a.times.front() < b.times.front();
+};
+
 }  // namespace
+
+void TrackWindows::add(TrackWindows more) {
+  images += more.images, blank += more.blank;
+  std::ranges::move(more.windows, std::back_inserter(windows));
+  std::ranges::sort(windows, kEarlier);
+}
 
 TrackWindows trackWindows(const replay::Recording& recording, const WindowOptions& options) {
   TrackWindows result;
@@ -145,8 +158,7 @@ TrackWindows trackWindows(const replay::Recording& recording, const WindowOption
       }
     }
   }
-  std::ranges::sort(result.windows,
-                    [](const auto& a, const auto& b) { return a.times.front() < b.times.front(); });
+  std::ranges::sort(result.windows, kEarlier);
   return result;
 }
 

@@ -18,6 +18,7 @@ struct TrackWindow {
 
 struct WindowOptions {
   std::size_t most = 40;  ///< largest number of windows
+  std::size_t skip = 0;   ///< windows with larger rotations that are left out
   double seconds = 0.7;   ///< length of a window, at least three images; shorter ones do not
                           ///< separate slow translation from rotation
   double until_s = 1e9;   ///< since the first image; later images are not used
@@ -27,6 +28,8 @@ struct TrackWindows {
   std::vector<TrackWindow> windows;  ///< sorted by time
   std::size_t images = 0;            ///< images that were read
   std::size_t blank = 0;             ///< windows without enough corners, or unreadable
+
+  void add(TrackWindows more);
 };
 
 /// Windows of cam0, distributed over the rotation about all axes. Images of another size than the

@@ -67,7 +67,7 @@ replay::DataFindings judgePoseTimes(const replay::PoseFile& file,
 replay::DataFindings judgePoseJumps(const std::vector<replay::StampedPose>& poses);
 
 /// Positions in a different world frame than the orientations. Codes: poses_other_position_axes,
-/// poses_in_degrees.
+/// poses_of_camera, poses_in_degrees.
 replay::DataFindings judgePoseAxes(const std::vector<replay::StampedPose>& poses,
                                    const replay::Recording& recording);
 

@@ -6,10 +6,8 @@
 #include <cmath>
 #include <optional>
 
-#include "common/base/algorithms/median.h"
-#include "tools/data_check/image_turn.h"
+#include "tools/data_check/motion_in.h"
 #include "tools/data_check/poses/pose_check.h"
-#include "tools/data_check/turn_integral.h"
 
 namespace perdure::tools {
 namespace {
@@ -61,49 +59,6 @@ std::optional<Still> longestStill(const Poses& poses) {
     longest = Still{from, i};
   }
   return longest;
-}
-
-/// RMS of the gyroscope's turning in steps of 0.3 s, without its mean.
-double turningIn(const replay::Recording& recording, TimePoint from, TimePoint to) {
-  if (recording.imu.size() < 2) return 0.0;
-  constexpr Duration kStep = std::chrono::milliseconds(300);
-  const TurnIntegral gyro(recording.imu);
-  std::vector<Eigen::Vector3d> turns;
-  for (TimePoint time = from; time + kStep <= to; time += kStep) {
-    if (gyro.covers(time, time + kStep)) turns.push_back(gyro.between(time, time + kStep));
-  }
-  return turns.size() < 3 ? 0.0 : TurnPairs(turns, turns).turning();
-}
-
-double speedIn(const replay::Recording& recording, TimePoint from, TimePoint to) {
-  std::vector<double> speeds;
-  for (const SpeedSample& sample : recording.speed) {
-    if (sample.time >= from && sample.time <= to) speeds.push_back(std::abs(sample.speed));
-  }
-  return medianOf(std::move(speeds));
-}
-
-/// Median flow in px of image pairs at three places; the background of a camera at rest has none.
-double flowIn(const replay::Recording& recording, TimePoint from, TimePoint to) {
-  std::vector<const replay::Recording::FrameFile*> frames;
-  for (const auto& frame : recording.frames) {
-    const bool inside = frame.camera == 0 && frame.time >= from && frame.time <= to;
-    if (inside && (frame.load || !frame.path.empty())) frames.push_back(&frame);
-  }
-  if (frames.size() < 4) return 0.0;
-  const CameraModel camera(recording.calibration.cameras.front());
-  std::vector<double> flows;
-  for (const std::size_t at : {frames.size() / 4, frames.size() / 2, frames.size() * 3 / 4}) {
-    const auto first = replay::monoImageOf(*frames[at - 1]),
-               second = replay::monoImageOf(*frames[at]);
-    if (!first || !second || first->size() != second->size()) continue;
-    std::vector<double> steps;
-    for (const Flow& flow : flowBetween(camera, FollowedImage(*first), FollowedImage(*second))) {
-      steps.push_back(recording.calibration.cameras.front().fx * flow.step.norm());
-    }
-    if (!steps.empty()) flows.push_back(medianOf(std::move(steps)));
-  }
-  return medianOf(std::move(flows));
 }
 
 }  // namespace

@@ -22,6 +22,13 @@ using replay::StampedPose;
 using Grade = DataFinding::Grade;
 using Poses = std::vector<StampedPose>;
 
+/// Poses of the first camera as those of the body.
+Poses ofBody(Poses poses, const replay::Recording& recording) {
+  const RigidTransform T_CB = recording.calibration.cameras.front().T_BC.inverse();
+  for (StampedPose& pose : poses) pose.T_WB = pose.T_WB * T_CB;
+  return poses;
+}
+
 double secondsBetween(const StampedPose& from, const StampedPose& to) {
   return toSeconds(to.time - from.time);
 }
@@ -198,9 +205,9 @@ Inversion howInverted(const Poses& poses, const replay::Recording& recording, bo
   for (std::size_t i = 0; i < poses.size(); ++i) {
     inverse[i].T_WB = poses[i].T_WB.inverse();
     conjugate[i].T_WB.q = poses[i].T_WB.q.conjugate();
-    if (!of_camera || recording.calibration.cameras.empty()) continue;
-    const RigidTransform T_CB = recording.calibration.cameras.front().T_BC.inverse();
-    inverse[i].T_WB = inverse[i].T_WB * T_CB, conjugate[i].T_WB = conjugate[i].T_WB * T_CB;
+  }
+  if (of_camera && !recording.calibration.cameras.empty()) {
+    inverse = ofBody(inverse, recording), conjugate = ofBody(conjugate, recording);
   }
   const auto common = [&](const Poses& some) {
     const auto scale = bestScale(some, recording);
@@ -274,6 +281,15 @@ DataFindings judgePoseAxes(const Poses& poses, const replay::Recording& recordin
   const auto given = bestScale(poses, recording);
   if (auto finding = degrees(poses, recording, given)) return {*finding};
   if (given && given->common > kSound) return {};
+  const double as_given = given ? given->common : 0.0;
+  const auto as_camera = bestScale(ofBody(poses, recording), recording);
+  if (as_camera && as_camera->common > std::max(kCommon, as_given + kMore)) {
+    return {{Grade::kFatal, "poses_of_camera",
+             fmt::format("the poses accelerate as those of the camera ({:.0f} % in common with the "
+                         "accelerometer; as those of the body {:.0f} %): give --odometry-of "
+                         "camera, or T_WB, which is T_WC times the inverse of T_BS",
+                         100.0 * as_camera->common, 100.0 * as_given)}};
+  }
   const TurnIntegral gyro(recording.imu);
   const auto all = allSignedAxes();
   std::vector<double> common;
@@ -287,7 +303,6 @@ DataFindings judgePoseAxes(const Poses& poses, const replay::Recording& recordin
     if (most <= best) continue;
     best = most, steps = pushes.size(), common = of_these;
   }
-  const double as_given = given ? given->common : 0.0;
   if (best < kCommon || best < as_given + kMore) return {};
   std::vector<SignedAxes> likely;
   for (std::size_t i = 0; i < all.size(); ++i) {

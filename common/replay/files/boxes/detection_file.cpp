@@ -77,12 +77,36 @@ Columns headerlessColumns(const TextLine& line) {
   return columns;
 }
 
+/// Refuses lines of numbers from 0 to 1 behind one or two whole ones.
+void refuseShareLines(const std::filesystem::path& file, const std::vector<TextLine>& lines) {
+  if (lines.empty()) return;
+  const char separator = separatorOf(lines.front().text);
+  bool fraction = false;
+  for (const TextLine& line : lines) {
+    const auto v = parseNumbers(split(line.text, separator));
+    if (!v || v->size() < 5) return;
+    for (std::size_t i = v->size() > 6 ? 2 : 1; i < v->size(); ++i) {
+      if ((*v)[i] < 0.0 || (*v)[i] > 1.0) return;
+      fraction = fraction || ((*v)[i] > 0.0 && (*v)[i] < 1.0);
+    }
+  }
+  if (!fraction) return;
+  throw StartupError(
+      ExitCode::kData,
+      "{}: its lines have no header and numbers from 0 to 1, which are shares of the image, as in "
+      "YOLO's label files (class, x and y of the centre, width, height); write a header "
+      "frame,class,x1,y1,x2,y2,score and corners in pixels",
+      file.c_str());
+}
+
 /// Refuses lines whose corners stand where MOT has the width and the height, or from the second
-/// column on.
-void refuseCorners(const std::filesystem::path& file, const std::vector<TextLine>& lines,
+/// column on. Boxes near the image's upper left corner may be both: as MOT's they all lie inside.
+void refuseCorners(const DetectionFileOptions& options, const std::vector<TextLine>& lines,
                    char separator) {
   constexpr std::size_t kLeast = 3;
+  constexpr double kBorder = 2.0;  // px
   std::size_t from_second = 0, from_third = 0;
+  bool inside = options.width > 0.0;
   for (const TextLine& line : lines) {
     const auto v = parseNumbers(split(line.text, separator));
     if (!v || v->size() < 7) return;
@@ -91,14 +115,16 @@ void refuseCorners(const std::filesystem::path& file, const std::vector<TextLine
     };
     from_second += isBox(1) && (*v)[5] >= 0.0 && (*v)[5] <= 1.0 ? 1 : 0;
     from_third += isBox(2) ? 1 : 0;
+    inside = inside && (*v)[2] + (*v)[4] < options.width + kBorder &&
+             (*v)[3] + (*v)[5] < options.height + kBorder;
   }
   const bool second = from_second == lines.size();
-  if (!second && (lines.size() < kLeast || from_third < lines.size())) return;
+  if (!second && (lines.size() < kLeast || from_third < lines.size() || inside)) return;
   throw StartupError(
       ExitCode::kData,
       "{}: its lines have no header and corners in columns {}, not MOT's id, x, y, width, height; "
       "write a header frame,class,x1,y1,x2,y2,score and these columns",
-      file.c_str(), second ? "2 to 5 with a score behind them" : "3 to 6");
+      options.file.c_str(), second ? "2 to 5 with a score behind them" : "3 to 6");
 }
 
 /// Returns an empty string, or the error in the numbers of the row.
@@ -223,7 +249,8 @@ Result<NumberedRow> readRow(const std::string& text, const Columns& columns,
 
 DetectionFile DetectionFile::read(const DetectionFileOptions& options,
                                   const ClassAliases& aliases) {
-  const auto lines = readLines(options.file, "--detections takes `model`, `none` or a file of boxes");
+  const auto lines =
+      readLines(options.file, "--detections takes `model`, `none` or a file of boxes");
   DetectionFile result;
   result.options_ = options;
   result.listed_frames_ = readFrameList(options.file);
@@ -254,10 +281,11 @@ void DetectionFile::takeCoco(const CocoBoxes& coco, const ClassAliases& aliases)
 
 void DetectionFile::takeLines(const std::vector<TextLine>& lines, const ClassAliases& aliases) {
   const DetectionFileOptions& options = options_;
+  refuseShareLines(options.file, lines);
   const bool headerless = isHeaderless(lines, options);
   const Columns columns =
       headerless ? headerlessColumns(lines[0]) : readHeader(options.file, lines[0], aliases);
-  if (columns.mot) refuseCorners(options.file, lines, columns.separator);
+  if (columns.mot) refuseCorners(options, lines, columns.separator);
   for (const auto& [column, name] : columns.logits) logit_classes_.push_back(name);
   Complaints wrong(options.file);
   for (std::size_t i = headerless ? 0 : 1; i < lines.size(); ++i) {
@@ -286,7 +314,28 @@ void DetectionFile::refuseShares() const {
                      options_.file.c_str(), most + options_.box_origin);
 }
 
-bool DetectionFile::hasSizes(double width, double height) const {
+std::string DetectionFile::whyOutside() const {
+  constexpr double kThousandth = 1000.0;
+  double right = 0.0, bottom = 0.0;
+  std::size_t outside = 0;
+  for (const auto& [frame, rows] : rows_) {
+    for (const Row& row : rows) {
+      const Box& box = row.detection.box;
+      right = std::max(right, box.x2), bottom = std::max(bottom, box.y2);
+      const double x = 0.5 * (box.x1 + box.x2), y = 0.5 * (box.y1 + box.y2);
+      outside += x < 0.0 || y < 0.0 || x > options_.width || y > options_.height ? 1 : 0;
+    }
+  }
+  if (options_.width == 0.0 || 4 * outside <= rows()) return {};
+  const bool thousandths = std::max(right, bottom) <= kThousandth;
+  return fmt::format(
+      "the centres of {} of {} boxes lie outside of the images ({}x{}); boxes reach to {:.0f}, "
+      "{:.0f}: they are of images of another size{}; give corners in pixels of these images",
+      outside, rows(), options_.width, options_.height, right, bottom,
+      thousandths ? ", or thousandths of the image" : "");
+}
+
+bool DetectionFile::hasSizes() const {
   constexpr std::size_t kLeast = 20;
   constexpr double kBorder = 2.0;  // px: boxes end there that the border cuts off
   std::map<std::pair<double, double>, std::set<double>> lefts;
@@ -300,7 +349,8 @@ bool DetectionFile::hasSizes(double width, double height) const {
   }
   return std::any_of(times.begin(), times.end(), [&](const auto& entry) {
     const auto& [corner, count] = entry;
-    const bool inside = corner.first < width - kBorder && corner.second < height - kBorder;
+    const bool inside =
+        corner.first < options_.width - kBorder && corner.second < options_.height - kBorder;
     return inside && rows() >= kLeast && 10 * count >= 9 * rows() && lefts[corner].size() > 2;
   });
 }

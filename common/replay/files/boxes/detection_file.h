@@ -32,6 +32,7 @@ struct DetectionFileOptions {
   double score_floor = 0.01;
   double azimuth_sigma = 0.35;  ///< radians
   BoxExtent boxes = BoxExtent::kUnknown;
+  double width = 0.0, height = 0.0;  ///< of the images; 0: not known
   /// Recording::numbers of the drive.
   std::map<std::string, std::uint64_t> numbers = {};
 };
@@ -59,9 +60,11 @@ class DetectionFile {
   std::size_t rowsBeyond(std::uint64_t last) const;
   /// A sentence if it is not certain or not as usual from where the file counts the frames.
   const std::string& note() const { return note_; }
-  /// Whether x2 and y2 are probably a width and a height in images of this size: nearly all boxes
-  /// have the same, away from the image's border, and their left sides move.
-  bool hasSizes(double width, double height) const;
+  /// Whether x2 and y2 are probably a width and a height: nearly all boxes have the same, away from
+  /// the image's border, and their left sides move.
+  bool hasSizes() const;
+  /// A sentence if many boxes lie outside of the images.
+  std::string whyOutside() const;
 
   struct Row {
     Detection detection;     ///< activations are empty until known, if the file has no logits

@@ -152,7 +152,11 @@ TEST(DetectionFile, MotLinesAreReadWithFramesFromOne) {
               HasSubstr("frame is a whole number from 1"));
   EXPECT_THAT(wrong("1,-1,100,90,40,60,-1,-1,-1,-1\n"), HasSubstr("score"));
   EXPECT_THAT(wrong("1,-1,100,90,-40,60,.9,-1,-1,-1\n"), HasSubstr("x1 < x2"));
-  EXPECT_THAT(wrong("0 .5 .5 .1 .2\n"), HasSubstr("MOT's lines have 7 to 10"));
+  EXPECT_THAT(wrong("0 5 5 10 20\n"), HasSubstr("MOT's lines have 7 to 10"));
+  for (const char* yolo :
+       {"0 .5 .5 .1 .2\n2 .4 1 .1 .2\n", "0 .5 .5 .1 .2 .9\n", "7 0 .5 .5 .1 .2 1\n"}) {
+    EXPECT_THAT(errorOfCsv(yolo), HasSubstr("as in YOLO's label files")) << yolo;
+  }
 }
 
 constexpr char kCocoTables[] =
@@ -189,19 +193,19 @@ TEST(DetectionFile, CocoTablesThatCountFromOneAreReadSo) {
   for (int k = 1; k <= 3; ++k) {
     const std::string id = std::to_string(k), comma = k == 1 ? "" : ",";
     images += comma + R"({"id": )" + id + R"(, "file_name": "frame_00)" + id + R"(.png"})";
-    boxes += comma + R"({"image_id": )" + id + R"(, "category_id": 1, "bbox": [)" + id +
-             "0, 2, 30, 4]}";
+    boxes +=
+        comma + R"({"image_id": )" + id + R"(, "category_id": 1, "bbox": [)" + id + "0, 2, 30, 4]}";
   }
-  const auto tables = readCsv(
-      R"({"images": [)" + images + R"(], "annotations": [)" + boxes + "]}", ofDrive());
+  const auto tables =
+      readCsv(R"({"images": [)" + images + R"(], "annotations": [)" + boxes + "]}", ofDrive());
   const auto results = readCsv("[" + boxes + "]", ofDrive());
   for (const auto& file : {tables, results}) {
     EXPECT_DOUBLE_EQ(file.at(0)->front().box.x1, 10.0);
     EXPECT_DOUBLE_EQ(file.at(2)->front().box.x1, 30.0);
     EXPECT_THAT(file.note(), HasSubstr("count from 1 and were read so"));
   }
-  const auto unsure = readCsv(R"([{"image_id": 1, "category_id": 1, "bbox": [1, 2, 30, 4]}])",
-                              ofDrive());
+  const auto unsure =
+      readCsv(R"([{"image_id": 1, "category_id": 1, "bbox": [1, 2, 30, 4]}])", ofDrive());
   EXPECT_EQ(unsure.at(1)->size(), 1U);
   EXPECT_THAT(unsure.note(), HasSubstr("taken as counted from 0"));
 }
@@ -230,8 +234,15 @@ TEST(DetectionFile, CornersWithoutHeaderAreNoMotLines) {
   };
   EXPECT_THAT(errorOf("0,100,90,140,150,.9,2\n1,101,90,141,150,.8,2\n"),
               HasSubstr("corners in columns 2 to 5 with a score behind them"));
-  EXPECT_THAT(errorOf("0,2,100,90,140,150,.9\n1,2,101,90,141,150,.8\n2,2,99,90,139,150,.8\n"),
-              HasSubstr("corners in columns 3 to 6"));
+  const std::string third = "0,2,100,90,140,150,.9\n1,2,101,90,141,150,.8\n2,2,99,90,139,150,.8\n";
+  EXPECT_THAT(errorOf(third), HasSubstr("corners in columns 3 to 6"));
+  DetectionFileOptions options = ofClass("car");
+  options.width = 230, options.height = 239;
+  EXPECT_THAT(startupErrorOf([&] { readCsv(third, options); }), HasSubstr("columns 3 to 6"));
+  options.width = 242, options.height = 240;
+  std::string mot = third;
+  mot[0] = '3';
+  EXPECT_EQ(readCsv(mot, options).at(0)->front().box.x2, 242.0) << "MOT's boxes lie in the image";
 }
 
 TEST(DetectionFile, WhatIsWrongInCocoIsNamed) {
@@ -271,8 +282,15 @@ TEST(DetectionFile, SharesOfTheImageAndSizesAreRecognised) {
     sizes += std::to_string(k) + ",car," + std::to_string(20 + k / 10) + ",30,80,90,.9\n";
     cut += std::to_string(k) + ",car," + std::to_string(200 + k) + ",30,319,239,.9\n";
   }
-  EXPECT_TRUE(readCsv(sizes).hasSizes(320, 240));
-  EXPECT_FALSE(readCsv(cut).hasSizes(320, 240)) << "the border of the image cuts them off";
+  DetectionFileOptions options;
+  options.width = 320, options.height = 240;
+  EXPECT_TRUE(readCsv(sizes, options).hasSizes());
+  EXPECT_FALSE(readCsv(cut, options).hasSizes()) << "the border of the image cuts them off";
+  EXPECT_EQ(readCsv(cut, options).whyOutside(), "");
+  EXPECT_THAT(
+      readCsv(header + "0,car,300,400,450,700,.9\n", options).whyOutside(),
+      HasSubstr("(320x240); boxes reach to 450, 700: they are of images of another size, or "
+                "thousandths of the image"));
 }
 
 TEST(DetectionFile, EveryWrongLineIsLocated) {
