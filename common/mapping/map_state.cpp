@@ -61,15 +61,16 @@ void MapState::removeLoop(EdgeId id) {
   endFactsOf(id);
 }
 
-void MapState::scaleOdometry(const DriftVariance& factor, const WorldId& session) {
-  std::set<AnchorId> of_session;
+void MapState::scaleOdometry(const DriftVariance& scale, const WorldId& session) {
+  std::map<AnchorId, DriftVariance> factors;
   for (auto& [id, anchor] : anchors_) {
-    if (anchor.session != session) continue;
+    if (anchor.session != session || anchor.scale == scale) continue;
+    const DriftVariance factor = scale.over(anchor.scale);
     anchor.from_previous.covariance = factor.of(anchor.from_previous.covariance);
-    anchor.scale = anchor.scale.times(factor);
-    of_session.insert(id);
+    anchor.scale = scale;
+    factors.emplace(id, factor);
   }
-  graph_.scaleOdometry(factor, of_session);
+  graph_.scaleOdometry(factors);
 }
 
 void MapState::move(const std::set<AnchorId>& anchors, const LevelPose& T_MN) {

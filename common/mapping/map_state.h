@@ -31,7 +31,8 @@ class MapState {
   EdgeId addLoop(const Edge& edge) { return graph_.add(edge); }
   /// Also ends the facts that depend on it.
   void removeLoop(EdgeId id);
-  void scaleOdometry(const DriftVariance& factor, const WorldId& session);
+  /// Sets the factor of all increments of the session.
+  void scaleOdometry(const DriftVariance& scale, const WorldId& session);
   void optimise() { (void)graph_.optimise(); }
   /// Moves a component as a whole: T_MA = T_MN T_NA.
   void move(const std::set<AnchorId>& anchors, const LevelPose& T_MN);

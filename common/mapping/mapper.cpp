@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "common/mapping/frames/level_errors.h"
@@ -100,17 +99,17 @@ void Mapper::replay(const WorldId& session) {
   dropTentativeLoops();
   active_.reset();
   tentative_.reset();
+  replays_ = true;
   continueDrift(session);
   tracked_ties_.begin();
-  searched_elsewhere_at_m_ = -parameters_.loop.elsewhere_each_m;
+  searched_widely_at_m_ = searched_elsewhere_at_m_ = -parameters_.loop.elsewhere_each_m;
   loop_search_.forget();
-  replays_ = true;
   for (const AnchorId id : way) {
     stand(state_.anchors().at(id));
     search();
   }
   replays_ = false;
-  searched_at_m_ = builder_.way_m();
+  searched_at_m_ = searched_widely_at_m_ = builder_.way_m();
 }
 
 void Mapper::onOdometry(const Odometry& odometry) {

@@ -175,6 +175,7 @@ class Mapper {
   bool isAgreedOn(const LoopSearch::Found& found);
   void close(const LoopSearch::Found& found);
   void learnDrift();
+  bool restsOnActive(const PlaceMatch& match) const;
   Edge edgeFrom(AnchorId a, AnchorId b, const LevelGaussian& T_Mb, EdgeKind kind) const;
   void bringTogether(const Edge& edge);
   const Marginals& marginals();
@@ -224,7 +225,8 @@ class Mapper {
   AnchorId looked_from_ = 0;                  ///< the anchor whose view was searched last
   std::size_t seen_ = 0, searched_with_ = 0;  ///< number of objects of the session, now and at the
                                               ///< last search
-  double searched_at_m_ = 0.0, searched_widely_at_m_ = 0.0, searched_elsewhere_at_m_ = 0.0;
+  double searched_at_m_ = 0.0, searched_widely_at_m_ = 0.0, searched_elsewhere_at_m_ = 0.0,
+         learned_at_m_ = 0.0;
   std::uint64_t revision_ = 0;
 };
 

@@ -49,7 +49,10 @@ void Mapper::settle() {
     loop_book_.remove(id);
   }
   for (const EdgeId id : verdict.withdrawn) withdraw(id);
-  if (!verdict.given_up.empty() || !verdict.withdrawn.empty()) state_.optimise();
+  if (!verdict.given_up.empty() || !verdict.withdrawn.empty()) {
+    learnDrift();
+    state_.optimise();
+  }
   for (const LoopClosure& loop : verdict.told) {
     change_.loops.push_back(loop);
     join(loop);
@@ -97,6 +100,12 @@ View Mapper::viewOfNow() const {
   return view_builder_.viewFrom(here.T_WA, builder_.way_m(), kBack_m);
 }
 
+/// Whether the match has a pair of the newest loop closure.
+bool Mapper::restsOnActive(const PlaceMatch& match) const {
+  return active_ && std::any_of(match.pairs.begin(), match.pairs.end(),
+                                [&](const auto& pair) { return active_->pairs.contains(pair); });
+}
+
 /// Searches by objects. If they give no match, searches by objects in a wider region, because the
 /// odometry may err more than is assumed, and by appearance, once for each anchor.
 std::optional<LoopSearch::Found> Mapper::searchNearby(const Whereabouts& here, bool new_view) {
@@ -106,6 +115,7 @@ std::optional<LoopSearch::Found> Mapper::searchNearby(const Whereabouts& here, b
   if (!found && widening_ > kWider && since_m >= parameters_.loop.elsewhere_each_m) {
     searched_widely_at_m_ = builder_.way_m();
     found = loop_search_.nearby(body(widening_));
+    if (found && restsOnActive(found->match)) found.reset();  // a less accurate measurement of it
   }
   if (found && view_search_.contradicts(*found, here, viewOfNow())) return std::nullopt;
   if (!found && new_view) found = view_search_.nearby(here, viewOfNow());
@@ -147,22 +157,19 @@ void Mapper::learnDrift() {
   }
   std::vector<Edge> loops;
   for (const auto& [id, edge] : state_.graph().edges()) {
-    const bool believed = state_.graph().weight(id) >= kBelieved;
-    if (edge.kind == EdgeKind::kLoop && believed) loops.push_back(edge);
+    if (edge.kind != EdgeKind::kLoop || state_.graph().weight(id) < kBelieved) continue;
+    loops.push_back(edge);
   }
   DriftScale drift(parameters_.drift_scale, way);
   const bool learned = drift.use(loops, parameters_.loop.view_m);
-  const DriftVariance factor =
-      drift.variance(parameters_.drift_scale.quantile).over(odometry_variance_);
-  constexpr double kChanged = 1e-6;
-  const bool changed =
-      std::abs(factor.plane - 1.0) > kChanged || std::abs(factor.height - 1.0) > kChanged;
-  if (learned && !replays_ && changed) {
-    state_.scaleOdometry(factor, *session_);
-    odometry_variance_ = odometry_variance_.times(factor);  // as Anchor::scale, to the last bit
+  if (!replays_) {
+    odometry_variance_ =
+        learned ? drift.variance(parameters_.drift_scale.quantile) : DriftVariance();
+    state_.scaleOdometry(odometry_variance_, *session_);
   }
   const DriftVariance most = drift.variance(parameters_.drift_scale.most);
   widening_ = std::sqrt(most.over(odometry_variance_).plane);
+  learned_at_m_ = builder_.way_m();
 }
 
 /// In similar streets one search may find the wrong street. A second search uses more objects.
@@ -188,10 +195,7 @@ void Mapper::close(const LoopSearch::Found& found) {
   const AnchorId a = found.home, b = builder_.last()->id;
   const Edge edge = edgeFrom(a, b, match.T_MB, EdgeKind::kLoop);
   const LevelPose before = state_.graph().pose(b);
-  const bool rests_on_the_same =
-      active_ && std::any_of(match.pairs.begin(), match.pairs.end(),
-                             [&](const auto& pair) { return active_->pairs.contains(pair); });
-  const std::optional<EdgeId> old = rests_on_the_same ? std::optional(active_->id) : std::nullopt;
+  const auto old = restsOnActive(match) ? std::optional(active_->id) : std::nullopt;
   if (old) loop_book_.remove(*old);
   if (!found.prior) {
     bringTogether(edge);
@@ -204,7 +208,7 @@ void Mapper::close(const LoopSearch::Found& found) {
   }
   if (!match.pairs.empty()) active_ = {id, pairsOf(match)};
   loop_book_.add({id, a, b, match, !found.prior, 0.0}, before, builder_.way_m());
-  learnDrift();
+  if (builder_.way_m() - learned_at_m_ >= parameters_.loop.elsewhere_each_m) learnDrift();
   graphMoved();
 }
 

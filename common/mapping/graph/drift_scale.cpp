@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "common/mapping/frames/level_errors.h"
@@ -13,7 +14,7 @@ namespace {
 
 constexpr double kLeast = 0.02, kMost = 32.0;
 constexpr int kSteps = 64;
-constexpr std::size_t kMostLoops = 20;
+constexpr std::size_t kMostLoops = 12;
 const std::vector<int> kPlane = {0, 1, 3};  // of [p, yaw]
 
 }  // namespace
@@ -28,7 +29,7 @@ DriftScale::DriftScale(const DriftScaleParameters& parameters, const std::vector
   height_ = plane_;
   Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
   for (const Anchor& anchor : way) {
-    const LevelPose pose = levelOf(anchor.T_WA);
+    const LevelPose pose = poses_.empty() ? LevelPose() : poses_.back() * anchor.from_previous.mean;
     if (!poses_.empty()) {
       // The increment turns everything after it about its end.
       Eigen::Matrix4d by_increment = byFrame(-pose.p);
@@ -89,13 +90,14 @@ DriftScale::Joint DriftScale::joint(const std::vector<Measured>& loops,
 
 /// Probability density of the loops for an unknown scale, as a logarithm.
 double DriftScale::logEvidence(const std::vector<Measured>& loops) const {
-  constexpr std::size_t kEach = 8;  // a coarse grid suffices here
+  constexpr std::size_t kEach = 2;  // a coarse grid suffices here
   const Joint all = joint(loops, kPlane);
   std::vector<double> terms;
   for (std::size_t k = 0; k < log_scales_.size(); k += kEach) {
     terms.push_back(plane_[k] + all.logLikelihood(log_scales_[k]));
   }
   const double peak = *std::max_element(terms.begin(), terms.end());
+  if (!std::isfinite(peak)) return -std::numeric_limits<double>::infinity();
   double sum = 0.0;
   for (const double term : terms) sum += std::exp(term - peak);
   return peak + std::log(sum);
@@ -154,6 +156,7 @@ DriftVariance DriftScale::variance(double quantile) const {
 
 double DriftScale::varianceOf(const LogPosterior& log_posterior, double quantile) const {
   const double peak = *std::max_element(log_posterior.begin(), log_posterior.end());
+  if (!std::isfinite(peak)) return 1.0;
   double all = 0.0;
   for (const double l : log_posterior) all += std::exp(l - peak);
   double sum = 0.0;

@@ -168,11 +168,12 @@ void PoseGraph::remove(EdgeId id) {
   weights_.erase(id);
 }
 
-void PoseGraph::scaleOdometry(const DriftVariance& factor, const std::set<AnchorId>& anchors) {
+void PoseGraph::scaleOdometry(const std::map<AnchorId, DriftVariance>& factors) {
+  if (factors.empty()) return;
   for (auto& [id, edge] : edges_) {
-    if (edge.kind == EdgeKind::kOdometry && anchors.contains(edge.b)) {
-      edge.T_ab.covariance = factor.of(edge.T_ab.covariance);
-    }
+    const auto factor = factors.find(edge.b);
+    if (edge.kind != EdgeKind::kOdometry || factor == factors.end()) continue;
+    edge.T_ab.covariance = factor->second.of(edge.T_ab.covariance);
   }
 }
 

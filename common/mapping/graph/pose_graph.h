@@ -53,8 +53,8 @@ class PoseGraph {
   /// Adds a stored edge with its earlier id. New edges receive higher ids.
   void restore(EdgeId id, const Edge& edge, double weight);
   void remove(EdgeId id);
-  /// Multiplies the covariances of odometry edges that lead to `anchors`.
-  void scaleOdometry(const DriftVariance& factor, const std::set<AnchorId>& anchors);
+  /// Multiplies the covariances of odometry edges by the factors of the anchors to which they lead.
+  void scaleOdometry(const std::map<AnchorId, DriftVariance>& factors);
   /// Fixes the first anchor of each component, and no other. optimise() calls it.
   void holdFirstAnchors();
 

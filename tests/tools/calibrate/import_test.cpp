@@ -325,9 +325,10 @@ TEST_F(RigImport, WhatIsUnknownOrMissingIsToldByName) {
               HasSubstr("has none of the keys cam0"));
   EXPECT_THAT(errorOf({file("imu.yaml", kKalibrImu)}), HasSubstr("no file has a camera"));
   const auto chain = file("chain.yaml", kChain);
-  EXPECT_THAT(errorOf({chain, chain, chain}), HasSubstr("is a third camera"));
+  EXPECT_THAT(errorOf({chain, file("chain2.yaml", kChain), file("chain3.yaml", kChain)}),
+              HasSubstr("is a third camera"));
   const auto imu = file("imu.yaml", kKalibrImu);
-  EXPECT_THAT(errorOf({chain, imu, imu}), HasSubstr("is a second IMU"));
+  EXPECT_THAT(errorOf({chain, imu, file("imu2.yaml", kKalibrImu)}), HasSubstr("is a second IMU"));
   EXPECT_THAT(errorOf({chain, file("scaled.yaml", "imu0:\n  model: scale-misalignment\n")}),
               HasSubstr("--imu-models calibrated"));
   EXPECT_THROW(transformOf("1 0 0 0"), StartupError);
