@@ -126,10 +126,16 @@ TEST_F(DemoPlan, NamesTheProgramThatIsMissing) {
 }
 
 TEST_F(DemoPlan, EmptiesAnEarlierRunButNoFolderOfSomeoneElse) {
-  const DemoFolders folders = prepareFolders(options_);
-  std::ofstream(folders.state / "old") << "";
+  fs::path state;
+  {
+    const DemoFolders earlier = prepareFolders(options_);
+    state = earlier.state;
+    std::ofstream(state / "old") << "";
+    EXPECT_THROW(prepareFolders(options_), StartupError);  // the earlier run goes on
+    EXPECT_TRUE(fs::exists(state / "old"));
+  }
   prepareFolders(options_);
-  EXPECT_FALSE(fs::exists(folders.state / "old"));
+  EXPECT_FALSE(fs::exists(state / "old"));
   options_.out = (folder_ / "other").string();
   fs::create_directories(folder_ / "other" / "run");
   std::ofstream(folder_ / "other" / "run" / "precious") << "";
