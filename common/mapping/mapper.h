@@ -172,7 +172,7 @@ class Mapper {
                     std::size_t& points) const;
   std::optional<Recallable> relativeTo(const Anchor& here, const Anchor& a);
   Recallable withRecord(Recallable there, ObjectId id, const ObjectRecord& record) const;
-  bool isAgreedOn(const LoopSearch::Found& found);
+  bool isAgreedOn(const LoopSearch::Found& found, std::size_t other_pairs);
   void close(const LoopSearch::Found& found);
   void learnDrift();
   bool restsOnActive(const PlaceMatch& match) const;
@@ -200,11 +200,12 @@ class Mapper {
     std::set<std::pair<ObjectId, ObjectId>> pairs;
   };
   std::optional<ActiveLoop> active_;
-  /// The pose of an unlocated session by one search.
+  /// The pose of the session by one search, where its place is not known well.
   struct Tentative {
     LevelPose T_MN;
     AnchorId component = 0;
     double way_m = 0.0;
+    std::set<std::pair<ObjectId, ObjectId>> pairs;
   };
   std::optional<Tentative> tentative_;
   /// The end of the previous session, until this session is connected with it.

@@ -111,11 +111,15 @@ bool Mapper::restsOnActive(const PlaceMatch& match) const {
 std::optional<LoopSearch::Found> Mapper::searchNearby(const Whereabouts& here, bool new_view) {
   auto found = loop_search_.nearby(here);
   constexpr double kWider = 1.5;
+  constexpr std::size_t kOthers = 3;  // pairs
   const double since_m = builder_.way_m() - searched_widely_at_m_;
   if (!found && widening_ > kWider && since_m >= parameters_.loop.elsewhere_each_m) {
     searched_widely_at_m_ = builder_.way_m();
     found = loop_search_.nearby(body(widening_));
-    if (found && restsOnActive(found->match)) found.reset();  // a less accurate measurement of it
+    // A match of the active loop's pairs is a less accurate measurement of it.
+    if (found && (restsOnActive(found->match) || !isAgreedOn(*found, kOthers))) {
+      found.reset();
+    }
   }
   if (found && view_search_.contradicts(*found, here, viewOfNow())) return std::nullopt;
   if (!found && new_view) found = view_search_.nearby(here, viewOfNow());
@@ -133,7 +137,7 @@ std::optional<LoopSearch::Found> Mapper::searchElsewhere(const Whereabouts& here
   }
   if (found && view_search_.contradicts(*found, here, viewOfNow())) return std::nullopt;
   if (!found && new_view) found = view_search_.elsewhere(here, viewOfNow());
-  return found && isAgreedOn(*found) ? found : std::nullopt;
+  return found && isAgreedOn(*found, 0) ? found : std::nullopt;
 }
 
 /// Searches the connected part of the map first. Searches the other components less often.
@@ -172,19 +176,25 @@ void Mapper::learnDrift() {
   learned_at_m_ = builder_.way_m();
 }
 
-/// In similar streets one search may find the wrong street. A second search uses more objects.
-bool Mapper::isAgreedOn(const LoopSearch::Found& found) {
+/// In similar streets one search may find the wrong street. A second search uses more objects, at
+/// least `other_pairs` of which the first one did not match.
+bool Mapper::isAgreedOn(const LoopSearch::Found& found, std::size_t other_pairs) {
   constexpr double kSame_m = 3.0, kSame_rad = 0.1;
   const LevelPose T_Nb = state_.graph().pose(builder_.last()->id);
   const AnchorId component = componentsOf(state_.graph()).at(found.home);
-  const Tentative now{found.match.T_MB.mean * T_Nb.inverse(), component, builder_.way_m()};
+  const Tentative now{found.match.T_MB.mean * T_Nb.inverse(), component, builder_.way_m(),
+                      pairsOf(found.match)};
   if (tentative_ && tentative_->component == component) {
     const double apart_m = now.way_m - tentative_->way_m;
     const LevelError d = difference(tentative_->T_MN * T_Nb, found.match.T_MB.mean);
     const bool same = d.head<2>().norm() < kSame_m && std::abs(d[3]) < kSame_rad;
     const LoopParameters& loop = parameters_.loop;
-    if (same && apart_m < loop.agree_after_m) return false;
-    if (same && apart_m < loop.agree_within_m) return true;
+    if (same && apart_m < loop.agree_within_m) {
+      const auto others =
+          std::count_if(now.pairs.begin(), now.pairs.end(),
+                        [this](const auto& pair) { return !tentative_->pairs.contains(pair); });
+      return apart_m >= loop.agree_after_m && static_cast<std::size_t>(others) >= other_pairs;
+    }
   }
   tentative_ = now;
   return false;

@@ -30,6 +30,15 @@ TEST(Mapper, ClosesTheLoopOfASecondLap) {
   EXPECT_GT(right, 3u);
 }
 
+TEST(Mapper, ClosesTheLoopThoughTheOdometryIsDeclaredTooAccurate) {
+  for (const std::uint32_t seed : {1u, 2u, 3u}) {
+    Drive drive({.seed = seed, .yaw_walk = 0.004, .told_yaw_walk = 0.0004});
+    drive.toTheEnd();
+    EXPECT_FALSE(drive.loops().empty()) << seed;
+    EXPECT_EQ(drive.wrong(), 0u) << seed;
+  }
+}
+
 TEST(Mapper, CorrectsTheWayBehindAsWell) {
   Drive drive(kDrifting);
   drive.toTheEnd();

@@ -6,6 +6,7 @@
 #include "common/math/gaussian.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
 #include "services/semantic_filter/core/belief/pose_correlation.h"
+#include "services/semantic_filter/core/tracks/merge.h"
 
 namespace perdure::semantic_filter {
 
@@ -20,6 +21,14 @@ bool forgettable(const Track& o, const TrackParameters& parameters) {
   const TimePoint last = std::max(o.unused.occluded.last, o.unused.out_of_view.last);
   const bool invisible = o.unused.count() > 0;
   return invisible && toSeconds(last - o.life.last_seen) > parameters.tentative_s;
+}
+
+/// Whether the track may be a visible confirmed one that was seen in part. It waits until misses
+/// remove that one or a merge joins both.
+bool waits(const Track& o, const std::vector<Track>& tracks, const FrameContext& frame) {
+  return std::any_of(tracks.begin(), tracks.end(), [&](const Track& t) {
+    return t.life.confirmed && t.id < o.id && t.visibility.fraction > 0.0 && mayBeOne(t, o, frame);
+  });
 }
 
 }  // namespace
@@ -51,7 +60,8 @@ std::vector<Track> confirmAndDelete(std::vector<Track>& tracks, const FrameConte
       o.life.confirmed = false;
       continue;
     }
-    if (established(o, frame) && sigma < parameters.confirm_sigma_m) {
+    if (established(o, frame) && sigma < parameters.confirm_sigma_m &&
+        (o.life.once_confirmed || !waits(o, tracks, frame))) {
       o.life.confirmed = o.life.once_confirmed = true;
     }
   }

@@ -234,6 +234,12 @@ bool sameKind(const Track& a, const Track& b) {
   return a.best().class_name == b.best().class_name || isOther(a) != isOther(b);
 }
 
+bool mayBeOne(const Track& a, const Track& b, const FrameContext& frame) {
+  constexpr double kShared = 0.2;  // of the lesser volume
+  return sameKind(a, b) && !detectedTogether(a, b) &&
+         sharedVolume(a.best().x, b.best().x, frame.view.up_W).of_lesser > kShared;
+}
+
 double overlap(const State& a, const State& b, const Eigen::Vector3d& up_W) {
   return sharedVolume(a, b, up_W).of_joint;
 }

@@ -23,6 +23,10 @@ double overlap(const State& a, const State& b, const Eigen::Vector3d& up_W);
 /// Pairs wait unless both are visible or one occludes the other.
 std::vector<MergeRecord> mergeObjects(std::vector<Track>& tracks, const FrameContext& frame);
 
+/// Whether two tracks of one kind share a part of their space, and no frame detected both: one may
+/// be the part of the other that was visible earlier.
+bool mayBeOne(const Track& a, const Track& b, const FrameContext& frame);
+
 /// Whether class and motion allow that both are one object.
 bool sameKind(const Track& a, const Track& b);
 

@@ -30,6 +30,28 @@ TEST_F(Lifecycle, ATrackWithTwoPossiblePlacesIsNotConfirmed) {
   EXPECT_TRUE(claimed(15.0, 0.001)) << "that it is near is ruled out";
 }
 
+TEST_F(Lifecycle, WhatMayBeAnObjectThatWasSeenInPartWaits) {
+  // From behind a nearer car, the end of the older one looked like a narrow car.
+  const auto claimed = [&](double beside_m, std::uint64_t older_frames, bool older_confirmed) {
+    Track older = makeObject(1, "car", makeState(20, 0, 0.7, 0, 4, 1.7, 1.5), 0.04);
+    older.life.confirmed = older.life.once_confirmed = older_confirmed;
+    older.history.detected = older_frames;
+    Track newer = makeObject(2, "car", makeState(20, beside_m, 0.7, M_PI / 2, 4, 1.7, 1.5), 0.04);
+    newer.history.detected = 0b1;
+    for (Track* o : {&older, &newer}) {
+      o->existence = {0.97, ExistenceEvidence::kPrior, o->as_of};
+    }
+    if (!older_confirmed) older.existence = {0.4, ExistenceEvidence::kPrior, older.as_of};
+    std::vector<Track> tracks{older, newer};
+    confirmAndDelete(tracks, frame);
+    return tracks.back().life.confirmed;
+  };
+  EXPECT_FALSE(claimed(1.2, 0b10, true));
+  EXPECT_TRUE(claimed(1.2, 0b11, true)) << "one frame detected both";
+  EXPECT_TRUE(claimed(3.0, 0b10, true)) << "it stands beside the older one";
+  EXPECT_TRUE(claimed(1.2, 0b10, false)) << "the older one is no longer believed";
+}
+
 TEST_F(Lifecycle, DetectionOnAnotherVisitRaisesTheLimitOfExistence) {
   Track o = makeObject(1, "car", makeState(10, 0, 0.7, 0, 4, 1.8, 1.5), 0.004);
   EXPECT_EQ(existenceCeiling(o, parameters.tracks), parameters.tracks.certain);
