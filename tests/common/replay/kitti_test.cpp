@@ -168,9 +168,9 @@ TEST(KittiRaw, AClockThatWasSetIsOneStepForBothCameras) {
   for (int i = 0; i < 60; ++i) {
     stamps +=
         fmt::format("2011-09-26 13:04:{:02}.{}00000000\n", 32 + i / 10 - (i < 30 ? 0 : 2), i % 10);
+    if (i < 4) continue;  // they exist
     fs::copy_file(drive / "oxts/data/0000000000.txt",
-                  drive / fmt::format("oxts/data/{:010}.txt", i),
-                  fs::copy_options::overwrite_existing);
+                  drive / fmt::format("oxts/data/{:010}.txt", i));
   }
   writeText(drive / "image_02/timestamps.txt", stamps);
   writeText(drive / "oxts/timestamps.txt", stamps);
