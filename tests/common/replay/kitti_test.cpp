@@ -166,8 +166,8 @@ TEST(KittiRaw, AClockThatWasSetIsOneStepForBothCameras) {
   const auto drive = tinyKittiRaw("set");
   std::string stamps;
   for (int i = 0; i < 60; ++i) {
-    stamps +=
-        fmt::format("2011-09-26 13:04:{:02}.{}00000000\n", 32 + i / 10 - (i < 30 ? 0 : 2), i % 10);
+    const int ms = 32'000 + 100 * i - (i < 30 ? 0 : 2030);
+    stamps += fmt::format("2011-09-26 13:04:{:02}.{:03}000000\n", ms / 1000, ms % 1000);
     if (i < 4) continue;  // they exist
     fs::copy_file(drive / "oxts/data/0000000000.txt",
                   drive / fmt::format("oxts/data/{:010}.txt", i));

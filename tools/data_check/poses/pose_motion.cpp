@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "common/base/algorithms/median.h"
 #include "tools/data_check/motion_in.h"
 #include "tools/data_check/poses/pose_check.h"
 
@@ -44,10 +45,10 @@ struct Still {
   std::size_t first, last;
 };
 
-/// The longest time, over a second, in which a pose is repeated.
+/// The longest time, over .4 s, in which a pose is repeated.
 std::optional<Still> longestStill(const Poses& poses) {
   constexpr double kSame_m = 1e-4, kSame_rad = 1e-4;
-  constexpr Duration kLeast = std::chrono::seconds(1);
+  constexpr Duration kLeast = std::chrono::milliseconds(400);
   constexpr std::size_t kFewest = 5;
   std::optional<Still> longest;
   Duration most = kLeast;
@@ -78,6 +79,18 @@ DataFindings judgePosesOfCamera(const Poses& poses, const replay::Recording& rec
                        "upright: give --odometry-of camera, or T_WB, which is T_WC times the "
                        "inverse of T_BS",
                        camera.name, as_body.y() < 0 ? "upwards" : "downwards")}};
+}
+
+DataFindings judgePosesBackwards(const Poses& poses, const replay::Recording& recording) {
+  constexpr double kBackwards = -0.95, kForwards_mps = 1.0;
+  std::vector<double> speeds;
+  for (const SpeedSample& sample : recording.speed) speeds.push_back(sample.speed);
+  const double speed = medianOf(std::move(speeds));
+  if (courseOf(poses).x() > kBackwards || speed < kForwards_mps) return {};
+  return {{Grade::kWarning, "poses_backwards",
+           fmt::format("the poses move backwards all the time while the speed is {:.1f} m/s: they "
+                       "are inverted (the world in the body), or their x axis is not forward",
+                       speed)}};
 }
 
 DataFindings judgePosesFrozen(const Poses& poses, const replay::Recording& recording, bool images) {
