@@ -237,7 +237,7 @@ double innovationRatio(const std::vector<vio::Innovation>& innovations) {
 
 replay::Recording thinned(replay::Recording recording) {
   constexpr double kMost_rad = 0.05;
-  constexpr Duration kMost = std::chrono::milliseconds(80), kShort = std::chrono::seconds(10);
+  constexpr Duration kMost = std::chrono::milliseconds(80), kShort = std::chrono::seconds(30);
   const auto& frames = recording.frames;
   if (frames.empty() || frames.back().time - frames.front().time < kShort) return recording;
   std::set<std::uint64_t> kept;

@@ -67,7 +67,7 @@ class RigWatch {
 };
 
 /// The recording without images that follow another one within 80 ms and .05 rad of turning. Vio
-/// needs all images of drives shorter than ten seconds; they are unchanged.
+/// needs all images of drives shorter than 30 s; they are unchanged.
 replay::Recording thinned(replay::Recording recording);
 
 /// Reads the drive, from its start on, as grey images. Throws StartupError if it has no images or
