@@ -144,6 +144,25 @@ void checkRate(const Recording& recording, DataFindings& findings) {
                    rate, said)});
 }
 
+/// The images are `apart` slower, by declared rates, than the inertial samples, and end as much
+/// later: one of the clocks runs at another rate. A camera of another rate ends when the IMU does.
+void checkOneRate(const Recording& recording, const StampList& imu, const StampList& images,
+                  double apart, DataFindings& findings) {
+  constexpr double kLeast = 0.02, kStarts_s = 0.1, kAlike = 0.2;
+  const double awaited = apart * toSeconds(between(imu.back(), imu.front())),
+               ends = toSeconds(between(images.back(), imu.back()));
+  if (std::abs(apart) < kLeast || std::abs(ends - awaited) > kAlike * std::abs(awaited) ||
+      std::abs(toSeconds(between(images.front(), imu.front()))) > kStarts_s)
+    return;
+  findings.push_back(
+      {StampGrade::kWarning, "declared_rates",
+       fmt::format("the stamps of {} run {:.1f} % too {} for those of the IMU: by rate_hz, and "
+                   "because they end {:.2f} s {}; see which of them has a wrong clock",
+                   recording.calibration.cameras.front().name, 100.0 * std::abs(apart),
+                   apart > 0.0 ? "fast" : "slow", std::abs(ends),
+                   ends > 0.0 ? "later" : "earlier")});
+}
+
 /// Both sensors differ from their declared rates by one factor: their common clock does.
 void checkCommonRate(const Recording& recording, const StampList& imu, const StampList& images,
                      DataFindings& findings) {
@@ -153,6 +172,7 @@ void checkCommonRate(const Recording& recording, const StampList& imu, const Sta
   const double imu_hz = recording.calibration.imu->rate_hz,
                images_hz = recording.calibration.cameras.front().rate_hz;
   const double slower = *of_imu * 1e-9 * imu_hz, of_camera = *of_images * 1e-9 * images_hz;
+  checkOneRate(recording, imu, images, of_camera / slower - 1.0, findings);
   if (std::abs(slower - 1.0) < kLeast || std::abs(of_camera / slower - 1.0) > kAlike) return;
   findings.push_back(
       {StampGrade::kWarning, "declared_rates",

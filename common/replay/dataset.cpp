@@ -125,8 +125,8 @@ std::optional<Reader> readerOf(const std::filesystem::path& folder) {
 Recording readRecording(const DatasetOptions& options) {
   const auto& path = options.path;
   if (!std::filesystem::is_directory(path)) {
-    if (hasMessages(path)) return readMessages(options);
     std::error_code error;
+    if (std::filesystem::exists(path, error) && hasMessages(path)) return readMessages(options);
     if (std::filesystem::is_regular_file(path, error)) refuseFile(path);
     throwMissing(path, "the dataset folder",
                  "--data takes a folder in EuRoC, KITTI raw, KITTI tracking or 7-Scenes layout, or "

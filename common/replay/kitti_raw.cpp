@@ -94,8 +94,18 @@ ImuCalibration oxtsCalibration() {
 
 struct OxtsRecord {
   TimePoint time;
+  std::size_t index = 0;
   std::vector<double> values;
 };
+
+/// Orders records, which have the index of their line.
+template <class Record>
+void orderByLine(std::vector<Record>& records, const char* kind, const fs::path& file,
+                 Recording& recording) {
+  orderByTime(
+      records, kind, file.string(), std::to_string(records.size()), recording,
+      [&](std::size_t i) { return fmt::format("{}:{}", file.string(), records[i].index + 1); });
+}
 
 std::vector<OxtsRecord> readOxts(const fs::path& folder, Recording& recording) {
   ReasonCounts& reasons = recording.reasons;
@@ -113,9 +123,9 @@ std::vector<OxtsRecord> readOxts(const fs::path& folder, Recording& recording) {
       reasons.add("imu_malformed");
       continue;
     }
-    records.push_back({*stamps[i], *values});
+    records.push_back({*stamps[i], i, *values});
   }
-  orderByTime(records, "imu", (folder / "timestamps.txt").string(), recording);
+  orderByLine(records, "imu", folder / "timestamps.txt", recording);
   return records;
 }
 
@@ -183,8 +193,18 @@ void addCamera(const fs::path& folder, const std::vector<std::optional<TimePoint
     }
     frames.push_back({*stamps[i], i, number, imagePath(folder / "data", tenDigits(i)).string()});
   }
-  orderByTime(frames, "frame", (folder / "timestamps.txt").string(), recording);
+  orderByLine(frames, "frame", folder / "timestamps.txt", recording);
   recording.frames.insert(recording.frames.end(), frames.begin(), frames.end());
+}
+
+/// The right images have the stamps of the left ones, so that a step of the clock counts once.
+void addRightCamera(const fs::path& folder, const CameraCalibration& camera, Recording& recording) {
+  recording.calibration.cameras.push_back(camera);
+  for (std::size_t i = 0, left = recording.frames.size(); i < left; ++i) {
+    auto frame = recording.frames[i];
+    frame.camera = 1, frame.path = imagePath(folder / "data", tenDigits(frame.index)).string();
+    recording.frames.push_back(std::move(frame));
+  }
 }
 
 }  // namespace
@@ -210,7 +230,7 @@ Recording readKittiRaw(const DatasetOptions& options) {
   recording.frame_count = stamps.size();
   addCamera(drive / "image_02", stamps, calibration.camera("cam0"), recording);
   if (fs::is_directory(drive / "image_03" / "data")) {
-    addCamera(drive / "image_03", stamps, calibration.camera("cam1"), recording);
+    addRightCamera(drive / "image_03", calibration.camera("cam1"), recording);
   }
   sortFrames(recording);
   addOxts(records, recording);

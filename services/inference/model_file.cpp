@@ -62,6 +62,20 @@ std::string whyNoNetwork(std::string_view bytes) {
   }
   if (begins.starts_with("<?xml")) return "is XML, as OpenVINO's; export the network as ONNX";
   if (begins.starts_with("\x89HDF")) return "is HDF5, as Keras' .h5; export the network as ONNX";
+  if (begins.starts_with("ftrt")) {
+    return "is an engine of TensorRT, for one kind of GPU; export the network as ONNX";
+  }
+  if (begins.starts_with("7767517")) return "is a network of ncnn; export it as ONNX";
+  if (begins.size() == 512 && begins.find_first_not_of('\0') == begins.npos) {
+    return "begins with zeros only: it was not copied whole; fetch it again";
+  }
+  const auto isPrinted = [](unsigned char c) {
+    return c >= ' ' || c == '\n' || c == '\r' || c == '\t';
+  };
+  if (!text.empty() && std::ranges::all_of(begins, isPrinted) && text[0] != '[' && text[0] != '#') {
+    return "is a text that begins with `" +
+           std::string(text.substr(0, text.find('\n')).substr(0, 60)) + "`; fetch the file itself";
+  }
   return {};
 }
 

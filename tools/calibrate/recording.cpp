@@ -11,6 +11,7 @@
 #include "common/replay/files/text_file.h"
 #include "common/vision/decode.h"
 #include "common/vision/image.h"
+#include "tools/data_check/data_check.h"
 
 namespace perdure::calibrate {
 namespace {
@@ -109,7 +110,9 @@ void readDataset(const Board& board, const ReadOptions& options, CalibrationDriv
   wanted.path = options.data, wanted.sequence = options.sequence, wanted.rig = options.rig;
   wanted.encoding = wanted.second_encoding = ImageEncoding::kMono8;
   const auto dataset = replay::Dataset::open(wanted);
-  replay::refuseFatal(replay::checkData(dataset->recording(), {}), options.data.string());
+  const auto doubts = replay::checkData(dataset->recording(), {});
+  replay::refuseFatal(doubts, options.data.string());
+  tools::printDoubts(dataset->recording(), doubts);
   for (const auto& camera : dataset->calibration().cameras)
     drive.cameras.push_back({camera, 0, {}});
   drive.imu = dataset->calibration().imu;

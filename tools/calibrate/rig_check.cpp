@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "common/base/algorithms/median.h"
 #include "common/base/errors.h"
@@ -36,7 +37,7 @@ class Watched {
   }
 
   void run(replay::Dataset& dataset, const RigCheckOptions& options) {
-    constexpr std::size_t kEvery = 20;  // interval of the checks, in images
+    constexpr std::size_t kEvery = 10;  // interval of the checks, in images
     std::optional<TimePoint> first;
     std::size_t images = 0;
     replay::ReadAhead ahead(dataset);
@@ -45,7 +46,6 @@ class Watched {
       if (const auto* speed = std::get_if<SpeedSample>(&*message)) node_->onSpeed(*speed);
       const auto* frame = std::get_if<Frame>(&*message);
       if (!frame || !frame->data) continue;
-      if (options.cancelled()) break;
       if (!first) first = frame->stamp.time;
       if (toSeconds(frame->stamp.time - *first) > options.seconds) break;
       node_->onFrame(*frame);
@@ -222,10 +222,10 @@ RigCheck RigWatch::check(const ReasonCounts& of_vio) const {
 }
 
 bool isSurelyGood(const RigCheck& check) {
-  constexpr double kFifth = 0.2;  // a bad value is then at least five deviations off
-  const bool sure = check.believed && check.sigma.head<3>().norm() < kFifth * kTurned.bad &&
-                    check.sigma.segment<3>(3).norm() < kFifth * kShifted_m.bad &&
-                    check.sigma[6] < kFifth * kLater_s.bad;
+  constexpr double kQuarter = 0.25;  // a bad value is then at least four deviations off
+  const bool sure = check.believed && check.sigma.head<3>().norm() < kQuarter * kTurned.bad &&
+                    check.sigma.segment<3>(3).norm() < kQuarter * kShifted_m.bad &&
+                    check.sigma[6] < kQuarter * kLater_s.bad;
   return sure && worstOf(judgeRig(check)) == Grade::kGood;
 }
 
@@ -233,6 +233,29 @@ double innovationRatio(const std::vector<vio::Innovation>& innovations) {
   std::vector<double> values;
   for (const auto& i : innovations) values.push_back(i.nis / chi2Quantile(0.5, i.rows));
   return medianOf(std::move(values));
+}
+
+replay::Recording thinned(replay::Recording recording) {
+  constexpr double kMost_rad = 0.05;
+  constexpr Duration kMost = std::chrono::milliseconds(80), kShort = std::chrono::seconds(30);
+  const auto& frames = recording.frames;
+  if (frames.empty() || frames.back().time - frames.front().time < kShort) return recording;
+  std::set<std::uint64_t> kept;
+  std::optional<TimePoint> last;
+  double turned = 0.0;
+  auto sample = recording.imu.begin();
+  for (const auto& frame : frames) {
+    for (; sample != recording.imu.end() && sample->time < frame.time; ++sample) {
+      if (sample == recording.imu.begin()) continue;
+      turned += sample->gyro.norm() * toSeconds(sample->time - std::prev(sample)->time);
+    }
+    if (frame.camera != 0) continue;
+    if (last && frame.time - *last < kMost && turned < kMost_rad) continue;
+    kept.insert(frame.index);
+    last = frame.time, turned = 0.0;
+  }
+  std::erase_if(recording.frames, [&](const auto& frame) { return !kept.contains(frame.index); });
+  return recording;
 }
 
 RigCheck checkRig(replay::Dataset& drive, const RigCheckOptions& options) {

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,7 +19,6 @@ struct RigCheckOptions {
   std::filesystem::path data;  ///< the drive's name in messages
   double seconds = 60.0;       ///< largest duration of the drive that is used
   bool until_sure = false;     ///< ends when everything is good and vio is certain
-  std::function<bool()> cancelled = [] { return false; };  ///< ends the run; asked at each image
   vio::Config vio = {};
 };
 
@@ -42,8 +40,8 @@ struct RigCheck {
   double gyro_bias_change = 0.0, accel_bias_change = 0.0;  ///< changes in the second half
 };
 
-/// Whether everything is good and vio is certain: standard deviations are at most a fifth of the
-/// bad limits, so that a bad value would be detected.
+/// Whether everything is good and vio is certain: standard deviations are at most a quarter of
+/// the bad limits, so that a bad value would be detected.
 bool isSurelyGood(const RigCheck& check);
 
 /// Observes a running vio.
@@ -67,6 +65,10 @@ class RigWatch {
   std::string saved_;
   std::vector<Eigen::Vector3d> gyro_, accel_;
 };
+
+/// The recording without images that follow another one within 80 ms and .05 rad of turning. Vio
+/// needs all images of drives shorter than 30 s; they are unchanged.
+replay::Recording thinned(replay::Recording recording);
 
 /// Reads the drive, from its start on, as grey images. Throws StartupError if it has no images or
 /// samples that can be read.

@@ -100,6 +100,7 @@ replay::DataFindings checkPoses(const replay::Recording& recording, const replay
   const auto poses = timedPoses(file, recording);
   // After one of these findings, all other checks would fail too.
   findings = judgePosesOfCamera(poses, recording);
+  if (findings.empty()) findings = judgePosesBackwards(poses, recording);
   if (findings.empty()) findings = judgePosesFrozen(poses, recording, use.images);
   if (findings.empty()) findings = judgePoseJumps(poses);
   if (!findings.empty()) return findings;

@@ -59,7 +59,7 @@ std::string makerOf(const SensorFile& file) {
       {"extrinsicRotation", kVins},
       {"projection_parameters", kVins},
       {"mirror_parameters", kVins},
-      {"cameras", "of Spectacular AI or OKVIS (not imported)"},
+      {"cameras", "of Spectacular AI, OKVIS or maplab (not imported)"},
       {"relative_config_imucam", "of OpenVINS, which names the files to give (not imported)"},
       {"target_type", "Kalibr's description of a board (not imported)"},
       {"gyroscope_noise_density", "an IMU's alone, without its cameras"},

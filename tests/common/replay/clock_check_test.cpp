@@ -122,6 +122,19 @@ TEST(ClockCheck, AClockOfAnotherRateIsSaidByTheDeclaredRatesOfBothSensors) {
   EXPECT_EQ(warningOf(101.0, 10.1), "none");
 }
 
+TEST(ClockCheck, AClockOfOneSensorThatRunsFastIsToldFromACameraOfALowerRate) {
+  const auto slower = [](Duration time) { return time + (time - seconds(100)) * 7 / 100; };
+  auto drive = readWith(kSame, slower);
+  drive.calibration.imu.emplace().rate_hz = 100.0;
+  auto& camera = drive.calibration.cameras.emplace_back();
+  camera.name = "cam0", camera.rate_hz = 10.0;
+  EXPECT_THAT(finding(drive, DataFinding::Grade::kWarning, "declared_rates"),
+              HasSubstr("the stamps of cam0 run 7.0 % too fast"));
+  const TimePoint end = drive.imu.back().time;
+  std::erase_if(drive.frames, [&](const auto& frame) { return frame.time > end; });
+  EXPECT_EQ(finding(drive, DataFinding::Grade::kWarning, "declared_rates"), "none");
+}
+
 TEST(ClockCheck, ATwentiethOfTheImagesOutsideOfTheSamplesIsTold) {
   const auto warningOf = [](Duration late) {
     const Stamp images = [=](Duration time) { return time + late; };

@@ -137,7 +137,7 @@ TEST(RecordedDrive, AFileWithoutMessagesIsRefused) {
   EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = folder / "none.mcap"}); }),
               HasSubstr("is no MCAP file"));
   EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = folder / "absent.mcap"}); }),
-              HasSubstr("No such file"));
+              HasSubstr("is missing"));
 }
 
 TEST(RecordedDrive, TakesAnyBytesAndGivesMessagesOrARefusal) {

@@ -24,7 +24,11 @@ TEST(ModelFile, WhatIsNoNetworkIsNamed) {
       {"PK\x03\x04 archive/data.pkl", "PyTorch"},
       {"<?xml version='1.0'?><net>", "OpenVINO"},
       {"\x1f\x8b\x08", "compressed"},
-      {"\x89HDF\r\n", "Keras"}};
+      {"\x89HDF\r\n", "Keras"},
+      {"ftrt\x01", "TensorRT"},
+      {"7767517\n3 3\n", "ncnn"},
+      {std::string(600, '\0'), "zeros only"},
+      {"Quota exceeded\n", "text that begins with `Quota exceeded`"}};
   for (const auto& [bytes, words] : cases) EXPECT_THAT(whyNoNetwork(bytes), HasSubstr(words));
   EXPECT_EQ(whyNoNetwork(""), "");
   EXPECT_EQ(whyNoNetwork("\x08\x07\x12\x07pytorch"), "") << "ONNX";

@@ -256,7 +256,7 @@ TEST_F(RigImport, FilesOfOtherProgramsAreNamedAsARig) {
   EXPECT_THAT(why("ost.yaml", kCameraInfo), AllOf(HasSubstr("camera_info"), HasSubstr(imports)));
   EXPECT_THAT(
       why("sai.json", "{\"cameras\": [{\"focalLengthX\": 500}]}"),
-      AllOf(HasSubstr("of Spectacular AI or OKVIS (not imported)"), Not(HasSubstr(imports))));
+      AllOf(HasSubstr("of Spectacular AI, OKVIS or maplab (not imported)"), Not(HasSubstr(imports))));
   EXPECT_THAT(why("board.yaml", "target_type: aprilgrid\n"),
               HasSubstr("Kalibr's description of a"));
   EXPECT_THAT(why("other.yaml", "speed: 3\n"),

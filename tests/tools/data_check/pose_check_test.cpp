@@ -329,6 +329,21 @@ TEST(PoseCheck, PosesOfACameraOnAShortStraightWayAreToldByTheAccelerometer) {
   EXPECT_EQ(findings[0].grade, DataFinding::Grade::kFatal);
 }
 
+TEST(PoseCheck, InvertedPosesOfAStraightWayMoveBackwards) {
+  Way way = wayOf({0.0, 0.0, 0.0});
+  SpeedSample speed;
+  speed.time = way.poses.front().time, speed.speed = 5.0;
+  way.recording.speed.push_back(speed);
+  for (std::size_t i = 0; i < way.poses.size(); ++i) {
+    way.poses[i].T_WB =
+        RigidTransform(Eigen::Quaterniond::Identity(), {0.02 * static_cast<double>(i), 0.0, 0.0});
+  }
+  EXPECT_THAT(codesIn(judgePosesBackwards(way.poses, way.recording)), ElementsAre());
+  for (auto& pose : way.poses) pose.T_WB = pose.T_WB.inverse();
+  EXPECT_THAT(codesIn(judgePosesBackwards(way.poses, way.recording)),
+              ElementsAre("poses_backwards"));
+}
+
 TEST(PoseCheck, PosesThatStandStillWhileTheBodyMovesAreToldWithTheTime) {
   const Poses sound = eachOf(phone().poses, 10);
   for (const std::size_t last : {sound.size(), std::size_t{230}}) {

@@ -2,9 +2,7 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cstdio>
-#include <future>
 
 #include "tools/bus_tools/doctor/doctor.h"
 #include "tools/calibrate/motion/from_motion.h"
@@ -31,12 +29,12 @@ void addFindings(const replay::DataFindings& of_data, Findings& findings) {
   }
 }
 
-std::unique_ptr<replay::Dataset> openGrey(const Drive& drive) {
-  return replay::Dataset::open({.path = drive.data,
-                                .sequence = drive.sequence,
-                                .encoding = ImageEncoding::kMono8,
-                                .second_encoding = ImageEncoding::kMono8,
-                                .rig = drive.rig});
+replay::DatasetOptions inGrey(const Drive& drive) {
+  return {.path = drive.data,
+          .sequence = drive.sequence,
+          .encoding = ImageEncoding::kMono8,
+          .second_encoding = ImageEncoding::kMono8,
+          .rig = drive.rig};
 }
 
 void checkPosesOf(const Drive& drive, const replay::Recording& recording, Findings& findings) {
@@ -62,7 +60,13 @@ void checkMotionOf(const replay::Recording& recording, replay::DataFindings& of_
   findings.push_back({Verdict::kOk, check.basis});
 }
 
-/// Returns whether the rig can be judged by the recording.
+/// Vio would only show the consequences of these.
+bool contradictsRig(const replay::DataFinding& finding) {
+  return finding.code == "focal_length" || finding.code == "time_offset" ||
+         finding.code == "readout";
+}
+
+/// Returns whether vio can judge the rig by the recording.
 bool checkRecording(const Drive& drive, const replay::Recording& recording, Findings& findings) {
   // The notes of 7-Scenes state what its layout leaves open; they are not faults of the data.
   const bool scenes = recording.kind == replay::DatasetKind::kSevenScenes;
@@ -77,6 +81,12 @@ bool checkRecording(const Drive& drive, const replay::Recording& recording, Find
   const bool usable = isUsable(of_data), without_imu = of_layout && !recording.calibration.imu;
   checkMotionOf(recording, of_data, findings);
   addFindings(of_data, findings);
+  if (std::ranges::any_of(of_data, contradictsRig)) {
+    findings.push_back({Verdict::kFail,
+                        "vio was not run, because the motion contradicts the rig: correct what is "
+                        "named above, and check again"});
+    return false;
+  }
   if (usable) checkPosesOf(drive, recording, findings);
   if (usable && without_imu) {
     findings.push_back(
@@ -88,28 +98,6 @@ bool checkRecording(const Drive& drive, const replay::Recording& recording, Find
   }
   return usable && !without_imu;
 }
-
-/// Runs vio in another thread; it ends early if its result is not wanted.
-class RunningVio {
- public:
-  RunningVio(const Drive& drive, replay::Dataset& dataset, calibrate::RigCheckOptions options) {
-    // Only one thread may read images inside a recording file.
-    const auto& frames = dataset.recording().frames;
-    if (!frames.empty() && frames.front().load) own_ = openGrey(drive);
-    options.cancelled = [this] { return cancelled_.load(); };
-    result_ = std::async(std::launch::async, calibrate::checkRig, std::ref(own_ ? *own_ : dataset),
-                         options);
-  }
-  ~RunningVio() { cancelled_ = true; }
-  RunningVio(const RunningVio&) = delete;
-  RunningVio& operator=(const RunningVio&) = delete;
-  calibrate::RigCheck get() { return result_.get(); }
-
- private:
-  std::unique_ptr<replay::Dataset> own_;
-  std::atomic<bool> cancelled_ = false;
-  std::future<calibrate::RigCheck> result_;  ///< its destructor waits
-};
 
 void showProgress(std::size_t done, std::size_t all) {
   constexpr std::size_t kEvery = 50;
@@ -134,10 +122,13 @@ Findings checkRigBy(const Drive& drive, std::optional<double> seconds) {
   calibrate::RigCheckOptions options;
   options.data = drive.data, options.until_sure = !seconds;
   if (seconds) options.seconds = *seconds;
-  const auto dataset = openGrey(drive);
-  RunningVio vio(drive, *dataset, options);
+  auto dataset = replay::Dataset::open(inGrey(drive));
   if (!checkRecording(drive, dataset->recording(), findings)) return findings;
-  const auto check = vio.get();
+  if (!seconds) {
+    dataset =
+        std::make_unique<replay::Dataset>(inGrey(drive), calibrate::thinned(dataset->recording()));
+  }
+  const auto check = calibrate::checkRig(*dataset, options);
   auto judgements = calibrate::judgeRig(check);
   settleUpsideDown(calibrate::worstOf(judgements) == calibrate::Grade::kGood, findings);
   if (check.cameras > 1 && calibrate::isSecondSuspect(check)) {
@@ -182,7 +173,7 @@ Findings fixRecording(const Drive& given, const std::string& folder) {
   }
   findings.push_back({Verdict::kOk, "written: " + folder});
   const Drive copy{.data = folder};
-  checkRecording(copy, openGrey(copy)->recording(), findings);
+  checkRecording(copy, replay::Dataset::open(inGrey(copy))->recording(), findings);
   return findings;
 }
 

@@ -8,6 +8,7 @@
 #include "common/base/checked_file.h"
 #include "common/base/errors.h"
 #include "common/replay/files/rig_file.h"
+#include "tools/data_check/data_check.h"
 
 namespace perdure::calibrate {
 namespace {
@@ -189,7 +190,9 @@ std::vector<std::string> writeMotionRig(const replay::DatasetOptions& drive,
     throw StartupError(ExitCode::kData, "{}{}; record images and IMU together", where,
                        recording.imu.empty() ? "has no inertial samples" : "has no camera");
   }
-  replay::refuseFatal(replay::checkData(recording, {}), drive.path.string());
+  const auto doubts = replay::checkData(recording, {});
+  replay::refuseFatal(doubts, drive.path.string());
+  tools::printDoubts(recording, doubts);
   const auto found = rigFromMotion(recording, options);
   if (!found) throw StartupError(ExitCode::kData, where + found.error().detail);
   const auto lines = linesOf(*found);

@@ -76,12 +76,13 @@ bool isSure(const JointEstimate& joint, double share) {
 
 MotionCheck checkMotion(const replay::Recording& recording) {
   constexpr std::size_t kWindows = 12, kFewest = 6;
+  constexpr double kSpacing_s = 0.06;  // closer images cost more than they tell
   const CameraCalibration& given = recording.calibration.cameras.front();
   if (given.distortion == DistortionModel::kRational) {
     return {{}, "the motion is not compared with a lens of eight coefficients"};
   }
   const JointOptions options{{given, Eigen::Vector3d::Zero()}, narrowPriors(given), 10};
-  TrackWindows tracks = trackWindows(recording, {.most = kFewest});
+  TrackWindows tracks = trackWindows(recording, {.most = kFewest, .spacing_s = kSpacing_s});
   JointEstimate joint;
   const auto estimate = [&] {
     const bool enough = tracks.windows.size() >= kFewest;
@@ -92,7 +93,8 @@ MotionCheck checkMotion(const replay::Recording& recording) {
   // or if they are so uncertain that others cannot change that.
   const bool first = estimate(), sure = first && isSure(joint, 0.5) && judge(given, joint).empty();
   if (!sure && (!first || isSure(joint, 2.0))) {
-    tracks.add(trackWindows(recording, {.most = kWindows - kFewest, .skip = kFewest}));
+    tracks.add(trackWindows(
+        recording, {.most = kWindows - kFewest, .skip = kFewest, .spacing_s = kSpacing_s}));
     if (!estimate()) {
       return {{}, "too few images with corners to judge focal length, time offset and readout"};
     }

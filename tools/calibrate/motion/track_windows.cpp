@@ -15,11 +15,13 @@ using Run = std::pair<std::size_t, std::size_t>;  ///< first frame, and one past
 
 constexpr std::size_t kFewestTracks = 15, kMostTracks = 40, kMostImages = 7;
 
-Frames framesOf(const replay::Recording& recording, double until_s) {
+Frames framesOf(const replay::Recording& recording, const WindowOptions& options) {
   Frames frames;
   for (const auto& frame : recording.frames) {
     if (frame.camera != 0 || (!frame.load && frame.path.empty())) continue;
-    if (!frames.empty() && toSeconds(frame.time - frames.front()->time) > until_s) break;
+    if (!frames.empty() && toSeconds(frame.time - frames.front()->time) > options.until_s) break;
+    if (!frames.empty() && toSeconds(frame.time - frames.back()->time) < options.spacing_s)
+      continue;
     frames.push_back(&frame);
   }
   return frames;
@@ -131,7 +133,7 @@ void TrackWindows::add(TrackWindows more) {
 
 TrackWindows trackWindows(const replay::Recording& recording, const WindowOptions& options) {
   TrackWindows result;
-  const Frames frames = framesOf(recording, options.until_s);
+  const Frames frames = framesOf(recording, options);
   if (frames.size() < 3 || recording.imu.size() < 3) return result;
   const CameraCalibration& camera = recording.calibration.cameras.front();
   // Files are read in parallel; frames inside a recording file are read one after another.

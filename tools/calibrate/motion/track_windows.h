@@ -17,11 +17,12 @@ struct TrackWindow {
 };
 
 struct WindowOptions {
-  std::size_t most = 40;  ///< largest number of windows
-  std::size_t skip = 0;   ///< windows with larger rotations that are left out
-  double seconds = 0.7;   ///< length of a window, at least three images; shorter ones do not
-                          ///< separate slow translation from rotation
-  double until_s = 1e9;   ///< since the first image; later images are not used
+  std::size_t most = 40;   ///< largest number of windows
+  std::size_t skip = 0;    ///< windows with larger rotations that are left out
+  double seconds = 0.7;    ///< length of a window, at least three images; shorter ones do not
+                           ///< separate slow translation from rotation
+  double spacing_s = 0.0;  ///< least time between the images that are followed
+  double until_s = 1e9;    ///< since the first image; later images are not used
 };
 
 struct TrackWindows {

@@ -49,7 +49,11 @@ replay::DataFindings judgePoseMoving(const std::vector<replay::StampedPose>& pos
 replay::DataFindings judgePosesOfCamera(const std::vector<replay::StampedPose>& poses,
                                         const replay::Recording& recording);
 
-/// A pose that is repeated for over a second while gyroscope, speed or (`images`) images move.
+/// Poses that move backwards all the time while the speed is positive. Code: poses_backwards.
+replay::DataFindings judgePosesBackwards(const std::vector<replay::StampedPose>& poses,
+                                         const replay::Recording& recording);
+
+/// A pose that is repeated for over .4 s while gyroscope, speed or (`images`) images move.
 /// Code: poses_frozen.
 replay::DataFindings judgePosesFrozen(const std::vector<replay::StampedPose>& poses,
                                       const replay::Recording& recording, bool images);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "common/base/algorithms/median.h"
 #include "tools/data_check/motion_in.h"
 #include "tools/data_check/poses/pose_check.h"
 
@@ -19,9 +20,9 @@ using Grade = DataFinding::Grade;
 using Poses = std::vector<StampedPose>;
 
 /// The mean of the directions of travel, in the frame that the poses have, over steps of a metre;
-/// its length shows how constant they are. Zero for a path under twenty metres.
-Eigen::Vector3d courseOf(const Poses& poses) {
-  constexpr double kStep_m = 1.0, kFewest = 20.0;
+/// its length shows how constant they are. Zero for fewer steps.
+Eigen::Vector3d courseOf(const Poses& poses, double fewest) {
+  constexpr double kStep_m = 1.0;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double count = 0.0;
   for (std::size_t i = 0, from = 0; i < poses.size(); ++i) {
@@ -30,7 +31,7 @@ Eigen::Vector3d courseOf(const Poses& poses) {
     sum += poses[from].T_WB.q.conjugate() * step.normalized();
     from = i, count += 1.0;
   }
-  return count < kFewest ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : Eigen::Vector3d(sum / count);
+  return count < fewest ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : Eigen::Vector3d(sum / count);
 }
 
 /// How constant an axis of the poses is in their world: 1 is constant.
@@ -44,10 +45,10 @@ struct Still {
   std::size_t first, last;
 };
 
-/// The longest time, over a second, in which a pose is repeated.
+/// The longest time, over .4 s, in which a pose is repeated.
 std::optional<Still> longestStill(const Poses& poses) {
   constexpr double kSame_m = 1e-4, kSame_rad = 1e-4;
-  constexpr Duration kLeast = std::chrono::seconds(1);
+  constexpr Duration kLeast = std::chrono::milliseconds(400);
   constexpr std::size_t kFewest = 5;
   std::optional<Still> longest;
   Duration most = kLeast;
@@ -67,7 +68,7 @@ DataFindings judgePosesOfCamera(const Poses& poses, const replay::Recording& rec
   constexpr double kCourse = 0.95, kTurned_rad = 0.2, kAlong = 0.9, kAsConstant = 0.01;
   if (poses.empty() || recording.calibration.cameras.empty()) return {};
   const CameraCalibration& camera = recording.calibration.cameras.front();
-  const Eigen::Vector3d course = courseOf(poses), down = Eigen::Vector3d::UnitY();
+  const Eigen::Vector3d course = courseOf(poses, 20.0), down = Eigen::Vector3d::UnitY();
   if (course.norm() < kCourse || Eigen::AngleAxisd(camera.T_BC.q).angle() < kTurned_rad) return {};
   const Eigen::Vector3d as_body = camera.T_BC.q.conjugate() * course;
   if (std::abs(course.z()) < kAlong || std::abs(as_body.y()) < kAlong) return {};
@@ -78,6 +79,18 @@ DataFindings judgePosesOfCamera(const Poses& poses, const replay::Recording& rec
                        "upright: give --odometry-of camera, or T_WB, which is T_WC times the "
                        "inverse of T_BS",
                        camera.name, as_body.y() < 0 ? "upwards" : "downwards")}};
+}
+
+DataFindings judgePosesBackwards(const Poses& poses, const replay::Recording& recording) {
+  constexpr double kBackwards = -0.95, kForwards_mps = 1.0;
+  std::vector<double> speeds;
+  for (const SpeedSample& sample : recording.speed) speeds.push_back(sample.speed);
+  const double speed = medianOf(std::move(speeds));
+  if (courseOf(poses, 5.0).x() > kBackwards || speed < kForwards_mps) return {};
+  return {{Grade::kWarning, "poses_backwards",
+           fmt::format("the poses move backwards all the time while the speed is {:.1f} m/s: they "
+                       "are inverted (the world in the body), or their x axis is not forward",
+                       speed)}};
 }
 
 DataFindings judgePosesFrozen(const Poses& poses, const replay::Recording& recording, bool images) {

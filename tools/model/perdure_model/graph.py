@@ -55,7 +55,7 @@ class Graph:
             raise Fault(f"{e.filename or path} is missing; give an .onnx file (weights kept in a second file must lie "
                         "beside it)", UNAVAILABLE)
         except Exception as e:  # protobuf's own errors, and others for a truncated file
-            raise Fault(f"{path} is not a whole ONNX file ({str(e).splitlines()[0] if str(e) else type(e).__name__}); "
+            raise Fault(f"{path} is not a whole ONNX file ({str(e).splitlines()[0] if str(e) and not isinstance(e, SystemError) else 'cut or damaged'}); "
                         "export or copy it again", DATA)
         graph = model.graph
         if not graph.node or not graph.output:

@@ -23,7 +23,12 @@ class CocoReader {
 
   CocoBoxes read() {
     const Json json = Json::parse(std::ifstream(file_), nullptr, false);
-    if (json.is_discarded()) refuse("is no whole JSON document; write it again");
+    if (json.is_discarded()) {
+      std::string line;
+      std::getline(std::ifstream(file_), line);
+      refuse(Json::accept(line) ? "has a JSON document in each line; write one list of them"
+                                : "is no whole JSON document; write it again");
+    }
     const Json& boxes = json.is_array() ? json : memberOf(json, "annotations");
     if (!boxes.is_array()) refuse("is no list of COCO's results and has no `annotations`");
     if (json.is_object()) readTables(json);
@@ -60,9 +65,10 @@ class CocoReader {
         refuse("has two `images` with the id " + memberOf(image, "id").dump());
       }
       if (!result_.frames->insert(frame).second && frame != kNoFrame) {
-        refuse(fmt::format("has two `images` of frame {}, the second is {}; give the boxes of one "
-                           "camera of one drive",
-                           frame, memberOf(image, "file_name").dump()));
+        refuse(
+            fmt::format("has two `images` of frame {}, the second is {}; give the boxes of one "
+                        "camera of one drive",
+                        frame, memberOf(image, "file_name").dump()));
       }
     }
   }
@@ -93,8 +99,9 @@ class CocoReader {
     const bool ends_with_drive = !numbers_.empty() && *frames.rbegin() == last;
     const bool complete = result_.frames && *frames.rbegin() == frames.size();
     if (!beyond && (!complete || ends_with_drive)) {
-      result_.note = "its frames begin at 1 and are taken as counted from 0; if they count from 1, "
-                     "subtract 1 from each";
+      result_.note =
+          "its frames begin at 1 and are taken as counted from 0; if they count from 1, "
+          "subtract 1 from each";
       return;
     }
     for (CocoBox& box : result_.boxes) --box.frame;
@@ -102,8 +109,8 @@ class CocoReader {
       result_.frames->clear();
       for (const std::uint64_t frame : frames) result_.frames->insert(frame - 1);
     }
-    result_.note = fmt::format("its frames are 1 … {}: they count from 1 and were read so",
-                               *frames.rbegin());
+    result_.note =
+        fmt::format("its frames are 1 … {}: they count from 1 and were read so", *frames.rbegin());
   }
 
   std::uint64_t frameOf(const Json& object, const char* name) const {

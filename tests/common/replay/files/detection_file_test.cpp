@@ -251,6 +251,8 @@ TEST(DetectionFile, WhatIsWrongInCocoIsNamed) {
   };
   EXPECT_THAT(results(R"({"image_id": 0, "category_id": 3, "bbox": [1, 2, 3, 4)"),
               HasSubstr("is no whole JSON"));
+  EXPECT_THAT(startupErrorOf([] { readCsv("{\"frame\": 0}\n{\"frame\": 1}\n", ofClass("car")); }),
+              HasSubstr("a JSON document in each line"));
   EXPECT_THAT(results(R"({"image_id": "a", "category_id": 3, "bbox": [1, 2, 3, 4]})"),
               HasSubstr("`image_id`: \"a\""));
   EXPECT_THAT(results(R"({"image_id": 0, "category_id": 3, "segmentation": []})"),
