@@ -75,7 +75,8 @@ void Mapper::dropTentativeLoops() {
   }
 }
 
-/// Takes the scale of the session's odometry errors from its anchors.
+/// The scale of the session's odometry errors: that of its anchors in a replay, which changes
+/// nothing, otherwise the one that its loops show.
 void Mapper::continueDrift(const WorldId& session) {
   const auto last = state_.newestOf(session);
   odometry_variance_ = last ? last->scale : DriftVariance();
@@ -109,7 +110,7 @@ void Mapper::replay(const WorldId& session) {
     search();
   }
   replays_ = false;
-  searched_at_m_ = searched_widely_at_m_ = builder_.way_m();
+  searched_at_m_ = searched_widely_at_m_ = learned_at_m_ = builder_.way_m();
 }
 
 void Mapper::onOdometry(const Odometry& odometry) {

@@ -24,9 +24,6 @@ struct DriftVariance {
   DriftVariance over(const DriftVariance& other) const {
     return {plane / other.plane, height / other.height};
   }
-  DriftVariance times(const DriftVariance& factor) const {
-    return {plane * factor.plane, height * factor.height};
-  }
   bool operator==(const DriftVariance&) const = default;
 };
 

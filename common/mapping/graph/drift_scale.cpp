@@ -7,7 +7,6 @@
 
 #include "common/mapping/frames/level_errors.h"
 #include "common/math/gaussian.h"
-#include "common/math/so3.h"
 
 namespace perdure::mapping {
 namespace {

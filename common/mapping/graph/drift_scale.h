@@ -22,9 +22,9 @@ class DriftScale {
   DriftScale(const DriftScaleParameters& parameters, const std::vector<Anchor>& way);
 
   /// Uses loops between anchors of the way, all at once: loops with common increments have common
-  /// errors. Of the loops that end within one stretch of `apart_m`, the most accurate one is used,
-  /// and of the stretches the newest twelve. Loops that the others contradict, and
-  /// other edges, are left out. Returns whether one was used.
+  /// errors. Among the loops that end within one stretch of `apart_m`, the most accurate one is
+  /// used, and of the stretches the newest twelve. Loops that the others contradict, and other
+  /// edges, are left out. Returns whether one was used.
   bool use(const std::vector<Edge>& loops, double apart_m);
 
   /// The factors for covariances of the odometry at a quantile of the posterior, in (0, 1).

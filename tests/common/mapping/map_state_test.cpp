@@ -148,6 +148,32 @@ TEST(MapState, AnAnchorThatIsNoLongerTheFirstOneIsSavedThoughItStaysWhereItIs) {
   pair.save();
 }
 
+/// Increments that had different factors have the same one afterwards, also in the graph.
+TEST(MapState, AllIncrementsOfASessionHaveOneScale) {
+  MapState state({}, {});
+  const WorldId session{1, 0}, other{2, 0};
+  for (AnchorId id = 1; id <= 4; ++id) {
+    Anchor anchor = anchorAt(id, id - 1, id < 4 ? session : other, 12.0 * static_cast<double>(id));
+    if (id == 4) anchor.previous = 0;
+    if (id == 2) anchor.scale = {9.0, 4.0};
+    anchor.from_previous.covariance = anchor.scale.of(Eigen::Matrix4d::Identity());
+    state.add(anchor);
+  }
+  state.scaleOdometry({4.0, 0.25}, session);
+  const Eigen::Matrix4d expected = Eigen::Vector4d(4.0, 4.0, 0.25, 4.0).asDiagonal();
+  for (const AnchorId id : {2u, 3u}) {
+    EXPECT_EQ(state.anchors().at(id).scale, (DriftVariance{4.0, 0.25}));
+    EXPECT_LT((state.anchors().at(id).from_previous.covariance - expected).norm(), 1e-12);
+  }
+  EXPECT_EQ(state.anchors().at(4).scale, DriftVariance());
+  std::size_t edges = 0;
+  for (const auto& [id, edge] : state.graph().edges()) {
+    EXPECT_LT((edge.T_ab.covariance - expected).norm(), 1e-12);
+    ++edges;
+  }
+  EXPECT_EQ(edges, 2u);
+}
+
 TEST(MapState, AnyStepsLeaveWhatOneSaveWouldHaveWritten) {
   for (std::uint32_t seed = 1; seed <= 20; ++seed) {
     std::mt19937 random(seed);
@@ -194,7 +220,8 @@ TEST(MapState, AnyStepsLeaveWhatOneSaveWouldHaveWritten) {
         pair.both([](MapState& state) { state.optimise(); });
       } else if (any < 88) {
         const WorldId session{1 + random() % 3, 0};
-        pair.both([&](MapState& state) { state.scaleOdometry({1.5, 2.0}, session); });
+        const DriftVariance scale{1.0 + static_cast<double>(random() % 4), 2.0};
+        pair.both([&](MapState& state) { state.scaleOdometry(scale, session); });
       } else if (any < 92) {
         const std::string name = "class" + std::to_string(random() % 5);
         pair.both([&](MapState& state) { state.numberOf(name); });
