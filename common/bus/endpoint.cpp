@@ -330,9 +330,8 @@ void RawWriter::leaveSharedMemory(const Reason& reason) {
   }
 }
 
-/// RouDi connects a writer to its readers up to 100 ms after DDS has matched them; earlier messages
-/// are lost. The first message with readers waits for that, so that no frame at the start of a
-/// drive is lost.
+/// RouDi connects a writer to its readers up to 100 ms after DDS has matched them, and earlier
+/// messages are lost. The first message with readers waits for that.
 void RawWriter::awaitJoin() {
   constexpr dds_duration_t kJoin = DDS_MSECS(200);
   if (!in_shared_memory_ || joined_ || matched() == 0) return;

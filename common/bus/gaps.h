@@ -1,5 +1,4 @@
-// Counts lost messages. A reader with a short history overwrites its oldest samples if its process
-// is late. DDS does not report this loss, but the sequence numbers of the stamps reveal it.
+// Counts messages that a late reader's short history overwrote. DDS does not report this loss.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +8,7 @@ namespace perdure::bus {
 /// One counter per topic with numbered stamps: the frames of one camera, or odometry.
 class Gaps {
  public:
-  /// Returns the number of sequence numbers between this message of `source` and the newest one
-  /// before it. Returns 0 for the first message of a source, and for repeated or late messages.
+  /// Missing sequence numbers between this message of `source` and the newest one before it.
   std::uint64_t before(std::uint64_t source, std::uint64_t sequence) {
     const bool follows = any_ && source == source_;
     if (follows && sequence <= newest_) return 0;

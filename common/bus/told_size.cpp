@@ -9,8 +9,7 @@
 namespace perdure::bus {
 namespace {
 
-/// QoS of endpoints that match each other only. They do not use shared memory, because their
-/// liveliness is manual.
+/// QoS of endpoints that match each other only; manual liveliness excludes shared memory.
 QosPtr privateQos() {
   QosPtr qos(dds_create_qos());
   dds_qset_partition1(qos.get(), "perdure/size");

@@ -5,10 +5,8 @@
 
 namespace perdure::bus {
 
-/// Cyclone 0.10.2 determines the size of a variable-length message in shared memory by serialising
-/// it, including its pixels, and discards the result. After this call the type of this topic of
-/// frames computes the size instead. It has no effect if Cyclone's interface differs from the
-/// expected one.
+/// Cyclone 0.10.2 finds the size of a message in shared memory by serialising it with its pixels.
+/// After this call the type of this topic of frames computes the size instead.
 void tellSizesOfFrames(std::int32_t participant, std::int32_t topic);
 
 }  // namespace perdure::bus

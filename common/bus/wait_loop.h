@@ -1,6 +1,5 @@
-// The main loop of a service. It waits for messages, ticks and wake-ups, and calls handlers in the
-// order of their registration. Handlers run in the thread that calls run(). Readers may belong to
-// several participants in several domains.
+// The main loop of a service: waits for messages, ticks and wake-ups, and calls handlers in the
+// order of their registration, in the thread that calls run().
 #pragma once
 
 #include <atomic>
@@ -39,8 +38,7 @@ class WaitLoop {
       });
     });
   }
-  /// Removes a reader, which may be destroyed afterwards. Must not be called from a handler of
-  /// messages or ticks, because the loop is iterating over the readers then.
+  /// Removes a reader. Must not be called from a handler of messages or ticks.
   void off(const Endpoint& reader);
   /// The first tick comes after one period; missed ticks are dropped.
   /// The tick is suspended while `wanted` returns false; the loop's thread calls `wanted`.
@@ -53,8 +51,7 @@ class WaitLoop {
   void run();
   /// Waits once, at most for `longest`, and handles what is available.
   void runOnce(std::chrono::nanoseconds longest);
-  /// May be called from any thread, but not from a signal handler. run() returns after the current
-  /// handler; other messages of its batch are dropped.
+  /// From any thread, but no signal handler. run() returns after the current handler.
   void stop();
   bool stopped() const { return stopped_; }
   /// May be called from any thread, but not from a signal handler.

@@ -5,8 +5,7 @@
 
 namespace perdure {
 
-/// Returns true if name, size, lens, pose on the body and times are exactly equal. The nominal rate
-/// may differ.
+/// True if name, size, lens, pose and times are equal. The nominal rate may differ.
 bool sameCamera(const CameraCalibration& a, const CameraCalibration& b);
 
 }  // namespace perdure

@@ -1,5 +1,4 @@
-// The health message of a process, published once a second. Handlers count; the system's values are
-// added.
+// The health message of a process, published once a second.
 #pragma once
 
 #include <atomic>

@@ -12,18 +12,15 @@ class Input {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// The name of the input, "inertial samples", and the fix for its silence: "mend the IMU, or
-  /// start capture".
+  /// `what`: "inertial samples"; `mend`: "mend the IMU, or start capture".
   Input(std::string what, std::string mend) : what_(std::move(what)), mend_(std::move(mend)) {}
 
   void heard() { heardAt(Clock::now()); }
   void heardAt(Clock::time_point now);
-  /// Returns true after three quarters of a second without a message, or after four periods if that
-  /// is longer. An input that has never arrived is not silent; the service then reports what it is
-  /// waiting for.
+  /// True after three quarters of a second, or four periods, without a message. An input that has
+  /// never arrived is not silent.
   bool silent(Clock::time_point now) const;
-  /// The message about the silence, such as "no inertial samples for 1.2 s; mend the IMU, or start
-  /// capture".
+  /// Such as "no inertial samples for 1.2 s; mend the IMU, or start capture".
   std::string sentence(Clock::time_point now) const;
 
  private:

@@ -156,8 +156,7 @@ void Context::run() {
   publishHealth();
 }
 
-/// Each completed turn of the loop feeds the watchdog. A hanging handler or a stopped process does
-/// not.
+/// Each completed turn of the loop feeds the watchdog.
 void Context::runLoop() {
   constexpr std::chrono::microseconds kLongest{1'000'000};
   Watchdog watchdog;
@@ -200,8 +199,7 @@ void Context::noteSharedMemory() {
   log_->log(domain_.sharedMemory().on() ? spdlog::level::info : spdlog::level::warn, "{}", text);
 }
 
-/// Cyclone disconnects a process when its identity expires. After a restart the process uses the
-/// renewed identity.
+/// Cyclone disconnects a process when its identity expires; a restart uses the renewed one.
 void Context::requireIdentity() const {
   const auto& identity = participant_.identity();
   if (!identity || identity->until > std::chrono::system_clock::now()) return;

@@ -1,5 +1,4 @@
-// Simulates an IMU in the body: point samples of the exact motion, with the errors of the
-// continuous-time model of Kalibr and EuRoC (white noise and bias random walk, given by densities).
+// Simulates an IMU in the body with the error model of Kalibr and EuRoC.
 #pragma once
 
 #include <vector>

@@ -18,8 +18,7 @@ std::optional<std::size_t> sizeOf(dds_stream_typecode kind) {
   return std::size_t{1} << (kind - DDS_OP_VAL_1BY);
 }
 
-/// Follows a message by Cyclone's operations, as Cyclone does, and reads lengths only. The
-/// functions return the next operation, or nullptr for an unknown one.
+/// Follows a message by Cyclone's operations, as Cyclone does, and reads lengths only.
 class Walk {
  public:
   explicit Walk(std::span<const std::uint8_t> cdr) : cdr_(cdr) {}

@@ -42,9 +42,8 @@ Result<CdrSample> CdrSample::read(std::span<const std::uint8_t> message,
   if (version == 0) {
     return fail("bad_encapsulation", std::string("not how ") + type.m_typename + " is encoded");
   }
-  // Cyclone checks and byte-swaps in place, and requires aligned memory. In XCDR2 it checks for
-  // four bytes per array element even if an element has eight. Byte-swapping may therefore access
-  // up to twice the size of the data.
+  // Cyclone checks and byte-swaps in place, needs aligned memory, and may access up to twice the
+  // size of the data.
   const auto payload = message.subspan(kHeader);
   std::vector<std::uint64_t> aligned(2 * payload.size() / sizeof(std::uint64_t) + 1);
   if (!payload.empty()) std::memcpy(aligned.data(), payload.data(), payload.size());

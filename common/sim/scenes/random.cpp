@@ -154,8 +154,7 @@ View ViewFinder::viewFrom(const Eigen::Vector3d& eye, double yaw, double pitch_d
   return view;
 }
 
-/// Returns a trajectory that passes one view a second, each with its own velocity. The motion
-/// between views is arbitrary.
+/// Passes one view a second, each with its velocity; the motion between is arbitrary.
 Trajectory throughViews(const std::vector<View>& views) {
   constexpr int kControls = 10;  // number per second; the middle seven form the view
   std::vector<RigidTransform> controls;

@@ -14,8 +14,7 @@
 namespace perdure::capture {
 namespace {
 
-constexpr double kBlock_s = 0.01;       // duration of the samples in one read, which adds to their
-                                        // age
+constexpr double kBlock_s = 0.01;       // duration of the samples in one read
 constexpr unsigned kTimeout_ms = 1000;  // without a sample for this long, the device counts as lost
 
 std::string sayError(ssize_t code) {
@@ -24,8 +23,7 @@ std::string sayError(ssize_t code) {
   return text;
 }
 
-/// First value of an attribute, from the device, otherwise from its first channel of a kind
-/// ("shared by type").
+/// First value of an attribute, from the device or its first channel of a kind.
 std::optional<double> readNumber(const iio_channel* channel, const char* attribute) {
   double value = 0.0;
   if (iio_channel_attr_read_double(channel, attribute, &value) < 0) return std::nullopt;
@@ -43,8 +41,7 @@ std::string readText(const iio_channel* channel, const char* attribute) {
   return trimmed(text);
 }
 
-/// Requests a rate, and returns the rate that the device has set. Many devices support only a few
-/// rates. Empty if the device has no rate attribute.
+/// Requests a rate, and returns the one that the device has set; empty without the attribute.
 std::optional<double> askRate(const iio_device* device, double wanted) {
   constexpr const char* kRate = "sampling_frequency";
   if (!iio_device_find_attr(device, kRate)) return std::nullopt;

@@ -1,5 +1,4 @@
-// Triggered buffer of one IIO device, local or of an iiod in the network. A thread of its own reads
-// it, and reopens it after a loss.
+// Triggered buffer of one IIO device, local or of an iiod. Its thread reopens it after a loss.
 #pragma once
 
 #include <atomic>

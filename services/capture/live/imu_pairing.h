@@ -25,9 +25,8 @@ struct InertialPair {
 /// Interpolates the acceleration at each reading of the gyroscope.
 class ImuPairing {
  public:
-  /// Returns the samples that this reading completes, in order of time. Readings with decreasing
-  /// time are dropped: "imu_out_of_order". Gyroscope readings without accelerations on both sides
-  /// within a tenth of a second are dropped: "imu_unpaired".
+  /// The samples that this reading completes, in order. Decreasing times ("imu_out_of_order") and
+  /// readings without accelerations within .1 s on both sides ("imu_unpaired") are dropped.
   std::vector<InertialPair> gyro(const Triad& reading);
   std::vector<InertialPair> accel(const Triad& reading);
   const ReasonCounts& reasons() const { return reasons_; }

@@ -1,5 +1,4 @@
-// Checks whether the readings of an IMU become samples. With wrong stamps, data arrive but give no
-// samples.
+// Detects wrong stamps of an IMU: data arrive but give no samples.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +8,7 @@ namespace perdure::capture {
 
 class ImuYield {
  public:
-  /// Takes the current totals of readings and of samples made from them. Returns a sentence if
-  /// fewer than half of the readings since the last call became samples; otherwise empty.
+  /// Takes totals of readings and samples. A sentence if fewer than half became samples.
   std::string look(std::uint64_t read, std::uint64_t given);
 
  private:

@@ -27,11 +27,9 @@ inline constexpr double kRoadWidth = 10.0;  ///< two lanes and two rows of parke
 inline constexpr double kLane = 1.4;        ///< road's centre line to the centre of a lane
 
 inline constexpr double kGridX = 82.0, kGridY = 66.0;  ///< distance between roads
-/// Roads in rows (along x) and columns, which extend slightly beyond the outer crossings. The first
-/// crossing is at the origin.
+/// Roads in rows (along x) and columns. The first crossing is at the origin.
 std::vector<Road> gridOfRoads(int columns, int rows);
-/// The furnishing of a grid of streets: a third of the slots are free, and trees and people are
-/// few.
+/// A third of the slots are free; trees and people are few.
 Furnishing furnishingOfGrid();
 
 /// Straight roads that may cross, with objects on both sides.
@@ -62,8 +60,7 @@ class Streets {
   Furnishing furnishing_;
 };
 
-/// A path on the right-hand lane that turns at these crossings. The first and the last point are
-/// its ends. Right turns are tighter than left turns.
+/// A path on the right-hand lane that turns at these crossings, from the first to the last.
 GroundPath laneThrough(const std::vector<Eigen::Vector2d>& points);
 /// Draws the direction and strength of sun and sky.
 void drawDaylight(SceneBuilder& builder);

@@ -30,15 +30,13 @@ class CameraTimeline {
   double period_ns_ = 0.0;
 };
 
-/// Pairs images by the nearest stamp. An image of cam0 waits for its partner no longer than the
-/// tolerance, and is then passed on alone. If cam1 sends no images, it does not wait. Images of
-/// cam1 wait until later images of cam0 arrive, and are then dropped.
+/// An image of cam0 waits for its nearest partner for the tolerance, if cam1 sends images, and is
+/// then passed on alone. Images of cam1 wait until cam0 is later.
 class StereoPairing {
  public:
   explicit StereoPairing(double rate_hz);
 
-  /// Takes an image of cam0 or cam1 and returns the images to publish: cam0 first, then cam1 with
-  /// the same number. `now_ns`: CLOCK_BOOTTIME.
+  /// Takes an image and returns those to publish: cam0 first, cam1 with the same number.
   std::vector<CameraImage> first(CameraImage image, std::int64_t now_ns);
   std::vector<CameraImage> second(CameraImage image, std::int64_t now_ns);
   /// Returns images whose wait has ended.
@@ -50,8 +48,7 @@ class StereoPairing {
   const std::string& problem() const { return problem_; }
   /// A sentence if the images of a pair typically differ by more than 2 ms.
   const std::string& note() const { return note_; }
-  /// Counts "stereo_unpaired_cam0", "stereo_unpaired_cam1", "camera_out_of_order_cam0" and
-  /// "…_cam1".
+  /// Counts "stereo_unpaired_cam0" and "…_cam1", "camera_out_of_order_cam0" and "…_cam1".
   const ReasonCounts& reasons() const { return reasons_; }
 
  private:

@@ -9,9 +9,8 @@
 
 namespace perdure::capture {
 
-/// Index in `ids` of the id equal to `wanted`, otherwise of the first id that contains it. With
-/// `alone`, only one id may contain it, so that left and right are not exchanged. Fails with
-/// "camera_absent" and the fix.
+/// Index of the id equal to `wanted`, else of the first that contains it. With `alone`, only one
+/// may contain it. Fails with "camera_absent".
 Result<std::size_t> chooseCamera(const std::vector<std::string>& ids, const std::string& wanted,
                                  bool alone);
 

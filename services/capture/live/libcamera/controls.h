@@ -16,8 +16,7 @@ namespace perdure::capture {
 
 struct AskedControls {
   libcamera::ControlList list;
-  std::string missing;  ///< a sentence on settings that the camera does not offer; empty if it
-                        ///< offers all
+  std::string missing;  ///< settings that the camera does not offer
   std::string refused;  ///< why the camera must not be used, with the fix; empty if it may be used
 };
 
@@ -32,9 +31,8 @@ std::span<const KnownFormat> knownFormats();
 void askFlip(libcamera::CameraConfiguration& configuration, const std::string& flip);
 /// Whether the configuration still contains the flip.
 bool flips(const libcamera::CameraConfiguration& configuration, const std::string& flip);
-/// Why images do not follow `camera.flip`, with the fix; empty if they do. With "none", images are
-/// left as delivered. Those of a camera mounted at 90° stay rotated, and are calibrated in this
-/// orientation.
+/// Why images do not follow `camera.flip`, with the fix. With "none", images are left as delivered,
+/// also rotated by 90°.
 std::string flipRefused(const libcamera::CameraConfiguration& configuration,
                         const std::string& flip);
 

@@ -5,10 +5,8 @@
 
 namespace perdure::capture {
 
-/// Calls `leave` and then `end` on the object's thread, and returns the result of `end`. Earlier
-/// messages of that thread are processed first. Messages that these post in turn are also processed
-/// first, for example by queueRequest(); libcamera processes them later, with raw pointers. After
-/// `leave`, the object must not post messages.
+/// Calls `leave` and `end` on the object's thread, after all of its earlier messages and those that
+/// they post (queueRequest()). Returns the result of `end`.
 template <class T, class Answer>
 Answer lastOfAll(T& object, void (T::*leave)(), Answer (T::*end)()) {
   object.invokeMethod(leave, libcamera::ConnectionTypeBlocking);
