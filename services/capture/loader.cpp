@@ -90,8 +90,7 @@ Loader::Loader(const Config& config, std::unique_ptr<replay::Dataset> drive, std
     const auto pauses = static_cast<Duration::rep>(std::max<std::uint64_t>(frame_count_, 2) - 1);
     length_ = end - begin + (end - begin) / pauses;
     until_ = begin + length_;
-    // Starts at the previous frame, because the samples after the last frame of a lap belong to
-    // that lap.
+    // Starts at the previous frame: samples after a lap's last frame belong to that lap.
     first -= std::min<std::uint64_t>(first, 1);
     lap_ = first / frame_count_;
     first %= frame_count_;

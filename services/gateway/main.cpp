@@ -62,8 +62,7 @@ void listenAlways(service::Context& context, gateway::Node& node) {
   context.on(bus::kTopic<MapReply>, [&](const MapReply& m) { node.onMapReply(m); });
 }
 
-/// For the first viewer, waits briefly for the newest stored messages, and then sends the current
-/// state. If none arrive in time, it sends the state received before.
+/// Waits briefly for the newest stored messages before it sends the state to the first viewer.
 class Beginning {
  public:
   explicit Beginning(gateway::Node& node) : node_(node) {}

@@ -1,6 +1,5 @@
-// Thread that runs the network, behind a queue of one frame, and the rules for writing results. The
-// newest frame replaces a waiting one, results carry the current strength of this process, and a
-// new process may take over.
+// Runs the network in a thread behind a queue of one frame, and decides with which strength results
+// are written.
 #pragma once
 
 #include <atomic>
@@ -95,8 +94,7 @@ class Worker {
   mutable std::mutex mutex_;  ///< protects all following members and the writers
   Ownership ownership_;
   Swap swap_;
-  Clock::time_point hold_until_{};  ///< results are withheld until this time, after the strength
-                                    ///< was lowered
+  Clock::time_point hold_until_{};  ///< no results after the strength was lowered
   bool silent_ = false;
   std::string failure_, last_problem_;
   ReasonCounts reasons_;

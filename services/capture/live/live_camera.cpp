@@ -5,8 +5,7 @@
 namespace perdure::capture {
 namespace {
 
-/// Silence is measured in waits without an image, not in time, because the camera may have sent
-/// images while the process was suspended.
+/// Counts waits without an image, because the process may have been suspended.
 constexpr std::chrono::milliseconds kWait{100};
 constexpr int kSilence = 10;
 

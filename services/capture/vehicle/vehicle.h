@@ -17,8 +17,7 @@
 
 namespace perdure::capture {
 
-/// Parses a UDP line: "SPEED" or "SPEED SIGMA" in m/s, separated by blanks or a comma. Fails with
-/// "speed_malformed".
+/// Parses "SPEED" or "SPEED SIGMA" in m/s. Fails with "speed_malformed".
 Result<SpeedReading> readSpeedLine(std::string_view line, double sigma, std::int64_t time_ns);
 
 /// Throws StartupError if the configuration has an invalid signal or address.
@@ -59,8 +58,7 @@ class Vehicle {
   std::optional<SpeedReading> said_;  ///< last reading of a datagram's lines
   EarthAnchor anchor_;
   std::atomic<bool> backwards_{false};
-  std::atomic<std::int64_t> speed_ns_, fix_ns_;  ///< time of the last one; initially the time of
-                                                 ///< the start
+  std::atomic<std::int64_t> speed_ns_, fix_ns_;  ///< initially the start
   mutable std::mutex mutex_;                     // protects the members below
   std::optional<WheelSpeed> wheels_;
   ReasonCounts reasons_;

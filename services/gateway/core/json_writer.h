@@ -32,8 +32,7 @@ class JsonWriter {
     out_ += "\":";
     return *this;
   }
-  /// Writes a number with `decimals` decimals. A value that is not finite becomes 0, because JSON
-  /// cannot represent it.
+  /// Writes a number with `decimals` decimals; 0 if it is not finite.
   JsonWriter& number(double value, int decimals = 4) {
     comma();
     char buffer[64];
@@ -73,8 +72,7 @@ class JsonWriter {
     out_ += ':';
     return *this;
   }
-  /// Writes a member: a key, and a bool, a number, a text, a list of numbers, or a value of a
-  /// type with a function put(JsonWriter&, value).
+  /// Writes a member: a key and a value, which may be of a type with put(JsonWriter&, value).
   template <class Value, class... Decimals>
   JsonWriter& with(std::string_view name, const Value& value, Decimals... decimals) {
     key(name);

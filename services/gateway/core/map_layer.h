@@ -1,5 +1,4 @@
-// The durable map in relation to the working set. Its tiles are in M, the working set is in W, and
-// T_MW of `map/frame` connects them.
+// The durable map in M and the working set in W, connected by T_MW of `map/frame`.
 #pragma once
 
 #include <map>
@@ -26,16 +25,14 @@ class MapLayer {
 
   /// The newest frame if it belongs to this W; otherwise nullptr.
   const MapFrame* frameOf(const WorldId& world) const;
-  /// Transforms points from W to M. Identity if no frame of this W was received; the map store then
-  /// publishes objects of W unchanged.
+  /// Maps W to M. Identity without a frame of this W: map_store then publishes in W.
   RigidTransform T_MW(const WorldId& world) const;
   /// M of this W.
   WorldId mapOf(const WorldId& world) const;
 
   struct View {
     std::vector<MapObject> here;  ///< objects in the M of this W
-    std::size_t elsewhere = 0;    ///< number of objects of maps whose transform to this M is
-                                  ///< unknown
+    std::size_t elsewhere = 0;    ///< of maps whose place in this M is not known
   };
   View viewFrom(const WorldId& world) const;
 

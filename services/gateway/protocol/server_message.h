@@ -1,6 +1,5 @@
-// Messages from the server of the Foxglove WebSocket protocol. time(), playbackState(),
-// serviceResponse(), assetMissing() and messageHead() return bytes of binary messages. The other
-// functions return JSON texts.
+// Messages from the server of the Foxglove WebSocket protocol, as JSON or as bytes of binary
+// messages.
 #pragma once
 
 #include <array>

@@ -1,6 +1,5 @@
-// Access control of the gateway. Host and Origin are checked against foreign pages, because any
-// page in a browser may open ws://127.0.0.1 or a name that resolves to it. The token is checked as
-// well.
+// Access control: Host, Origin and token are checked, because any page in a browser may open
+// ws://127.0.0.1 or a name that resolves to it.
 #pragma once
 
 #include <string>
@@ -23,11 +22,9 @@ class Guard {
 
   /// Fails with host_refused if the Host header does not name this gateway.
   Result<void> checkHost(std::string_view host) const;
-  /// Fails with origin_refused. An empty origin does not come from a browser; an origin with the
-  /// same host and port is the gateway's own page.
+  /// Fails with origin_refused. Browsers send an origin; that of the own page is the host.
   Result<void> checkOrigin(std::string_view origin, std::string_view host) const;
-  /// Fails with token_wrong. The token is in the target's query, or given as "Bearer …"; the
-  /// comparison takes constant time.
+  /// Fails with token_wrong. The token is in the target's query, or given as "Bearer …".
   Result<void> checkToken(std::string_view target, std::string_view authorization) const;
 
  private:

@@ -1,5 +1,4 @@
-// Subscriptions of all clients, messages for late clients, and service calls. The hub has no
-// sockets; one thread uses it.
+// Subscriptions of all clients, messages for late clients, and service calls; one thread.
 #pragma once
 
 #include <chrono>
@@ -76,8 +75,7 @@ class Hub {
  private:
   struct Kept {
     ChannelInfo info;
-    std::deque<Encoded> messages;  ///< messages for late clients: the last ones of kEach, the
-                                   ///< newest of kNewest
+    std::deque<Encoded> messages;  ///< for late clients
     std::size_t subscriptions = 0;
   };
   void handle(Viewer& viewer, const protocol::ClientMessage& message);

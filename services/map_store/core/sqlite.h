@@ -1,5 +1,4 @@
-// RAII wrappers for SQLite: a connection, prepared statements, and a transaction that rolls back
-// automatically.
+// RAII wrappers for SQLite: connection, prepared statements, transaction.
 #pragma once
 
 #include <cstdint>
@@ -21,9 +20,8 @@ struct sqlite3_stmt;
 
 namespace perdure::map_store {
 
-/// The reason of an SQLite result code: "disk_full", "read_only", "busy", "corrupt",
-/// "not_a_database", "cannot_open", "io_error", "constraint" or "database_error"; the detail is
-/// SQLite's sentence.
+/// The reason of a result code: "disk_full", "read_only", "busy", "corrupt", "not_a_database",
+/// "cannot_open", "io_error", "constraint" or "database_error".
 Reason reasonOf(int code, std::string_view detail);
 
 /// The exit status of a program that ends for this reason: 74 for a failed write, else 69.
@@ -58,8 +56,7 @@ Result<std::invoke_result_t<Run>> attempt(Run run) {
   }
 }
 
-/// One prepared statement. Parameters count from 1, columns from 0. Valid for the lifetime of its
-/// connection.
+/// One prepared statement. Parameters count from 1, columns from 0.
 class Statement {
  public:
   Statement() = default;
@@ -159,8 +156,7 @@ class Connection {
   std::unique_ptr<sqlite3, Close> connection_;
 };
 
-/// Calls `read` as attempt() does, and all its queries see one state of the file. Outside a
-/// transaction a savepoint acts as one.
+/// Calls `read` as attempt() does; all its queries see one state of the file.
 template <class Read>
 Result<std::invoke_result_t<Read>> inOneState(const Connection& connection, Read read) {
   if (auto begun = connection.execute("SAVEPOINT state"); !begun) {

@@ -1,5 +1,4 @@
-// A connection to PostgreSQL with bounded waits: non-blocking libpq behind RAII. Values keep their
-// bits.
+// A connection to PostgreSQL with bounded waits: non-blocking libpq behind RAII.
 #pragma once
 
 #include <chrono>
@@ -59,11 +58,9 @@ class Answer {
   std::unique_ptr<pg_result, Clear> result_;
 };
 
-/// Reasons: "server_unreachable" (no connection, no answer, or the connection was lost),
-/// "server_login" (name, password or database), "server_rights", "server_full", "server_busy",
-/// "server_refused" (any other), "server_overtaken" (another process has written this map
-/// meanwhile), "stopped". After "server_unreachable" and "stopped" the link cannot be used any
-/// more.
+/// Reasons: "server_unreachable", "server_login", "server_rights", "server_full", "server_busy",
+/// "server_refused" (any other), "server_overtaken" (another process wrote this map), "stopped".
+/// After "server_unreachable" and "stopped" the link cannot be used.
 class Link {
  public:
   /// `stop` must outlive the link; raising it ends every wait.
@@ -75,8 +72,7 @@ class Link {
   Result<void> run(const std::string& sql);
   Result<void> prepare(const std::string& name, const std::string& sql);
 
-  /// Statements that are sent together: begin, queue, then end. They are one transaction, or part
-  /// of the open one.
+  /// Statements that are sent together: begin, queue, end; one transaction or part of it.
   void beginBatch(bool as_transaction = true);
   void queue(const std::string& prepared, const Values& values);
   /// Success means that the transaction is committed. After "server_unreachable" this is unknown.

@@ -9,8 +9,7 @@ namespace perdure::map_store::fleet {
 struct Parameters {
   std::string url;      ///< URL of a PostgreSQL database; empty: no server
   std::string vehicle;  ///< name of the map on the server; empty: the host name
-  /// Position of M: latitude and longitude [°, WGS 84], height above the ellipsoid [m], yaw of the
-  /// x axis from east [°]. Empty: as in the map's file, if present.
+  /// M: latitude, longitude [°, WGS 84], height [m], yaw from east [°]; empty: as in the file.
   std::vector<double> earth_anchor;
 };
 

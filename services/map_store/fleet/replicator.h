@@ -1,6 +1,5 @@
 // Keeps a fleet's server up to date with a map's file, in its own thread. The file is the buffer:
-// the service never waits for the server. Entries that the server has not confirmed stay in the
-// file's outbox, even if either side restarts.
+// entries stay in its outbox until they are confirmed.
 #pragma once
 
 #include <chrono>

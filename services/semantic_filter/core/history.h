@@ -1,5 +1,4 @@
-// The latest frames, each with the belief before it. Late detections therefore give the same
-// posterior as detections in time. The history also has the pose error of each frame.
+// The latest frames with the belief before each, so that late detections give the same posterior.
 #pragma once
 
 #include <cstddef>

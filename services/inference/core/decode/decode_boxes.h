@@ -8,10 +8,9 @@
 
 namespace perdure::inference {
 
-/// `tensors`: those of tensorNames(), with checked shapes. `box_form` defines the four numbers of a
-/// box; a share is relative to the input's width or height. With priors and variances v:
-///   centre = prior + t·v₀·size of the prior, size = size of the prior · exp(t·v₁)
-/// Fails with "model_output_shape" if the numbers of boxes, scores and priors differ.
+/// `tensors`: those of tensorNames(), with checked shapes. With priors and variances v: centre =
+/// prior + t·v₀·size of the prior, size = size of the prior · exp(t·v₁). Fails with
+/// "model_output_shape" if numbers differ.
 Result<void> decodeBoxes(const ModelDescription& model, const DecodeOptions& options,
                          const std::vector<Tensor>& tensors, std::vector<Candidate>& out);
 

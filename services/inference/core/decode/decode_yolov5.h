@@ -7,9 +7,8 @@
 
 namespace perdure::inference {
 
-/// `tensor`: (1,A·(5+K),H,W) or (1,A,H,W,5+K) of one level, with checked shape. Each anchor has x,
-/// y, w, h, objectness and K classes:
-///   centre (g − ½ + 2σ(t))·s, size anchor·(2σ(t))²
+/// `tensor`: (1,A·(5+K),H,W) or (1,A,H,W,5+K) of one level. Each anchor has x, y, w, h, objectness
+/// and K classes: centre (g − ½ + 2σ(t))·s, size anchor·(2σ(t))²
 void decodeYolov5(const ModelDescription& model, const DecodeOptions& options, const Level& level,
                   const Tensor& tensor, std::vector<Candidate>& out);
 /// Box of anchor `a` in cell (gx, gy): `raw` holds x, y, w and h, `step` apart.

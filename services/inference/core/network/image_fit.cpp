@@ -21,8 +21,7 @@ Result<cv::Mat> viewOf(const Frame& frame) {
   return cv::Mat(static_cast<int>(frame.height), static_cast<int>(frame.width), type, data);
 }
 
-/// Converts interleaved 8-bit BGR of the input's size to float planes in the network's colour
-/// order.
+/// Interleaved 8-bit BGR to float planes in the network's colour order.
 cv::Mat toPlanes(const Input& input, const cv::Mat& bgr) {
   const int sizes[] = {1, 3, input.height, input.width};
   cv::Mat blob(4, sizes, CV_32F);

@@ -1,5 +1,4 @@
-// A network from a file, evaluated for named raw tensors. OpenCV's DNN module runs it, or ONNX
-// Runtime if this build includes it.
+// A network from a file, run by OpenCV's DNN module or ONNX Runtime.
 #pragma once
 
 #include <memory>
@@ -42,9 +41,8 @@ class Network {
   virtual std::string backend() const = 0;
 };
 
-/// `threads`: threads of ONNX Runtime; OpenCV uses those of the process (cv::setNumThreads). Fails
-/// with "model_unreadable", "model_without_tensor" or "backend_absent". The detail is a clause that
-/// names the backend and the cause.
+/// `threads`: of ONNX Runtime; OpenCV uses those of the process. Fails with "model_unreadable",
+/// "model_without_tensor" or "backend_absent".
 Result<std::unique_ptr<Network>> loadNetwork(const NetworkFile& file,
                                              const std::vector<std::string>& tensors,
                                              Backend backend = Backend::kAuto, int threads = 1);

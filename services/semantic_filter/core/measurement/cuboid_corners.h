@@ -1,5 +1,5 @@
-// The corners of an object's shape before the camera, and their images, for cuboid_projection.
-// Derivation: tools/docs/maths/cuboid_projection.md.
+// The corners of a shape before the camera, and their images
+// (tools/docs/maths/cuboid_projection.md).
 #pragma once
 
 #include <Eigen/Core>

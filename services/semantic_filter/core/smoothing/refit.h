@@ -1,5 +1,5 @@
-// Refit: when a track is fitted to its keyframes, and the fits of all its hypotheses (Dellaert,
-// Kaess 2017). Derivation: tools/docs/maths/map_fit.md.
+// When a track is fitted to its keyframes, and the fits of all its hypotheses
+// (tools/docs/maths/map_fit.md).
 #pragma once
 
 #include "services/semantic_filter/core/belief/belief.h"
@@ -19,8 +19,7 @@ struct NetworkEvidence {
   /// Nats for boxes that enclose outlines, not cuboids, by all keyframes; if the frame asks for it.
   std::optional<double> outline_nats = {};
 };
-/// Fits the hypotheses and weighs rest against motion. Returns its evidence
-/// about the network, if it is reliable enough.
+/// Fits the hypotheses and weighs rest against motion. Returns its evidence, if reliable.
 std::optional<NetworkEvidence> refit(Track& track, const FrameContext& frame);
 
 /// Fits the tracks with the largest refitNeed, and learns noise scales and ground from them.
