@@ -15,8 +15,7 @@ namespace {
 
 using namespace perdure;
 
-/// Delays messages, in order, until the map store has answered with the working set of an earlier
-/// run. Otherwise new tracks would get ids that are already in use.
+/// Delays messages until the map store has answered, because ids may be in use already.
 class Gate {
  public:
   void pass(std::function<void()> message) {

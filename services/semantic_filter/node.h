@@ -1,5 +1,4 @@
-// The semantic filter as a node: checks messages, waits for detections, and publishes objects,
-// events and predictions; core/history estimates. Single-threaded; time comes from messages only.
+// The filter as a node: checks messages, waits for detections, publishes. Single-threaded.
 #pragma once
 
 #include <deque>

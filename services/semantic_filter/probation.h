@@ -1,5 +1,4 @@
-// Delayed detections of a new inference process that misses everything that should be visible,
-// until the process that it replaces decides (services/inference/README.md, roll-backs).
+// Delayed detections of a new inference process that misses everything (README, roll-backs).
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,5 @@
-// Node of vio if another program gives the poses (`input.odometry: given`). It reads that odometry
-// and the frames, and publishes landmarks. It waits for the pose of each frame and pairs stereo
-// frames.
+// Node of vio with given poses (`input.odometry: given`): waits for the pose of each frame, pairs
+// stereo frames, publishes landmarks.
 #pragma once
 
 #include <deque>

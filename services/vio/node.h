@@ -1,5 +1,4 @@
-// Node of vio. Input: inertial samples, speed and frames; output: odometry and landmarks. It waits
-// until inertial samples cover a frame's time, pairs stereo frames, starts, resets and resumes.
+// Node of vio: inertial samples, speed and frames in; odometry and landmarks out.
 #pragma once
 
 #include <memory>
@@ -52,8 +51,7 @@ class Node {
   void setWorld(WorldId world) { world_ = world; }
   /// Text for restoreState() in another process; empty before a start.
   std::string saveState() const;
-  /// Resumes at the next frame, unless the saved state is too old. Fails with "state_malformed" or
-  /// "state_other_cameras".
+  /// Resumes at the next frame. Fails with "state_malformed" or "state_other_cameras".
   Result<void> restoreState(const std::string& text);
 
   const ReasonCounts& reasons() const;

@@ -1,6 +1,5 @@
-// Detects that the position has become uncertain: its standard deviation has grown by more than a
-// limit over the last ten seconds, not counting the effect of the heading's error over the distance
-// travelled.
+// The position's deviation has grown by more than a limit in ten seconds, apart from the effect of
+// the heading's error.
 #pragma once
 
 #include <Eigen/Core>

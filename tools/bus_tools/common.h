@@ -12,8 +12,7 @@ class App;
 
 namespace perdure::tools {
 
-/// Adds --interface, --peers, --domain, --vehicle, --security and --identity. The defaults come
-/// from bus.yaml in the services' configuration folder.
+/// Adds the options of bus.*, with defaults from the services' bus.yaml.
 void addBusOptions(CLI::App& command, bus::Options& options);
 
 /// Runs the loop until it is stopped, a signal arrives, or `seconds` have passed (0: no limit).

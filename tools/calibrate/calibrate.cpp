@@ -16,8 +16,7 @@ DistortionModel modelOf(const CalibrateOptions& options, const CameraCalibration
   return options.lens.value_or(radial ? DistortionModel::kRadialTangential : prior.distortion);
 }
 
-/// The IMU noise of the recording, or that of vio's default configuration if the recording has
-/// none.
+/// The IMU noise of the recording, else that of vio's default configuration.
 ImuCalibration noiseOf(const CalibrationDrive& drive) {
   constexpr ImuCalibration kUsual{1.7e-4, 2e-5, 2e-3, 3e-3, 200.0};
   const bool tells = drive.imu && drive.imu->gyro_noise > 0.0 && drive.imu->accel_noise > 0.0;

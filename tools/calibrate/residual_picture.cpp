@@ -19,8 +19,7 @@ constexpr int kImageWidth = 720, kChartWidth = 760, kMargin = 70, kTop = 50;
 const Colour kSmall(190, 160, 60), kLarge(40, 60, 220);
 const Colour kFirst(200, 120, 30), kSecond(40, 150, 60), kThird(50, 60, 210);
 
-/// Draws each corner as a dot whose redness grows with its residual, and the mean of each cell as
-/// an arrow.
+/// Dots whose redness grows with the residual, and the mean of each cell as an arrow.
 void drawImage(cv::Mat& picture, const cv::Rect& area, const CameraCalibration& camera,
                const std::vector<CornerResidual>& residuals, double sigma) {
   const double scale = static_cast<double>(area.width) / camera.width;

@@ -1,5 +1,4 @@
-// A calibration with exact ground truth: a board on a wall, and a hand that moves a camera and an
-// IMU in front of it. It gives corners with noise for fast tests, or rendered images.
+// A calibration with exact truth: a board on a wall, and a hand with camera and IMU.
 #pragma once
 
 #include <cstdint>
@@ -24,8 +23,7 @@ struct SimulatedOptions {
   bool shake = true;  ///< false: slow motion only, for intrinsics alone
 };
 
-/// The scene's rig holds the ground truth and, as `calibration`, the values of a data sheet. These
-/// are off by a few per cent, degrees and centimetres, and have no time offset.
+/// The rig holds the truth and, as `calibration`, a data sheet that is slightly off.
 struct SimulatedCalibration {
   SimulatedOptions options;
   sim::Scene scene;

@@ -191,8 +191,7 @@ void Demo::endOne(const std::string& service) {
   while (supervisor_->runs(service) && monotonicNs() < end) loop_->runOnce(50ms);
 }
 
-/// Ends the processes that `perdure inference swap` started, because the supervisor did not start
-/// them.
+/// Ends the processes that `perdure inference swap` started.
 void Demo::endSwappedIn() const {
   const auto isInference = [](pid_t pid) {
     std::error_code gone;

@@ -1,5 +1,4 @@
-// Measures the age of a frame when its objects arrive, and the part of it that is not inference
-// time.
+// Measures the age of a frame when its objects arrive, with and without inference.
 #pragma once
 
 #include <cstdint>
@@ -19,9 +18,8 @@ class LatencyMeter {
   void onDetections(const Detections& detections);
 
   double last_ms() const { return last_ms_; }
-  /// {"latency_ms": {"median", "p99"}, "latency_beyond_network_ms": {…}}. The latency lasts from
-  /// the publication of the frame by capture to the arrival of its objects. The second one excludes
-  /// Detections::forward_s, over the frames whose detections contain it.
+  /// {"latency_ms": {"median", "p99"}, "latency_beyond_network_ms": {…}}: from capture to the
+  /// arrival of objects; the second without Detections::forward_s.
   nlohmann::ordered_json report() const;
 
  private:

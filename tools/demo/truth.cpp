@@ -49,8 +49,7 @@ Eigen::Vector3d middleOf(const std::vector<replay::KittiLabel>& labels, std::int
   return middle;
 }
 
-/// Lists each counted track with the nearest car of the rows. FINAL has one position for each
-/// object.
+/// Each counted track with the nearest car of FINAL, which has one position an object.
 Json parkedCars(const std::vector<replay::KittiLabel>& labels, const std::set<std::int64_t>& tracks,
                 const PosesByFrame& poses, const RigidTransform& T_RI,
                 const std::vector<EstimateRow>& rows) {

@@ -1,5 +1,4 @@
-// Scores objects against the labels of KITTI tracking; estimates are transformed to rectified
-// camera 0.
+// Scores objects against KITTI tracking labels, in rectified camera 0.
 #pragma once
 
 #include <optional>
@@ -9,8 +8,7 @@
 
 namespace perdure::tools {
 
-/// Transforms a row from W to the camera. Empty if the centre is behind the camera or outside the
-/// image.
+/// A row in the camera; empty if its centre is behind it or outside the image.
 std::optional<Estimate> toCamera(const EstimateRow& row, const RigidTransform& T_RW,
                                  const replay::KittiCalibration& calibration);
 

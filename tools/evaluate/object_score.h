@@ -1,5 +1,4 @@
-// Precision and recall of objects against counted ground truth, and identity errors (Table 1 of the
-// paper).
+// Precision, recall and identity errors of objects against truth (Table 1 of the paper).
 #pragma once
 
 #include <array>

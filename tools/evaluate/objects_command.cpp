@@ -1,5 +1,4 @@
-// `perdure evaluate objects`: the nine cells and the identities, as text or JSON, against a
-// simulated folder or KITTI tracking.
+// `perdure evaluate objects`: the nine cells and the identities, as text or JSON.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>

@@ -1,5 +1,4 @@
-// `perdure evaluate trajectory`: compares a TUM file with a pose file or the ground truth of a
-// dataset folder.
+// `perdure evaluate trajectory`: a TUM file against a pose file or a dataset's truth.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -89,8 +88,7 @@ struct Compared {
   std::size_t untold = 0;    ///< frames between poses that lack one, for unknown reasons
 };
 
-/// Removes the times of frames that the run skipped, and returns their number. Removes nothing if a
-/// pose has such a time, because the report then belongs to other data.
+/// Removes the times of frames that the run skipped; none if a pose has such a time.
 std::size_t leaveOutUnused(const fs::path& run, const PoseFile& poses, Truth& truth) {
   const auto used = usedFramesOf(run);
   if (!used) return 0;

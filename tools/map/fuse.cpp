@@ -78,8 +78,7 @@ FusedFile bring(WholeMap& fused, const GivenMap& given, const mapping::Parameter
   return file;
 }
 
-/// Counts sessions and objects for each part; objects without a position in the graph belong to no
-/// part.
+/// Sessions and objects for each part; objects without a position belong to none.
 void countParts(const mapping::MapContents& map, FuseOutcome& outcome) {
   outcome.parts = mapping::partsOf(map);
   outcome.objects_of_part.assign(outcome.parts.size(), 0);

@@ -43,8 +43,7 @@ struct FuseOutcome {
   std::vector<mapping::Change> changes() const;
 };
 
-/// Reads the files and writes `out`, either completely or not at all. The order of the files has no
-/// effect. Throws StartupError with the fix.
+/// Writes `out` completely or not at all. The order of files has no effect. Throws StartupError.
 FuseOutcome fuseFiles(const FuseRequest& request);
 
 std::string toText(const FuseOutcome& outcome);

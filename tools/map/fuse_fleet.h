@@ -7,10 +7,9 @@
 
 namespace perdure::tools {
 
-/// Merges the newest map of each vehicle on the server with the files of the request. Stores the
-/// result there as the map `name`. An older map of this name is replaced but not merged, because
-/// the vehicles' maps contain its data. Vehicles with an incomplete upload are omitted.
-/// request.out: also writes this file; "": server only. Throws StartupError.
+/// Merges the newest map of each vehicle with the files of the request and stores it on the server
+/// as `name`, replacing an older one. Incomplete uploads are omitted. request.out: also a file; "":
+/// none. Throws StartupError.
 FuseOutcome fuseFleet(FuseRequest request, const std::string& url, const std::string& name);
 
 }  // namespace perdure::tools

@@ -35,8 +35,7 @@ struct ServiceOptions {
   bool expects = false;  ///< evaluates the filter's predictions
 };
 
-/// Runs the loop of the service in its own thread, so that Health and liveliness continue while
-/// Python processes a frame. It hands over the newest frame and drops older ones.
+/// Runs the service's loop in a thread, so that Health continues; keeps the newest frame.
 class InferenceService {
  public:
   InferenceService(const BusSettings& settings, const ServiceOptions& options,

@@ -19,8 +19,7 @@ class FaultWatch {
 
   /// A description, if this message is a process's transition to a fault.
   std::optional<std::string> onHealth(const Health& health, Time now);
-  /// A description, if the number of `health` writers that missed their lease has grown. An orderly
-  /// shutdown is no fault, because it removes the writer.
+  /// If more `health` writers missed their lease. An orderly shutdown removes the writer.
   std::optional<std::string> onSilent(std::size_t silent, Time now);
 
  private:

@@ -20,8 +20,7 @@ struct RecorderOptions {
   HealthState fault = HealthState::kFailed;  ///< the first state that is a fault
 };
 
-/// Log times: the system clock at the start, continued by the steady clock, so that clock
-/// corrections have no effect.
+/// The system clock at the start, continued by the steady clock.
 class LogClock {
  public:
   LogClock();

@@ -1,5 +1,4 @@
-// Writes chunks to files of limited length, each of which can be read alone. After a full disk, it
-// continues when there is space.
+// Writes chunks to files that can be read alone. Continues after a full disk.
 #pragma once
 
 #include <memory>

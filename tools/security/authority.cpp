@@ -38,8 +38,7 @@ void requireName(const std::string& name) {
                          "most 48, and not \"authority\"");
 }
 
-/// Restricts the permissions to `topics`: those that a ros2_driver writes, or that another role
-/// reads.
+/// Restricts the permissions to `topics`.
 void narrow(Permissions& permissions, bus::Role role, const std::vector<std::string>& topics) {
   if (topics.empty()) return;
   if (role != bus::Role::kRos2Driver) {

@@ -1,5 +1,4 @@
-// Checks whether poses agree with the images, by the tracks with parallax of the last images.
-// Derivation: tools/docs/maths/vio-known-poses.md.
+// Whether poses agree with the images (tools/docs/maths/vio-known-poses.md).
 #pragma once
 
 #include <cstddef>

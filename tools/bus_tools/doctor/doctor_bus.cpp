@@ -39,8 +39,7 @@ Finding checkCount(std::size_t participants) {
   return {Verdict::kWarn, text + "; near the limit of 61: another bus.domain parts them"};
 }
 
-/// Finds endpoints that use one of our topics with another type name. DDS drops their samples
-/// silently.
+/// Finds endpoints with another type name, whose samples DDS drops silently.
 Findings checkTypes(const std::vector<bus::RemoteEndpoint>& endpoints, const std::string& prefix) {
   Findings findings;
   for (const bus::RemoteEndpoint& endpoint : endpoints) {

@@ -118,8 +118,7 @@ StatusNode judgeService(const std::string& name, const ServiceSeen* seen, const 
   return node;
 }
 
-/// The process that writes the topics of `service` while `service` is silent; empty if there is
-/// none.
+/// The process that writes the topics of a silent `service`, if any.
 std::string standInFor(const StatusSeen& seen, const std::string& service) {
   if (isHeard(seen, service)) return {};
   for (const auto& [name, topic] : seen.topics) {

@@ -35,8 +35,7 @@ struct Alignment {
 Result<Alignment> alignRates(const std::vector<CameraPose>& poses,
                              const std::vector<ImuReading>& readings, double widest_s);
 
-/// Whether each pose rotated as the gyroscope did, compared with most of its neighbours in time. A
-/// board detected upside down, or a view with an ambiguous pose, did not.
+/// Whether each pose rotated as the gyroscope did; a board detected upside down did not.
 std::vector<bool> agreeing(const std::vector<CameraPose>& poses,
                            const std::vector<ImuReading>& readings, const Alignment& alignment);
 

@@ -34,8 +34,7 @@ double correlationOf(const std::vector<ImuResidual>& all, Eigen::Vector3d ImuRes
   return square > 0.0 ? product / square : 0.0;
 }
 
-/// Whether a reading is clipped: the largest value of an axis repeats at least three times in a
-/// row.
+/// Whether a reading is clipped: the largest value of an axis repeats three times in a row.
 bool isSaturated(const std::vector<ImuReading>& readings, Eigen::Vector3d ImuReading::*which,
                  double least) {
   for (int axis = 0; axis < 3; ++axis) {
@@ -169,8 +168,7 @@ class CameraImuRun {
     return {};
   }
 
-  /// Removes views whose rotation contradicts the gyroscope, because all of their corners would be
-  /// wrong.
+  /// Removes views whose rotation contradicts the gyroscope.
   void dropDisagreeing(const Alignment& alignment) {
     const auto good = agreeing(poses_, near_, alignment);
     std::vector<CameraPose> poses;
@@ -233,8 +231,7 @@ class CameraImuRun {
     return {};
   }
 
-  /// Sets the standard deviations from the residuals. Those of the IMU are at least the declared
-  /// ones.
+  /// Sets the deviations from the residuals; those of the IMU are at least the declared ones.
   void weigh() {
     std::vector<double> sizes;
     for (const auto& r : problem_.cornerResiduals()) sizes.push_back(r.residual.norm());
@@ -250,8 +247,7 @@ class CameraImuRun {
         std::max(declared_.accel, rmsOf(left, &ImuResidual::accel).norm() / std::sqrt(3.0) * freed);
   }
 
-  /// Factor from the residuals to the noise: the degrees of freedom of the spline reduce the
-  /// residuals.
+  /// Factor from the residuals to the noise, by the degrees of freedom of the spline.
   double freedomOf(std::size_t samples) const {
     const auto n = static_cast<double>(samples);
     const auto controls = static_cast<double>(problem_.x.spline.controls.size());

@@ -1,5 +1,4 @@
-// The residuals of the camera-IMU problem, for Ceres' automatic derivatives. Rotations are
-// Hamilton quaternions in Eigen's order (x y z w).
+// Residuals for Ceres' automatic derivatives; Hamilton quaternions x y z w.
 #pragma once
 
 #include <ceres/manifold.h>

@@ -1,5 +1,4 @@
-// The least-squares problem of camera_imu.h: parameters, residuals and the covariance of a
-// solution.
+// The least-squares problem of camera_imu.h.
 #pragma once
 
 #include <ceres/problem.h>

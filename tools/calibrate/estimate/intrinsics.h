@@ -1,6 +1,5 @@
-// Estimates focal lengths, principal point and distortion from views of a board. The least-squares
-// problem covers the poses of the views and the lens (Zhang, "A Flexible New Technique for Camera
-// Calibration", PAMI 2000). It supports each lens model of common/camera.
+// Estimates focal lengths, principal point and distortion from views of a board (Zhang, PAMI 2000),
+// for each lens model of common/camera.
 #pragma once
 
 #include <Eigen/Core>
@@ -45,8 +44,7 @@ void setLens(const Vector8d& lens, CameraCalibration& camera);
 std::optional<RigidTransform> boardPose(const CameraModel& camera, const Board& board,
                                         const View& view);
 
-/// `camera` provides the name and the image size. Fails with calibrate_few_views or
-/// calibrate_no_convergence; the detail states the fix.
+/// `camera`: name and size. Fails with calibrate_few_views or calibrate_no_convergence.
 Result<Intrinsics> estimateIntrinsics(const Board& board, const std::vector<View>& views,
                                       const CameraCalibration& camera,
                                       const IntrinsicsOptions& options);

@@ -24,8 +24,7 @@ struct View {
   std::vector<Corner> corners;
 };
 
-/// The corners of the board in a grey image; empty if there is no board. Accurate to a few
-/// hundredths of a pixel.
+/// The corners of the board in a grey image, to a few hundredths of a pixel; empty: no board.
 std::vector<Corner> findCorners(const Board& board, const cv::Mat& grey);
 
 }  // namespace perdure::calibrate

@@ -1,6 +1,5 @@
-// Focal length, rotation between camera and IMU, and time offset from rotations alone, without an
-// initial estimate: for each focal length and each offset the rotation follows in closed form
-// (Wahba's problem, Kabsch).
+// Focal length, rotation and time offset from rotations alone: for each length and offset the
+// rotation follows in closed form (Wahba, Kabsch).
 #pragma once
 
 #include "tools/calibrate/motion/track_windows.h"
@@ -15,8 +14,7 @@ struct FirstGuess {
   std::size_t pairs = 0;
 };
 
-/// `camera`: image size and name. Focal lengths from 0.4 to 2.5 widths, offsets up to half a
-/// second.
+/// `camera`: size and name. Focal lengths of 0.4 to 2.5 widths, offsets up to half a second.
 FirstGuess guessFromTurns(const std::vector<TrackWindow>& windows,
                           const std::vector<ImuSample>& samples, const CameraCalibration& camera);
 

@@ -17,8 +17,7 @@ constexpr double kFree = std::numeric_limits<double>::infinity();
 constexpr double kUnseen =
     0.7;  ///< share of a prior's deviation above which the motion shows nothing
 
-/// Deviations of real rigs: readouts of phones are below 35 ms, principal points within 1 % of the
-/// middle, biases of MEMS gyroscopes below 0.05 rad/s.
+/// Real rigs: phones' readouts below 35 ms, principal points within 1 %, biases below 0.05 rad/s.
 JointVector widePriors(const CameraCalibration& camera) {
   JointVector sigma;
   const double centre = 0.01 * camera.width;

@@ -19,8 +19,7 @@ struct TrackWindow {
 struct WindowOptions {
   std::size_t most = 40;  ///< largest number of windows
   std::size_t skip = 0;   ///< windows with larger rotations that are left out
-  double seconds = 0.7;   ///< length of a window, at least three images; shorter ones do not
-                          ///< separate slow translation from rotation
+  double seconds = 0.7;   ///< at least three images; shorter: no separation
   double until_s = 1e9;   ///< since the first image; later images are not used
 };
 
@@ -32,8 +31,7 @@ struct TrackWindows {
   void add(TrackWindows more);
 };
 
-/// Windows of cam0, distributed over the rotation about all axes. Images of another size than the
-/// calibration's are not used.
+/// Windows of cam0, distributed over rotations about all axes.
 TrackWindows trackWindows(const replay::Recording& recording, const WindowOptions& options);
 
 }  // namespace perdure::calibrate

@@ -41,8 +41,7 @@ std::string addRow(const std::string& text, Places& places) {
   return "an earlier line has this visit of this place; write its frames in one line";
 }
 
-/// An object at a place: the offset from the place to its centre, horizontally along the ray from
-/// the body and to the left of it.
+/// Offset from the place to the object's centre, along the ray from the body and to its left.
 struct ObjectAtPlace {
   std::uint64_t id = 0;
   double along = 0.0, across = 0.0;

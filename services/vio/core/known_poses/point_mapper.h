@@ -1,5 +1,4 @@
-// Maps points from tracks and poses that another program gives, and estimates how the tracks agree
-// with them. It does not access images, threads or clocks. Derivation:
+// Maps points from tracks and given poses, and estimates how they agree. Derivation:
 // tools/docs/maths/vio-known-poses.md.
 #pragma once
 
@@ -30,8 +29,7 @@ class PointMapper {
               std::vector<RigidTransform> T_BC, std::vector<double> readout_s = {});
 
   void add(const KnownPose& pose, const TrackedFrame& tracked);
-  /// Points of the newest image whose position is known, by rising id, without descriptors, and
-  /// without those that fit the poses much worse.
+  /// Points of the newest image with known position, by rising id, without misfits.
   const std::vector<Landmark>& landmarks() const { return landmarks_; }
   const Mapped& mapped() const { return mapped_; }
   /// Ratio of the tracks' residuals to VisionOptions::sigma_px, at least 1.

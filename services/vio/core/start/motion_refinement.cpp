@@ -146,8 +146,7 @@ double stretchOf(const MotionWindow& w, const VectorXd& dx) {
   return std::clamp(along / square, -kLargestStretch, kLargestStretch);
 }
 
-/// Adds a step. Its scale part, along which the images' cost is constant, is applied as a factor,
-/// which preserves the fit to the images.
+/// Adds a step; its scale part is a factor, which preserves the fit to the images.
 void move(Estimate& e, const VectorXd& dx, const Normal& n) {
   const double stretch = stretchOf(e.window, dx), factor = std::exp(stretch);
   VectorXd rest = dx;

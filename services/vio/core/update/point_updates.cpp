@@ -118,8 +118,7 @@ Innovation innovationOf(const State& state, const PointRows& rows, const ImagePo
           used};
 }
 
-/// The rows of a track that depend on the state alone. A point without parallax whose depth does
-/// not follow from the state gets that of the scene (tools/docs/maths/vio-visual-update.md).
+/// The rows of a track that depend on the state alone (tools/docs/maths/vio-visual-update.md).
 Result<PointSystem> rowsOfTrack(const Track& track, const State& state, const MatrixView& P,
                                 const VisionOptions& options, bool& supposed) {
   const std::vector<Ray> rays = raysOf(track, state, options.sigma_px);

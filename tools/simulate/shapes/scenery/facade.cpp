@@ -19,8 +19,7 @@ struct Look {
   bool ledges, bars, bands, shutters, shop;
 };
 
-/// One side of the house. u is to the right along the wall seen from outside, z up, and out is away
-/// from the wall.
+/// One side of the house: u to the right seen from outside, z up, out away from it.
 class Side {
  public:
   Side(MeshBuilder& b, const Look& look, const Vec3& origin, const Vec3& right, float width,
