@@ -27,4 +27,10 @@ constexpr Duration durationFromSeconds(double s) {
   return Duration(static_cast<std::int64_t>(s * 1e9 + (s < 0 ? -0.5 : 0.5)));
 }
 
+/// Nanoseconds within 146 years of the clock's zero: the difference of any two fits into 64 bits.
+constexpr bool isTime(std::int64_t ns) {
+  constexpr std::int64_t kLast = std::int64_t{1} << 62;
+  return ns > -kLast && ns < kLast;
+}
+
 }  // namespace perdure

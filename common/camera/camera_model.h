@@ -51,4 +51,7 @@ class CameraModel {
   RigidTransform T_BC_;
 };
 
+/// True if name, size, lens, pose and times are equal. The nominal rate may differ.
+bool sameCamera(const CameraCalibration& a, const CameraCalibration& b);
+
 }  // namespace perdure

@@ -14,7 +14,6 @@
 #include "common/bus/once.h"
 #include "common/bus/wait_loop.h"
 #include "common/service/health.h"
-#include "common/service/input.h"
 #include "common/service/process.h"
 
 namespace perdure::service {

@@ -16,7 +16,6 @@
 #include "services/capture/live/clocks.h"
 #include "services/capture/live/iio_stream.h"
 #include "services/capture/live/imu_pairing.h"
-#include "services/capture/live/imu_yield.h"
 #include "services/capture/vehicle/vehicle.h"
 
 namespace perdure::capture {

@@ -112,7 +112,7 @@ class Node {
   bool wantsTiles() const { return wants(kMap) || wants(kMapScene); }
   std::size_t sendMap();  ///< number of objects sent
   bool wantsGraph() const { return wants(kMapGraph) || wants(kMapGraphScene); }
-  // Defined in node_graph.cpp.
+  // Defined in node_calls.cpp.
   void lookAtGraph(bool looked_before);
   void followGraph(std::int64_t now_ns);
   void onNoGraph(const std::string& why);

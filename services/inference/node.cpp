@@ -9,7 +9,7 @@
 #include "common/base/check.h"
 #include "common/base/errors.h"
 #include "services/inference/core/decode/suppress.h"
-#include "services/inference/core/upright.h"
+#include "services/inference/core/network/image_fit.h"
 
 namespace perdure::inference {
 namespace {

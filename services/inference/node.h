@@ -32,7 +32,7 @@ class Node {
   /// Backend of the network, for people.
   std::string backend() const;
 
-  /// Calibration and odometry determine the turn of the next frames (core/upright.h).
+  /// Calibration and odometry determine the turn of the next frames (core/network/image_fit.h).
   void onCalibration(const perdure::Calibration& calibration) { calibration_ = calibration; }
   void onOdometry(const Odometry& odometry);
 

@@ -13,10 +13,9 @@
 #include "common/types/sensors.h"
 #include "services/vio/cameras.h"
 #include "services/vio/config.h"
-#include "services/vio/core/agreement.h"
 #include "services/vio/core/known_poses/point_mapper.h"
-#include "services/vio/in_vain.h"
 #include "services/vio/moving_mask.h"
+#include "services/vio/doubts.h"
 #include "services/vio/waiting_frames.h"
 
 namespace perdure::vio {

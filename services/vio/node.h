@@ -14,13 +14,11 @@
 #include "common/types/sensors.h"
 #include "services/vio/cameras.h"
 #include "services/vio/config.h"
-#include "services/vio/core/agreement.h"
+#include "services/vio/core/known_poses/point_mapper.h"
 #include "services/vio/core/start/initialiser.h"
 #include "services/vio/core/start/motion_initialiser.h"
 #include "services/vio/core/start/speed_history.h"
-#include "services/vio/in_vain.h"
-#include "services/vio/position_doubt.h"
-#include "services/vio/speed_doubt.h"
+#include "services/vio/doubts.h"
 #include "services/vio/waiting_frames.h"
 
 namespace perdure::vio {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "common/sim/scene.h"
-#include "tools/calibrate/estimate/views.h"
+#include "tools/calibrate/estimate/board.h"
 #include "tools/simulate/render/lens.h"
 #include "tools/simulate/render/renderer.h"
 

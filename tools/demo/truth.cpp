@@ -10,8 +10,8 @@
 #include "common/replay/files/kitti_calibration.h"
 #include "common/replay/files/kitti_labels.h"
 #include "common/replay/files/pose_file.h"
-#include "tools/evaluate/kitti_score.h"
 #include "tools/evaluate/object_report.h"
+#include "tools/evaluate/object_truth.h"
 
 namespace perdure::tools {
 namespace {

@@ -46,6 +46,11 @@ struct FuseOutcome {
 /// Writes `out` completely or not at all. The order of files has no effect. Throws StartupError.
 FuseOutcome fuseFiles(const FuseRequest& request);
 
+/// Merges the newest map of each vehicle with the files of the request and stores it on the server
+/// as `name`, replacing an older one. Incomplete uploads are omitted. request.out: also a file; "":
+/// none. Throws StartupError.
+FuseOutcome fuseFleet(FuseRequest request, const std::string& url, const std::string& name);
+
 std::string toText(const FuseOutcome& outcome);
 std::string toJsonText(const FuseOutcome& outcome);
 

@@ -9,7 +9,7 @@
 #include "common/bus/cdr_reader.h"
 #include "common/bus/discovery.h"
 #include "common/service/service.h"
-#include "tools/record/fault_watch.h"
+#include "tools/record/black_box.h"
 #include "tools/record/store.h"
 
 namespace perdure::tools {

@@ -8,7 +8,7 @@
 
 #include "common/base/errors.h"
 #include "common/base/files/folder_lock.h"
-#include "common/sim/truth_files.h"
+#include "common/sim/truth.h"
 #include "tools/base/files.h"
 #include "tools/simulate/journal.h"
 #include "tools/simulate/render/counter_noise.h"

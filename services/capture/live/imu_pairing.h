@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "common/base/result.h"
@@ -39,6 +40,16 @@ class ImuPairing {
   /// Times of the last readings.
   std::int64_t gyro_ns_ = std::numeric_limits<std::int64_t>::min(), accel_ns_ = gyro_ns_;
   ReasonCounts reasons_;
+};
+
+/// Detects wrong stamps of an IMU: data arrive but give no samples.
+class ImuYield {
+ public:
+  /// Takes totals of readings and samples. A sentence if fewer than half became samples.
+  std::string look(std::uint64_t read, std::uint64_t given);
+
+ private:
+  std::uint64_t read_ = 0, given_ = 0;
 };
 
 }  // namespace perdure::capture

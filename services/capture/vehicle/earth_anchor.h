@@ -6,7 +6,7 @@
 #include <deque>
 #include <optional>
 
-#include "services/capture/vehicle/gnss_fix.h"
+#include "services/capture/vehicle/gpsd.h"
 
 namespace perdure::capture {
 

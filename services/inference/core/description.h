@@ -125,7 +125,7 @@ struct ModelDescription {
   double spread_scale = 0.0;  ///< perdure: spread to standard deviation; 0: none
   double box_sigma = 0.0;  ///< standard deviation of a side relative to the box's size; 0: unknown
   BoxExtent boxes = BoxExtent::kUnknown;
-  bool upright = true;  ///< images may be turned upright (core/upright.h)
+  bool upright = true;  ///< images may be turned upright (core/network/image_fit.h)
   /// Insets of the sides by class; see ModelInfo.
   std::map<std::string, std::array<double, 4>> side_insets;
   Calibration calibration;

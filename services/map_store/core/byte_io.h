@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "common/base/time.h"
-#include "common/base/time_bounds.h"
 
 namespace perdure::map_store {
 

@@ -1,6 +1,9 @@
 // A connection to PostgreSQL with bounded waits: non-blocking libpq behind RAII.
 #pragma once
 
+#include <sys/eventfd.h>
+#include <unistd.h>
+
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -10,13 +13,33 @@
 #include <string_view>
 #include <vector>
 
+#include "common/base/check.h"
 #include "common/base/result.h"
-#include "services/map_store/fleet/stop.h"
 
 struct pg_conn;
 struct pg_result;
 
 namespace perdure::map_store::fleet {
+
+/// Ends the waits of another thread.
+class Stop {
+ public:
+  Stop() : file_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+    perdure::check(file_ >= 0, "a process has a file descriptor left");
+  }
+  ~Stop() { close(file_); }
+  Stop(const Stop&) = delete;
+  Stop& operator=(const Stop&) = delete;
+  /// May be called from any thread; cannot be undone.
+  void raise() const {
+    const std::uint64_t one = 1;
+    (void)!write(file_, &one, sizeof one);
+  }
+  int file() const { return file_; }  ///< becomes readable once raised
+
+ private:
+  int file_;
+};
 
 /// Time limits of waits. Name resolution uses the limits of the system's resolver.
 struct Patience {

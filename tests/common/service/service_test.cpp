@@ -13,7 +13,7 @@
 
 #include "common/base/subprocess.h"
 #include "common/bus/wait_loop.h"
-#include "common/service/input.h"
+#include "common/service/health.h"
 #include "common/types/end_of_drive.h"
 #include "tests/common/bus/isolation.h"
 

@@ -2,7 +2,7 @@
 
 #include <numbers>
 
-#include "tools/evaluate/kitti_score.h"
+#include "tools/evaluate/object_truth.h"
 
 namespace perdure::tools {
 namespace {

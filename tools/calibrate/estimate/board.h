@@ -4,7 +4,13 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
 #include <string>
+#include <vector>
+
+#include "common/base/time.h"
+#include "common/types/sensors.h"
 
 namespace perdure::calibrate {
 
@@ -35,5 +41,19 @@ struct Board {
 
 /// A page to print at 100 %, with a scale bar and the text of the board.
 std::string boardSvg(const Board& board);
+
+struct Corner {
+  std::size_t id = 0;  ///< index of Board::corner
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+};
+
+struct View {
+  std::uint64_t frame = 0;
+  TimePoint time;  ///< stamp of the image, by the camera's clock
+  std::vector<Corner> corners;
+};
+
+/// The corners of the board in a grey image, to a few hundredths of a pixel; empty: no board.
+std::vector<Corner> findCorners(const Board& board, const cv::Mat& grey);
 
 }  // namespace perdure::calibrate

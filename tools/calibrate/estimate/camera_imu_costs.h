@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "common/math/so3.h"
+#include "tools/calibrate/estimate/board.h"
 #include "tools/calibrate/estimate/lens.h"
 #include "tools/calibrate/estimate/spline.h"
-#include "tools/calibrate/estimate/views.h"
 
 namespace perdure::calibrate {
 

@@ -6,7 +6,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "tools/calibrate/estimate/views.h"
+#include "tools/calibrate/estimate/board.h"
 
 namespace perdure::calibrate {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "common/base/result.h"
 #include "common/camera/camera_model.h"
-#include "tools/calibrate/estimate/views.h"
+#include "tools/calibrate/estimate/board.h"
 
 namespace perdure::calibrate {
 

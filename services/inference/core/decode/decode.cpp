@@ -2,10 +2,7 @@
 
 #include <cmath>
 
-#include "services/inference/core/decode/decode_boxes.h"
-#include "services/inference/core/decode/decode_distances.h"
-#include "services/inference/core/decode/decode_perdure.h"
-#include "services/inference/core/decode/decode_yolov5.h"
+#include "services/inference/core/decode/decode_families.h"
 #include "services/inference/core/decode/evidence.h"
 #include "services/inference/core/decode/weigh.h"
 

@@ -1,6 +1,7 @@
 // Turns an image upright and fits it to the network's input, and maps boxes back to the image.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <opencv2/core/mat.hpp>
 
@@ -37,5 +38,9 @@ double paddedShare(const Input& input, int image_width, int image_height, int qu
 
 /// Input blob (1,3,H,W) of float32. Fails with "frame_malformed" if size and data differ.
 Result<cv::Mat> makeBlob(const Input& input, const Frame& frame, int quarters = 0);
+
+/// Clockwise quarter turns, 0 to 3. `up_C`: against gravity. `present` stays until the image leans
+/// by more than 55°, and if the camera looks up or down by more than 60°.
+int uprightQuarters(const Eigen::Vector3d& up_C, int present);
 
 }  // namespace perdure::inference
