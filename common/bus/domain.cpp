@@ -98,7 +98,6 @@ const char* givenConfiguration() {
   return uri != nullptr && *uri != '\0' ? uri : nullptr;
 }
 
-/// Checks the name of an interface or of a host.
 bool isPlainName(const std::string& name) {
   return !name.empty() && name.find_first_of("<>&\"' \t\n") == std::string::npos;
 }

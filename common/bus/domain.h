@@ -100,7 +100,6 @@ class Participant {
   std::shared_ptr<const Entity> keep(Entity entity) const;
   /// "imu" → "perdure/ego/imu".
   std::string wireName(const std::string& topic) const { return prefix_ + topic; }
-  /// The identity of the participant. Returns nothing if bus.security is off.
   const std::optional<Identity>& identity() const { return identity_; }
 
  private:

@@ -150,9 +150,7 @@ class Reader : public RawReader {
 class RawWriter : public AnyWriter {
  public:
   std::int32_t strength() const { return strength_; }
-  /// Sets the strength on an exclusive topic. It may be called at any time.
   void setStrength(std::int32_t strength);
-  /// Asserts liveliness without a message, for exclusive topics.
   void assertLiveliness();
   /// The number of times that this writer missed its own lease and was considered dead.
   std::uint64_t livelinessLost() const;

@@ -13,7 +13,6 @@ class Once {
  public:
   explicit Once(std::size_t capacity = 1024) : capacity_(capacity) {}
 
-  /// Returns true on the first occurrence.
   bool first(std::uint64_t source, std::uint64_t sequence) {
     if (!seen_.emplace(source, sequence).second) {
       ++repeated_;

@@ -18,7 +18,6 @@ class SecurityLog {
   /// Adds security_refused_no_certificate (participants), _unknown_authority, _expired, _revoked,
   /// _certificate (handshakes), _permissions, _writer, _reader.
   void report(ReasonCounts& counts) const;
-  /// The first message of each kind.
   std::map<std::string, std::string> firstDetails() const;
   /// The latest error of this process's own identity.
   std::string own() const;

@@ -25,11 +25,9 @@ class WaitLoop {
       return reader.drainBatch(handler, on_gone);
     });
   }
-  /// Registers a handler of serialised messages.
   void on(CdrReader& reader, CdrReader::Handler handler) {
     attach(reader, [&reader, handler = std::move(handler)] { return reader.drainBatch(handler); });
   }
-  /// Registers a handler of byte messages (common/bus/foreign).
   template <class BytesReader>
   void onBytes(BytesReader& reader, typename BytesReader::Handler handler) {
     attach(reader, [this, &reader, handler = std::move(handler)] {
@@ -47,7 +45,6 @@ class WaitLoop {
   /// The handler runs in the loop's thread soon after wake(). Several wake-ups may become one call.
   void onWake(std::function<void()> handler) { on_wake_ = std::move(handler); }
 
-  /// Runs until stop().
   void run();
   /// Waits once, at most for `longest`, and handles what is available.
   void runOnce(std::chrono::nanoseconds longest);

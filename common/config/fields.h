@@ -52,14 +52,12 @@ class Fields {
                std::size_t length = 0);
   void texts(std::string key, std::vector<std::string>& target, Doc doc);
   void require();
-  /// Sets whether the fields described next are marked expert.
   void expert(bool on) { expert_ = on; }
   /// Refuses a key of earlier versions with this sentence: "is now tracks.confirm".
   void formerly(std::string key, std::string sentence);
 
   /// The sentence for a key of earlier versions; empty for other keys.
   std::string formerlyOf(const std::string& key) const;
-  /// Returns whether earlier versions had keys in this group.
   bool wasGroup(const std::string& name) const;
 
   const std::vector<Field>& all() const { return fields_; }

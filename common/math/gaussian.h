@@ -22,7 +22,6 @@ double squaredMahalanobis(const VectorView& residual, const MatrixView& S);
 /// S⁻¹ B of a symmetric S, n × n, and an n × m matrix B.
 Eigen::MatrixXd solveSymmetric(const MatrixView& S, const MatrixView& B);
 
-/// S⁻¹ of a symmetric S.
 Eigen::MatrixXd inverseSymmetric(const MatrixView& S);
 
 /// B S⁻¹: the regression of B on the variable with covariance S; zero if a pivot < 1e-18.

@@ -12,7 +12,6 @@ namespace perdure::ros {
 Result<Frame> frameOf(const Image& image, int bits = 16);
 /// An image of mono8 or bgr8 in the frame <camera>_optical. The frame must not be compressed.
 Image imageOf(const Frame& frame);
-/// The message for a JPEG frame.
 CompressedImage compressedOf(const Frame& frame);
 /// Number of used bits of a 16-bit image: the smallest of 8, 10, 12, 14, 16 that holds its
 /// brightest value. Returns 16 for other images.

@@ -18,7 +18,6 @@
 
 namespace perdure::ros {
 
-/// An output topic of ROS 2.
 struct Outlet {
   std::string topic;       ///< "/perdure/objects"
   std::string type;        ///< "vision_msgs/Detection3DArray"

@@ -115,7 +115,6 @@ class Context {
   ClockSteps clock_steps_;
 };
 
-/// A command line option as an abbreviation of --set key=value.
 struct Shorthand {
   std::string option, key, type;
 };

@@ -77,7 +77,6 @@ Eigen::MatrixXd classDirections(const DetectorModel& model) {
   return llt.matrixL();
 }
 
-/// An object in the image, according to the truth.
 struct SimulatedDetector::Sight {
   TruthView view;
   double time_s = 0.0;

@@ -47,7 +47,6 @@ struct Prop {
 };
 
 enum class GroundKind { kStreet, kRoom };
-/// A section of road with pavements, for the rendered ground.
 struct Road {
   Eigen::Vector2d from, to;
   double width_m = 7.0;

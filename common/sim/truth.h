@@ -39,7 +39,6 @@ struct TruthObject {
   TruthKey at(TimePoint t) const;
 };
 
-/// The part of a box within an image of this size.
 Box clipped(const Box& box, double width, double height);
 
 /// One object in one frame of cam0. Rows exist for objects whose full outline touches the image.

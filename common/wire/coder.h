@@ -266,7 +266,6 @@ class Coder {
     }
     checkMatrix(name, d, kMatrixEntry);
   }
-  /// Visits one part of the message under its name.
   void under(const char* name, long index, auto visit) {
     path_.push_back({name, index});
     visit();

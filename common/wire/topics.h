@@ -149,13 +149,11 @@ constexpr std::tuple kRows{
 
 using Topics = std::remove_const_t<decltype(table::kRows)>;
 
-/// Calls visit(row) for each topic, in the order of the list.
 template <class Visit>
 constexpr void forEachTopic(Visit visit) {
   std::apply([&](const auto&... row) { (visit(row), ...); }, table::kRows);
 }
 
-/// Position of a message in the list.
 template <class T>
 inline constexpr std::size_t kPosition = []<class... Rows>(const std::tuple<Rows...>&) {
   const std::array same{std::is_same_v<T, typename Rows::Message>...};

@@ -16,7 +16,6 @@ std::optional<ImageEncoding> encodingOf(const std::string& name) {
   return std::nullopt;
 }
 
-/// Returns the time of a const or mutable message.
 template <class Message>
 auto& timeOf(Message& message) {
   return std::visit(
@@ -30,7 +29,6 @@ auto& timeOf(Message& message) {
       message);
 }
 
-/// Throws if a drive has no readable image.
 void requireImages(replay::Dataset& drive, const std::string& path) {
   for (auto message = drive.next(); message; message = drive.next()) {
     const auto* frame = std::get_if<Frame>(&*message);
@@ -44,7 +42,6 @@ void requireImages(replay::Dataset& drive, const std::string& path) {
                          "without them runs in `perdure pipeline`).");
 }
 
-/// Times of the first and the last frame of cam0.
 std::pair<TimePoint, TimePoint> spanOf(const replay::Dataset& drive) {
   TimePoint first = TimePoint::max(), last = TimePoint::min();
   for (std::uint64_t i = 0; i < drive.frameCount() && first == TimePoint::max(); ++i) {

@@ -39,7 +39,6 @@ class Node {
   /// Sends the pending message if it is due. Returns the time until the next call, if not max().
   Duration tick(std::int64_t now_ns);
 
-  /// Whether all messages have been sent.
   bool finished() const { return ended_ && !pending_; }
   const RunState& state() const { return state_; }
   std::uint64_t framesGiven() const { return frames_given_; }

@@ -24,7 +24,6 @@ class StartGate {
 
   /// Opens half a second after all readers are present, or after the timeout, for good.
   bool open(Clock::time_point now);
-  /// Names of the absent readers.
   const std::vector<std::string>& missing() const { return missing_; }
 
  private:

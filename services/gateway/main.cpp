@@ -100,7 +100,6 @@ class Beginning {
   std::int64_t until_ns_ = 0;
 };
 
-/// Readers that are open while viewers need them.
 class Readers {
  public:
   Readers(service::Context& context, gateway::Node& node, Beginning& beginning, web::Server& server,

@@ -148,7 +148,6 @@ class Node {
   std::optional<Odometry> odometry_;
   std::optional<Objects> objects_;
   std::optional<ModelInfo> model_;
-  /// Detections of the newest frames, by camera.
   std::map<std::string, std::deque<Detections>> detections_;
   std::set<std::size_t> awaited_;  ///< wait for the detections of objects_' frame
   bool unplaced_ = false;          ///< an event of the whole map was received before the first pose

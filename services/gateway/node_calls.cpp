@@ -150,14 +150,12 @@ void Node::onMapReply(const MapReply& reply) {
   }
 }
 
-/// A new viewer receives the current graph.
 void Node::lookAtGraph(bool looked_before) {
   if (wantsGraph() == looked_before) return;
   graph_pace_.begin();
   if (!wantsGraph()) graph_.reset();
 }
 
-/// Without viewers, no query is sent.
 void Node::followGraph(std::int64_t now_ns) {
   if (!wantsGraph() || !graph_pace_.due(now_ns)) return;
   MapQuery query;

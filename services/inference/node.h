@@ -29,7 +29,6 @@ class Node {
   const ModelInfo& model() const { return info_; }
 
   const ModelDescription& description() const { return description_; }
-  /// Backend of the network, for people.
   std::string backend() const;
 
   /// Calibration and odometry determine the turn of the next frames (core/network/image_fit.h).
@@ -66,7 +65,6 @@ class Node {
                  const std::vector<Candidate>& reported, const std::vector<Candidate>& candidates,
                  Detections& out) const;
 
-  /// The network at one size of its input.
   struct Size {
     ModelDescription description;
     std::unique_ptr<Network> network;

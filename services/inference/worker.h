@@ -19,7 +19,6 @@
 
 namespace perdure::inference {
 
-/// Writers and readers of a worker.
 struct WorkerBus {
   bus::Writer<Detections>& detections;
   /// Reader of `detections`, matched with writers of this and of other processes.
@@ -38,7 +37,6 @@ class Worker {
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  /// Initial strength.
   static std::int32_t firstStrength(const OwnershipConfig& ownership);
 
   /// Adds a frame. A frame that still waits is dropped and counted.
@@ -46,7 +44,6 @@ class Worker {
   /// Calibration and odometry determine the turn of the following frames.
   void onCalibration(const perdure::Calibration& calibration);
   void onOdometry(const Odometry& odometry);
-  /// Sets the predicted objects for the following frames.
   void expect(const Predictions& predictions);
   /// Asserts liveliness, unless the network is stuck. Call it several times in a lease.
   void assertAlive();
@@ -76,7 +73,6 @@ class Worker {
   void noteFailure(const Reason& reason);
   void noteLapse(Clock::time_point now);
   void adoptStrength(Clock::time_point now);
-  /// Executes the actions of the swap.
   void obey();
   std::string reducedInput() const;
 

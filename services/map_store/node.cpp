@@ -41,7 +41,6 @@ std::string faultOf(const MapQuery& query) {
 
 namespace {
 
-/// Replaces object ids by track ids.
 Objects byTrack(Objects objects) {
   for (ObjectBelief& belief : objects.objects) {
     belief.id = belief.trackId();

@@ -24,7 +24,6 @@ class RosSide {
   RosSide(service::Context& context, const Config& config);
 
   void advertise(const ros::Outlet& outlet);
-  /// Whether the topic has a reader.
   bool wants(const std::string& topic) const;
   void write(const ros::Outlet& outlet, std::vector<std::uint8_t> cdr);
   /// Adds a reader. `input`: prefix of its counts. Without `reliable` it is best effort.

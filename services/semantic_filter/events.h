@@ -25,7 +25,6 @@ class EventTracker {
   /// The track is archived from now on. The next update creates its event.
   void archived(TrackId id) { archived_.insert(id); }
   void clear() { *this = {}; }
-  /// Whether the track was published as confirmed.
   bool wasConfirmed(TrackId id) const;
 
  private:

@@ -43,7 +43,6 @@ class Node {
   const ReasonCounts& reasons() const { return reasons_; }
   InstanceId instance() const { return instance_; }
   const Belief& belief() const { return history_.belief(); }
-  /// The noise scale of the network's boxes, as text for users.
   std::string note() const;
 
  private:

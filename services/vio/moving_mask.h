@@ -21,7 +21,6 @@ class MovingMask {
  public:
   explicit MovingMask(const MovingMaskOptions& options) : options_(options) {}
 
-  /// Stores those of the newest objects that move.
   void onObjects(const Objects& objects);
   /// Boxes, px, of the moving objects' cuboids at `now`. T_WB: the body in `world`.
   std::vector<cv::Rect2f> boxes(const CameraModel& camera, const WorldId& world,

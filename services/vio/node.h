@@ -40,7 +40,6 @@ class Node {
   void onImu(const ImuSample& sample);
   void onSpeed(const SpeedSample& sample);
   void onFrame(const Frame& frame);
-  /// Objects of the object filter; used only with input.moving_mask.
   void onObjects(const Objects& objects) { moving_.onObjects(objects); }
   /// End of data: processes the waiting frames and repeats the last inertial sample.
   void flush() { drain(true); }

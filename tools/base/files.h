@@ -10,7 +10,6 @@
 
 namespace perdure::tools {
 
-/// The content of a file; empty if it cannot be read.
 inline std::string textOf(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::ostringstream text;

@@ -18,7 +18,6 @@ void addBusOptions(CLI::App& command, bus::Options& options);
 /// Runs the loop until it is stopped, a signal arrives, or `seconds` have passed (0: no limit).
 void runLoop(bus::WaitLoop& loop, double seconds);
 
-/// Time of CLOCK_MONOTONIC, in s.
 double steadySeconds();
 
 /// The five services, named as in Health and in discovery.

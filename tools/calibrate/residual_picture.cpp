@@ -66,7 +66,6 @@ void drawChart(cv::Mat& picture, const cv::Rect& area, const std::string& title,
   tools::drawText(picture, title, {area.x, area.y - 10}, kInk);
 }
 
-/// RMS of the corner residuals of each image.
 Points rmsByImage(const std::vector<CornerResidual>& residuals) {
   Points points;
   for (std::size_t i = 0; i < residuals.size();) {

@@ -150,7 +150,6 @@ Judgement judgeGravity(const RigCheck& check) {
                 "vio.yaml or the IMU's scale is wrong");
 }
 
-/// Share of the images that contradict the IMU.
 double againstOf(const RigCheck& check) {
   return static_cast<double>(check.contradicted) /
          static_cast<double>(std::max<std::size_t>(1, check.frames));

@@ -44,7 +44,6 @@ struct RigCheck {
 /// Whether everything is good, with deviations of at most a fifth of the bad limits.
 bool isSurelyGood(const RigCheck& check);
 
-/// Observes a running vio.
 class RigWatch {
  public:
   /// Ignores data later than `seconds` after the first odometry.

@@ -32,7 +32,6 @@ struct SimulatedCalibration {
   const CameraCalibration& truth() const { return scene.rig.true_calibration.cameras[0]; }
   /// Stamps of the images; an image shows the body at its stamp plus the time offset.
   std::vector<TimePoint> stamps() const;
-  /// Board in camera at scene time t.
   RigidTransform T_CT(double t_s) const;
 };
 

@@ -43,7 +43,6 @@ struct ServicePlan {
   std::string log;                   ///< path of the log file
 };
 
-/// Folders of a demo run, all absolute.
 struct DemoFolders {
   std::filesystem::path out, run, state;
   std::unique_ptr<FolderLock> lock;  ///< of OUT

@@ -67,9 +67,7 @@ class Reporter {
   Reporter(const bus::Participant& participant, bus::WaitLoop& loop, OutputWriter& outputs,
            std::map<std::string, ShapePoints> shapes);
 
-  /// Number of frames received so far.
   std::size_t odometryFrames() const { return odometry_.size(); }
-  /// Sensor time of the newest frame with odometry.
   double secondsOfDrive() const { return toSeconds(newest_time_ - first_time_); }
   /// Whether the drive has ended and every frame with odometry has objects.
   bool drained() const;

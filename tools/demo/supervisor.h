@@ -28,7 +28,6 @@ class Supervisor {
   /// Requests the end with SIGTERM and returns at once; it is not started again.
   void stop(const std::string& service);
   bool runs(const std::string& service);
-  /// Number of starts of a service; 0 for an unknown one.
   int starts(const std::string& service) const;
 
  private:

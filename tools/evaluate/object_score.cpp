@@ -58,7 +58,6 @@ double bestOverlap(const Box& box, const std::vector<TruthLabel>& labels) {
   return best;
 }
 
-/// State of one true object across frames.
 struct Track {
   std::uint64_t counted = 0, matched = 0, unmatched_since = 0;
   std::uint64_t last_id = 0;

@@ -56,7 +56,6 @@ struct ScoreOptions {
   double frame_interval_s = 0.1;
 };
 
-/// An estimate in the reference frame of the ground truth.
 struct Estimate {
   std::uint64_t id = 0;
   std::string class_name;
@@ -65,7 +64,6 @@ struct Estimate {
   Box box;  ///< box of the cuboid's corners, clipped to the image
 };
 
-/// One frame with its ground truth and estimates.
 struct ScoredFrame {
   TruthFrame truth;
   std::vector<Estimate> estimates;

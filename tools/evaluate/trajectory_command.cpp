@@ -111,7 +111,6 @@ Alignment alignmentOf(const std::string& name) {
   return name == "yaw" ? Alignment::kYaw : Alignment::kRigid;
 }
 
-/// Text for the alignment in the output.
 const char* nameOf(Alignment alignment) {
   switch (alignment) {
     case Alignment::kYaw:

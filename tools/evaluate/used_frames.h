@@ -27,7 +27,6 @@ double strideOf(const UsedFrames& frames);
 std::size_t withoutPose(const std::vector<TimePoint>& frames,
                         const std::vector<replay::StampedPose>& poses);
 
-/// Note for people about such frames.
 std::string noteOfUntold(std::size_t frames);
 
 /// Removes the frames that were not used and returns their number.

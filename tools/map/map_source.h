@@ -28,7 +28,6 @@ MapReply askMapFile(const std::string& path, const MapQuery& query,
 MapReply askGraphOfFile(const std::string& path, const MapQuery& query);
 /// Geographic origin of the newest session's M, and its yaw; empty if none. Throws StartupError.
 std::optional<GeoAnchor> earthAnchorOfMapFile(const std::string& path);
-/// The standing of an object in the file. Throws StartupError.
 Standing askStanding(const std::string& path, ObjectId id);
 
 }  // namespace perdure::tools

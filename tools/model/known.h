@@ -35,7 +35,6 @@ std::vector<KnownNetwork> knownNetworks(const std::filesystem::path& list);
 /// Lower-case hexadecimal. Throws StartupError(kUnavailable) if the file cannot be read.
 std::string sha256Of(const std::filesystem::path& file);
 
-/// A description of a few lines.
 std::string describe(const KnownNetwork& network);
 
 }  // namespace perdure::tools

@@ -51,7 +51,6 @@ class ObjectHistory {
   /// The last belief of each confirmed object that was neither deleted nor merged, by id.
   std::vector<ObjectBelief> lastBeliefs() const;
   ObjectId survivorOf(ObjectId id) const;
-  /// Number of confirmed objects in the newest message.
   std::size_t confirmedNow() const;
 
  private:

@@ -84,9 +84,7 @@ class OutputWriter {
   std::ofstream events_, odometry_;
 };
 
-/// One line of events.jsonl.
 nlohmann::ordered_json toJson(const Event& event);
-/// One element of objects.json.
 nlohmann::ordered_json toJson(const ObjectBelief& belief);
 
 }  // namespace perdure::tools

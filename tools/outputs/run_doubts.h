@@ -33,9 +33,7 @@ Doubts doubtsOfRun(const RunFacts& facts);
 
 /// " | WARNING: …" with each `what`; "" if there are none.
 std::string endOfLine(const Doubts& doubts);
-/// Prints a warning for each on standard error.
 void printWarnings(const Doubts& doubts);
-/// A list of sentences.
 nlohmann::ordered_json toJson(const Doubts& doubts);
 
 }  // namespace perdure::tools

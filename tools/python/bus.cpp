@@ -103,7 +103,6 @@ void refuseTopic(const std::string& topic) {
 
 namespace {
 
-/// A writer of any topic, selected by name.
 class Publisher {
  public:
   /// Raises UnknownTopic.

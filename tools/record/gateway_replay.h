@@ -26,7 +26,6 @@ class GatewayReplay {
 
   std::uint16_t port() const { return server_->port(); }
   gateway::TimeRange range() const { return {sensorTime(first_.log_ns), sensorTime(last_.log_ns)}; }
-  /// Runs until stop().
   void run();
   void stop();  ///< may be called from any thread
 

@@ -32,7 +32,6 @@ class Player {
   /// Plays once to the end, or until the loop is stopped.
   void play();
   std::uint64_t played() const { return played_; }
-  /// Messages that could not be played, by topic and reason.
   const ReasonCounts& reasons() const { return reasons_; }
   const std::set<std::string>& topics() const { return topics_; }
   /// Omitted topics with their writer, for example "map/frame (map_store)".

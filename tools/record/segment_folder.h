@@ -19,14 +19,12 @@ class SegmentFolder {
 
   /// "FOLDER/perdure-000124-20261122T091658Z.mcap"; `word` after the time: "-fault".
   std::filesystem::path nextFile(std::int64_t wall_ns, const std::string& word);
-  /// Sets the current size of one of its files.
   void sizeIs(const std::filesystem::path& file, std::uint64_t bytes) { sizes_[file] = bytes; }
   void remove(const std::filesystem::path& file);
   /// Removes the oldest files until the quota is met, but never the newest.
   void keepQuota();
   /// Size limit of a file, of this process (`ulimit -f`) and of FAT.
   std::uint64_t largestFile() const;
-  /// Whether enough free space remains after `bytes` more.
   bool hasRoomFor(std::uint64_t bytes) const;
 
   std::uint64_t bytes() const;

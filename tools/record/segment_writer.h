@@ -37,7 +37,6 @@ class SegmentWriter {
 
   /// Returns false if the chunk could not be written and is lost; problem() has the reason.
   bool add(const PackedChunk& packed);
-  /// Finishes the current file.
   void finish();
 
   /// The problem as a sentence; empty if there is no problem.

@@ -63,7 +63,6 @@ void requireTopics(const std::vector<std::string>& topics) {
   }
 }
 
-/// The owner of an existing file or folder.
 std::optional<Owner> ownerOf(const fs::path& path) {
   struct stat status {};
   if (stat(path.c_str(), &status) != 0) return std::nullopt;

@@ -25,7 +25,6 @@ struct Subject {
 };
 
 bus::Key makeKey();
-/// A self-signed certificate.
 bus::Certificate makeAuthority(EVP_PKEY* key, const Validity& validity);
 
 /// The signing authority. Its certificate and key must outlive it.

@@ -23,7 +23,6 @@ struct CommandLine {
   bool list = false, quiet = false, no_noise = false, no_images = false;
 };
 
-/// Parses "640x480". Throws StartupError(kUsage).
 void readSize(const std::string& text, sim::SceneOptions& world) {
   const char* end = text.data() + text.size();
   const auto width = std::from_chars(text.data(), end, world.width);
@@ -43,7 +42,6 @@ void listScenes() {
   }
 }
 
-/// Shows progress: one updated line on a terminal, otherwise a line for each tenth.
 class ProgressBar {
  public:
   void show(const SimulateProgress& progress) {

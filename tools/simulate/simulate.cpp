@@ -67,7 +67,6 @@ FolderLock claim(const fs::path& out, const std::string& description) {
   return lock;
 }
 
-/// The cameras of a run, their pictures, and their progress.
 class Run {
  public:
   Run(const SimulateOptions& options, const sim::Scene& scene)

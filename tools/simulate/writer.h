@@ -33,7 +33,6 @@ std::string insideCsv(const std::vector<std::vector<sim::TruthView>>& views_by_f
 void writeSensors(const std::filesystem::path& folder, const sim::Scene& scene);
 
 enum class ImageFormat { kPng, kJpeg };
-/// ".png" or ".jpg".
 std::string extensionOf(ImageFormat format);
 /// Packed rows, `channels` 1 or 3 (BGR).
 void writeImage(const std::filesystem::path& file, int width, int height, int channels,

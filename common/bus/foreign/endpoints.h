@@ -38,7 +38,6 @@ class ForeignWriter : public AnyWriter {
   ForeignWriter(const Participant& participant, const ForeignTopic& topic);
   ~ForeignWriter();
 
-  /// `cdr` includes its header.
   Result<void> write(std::vector<std::uint8_t> cdr);
 
  private:

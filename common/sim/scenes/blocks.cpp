@@ -45,7 +45,6 @@ class Block {
     Eigen::Vector3d size;
     Place place;
   };
-  /// One of the four sides of a block.
   struct Side;
 
   static std::vector<Side> sidesOf(const Eigen::Vector2d& half);
@@ -258,7 +257,6 @@ std::vector<std::size_t> changesOf(Dice& dice) {
   return changes;
 }
 
-/// Places a house at the end of each road, facing the road.
 void closeRoads(const std::vector<Road>& roads, SceneBuilder& builder) {
   constexpr double kDepth = 7.0, kFromEnd = 0.5 * kRoadWidth + 3.3 + 0.5 * kDepth;
   for (const Road& road : roads) {

@@ -36,7 +36,6 @@ std::vector<Eigen::Vector2d> turns() {
   return points;
 }
 
-/// Removes random vehicles until the planned number is left.
 void thinOut(SceneBuilder& builder) {
   auto& objects = builder.scene().objects;
   const auto isVehicle = [](const SceneObject& o) {

@@ -25,7 +25,6 @@ class Credits {
     while (!on_the_way_.empty() && on_the_way_.front() < creditedByAll()) on_the_way_.pop_front();
   }
   bool maySend() const { return answered_.empty() || on_the_way_.size() < window_; }
-  /// Drops the oldest open frame if no answer arrives.
   void giveUp() {
     if (!on_the_way_.empty()) on_the_way_.pop_front();
   }

@@ -14,7 +14,6 @@
 
 namespace perdure::capture {
 
-/// The configuration of one camera, whose id is in `id`.
 struct CameraSettings : CameraConfig {
   bool id_alone = false;                ///< the id must match one camera only
   std::uint32_t width = 0, height = 0;  ///< pixels, as in the calibration of the rig
@@ -30,7 +29,6 @@ struct CameraShot {
   Result<Frame> frame;         ///< pixels only; fails with "camera_frame_error"
 };
 
-/// An image as it is passed on.
 struct CameraImage {
   std::int64_t time_ns = 0;  ///< CLOCK_BOOTTIME, middle of the middle row's exposure
   std::uint64_t number = 0;  ///< continues over openings; lost images leave a gap
@@ -40,7 +38,6 @@ struct CameraImage {
 class CameraSession {
  public:
   virtual ~CameraSession() = default;
-  /// Name for people.
   virtual std::string name() const = 0;
   /// Settings that the camera does not follow, and why; empty if it follows all.
   virtual std::string note() const = 0;

@@ -46,7 +46,6 @@ class ClockMap {
   void observe(std::int64_t theirs_ns, std::int64_t ours_ns);
   /// Converts a remote time; empty in the first half second.
   std::optional<std::int64_t> toOurs(std::int64_t theirs_ns) const;
-  /// Number of clock jumps, which are changes larger than drift.
   std::uint64_t jumps() const { return jumps_; }
 
  private:

@@ -59,7 +59,6 @@ std::optional<double> askRate(const iio_channel* channel, double wanted) {
   return is && *is > 0.0 ? is : std::nullopt;
 }
 
-/// One axis, with the conversion of its integer readings.
 struct Axis {
   iio_channel* channel = nullptr;
   double scale = 1.0, offset = 0.0;
@@ -245,7 +244,6 @@ class IioStream::Device {
     return {};
   }
 
-  /// Time of scan i in a block of `scans`.
   std::optional<std::int64_t> timeOf(ssize_t i, ssize_t scans, std::int64_t now_ns) {
     std::int64_t stamp = 0;
     if (stamp_) {

@@ -25,7 +25,6 @@ struct IioSettings {
   bool gyro = true, accel = true;  ///< required channels
 };
 
-/// Values of one scan of the device.
 struct IioScan {
   std::int64_t time_ns = 0;                    ///< CLOCK_BOOTTIME
   std::optional<Eigen::Vector3d> gyro, accel;  ///< rad/s and m/s²

@@ -14,7 +14,6 @@ std::string trimmed(std::string_view text);
 /// Clock of a device's stamps. kElsewhere: a clock that the host cannot read.
 enum class StampClock { kBoot, kMonotonic, kRealtime, kElsewhere };
 
-/// Parses `current_timestamp_clock`.
 StampClock stampClockNamed(std::string_view text);
 
 /// Parses a mount matrix, "1, 0, 0; 0, 1, 0; 0, 0, 1", row by row. Empty if the text is not a

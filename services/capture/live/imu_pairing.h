@@ -37,7 +37,6 @@ class ImuPairing {
   std::vector<InertialPair> pairs();
 
   std::deque<Triad> gyro_, accel_;
-  /// Times of the last readings.
   std::int64_t gyro_ns_ = std::numeric_limits<std::int64_t>::min(), accel_ns_ = gyro_ns_;
   ReasonCounts reasons_;
 };

@@ -37,7 +37,6 @@ class Vehicle {
 
   /// A sentence with the fix; empty while all configured sources send data.
   std::string problem() const;
-  /// Names of the active sources, for people.
   std::string name() const;
   void report(ReasonCounts& counts) const;
 

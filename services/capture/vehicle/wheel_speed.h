@@ -13,7 +13,6 @@
 
 namespace perdure::capture {
 
-/// One reading of the vehicle's speed.
 struct SpeedReading {
   std::int64_t time_ns = 0;  ///< CLOCK_BOOTTIME
   double speed = 0.0;        ///< m/s along the body's x axis; negative backwards

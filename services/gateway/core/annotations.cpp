@@ -59,7 +59,6 @@ void putLabel(JsonWriter& json, TimePoint time, const Label& label) {
   json.with("background_color", label.colour).end('}');
 }
 
-/// Strokes of the object's cuboid in the image.
 std::vector<Point> projected(const Objects& objects, const ObjectBelief& object,
                              const CameraModel& camera) {
   const RigidTransform T_CW = (objects.T_WB * camera.T_BC()).inverse();

@@ -17,7 +17,6 @@ class GraphPace {
  public:
   /// The graph may differ from the last answer.
   void changed() { stale_ = true; }
-  /// Whether to query now. `now_ns`: a monotonic time.
   bool due(std::int64_t now_ns);
   void answered(const MapReply& reply, std::int64_t now_ns);
   /// Repeats the query later, if clients still need it.

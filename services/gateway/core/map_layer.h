@@ -13,21 +13,18 @@ namespace perdure::gateway {
 
 class MapLayer {
  public:
-  /// Takes a message of `map/frame`.
   void follow(const MapFrame& frame);
   void put(const MapTile& tile);
   void erase(const MapTile& key);
   /// Clears the tiles, because they are no longer received.
   void clear() { tiles_.clear(); }
   bool empty() const { return tiles_.empty(); }
-  /// Whether tiles or T_MW have changed since the last call.
   bool takeChanged();
 
   /// The newest frame if it belongs to this W; otherwise nullptr.
   const MapFrame* frameOf(const WorldId& world) const;
   /// Maps W to M. Identity without a frame of this W: map_store then publishes in W.
   RigidTransform T_MW(const WorldId& world) const;
-  /// M of this W.
   WorldId mapOf(const WorldId& world) const;
 
   struct View {
@@ -45,7 +42,6 @@ class MapLayer {
 /// The message "perdure.MapFrame".
 std::string mapFrameJson(const MapFrame& frame);
 
-/// Largest number of map objects that are sent.
 inline constexpr std::size_t kMostOfMap = 2000;
 /// The nearest kMostOfMap of `objects`, nearest first. `p_MB`: position of the body in M.
 std::vector<MapObject> nearestTo(const Eigen::Vector3d& p_MB, std::vector<MapObject> objects);

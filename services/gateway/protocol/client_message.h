@@ -13,7 +13,6 @@
 
 namespace perdure::gateway::protocol {
 
-/// Largest number of subscriptions in one message.
 inline constexpr std::size_t kMostSubscriptions = 256;
 
 struct Subscription {

@@ -31,7 +31,6 @@ class Guard {
   const Options options_;
 };
 
-/// Path of a target, without its query.
 std::string_view pathOf(std::string_view target);
 
 }  // namespace perdure::gateway::web

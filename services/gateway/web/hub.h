@@ -25,7 +25,6 @@ class Viewer {
   Outbox& outbox() { return outbox_; }
   std::uint64_t id() const { return id_; }
 
-  /// Called if a message waits in the outbox.
   virtual void flush() = 0;
   /// Closes the client; `why` is the reason as text.
   virtual void cut(const std::string& why) = 0;

@@ -33,13 +33,11 @@ class Outbox {
   bool putControl(std::string message, bool text);
   /// Adds the time of the newest message, which replaces a waiting one.
   void putTime(std::string message);
-  /// Removes the waiting messages of this subscription.
   void forget(std::uint32_t subscription);
 
   std::optional<Outgoing> take();
   std::size_t size() const { return waiting_.size(); }
   std::uint64_t dropped() const { return dropped_; }
-  /// Number of events lost since the last call.
   std::uint64_t takeLostEvents();
 
  private:

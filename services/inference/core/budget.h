@@ -16,7 +16,6 @@ class Budget {
   /// `shares`: pixels of each size relative to the first, falling from 1. `budget_ms` 0: none.
   Budget(double budget_ms, std::vector<double> shares);
 
-  /// Index of the current size.
   std::size_t size() const { return size_; }
   /// Adds the time of a frame at the current size. Returns whether the size has changed.
   bool took(double ms);

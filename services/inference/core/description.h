@@ -25,7 +25,6 @@ enum class Family {
   kYoloFastestV2,
 };
 
-/// How an image is fitted to the input size.
 enum class Fit {
   kLetterboxTopLeft,  ///< one scale, image in the top left corner, rest padded (YOLOX)
   kLetterboxCentre,   ///< one scale, image in the middle, rest padded

@@ -68,7 +68,6 @@ struct Found {
   std::uint64_t malformed = 0;  ///< rows that were left out because their belief could not be read
 };
 
-/// The stored position of an object on the map.
 struct StoredPlace {
   ObjectId id = 0;
   WorldId world;  ///< the W of the position
@@ -90,14 +89,12 @@ class MapReader {
   Result<Found> find(const MapQuery& query, const WorldId& newest, std::uint32_t limit) const;
   /// All objects on the map, in full, by id; rows that cannot be read are left out.
   Result<std::vector<PlacedBelief>> beliefs() const;
-  /// The objects nearer than the radius, in full, nearest first.
   Result<Found> inFullNear(const Eigen::Vector3d& centre, double radius, const WorldId& world,
                            std::uint32_t limit) const;
   /// The last belief of a track; nothing if it is not on the map.
   Result<std::optional<PlacedBelief>> beliefOf(TrackId track) const;
   /// Those of the objects `ids` that are on the map, in this order; at most `limit`.
   Result<Found> byIds(const std::vector<ObjectId>& ids, std::size_t limit) const;
-  /// The places of all objects on the map, by id.
   Result<std::vector<StoredPlace>> places() const;
   /// Nothing if the object is not on the map.
   Result<std::optional<StoredPlace>> placeOf(ObjectId id) const;
@@ -121,7 +118,6 @@ class MapReader {
 
 class MapDatabase {
  public:
-  /// Throws StartupError.
   explicit MapDatabase(const StoreOptions& options);
 
   /// Commits everything or nothing; the data is durable on return. Beliefs that did not change, or
@@ -135,7 +131,6 @@ class MapDatabase {
   const std::string& notice() const { return notice_; }
 
  private:
-  /// The stored row of a track or an object.
   struct Row {
     std::uint64_t digest = 0;  ///< digest of the belief; 0: not known
     bool stored = false;

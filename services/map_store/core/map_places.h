@@ -21,7 +21,6 @@ class MapPlaces {
   /// Adds or updates an object on the map. `record`: its record in the graph, or null.
   void put(const StoredPlace& stored, const mapping::ObjectRecord* record,
            const mapping::MapFrames& frames);
-  /// Removes an object that left the map.
   void erase(ObjectId id);
   /// Places all objects anew. A square becomes stale if an object moved 0.1 m since it was taken.
   void lay(const mapping::MapFrames& frames);
@@ -68,7 +67,6 @@ class MapInM {
 
   /// As MapReader::find does, in M. Spatial queries search in the M of `newest`.
   Result<Found> find(const MapQuery& query, const WorldId& newest, std::uint32_t limit) const;
-  /// The objects of a square.
   Result<Found> objects(const std::vector<ObjectId>& ids) const;
   std::map<Square, std::vector<ObjectId>> takeStale() { return places_.takeStale(); }
 

@@ -27,7 +27,6 @@ struct OpenedStore {
   std::string notice;  ///< a sentence if a damaged file was renamed, else empty
 };
 
-/// Application id and version in a database's header.
 struct Identity {
   std::int64_t application = 0, version = 0, tables = 0;
   bool empty() const { return application == 0 && version == 0 && tables == 0; }

@@ -71,7 +71,6 @@ class Statement {
   Statement& bind(int index, std::string_view value);
   Statement& bind(int index, std::span<const std::uint8_t> value);
   Statement& bindNull(int index);
-  /// Binds the values to the parameters from 1.
   Statement& bindAll(const auto&... values) {
     int index = 0;
     (bind(++index, values), ...);
@@ -84,7 +83,6 @@ class Statement {
   Result<void> run() {
     return forEach([](const Statement&) {});
   }
-  /// Calls `take` for each row.
   Result<void> forEach(auto take) {
     for (;;) {
       const auto row = step();
@@ -120,12 +118,10 @@ class Connection {
   static Result<Connection> open(const std::string& path, Mode mode);
 
   Result<Statement> prepare(std::string_view sql) const;
-  /// Runs one statement with the values of its parameters.
   Result<void> run(std::string_view sql, const auto&... values) const {
     return prepare(sql).and_then(
         [&](Statement statement) { return statement.bindAll(values...).run(); });
   }
-  /// Calls `take` for each row of a query with the values of its parameters.
   Result<void> forRows(std::string_view sql, auto take, const auto&... values) const {
     return prepare(sql).and_then(
         [&](Statement rows) { return rows.bindAll(values...).forEach(take); });

@@ -47,7 +47,6 @@ struct Patience {
   std::chrono::milliseconds answer{20'000};  ///< while nothing is sent or received
 };
 
-/// Parameters of one statement, in order.
 class Values {
  public:
   Values& put(std::int64_t value);
@@ -62,7 +61,6 @@ class Values {
   std::vector<std::optional<std::string>> bytes_;
 };
 
-/// The result of a statement.
 class Answer {
  public:
   explicit Answer(pg_result* result) : result_(result) {}
@@ -89,7 +87,6 @@ class Link {
   /// `stop` must outlive the link; raising it ends every wait.
   static Result<Link> open(const std::string& url, const Patience& patience, const Stop& stop);
 
-  /// Runs one statement and returns its answer.
   Result<Answer> ask(const std::string& sql, const Values& values = {});
   /// Runs statements without parameters or answers in one transaction.
   Result<void> run(const std::string& sql);

@@ -7,7 +7,6 @@
 
 namespace perdure::map_store::fleet {
 
-/// One map on the server.
 struct ServerMap {
   std::int64_t number = 0;
   std::string vehicle, file;  ///< name of the map, and identity of the map's file

@@ -12,7 +12,6 @@
 
 namespace perdure::map_store::fleet {
 
-/// Time limits, and the size of a transaction.
 struct Pace {
   std::chrono::milliseconds connect{10'000};   ///< limit for a connection
   std::chrono::milliseconds answer{20'000};    ///< while nothing is sent or received

@@ -11,7 +11,6 @@
 
 namespace perdure::ros2 {
 
-/// Recent frames, by their stamps in ROS.
 class FrameBook {
  public:
   void add(TimePoint ros_stamp, const FrameStamp& stamp);

@@ -34,7 +34,6 @@ class Rig {
 
   /// The calibration once it is complete, and after each change. Its source is not set.
   std::optional<Calibration> news();
-  /// The last complete calibration, if any.
   const std::optional<Calibration>& complete() const { return told_; }
   /// The missing inputs, with the fix; empty if none are missing.
   std::string missing() const;

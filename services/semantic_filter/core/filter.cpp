@@ -79,7 +79,6 @@ ScratchVector<TrackVisibility> updateVisibility(Belief& belief, const FrameInput
   return visibilities;
 }
 
-/// Notes a frame in which the track is not visible in its ledger.
 void noteNotVisible(Track& track, Visibility why, TimePoint now, double min_speed) {
   if (track.unused.count() == 0) stopSlowHypotheses(track, min_speed);
   const bool away = why == Visibility::kOutOfView || why == Visibility::kBehind;
@@ -97,7 +96,6 @@ struct ScoredTrack {
   bool sound = true;  ///< state of its numbers after the update
 };
 
-/// The parts of a step that use the detections.
 struct Step {
   Belief& belief;
   const FrameInput& input;
@@ -113,7 +111,6 @@ struct Step {
   void resolveIdentities(StepReport& report);
 };
 
-/// Predicts and scores the visible tracks.
 ScratchVector<ScoredTrack> Step::scoreAll(const ScratchVector<TrackVisibility>& visibilities) {
   ScratchVector<ScoredTrack> scored;
   scored.reserve(static_cast<std::size_t>(

@@ -19,7 +19,6 @@
 
 namespace perdure::vio {
 
-/// State at which a filter begins, at `time` of the IMU clock.
 struct Start {
   TimePoint time;
   Nav nav;

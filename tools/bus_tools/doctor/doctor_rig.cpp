@@ -20,7 +20,6 @@ bool isFatal(const replay::DataFinding& finding) {
   return finding.grade == replay::DataFinding::Grade::kFatal;
 }
 
-/// Whether vio can run on the recording.
 bool isUsable(const replay::DataFindings& of_data) {
   return std::ranges::none_of(of_data, isFatal);
 }
@@ -61,7 +60,6 @@ void checkMotionOf(const replay::Recording& recording, replay::DataFindings& of_
   findings.push_back({Verdict::kOk, check.basis});
 }
 
-/// Returns whether the rig can be judged by the recording.
 bool checkRecording(const Drive& drive, const replay::Recording& recording, Findings& findings) {
   // The notes of 7-Scenes state what its layout leaves open; they are not faults of the data.
   const bool scenes = recording.kind == replay::DatasetKind::kSevenScenes;

@@ -90,7 +90,6 @@ struct StatusSeen {
 };
 
 StatusNode judge(const StatusSeen& seen);
-/// The part of the tree about the map.
 StatusNode judgeMap(const StatusSeen& seen);
 
 const char* levelWord(Level level);

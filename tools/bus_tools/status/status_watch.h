@@ -20,7 +20,6 @@ class StatusWatch {
   explicit StatusWatch(const bus::Options& options);
 
   bus::WaitLoop& loop() { return loop_; }
-  /// Sets a handler that is also called for each Health message.
   void onHealth(std::function<void(const Health&)> handler) { on_health_ = std::move(handler); }
   /// The current observations, without the host.
   StatusSeen seen();

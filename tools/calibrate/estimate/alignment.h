@@ -11,7 +11,6 @@
 
 namespace perdure::calibrate {
 
-/// Pose of the camera at a time of its own clock.
 struct CameraPose {
   double time_s = 0.0;
   RigidTransform T_TC;

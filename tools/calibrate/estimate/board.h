@@ -32,7 +32,6 @@ struct Board {
   /// Upper left and lower right end of the printed area, including a white margin.
   Eigen::Vector2d printFrom() const;
   Eigen::Vector2d printTo() const;
-  /// Whether a point of the board plane is printed black.
   bool black(const Eigen::Vector2d& point) const;
 
  private:

@@ -24,7 +24,6 @@ Eigen::Vector3d rmsOf(const std::vector<ImuResidual>& all, Eigen::Vector3d ImuRe
   return (sum / static_cast<double>(all.size())).cwiseSqrt();
 }
 
-/// Correlation of each value with the next one.
 double correlationOf(const std::vector<ImuResidual>& all, Eigen::Vector3d ImuResidual::*which) {
   double product = 0.0, square = 0.0;
   for (std::size_t i = 1; i < all.size(); ++i) {
@@ -50,7 +49,6 @@ bool isSaturated(const std::vector<ImuReading>& readings, Eigen::Vector3d ImuRea
   return false;
 }
 
-/// The longest sequence of views without a gap.
 std::vector<Sighting> longestStretch(const std::vector<Sighting>& all, double gap_s) {
   std::size_t best_from = 0, best_to = 0, from = 0;
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -141,7 +139,6 @@ class CameraImuRun {
     return {};
   }
 
-  /// Computes the initial estimates in closed form.
   Result<void> start() {
     const auto aligned = alignRates(poses_, near_, options_.widest_offset_s);
     if (!aligned) return tl::unexpected(aligned.error());
@@ -181,7 +178,6 @@ class CameraImuRun {
     poses_ = std::move(poses), problem_.sightings = std::move(sightings);
   }
 
-  /// Initialises a spline over the views from the camera poses.
   void placeSpline() {
     auto& x = problem_.x;
     x.spline.interval_s = chooseKnotInterval(near_);

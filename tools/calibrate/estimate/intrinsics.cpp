@@ -125,7 +125,6 @@ struct ViewState {
   std::vector<bool> good;
 };
 
-/// The least-squares problem over a lens and the poses of the views.
 class Bundle {
  public:
   Bundle(const Board& board, const CameraCalibration& camera, const IntrinsicsOptions& options)

@@ -15,7 +15,6 @@ namespace perdure::calibrate {
 using Vector8d = Eigen::Matrix<double, 8, 1>;
 using Matrix8d = Eigen::Matrix<double, 8, 8>;
 
-/// Residual of a detected corner against its predicted position.
 struct CornerResidual {
   std::uint64_t frame = 0;
   double time_s = 0.0;  ///< time since the first view

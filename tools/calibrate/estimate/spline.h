@@ -85,7 +85,6 @@ Vector3<T> positionAt(const std::array<Eigen::Map<const Vector3<T>>, kOrder>& co
   return sum;
 }
 
-/// Control points and their times.
 struct Spline {
   double start_s = 0.0, interval_s = 0.05;
   std::vector<RigidTransform> controls;  ///< T_TB

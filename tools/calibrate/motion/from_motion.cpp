@@ -127,7 +127,6 @@ std::string unsureOf(const JointEstimate& joint) {
   return unsure;
 }
 
-/// Two images of a window.
 struct Pair {
   TimePoint from, to;
   std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>> pixels;

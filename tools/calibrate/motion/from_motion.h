@@ -45,7 +45,6 @@ std::vector<std::string> writeMotionRig(const replay::DatasetOptions& drive,
                                         const WindowOptions& options,
                                         const std::filesystem::path& file);
 
-/// Comparison of a recording's own calibration with the motion.
 struct MotionCheck {
   replay::DataFindings findings;  ///< codes: focal_length, time_offset, readout
   /// The motion that the comparison is based on, or why no comparison is possible.

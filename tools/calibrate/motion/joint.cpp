@@ -54,7 +54,6 @@ class Problem {
   }
   /// Minus the mean force, as if the body did not accelerate.
   Eigen::Vector3d gravityIn(const Window& window) const;
-  /// Squared residuals, in px².
   std::vector<double> squares(const JointState& state, const Window& window) const;
   std::vector<double> allSquares() const;
   double cost(const JointState& state, const Window& window) const;

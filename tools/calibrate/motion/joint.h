@@ -32,7 +32,6 @@ struct JointState {
 };
 /// `state` changed by a small `step`.
 JointState moved(const JointState& state, const JointVector& step);
-/// The step from one state to another, as for moved().
 JointVector between(const JointState& from, const JointState& to);
 
 struct JointOptions {

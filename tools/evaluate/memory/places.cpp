@@ -11,7 +11,6 @@ namespace {
 
 constexpr char kPlacesHeader[] = "place,visit,x,y,z,frames";
 
-/// Adds a row to the places. Returns what is wrong with it, or "".
 std::string addRow(const std::string& text, Places& places) {
   const auto fields = replay::split(text, ',');
   if (fields.size() != 6) {

@@ -11,7 +11,6 @@ namespace perdure::tools {
 /// A row of the places' file: where an object is by the sensors of one visit.
 struct PlaceVisit {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< in the frame of the true poses
-  /// Frames in which the detector detects the object.
   std::vector<std::uint64_t> frames;
 };
 using Places = std::map<std::uint64_t, std::map<std::uint64_t, PlaceVisit>>;  ///< by place, visit

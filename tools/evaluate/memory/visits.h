@@ -48,7 +48,6 @@ struct Visit {
   /// The id of most frames; the smallest one on a tie. Empty if no report matched.
   std::optional<std::uint64_t> id() const;
 };
-/// Visits by true object.
 std::map<std::uint64_t, std::vector<Visit>> visitsOf(const std::vector<MemoryFrame>& frames,
                                                      const MemoryOptions& options);
 
@@ -70,7 +69,6 @@ struct MemoryScore {
 MemoryScore scoreMemory(const SimulatedTruth& truth, const std::vector<MemoryFrame>& frames,
                         const MemoryOptions& options);
 
-/// Score of a run that started with the map of another run.
 struct ReturnScore {
   std::uint64_t ids = 0;    ///< ids that the earlier run reported
   std::uint64_t known = 0;  ///< objects that the earlier run reported and this run sees
@@ -78,7 +76,6 @@ struct ReturnScore {
   std::uint64_t seen = 0, reported = 0;
   std::uint64_t kept = 0;   ///< objects with the id of the last earlier visit
   std::uint64_t wrong = 0;  ///< objects with an id of another object
-  /// Time and place of the first report of a known id.
   struct First {
     double seconds = 0.0, way_m = 0.0;
     std::uint64_t objects = 0;  ///< objects visible up to that frame, inclusive

@@ -33,7 +33,6 @@ struct DriveInMap {
   RigidTransform T_MB(const replay::StampedPose& pose) const;
   /// T_MW at the last anchor before a time, or at the first one.
   RigidTransform T_MW(TimePoint time) const;
-  /// T_MW at the start of the session.
   RigidTransform T_MW_begin() const;
 };
 

@@ -31,7 +31,6 @@ bool clip(const cv::Rect2d& area, cv::Point2d& a, cv::Point2d& b);
 /// Connects points inside or outside the image; dashes continue across the joints.
 void drawLine(cv::Mat& image, const Polyline& line, const Stroke& stroke);
 void drawClosed(cv::Mat& image, Polyline corners, const Stroke& stroke);
-/// Fills a convex outline, `opacity` in [0, 1].
 void drawFilled(cv::Mat& image, const Polyline& corners, const Colour& colour, double opacity);
 /// Mixes a rectangle of the image with a colour; clips it to the image.
 void tint(cv::Mat& image, const cv::Rect& area, const Colour& colour, double opacity);

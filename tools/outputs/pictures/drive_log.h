@@ -11,7 +11,6 @@
 
 namespace perdure::tools {
 
-/// The most probable class of an object at a frame.
 struct ObjectGlance {
   ObjectId id = 0;
   std::string class_name;

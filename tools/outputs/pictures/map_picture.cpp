@@ -113,7 +113,6 @@ void drawWay(cv::Mat& picture, const MapView& view, const std::vector<Eigen::Vec
   drawLine(picture, line, stroke);
 }
 
-/// Draws a disc at the start and an arrow head at the end.
 void drawEnds(cv::Mat& picture, const MapView& view, const std::vector<Eigen::Vector3d>& path) {
   if (path.empty()) return;
   cv::circle(picture, cv::Point(view.at(flat(path.front()))), thick(view, 5), kInk, cv::FILLED,

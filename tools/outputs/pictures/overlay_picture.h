@@ -21,7 +21,6 @@ class OverlayPicture {
 
   /// Size of each picture: the scaled image, the plan and the header; even numbers.
   cv::Size size() const;
-  /// Area of the image in the picture.
   cv::Rect imageArea() const;
   /// `image`: not undistorted. `path`: up to this frame. `start`: displayed as 0.
   cv::Mat draw(const cv::Mat& image, const FrameGlance& frame,

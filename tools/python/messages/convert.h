@@ -10,7 +10,6 @@ namespace perdure::python {
 
 /// Matrices become separate numpy arrays; pixels are not copied.
 pybind11::object toPython(std::type_index type, const void* message);
-/// Kinds and shapes are checked here, bounds by the encoder. Raises perdure.Refused.
 void fromPython(std::type_index type, pybind11::handle from, void* message);
 
 /// T: the type of a topic, or a type that a topic's type contains.

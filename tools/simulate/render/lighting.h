@@ -10,7 +10,6 @@
 
 namespace perdure::tools {
 
-/// Intersection of a ray.
 struct Hit {
   std::uint32_t instance = kNothing;  ///< kNothing: the sky
   std::uint32_t material = 0;
@@ -24,7 +23,6 @@ struct Hit {
 class Lighting {
  public:
   explicit Lighting(const sim::Scene& scene);
-  /// Updates the positions of the objects.
   void setTime(const World& world);
 
   const Eigen::Vector3f& sun() const { return sun_W_; }

@@ -19,7 +19,6 @@ class Room {
   bool putDesk(const Eigen::Vector2d& at_wall, double inwards);
   /// Places desks, couches, shelves, crates and people along all four walls.
   void furnishWalls();
-  /// Tries to place `count` objects of the class anywhere on the floor.
   void scatter(const std::string& class_name, int count);
   void scatterCrates(int count);
 

@@ -40,7 +40,6 @@ class LiveCameras {
   std::list<LiveCamera> cameras_;
 };
 
-/// Name of camera i: "cam0", "cam1".
 std::string cameraName(std::size_t i);
 
 }  // namespace perdure::capture

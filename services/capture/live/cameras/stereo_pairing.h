@@ -12,7 +12,6 @@
 
 namespace perdure::capture {
 
-/// Stamps of one camera.
 class CameraTimeline {
  public:
   /// False if the stamp decreases, or is ahead of `now_ns` by more than `interval_ns`.
@@ -21,7 +20,6 @@ class CameraTimeline {
   std::optional<std::int64_t> last_ns() const { return last_ns_; }
   /// Smoothed time between images; 0: not known.
   double period_ns() const { return period_ns_; }
-  /// Whether an image arrived in the last `longest_ns`.
   bool flows(std::int64_t now_ns, double longest_ns) const;
 
  private:
@@ -39,7 +37,6 @@ class StereoPairing {
   /// Takes an image and returns those to publish: cam0 first, cam1 with the same number.
   std::vector<CameraImage> first(CameraImage image, std::int64_t now_ns);
   std::vector<CameraImage> second(CameraImage image, std::int64_t now_ns);
-  /// Returns images whose wait has ended.
   std::vector<CameraImage> due(std::int64_t now_ns);
 
   /// A third of the time between two images, at most vio's own pairing tolerance of 10 ms.

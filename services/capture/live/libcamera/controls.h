@@ -24,12 +24,10 @@ struct AskedControls {
 AskedControls controlsFor(const CameraSettings& settings, const libcamera::ControlInfoMap& offered);
 
 using KnownFormat = std::pair<libcamera::PixelFormat, PixelLayout>;
-/// Known formats, the best first.
 std::span<const KnownFormat> knownFormats();
 
 /// Requests `camera.flip`; validate() removes it if the camera does not support it.
 void askFlip(libcamera::CameraConfiguration& configuration, const std::string& flip);
-/// Whether the configuration still contains the flip.
 bool flips(const libcamera::CameraConfiguration& configuration, const std::string& flip);
 /// Why images do not follow `camera.flip`, with the fix. With "none", images are left as delivered,
 /// also rotated by 90°.

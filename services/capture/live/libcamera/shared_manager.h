@@ -27,7 +27,6 @@ class Unended {
 
 class SharedManager {
  public:
-  /// `devices`: folder of the video nodes.
   explicit SharedManager(std::function<void(const std::string&)> log,
                          std::filesystem::path devices = "/dev")
       : log_(std::move(log)), devices_(std::move(devices)) {}
@@ -46,7 +45,6 @@ class SharedManager {
   /// Keeps a camera whose removal udev has not reported yet. A later manager() destroys it once
   /// over() is true. The destructor waits for it for two seconds, and otherwise leaks it.
   void keepUntilOver(std::unique_ptr<Unended> camera);
-  /// Returns whether a removed camera is still stored.
   bool keeps() const;
   /// Increases if the open cameras must be closed briefly.
   unsigned restarts() const { return restarts_; }

@@ -16,7 +16,6 @@ struct Overlap {
   std::size_t index = 0;
 };
 
-/// Finds the box with the largest overlap.
 template <class Boxes>
 Overlap mostOverlapping(const Box& box, const Boxes& others) {
   Overlap most;
@@ -27,7 +26,6 @@ Overlap mostOverlapping(const Box& box, const Boxes& others) {
   return most;
 }
 
-/// Which expectations and which reported boxes have a match.
 struct Meetings {
   std::vector<bool> met, used;
 };

@@ -53,7 +53,6 @@ inline constexpr double kPrimedHorizon_s = 0.5;
 /// Whether camera and source match, and the predictions' frame is at most kPrimedHorizon_s older.
 bool fitsFrame(const Predictions& predictions, const Frame& frame);
 
-/// Predicted box after `after` seconds.
 Box movedOn(const Prediction& prediction, double after);
 
 }  // namespace perdure::inference

@@ -9,7 +9,6 @@
 namespace perdure::inference {
 namespace {
 
-/// Access to the column of class k in the scores of one box.
 class Columns {
  public:
   Columns(const ModelDescription& model, const RawScores& raw)

@@ -29,7 +29,6 @@ std::optional<std::size_t> weigh(const ModelDescription& model, const DecodeOpti
 /// Soft-max of `count` values, `step` apart.
 std::vector<double> softMax(const float* values, std::size_t step, std::size_t count);
 
-/// Box from its centre and size.
 inline Box centred(double cx, double cy, double width, double height) {
   return {cx - width / 2, cy - height / 2, cx + width / 2, cy + height / 2};
 }

@@ -21,7 +21,6 @@ enum class Backend {
 /// Backend of a name, which must be "auto", "opencv" or "onnxruntime".
 Backend backendOf(const std::string& name);
 
-/// Whether this build includes ONNX Runtime.
 bool hasOnnxRuntime();
 
 struct NetworkFile {
@@ -37,7 +36,6 @@ class Network {
   /// `blob` is (1,3,H,W), float32. The tensors are valid until the next call. Fails with
   /// "model_failed" if the network could not be evaluated, or with "model_output_shape".
   virtual Result<std::vector<Tensor>> forward(const cv::Mat& blob) = 0;
-  /// Name and version of the backend, for people.
   virtual std::string backend() const = 0;
 };
 

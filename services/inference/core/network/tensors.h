@@ -20,7 +20,6 @@ struct Tensor {
 /// A length in expectedShapes() that the network chooses.
 inline constexpr int kAnyLength = -1;
 
-/// A tensor of one level of the heads.
 struct LevelTensor {
   const char* key;           ///< key in model.json
   std::string Level::*name;  ///< member with the tensor's name in the network

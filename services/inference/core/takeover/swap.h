@@ -50,7 +50,6 @@ class Swap {
   void told(const SwapNotice& notice, Time now);
   /// Call it several times in a lease.
   void tick(Time now);
-  /// Returns the actions since the last call.
   Actions take() { return std::exchange(actions_, {}); }
 
   /// Whether no other writer was received for a lease.
@@ -58,7 +57,6 @@ class Swap {
   bool rehearsing() const { return role_ == Role::kRehearsing; }
   /// Last event, for people; empty if there was none.
   const std::string& message() const { return message_; }
-  /// Counts of roll-backs by reason.
   const ReasonCounts& reasons() const { return reasons_; }
 
  private:

@@ -13,7 +13,6 @@ namespace perdure::map_store {
 /// Maps of older versions have no tables of the graph.
 inline constexpr int kFirstSchemaWithGraph = 3;
 
-/// SQL that creates the tables.
 extern const char* const kGraphSchema;
 /// SQL that creates the later tables if they do not exist: views, and tracks that share an object.
 extern const char* const kAddedSchema;

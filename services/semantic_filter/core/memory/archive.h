@@ -17,7 +17,6 @@ class Archive {
   Archive(const MemoryParameters& parameters, double min_speed)
       : parameters_(parameters), min_speed_(min_speed) {}
 
-  /// The tracks that leave the working set, ordered by id.
   struct Leaving {
     std::vector<TrackId> archived;   ///< at rest and on the map, until they are recalled
     std::vector<TrackId> forgotten;  ///< never confirmed, or moving and out of view

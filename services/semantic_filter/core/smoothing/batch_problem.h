@@ -113,7 +113,6 @@ class BatchProblem {
   std::optional<Stack> linearise(const State& x) const;
   /// Writes into `result` and uses its memory.
   void covariance(const State& x, const Stack& s, SideCovariance& result) const;
-  /// Returns information and gradient of keyframes and priors at x.
   Quadratic quadratic(const State& x, const Gram& gram) const;
   /// Returns -2 log of the priors, without a constant and without the azimuths.
   double priorCost(const State& x) const;
@@ -127,7 +126,6 @@ class BatchProblem {
   ResidualRatio azimuthResidualRatio(const State& x, double yaw_variance) const;
   /// Returns log |Λ / 2π| of the velocity prior; 0 at rest.
   double logSpeedPrior() const;
-  /// Returns log |Λ| of the size prior.
   double logSizePrior() const;
   /// Returns the part of log |R| that belongs to no density: of cut sides and whether they count.
   double logVolumeOfCuts(const Stack& s, const PerKeyframe& inflations) const;

@@ -10,7 +10,6 @@ namespace perdure::semantic_filter {
 bool addKeyframe(Track& track, Keyframe keyframe, const ViewScales& scales,
                  const SmoothingParameters& parameters);
 
-/// Whether the box of the keyframe fits the hypothesis.
 bool explains(const Hypothesis& h, const Keyframe& keyframe, const FrameContext& frame);
 
 /// Adds the keyframes of b to those of a. Both tracks are one object.

@@ -30,7 +30,6 @@ class MapFit {
   SideEvidence sideEvidence() const;
   /// Residuals of the azimuths, by the first assumption; their count: degrees of freedom.
   ResidualRatio azimuthResidualRatio() const;
-  /// Returns the number of sides that count, of all keyframes.
   std::size_t sides() const;
   /// Returns 1 for each keyframe that contradicts the fit, 0 for the others.
   const KeyframeCounts& contradictions() const;

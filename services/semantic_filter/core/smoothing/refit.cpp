@@ -11,7 +11,6 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// How many of the accepted fits contradict each keyframe.
 struct ContradictionCounts {
   int fits = 0;
   KeyframeCounts counts;

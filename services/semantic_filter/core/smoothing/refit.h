@@ -12,7 +12,6 @@ bool considerKeyframe(Track& track, const BoxDetection& box, const std::array<bo
                       const FrameContext& frame);
 /// Returns the number of new keyframes over the awaited `fresh` share; from 1 on a fit is due.
 double refitNeed(const Track& track, double fresh);
-/// Evidence of one track about the boxes of its network.
 struct NetworkEvidence {
   SideEvidence sides;      ///< of keyframes that no earlier evidence counted; with mode searches
   ResidualRatio azimuths;  ///< of keyframes that no earlier fit counted

@@ -26,7 +26,6 @@ std::vector<MergeRecord> mergeObjects(std::vector<Track>& tracks, const FrameCon
 /// Whether class and motion allow that both are one object.
 bool sameKind(const Track& a, const Track& b);
 
-/// Merges b into a. Both are one object.
 void mergeTwo(Track& a, Track& b, const FrameContext& frame);
 
 /// Fuses two beliefs with independent errors, but for the size prior and the pose error.

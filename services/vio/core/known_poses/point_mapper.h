@@ -38,7 +38,6 @@ class Agreement {
   std::size_t images_ = 0;
 };
 
-/// Given pose and motion of the body at one image.
 struct KnownPose {
   RigidTransform T_WB;
   Matrix6d covariance = Matrix6d::Zero();                ///< covariance of [θ, p], as in Odometry

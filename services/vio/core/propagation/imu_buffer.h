@@ -31,7 +31,6 @@ class ImuBuffer {
   std::vector<ImuReading> between(TimePoint from, TimePoint to) const;
   /// Writes the same readings into `readings` and reuses its memory.
   void between(TimePoint from, TimePoint to, std::vector<ImuReading>& readings) const;
-  /// Longest time without a sample inside [from, to].
   Duration longestGap(TimePoint from, TimePoint to) const;
   /// Median interval of the newest samples; empty for fewer than three samples.
   std::optional<Duration> period() const;

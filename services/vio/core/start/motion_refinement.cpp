@@ -37,7 +37,6 @@ double priorCost(const MotionWindow& w, const Options& o) {
              (o.calibration.time_offset_s * o.calibration.time_offset_s);
 }
 
-/// Cost of the increments, the biases and the time offset.
 double inertialCost(const Estimate& e, const Inertial& inertial, const Options& o) {
   double cost = priorCost(e.window, o);
   for (std::size_t i = 0; i < inertial.increments.size(); ++i) {

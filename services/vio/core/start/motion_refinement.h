@@ -64,7 +64,6 @@ Result<RefinedWindow> refine(MotionWindow window, const ImuBuffer& imu, const Op
 /// Largest error of a usable velocity, and distance of other good minima, as a share.
 inline constexpr double kVelocityShare = 0.16;
 
-/// Triangulates the points from the poses of the window.
 void placePoints(MotionWindow& window);
 
 /// Fails as refine() does, and with "start_unobservable" if another minimum fits about as well.

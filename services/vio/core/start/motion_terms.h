@@ -55,7 +55,6 @@ struct Inertial {
 Result<Inertial> inertialOf(const MotionWindow& window, const ImuBuffer& imu,
                             const ImuNoise& noise);
 
-/// Residual of a view in deviations, and its derivatives.
 struct ViewTerm {
   Eigen::Vector2d r;
   Eigen::Matrix<double, 2, 3> by_ray;
@@ -64,7 +63,6 @@ struct ViewTerm {
   double weight = 1.0;  ///< Huber's weight
 };
 
-/// Empty if the point is behind the camera.
 std::optional<ViewTerm> viewTerm(const Estimate& estimate, std::size_t point,
                                  const WindowView& view, const Inertial& inertial, double sigma_px);
 

@@ -6,7 +6,6 @@
 
 namespace perdure::vio {
 
-/// Continuous-time densities of the inertial noise.
 struct ImuNoise {
   double gyro = 1.7e-4;        ///< rad/s/√Hz
   double gyro_walk = 2.0e-5;   ///< rad/s²/√Hz
@@ -51,7 +50,6 @@ struct VisionOptions {
   double sceneSigma() const { return 0.25 * std::log(max_depth_m / min_depth_m); }
 };
 
-/// Standard deviations of the calibration's values.
 struct CalibrationOptions {
   bool estimate_extrinsics = true, estimate_time_offset = true;
   bool estimate_readout = true;       ///< estimates the readout of a rolling shutter

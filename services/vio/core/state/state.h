@@ -160,7 +160,6 @@ class State {
   Result<void> update(std::span<const Measurement> measurements);
   /// Returns H P Hᵀ for an H with the columns of `blocks`.
   Eigen::MatrixXd project(const MatrixView& H, std::span<const Block> blocks) const;
-  /// Returns the covariance of the error of `blocks`.
   Eigen::MatrixXd covarianceOf(std::span<const Block> blocks) const;
   Eigen::MatrixXd covarianceOf(std::initializer_list<Block> blocks) const {
     return covarianceOf(std::span(blocks.begin(), blocks.size()));

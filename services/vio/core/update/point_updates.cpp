@@ -61,7 +61,6 @@ Result<PointRows> rowsOf(const State& state, const PointState& point, const Obse
   return rows;
 }
 
-/// A point of the state that the newest image sees.
 struct Seen {
   std::size_t point;  ///< index in state.points
   const ImagePoint* pixel;

@@ -21,7 +21,6 @@ struct UpdateCounts {
 Result<UpdateCounts> updateMsckf(State& state, const std::vector<const Track*>& tracks,
                                  const VisionOptions& options, ReasonCounts& reasons);
 
-/// Innovation of a point of the state in the newest image.
 struct Innovation {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();     ///< pixel in the first camera
   Eigen::Vector2d residual = Eigen::Vector2d::Zero();  ///< observed minus predicted, px

@@ -35,7 +35,6 @@ class Standstill {
   /// Clears the memory, at a start or after motion.
   void forget() { confirmed_.reset(); }
   bool known() const { return confirmed_.has_value(); }
-  /// The images show that the body stands still at `now`.
   void confirm(TimePoint now, const RestExpectation& expected);
   /// Whether the body has not moved since. A disturbance of up to a second only interrupts.
   bool holds(const ImuBuffer& imu, TimePoint now, const ImuNoise& noise);

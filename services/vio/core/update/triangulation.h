@@ -33,7 +33,6 @@ struct Triangulated {
 Result<Triangulated> triangulate(const std::vector<Ray>& rays, const VisionOptions& options,
                                  std::optional<double> scene = {});
 
-/// Rays of a track from the clones that saw it.
 std::vector<Ray> raysOf(const Track& track, const State& state, double sigma_px);
 
 /// Cross-covariance with the pose [θ, p] of a point rigid with T_WB: −R [p_B]× θ + δp + R δp_B.

@@ -81,7 +81,6 @@ class Side {
 
   bool shop() const { return front_ && l_.shop && w_ > 5.0F; }
 
-  /// Adds the sign board.
   void shopFront(float storey) {
     const float z = std::min(2.75F, storey - 0.55F), from = 0.06F * w_, to = 0.94F * w_;
     block(from, to, z, z + 0.5F, 0.0F, 0.08F, l_.frame);
@@ -90,7 +89,6 @@ class Side {
                at(to - 0.1F, z + 0.46F, 0.085F), at(from + 0.1F, z + 0.46F, 0.085F), l_.sign);
   }
 
-  /// Adds a piece of wall with one opening.
   void cell(float u, float z, float bay, float storey, bool door, bool ground) {
     const bool display = ground && shop() && !door;
     const float half = 0.5F * (door      ? 1.15F
