@@ -4,7 +4,6 @@
 #include <dds/dds.h>
 #include <dds/ddsc/dds_loan_api.h>
 
-#include <cstdint>
 #include <memory>
 #include <string>
 

@@ -13,7 +13,7 @@
 #include "common/bus/security_log.h"
 #include "common/service/process.h"
 #include "common/service/signals.h"
-#include "common/types/end_of_drive.h"
+#include "common/types/health.h"
 
 namespace perdure::service {
 namespace {

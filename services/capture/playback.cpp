@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "common/types/end_of_drive.h"
+#include "common/types/health.h"
 #include "services/capture/live/clocks.h"
 #include "services/capture/run_file.h"
 

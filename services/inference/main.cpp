@@ -1,5 +1,5 @@
 // perdure-inference: computes detections from frames.
-#include "common/bus/gaps.h"
+#include "common/bus/once.h"
 #include "common/service/service.h"
 #include "common/vision/jpeg.h"
 #include "services/inference/worker.h"

@@ -4,11 +4,11 @@
 #include <functional>
 
 #include "common/base/heap.h"
-#include "common/bus/gaps.h"
+#include "common/bus/once.h"
 #include "common/bus/topics.h"
 #include "common/service/service.h"
+#include "services/semantic_filter/events.h"
 #include "services/semantic_filter/node.h"
-#include "services/semantic_filter/object_states.h"
 #include "services/semantic_filter/priors.h"
 
 namespace {

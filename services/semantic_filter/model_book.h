@@ -1,6 +1,7 @@
 // The models whose detections may arrive, and the model in use.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -8,8 +9,10 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "common/base/result.h"
+#include "common/types/detections.h"
 #include "services/semantic_filter/core/measurement/detection.h"
 
 namespace perdure::semantic_filter {
@@ -38,6 +41,25 @@ class ModelBook {
   std::deque<std::uint64_t> order_;  ///< in order of arrival
   std::uint64_t used_ = 0;
   TimePoint used_at_;
+};
+
+/// Delayed detections of a new inference process that misses everything (README, roll-backs).
+class Probation {
+ public:
+  /// Most delayed frames. The old process decides within fewer; the history can repeat more.
+  static constexpr std::size_t kLongest = 24;
+
+  void begin(InstanceId newcomer) { newcomer_ = newcomer; }
+  void end() { newcomer_ = 0; }
+  bool isOf(InstanceId instance) const { return newcomer_ != 0 && instance == newcomer_; }
+
+  void keep(const Detections& detections) { kept_.push_back(detections); }
+  bool full() const { return kept_.size() >= kLongest; }
+  std::vector<Detections> take() { return std::exchange(kept_, {}); }
+
+ private:
+  InstanceId newcomer_ = 0;
+  std::vector<Detections> kept_;
 };
 
 }  // namespace perdure::semantic_filter

@@ -15,7 +15,6 @@
 #include "services/semantic_filter/core/memory/archive.h"
 #include "services/semantic_filter/events.h"
 #include "services/semantic_filter/model_book.h"
-#include "services/semantic_filter/probation.h"
 #include "services/semantic_filter/return_events.h"
 
 namespace perdure::semantic_filter {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/bus/topics.h"
-#include "common/types/end_of_drive.h"
+#include "common/types/health.h"
 #include "tools/outputs/stage_timer.h"
 
 namespace perdure::tools {

@@ -5,7 +5,7 @@
 #include <mutex>
 #include <thread>
 
-#include "common/bus/gaps.h"
+#include "common/bus/once.h"
 #include "common/service/service.h"
 #include "tools/python/bindings.h"
 #include "tools/python/bus.h"

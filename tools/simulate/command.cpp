@@ -4,10 +4,8 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <chrono>
-#include <cstdio>
 #include <iostream>
 #include <memory>
-#include <thread>
 
 #include "common/base/errors.h"
 #include "tools/perdure/commands.h"

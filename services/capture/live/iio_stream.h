@@ -1,11 +1,13 @@
 // Triggered buffer of one IIO device, local or of an iiod. Its thread reopens it after a loss.
 #pragma once
 
+#include <Eigen/Core>
 #include <atomic>
 #include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 
 #include "services/capture/live/device_state.h"
@@ -14,6 +16,18 @@
 struct iio_buffer;
 
 namespace perdure::capture {
+
+/// Removes surrounding white space; sysfs files end in a newline.
+std::string trimmed(std::string_view text);
+
+/// Clock of a device's stamps. kElsewhere: a clock that the host cannot read.
+enum class StampClock { kBoot, kMonotonic, kRealtime, kElsewhere };
+
+StampClock stampClockNamed(std::string_view text);
+
+/// Parses a mount matrix, "1, 0, 0; 0, 1, 0; 0, 0, 1", row by row. Empty if the text is not a
+/// matrix.
+std::optional<Eigen::Matrix3d> parseMount(std::string text);
 
 struct IioSettings {
   std::string uri = "local:";

@@ -2,13 +2,26 @@
 // ws://127.0.0.1 or a name that resolves to it.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "common/base/result.h"
-#include "services/gateway/web/options.h"
 
 namespace perdure::gateway::web {
+
+struct Options {
+  std::string address = "127.0.0.1";
+  std::int64_t port = 8765;
+  std::string token;  ///< empty: no token is required
+  std::vector<std::string> allowed_hosts;
+  std::vector<std::string> allowed_origins = {"https://app.foxglove.dev"};
+  std::int64_t most_clients = 16;
+  std::int64_t most_connections = 64;
+  std::int64_t most_message_kb = 64;  ///< size of a client's message
+  std::int64_t most_events = 256;     ///< events that wait for a slow client
+};
 
 /// True for 127.0.0.0/8, ::1 and localhost.
 bool isLoopback(std::string_view address);

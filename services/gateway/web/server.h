@@ -10,8 +10,8 @@
 #include "common/base/result.h"
 #include "services/gateway/core/channels.h"
 #include "services/gateway/web/files.h"
+#include "services/gateway/web/guard.h"
 #include "services/gateway/web/hub.h"
-#include "services/gateway/web/options.h"
 
 namespace perdure::gateway::web {
 

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "common/base/result.h"
-#include "services/map_store/fleet/parameters.h"
+#include "services/map_store/fleet/server_url.h"
 
 namespace perdure::map_store::fleet {
 

@@ -4,9 +4,14 @@
 #include <string>
 #include <vector>
 
-#include "services/map_store/fleet/parameters.h"
-
 namespace perdure::map_store::fleet {
+
+struct Parameters {
+  std::string url;      ///< URL of a PostgreSQL database; empty: no server
+  std::string vehicle;  ///< name of the map on the server; empty: the host name
+  /// M: latitude, longitude [°, WGS 84], height [m], yaw from east [°]; empty: as in the file.
+  std::vector<double> earth_anchor;
+};
 
 /// Whether this program was built with PostgreSQL's library.
 bool isBuilt();

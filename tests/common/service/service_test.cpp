@@ -14,7 +14,7 @@
 #include "common/base/subprocess.h"
 #include "common/bus/wait_loop.h"
 #include "common/service/health.h"
-#include "common/types/end_of_drive.h"
+#include "common/types/health.h"
 #include "tests/common/bus/isolation.h"
 
 namespace perdure::service {

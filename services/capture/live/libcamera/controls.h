@@ -5,14 +5,22 @@
 #include <libcamera/controls.h>
 #include <libcamera/pixel_format.h>
 
+#include <cstddef>
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "common/base/result.h"
 #include "services/capture/live/camera_session.h"
 #include "services/capture/live/pixels.h"
 
 namespace perdure::capture {
+
+/// Index of the id equal to `wanted`, else of the first that contains it. With `alone`, only one
+/// may contain it. Fails with "camera_absent".
+Result<std::size_t> chooseCamera(const std::vector<std::string>& ids, const std::string& wanted,
+                                 bool alone);
 
 struct AskedControls {
   libcamera::ControlList list;

@@ -6,7 +6,6 @@
 #include <iterator>
 #include <utility>
 
-#include "services/capture/live/libcamera/last_of_all.h"
 #include "services/capture/live/libcamera/video_nodes.h"
 
 namespace perdure::capture {

@@ -1,6 +1,7 @@
 // An acquired libcamera camera and its requests.
 #pragma once
 
+#include <libcamera/base/object.h>
 #include <libcamera/libcamera.h>
 
 #include <atomic>
@@ -15,6 +16,14 @@
 #include "services/capture/live/libcamera/shared_manager.h"
 
 namespace perdure::capture {
+
+/// Calls `leave` and `end` on the object's thread, after all of its earlier messages and those that
+/// they post (queueRequest()). Returns the result of `end`.
+template <class T, class Answer>
+Answer lastOfAll(T& object, void (T::*leave)(), Answer (T::*end)()) {
+  object.invokeMethod(leave, libcamera::ConnectionTypeBlocking);
+  return object.invokeMethod(end, libcamera::ConnectionTypeBlocking);
+}
 
 /// All access to requests and signals is on libcamera's thread, which uses raw pointers: no camera
 /// can be unplugged in between, and after over() no pointers remain.

@@ -9,7 +9,6 @@
 
 #include "common/vision/jpeg.h"
 #include "services/capture/live/clocks.h"
-#include "services/capture/live/libcamera/camera_choice.h"
 #include "services/capture/live/libcamera/camera_memory.h"
 #include "services/capture/live/libcamera/controls.h"
 #include "services/capture/live/libcamera/running_camera.h"
