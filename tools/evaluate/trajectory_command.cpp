@@ -3,10 +3,12 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "common/base/check.h"
 #include "common/base/errors.h"
 #include "common/replay/dataset.h"
 #include "tools/evaluate/command.h"
@@ -112,15 +114,9 @@ Alignment alignmentOf(const std::string& name) {
 }
 
 const char* nameOf(Alignment alignment) {
-  switch (alignment) {
-    case Alignment::kYaw:
-      return "aligned in position and yaw";
-    case Alignment::kRigid:
-      return "aligned in position and rotation";
-    case Alignment::kStart:
-      return "aligned at the start";
-  }
-  return "";
+  return nameAt(std::array{"aligned in position and yaw", "aligned in position and rotation",
+                           "aligned at the start"},
+                alignment);
 }
 
 Compared compare(const TrajectoryOptions& options) {
