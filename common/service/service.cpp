@@ -77,15 +77,6 @@ void readConfiguration(config::Fields& fields, const CommandLine& line,
   config::refuse(problems);
 }
 
-std::shared_ptr<spdlog::logger> makeLog(const std::string& process, const std::string& level) {
-  auto log =
-      std::make_shared<spdlog::logger>(process, std::make_shared<spdlog::sinks::stderr_sink_mt>());
-  log->set_pattern("%Y-%m-%d %H:%M:%S.%e %n %l: %v");
-  log->set_level(spdlog::level::from_str(level));
-  log->flush_on(spdlog::level::trace);
-  return log;
-}
-
 /// Everything after reading the command line; throws StartupError.
 void start(const Program& program, const CommandLine& line) {
   const BlockedSignals blocked;
@@ -113,6 +104,15 @@ void start(const Program& program, const CommandLine& line) {
 }
 
 }  // namespace
+
+std::shared_ptr<spdlog::logger> makeLog(const std::string& process, const std::string& level) {
+  auto log =
+      std::make_shared<spdlog::logger>(process, std::make_shared<spdlog::sinks::stderr_sink_mt>());
+  log->set_pattern("%Y-%m-%d %H:%M:%S.%e %n %l: %v");
+  log->set_level(spdlog::level::from_str(level));
+  log->flush_on(spdlog::level::trace);
+  return log;
+}
 
 Context::Context(const std::string& process, const bus::Domain& domain,
                  std::shared_ptr<spdlog::logger> log)

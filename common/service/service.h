@@ -18,6 +18,15 @@
 
 namespace perdure::service {
 
+/// A log to standard error.
+std::shared_ptr<spdlog::logger> makeLog(const std::string& process,
+                                        const std::string& level = "info");
+
+/// The time of std::chrono::steady_clock, ns.
+inline std::int64_t monotonicNs() {
+  return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
 /// The context of a service's body: its endpoints, loop, health and log.
 class Context {
  public:

@@ -18,11 +18,8 @@
 namespace {
 
 using namespace perdure;
+using service::monotonicNs;
 namespace web = gateway::web;
-
-std::int64_t monotonicNs() {
-  return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
-}
 
 /// Topics of @final types, which CDR readers decode by their IDL.
 constexpr const char* kRawTopics[] = {"imu", "speed", "odometry", "landmarks"};

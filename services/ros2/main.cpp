@@ -17,10 +17,7 @@
 namespace {
 
 using namespace perdure;
-
-std::int64_t monotonicNs() {
-  return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
-}
+using service::monotonicNs;
 
 /// Output side: publishes the data of the bus in ROS.
 class Outwards {

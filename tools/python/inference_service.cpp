@@ -1,5 +1,4 @@
 #include <pybind11/stl.h>
-#include <spdlog/sinks/stdout_sinks.h>
 
 #include <condition_variable>
 #include <mutex>
@@ -20,14 +19,6 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds kHangs{10};  // longer than any network needs for a frame
 
-std::shared_ptr<spdlog::logger> makeLog(const std::string& process) {
-  auto log =
-      std::make_shared<spdlog::logger>(process, std::make_shared<spdlog::sinks::stderr_sink_mt>());
-  log->set_pattern("%Y-%m-%d %H:%M:%S.%e %n %l: %v");
-  log->flush_on(spdlog::level::trace);
-  return log;
-}
-
 struct ServiceOptions {
   std::string process, camera;
   std::int32_t strength = 1;
@@ -42,7 +33,7 @@ class InferenceService {
                    const ModelInfo& model)
       : options_(options),
         context_(options.process, openDomain(serviceOptionsOf(settings, options.process)),
-                 makeLog(options.process)),
+                 service::makeLog(options.process)),
         detections_(context_.writer(bus::kTopic<Detections>,
                                     {.strength = options.strength, .lease_s = options.lease_s})),
         frames_(context_.needs("frames", "mend the camera, or start capture")) {

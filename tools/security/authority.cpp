@@ -7,8 +7,8 @@
 #include <regex>
 
 #include "common/base/errors.h"
+#include "common/base/files/access.h"
 #include "common/bus/security/identity.h"
-#include "tools/base/files.h"
 #include "tools/security/private_file.h"
 
 namespace perdure::tools {

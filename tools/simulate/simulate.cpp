@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/errors.h"
+#include "common/base/files/access.h"
 #include "common/base/files/folder_lock.h"
 #include "common/sim/truth.h"
-#include "tools/base/files.h"
 #include "tools/simulate/journal.h"
 #include "tools/simulate/render/counter_noise.h"
 #include "tools/simulate/render/outline.h"

@@ -1,10 +1,13 @@
-// Permissions of files, for error messages.
+// Content and permissions of files.
 #pragma once
 
 #include <filesystem>
 #include <string>
 
 namespace perdure {
+
+/// The content; empty if the file cannot be read.
+std::string textOf(const std::filesystem::path& file);
 
 /// Why this process may not read a file, with owner, mode and fix; empty if it may, or if it is
 /// absent. The place is the file or the first of its folders that may not be entered.
