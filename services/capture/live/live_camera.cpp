@@ -7,7 +7,7 @@ namespace {
 
 /// Counts waits without an image, because the process may have been suspended.
 constexpr std::chrono::milliseconds kWait{100};
-constexpr int kSilence = 10;
+constexpr int kSilentIntervals = 10;
 
 }  // namespace
 
@@ -33,7 +33,7 @@ void LiveCamera::flow(CameraSession& session) {
   numbers_.reopened();
   rate_.reopened();
   int silent = 0;
-  while (!stopping_ && !session.stepsAside() && silent < kSilence) {
+  while (!stopping_ && !session.stepsAside() && silent < kSilentIntervals) {
     auto shot = session.next(kWait);
     silent = shot ? 0 : silent + 1;
     if (!shot && session.gone()) break;  // all earlier images have been passed on
