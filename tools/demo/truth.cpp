@@ -11,7 +11,7 @@
 #include "common/replay/files/kitti_labels.h"
 #include "common/replay/files/pose_file.h"
 #include "tools/evaluate/object_report.h"
-#include "tools/evaluate/object_truth.h"
+#include "tools/evaluate/object_score.h"
 
 namespace perdure::tools {
 namespace {

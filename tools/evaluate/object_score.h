@@ -4,9 +4,12 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "common/replay/files/kitti_calibration.h"
+#include "tools/evaluate/object_rows.h"
 #include "tools/evaluate/object_truth.h"
 
 namespace perdure::tools {
@@ -75,5 +78,14 @@ bool isNeutral(const Estimate& estimate, const TruthFrame& truth);
 /// `frames`: by frame index.
 ObjectScore scoreFrames(const std::map<std::uint64_t, ScoredFrame>& frames,
                         const ScoreOptions& options);
+
+/// A row in the camera; empty if its centre is behind it or outside the image.
+std::optional<Estimate> toCamera(const EstimateRow& row, const RigidTransform& T_RW,
+                                 const replay::KittiCalibration& calibration);
+
+ObjectScore scoreObjects(const std::vector<EstimateRow>& rows,
+                         const std::map<std::uint64_t, TruthFrame>& truth,
+                         const PosesByFrame& poses, const replay::KittiCalibration& calibration,
+                         const ScoreOptions& options);
 
 }  // namespace perdure::tools

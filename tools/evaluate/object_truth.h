@@ -2,16 +2,12 @@
 #pragma once
 
 #include <map>
-#include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "common/math/rigid_transform.h"
-#include "common/replay/files/kitti_calibration.h"
 #include "common/replay/files/kitti_labels.h"
-#include "tools/evaluate/object_rows.h"
-#include "tools/evaluate/object_score.h"
 
 namespace perdure::tools {
 
@@ -43,14 +39,5 @@ std::set<std::int64_t> staticTracks(const std::vector<replay::KittiLabel>& label
 /// Counted labels: `Car`, occluded 0, truncated 0, at least 25 px tall, of a static track.
 std::map<std::uint64_t, TruthFrame> sortTruth(const std::vector<replay::KittiLabel>& labels,
                                               const std::set<std::int64_t>& static_tracks);
-
-/// A row in the camera; empty if its centre is behind it or outside the image.
-std::optional<Estimate> toCamera(const EstimateRow& row, const RigidTransform& T_RW,
-                                 const replay::KittiCalibration& calibration);
-
-ObjectScore scoreObjects(const std::vector<EstimateRow>& rows,
-                         const std::map<std::uint64_t, TruthFrame>& truth,
-                         const PosesByFrame& poses, const replay::KittiCalibration& calibration,
-                         const ScoreOptions& options);
 
 }  // namespace perdure::tools

@@ -9,7 +9,7 @@
 #include "common/base/errors.h"
 #include "common/replay/files/pose_file.h"
 #include "tools/evaluate/command.h"
-#include "tools/evaluate/object_truth.h"
+#include "tools/evaluate/object_score.h"
 #include "tools/evaluate/simulated_truth.h"
 #include "tools/evaluate/used_frames.h"
 
