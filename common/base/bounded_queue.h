@@ -55,7 +55,6 @@ class BoundedQueue {
     return takeFront();
   }
 
-  /// Returns an element if one is available, without waiting.
   std::optional<T> tryPop() {
     const std::lock_guard lock(mutex_);
     return takeFront();

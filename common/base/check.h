@@ -11,8 +11,7 @@ namespace perdure {
 /// Prints "file:line: function: must hold: <what>" to stderr and aborts.
 [[noreturn]] void failCheck(std::string_view what, const std::source_location& where);
 
-/// Aborts with the source location and `what must hold` unless `condition` is true. Never use it on
-/// external input.
+/// Aborts unless `condition` is true. Never use it on external input.
 inline void check(bool condition, std::string_view what,
                   const std::source_location& where = std::source_location::current()) {
   if (!condition) [[unlikely]]

@@ -19,13 +19,11 @@ enum class ExitCode : int {
   kConfiguration = 78,  ///< the configuration is wrong
 };
 
-/// Thrown only before a service runs, and caught once in runService (or in main of a tool). The
-/// message is one or more sentences that state the fix.
+/// Thrown before a service runs, and caught in runService or main. The message states the fix.
 class StartupError : public std::runtime_error {
  public:
   StartupError(ExitCode code, const std::string& message)
       : std::runtime_error(message), code_(code) {}
-  /// The message as of fmt::format.
   template <class First, class... More>
   StartupError(ExitCode code, fmt::format_string<First, More...> format, First&& first,
                More&&... more)

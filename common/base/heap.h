@@ -3,9 +3,8 @@
 
 namespace perdure {
 
-/// Makes the process retain up to 64 MB of freed memory. By default glibc returns this memory and
-/// requests it again within each frame, which causes a page fault per 4 kB. Call the function in
-/// main(). It has no effect without glibc.
+/// Makes the process retain up to 64 MB of freed memory (glibc), which otherwise is returned and
+/// requested again within each frame. Call it in main().
 void keepFreedMemory();
 
 }  // namespace perdure

@@ -14,15 +14,12 @@ namespace perdure {
 using InstanceId = std::uint64_t;
 InstanceId makeInstanceId();
 
-/// The public id of an object: the lowest id of the tracks that the map considers one object. Never
-/// reused within a map. 0 means "no object".
+/// The public id: the lowest id of the object's tracks. Never reused within a map. 0: no object.
 using ObjectId = std::uint64_t;
-/// The filter's estimate of an object over one or more visits. The filter assigns the id; it never
-/// changes.
+/// The filter's estimate of an object over one or more visits. The id never changes.
 using TrackId = std::uint64_t;
 
-/// Identifies the image of a message by source instance and sequence number. The other members save
-/// the readers a look-up.
+/// Source instance and sequence number identify an image. The rest saves look-ups.
 struct FrameStamp {
   InstanceId source = 0;         ///< the capture process that made the frame
   std::uint64_t sequence = 0;    ///< index of the frame in the drive; continues after a restart

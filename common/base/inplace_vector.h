@@ -1,5 +1,4 @@
-// A vector of at most N elements with storage inside the object, without heap memory. It has the
-// part of C++26's std::inplace_vector that Perdure needs, for default-constructible elements.
+// A vector of at most N default-constructible elements without heap memory (as C++26's).
 #pragma once
 
 #include <array>

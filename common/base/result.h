@@ -12,8 +12,7 @@
 
 namespace perdure {
 
-/// The reason for a failure. `code` is a short, stable snake_case word that Health counts; `detail`
-/// states how to fix the cause.
+/// `code` is a stable snake_case word that Health counts; `detail` states the fix.
 struct Reason {
   std::string code;
   std::string detail;
@@ -26,15 +25,13 @@ inline tl::unexpected<Reason> fail(std::string_view code, std::string_view detai
   return tl::unexpected<Reason>(Reason{std::string(code), std::string(detail)});
 }
 
-/// The detail as of fmt::format.
 template <class First, class... More>
 tl::unexpected<Reason> fail(std::string_view code, fmt::format_string<First, More...> detail,
                             First&& first, More&&... more) {
   return fail(code, fmt::format(detail, std::forward<First>(first), std::forward<More>(more)...));
 }
 
-/// Counts of reasons since the start, published in Health. Ordered, so that the output is
-/// repeatable.
+/// Counts of reasons since the start, published in Health; ordered.
 class ReasonCounts {
  public:
   void add(const Reason& reason, std::uint64_t count = 1) { add(reason.code, count); }

@@ -15,7 +15,6 @@
 #include <cstddef>
 #include <functional>
 #include <map>
-#include <new>
 #include <utility>
 #include <vector>
 

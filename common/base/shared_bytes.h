@@ -1,5 +1,4 @@
-// Immutable bytes with several owners: a vector, or a part of a larger buffer that stays in place
-// while it has owners.
+// Immutable bytes with several owners: a vector, or a part of a larger buffer.
 #pragma once
 
 #include <cstddef>

@@ -1,8 +1,6 @@
-// A vector whose copies share their elements until one of them is modified (copy on write). Data
-// stored for every frame therefore cost only the changed parts. Element access through a non-const
-// vector counts as modification; use read() for reading.
-//
-// The memory of released elements is reused by later vectors of the same thread.
+// A vector whose copies share their elements until one is modified (copy on write). Access through
+// a non-const vector counts as modification; use read(). Memory of released elements is reused by
+// later vectors of the thread.
 #pragma once
 
 #include <algorithm>
@@ -45,8 +43,7 @@ class SharedVector {
     static const Vector kEmpty;
     return block_ ? block_->items : kEmpty;
   }
-  /// Gives write access to unshared elements, with capacity for `room` elements. Making a copy
-  /// invalidates references to elements.
+  /// Unshared elements, with capacity for `room`. Making a copy invalidates references to them.
   Vector& write(std::size_t room = 0) {
     if (!block_) {
       block_ = takeBlock();
@@ -88,8 +85,7 @@ class SharedVector {
   using Spare = std::vector<std::unique_ptr<Block>>;
   static constexpr std::size_t kMostSpare = 512;
 
-  /// The spare blocks of the thread. Returns null if the thread is ending and the blocks are
-  /// already destroyed.
+  /// The spare blocks of the thread; null if the thread is ending and they are destroyed.
   static Spare* spare() {
     struct Kept {
       Spare blocks;

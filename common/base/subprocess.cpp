@@ -36,8 +36,7 @@ struct Pipe {
   }
 };
 
-/// "NAME=value" strings: the environment of this process, with the values of `more` added or
-/// replaced.
+/// "NAME=value" strings: the environment of this process with the values of `more`.
 std::vector<std::string> environmentWith(const std::map<std::string, std::string>& more) {
   std::vector<std::string> words;
   for (char** entry = environ; *entry != nullptr; ++entry) {
@@ -55,8 +54,7 @@ std::vector<char*> pointersTo(std::vector<std::string>& words) {
   return pointers;
 }
 
-/// The data that the child needs. They are prepared before fork, because only system calls are safe
-/// after it.
+/// Data of the child, prepared before fork, because only system calls are safe after it.
 struct Start {
   const ProgramOptions& options;
   std::string program;

@@ -1,5 +1,4 @@
-// A program that runs in parallel with this one. No shell is used; the arguments are passed
-// unchanged.
+// A program that runs in parallel with this one. No shell is used.
 #pragma once
 
 #include <sys/types.h>
@@ -28,8 +27,7 @@ std::optional<std::filesystem::path> findProgram(const std::string& name);
 /// The process is killed and waited for at the end of the scope, unless leaveAlone() was called.
 class Subprocess {
  public:
-  /// Throws StartupError(kUnavailable), "PROGRAM cannot be started: why", also if the log cannot be
-  /// written.
+  /// Throws StartupError(kUnavailable), "PROGRAM cannot be started: why".
   explicit Subprocess(const ProgramOptions& options);
   ~Subprocess();
   Subprocess(const Subprocess&) = delete;
@@ -37,17 +35,13 @@ class Subprocess {
 
   pid_t pid() const { return pid_; }
   void signal(int number) const;
-  /// The exit status of the process, or 128 + the signal that ended it. Returns nothing while it
-  /// runs.
+  /// The exit status, or 128 + the signal that ended it. Nothing while it runs.
   std::optional<int> ended();
-  /// Waits for the end of the process and returns its status as ended() does.
   int waitForEnd();
   /// Waits for at most `longest` and returns the status as ended() does.
   std::optional<int> wait(std::chrono::milliseconds longest);
-  /// Sends SIGTERM, and SIGKILL if the process still runs after `patience`. Returns when it has
-  /// ended.
+  /// Sends SIGTERM, and SIGKILL after `patience`. Returns when the process has ended.
   void stop(std::chrono::milliseconds patience);
-  /// The process may outlive this object.
   void leaveAlone() { left_alone_ = true; }
 
  private:
@@ -62,8 +56,7 @@ struct ProgramAnswer {
   bool too_late = false;
 };
 
-/// Runs a program to its end and returns its output (`options.log` must be empty). The program is
-/// killed after `longest`. Throws like Subprocess.
+/// Returns the output of a program (`options.log` is empty), which is killed after `longest`.
 ProgramAnswer runProgram(const ProgramOptions& options,
                          std::chrono::milliseconds longest = std::chrono::hours(1));
 

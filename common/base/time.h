@@ -8,8 +8,7 @@ namespace perdure {
 
 using Duration = std::chrono::nanoseconds;
 
-/// The clock of the sensors or of a recording. It has no now(), because time arrives in messages
-/// only.
+/// The clock of the sensors or of a recording. It has no now().
 struct SensorClock {
   using rep = std::int64_t;
   using period = std::nano;
@@ -26,6 +25,12 @@ constexpr double toSeconds(TimePoint t) { return toSeconds(t.time_since_epoch())
 /// Rounds to the nearest nanosecond; |s| < 9e9 s.
 constexpr Duration durationFromSeconds(double s) {
   return Duration(static_cast<std::int64_t>(s * 1e9 + (s < 0 ? -0.5 : 0.5)));
+}
+
+/// Nanoseconds within 146 years of the clock's zero: the difference of any two fits into 64 bits.
+constexpr bool isTime(std::int64_t ns) {
+  constexpr std::int64_t kLast = std::int64_t{1} << 62;
+  return ns > -kLast && ns < kLast;
 }
 
 }  // namespace perdure

@@ -33,8 +33,7 @@ std::optional<StandIn> standInFor(std::string_view service,
 class Discovery {
  public:
   explicit Discovery(const Participant& participant);
-  /// Names of the participants discovered so far, including this process; "" for one without a
-  /// name.
+  /// Names of the participants, including this process; "" for one without a name.
   std::vector<std::string> participants();
   std::vector<RemoteEndpoint> endpoints();
 

@@ -38,13 +38,11 @@ std::string loopbackXml() {
          indexXml() + "<Peers><Peer Address=\"127.0.0.1\"/></Peers></Discovery>";
 }
 
-/// Data lost between hosts are requested and sent again within a frame's period. With Cyclone's
-/// default of 100 ms, each lost fragment would double the age of its image.
+/// Data lost between hosts are sent again within a frame's period; the default is 100 ms.
 constexpr char kResendSoon[] =
     "<NackDelay>5ms</NackDelay><HeartbeatInterval>20ms</HeartbeatInterval>";
 
-/// Hosts that multicast does not reach are addressed by unicast only, and so are processes of this
-/// host.
+/// Hosts that multicast does not reach, and processes of this host, are addressed by unicast.
 std::string peersXml(const std::string& interface, const std::vector<std::string>& peers) {
   if (peers.empty()) return {};
   std::string xml = "<Peers><Peer Address=\"" + addressOf(interface) + "\"/>";
@@ -52,8 +50,7 @@ std::string peersXml(const std::string& interface, const std::vector<std::string
   return xml + "</Peers>";
 }
 
-/// Shortens the time until a host is discovered again after an absence longer than the lease (10
-/// s). The default takes half a minute.
+/// A host is found again soon after an absence longer than the lease (10 s), not in half a minute.
 constexpr char kMeetSoon[] = "<SPDPInterval>2s</SPDPInterval>";
 
 /// Third-party programs get large messages by unicast, as Fast DDS sends them.
@@ -101,7 +98,6 @@ const char* givenConfiguration() {
   return uri != nullptr && *uri != '\0' ? uri : nullptr;
 }
 
-/// Checks the name of an interface or of a host.
 bool isPlainName(const std::string& name) {
   return !name.empty() && name.find_first_of("<>&\"' \t\n") == std::string::npos;
 }
@@ -168,8 +164,7 @@ std::int32_t createDomain(const Options& options, const std::string& locator) {
           (given != nullptr ? ", and CYCLONEDDS_URI, which is set, goes before it" : ""));
 }
 
-/// Assigns the identity in `folder` to a participant. Its properties take precedence over the
-/// security settings in CYCLONEDDS_URI.
+/// Assigns the identity in `folder`. It takes precedence over CYCLONEDDS_URI.
 Identity secure(dds_qos_t& qos, const std::string& folder) {
   const auto identity = readIdentity(folder);
   if (!identity) {

@@ -11,7 +11,6 @@
 namespace perdure::bus {
 namespace {
 
-/// Visits the IPv4 addresses of interfaces that are up.
 void eachAddress(const std::function<void(const ifaddrs&)>& visit) {
   constexpr unsigned kUp = IFF_UP | IFF_RUNNING;
   ifaddrs* all = nullptr;

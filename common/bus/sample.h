@@ -1,5 +1,4 @@
-// Received messages in place: in shared memory, or complete from the network. Internal to
-// common/bus.
+// Received messages in place: in shared memory, or complete from the network.
 #pragma once
 
 #include <cstddef>

@@ -59,8 +59,7 @@ void takeTrace(void* log, const dds_log_data_t* data) {
 
 }  // namespace
 
-/// Each endpoint of an unknown participant is refused, and refused again at each rediscovery. The
-/// participant counts once.
+/// An unknown participant counts once, although each of its endpoints is refused repeatedly.
 bool SecurityLog::isNewcomer(const std::string& message) {
   constexpr std::size_t kMost = 1024;
   constexpr std::string_view kBefore = "remote writer ";  // "remote reader " has the same length

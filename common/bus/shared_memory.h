@@ -1,5 +1,4 @@
-// Checks whether messages may use shared memory. RouDi of iceoryx must respond, because Cyclone
-// would otherwise wait for a minute and abort.
+// Shared memory needs a responding RouDi, because Cyclone would otherwise wait and abort.
 #pragma once
 
 #include <string>
@@ -8,9 +7,8 @@
 
 namespace perdure::bus {
 
-/// A Cyclone locator that identifies one start of RouDi on this host. Processes with the same
-/// locator share memory. Others, for example from before a restart of RouDi, communicate over the
-/// network interface. Reasons: "no_roudi" (the detail states the fix).
+/// A locator that identifies one start of RouDi on this host; processes with the same one share
+/// memory. Reason: "no_roudi".
 Result<std::string> sharedMemoryLocator();
 
 }  // namespace perdure::bus

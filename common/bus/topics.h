@@ -49,8 +49,7 @@ inline bool isRowOf(std::string_view row, std::string_view topic) {
   return row.ends_with('/') ? topic.starts_with(row) && topic != row : topic == row;
 }
 
-/// Calls visit(Topic<T>) with the type that belongs to a name. Returns false if the name is
-/// unknown.
+/// Calls visit(Topic<T>) with the type of a name. Returns false if the name is unknown.
 template <class Visit>
 bool withTopic(const std::string& name, Visit visit) {
   bool found = false;

@@ -1,6 +1,5 @@
-// The main loop of a service. It waits for messages, ticks and wake-ups, and calls handlers in the
-// order of their registration. Handlers run in the thread that calls run(). Readers may belong to
-// several participants in several domains.
+// The main loop of a service: waits for messages, ticks and wake-ups, and calls handlers in the
+// order of their registration, in the thread that calls run().
 #pragma once
 
 #include <atomic>
@@ -26,11 +25,9 @@ class WaitLoop {
       return reader.drainBatch(handler, on_gone);
     });
   }
-  /// Registers a handler of serialised messages.
   void on(CdrReader& reader, CdrReader::Handler handler) {
     attach(reader, [&reader, handler = std::move(handler)] { return reader.drainBatch(handler); });
   }
-  /// Registers a handler of byte messages (common/bus/foreign).
   template <class BytesReader>
   void onBytes(BytesReader& reader, typename BytesReader::Handler handler) {
     attach(reader, [this, &reader, handler = std::move(handler)] {
@@ -39,8 +36,7 @@ class WaitLoop {
       });
     });
   }
-  /// Removes a reader, which may be destroyed afterwards. Must not be called from a handler of
-  /// messages or ticks, because the loop is iterating over the readers then.
+  /// Removes a reader. Must not be called from a handler of messages or ticks.
   void off(const Endpoint& reader);
   /// The first tick comes after one period; missed ticks are dropped.
   /// The tick is suspended while `wanted` returns false; the loop's thread calls `wanted`.
@@ -49,12 +45,10 @@ class WaitLoop {
   /// The handler runs in the loop's thread soon after wake(). Several wake-ups may become one call.
   void onWake(std::function<void()> handler) { on_wake_ = std::move(handler); }
 
-  /// Runs until stop().
   void run();
   /// Waits once, at most for `longest`, and handles what is available.
   void runOnce(std::chrono::nanoseconds longest);
-  /// May be called from any thread, but not from a signal handler. run() returns after the current
-  /// handler; other messages of its batch are dropped.
+  /// From any thread, but no signal handler. run() returns after the current handler.
   void stop();
   bool stopped() const { return stopped_; }
   /// May be called from any thread, but not from a signal handler.

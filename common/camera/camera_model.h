@@ -1,6 +1,5 @@
 // Projection of points of the camera frame (z forward, x right, y down) into pixels, with
-// Jacobians. Models: pinhole with no, radial-tangential (Brown), rational or equidistant
-// (Kannala-Brandt) distortion, as OpenCV and EuRoC define them.
+// Jacobians. Lens models as OpenCV and EuRoC define them.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,17 +18,14 @@ Eigen::Vector2d distortRadTan(DistortionModel model, const LensCoefficients& d,
 
 class CameraModel {
  public:
-  /// Checks that the calibration is usable (focal lengths > 0, as many coefficients as the model
-  /// has).
+  /// Checks that the calibration is usable.
   explicit CameraModel(const CameraCalibration& calibration);
 
-  /// Pixel of a point in C. Returns nothing if the point is not in front of the camera (z < 1e-3 m)
-  /// or lies outside the range in which the distortion is invertible. J_point (2×3) = d pixel / d
-  /// point, if given.
+  /// Pixel of a point in C; nothing if z < 1e-3 m or the distortion is not invertible there.
+  /// J_point (2×3) = d pixel / d point.
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& point_C,
                                          Eigen::Matrix<double, 2, 3>* J_point = nullptr) const;
-  /// Normalised, undistorted image point (x/z, y/z) of a pixel, by Newton's iteration. Returns
-  /// nothing if the iteration does not converge.
+  /// Undistorted image point (x/z, y/z) by Newton's iteration; nothing if it does not converge.
   std::optional<Eigen::Vector2d> unproject(const Eigen::Vector2d& pixel) const;
   /// Distorted pixel of a normalised point; J (2×2) = d pixel / d normalised.
   Eigen::Vector2d distort(const Eigen::Vector2d& normalised, Eigen::Matrix2d* J = nullptr) const;
@@ -54,5 +50,8 @@ class CameraModel {
   double max_radius2_;  ///< squared normalised radius up to which the distortion is monotone
   RigidTransform T_BC_;
 };
+
+/// True if name, size, lens, pose and times are equal. The nominal rate may differ.
+bool sameCamera(const CameraCalibration& a, const CameraCalibration& b);
 
 }  // namespace perdure

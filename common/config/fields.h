@@ -1,5 +1,4 @@
-// One description of a configuration's fields. Reading, validation, printing and the tables of the
-// README files use it. A service writes `void describe(Config&, config::Fields&)`.
+// One description of a configuration's fields, for reading, validation, printing and tables.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +10,7 @@
 
 namespace perdure::config {
 
-/// Documentation of a field for users. `mend` states the fix at the end of the error message: "…;
-/// <mend>".
+/// Documentation of a field for users. `mend` is the fix at the end of the error message.
 struct Doc {
   std::string text;       ///< text in one line
   std::string unit = {};  ///< "rad/s/√Hz", "px", "" for none
@@ -53,17 +51,13 @@ class Fields {
   void numbers(std::string key, std::vector<double>& target, Range range, Doc doc,
                std::size_t length = 0);
   void texts(std::string key, std::vector<std::string>& target, Doc doc);
-  /// Marks the field described last as required.
   void require();
-  /// Sets whether the fields described next are marked expert.
   void expert(bool on) { expert_ = on; }
-  /// Refuses a key of earlier versions with this sentence: "is now tracks.confirm", "is fixed at
-  /// 0.05".
+  /// Refuses a key of earlier versions with this sentence: "is now tracks.confirm".
   void formerly(std::string key, std::string sentence);
 
   /// The sentence for a key of earlier versions; empty for other keys.
   std::string formerlyOf(const std::string& key) const;
-  /// Returns whether earlier versions had keys in this group.
   bool wasGroup(const std::string& name) const;
 
   const std::vector<Field>& all() const { return fields_; }
@@ -84,17 +78,13 @@ struct Problem {
   std::string str() const;
 };
 
-/// Reads YAML text into the fields' targets and returns *all* problems at once. They are syntax
-/// errors, unknown keys (with the nearest known one), wrong types, values out of range, missing
-/// keys and repeated keys. Targets of faulty fields retain their defaults.
+/// Reads YAML text into the fields' targets and returns *all* problems at once: syntax, unknown,
+/// missing and repeated keys, types, ranges. Faulty fields retain their defaults.
 std::vector<Problem> readYaml(Fields& fields, const std::string& yaml, const std::string& file);
-/// Applies readYaml to the content of a file. A file that cannot be read is a problem too.
 std::vector<Problem> readFile(Fields& fields, const std::string& path);
-/// Applies "key=value" from --set. The value is YAML; one of a text without quotes is taken as it
-/// is.
+/// Applies "key=value" from --set. The value is YAML, or a text without quotes.
 std::vector<Problem> assign(Fields& fields, const std::string& assignment);
-/// Problems of required fields that neither a file nor --set has given. (readYaml and assign record
-/// which fields were given.)
+/// Problems of required fields that neither a file nor --set has given.
 std::vector<Problem> missing(const Fields& fields, const std::string& file);
 
 /// Throws StartupError (78) with one line per problem. Does nothing if there are none.

@@ -23,7 +23,6 @@ std::string shortened(const std::string& text) {
   return text.size() <= kLongest ? text : text.substr(0, kLongest) + "…";
 }
 
-/// The node as a finite number.
 template <class Number>
 std::optional<Number> parse(const YAML::Node& node) {
   if (!node.IsScalar() || node.Tag() == "!") return std::nullopt;  // "!" marks quoted values

@@ -52,8 +52,7 @@ PERDURE_INLINE void reduceRow(double* S, long stride, long i, long j, long width
   }
 }
 
-/// Subtracts the contribution of earlier columns in the block and factorises `width` columns from j
-/// on.
+/// Subtracts earlier columns in the block and factorises `width` columns from j on.
 PERDURE_INLINE bool factoriseBlock(double* S, long stride, long j, long width, Four& inverse) {
   for (long c = j; c < j + width; ++c) {
     double* column = S + c * stride;

@@ -1,6 +1,5 @@
-// Small functions for Gaussians: density, symmetry, definiteness, and decompositions of
-// covariances. The decompositions are compiled once for any size. If Eigen's templates were
-// instantiated for each size and file, they would take a third of the build time.
+// Functions for Gaussians: density, symmetry, definiteness, decompositions of covariances. These
+// are compiled once for any size, because instances in each file compile slowly.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,11 +22,9 @@ double squaredMahalanobis(const VectorView& residual, const MatrixView& S);
 /// S⁻¹ B of a symmetric S, n × n, and an n × m matrix B.
 Eigen::MatrixXd solveSymmetric(const MatrixView& S, const MatrixView& B);
 
-/// S⁻¹ of a symmetric S.
 Eigen::MatrixXd inverseSymmetric(const MatrixView& S);
 
-/// B S⁻¹ of an m × n matrix B: the regression of B on the variable with covariance S. The result is
-/// zero if S is not positive definite (a pivot below 1e-18).
+/// B S⁻¹: the regression of B on the variable with covariance S; zero if a pivot < 1e-18.
 Eigen::MatrixXd regressOn(const MatrixView& S, const MatrixView& B);
 
 /// A⁻¹ of any square A; not finite if A is singular.
@@ -53,8 +50,7 @@ using ByColumns =
     Eigen::Matrix<double, Derived::RowsAtCompileTime, Derived::ColsAtCompileTime, Eigen::ColMajor,
                   Derived::MaxRowsAtCompileTime, Derived::MaxColsAtCompileTime>;
 
-/// The factorisation S = L Lᵀ. `Matrix` is the storage type of S; results have the type of the
-/// argument. Data of fixed or bounded size therefore need no heap memory.
+/// The factorisation S = L Lᵀ. `Matrix` is the storage of S; fixed sizes need no heap memory.
 template <class Matrix>
 class Cholesky {
  public:
@@ -66,14 +62,12 @@ class Cholesky {
   void factorise() { positive_ = dense::factorise(L_.data(), L_.rows(), L_.rows()); }
 
   bool positive() const { return positive_; }  ///< if false, no other function may be called
-  /// Returns L⁻¹ B.
   template <class Derived>
   ByColumns<Derived> whiten(const Eigen::MatrixBase<Derived>& B) const {
     ByColumns<Derived> W = B;
     dense::whiten(L_.data(), L_.rows(), L_.rows(), W.data(), W.cols());
     return W;
   }
-  /// Returns L⁻ᵀ B.
   template <class Derived>
   ByColumns<Derived> unwhiten(const Eigen::MatrixBase<Derived>& B) const {
     ByColumns<Derived> x = B;
@@ -84,7 +78,6 @@ class Cholesky {
     }
     return x;
   }
-  /// Returns S⁻¹ B.
   template <class Derived>
   ByColumns<Derived> solve(const Eigen::MatrixBase<Derived>& B) const {
     return unwhiten(whiten(B));

@@ -1,5 +1,4 @@
-// S = L Lᵀ for small matrices of fixed size, which a filter factorises by the thousand. They stay
-// on the stack and avoid the call overhead of the functions for any size in gaussian.h.
+// S = L Lᵀ for small matrices of fixed size, on the stack.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,8 +6,7 @@
 
 namespace perdure {
 
-/// Stores L of S = L Lᵀ in S's lower triangle; the upper one is neither read nor written. Returns
-/// false if S is not positive definite; S is then undefined.
+/// As choleskyInPlace().
 template <int N>
 bool choleskyInPlace(Eigen::Matrix<double, N, N>& S) {
   for (int j = 0; j < N; ++j) {

@@ -1,6 +1,5 @@
-// Products of matrices of fixed size, based on dense_kernels.h, for the updates of a filter, which
-// need them by the thousand. Sums are in the order of the inner dimension, as in Eigen's
-// lazyProduct.
+// Products of matrices of fixed size for the updates of a filter (dense_kernels.h). Sums are in the
+// order of the inner dimension, as in Eigen's lazyProduct.
 #pragma once
 
 #include <Eigen/Core>

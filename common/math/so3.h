@@ -27,7 +27,6 @@ bool isRotation(const Eigen::Matrix3d& R);
 double wrapAngle(double angle);
 /// Yaw about +z of a rotation (x axis projected on the horizontal plane), in (-pi, pi].
 double yawOf(const Eigen::Matrix3d& R);
-/// The rotation by `yaw` about z.
 Eigen::Matrix3d rotationAboutZ(double yaw);
 /// The smallest rotation that takes the unit vector `up` to +z.
 Eigen::Quaterniond levelling(const Eigen::Vector3d& up);

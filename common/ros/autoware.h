@@ -1,5 +1,4 @@
-// Objects for Autoware: autoware_perception_msgs/TrackedObjects, as in its messages since version
-// 1.0.
+// Objects for Autoware: autoware_perception_msgs/TrackedObjects since version 1.0.
 #pragma once
 
 #include "common/ros/messages.h"
@@ -95,10 +94,9 @@ struct TrackedObjects {
   static void fields(auto& m, auto& a) { a("header", m.header), a("objects", m.objects); }
 };
 
-/// Confirmed objects in `map`; T_MW is the pose of W in it. The last eight bytes of the UUID are
-/// the id. Classes unknown to Autoware are UNKNOWN. Pose, covariance and size are those of the most
-/// probable class. The sign of the orientation is known only for moving objects. If the σ of the
-/// yaw is above 1 rad, the orientation is marked as unavailable.
+/// Confirmed objects in `map` by their most probable class; T_MW is the pose of W in it. The last
+/// eight bytes of the UUID are the id. The orientation is marked unavailable above 1 rad (σ of the
+/// yaw); its sign is known for moving objects only.
 TrackedObjects trackedObjectsOf(const Objects& objects, const RigidTransform& T_MW);
 
 }  // namespace perdure::ros::autoware

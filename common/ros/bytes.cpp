@@ -6,8 +6,7 @@ namespace perdure::ros {
 namespace {
 
 constexpr std::size_t kHead = 4;
-/// Second byte of the CDR header. Its lowest bit is the byte order; the other bits are the
-/// encoding.
+/// Second byte of the CDR header: lowest bit byte order, other bits encoding.
 enum : std::uint8_t { kLittle = 1, kXcdr1 = 0, kXcdr2 = 6 };
 
 }  // namespace

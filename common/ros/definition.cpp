@@ -27,8 +27,7 @@ constexpr const char* nameOfPlain() {
   if constexpr (std::same_as<X, std::int32_t>) return "int32";
 }
 
-/// Visits a struct and writes its fields. `all` receives every struct once, contained structs
-/// first.
+/// Visits a struct and its fields. `all` receives every struct once, contained ones first.
 class Walk {
  public:
   explicit Walk(std::vector<Definition>& all) : all_(all) {}

@@ -7,8 +7,7 @@ namespace {
 
 Quaternion quaternionOf(const Eigen::Quaterniond& q) { return {q.x(), q.y(), q.z(), q.w()}; }
 
-/// Transforms points of the optical frame (x right, y down, z forward) into the link frame (x
-/// forward, y left, z up).
+/// Transforms the optical frame (x right, y down) into the link frame (x forward, y left).
 const RigidTransform& opticalInLink() {
   static const RigidTransform T(Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5), Eigen::Vector3d::Zero());
   return T;

@@ -56,7 +56,6 @@ Result<const PixelForm*> encodingOf(const Image& image) {
   return fail("image_encoding", "images are `{}`; {} are read", image.encoding, knownEncodings());
 }
 
-/// A view of the message's rows.
 Result<cv::Mat> rowsOf(const Image& image, const PixelForm& encoding) {
   const std::uint64_t least = std::uint64_t{image.width} * CV_ELEM_SIZE(encoding.type);
   const std::uint64_t bytes = std::uint64_t{image.step} * image.height;

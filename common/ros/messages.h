@@ -1,6 +1,5 @@
-// ROS messages as structs, with the names and field order of ROS 2 (Humble and later). Messages of
-// the same name in ROS 1 differ only by a number in their header. Each struct lists its fields
-// once, for all formats: CDR, ROS 1 bytes, and the text of the definition.
+// ROS messages as structs, with the names and field order of ROS 2. Each lists its fields once, for
+// CDR, ROS 1 bytes, and the text of the definition.
 #pragma once
 
 #include <array>

@@ -1,6 +1,5 @@
-// Publishes Perdure's topics as topics of ROS 2. Each input message of Perdure gives encoded ROS
-// messages. Further data that they need (calibration, classes, pose of the odometry in the map,
-// latest angular rate) are stored from earlier messages.
+// Publishes Perdure's topics as topics of ROS 2. Data that several messages need (calibration,
+// classes, map frame, angular rate) are stored.
 #pragma once
 
 #include <functional>
@@ -19,7 +18,6 @@
 
 namespace perdure::ros {
 
-/// An output topic of ROS 2.
 struct Outlet {
   std::string topic;       ///< "/perdure/objects"
   std::string type;        ///< "vision_msgs/Detection3DArray"
@@ -30,11 +28,9 @@ struct Outlet {
 class Mirror {
  public:
   using Out = std::function<void(const Outlet& outlet, std::vector<std::uint8_t> cdr)>;
-  /// Returns whether a topic has readers. Messages without readers are not created, unless the
-  /// topic is latched.
+  /// Whether a topic has readers. Without them only latched messages are created.
   using Wanted = std::function<bool(const Outlet& outlet)>;
-  /// `prefix` precedes all topics except /tf and /tf_static. Without `wanted` all messages are
-  /// created.
+  /// `prefix` precedes all topics except /tf and /tf_static.
   Mirror(std::string prefix, Out out, Wanted wanted = {})
       : prefix_(std::move(prefix)), out_(std::move(out)), wanted_(std::move(wanted)) {}
 

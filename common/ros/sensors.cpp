@@ -14,8 +14,7 @@ namespace {
 
 Eigen::Vector3d vectorOf(const Vector3& v) { return {v.x, v.y, v.z}; }
 
-/// Names the first non-finite number in `values`, for example "D[1] is nan". Otherwise the result
-/// is empty.
+/// Names the first non-finite number in `values`, for example "D[1] is nan", if any.
 std::string notFinite(const char* name, std::span<const double> values) {
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!std::isfinite(values[i])) return fmt::format("{}[{}] is {}", name, i, values[i]);

@@ -1,11 +1,11 @@
-// The health message of a process, published once a second. Handlers count; the system's values are
-// added.
+// The health message of a process, and the inputs that it depends on.
 #pragma once
 
 #include <atomic>
 #include <chrono>
 #include <deque>
 #include <mutex>
+#include <optional>
 #include <string>
 
 #include "common/types/health.h"
@@ -41,6 +41,28 @@ class HealthMeter {
   HealthState state_ = HealthState::kStarting;
   std::string message_;
   std::deque<std::pair<Clock::time_point, std::uint64_t>> history_;
+};
+
+/// An input that a service needs: detects that it stops. Use it in the loop's thread only.
+class Input {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  /// `what`: "inertial samples"; `mend`: "mend the IMU, or start capture".
+  Input(std::string what, std::string mend) : what_(std::move(what)), mend_(std::move(mend)) {}
+
+  void heard() { heardAt(Clock::now()); }
+  void heardAt(Clock::time_point now);
+  /// True after three quarters of a second, or four periods, without a message. An input that has
+  /// never arrived is not silent.
+  bool silent(Clock::time_point now) const;
+  /// Such as "no inertial samples for 1.2 s; mend the IMU, or start capture".
+  std::string sentence(Clock::time_point now) const;
+
+ private:
+  std::string what_, mend_;
+  std::optional<Clock::time_point> last_;
+  std::optional<double> period_s_;  ///< smoothed
 };
 
 }  // namespace perdure::service

@@ -21,8 +21,7 @@ std::int64_t nowNs(clockid_t clock) {
   return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
 }
 
-/// Offset of the wall clock from the time since boot; `within_ns` is the time between the two
-/// readings.
+/// Offset of the wall clock from the time since boot; `within_ns`: time between the readings.
 std::int64_t wallOffsetNs(std::int64_t& within_ns) {
   const std::int64_t before = nowNs(CLOCK_BOOTTIME);
   const std::int64_t wall = nowNs(CLOCK_REALTIME);

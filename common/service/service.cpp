@@ -13,7 +13,7 @@
 #include "common/bus/security_log.h"
 #include "common/service/process.h"
 #include "common/service/signals.h"
-#include "common/types/end_of_drive.h"
+#include "common/types/health.h"
 
 namespace perdure::service {
 namespace {
@@ -77,15 +77,6 @@ void readConfiguration(config::Fields& fields, const CommandLine& line,
   config::refuse(problems);
 }
 
-std::shared_ptr<spdlog::logger> makeLog(const std::string& process, const std::string& level) {
-  auto log =
-      std::make_shared<spdlog::logger>(process, std::make_shared<spdlog::sinks::stderr_sink_mt>());
-  log->set_pattern("%Y-%m-%d %H:%M:%S.%e %n %l: %v");
-  log->set_level(spdlog::level::from_str(level));
-  log->flush_on(spdlog::level::trace);
-  return log;
-}
-
 /// Everything after reading the command line; throws StartupError.
 void start(const Program& program, const CommandLine& line) {
   const BlockedSignals blocked;
@@ -113,6 +104,15 @@ void start(const Program& program, const CommandLine& line) {
 }
 
 }  // namespace
+
+std::shared_ptr<spdlog::logger> makeLog(const std::string& process, const std::string& level) {
+  auto log =
+      std::make_shared<spdlog::logger>(process, std::make_shared<spdlog::sinks::stderr_sink_mt>());
+  log->set_pattern("%Y-%m-%d %H:%M:%S.%e %n %l: %v");
+  log->set_level(spdlog::level::from_str(level));
+  log->flush_on(spdlog::level::trace);
+  return log;
+}
 
 Context::Context(const std::string& process, const bus::Domain& domain,
                  std::shared_ptr<spdlog::logger> log)
@@ -156,8 +156,7 @@ void Context::run() {
   publishHealth();
 }
 
-/// Each completed turn of the loop feeds the watchdog. A hanging handler or a stopped process does
-/// not.
+/// Each completed turn of the loop feeds the watchdog.
 void Context::runLoop() {
   constexpr std::chrono::microseconds kLongest{1'000'000};
   Watchdog watchdog;
@@ -200,8 +199,7 @@ void Context::noteSharedMemory() {
   log_->log(domain_.sharedMemory().on() ? spdlog::level::info : spdlog::level::warn, "{}", text);
 }
 
-/// Cyclone disconnects a process when its identity expires. After a restart the process uses the
-/// renewed identity.
+/// Cyclone disconnects a process when its identity expires; a restart uses the renewed one.
 void Context::requireIdentity() const {
   const auto& identity = participant_.identity();
   if (!identity || identity->until > std::chrono::system_clock::now()) return;

@@ -1,5 +1,4 @@
-// The common part of every service's main: options, configuration, log, signals, health, watchdog.
-// README.md in this folder shows an example of a main.
+// The common part of every service's main. README.md in this folder shows an example.
 #pragma once
 
 #include <spdlog/logger.h>
@@ -15,10 +14,18 @@
 #include "common/bus/once.h"
 #include "common/bus/wait_loop.h"
 #include "common/service/health.h"
-#include "common/service/input.h"
 #include "common/service/process.h"
 
 namespace perdure::service {
+
+/// A log to standard error.
+std::shared_ptr<spdlog::logger> makeLog(const std::string& process,
+                                        const std::string& level = "info");
+
+/// The time of std::chrono::steady_clock, ns.
+inline std::int64_t monotonicNs() {
+  return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 /// The context of a service's body: its endpoints, loop, health and log.
 class Context {
@@ -41,8 +48,7 @@ class Context {
   HealthMeter& health() { return health_; }
   spdlog::logger& log() { return *log_; }
 
-  /// A reader whose messages go to `handler` in the loop's thread. Its counts are published in
-  /// Health.
+  /// A reader whose messages go to `handler` in the loop's thread.
   template <class T>
   bus::Reader<T>& on(const bus::Topic<T>& topic, std::type_identity_t<Sink<T>> handler,
                      std::type_identity_t<Sink<T>> on_gone = {}) {
@@ -52,7 +58,6 @@ class Context {
     endpoints_.push_back(reader);
     return *reader;
   }
-  /// A writer. Its counts are published in Health.
   template <class T>
   bus::Writer<T>& writer(const bus::Topic<T>& topic, const bus::WriterOptions& options = {}) {
     auto writer = std::make_shared<bus::Writer<T>>(participant_, topic, options);
@@ -60,7 +65,6 @@ class Context {
     endpoints_.push_back(writer);
     return *writer;
   }
-  /// A writer as a node's output. Messages that cannot be written are counted in Health.
   template <class T>
   Sink<T> sink(const bus::Topic<T>& topic) {
     return [&to = writer(topic)](const T& value) { (void)to.write(value); };
@@ -79,8 +83,7 @@ class Context {
     return inputs_.emplace_back(what, mend);
   }
 
-  /// Monitors a separate thread: the watchdog is fed only while `goes_on` returns true. It is
-  /// called in the loop's thread.
+  /// The watchdog is fed only while `goes_on`, called in the loop's thread, returns true.
   void watch(std::function<bool()> goes_on) { watched_.push_back(std::move(goes_on)); }
 
   void every(std::chrono::nanoseconds period, std::function<void()> tick) {
@@ -121,7 +124,6 @@ class Context {
   ClockSteps clock_steps_;
 };
 
-/// A command line option as an abbreviation of --set key=value.
 struct Shorthand {
   std::string option, key, type;
 };

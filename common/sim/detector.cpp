@@ -77,7 +77,6 @@ Eigen::MatrixXd classDirections(const DetectorModel& model) {
   return llt.matrixL();
 }
 
-/// An object in the image, according to the truth.
 struct SimulatedDetector::Sight {
   TruthView view;
   double time_s = 0.0;
@@ -89,13 +88,11 @@ struct SimulatedDetector::Sight {
   double bearing = 0.0;  ///< direction of the camera, as seen from the object
 };
 
-/// Standard normal numbers for one observation. One part is drawn for each frame. The other part is
-/// a fixed function of object and viewpoint: waves of random phase, whose correlation decreases as
-/// the viewpoint changes.
+/// Standard normal numbers for one observation: a part drawn for each frame, and a fixed function
+/// of object and viewpoint (waves of random phase).
 class SimulatedDetector::Errors {
  public:
-  /// `time` is in units of the time constant of sides; empty: errors of sides are drawn for each
-  /// frame.
+  /// `time`: in units of the time constant of sides; empty: drawn for each frame.
   Errors(std::uint64_t seed, std::uint64_t frame, std::uint64_t object, double persistent,
          double bearing, double log_distance, std::optional<double> time = {})
       : fresh_(seedOf("look", {seed, frame, object})),
@@ -198,8 +195,7 @@ double SimulatedDetector::visibleShare(const TruthView& view) const {
   return inside > 0.0 ? std::min(1.0, view.visible_fraction / inside) : 0.0;
 }
 
-/// Gives a hidden object the visibility of the last frame in which it was visible, and moves its
-/// box to where that frame and the one before it predict it.
+/// Gives a hidden object the visibility of the last visible frame, and moves its box on.
 void SimulatedDetector::coast(Sight& sight, std::uint64_t frame) const {
   const std::uint64_t id = sight.view.object_id;
   const double most =
@@ -348,8 +344,7 @@ std::optional<Box> SimulatedDetector::withErrors(const Box& box, Errors& errors)
   return noisy;
 }
 
-/// Returns 1 for large and visible objects. The value decreases towards least_separation for barely
-/// detectable ones.
+/// 1 for large and visible objects, down to least_separation for barely detectable ones.
 double SimulatedDetector::quality(double size_px, double visible) const {
   const double ease = foundProbability(size_px, visible) / std::max(model_.found, 1e-9);
   return model_.least_separation + (1.0 - model_.least_separation) * ease;

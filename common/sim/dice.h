@@ -1,5 +1,4 @@
-// Seeded random choices: the same seed gives the same results on every machine and with every
-// library.
+// Seeded random choices that are the same on every machine and with every library.
 #pragma once
 
 #include <cmath>

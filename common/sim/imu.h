@@ -1,5 +1,4 @@
-// Simulates an IMU in the body: point samples of the exact motion, with the errors of the
-// continuous-time model of Kalibr and EuRoC (white noise and bias random walk, given by densities).
+// Simulates an IMU (error model of Kalibr and EuRoC) and the wheel speed of a vehicle.
 #pragma once
 
 #include <vector>
@@ -23,5 +22,9 @@ struct ImuRecord {
 std::vector<ImuRecord> simulateImu(const Trajectory& body, const ImuCalibration& calibration,
                                    const ImuErrors& errors, std::uint64_t seed, double seconds,
                                    TimePoint epoch);
+
+/// Samples from the scene's t = 0 until `seconds`; `epoch` is the sensor time of t = 0.
+std::vector<SpeedSample> simulateSpeed(const Trajectory& body, const SpeedErrors& errors,
+                                       std::uint64_t seed, double seconds, TimePoint epoch);
 
 }  // namespace perdure::sim

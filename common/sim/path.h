@@ -9,7 +9,6 @@
 
 namespace perdure::sim {
 
-/// A corner point of a path and the radius of its curve.
 struct Corner {
   Eigen::Vector2d point;
   double radius = 0.0;
@@ -21,8 +20,7 @@ struct PathPoint {
   double curvature = 0.0;  ///< 1/m, left turns positive
 };
 
-/// Straight lines and arcs, with gradual changes of curvature. A closed path repeats; an open path
-/// continues straight beyond its ends.
+/// Lines and arcs, with gradual changes of curvature. An open path continues straight.
 class GroundPath {
  public:
   GroundPath(const std::vector<Corner>& corners, bool closed, double smoothing_m = 4.0);
@@ -60,7 +58,6 @@ Drive drive(const GroundPath& path, const SpeedLimits& limits, double from, doub
 /// Drives at constant speed from start to end, without a rest.
 Drive cruise(double from, double speed, double from_s, double until_s);
 
-/// The response of a vehicle's body to acceleration and to the road.
 struct Suspension {
   double height = 1.5;  ///< height of the body's origin above the ground
   double roll_per_accel = 0.009, pitch_per_accel = 0.006;  ///< rad per m/s²

@@ -1,6 +1,5 @@
-// A scene with exact truth: objects and their poses over time, the motion of the body, and its
-// sensors. A scene is a value determined by name, seed and options. W has z up; the ground is z =
-// 0.
+// A scene with exact truth, determined by name, seed and options: objects, motion of the body,
+// sensors. W has z up; the ground is z = 0.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,12 +25,10 @@ struct SceneObject {
   std::uint64_t look_seed = 0;  ///< colours, textures, details
   Eigen::Vector3d size =
       Eigen::Vector3d::Ones();  ///< length (x of O), width (y), height (z); metres
-  /// Pose of the centre of its box, yaw about +z. Object frame O: x forwards, z up, origin in the
-  /// centre.
+  /// Pose of the centre of its box, yaw about +z. O: x forwards, z up, origin in the centre.
   Trajectory motion{RigidTransform{}};
   bool moves = false;  ///< moves at some time during its presence
-  /// It jumps between two frames, as if moved by a person. The truth has two keys and no motion
-  /// between them. `moves` is set too.
+  /// It jumps between two frames, as if moved by a person: two keys without motion between.
   bool steps = false;
   double present_from_s = -1e9, present_until_s = 1e9;
 
@@ -40,9 +37,8 @@ struct SceneObject {
 
 enum class PropKind { kFacade, kTree, kPole, kHedge, kWall, kKerb, kFloor, kCrate, kShelf };
 
-/// Scenery: visible and able to occlude objects, but not part of the truth. The pose is that of the
-/// centre of its box. Long props (facades, walls, hedges, kerbs, shelves) have x along their
-/// length; their front is −y.
+/// Scenery that can occlude objects but is not in the truth. Long props have x along their length;
+/// their front is −y.
 struct Prop {
   PropKind kind = PropKind::kFacade;
   std::uint64_t look_seed = 0;
@@ -51,7 +47,6 @@ struct Prop {
 };
 
 enum class GroundKind { kStreet, kRoom };
-/// A section of road with pavements, for the rendered ground.
 struct Road {
   Eigen::Vector2d from, to;
   double width_m = 7.0;
@@ -76,8 +71,7 @@ struct SpeedErrors {
   bool noise = true;
 };
 
-/// The sensors. `calibration` is written to the sensor.yaml files; `true_calibration` describes the
-/// simulated sensors. The two differ only in tests of calibration.
+/// `calibration` is written to the files; `true_calibration` describes the sensors (tests).
 struct Rig {
   Calibration calibration, true_calibration;
   std::vector<CameraErrors> cameras;
@@ -104,16 +98,14 @@ struct SceneOptions {
   bool stereo = false, mono8 = false, rolling_shutter = false, noise = true;
   std::uint32_t width = 640, height = 480;
   double rate_hz = 20.0;
-  /// Looks (colours, textures, details of shapes) have different seeds for training, testing and
-  /// use. A network is therefore never tested on its training data.
+  /// Looks have different seeds for training, testing and use.
   std::string look_set = "use";  ///< use, train, test
 };
 
 struct SceneName {
   std::string name, proves;
 };
-/// street, room, toy, occlusion, vanish, row, roll, still, straight, traffic, town, suburb, blocks,
-/// kilometre, lap, and `random`, single views for training.
+/// All scenes, and `random`: single views for training.
 const std::vector<SceneName>& sceneNames();
 /// Throws StartupError(kUsage) with the known names if `name` is unknown.
 Scene makeScene(const std::string& name, std::uint64_t seed, const SceneOptions& options);

@@ -1,5 +1,4 @@
-// Upright boxes around objects, and a test for their intersection. No two objects of a scene may
-// intersect.
+// Upright boxes around objects, and a test for their intersection.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,8 +19,7 @@ struct Solid {
   std::array<Eigen::Vector2d, 4> corners() const;
 };
 
-/// The largest gap between the two along their separating directions. It is a lower bound of the
-/// distance; negative values mean an overlap of at least that size.
+/// The largest gap along separating directions: a lower bound of the distance.
 double gapBetween(const Solid& a, const Solid& b);
 bool meet(const Solid& a, const Solid& b, double margin = 0.0);
 /// Distance on the ground from a point to the outline; 0 inside.

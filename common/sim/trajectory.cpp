@@ -77,8 +77,7 @@ MotionState Trajectory::at(double t_s) const {
   const double u =
       std::clamp((t_s - start_s_) / interval_s_, -8.0, static_cast<double>(control_.size()) + 8.0);
   const double position_segment = std::floor(u), rotation_segment = std::floor(u + 0.5);
-  // The knots of the rotation's spline lie half-way between the controls. Both splines therefore
-  // have no lag.
+  // The rotation's knots lie half-way between the controls, so that neither spline has a lag.
   evaluatePosition(Controls(control_, static_cast<std::int64_t>(position_segment) - 2),
                    u - position_segment, interval_s_, state);
   evaluateRotation(Controls(control_, static_cast<std::int64_t>(rotation_segment) - 2),

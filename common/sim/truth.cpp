@@ -6,7 +6,6 @@
 
 #include "common/base/errors.h"
 #include "common/math/so3.h"
-#include "common/sim/truth_files.h"
 
 namespace perdure::sim {
 namespace {

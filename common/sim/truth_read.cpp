@@ -13,7 +13,6 @@
 
 #include "common/base/errors.h"
 #include "common/sim/truth.h"
-#include "common/sim/truth_files.h"
 
 namespace perdure::sim {
 namespace {

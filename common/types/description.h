@@ -9,7 +9,7 @@
 #include <type_traits>
 
 #include "common/base/ids.h"
-#include "common/base/time_bounds.h"
+#include "common/base/time.h"
 
 namespace perdure::wire {
 

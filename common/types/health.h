@@ -1,10 +1,12 @@
 // The state of each process. Every process publishes it, keyed by process.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <string>
 
+#include "common/base/check.h"
 #include "common/base/ids.h"
 #include "common/types/description.h"
 
@@ -24,6 +26,22 @@ struct Health {
   std::uint64_t rss_bytes = 0;
   std::map<std::string, std::uint64_t> reasons;  ///< counted reasons, including those of DDS
 };
+
+inline const char* nameOf(HealthState state) {
+  constexpr std::array kNames{"starting", "ok", "degraded", "failed"};
+  return nameAt(kNames, state);
+}
+
+/// Message in the Health of capture.
+inline constexpr char kEndOfDrive[] = "end of drive";
+/// A reason in Health, set if the silence of inputs is the only cause of the degraded state.
+inline constexpr char kInputSilent[] = "input_silent";
+
+/// Returns whether the end of the drive is the only fault. `capture` is null if none was received.
+inline bool endedWith(const Health* capture, const Health& health) {
+  return capture != nullptr && capture->message == kEndOfDrive &&
+         health.state == HealthState::kDegraded && health.reasons.contains(kInputSilent);
+}
 
 }  // namespace perdure
 

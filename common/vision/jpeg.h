@@ -1,5 +1,4 @@
-// Compresses frames as JPEG and decodes them with TurboJPEG, for networks without the bandwidth for
-// raw images.
+// Compresses frames as JPEG and decodes them with TurboJPEG.
 #pragma once
 
 #include "common/base/result.h"
@@ -11,9 +10,8 @@ namespace perdure::vision {
 /// image_missing, image_malformed (size and bytes disagree), jpeg_failed.
 Result<Frame> compressed(const Frame& frame, int quality);
 
-/// The decoded image with packed rows, in the encoding `wanted`; an uncompressed frame is
-/// unchanged. Reasons: image_missing; jpeg_malformed (truncated, corrupt, not JPEG);
-/// jpeg_size_wrong (not the frame's own width and height).
+/// Decodes with packed rows as `wanted`; raw frames are unchanged. Reasons: image_missing,
+/// jpeg_malformed, jpeg_size_wrong (not the frame's own size).
 Result<Frame> decompressed(const Frame& frame, ImageEncoding wanted);
 /// Decodes in the colours of the compressed image.
 Result<Frame> decompressed(const Frame& frame);

@@ -26,8 +26,7 @@ class Coder {
   using Memory = std::conditional_t<kEncodes, Arena&, std::shared_ptr<const void>>;
 
  public:
-  /// The arena of the encoded sequences; or the owner of the decoded message's memory, whose pixels
-  /// are then not copied.
+  /// The arena of the encoded sequences; or the owner of the decoded message's memory.
   explicit Coder(Memory memory) : memory_(std::forward<Memory>(memory)) {}
 
   bool failed() const { return reason_.has_value(); }
@@ -267,7 +266,6 @@ class Coder {
     }
     checkMatrix(name, d, kMatrixEntry);
   }
-  /// Visits one part of the message under its name.
   void under(const char* name, long index, auto visit) {
     path_.push_back({name, index});
     visit();

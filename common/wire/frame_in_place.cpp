@@ -10,7 +10,6 @@ class Cursor {
  public:
   explicit Cursor(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
 
-  /// Reads the next value, aligned to its size.
   template <class X>
   bool value(X& x) {
     static_assert(std::is_arithmetic_v<X>);

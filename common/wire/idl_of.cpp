@@ -16,8 +16,7 @@ const idl::File* fileOf(std::string_view struct_name) {
   return nullptr;
 }
 
-/// The file's text after that of the files that it includes. No file is included twice
-/// (idl/README.md).
+/// The file's text after that of the files that it includes (idl/README.md).
 std::string inlined(const idl::File& file) {
   std::string before, text;
   std::istringstream lines{std::string(file.text)};

@@ -21,7 +21,6 @@ enum class Role : std::uint32_t {
   kRos2Driver = 1u << 11,  ///< the bridge with inputs: also writes their topics; on demand only
 };
 
-/// A set of roles.
 class Roles {
  public:
   constexpr Roles() = default;

@@ -14,7 +14,7 @@
 #include <memory>
 
 #include "common/base/errors.h"
-#include "services/capture/live/iio_text.h"
+#include "services/capture/live/iio_stream.h"
 #include "services/capture/live/libcamera/log.h"
 
 namespace perdure::capture {

@@ -1,5 +1,4 @@
-// `perdure-capture --list`: lists the connected cameras and inertial units, their capabilities, and
-// a configuration to copy.
+// `perdure-capture --list`: connected cameras and inertial units, and a configuration.
 #pragma once
 
 #include <cstdint>
@@ -36,8 +35,7 @@ struct Seen {
 /// Finds devices through libcamera and through the libiio context `uri`.
 Seen lookAround(const std::string& uri);
 
-/// Text for people: the devices found, or the places searched if none were found. It includes a
-/// configuration for up to two cameras and for the first unit with both sensors.
+/// The devices found, or the places searched, and a configuration to copy.
 std::string describe(const Seen& seen, const std::string& uri);
 
 /// Runs `perdure-capture --list [URI]` and prints the result. Returns 69 if no device is found.

@@ -1,5 +1,4 @@
-// Publishes live sensors on the bus: one or two cameras, an IMU, the vehicle's speed, and the
-// calibration of the rig.
+// Publishes live sensors: cameras, IMU, speed, and the calibration of the rig.
 #pragma once
 
 #include <functional>
@@ -17,7 +16,6 @@
 #include "services/capture/live/clocks.h"
 #include "services/capture/live/iio_stream.h"
 #include "services/capture/live/imu_pairing.h"
-#include "services/capture/live/imu_yield.h"
 #include "services/capture/vehicle/vehicle.h"
 
 namespace perdure::capture {
@@ -59,8 +57,7 @@ class Live {
   Sink<SpeedSample> speed_;
   std::string unused_;  ///< cameras of the rig that the configuration does not use
   Calibration rig_;
-  BoundedQueue<Message> queue_{1024, Overflow::kDropOldest};  // holds several seconds of IMU
-                                                              // samples
+  BoundedQueue<Message> queue_{1024, Overflow::kDropOldest};  // seconds of IMU samples
   /// A separate queue, so that a network sender that sends too much causes no loss of images.
   BoundedQueue<Message> from_vehicle_{256, Overflow::kDropOldest};
   std::uint64_t samples_ = 0;

@@ -16,7 +16,6 @@ std::optional<ImageEncoding> encodingOf(const std::string& name) {
   return std::nullopt;
 }
 
-/// Returns the time of a const or mutable message.
 template <class Message>
 auto& timeOf(Message& message) {
   return std::visit(
@@ -30,7 +29,6 @@ auto& timeOf(Message& message) {
       message);
 }
 
-/// Throws if a drive has no readable image.
 void requireImages(replay::Dataset& drive, const std::string& path) {
   for (auto message = drive.next(); message; message = drive.next()) {
     const auto* frame = std::get_if<Frame>(&*message);
@@ -44,7 +42,6 @@ void requireImages(replay::Dataset& drive, const std::string& path) {
                          "without them runs in `perdure pipeline`).");
 }
 
-/// Times of the first and the last frame of cam0.
 std::pair<TimePoint, TimePoint> spanOf(const replay::Dataset& drive) {
   TimePoint first = TimePoint::max(), last = TimePoint::min();
   for (std::uint64_t i = 0; i < drive.frameCount() && first == TimePoint::max(); ++i) {
@@ -90,8 +87,7 @@ Loader::Loader(const Config& config, std::unique_ptr<replay::Dataset> drive, std
     const auto pauses = static_cast<Duration::rep>(std::max<std::uint64_t>(frame_count_, 2) - 1);
     length_ = end - begin + (end - begin) / pauses;
     until_ = begin + length_;
-    // Starts at the previous frame, because the samples after the last frame of a lap belong to
-    // that lap.
+    // Starts at the previous frame: samples after a lap's last frame belong to that lap.
     first -= std::min<std::uint64_t>(first, 1);
     lap_ = first / frame_count_;
     first %= frame_count_;

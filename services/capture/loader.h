@@ -20,9 +20,8 @@ std::unique_ptr<replay::Dataset> openDrive(const Config& config, InstanceId sour
 class Loader {
  public:
   /// Begins at frame `first`. `notify` is called on the loader's thread after each message. With
-  /// run.on_end "repeat" the drive repeats without end. Frame n·frameCount() + i is then its frame
-  /// i, later by n lap lengths (all frames and the interval between laps). Reading then begins one
-  /// frame early, with the samples of that frame.
+  /// run.on_end "repeat", frame n·frameCount() + i is frame i, later by n lap lengths; reading then
+  /// begins one frame early, with its samples.
   Loader(const Config& config, std::unique_ptr<replay::Dataset> drive, std::uint64_t first,
          std::function<void()> notify);
   ~Loader();
@@ -32,8 +31,7 @@ class Loader {
   /// Next message if it is ready; ended() is true after the last one.
   std::optional<replay::Message> take();
   bool ended() const;
-  /// Counts of omitted data so far (image_truncated, imu_gap, …), and the last problem as text for
-  /// people.
+  /// Counts of omitted data (image_truncated, imu_gap, …), and the last problem as text.
   ReasonCounts reasons() const;
   std::string lastProblem() const;
 

@@ -1,5 +1,4 @@
-// perdure-capture: publishes a drive or live sensors as frames, inertial samples, speed and
-// calibration.
+// perdure-capture: publishes a drive or live sensors.
 #include <string_view>
 
 #include "services/capture/list.h"

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "common/types/end_of_drive.h"
+#include "common/types/health.h"
 #include "services/capture/live/clocks.h"
 #include "services/capture/run_file.h"
 
@@ -113,8 +113,7 @@ void Playback::begin() {
 
 void Playback::feed() {
   if (!node_->wants()) return;
-  const bool ended = loader_->ended();  // read before take(), so that true means that no message
-                                        // follows
+  const bool ended = loader_->ended();  // before take(): true means that nothing follows
   if (auto message = loader_->take()) {
     if (std::holds_alternative<Frame>(*message)) {
       if (std::get<Frame>(*message).camera == "cam0") context_.health().frameIn();
@@ -144,8 +143,7 @@ void Playback::pump() {
   if (node_->finished()) finish();
 }
 
-/// Writes the file if its content would change. A sample alone does not cause a write until the
-/// next frame, because a few repeated samples do no harm.
+/// Writes the file if its content changes. Samples alone wait for the next frame.
 void Playback::saveState() {
   RunState state = node_->state();
   if (config_.run.state.empty() || (state.next_sequence == saved_.next_sequence &&

@@ -2,21 +2,11 @@
 
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 
+#include "common/base/files/access.h"
 #include "common/base/ids.h"
 
 namespace perdure::capture {
-namespace {
-
-std::string contentOf(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
-
-}  // namespace
 
 std::string driveOf(const Config& config) {
   std::error_code error;
@@ -26,14 +16,14 @@ std::string driveOf(const Config& config) {
 }
 
 std::string bootId() {
-  std::string id = contentOf("/proc/sys/kernel/random/boot_id");
+  std::string id = textOf("/proc/sys/kernel/random/boot_id");
   while (!id.empty() && id.back() == '\n') id.pop_back();
   return id.empty() ? "unknown" : id;
 }
 
 std::optional<RunState> readRunState(const Config& config) {
   if (config.run.state.empty()) return std::nullopt;
-  auto state = runStateFrom(contentOf(config.run.state));
+  auto state = runStateFrom(textOf(config.run.state));
   if (!state || state->drive != driveOf(config) || state->boot != bootId()) return std::nullopt;
   return state;
 }

@@ -9,9 +9,7 @@
 
 namespace perdure::capture {
 
-/// Identity of a run, from drive, pace and rate.
 std::string driveOf(const Config& config);
-/// Identity of the machine's current boot.
 std::string bootId();
 
 /// State of the same run on the same boot. Empty if there is none, or if `config` names no file.

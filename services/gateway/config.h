@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/config/fields.h"
-#include "services/gateway/web/options.h"
+#include "services/gateway/web/guard.h"
 
 namespace perdure::gateway {
 

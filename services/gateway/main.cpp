@@ -18,11 +18,8 @@
 namespace {
 
 using namespace perdure;
+using service::monotonicNs;
 namespace web = gateway::web;
-
-std::int64_t monotonicNs() {
-  return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
-}
 
 /// Topics of @final types, which CDR readers decode by their IDL.
 constexpr const char* kRawTopics[] = {"imu", "speed", "odometry", "landmarks"};
@@ -62,8 +59,7 @@ void listenAlways(service::Context& context, gateway::Node& node) {
   context.on(bus::kTopic<MapReply>, [&](const MapReply& m) { node.onMapReply(m); });
 }
 
-/// For the first viewer, waits briefly for the newest stored messages, and then sends the current
-/// state. If none arrive in time, it sends the state received before.
+/// Waits briefly for the newest stored messages before it sends the state to the first viewer.
 class Beginning {
  public:
   explicit Beginning(gateway::Node& node) : node_(node) {}
@@ -101,7 +97,6 @@ class Beginning {
   std::int64_t until_ns_ = 0;
 };
 
-/// Readers that are open while viewers need them.
 class Readers {
  public:
   Readers(service::Context& context, gateway::Node& node, Beginning& beginning, web::Server& server,

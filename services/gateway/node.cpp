@@ -9,10 +9,8 @@ namespace perdure::gateway {
 namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr std::chrono::seconds kLongBack{2};  // a larger jump back means a restarted recording or
-                                              // another drive
-constexpr std::chrono::seconds kGap{1};  // sensor time; after a longer gap, the earlier trajectory
-                                         // is not continued
+constexpr std::chrono::seconds kLongBack{2};  // restarted recording or another drive
+constexpr std::chrono::seconds kGap{1};       // longer: the trajectory begins again
 
 }  // namespace
 
@@ -213,8 +211,7 @@ void Node::beginAnew(TimePoint time) {
 void Node::onObjects(const Objects& objects, std::int64_t now_ns) {
   last_.objects_ns = now_ns;
   const double latency = 1e-6 * static_cast<double>(now_ns - objects.stamp.captured_ns);
-  constexpr double kLongest = 1e4;  // ms; a longer latency comes from another host's clock, or from
-                                    // a recording
+  constexpr double kLongest = 1e4;  // ms; longer: another host's clock, or a recording
   latency_ms_ = objects.stamp.captured_ns > 0 && latency >= 0 && latency < kLongest ? latency : -1;
   take(objects);
 }

@@ -1,5 +1,4 @@
-// The gateway without bus and sockets. It converts messages of the bus to messages of channels.
-// Only channels with viewers are computed, and each message only once.
+// The gateway without bus and sockets. Only channels with viewers are computed, once.
 #pragma once
 
 #include <deque>
@@ -47,8 +46,7 @@ class Node {
   void onDetections(const Detections& detections);
   void onModel(const ModelInfo& model);
   void onObjects(const Objects& objects, std::int64_t now_ns);
-  /// Takes the newest message that was sent before the first viewer, for example at the end of a
-  /// drive.
+  /// Takes the newest message from before the first viewer.
   void onObjectsOfBefore(const Objects& objects);
   void onFrameOfBefore(std::size_t camera, const Frame& frame);
   void onEvent(const Event& event);
@@ -114,7 +112,7 @@ class Node {
   bool wantsTiles() const { return wants(kMap) || wants(kMapScene); }
   std::size_t sendMap();  ///< number of objects sent
   bool wantsGraph() const { return wants(kMapGraph) || wants(kMapGraphScene); }
-  // Defined in node_graph.cpp.
+  // Defined in node_calls.cpp.
   void lookAtGraph(bool looked_before);
   void followGraph(std::int64_t now_ns);
   void onNoGraph(const std::string& why);
@@ -150,10 +148,8 @@ class Node {
   std::optional<Odometry> odometry_;
   std::optional<Objects> objects_;
   std::optional<ModelInfo> model_;
-  /// Detections of the newest frames, by camera.
   std::map<std::string, std::deque<Detections>> detections_;
-  std::set<std::size_t> awaited_;  ///< cameras whose annotations wait for the detections of
-                                   ///< objects_' frame
+  std::set<std::size_t> awaited_;  ///< wait for the detections of objects_' frame
   bool unplaced_ = false;          ///< an event of the whole map was received before the first pose
   std::deque<Happened> events_;
   std::map<ObjectId, Event> returns_;

@@ -5,8 +5,7 @@ namespace perdure::gateway {
 namespace {
 
 constexpr std::size_t kMostEvents = 256;
-constexpr std::chrono::seconds kThen{1};  // largest time difference at which a pose counts as that
-                                          // of an event
+constexpr std::chrono::seconds kThen{1};  // between an event and its pose
 
 }  // namespace
 
@@ -23,8 +22,7 @@ void Node::onEvent(const Event& event) {
   if (wants(kLog)) sendEvent(events_.back(), true);
 }
 
-/// An event may arrive before the first pose of its W. Its position is then added for later
-/// clients.
+/// The position of an event before the first pose of its W is added for later clients.
 void Node::placeEvents() {
   if (!unplaced_) return;
   unplaced_ = false;
@@ -35,8 +33,7 @@ void Node::placeEvents() {
   }
 }
 
-/// Position of an object's event: the estimate of the object. Position of an event of the whole
-/// map: the vehicle at that time.
+/// The estimate of the object, or the vehicle at that time for events of the whole map.
 std::optional<Eigen::Vector3d> Node::placeOf(const Event& event) const {
   const auto now = body();
   if (!now || event.world != now->world) return std::nullopt;

@@ -1,5 +1,5 @@
 // perdure-inference: computes detections from frames.
-#include "common/bus/gaps.h"
+#include "common/bus/once.h"
 #include "common/service/service.h"
 #include "common/vision/jpeg.h"
 #include "services/inference/worker.h"
@@ -9,8 +9,7 @@ namespace {
 using namespace perdure;
 
 void run(service::Context& context, const inference::Config& config) {
-  inference::Node node(config, context.instance());  // created first, so that frames do not queue
-                                                     // up during loading
+  inference::Node node(config, context.instance());  // first, so that frames do not queue up
   context.log().info("network {} with {} classes, hash {}, by {}", node.model().name,
                      node.model().classes.size(), toHex(node.model().hash), node.backend());
   const auto& ownership = config.ownership;

@@ -23,8 +23,7 @@ struct ListFile {
   std::uintmax_t most_bytes;  ///< size limit; a larger file was probably named by mistake
 };
 
-/// Non-empty lines, without trailing white space. Reports an error for `key` if there are none, or
-/// if the file is too large.
+/// Non-empty lines. Reports an error for `key` if there are none, or if the file is too large.
 std::vector<std::string> linesOf(const ListFile& list, JsonReader& reader);
 
 }  // namespace perdure::inference

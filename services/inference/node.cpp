@@ -9,7 +9,7 @@
 #include "common/base/check.h"
 #include "common/base/errors.h"
 #include "services/inference/core/decode/suppress.h"
-#include "services/inference/core/upright.h"
+#include "services/inference/core/network/image_fit.h"
 
 namespace perdure::inference {
 namespace {
@@ -68,8 +68,7 @@ Detection inImage(const Candidate& candidate, const ImageFit& fit) {
   return detection;
 }
 
-/// The part of a box inside the image. Empty if it is less than a quarter of the box, or too small
-/// to detect.
+/// The part of a box inside the image; empty if below a quarter of it, or too small to detect.
 std::optional<Box> partInside(const Box& box, const ImageFit& fit) {
   constexpr double kLeastSide = 3.0, kLeastShare = 0.25;
   const double left = fit.offset_x, top = fit.offset_y;
@@ -143,8 +142,7 @@ ImageFit Node::fitTo(const Frame& frame) const {
                quarters_);
 }
 
-/// Each size has its own network, because OpenCV initialises one again when its input changes.
-/// Sizes that the network does not accept are left out.
+/// Each size has its own network. Sizes that the network does not accept are left out.
 void Node::addSmallerSizes(const ModelFile& file) {
   constexpr int kMultiple = 32;  // multiple of all strides
   const Input& full = description_.input;
@@ -269,8 +267,7 @@ Result<Detections> Node::infer(const Frame& frame, const Predictions& expected) 
   return out;
 }
 
-/// Expectations in the order of the predictions. The activation is 0 for those outside the image,
-/// too small for the network, or of a class that is not reported.
+/// In the order of the predictions; activation 0 for those that cannot be reported.
 std::vector<Expectation> Node::expectationsOf(const Predictions& expected,
                                               const Frame& frame) const {
   const ImageFit fit = fitTo(frame);

@@ -25,39 +25,31 @@ class Node {
   /// Loads, warms up and tests the network. Throws StartupError with the fix.
   Node(const Config& config, InstanceId instance);
 
-  /// Description of the activations and of the reported classes. A turn of the images has a
-  /// description of its own, because boxes have other insets then.
+  /// Of the activations and reported classes, for the present turn of the images.
   const ModelInfo& model() const { return info_; }
 
   const ModelDescription& description() const { return description_; }
-  /// Backend of the network, for people.
   std::string backend() const;
 
-  /// Calibration and odometry determine the turn of the next frames (core/upright.h).
+  /// Calibration and odometry determine the turn of the next frames (core/network/image_fit.h).
   void onCalibration(const perdure::Calibration& calibration) { calibration_ = calibration; }
   void onOdometry(const Odometry& odometry);
 
-  /// Boxes in pixels of the frame, not clipped to the image. An empty list is a valid result.
-  /// `expected`: predicted objects. Each one without a matching box gets a top-down answer
-  /// (core/decode/prime.h), if the model is calibrated for it and the predictions match the frame.
-  /// Fails with "frame_malformed", "model_failed", "model_output_shape" or
-  /// "model_output_not_finite".
+  /// Boxes in pixels of the frame, not clipped. `expected`: each one without a matching box gets a
+  /// top-down answer (prime.h) if the model is calibrated for it. Fails with "frame_malformed",
+  /// "model_failed", "model_output_shape" or "model_output_not_finite".
   Result<Detections> infer(const Frame& frame, const Predictions& expected = {});
 
-  /// Sets a steady clock in seconds, for Detections::forward_s; without a clock, forward_s stays 0
-  /// (unknown).
+  /// Sets a steady clock in seconds, for Detections::forward_s.
   void timeBy(std::function<double()> clock_s) { clock_s_ = std::move(clock_s); }
 
-  /// Pixels of each supported input size relative to the network's own, falling from 1. With a time
-  /// budget there is more than one size.
+  /// Pixels of each supported input size relative to the network's own, falling from 1.
   std::vector<double> sizeShares() const;
-  /// Selects the size for the next frames.
   void useSize(std::size_t size);
   /// Input width relative to the network's own.
   double inputScale() const;
 
-  /// All boxes whose best reported class scores `floor` or more, in pixels of the network's input,
-  /// before overlaps are merged. Fails like infer().
+  /// All boxes whose best reported class scores `floor`, in pixels of the input, unmerged.
   Result<std::vector<Candidate>> candidatesIn(const Frame& frame, double floor);
 
  private:
@@ -73,7 +65,6 @@ class Node {
                  const std::vector<Candidate>& reported, const std::vector<Candidate>& candidates,
                  Detections& out) const;
 
-  /// The network at one size of its input.
   struct Size {
     ModelDescription description;
     std::unique_ptr<Network> network;

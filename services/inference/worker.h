@@ -1,6 +1,5 @@
-// Thread that runs the network, behind a queue of one frame, and the rules for writing results. The
-// newest frame replaces a waiting one, results carry the current strength of this process, and a
-// new process may take over.
+// Runs the network in a thread behind a queue of one frame, and decides with which strength results
+// are written.
 #pragma once
 
 #include <atomic>
@@ -20,7 +19,6 @@
 
 namespace perdure::inference {
 
-/// Writers and readers of a worker.
 struct WorkerBus {
   bus::Writer<Detections>& detections;
   /// Reader of `detections`, matched with writers of this and of other processes.
@@ -39,7 +37,6 @@ class Worker {
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  /// Initial strength.
   static std::int32_t firstStrength(const OwnershipConfig& ownership);
 
   /// Adds a frame. A frame that still waits is dropped and counted.
@@ -47,7 +44,6 @@ class Worker {
   /// Calibration and odometry determine the turn of the following frames.
   void onCalibration(const perdure::Calibration& calibration);
   void onOdometry(const Odometry& odometry);
-  /// Sets the predicted objects for the following frames.
   void expect(const Predictions& predictions);
   /// Asserts liveliness, unless the network is stuck. Call it several times in a lease.
   void assertAlive();
@@ -77,7 +73,6 @@ class Worker {
   void noteFailure(const Reason& reason);
   void noteLapse(Clock::time_point now);
   void adoptStrength(Clock::time_point now);
-  /// Executes the actions of the swap.
   void obey();
   std::string reducedInput() const;
 
@@ -95,8 +90,7 @@ class Worker {
   mutable std::mutex mutex_;  ///< protects all following members and the writers
   Ownership ownership_;
   Swap swap_;
-  Clock::time_point hold_until_{};  ///< results are withheld until this time, after the strength
-                                    ///< was lowered
+  Clock::time_point hold_until_{};  ///< no results after the strength was lowered
   bool silent_ = false;
   std::string failure_, last_problem_;
   ReasonCounts reasons_;

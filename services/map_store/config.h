@@ -6,7 +6,7 @@
 
 #include "common/config/fields.h"
 #include "common/mapping/parameters.h"
-#include "services/map_store/fleet/parameters.h"
+#include "services/map_store/fleet/server_url.h"
 
 namespace perdure::map_store {
 

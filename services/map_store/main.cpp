@@ -13,8 +13,7 @@ namespace {
 
 using namespace perdure;
 
-/// The fleet's server: it receives each commit, and the log and Health report the progress. Does
-/// nothing if `store.url` is empty.
+/// The fleet's server, if `store.url` is set: receives each commit; log and Health report.
 class FleetServer {
  public:
   explicit FleetServer(const map_store::Config& config) {
@@ -43,8 +42,7 @@ class FleetServer {
     failing_ = progress.failing;
     return progress.trouble;
   }
-  /// Sends the last commit if the server accepts it at once; otherwise it is sent after the next
-  /// start.
+  /// Sends the last commit if the server accepts it at once.
   void finish() {
     if (!replicator_) return;
     constexpr std::chrono::milliseconds kLastWords{300};

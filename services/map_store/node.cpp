@@ -41,7 +41,6 @@ std::string faultOf(const MapQuery& query) {
 
 namespace {
 
-/// Replaces object ids by track ids.
 Objects byTrack(Objects objects) {
   for (ObjectBelief& belief : objects.objects) {
     belief.id = belief.trackId();
@@ -120,8 +119,7 @@ void Node::onObjects(const Objects& objects) {
   newest_ = std::move(next);
   dirty_ = true;
   if (graph_) followGraph();
-  constexpr double kStep_m = 20.0 / 3.0;  // the filter's working set reaches this much farther than
-                                          // its requests
+  constexpr double kStep_m = 20.0 / 3.0;  // the working set reaches this much farther
   const bool moved = !near_from_W_ || (newest_->T_WB.p - *near_from_W_).norm() > kStep_m;
   if (moved || !same_filter) sendNear();
 }
@@ -137,8 +135,8 @@ bool Node::wasConfirmed(TrackId track) const {
 /// Takes the ended tracks that were not in the previous message.
 void Node::takeEnded(const std::vector<EndedTrack>& ended) {
   for (const EndedTrack& each : ended) {
-    if (newest_ && std::find(newest_->ended.begin(), newest_->ended.end(), each) !=
-                       newest_->ended.end()) {
+    if (newest_ &&
+        std::find(newest_->ended.begin(), newest_->ended.end(), each) != newest_->ended.end()) {
       continue;
     }
     const bool merged = each.into != 0;

@@ -54,8 +54,7 @@ class Node {
   void onCalibration(const Calibration& calibration) { earth_.onCalibration(calibration); }
   void onLandmarks(const Landmarks& landmarks);
   void onQuery(const MapQuery& query);
-  /// Commits and publishes changes that are due. `now`: a monotonic time with any origin. Must be
-  /// called at least ten times a second.
+  /// Commits and publishes what is due; at least ten times a second. `now`: monotonic.
   void tick(Duration now);
   /// A server has the outbox's entries up to this one; the next commit removes them.
   void onAcknowledged(std::int64_t number) { acknowledged_ = std::max(acknowledged_, number); }
@@ -135,8 +134,7 @@ class Node {
     std::uint64_t graph = 0;  ///< revision of the graph that placed it
     std::uint64_t near = 0;   ///< revision of the message
   };
-  std::map<TrackId, Given> placed_;  ///< tracks that were given to the filter and not detected
-                                     ///< since
+  std::map<TrackId, Given> placed_;  ///< given to the filter and not detected since
   struct Join {
     TrackId seen = 0;
     std::uint64_t near = 0;  ///< revision of the first message that gave it; 0: not given yet

@@ -1,5 +1,4 @@
-// perdure-ros2: publishes Perdure's topics in ROS 2, and reads drivers of ROS 2, without ROS
-// libraries.
+// perdure-ros2: the bridge to ROS 2, without ROS libraries.
 #include <chrono>
 #include <functional>
 #include <list>
@@ -18,10 +17,7 @@
 namespace {
 
 using namespace perdure;
-
-std::int64_t monotonicNs() {
-  return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
-}
+using service::monotonicNs;
 
 /// Output side: publishes the data of the bus in ROS.
 class Outwards {
@@ -93,8 +89,7 @@ class Outwards {
     }
   }
 
-  /// Publishes the raw and the compressed image, if their topics have readers. The encoding on the
-  /// bus does not matter.
+  /// Publishes the raw and the compressed image, if their topics have readers.
   void onFrame(const Frame& frame) {
     mirror_.onFrame(frame);
     const std::string image = mirror_.imageTopic(frame.camera);

@@ -35,7 +35,6 @@ class Node {
   /// `rig`: content of the file in.rig; empty without a file.
   Node(const Config& config, Calibration rig, InstanceId instance, Outputs outputs);
 
-  /// Publishes the detector's classes.
   void start();
 
   // Messages of ROS. `camera`: index in Config::cameras().
@@ -84,7 +83,6 @@ class Node {
   ModelInfo model_;
   std::vector<int> bits_;
   std::uint64_t next_frame_ = 0, next_sample_ = 0;
-  /// Detections whose frame has not arrived yet.
   std::deque<ros::Detection2DArray> early_;
 };
 

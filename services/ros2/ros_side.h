@@ -1,5 +1,4 @@
-// Connection to ROS: a DDS participant with the topics, types and quality of service of ROS 2's own
-// middlewares.
+// A DDS participant with the topics, types and quality of service of ROS 2.
 #pragma once
 
 #include <map>
@@ -21,16 +20,13 @@ std::string wireType(const std::string& type);
 
 class RosSide {
  public:
-  /// Joins the domain of ROS. Throws StartupError: a secured bus cannot include ROS (78), or DDS
-  /// fails (69).
+  /// Throws StartupError: a secured bus cannot include ROS (78), or DDS fails (69).
   RosSide(service::Context& context, const Config& config);
 
   void advertise(const ros::Outlet& outlet);
-  /// Whether the topic has a reader.
   bool wants(const std::string& topic) const;
   void write(const ros::Outlet& outlet, std::vector<std::uint8_t> cdr);
-  /// Adds a reader. `input`: prefix of its counts. Without `reliable` it is best effort, which is
-  /// compatible with all drivers.
+  /// Adds a reader. `input`: prefix of its counts. Without `reliable` it is best effort.
   void read(const std::string& input, const std::string& topic, const std::string& type,
             bool reliable, bool latched, int depth, bus::ForeignReader::Handler handler);
   /// A sentence with the fix if the network changed or an input has no writer; otherwise empty.

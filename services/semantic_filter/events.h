@@ -25,7 +25,6 @@ class EventTracker {
   /// The track is archived from now on. The next update creates its event.
   void archived(TrackId id) { archived_.insert(id); }
   void clear() { *this = {}; }
-  /// Whether the track was published as confirmed.
   bool wasConfirmed(TrackId id) const;
 
  private:
@@ -47,6 +46,25 @@ class EventTracker {
   std::map<TrackId, Known> known_;
   std::map<TrackId, bool> recalled_;  ///< whether it was restored
   std::set<TrackId> archived_;
+};
+
+/// Derives `object_state` from `objects`: the keyed states to write or to dispose of.
+class ObjectStates {
+ public:
+  struct Changes {
+    /// new, updated by a frame, or changed in visibility or confirmation
+    std::vector<ObjectState> written;
+    std::vector<ObjectState> gone;  ///< only the key is valid
+  };
+  Changes update(const Objects& objects);
+
+ private:
+  struct Sent {
+    TimePoint as_of;
+    Visibility visibility = Visibility::kVisible;
+    bool confirmed = false;
+  };
+  std::map<ObjectId, Sent> sent_;
 };
 
 }  // namespace perdure::semantic_filter

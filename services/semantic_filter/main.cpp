@@ -4,19 +4,18 @@
 #include <functional>
 
 #include "common/base/heap.h"
-#include "common/bus/gaps.h"
+#include "common/bus/once.h"
 #include "common/bus/topics.h"
 #include "common/service/service.h"
+#include "services/semantic_filter/events.h"
 #include "services/semantic_filter/node.h"
-#include "services/semantic_filter/object_states.h"
 #include "services/semantic_filter/priors.h"
 
 namespace {
 
 using namespace perdure;
 
-/// Delays messages, in order, until the map store has answered with the working set of an earlier
-/// run. Otherwise new tracks would get ids that are already in use.
+/// Delays messages until the map store has answered, because ids may be in use already.
 class Gate {
  public:
   void pass(std::function<void()> message) {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/camera/same_camera.h"
+#include "common/camera/camera_model.h"
 #include "common/math/gaussian.h"
 #include "services/semantic_filter/core/belief/motion_model.h"
 #include "services/semantic_filter/core/belief/track_message.h"

@@ -1,5 +1,4 @@
-// The semantic filter as a node: checks messages, waits for detections, and publishes objects,
-// events and predictions; core/history estimates. Single-threaded; time comes from messages only.
+// The filter as a node: checks messages, waits for detections, publishes. Single-threaded.
 #pragma once
 
 #include <deque>
@@ -16,7 +15,6 @@
 #include "services/semantic_filter/core/memory/archive.h"
 #include "services/semantic_filter/events.h"
 #include "services/semantic_filter/model_book.h"
-#include "services/semantic_filter/probation.h"
 #include "services/semantic_filter/return_events.h"
 
 namespace perdure::semantic_filter {
@@ -44,7 +42,6 @@ class Node {
   const ReasonCounts& reasons() const { return reasons_; }
   InstanceId instance() const { return instance_; }
   const Belief& belief() const { return history_.belief(); }
-  /// The noise scale of the network's boxes, as text for users.
   std::string note() const;
 
  private:

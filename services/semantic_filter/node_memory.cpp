@@ -122,7 +122,6 @@ TrackId Node::trackOf(ObjectId object) const {
   return at == track_of_.end() ? object : at->second;
 }
 
-/// Stores tracks that ended until the map has them on disk.
 void Node::keepEnded(const std::vector<EndedTrack>& ended) {
   ended_.insert(ended_.end(), ended.begin(), ended.end());
   while (ended_.size() > kMostEnded) dropOldestEnded();

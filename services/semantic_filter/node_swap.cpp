@@ -24,8 +24,7 @@ bool missesAll(const std::vector<Prediction>& expected, const Detections& detect
 
 }  // namespace
 
-/// Inference decides which process answers. The detections of a new process are delayed in case of
-/// doubt until it passes its probation. A failure is reported as an event.
+/// Detections of a new process are delayed in doubt until its probation ends.
 void Node::onSwap(const SwapNotice& notice) {
   if (notice.step == SwapStep::kTookOver && notice.about != 0) {
     settleProbation(true);

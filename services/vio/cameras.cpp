@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "common/camera/same_camera.h"
 #include "common/vision/image.h"
 
 namespace perdure::vio {

@@ -1,6 +1,5 @@
-// Node of vio if another program gives the poses (`input.odometry: given`). It reads that odometry
-// and the frames, and publishes landmarks. It waits for the pose of each frame and pairs stereo
-// frames.
+// Node of vio with given poses (`input.odometry: given`): waits for the pose of each frame, pairs
+// stereo frames, publishes landmarks.
 #pragma once
 
 #include <deque>
@@ -14,10 +13,9 @@
 #include "common/types/sensors.h"
 #include "services/vio/cameras.h"
 #include "services/vio/config.h"
-#include "services/vio/core/agreement.h"
 #include "services/vio/core/known_poses/point_mapper.h"
-#include "services/vio/in_vain.h"
 #include "services/vio/moving_mask.h"
+#include "services/vio/doubts.h"
 #include "services/vio/waiting_frames.h"
 
 namespace perdure::vio {

@@ -3,7 +3,7 @@
 #include <functional>
 #include <opencv2/core/utility.hpp>
 
-#include "common/bus/gaps.h"
+#include "common/bus/once.h"
 #include "common/bus/topics.h"
 #include "common/service/service.h"
 #include "common/vision/jpeg.h"

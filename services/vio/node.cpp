@@ -189,8 +189,7 @@ bool Node::ready() const {
   if (imu_.empty()) return false;
   // The time is that of the last row, because an image arrives only after its read-out.
   now += durationFromSeconds(0.5 * std::max(0.0, std::ranges::max(readouts(cameras_->models))));
-  // The last sample may be extrapolated by a quarter of a period. A capture that waits for this
-  // frame's answer sends no sample beyond the next frame.
+  // The last sample may be extrapolated by a quarter of a period.
   if (const auto period = imu_.period()) now -= *period / 4;
   if (imu_.last() < now + durationFromSeconds(config_.imu_slack_s)) return false;
   if (waitsForPair()) return false;

@@ -1,5 +1,4 @@
-// Node of vio. Input: inertial samples, speed and frames; output: odometry and landmarks. It waits
-// until inertial samples cover a frame's time, pairs stereo frames, starts, resets and resumes.
+// Node of vio: inertial samples, speed and frames in; odometry and landmarks out.
 #pragma once
 
 #include <memory>
@@ -15,13 +14,11 @@
 #include "common/types/sensors.h"
 #include "services/vio/cameras.h"
 #include "services/vio/config.h"
-#include "services/vio/core/agreement.h"
+#include "services/vio/core/known_poses/point_mapper.h"
 #include "services/vio/core/start/initialiser.h"
 #include "services/vio/core/start/motion_initialiser.h"
 #include "services/vio/core/start/speed_history.h"
-#include "services/vio/in_vain.h"
-#include "services/vio/position_doubt.h"
-#include "services/vio/speed_doubt.h"
+#include "services/vio/doubts.h"
 #include "services/vio/waiting_frames.h"
 
 namespace perdure::vio {
@@ -43,7 +40,6 @@ class Node {
   void onImu(const ImuSample& sample);
   void onSpeed(const SpeedSample& sample);
   void onFrame(const Frame& frame);
-  /// Objects of the object filter; used only with input.moving_mask.
   void onObjects(const Objects& objects) { moving_.onObjects(objects); }
   /// End of data: processes the waiting frames and repeats the last inertial sample.
   void flush() { drain(true); }
@@ -52,8 +48,7 @@ class Node {
   void setWorld(WorldId world) { world_ = world; }
   /// Text for restoreState() in another process; empty before a start.
   std::string saveState() const;
-  /// Resumes at the next frame, unless the saved state is too old. Fails with "state_malformed" or
-  /// "state_other_cameras".
+  /// Resumes at the next frame. Fails with "state_malformed" or "state_other_cameras".
   Result<void> restoreState(const std::string& text);
 
   const ReasonCounts& reasons() const;

@@ -69,8 +69,7 @@ void Node::begin(TimePoint now, const FrameInput& input) {
   const bool moves = moved && *moved >= options.start.rest_disparity_px;
   const bool slow = !input.speed || std::abs(input.speed->speed) < 0.1;
   Result<Start> start = fail("start_waits");
-  // A start from older samples would give an old pose, and the filter would be reset at the next
-  // frame.
+  // A start from older samples would be reset at the next frame.
   constexpr std::chrono::milliseconds kFresh{300};
   const bool fresh =
       !imu_.empty() && toSeconds(imu_.longestGap(now - kFresh, now)) <= config_.core.imu.gap_from_s;

@@ -2,10 +2,10 @@
 
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 #include <system_error>
 
 #include "common/base/errors.h"
+#include "common/base/files/access.h"
 
 namespace perdure::vio {
 
@@ -25,11 +25,8 @@ StateFile::StateFile(const std::string& directory) {
 
 std::optional<std::string> StateFile::read() const {
   if (path_.empty()) return std::nullopt;
-  std::ifstream in(path_, std::ios::binary);
-  if (!in) return std::nullopt;
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
+  if (!std::ifstream(path_)) return std::nullopt;
+  return textOf(path_);
 }
 
 Result<void> StateFile::write(const std::string& text) const {

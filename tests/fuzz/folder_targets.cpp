@@ -4,7 +4,6 @@
 
 #include "common/replay/dataset.h"
 #include "common/sim/truth.h"
-#include "common/sim/truth_files.h"
 #include "tests/common/replay/tiny_datasets.h"
 #include "tests/fuzz/scratch.h"
 #include "tests/fuzz/target.h"

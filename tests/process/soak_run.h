@@ -13,8 +13,8 @@
 #include "common/bus/topics.h"
 #include "common/bus/wait_loop.h"
 #include "tests/process/support.h"
-#include "tools/demo/latency.h"
 #include "tools/demo/plan.h"
+#include "tools/demo/reporter.h"
 
 namespace perdure::test {
 

@@ -3,26 +3,15 @@
 
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 #include <string>
 #include <system_error>
 
 namespace perdure::tools {
 
-/// The content of a file; empty if it cannot be read.
-inline std::string textOf(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
-
 /// A folder that its destructor removes with its content.
 class TemporaryFolder {
  public:
-  /// Creates a folder whose path starts with `start`. On failure, fail(its name) throws; errno has
-  /// the reason.
+  /// Creates a folder `start`…. On failure, fail(its name) throws; errno has the reason.
   template <class Fail>
   TemporaryFolder(const std::filesystem::path& start, Fail&& fail) {
     std::string name = start.string() + "XXXXXX";

@@ -12,14 +12,12 @@ class App;
 
 namespace perdure::tools {
 
-/// Adds --interface, --peers, --domain, --vehicle, --security and --identity. The defaults come
-/// from bus.yaml in the services' configuration folder.
+/// Adds the options of bus.*, with defaults from the services' bus.yaml.
 void addBusOptions(CLI::App& command, bus::Options& options);
 
 /// Runs the loop until it is stopped, a signal arrives, or `seconds` have passed (0: no limit).
 void runLoop(bus::WaitLoop& loop, double seconds);
 
-/// Time of CLOCK_MONOTONIC, in s.
 double steadySeconds();
 
 /// The five services, named as in Health and in discovery.

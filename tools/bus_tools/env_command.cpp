@@ -9,7 +9,6 @@
 namespace perdure::tools {
 namespace {
 
-/// Quotes a text for a POSIX shell.
 std::string singleQuoted(const std::string& text) {
   std::string out = "'";
   for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);

@@ -7,12 +7,10 @@
 
 namespace perdure::tools {
 
-/// The folder of the services' configuration files: /etc/perdure of an installation, or config/ in
-/// the working directory. Empty if neither exists.
+/// /etc/perdure, or config/ in the working directory; empty if neither exists.
 std::string configurationFolder();
 
-/// The options in bus.yaml of that folder, or in the file that PERDURE_BUS names. Throws
-/// StartupError.
+/// The options of the services: bus.yaml, or the file of PERDURE_BUS. Throws StartupError.
 bus::Options servicesOptions();
 /// Returns these options for readers: without shared memory and without the services' identity.
 bus::Options listenersOptions();

@@ -1,5 +1,4 @@
-// `perdure calibrate` as a function: from the data of a recording to a rig, its report and its
-// pictures.
+// `perdure calibrate` as a function: from a recording to a rig, its report and pictures.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,4 @@
-// `perdure calibrate`: the rig of a camera and an IMU from a recording of a board, from motion, or
-// from the calibration of another program.
+// `perdure calibrate`: from a board, from motion, or from another program.
 #include <fmt/format.h>
 #include <unistd.h>
 

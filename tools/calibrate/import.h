@@ -15,10 +15,9 @@ struct ImportedRig {
   std::vector<std::string> ignored;  ///< unknown keys
 };
 
-/// Imports Kalibr's camchain and imu files, ROS camera_info, EuRoC's sensor.yaml, calibrations of
-/// VINS, ORB-SLAM3 and Basalt, or a rig file of Perdure. Cameras keep the order of the files.
-/// `T_BC`: poses of the cameras whose file has none, in that order. Throws StartupError with the
-/// file, the key and the fix.
+/// Imports Kalibr's camchain and imu files, ROS camera_info, EuRoC's sensor.yaml, VINS, ORB-SLAM3,
+/// Basalt, or a rig file. `T_BC`: poses of the cameras whose file has none, in order. Throws
+/// StartupError.
 ImportedRig importRig(const std::vector<std::filesystem::path>& files,
                       const std::vector<RigidTransform>& T_BC = {});
 

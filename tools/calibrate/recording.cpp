@@ -27,7 +27,6 @@ struct Picture {
   cv::Mat grey;
 };
 
-/// Detects corners in arriving images, several images in parallel.
 class Finder {
  public:
   Finder(const Board& board, CalibrationDrive& drive) : board_(board), drive_(drive) {}

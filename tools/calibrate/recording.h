@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/calibrate/estimate/views.h"
+#include "tools/calibrate/estimate/board.h"
 
 namespace perdure::calibrate {
 

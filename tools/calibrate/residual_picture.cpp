@@ -19,8 +19,7 @@ constexpr int kImageWidth = 720, kChartWidth = 760, kMargin = 70, kTop = 50;
 const Colour kSmall(190, 160, 60), kLarge(40, 60, 220);
 const Colour kFirst(200, 120, 30), kSecond(40, 150, 60), kThird(50, 60, 210);
 
-/// Draws each corner as a dot whose redness grows with its residual, and the mean of each cell as
-/// an arrow.
+/// Dots whose redness grows with the residual, and the mean of each cell as an arrow.
 void drawImage(cv::Mat& picture, const cv::Rect& area, const CameraCalibration& camera,
                const std::vector<CornerResidual>& residuals, double sigma) {
   const double scale = static_cast<double>(area.width) / camera.width;
@@ -67,7 +66,6 @@ void drawChart(cv::Mat& picture, const cv::Rect& area, const std::string& title,
   tools::drawText(picture, title, {area.x, area.y - 10}, kInk);
 }
 
-/// RMS of the corner residuals of each image.
 Points rmsByImage(const std::vector<CornerResidual>& residuals) {
   Points points;
   for (std::size_t i = 0; i < residuals.size();) {

@@ -1,5 +1,4 @@
-// Judges a rig file by a recording of any scene. Vio runs with the rig, and its innovations show
-// how accurate the rig is.
+// Judges a rig file by a recording of any scene, by the innovations of vio.
 #pragma once
 
 #include <filesystem>
@@ -44,7 +43,6 @@ struct RigCheck {
 /// the bad limits, so that a bad value would be detected.
 bool isSurelyGood(const RigCheck& check);
 
-/// Observes a running vio.
 class RigWatch {
  public:
   /// Ignores data later than `seconds` after the first odometry.
@@ -74,16 +72,14 @@ replay::Recording thinned(replay::Recording recording);
 /// samples that can be read.
 RigCheck checkRig(replay::Dataset& drive, const RigCheckOptions& options);
 
-/// Median of the normalised innovations squared, divided by its expected value (1 for a consistent
-/// filter).
+/// Median of the normalised innovations squared over its expectation (1: consistent).
 double innovationRatio(const std::vector<vio::Innovation>& innovations);
 /// Judges the run of vio, and calls judgeBelief if the run was good enough.
 Judgements judgeRig(const RigCheck& check);
 /// Judges the estimates of lens, pose and IMU, or reports that the data are too few.
 Judgements judgeBelief(const RigCheck& check);
 
-/// Whether the two cameras contradict each other so much that a run with the first camera alone is
-/// useful. judgeSecond judges that run; it returns nothing if that run contradicts as well.
+/// Whether the cameras contradict each other so much that a run with the first alone is useful.
 bool isSecondSuspect(const RigCheck& check);
 Judgements judgeSecond(const RigCheck& both, const RigCheck& alone);
 

@@ -75,8 +75,7 @@ struct Wander3 {
   Eigen::Vector3d at(double t) const { return {x.at(t), y.at(t), z.at(t)}; }
 };
 
-/// Motion of the hand: moves in front of the board and looks past its middle. After a third of the
-/// time, it also shakes and rotates about all axes.
+/// Moves in front of the board; after a third of the time, it also shakes and rotates.
 sim::Trajectory handMotion(const SimulatedCalibration& simulated, sim::Dice& dice) {
   const SimulatedOptions& options = simulated.options;
   const CameraCalibration& camera = simulated.truth();
@@ -96,8 +95,7 @@ sim::Trajectory handMotion(const SimulatedCalibration& simulated, sim::Dice& dic
     const Eigen::Vector3d p_TC(middle.x() + 1.0 * distance * p.x(),
                                middle.y() + 0.8 * distance * p.y(),
                                -distance * (1.05 + 0.35 * p.z()));
-    // The camera first looks at the middle of the board; the rotations are added below. x right, y
-    // down, z forward.
+    // The camera first looks at the middle of the board. x right, y down, z forward.
     const Eigen::Vector3d z = (Eigen::Vector3d(middle.x(), middle.y(), 0.0) - p_TC).normalized();
     Eigen::Matrix3d R_TC;
     R_TC.col(0) = Eigen::Vector3d::UnitY().cross(z).normalized();

@@ -1,5 +1,4 @@
-// A calibration with exact ground truth: a board on a wall, and a hand that moves a camera and an
-// IMU in front of it. It gives corners with noise for fast tests, or rendered images.
+// A calibration with exact truth: a board on a wall, and a hand with camera and IMU.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +7,7 @@
 #include <vector>
 
 #include "common/sim/scene.h"
-#include "tools/calibrate/estimate/views.h"
+#include "tools/calibrate/estimate/board.h"
 #include "tools/simulate/render/lens.h"
 #include "tools/simulate/render/renderer.h"
 
@@ -24,8 +23,7 @@ struct SimulatedOptions {
   bool shake = true;  ///< false: slow motion only, for intrinsics alone
 };
 
-/// The scene's rig holds the ground truth and, as `calibration`, the values of a data sheet. These
-/// are off by a few per cent, degrees and centimetres, and have no time offset.
+/// The rig holds the truth and, as `calibration`, a data sheet that is slightly off.
 struct SimulatedCalibration {
   SimulatedOptions options;
   sim::Scene scene;
@@ -34,7 +32,6 @@ struct SimulatedCalibration {
   const CameraCalibration& truth() const { return scene.rig.true_calibration.cameras[0]; }
   /// Stamps of the images; an image shows the body at its stamp plus the time offset.
   std::vector<TimePoint> stamps() const;
-  /// Board in camera at scene time t.
   RigidTransform T_CT(double t_s) const;
 };
 

@@ -18,7 +18,6 @@ namespace fs = std::filesystem;
 constexpr float kBlack = 0.03F, kWhite = 0.6F, kWall = 0.22F;
 constexpr std::size_t kSamples = 16;  ///< samples of a pixel: 4×4 positions, each at its own time
 
-/// Pose of the camera relative to the board at one time.
 struct Eye {
   Eigen::Matrix3f R_TC;
   Eigen::Vector3f p_TC;
@@ -106,7 +105,6 @@ void drawBoard(const SimulatedCalibration& simulated, const tools::Lens& lens, d
 
 namespace {
 
-/// Calls `take` with each developed image.
 template <class Take>
 void drawAll(const SimulatedCalibration& simulated, Take&& take) {
   tools::Workers workers(2);

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "common/base/check.h"
 #include "common/math/so3.h"
 
 namespace perdure::calibrate {
@@ -183,28 +184,13 @@ Grade worstOf(const Judgements& judgements) {
   return worst;
 }
 
-const char* wordOf(Grade grade) {
-  switch (grade) {
-    case Grade::kGood:
-      return "good";
-    case Grade::kDoubtful:
-      return "doubtful";
-    case Grade::kBad:
-      return "bad";
-  }
-  return "bad";
-}
+const char* wordOf(Grade grade) { return nameAt(std::array{"good", "doubtful", "bad"}, grade); }
 
 std::string summaryOf(const Judgements& judgements) {
-  switch (worstOf(judgements)) {
-    case Grade::kGood:
-      return "good: use it";
-    case Grade::kDoubtful:
-      return "usable, but record again as the doubtful lines say if you can";
-    case Grade::kBad:
-      return "do not use it: correct what the bad lines name and record again";
-  }
-  return {};
+  return nameAt(
+      std::array{"good: use it", "usable, but record again as the doubtful lines say if you can",
+                 "do not use it: correct what the bad lines name and record again"},
+      worstOf(judgements));
 }
 
 std::vector<Cell> cellsOf(const CameraCalibration& camera,

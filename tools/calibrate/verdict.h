@@ -23,7 +23,6 @@ Grade gradeOf(double value, double good, double bad);
 Judgement judged(Grade grade, std::string text, const std::string& remedy);
 
 Grade worstOf(const Judgements& judgements);
-/// "good", "doubtful", "bad".
 const char* wordOf(Grade grade);
 std::string summaryOf(const Judgements& judgements);
 
@@ -33,7 +32,6 @@ struct Cell {
   std::size_t corners = 0;
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();  ///< mean residual, px
 };
-/// Returns the cells row by row.
 std::vector<Cell> cellsOf(const CameraCalibration& camera,
                           const std::vector<CornerResidual>& residuals);
 

@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <cstdlib>
 #include <iostream>
 
@@ -16,7 +15,7 @@
 #include "common/base/ids.h"
 #include "common/base/subprocess.h"
 #include "common/replay/ros_topics.h"
-#include "common/types/end_of_drive.h"
+#include "common/types/health.h"
 #include "tools/data_check/data_check.h"
 #include "tools/evaluate/object_report.h"
 #include "tools/evaluate/simulated_truth.h"
@@ -191,8 +190,7 @@ void Demo::endOne(const std::string& service) {
   while (supervisor_->runs(service) && monotonicNs() < end) loop_->runOnce(50ms);
 }
 
-/// Ends the processes that `perdure inference swap` started, because the supervisor did not start
-/// them.
+/// Ends the processes that `perdure inference swap` started.
 void Demo::endSwappedIn() const {
   const auto isInference = [](pid_t pid) {
     std::error_code gone;

@@ -16,16 +16,14 @@ namespace perdure::tools {
 
 class Demo {
  public:
-  /// Checks data, model and configuration, then starts everything. Throws StartupError with the
-  /// fix.
+  /// Checks data, model and configuration, then starts everything. Throws StartupError.
   Demo(const DemoOptions& options, const std::atomic<bool>& interrupted);
   ~Demo() { endSwappedIn(); }
   Demo(const Demo&) = delete;
   Demo& operator=(const Demo&) = delete;
 
-  /// Runs until the drive has ended and all data are processed, --seconds are over, or the demo is
-  /// interrupted. Then it ends the services in order (unless --keep is given) and writes the
-  /// outputs. Throws StartupError if a service cannot run.
+  /// Runs until the drive has ended, --seconds are over, or an interruption. Ends the services
+  /// (unless --keep) and writes the outputs. Throws StartupError.
   void run();
   /// Keeps everything running after the drive if --keep is given, until interrupted; then ends it.
   void keep();

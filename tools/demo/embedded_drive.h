@@ -12,8 +12,7 @@ namespace perdure::tools {
 /// Sixty seconds of `street` with its first seed, as JPEG.
 SimulateOptions embeddedScene();
 
-/// FOLDER/street-DIGEST. The digest covers the scene, the options and the version, which determine
-/// the frames together with the renderer's code.
+/// FOLDER/street-DIGEST. The digest covers the scene, the options and the version.
 std::filesystem::path embeddedDriveFolder(const std::filesystem::path& cache);
 
 /// Renders the drive there. Continues an interrupted rendering, and reuses a complete one. Calls
@@ -21,8 +20,7 @@ std::filesystem::path embeddedDriveFolder(const std::filesystem::path& cache);
 std::filesystem::path embeddedDrive(const std::filesystem::path& cache,
                                     const std::function<void(const SimulateProgress&)>& report);
 
-/// The only network (.onnx) in ROOT/models/demo, or else in ROOT/models. Throws
-/// StartupError(kUsage) with the fix if there is none, or more than one.
+/// The only network in ROOT/models/demo, else in ROOT/models. Throws StartupError(kUsage).
 std::string embeddedModel(const std::filesystem::path& root);
 
 }  // namespace perdure::tools

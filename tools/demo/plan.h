@@ -43,7 +43,6 @@ struct ServicePlan {
   std::string log;                   ///< path of the log file
 };
 
-/// Folders of a demo run, all absolute.
 struct DemoFolders {
   std::filesystem::path out, run, state;
   std::unique_ptr<FolderLock> lock;  ///< of OUT
@@ -52,12 +51,10 @@ struct DemoFolders {
 /// Creates OUT and empties OUT/run, which belongs to this command. Throws StartupError.
 DemoFolders prepareFolders(const DemoOptions& options);
 
-/// Shape points for each class within its cuboid, from the filter's configuration in ROOT. Throws
-/// StartupError if that configuration or its class priors cannot be used.
+/// Shape points for each class, from the filter's configuration in ROOT. Throws StartupError.
 std::map<std::string, std::vector<Eigen::Vector3d>> shapesFor(const DemoOptions& options);
 
-/// Plans the services in the order of kServices. Throws StartupError if a program is missing or
-/// --rate is invalid.
+/// The services in the order of kServices. Throws StartupError.
 std::vector<ServicePlan> planServices(const DemoOptions& options, const DemoFolders& folders);
 
 /// perdure-gateway on this port of the loopback interface; empty if it is not installed.

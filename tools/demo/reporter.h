@@ -11,12 +11,34 @@
 #include <vector>
 
 #include "common/bus/wait_loop.h"
+#include "common/types/detections.h"
 #include "common/types/health.h"
-#include "tools/demo/latency.h"
+#include "common/types/objects.h"
 #include "tools/outputs/output_writer.h"
 #include "tools/outputs/run_doubts.h"
 
 namespace perdure::tools {
+
+/// Works on one host only, because ages use the CLOCK_MONOTONIC of capture. Counts each frame once.
+class LatencyMeter {
+ public:
+  /// `now_ns`: time of arrival at this process.
+  void onObjects(const Objects& objects, std::int64_t now_ns);
+  void onDetections(const Detections& detections);
+
+  double last_ms() const { return last_ms_; }
+  /// {"latency_ms": {"median", "p99"}, "latency_beyond_network_ms": {…}}: from capture to the
+  /// arrival of objects; the second without Detections::forward_s.
+  nlohmann::ordered_json report() const;
+
+ private:
+  struct Frame {
+    double age_ms = -1.0;      ///< below 0: no objects yet
+    double forward_ms = -1.0;  ///< below 0: unknown
+  };
+  std::map<std::uint64_t, Frame> frames_;  ///< key: sequence number
+  double last_ms_ = 0.0;
+};
 
 /// The counts of one service over all of its processes, because each process counts from 0.
 class ServiceCounts {
@@ -41,14 +63,11 @@ class ServiceCounts {
 
 class Reporter {
  public:
-  /// Subscribes to the topics. `loop` must outlive the reporter, and the caller runs it. `shapes`
-  /// come from the filter's class priors, for a network whose boxes enclose outlines.
+  /// Subscribes to the topics; the caller runs `loop`. `shapes`: of the filter's class priors.
   Reporter(const bus::Participant& participant, bus::WaitLoop& loop, OutputWriter& outputs,
            std::map<std::string, ShapePoints> shapes);
 
-  /// Number of frames received so far.
   std::size_t odometryFrames() const { return odometry_.size(); }
-  /// Sensor time of the newest frame with odometry.
   double secondsOfDrive() const { return toSeconds(newest_time_ - first_time_); }
   /// Whether the drive has ended and every frame with odometry has objects.
   bool drained() const;

@@ -8,7 +8,7 @@
 
 #include "common/base/check.h"
 #include "common/base/errors.h"
-#include "tools/base/files.h"
+#include "common/base/files/access.h"
 
 namespace perdure::tools {
 namespace {

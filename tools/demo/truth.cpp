@@ -10,8 +10,8 @@
 #include "common/replay/files/kitti_calibration.h"
 #include "common/replay/files/kitti_labels.h"
 #include "common/replay/files/pose_file.h"
-#include "tools/evaluate/kitti_score.h"
 #include "tools/evaluate/object_report.h"
+#include "tools/evaluate/object_score.h"
 
 namespace perdure::tools {
 namespace {
@@ -49,8 +49,7 @@ Eigen::Vector3d middleOf(const std::vector<replay::KittiLabel>& labels, std::int
   return middle;
 }
 
-/// Lists each counted track with the nearest car of the rows. FINAL has one position for each
-/// object.
+/// Each counted track with the nearest car of FINAL, which has one position an object.
 Json parkedCars(const std::vector<replay::KittiLabel>& labels, const std::set<std::int64_t>& tracks,
                 const PosesByFrame& poses, const RigidTransform& T_RI,
                 const std::vector<EstimateRow>& rows) {

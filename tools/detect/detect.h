@@ -1,5 +1,4 @@
-// Runs the node of the inference service over all frames of a dataset and writes its detections as
-// CSV.
+// Runs the node of inference over a dataset and writes its detections as CSV.
 #pragma once
 
 #include <cstdint>
@@ -24,9 +23,8 @@ struct DetectSummary {
   double cpu_ms_median = 0.0;  ///< time for each frame, all threads: image to detections
 };
 
-/// Columns: frame,class,x1,y1,x2,y2,score,azimuth,sigma_azimuth,logit:<class>…. The class is the
-/// one with the largest soft-max value of the K+1 activations, without clutter. The score is that
-/// value.
+/// Columns: frame,class,x1,y1,x2,y2,score,azimuth,sigma_azimuth,logit:<class>…. The class has the
+/// largest soft-max of the K+1 activations without clutter; the score is its value.
 void writeDetectionHeader(std::ostream& out, const ModelInfo& model);
 void writeDetection(std::ostream& out, const ModelInfo& model, std::uint64_t frame,
                     const Detection& detection);

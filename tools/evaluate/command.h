@@ -1,5 +1,4 @@
-// `perdure evaluate {objects,trajectory,consistency,memory}`: compares objects and trajectory with
-// ground truth. Also judges whether covariances match the errors, and whether ids persist.
+// `perdure evaluate {objects,trajectory,consistency,memory}`: comparison with ground truth.
 #pragma once
 
 #include <functional>

@@ -27,8 +27,7 @@ struct Consistency {
   std::optional<OdometryScore> odometry;
 };
 
-/// Transform from the ground truth's world to the run's, by yaw and position at their first common
-/// pose.
+/// From the truth's world to the run's, by yaw and position at their first common pose.
 RigidTransform alignedAtTheStart(const SimulatedTruth& truth,
                                  const std::vector<replay::StampedPose>& trajectory) {
   for (const auto& pose : trajectory) {

@@ -1,6 +1,5 @@
-// Checks whether covariances are consistent, by normalised estimation errors squared of the map's
-// objects against exact ground truth. Their mean (ANEES) is compared with its χ² band (Bar-Shalom
-// et al., "Estimation with Applications to Tracking and Navigation", 5.4).
+// Whether covariances are consistent: mean normalised estimation error squared (ANEES) of the map's
+// objects in its χ² band (Bar-Shalom et al., 5.4).
 #pragma once
 
 #include <Eigen/Core>
@@ -30,8 +29,7 @@ struct MapBelief {
 /// Throws StartupError(kUnavailable) if the file is missing or invalid.
 std::vector<MapBelief> readBeliefs(const std::filesystem::path& file);
 
-/// Normalised squared errors with `dof` degrees of freedom each; chi-square for a consistent
-/// estimate.
+/// Normalised squared errors with `dof` degrees of freedom each.
 struct Anees {
   std::string what;
   int dof = 1;
@@ -43,8 +41,7 @@ struct Anees {
   std::pair<double, double> band() const;  ///< 95 % band of mean(), independent objects
 };
 
-/// ANEES over several runs with different seeds. A run counts as one sample, because its pose
-/// errors affect all of its objects alike.
+/// ANEES over runs of different seeds. A run is one sample: its pose errors are common.
 struct RunAnees {
   std::string what;
   int dof = 1;
@@ -85,9 +82,8 @@ struct ConsistencyScore {
   std::uint64_t objects = 0, left_out = 0;  ///< left_out: without a partner, or moving
 };
 
-/// Compares each static object with existence above one half and a class name. Its partner is the
-/// nearest true object of that class within `within` metres that is not nearer to another belief.
-/// T_WT transforms the ground truth's world to the map's.
+/// Each static object with existence above one half and the nearest true object of its class within
+/// `within` metres that is nearer to no other belief.
 ConsistencyScore scoreConsistency(const std::vector<MapBelief>& beliefs, const sim::Truth& truth,
                                   const RigidTransform& T_WT, double within);
 

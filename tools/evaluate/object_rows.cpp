@@ -50,8 +50,7 @@ std::optional<std::uint64_t> multipleOfTenth(TimePoint time) {
   return static_cast<std::uint64_t>(ns / tenth);
 }
 
-/// The frame of row i by the ties around it, or by time if the rows between them are not
-/// consecutive frames.
+/// The frame of row i by the ties around it, or by time.
 std::optional<std::uint64_t> frameOf(std::size_t i, const std::vector<replay::StampedPose>& poses,
                                      const Ties& ties) {
   if (ties.empty()) return multipleOfTenth(poses[i].time).value_or(i);

@@ -1,13 +1,15 @@
-// Precision and recall of objects against counted ground truth, and identity errors (Table 1 of the
-// paper).
+// Precision, recall and identity errors of objects against truth (Table 1 of the paper).
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "common/replay/files/kitti_calibration.h"
+#include "tools/evaluate/object_rows.h"
 #include "tools/evaluate/object_truth.h"
 
 namespace perdure::tools {
@@ -57,7 +59,6 @@ struct ScoreOptions {
   double frame_interval_s = 0.1;
 };
 
-/// An estimate in the reference frame of the ground truth.
 struct Estimate {
   std::uint64_t id = 0;
   std::string class_name;
@@ -66,7 +67,6 @@ struct Estimate {
   Box box;  ///< box of the cuboid's corners, clipped to the image
 };
 
-/// One frame with its ground truth and estimates.
 struct ScoredFrame {
   TruthFrame truth;
   std::vector<Estimate> estimates;
@@ -78,5 +78,14 @@ bool isNeutral(const Estimate& estimate, const TruthFrame& truth);
 /// `frames`: by frame index.
 ObjectScore scoreFrames(const std::map<std::uint64_t, ScoredFrame>& frames,
                         const ScoreOptions& options);
+
+/// A row in the camera; empty if its centre is behind it or outside the image.
+std::optional<Estimate> toCamera(const EstimateRow& row, const RigidTransform& T_RW,
+                                 const replay::KittiCalibration& calibration);
+
+ObjectScore scoreObjects(const std::vector<EstimateRow>& rows,
+                         const std::map<std::uint64_t, TruthFrame>& truth,
+                         const PosesByFrame& poses, const replay::KittiCalibration& calibration,
+                         const ScoreOptions& options);
 
 }  // namespace perdure::tools

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "common/math/rigid_transform.h"
-#include "common/replay/files/kitti_calibration.h"
 #include "common/replay/files/kitti_labels.h"
 
 namespace perdure::tools {
@@ -21,8 +20,7 @@ struct TruthLabel {
   Box box;             ///< outline in the image
 };
 
-/// Ground truth of one frame. For KITTI: in rectified camera 0, boxes in image 2, heading
-/// `rotation_y`.
+/// Truth of one frame. KITTI: rectified camera 0, boxes in image 2, heading `rotation_y`.
 struct TruthFrame {
   std::vector<TruthLabel> counted;
   std::vector<TruthLabel> ignored;  ///< other labels
@@ -33,9 +31,8 @@ inline constexpr double kMinHeight_px = 25.0;  ///< least height of a counted bo
 
 using PosesByFrame = std::map<std::uint64_t, RigidTransform>;  ///< T_WB
 
-/// Tracks that are static in the world: the medians of their first and last fifth are less than 1.5
-/// m apart. No point is more than 2 m from the overall median. Frames without a pose are omitted; a
-/// track without any pose is not static.
+/// Tracks that are static: medians of first and last fifth within 1.5 m, no point beyond 2 m of the
+/// median. Frames without a pose are omitted.
 std::set<std::int64_t> staticTracks(const std::vector<replay::KittiLabel>& labels,
                                     const RigidTransform& T_RI, const PosesByFrame& poses);
 

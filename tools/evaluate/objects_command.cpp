@@ -1,5 +1,4 @@
-// `perdure evaluate objects`: the nine cells and the identities, as text or JSON, against a
-// simulated folder or KITTI tracking.
+// `perdure evaluate objects`: the nine cells and the identities, as text or JSON.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -10,7 +9,7 @@
 #include "common/base/errors.h"
 #include "common/replay/files/pose_file.h"
 #include "tools/evaluate/command.h"
-#include "tools/evaluate/kitti_score.h"
+#include "tools/evaluate/object_score.h"
 #include "tools/evaluate/simulated_truth.h"
 #include "tools/evaluate/used_frames.h"
 

@@ -1,5 +1,4 @@
-// Checks whether probabilities are calibrated: of all claims with probability 0.8, eight in ten
-// should be true (DeGroot and Fienberg, "The Comparison and Evaluation of Forecasters", 1983).
+// Whether probabilities are calibrated (DeGroot and Fienberg, 1983).
 #pragma once
 
 #include <cstddef>
@@ -26,12 +25,10 @@ struct Reliability {
 
   /// Bins of equal width over [0, 1].
   std::vector<ReliabilityBin> bins(std::size_t count = 10) const;
-  /// Expected calibration error: Σ |believed − observed| of the bins, weighted by their share of
-  /// the claims.
+  /// Expected calibration error: Σ |believed − observed| of the bins, weighted by share.
   double calibrationError(std::size_t bins = 10) const;
   double brier() const;  ///< mean of (stated probability − outcome)²
-  /// 1 − brier() divided by the score of a constant forecast of the observed share; 0 if all claims
-  /// are true or all are false.
+  /// 1 − brier() over the score of a constant forecast; 0 if all claims are equal.
   double skill() const;
 };
 

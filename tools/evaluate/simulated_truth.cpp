@@ -33,8 +33,7 @@ bool insideImage(const Box& box, const CameraModel& camera) {
   return box.x1 >= 0 && box.y1 >= 0 && box.x2 <= camera.width() && box.y2 <= camera.height();
 }
 
-/// Box of the corners that the camera can project, clipped to the image. Without any, a box around
-/// the centre.
+/// Box of the corners that can be projected, clipped; without any, around the centre.
 Box boxOf(const EstimateRow& row, const Eye& eye, const CameraModel& camera) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   Box box{kInfinity, kInfinity, -kInfinity, -kInfinity};

@@ -1,13 +1,14 @@
-// `perdure evaluate trajectory`: compares a TUM file with a pose file or the ground truth of a
-// dataset folder.
+// `perdure evaluate trajectory`: a TUM file against a pose file or a dataset's truth.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "common/base/check.h"
 #include "common/base/errors.h"
 #include "common/replay/dataset.h"
 #include "tools/evaluate/command.h"
@@ -89,8 +90,7 @@ struct Compared {
   std::size_t untold = 0;    ///< frames between poses that lack one, for unknown reasons
 };
 
-/// Removes the times of frames that the run skipped, and returns their number. Removes nothing if a
-/// pose has such a time, because the report then belongs to other data.
+/// Removes the times of frames that the run skipped; none if a pose has such a time.
 std::size_t leaveOutUnused(const fs::path& run, const PoseFile& poses, Truth& truth) {
   const auto used = usedFramesOf(run);
   if (!used) return 0;
@@ -113,17 +113,10 @@ Alignment alignmentOf(const std::string& name) {
   return name == "yaw" ? Alignment::kYaw : Alignment::kRigid;
 }
 
-/// Text for the alignment in the output.
 const char* nameOf(Alignment alignment) {
-  switch (alignment) {
-    case Alignment::kYaw:
-      return "aligned in position and yaw";
-    case Alignment::kRigid:
-      return "aligned in position and rotation";
-    case Alignment::kStart:
-      return "aligned at the start";
-  }
-  return "";
+  return nameAt(std::array{"aligned in position and yaw", "aligned in position and rotation",
+                           "aligned at the start"},
+                alignment);
 }
 
 Compared compare(const TrajectoryOptions& options) {

@@ -1,6 +1,5 @@
-// Error of a trajectory against ground truth: ATE after alignment, RPE, and KITTI's segment errors.
-// Sources: Zhang and Scaramuzza, "A Tutorial on Quantitative Trajectory Evaluation" (IROS 2018);
-// Geiger et al., "Are we ready for autonomous driving?" (CVPR 2012) for t_err and r_err.
+// ATE after alignment, RPE (Zhang and Scaramuzza, IROS 2018), and KITTI's t_err and r_err (Geiger
+// et al., CVPR 2012).
 #pragma once
 
 #include <vector>
@@ -21,8 +20,7 @@ enum class Alignment {
   kStart,  ///< position and yaw of the first pose only
 };
 
-/// T_GE with T_GE · estimate ≈ truth, by least squares of positions, or from the first pair only.
-/// Needs at least one pair.
+/// T_GE · estimate ≈ truth, by least squares of positions, or the first pair.
 RigidTransform align(const std::vector<PosePair>& pairs, Alignment alignment);
 
 struct SegmentError {

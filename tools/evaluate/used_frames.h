@@ -1,5 +1,4 @@
-// The frames of the data that a run used. Frames that --every, --from and --seconds skip are not
-// misses. The pipeline stores the list in report.json.
+// The frames that a run used, so that skipped ones are no misses; stored in report.json.
 #pragma once
 
 #include <cstdint>
@@ -19,18 +18,15 @@ using UsedFrames = std::set<std::uint64_t>;
 
 /// `frames` of report.json: their number, and [first, last, step] of each run of frames.
 nlohmann::ordered_json framesToJson(const UsedFrames& frames);
-/// Reads RUN/report.json; empty if it is missing or has no frames. Throws StartupError if the
-/// frames are invalid.
+/// Reads RUN/report.json; empty without frames. Throws StartupError if they are invalid.
 std::optional<UsedFrames> usedFramesOf(const std::filesystem::path& run);
 /// Number of frames of the data from one used frame to the next; 1 if there are fewer than two.
 double strideOf(const UsedFrames& frames);
 
-/// Number of frames without a pose between the first pose and the last one. If the used frames are
-/// unknown, these are either misses or frames that --every skipped.
+/// Frames without a pose from the first pose to the last: misses, or skipped by --every.
 std::size_t withoutPose(const std::vector<TimePoint>& frames,
                         const std::vector<replay::StampedPose>& poses);
 
-/// Note for people about such frames.
 std::string noteOfUntold(std::size_t frames);
 
 /// Removes the frames that were not used and returns their number.

@@ -137,7 +137,6 @@ void chooseKind(Request& request) {
   }
 }
 
-/// The given anchor, or else the one of the map's file.
 std::optional<GeoAnchor> anchorOf(const Request& request) {
   if (request.anchor.empty()) {
     const bool known = !request.db.empty() && request.frame == "M";

@@ -14,7 +14,8 @@
 #include "services/map_store/config.h"
 #include "services/map_store/core/map_contents.h"
 #include "services/map_store/core/schema.h"
-#include "tools/map/fuse_fleet.h"
+#include "services/map_store/fleet/map_transfer.h"
+#include "tools/base/files.h"
 
 namespace perdure::tools {
 namespace {
@@ -78,8 +79,7 @@ FusedFile bring(WholeMap& fused, const GivenMap& given, const mapping::Parameter
   return file;
 }
 
-/// Counts sessions and objects for each part; objects without a position in the graph belong to no
-/// part.
+/// Sessions and objects for each part; objects without a position belong to none.
 void countParts(const mapping::MapContents& map, FuseOutcome& outcome) {
   outcome.parts = mapping::partsOf(map);
   outcome.objects_of_part.assign(outcome.parts.size(), 0);
@@ -249,6 +249,25 @@ FuseOutcome fuseFiles(const FuseRequest& request) {
   }
   countParts(fused.contents, outcome);
   map_store::writeWholeMap(fused, request.out, request.force);
+  return outcome;
+}
+
+FuseOutcome fuseFleet(FuseRequest request, const std::string& url, const std::string& name) {
+  const fs::path place = fs::temp_directory_path();
+  const TemporaryFolder folder(place / "perdure-fleet-", [&](const std::string&) {
+    throw StartupError(ExitCode::kUnavailable, "No folder for the vehicles' maps can be made in " +
+                                                   place.string() +
+                                                   "; set TMPDIR to one that this user may write.");
+  });
+  for (std::string& file : map_store::fleet::pullVehicles(url, folder.path().string())) {
+    request.files.push_back(std::move(file));
+  }
+  if (request.out.empty()) request.out = (folder.path() / "fused").string();
+  FuseOutcome outcome = fuseFiles(request);
+  map_store::fleet::pushMap(outcome.out, url, name);
+  outcome.out =
+      name + " on the server" +
+      (request.out.starts_with(folder.path().string()) ? std::string() : ", " + request.out);
   return outcome;
 }
 

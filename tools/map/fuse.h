@@ -43,9 +43,13 @@ struct FuseOutcome {
   std::vector<mapping::Change> changes() const;
 };
 
-/// Reads the files and writes `out`, either completely or not at all. The order of the files has no
-/// effect. Throws StartupError with the fix.
+/// Writes `out` completely or not at all. The order of files has no effect. Throws StartupError.
 FuseOutcome fuseFiles(const FuseRequest& request);
+
+/// Merges the newest map of each vehicle with the files of the request and stores it on the server
+/// as `name`, replacing an older one. Incomplete uploads are omitted. request.out: also a file; "":
+/// none. Throws StartupError.
+FuseOutcome fuseFleet(FuseRequest request, const std::string& url, const std::string& name);
 
 std::string toText(const FuseOutcome& outcome);
 std::string toJsonText(const FuseOutcome& outcome);

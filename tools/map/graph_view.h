@@ -1,5 +1,4 @@
-// The graph of a map for people and programs: length and uncertainty of the trajectory, and the
-// evidence for its loops.
+// The graph of a map for people and programs.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -9,8 +8,7 @@
 
 namespace perdure::tools {
 
-/// Text for a reply of kind graph. The figures cover only the data in the reply; the text states if
-/// these are truncated.
+/// Text for a reply of kind graph, over the data in the reply, which may be truncated.
 std::string toGraphText(const MapReply& graph);
 nlohmann::ordered_json toGraphJson(const MapReply& graph);
 

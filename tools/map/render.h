@@ -13,7 +13,6 @@ namespace perdure::tools {
 
 /// One line for each object, with a header.
 std::string toTable(const std::vector<MapObject>& objects);
-/// All data of one object, with standard deviations.
 std::string toText(const MapObject& object);
 nlohmann::ordered_json toJson(const MapObject& object);
 /// RFC 7946. `anchor`: geographic position of the frame's origin, and yaw of its x axis from east.

@@ -1,5 +1,4 @@
-// Data of a map's file about an object beside its belief: its anchors, the objects merged into it,
-// and the loops that connect the map there.
+// An object's anchors, the objects merged into it, and the loops there.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -37,8 +36,7 @@ struct Standing {
   std::vector<Loop> loops;
 };
 
-/// `belief`: as stored, in its W. Includes the loops with an end within 60 m in M of the object's
-/// anchors.
+/// `belief`: as stored. Loops have an end within 60 m in M of the object's anchors.
 Standing standingOf(const ObjectBelief& belief, const WorldId& world, const mapping::SavedMap& map,
                     std::vector<ObjectId> absorbed);
 

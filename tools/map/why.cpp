@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
+
+#include "common/base/check.h"
 
 namespace perdure::tools {
 namespace {
@@ -32,62 +35,38 @@ std::string backFrom(const char* where, const LedgerEntry& entry) {
 }
 
 std::string sentence(ExistenceEvidence kind, const LedgerEntry& entry) {
+  constexpr std::array kSentences{
+      "before its first box: few boxes are new objects",
+      "detected in {observations}",
+      "detected in {observations} more from the same place: little weight",
+      "not detected in {observations} of its place",
+      "of these excused: an object that is not on the map may have occluded it",
+      "{observations} not used: it was occluded",
+      "{observations} not used: it was out of view",
+      "time passed: objects leave",
+      "{hypotheses} removed: no longer of the size of their class",
+      "{hypotheses} removed: that it drove off unseen",
+      "its first box may have been another object's",
+      "merged {times} with an object that was the same"};
+  if (kind == ExistenceEvidence::kRestore) return backFrom("a restart", entry);
+  if (kind == ExistenceEvidence::kRecall) return backFrom("the map", entry);
   const std::uint32_t n = entry.count;
-  switch (kind) {
-    case ExistenceEvidence::kPrior:
-      return "before its first box: few boxes are new objects";
-    case ExistenceEvidence::kHit:
-      return "detected in " + observations(n);
-    case ExistenceEvidence::kRepeated:
-      return "detected in " + observations(n) + " more from the same place: little weight";
-    case ExistenceEvidence::kMiss:
-      return "not detected in " + observations(n) + " of its place";
-    case ExistenceEvidence::kUnmappedOccluder:
-      return "of these excused: an object that is not on the map may have occluded it";
-    case ExistenceEvidence::kHidden:
-      return observations(n) + " not used: it was occluded";
-    case ExistenceEvidence::kAway:
-      return observations(n) + " not used: it was out of view";
-    case ExistenceEvidence::kTime:
-      return "time passed: objects leave";
-    case ExistenceEvidence::kMisshapen:
-      return hypotheses(n) + " removed: no longer of the size of their class";
-    case ExistenceEvidence::kLost:
-      return hypotheses(n) + " removed: that it drove off unseen";
-    case ExistenceEvidence::kShared:
-      return "its first box may have been another object's";
-    case ExistenceEvidence::kMerge:
-      return "merged " + times(n) + " with an object that was the same";
-    case ExistenceEvidence::kRestore:
-      return backFrom("a restart", entry);
-    case ExistenceEvidence::kRecall:
-      return backFrom("the map", entry);
-  }
-  return {};
+  return fmt::format(fmt::runtime(nameAt(kSentences, kind)),
+                     fmt::arg("observations", observations(n)),
+                     fmt::arg("hypotheses", hypotheses(n)), fmt::arg("times", times(n)));
 }
 
 const char* sentence(ClassEvidence kind) {
-  switch (kind) {
-    case ClassEvidence::kPrior:
-      return "how frequent the two are";
-    case ClassEvidence::kActivation:
-      return "activations of the network in its boxes";
-    case ClassEvidence::kGeometry:
-      return "how well size and place explain the boxes";
-    case ClassEvidence::kMiss:
-      return "observations without a detection";
-    case ClassEvidence::kMotion:
-      return "whether it moves";
-    case ClassEvidence::kPruning:
-      return "hypotheses that were removed";
-    case ClassEvidence::kMerge:
-      return "merged objects";
-    case ClassEvidence::kRestore:
-      return "evidence from before this ledger";
-    case ClassEvidence::kContext:
-      return "objects near it";
-  }
-  return "";
+  constexpr std::array kSentences{"how frequent the two are",
+                                  "activations of the network in its boxes",
+                                  "how well size and place explain the boxes",
+                                  "observations without a detection",
+                                  "whether it moves",
+                                  "hypotheses that were removed",
+                                  "merged objects",
+                                  "evidence from before this ledger",
+                                  "objects near it"};
+  return nameAt(kSentences, kind);
 }
 
 std::string line(double nats, const std::string& what) {

@@ -7,8 +7,7 @@
 
 namespace perdure::tools {
 
-/// Lists the entries of existence and class with their sums. Reports a missing ledger, and a sum
-/// that differs from the current estimate.
+/// Entries of existence and class with their sums, and whether these differ from the estimate.
 std::string toWhy(const ObjectBelief& object);
 
 }  // namespace perdure::tools

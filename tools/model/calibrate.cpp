@@ -36,8 +36,7 @@ struct Target {
   std::optional<Box> hull;
 };
 
-/// The network's output for a frame: candidates whose activations are its own log-odds instead of
-/// evidence.
+/// The network's output for a frame: its own log-odds instead of evidence.
 struct Seen {
   std::vector<Candidate> candidates;
   std::vector<Target> targets;
@@ -67,8 +66,7 @@ double covered(const Box& box, const Box& by) {
 
 constexpr int kClutter = -1, kNeutral = -2;
 
-/// For each box, in order of decreasing evidence: the index of its target, or one of the values
-/// above.
+/// For each box, by decreasing evidence: its target, or one of the values above.
 std::vector<int> match(const std::vector<Candidate>& boxes, const std::vector<Target>& targets) {
   std::vector<int> result;
   std::vector<bool> taken(targets.size(), false);
@@ -287,8 +285,7 @@ inference::Expectation expectationAt(const Target& target, std::mt19937& random)
   return {moved, target.k, {x, y, x, y}};
 }
 
-/// Evaluates predictions at true objects, and at empty places. The empty places are the positions
-/// and sizes of objects in two other frames.
+/// Predictions at true objects, and at empty places (of two other frames).
 std::vector<PrimedOutcome> Study::askAround(const Calibration& calibration) const {
   std::mt19937 random(1);
   std::vector<PrimedOutcome> places;
@@ -336,8 +333,7 @@ void Study::fitPrimedAnswers(Calibration& calibration) {
   result_.primed_nats_elsewhere = elsewhere / static_cast<double>(result_.asked_elsewhere);
 }
 
-/// Fits the calibration in a few rounds. Overlapping boxes lose nats (suppress.h), so that the
-/// boxes depend slightly on the calibration.
+/// A few rounds, because boxes depend slightly on the calibration (suppress.h).
 void Study::fit() {
   Calibration calibration = options_.primed_only ? result_.before : plain();
   calibration.primed = {};

@@ -33,8 +33,7 @@ struct CalibrationResult {
   std::map<std::string, std::array<double, 4>> side_insets;  ///< insets of frequent classes
 };
 
-/// Runs the service's own node. Throws StartupError if the network, the data or the labels cannot
-/// be used, or are too few. `progress` may be empty.
+/// Runs the service's own node. Throws StartupError for unusable or too few data.
 CalibrationResult calibrate(const CalibrateOptions& options,
                             const std::function<void(std::size_t, std::size_t)>& progress);
 

@@ -7,8 +7,8 @@
 
 #include "common/base/checked_file.h"
 #include "common/base/errors.h"
+#include "common/base/files/access.h"
 #include "services/inference/model_file.h"
-#include "tools/base/files.h"
 #include "tools/model/calibrate.h"
 #include "tools/model/command.h"
 

@@ -28,7 +28,6 @@ double softMaxOf(const std::vector<double>& x, double beta, double b, std::vecto
   return highest + std::log(sum);
 }
 
-/// Negative log-likelihood in θ = (β, b), with gradient and Hessian.
 struct Cost {
   double value = 0.0;
   Eigen::Vector2d gradient = Eigen::Vector2d::Zero();

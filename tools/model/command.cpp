@@ -10,6 +10,7 @@
 
 #include "common/base/checked_file.h"
 #include "common/base/errors.h"
+#include "common/base/files/access.h"
 #include "common/base/ids.h"
 #include "tools/model/check.h"
 #include "tools/model/importer.h"

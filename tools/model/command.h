@@ -7,9 +7,7 @@ class App;
 
 namespace perdure::tools {
 
-/// Adds the subcommands `list` and `fetch`.
 void addFetch(CLI::App& model);
-/// Adds the subcommand `calibrate`.
 void addCalibrate(CLI::App& model);
 
 }  // namespace perdure::tools

@@ -3,10 +3,10 @@
 #include <optional>
 
 #include "common/base/errors.h"
+#include "common/base/files/access.h"
 #include "common/base/subprocess.h"
 #include "services/inference/core/network/network.h"
 #include "services/inference/model_file.h"
-#include "tools/base/files.h"
 
 namespace perdure::tools {
 namespace {

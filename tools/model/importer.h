@@ -1,5 +1,4 @@
-// Reads an ONNX file, repairs it for OpenCV 4.6 and writes its model.json. It runs the Python part
-// (perdure_model, which needs Debian's python3-onnx).
+// Reads an ONNX file, repairs it for OpenCV 4.6 and writes its model.json, by perdure_model.
 #pragma once
 
 #include <filesystem>
@@ -20,8 +19,7 @@ struct ImportRequest {
 std::filesystem::path importedPath(const std::filesystem::path& network,
                                    const std::filesystem::path& folder);
 
-/// Returns the exit status of the Python part, which has reported its result or error. Throws
-/// StartupError (69) if Python or the Python part is missing.
+/// Exit status of the Python part, which reports. Throws StartupError (69) if it is missing.
 int importNetwork(const ImportRequest& request);
 
 struct ImportOptions {
@@ -31,9 +29,8 @@ struct ImportOptions {
   std::vector<std::string> arguments{};  ///< options of the Python part
 };
 
-/// The complete `perdure model import`: import, comparison, test picture, output files. Prints the
-/// results. Throws StartupError, or CLI::RuntimeError with the status of the Python part, which has
-/// reported the error. Then no file is written.
+/// Import, comparison, test picture, output files. Throws StartupError, or CLI::RuntimeError with
+/// the status of the Python part; then no file is written.
 void importAndLook(const ImportOptions& options);
 
 }  // namespace perdure::tools

@@ -97,8 +97,7 @@ TrueBox labelOf(const replay::KittiLabel& label, const replay::ClassAliases& ali
 LabelledData readKitti(const LabelRequest& request, std::unique_ptr<replay::Dataset> dataset,
                        const replay::ClassAliases& aliases, double least_px) {
   LabelledData data;
-  // Excludes cyclists, because most networks report a person and a bicycle, of which KITTI labels
-  // only some.
+  // Excludes cyclists: networks report a person and a bicycle, KITTI labels only some.
   data.judged = {"car", "truck", "van"};
   const auto labels = replay::readKittiLabels(labelFile(request, dataset->kind()));
   for (std::uint64_t i = 0; i < dataset->frameCount(); i += request.every) {

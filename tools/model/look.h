@@ -27,8 +27,7 @@ struct Look {
   int input_width = 0, input_height = 0;
 };
 
-/// Throws StartupError if the network or its model.json cannot be used. If `frame` is null, a grey
-/// ramp of the input's size is used.
+/// Without `frame`, a grey ramp of the input's size. Throws StartupError.
 Look lookAt(const std::filesystem::path& network, const Frame* frame, double threshold);
 
 /// Throws StartupError (64) unless the name is that of a PNG or JPEG.

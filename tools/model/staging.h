@@ -9,8 +9,7 @@
 
 namespace perdure::tools {
 
-/// A folder in `parent`. Throws StartupError: kInputOutput if the disk is full, otherwise
-/// kUnavailable.
+/// A folder in `parent`. Throws StartupError: kInputOutput (disk full) or kUnavailable.
 TemporaryFolder temporaryFolder(const std::filesystem::path& parent, const std::string& prefix,
                                 const std::string& mend);
 

@@ -1,5 +1,4 @@
-// The ledger of an object as JSON, with the names of the kinds of evidence; and numbers that are
-// equal on every machine.
+// The ledger as JSON, with numbers that are equal on every machine.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -8,8 +7,7 @@
 
 namespace perdure::tools {
 
-/// Rounds to ten significant digits. This is better than a micrometre over a town, and hides the
-/// last bits, in which compilers may differ.
+/// Ten significant digits hide the last bits, in which compilers differ.
 double rounded(double value);
 
 /// Contains only the observed kinds; null for an empty ledger. Unknown kinds are named "kind_N".

@@ -45,8 +45,7 @@ const ShapePoints& cuboidPoints() {
   return corners;
 }
 
-/// Outline of a row from a pose: the hull of its shape, or the box around its cuboid's image if the
-/// shape is unknown. Empty if its centre is outside the image.
+/// Hull of a row's shape, or of its cuboid; empty if its centre is outside the image.
 std::optional<Outline> outlineOf(const ObjectRow& row, const ShapePoints* shape,
                                  const RigidTransform& T_CW, const CameraModel& camera) {
   const Eigen::Vector3d centre = T_CW * row.p_W;
@@ -184,8 +183,7 @@ std::map<ObjectId, ObjectHistory::Look> ObjectHistory::looksOfSurvivors(
   return looks;
 }
 
-/// For objects that were certainly elsewhere while they were estimated to be moving: the last such
-/// frame.
+/// The last frame in which an object was estimated to be moving elsewhere.
 std::map<ObjectId, std::uint64_t> ObjectHistory::lastFramesElsewhere() const {
   constexpr double kSurely = 21.1;  // χ² of three degrees of freedom, 0.9999
   std::map<ObjectId, std::uint64_t> result;

@@ -1,6 +1,5 @@
-// Estimates of each object in each frame, and the two tables made from them. INST contains the
-// causal estimate at the frame; FINAL contains the object's last estimate, mapped back (paper, line
-// 337).
+// Estimates of each object in each frame: INST the causal ones, FINAL the last one, mapped back
+// (paper, line 337).
 #pragma once
 
 #include <cstdint>
@@ -37,27 +36,21 @@ class ObjectHistory {
  public:
   /// Needed for FINAL, to project the last estimate into the frames.
   void setCamera(const CameraCalibration& calibration) { camera_.emplace(calibration); }
-  /// Shapes of the classes within their cuboids, also for FINAL. Classes without a shape, and all
-  /// classes before this call, use the box around the cuboid's image.
+  /// Shapes of the classes, also for FINAL; classes without one use their cuboid.
   void setShapes(std::map<std::string, ShapePoints> shapes) { shapes_ = std::move(shapes); }
   void add(const Objects& objects);
   void add(const Event& event);
 
   /// Confirmed, static, present objects that are not occluded, by frame and id.
   std::vector<ObjectRow> inst() const;
-  /// Rows with the surviving id after merges and the last estimate. They start at the first
-  /// detection with existence r of at least 0.1. A frame has a row if the object projects into the
-  /// image and is not occluded. Occluded means: estimated so at the time, or less than 0.6 visible
-  /// beside the last estimates of nearer objects.
-  ///
-  /// Objects that ended as moving or deleted have no rows. An object that moved before it stopped
-  /// at its last position has no rows until then.
+  /// Rows with the surviving id and the last estimate, from the first detection with r ≥ 0.1, in
+  /// the frames in which the object projects into the image and is not occluded (by the estimate
+  /// then, or less than 0.6 visible beside the last estimates). Objects that ended moving or
+  /// deleted have none, nor do movers before they stopped.
   std::vector<ObjectRow> finalRows() const;
-  /// The last belief of each confirmed object that was neither deleted nor merged into another, by
-  /// id.
+  /// The last belief of each confirmed object that was neither deleted nor merged, by id.
   std::vector<ObjectBelief> lastBeliefs() const;
   ObjectId survivorOf(ObjectId id) const;
-  /// Number of confirmed objects in the newest message.
   std::size_t confirmedNow() const;
 
  private:

@@ -265,8 +265,7 @@ void OutputWriter::writeObjects() const {
   writeJson("objects.json", {{"objects", objects}});
 }
 
-/// T_MB at the pose nearest to the anchor's time, in the frame of the map. Empty if no pose is
-/// within a second, because the position would be uncertain.
+/// T_MB at a pose within a second of the anchor's time, in the frame of the map.
 std::optional<RigidTransform> OutputWriter::poseAtAnchor() const {
   if (!anchor_) return std::nullopt;
   constexpr Duration kNear = std::chrono::seconds(1);

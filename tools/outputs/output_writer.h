@@ -1,5 +1,4 @@
-// Writes the output files of `perdure pipeline` and the demo from the streams odometry, objects and
-// events. The same messages give the same bytes.
+// Writes the files of `perdure pipeline` and the demo; same messages, same bytes.
 #pragma once
 
 #include <filesystem>
@@ -25,8 +24,7 @@ namespace perdure::tools {
 
 class OutputWriter {
  public:
-  /// Creates a missing folder. Throws StartupError (kUnavailable) if that fails. `sequence` is the
-  /// value of the column with this name.
+  /// Creates the folder. Throws StartupError (kUnavailable). `sequence`: value of that column.
   OutputWriter(std::filesystem::path folder, std::string sequence);
 
   void setShapes(std::map<std::string, ShapePoints> shapes) {
@@ -41,12 +39,10 @@ class OutputWriter {
   void onLandmarks(const Landmarks& landmarks);
   /// Ground truth for the pictures, in W; to be called before finish().
   void setTruth(PictureTruth truth) { truth_ = std::move(truth); }
-  /// Writes map.png and map.geojson in M, and trajectory_map.tum with the trajectory of the map's
-  /// final graph. To be called before finish().
+  /// Writes map.png, map.geojson and trajectory_map.tum in M; before finish().
   void setInMap(DriveInMap in_map) { in_map_ = std::move(in_map); }
 
-  /// Writes all files except events.jsonl and odometry.csv, which are written as messages arrive.
-  /// Throws StartupError(kInputOutput) with the file that is incomplete.
+  /// Writes the files that are not written as messages arrive. Throws StartupError(kInputOutput).
   void finish();
   /// Writes an additional file: timing.json, report.json.
   void writeJson(const std::string& name, const nlohmann::ordered_json& json) const;
@@ -88,9 +84,7 @@ class OutputWriter {
   std::ofstream events_, odometry_;
 };
 
-/// One line of events.jsonl.
 nlohmann::ordered_json toJson(const Event& event);
-/// One element of objects.json.
 nlohmann::ordered_json toJson(const ObjectBelief& belief);
 
 }  // namespace perdure::tools

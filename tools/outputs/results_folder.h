@@ -7,22 +7,19 @@
 
 namespace perdure::tools {
 
-/// A folder without a run is written directly. Otherwise files are written to a subfolder
-/// `unfinished`, and replace the earlier ones when the run has ended. If the run fails, the
-/// subfolder is removed, and so is a new folder that stayed empty. Other processes cannot write to
-/// the folder meanwhile.
+/// Without a run it is written directly; else files go to a subfolder `unfinished` and replace the
+/// earlier ones at the end. A failure removes the subfolder, or a new, empty folder. Other
+/// processes cannot write meanwhile.
 class ResultsFolder {
  public:
-  /// Throws StartupError(kUnavailable) if another process writes to the folder, or if the remains
-  /// of a killed run cannot be removed.
+  /// Throws StartupError(kUnavailable) if another process writes, or remains cannot be removed.
   explicit ResultsFolder(std::filesystem::path out);
   ResultsFolder(const ResultsFolder&) = delete;
   ResultsFolder& operator=(const ResultsFolder&) = delete;
   ~ResultsFolder();
 
   const std::filesystem::path& folder() const { return written_; }
-  /// Replaces the earlier results; no file in the folder may be open. Throws
-  /// StartupError(kInputOutput) on failure.
+  /// Replaces the earlier results; no file may be open. Throws StartupError(kInputOutput).
   void keep();
 
  private:

@@ -1,5 +1,4 @@
-// Problems of a run that ended normally, for the user. Pipeline and demo print them as warnings,
-// end their last line with them, and write them into report.json.
+// Problems of a run that ended normally, as warnings and in report.json.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -29,15 +28,12 @@ struct RunFacts {
 /// Number of images that are missing, cannot be read, or have a line that cannot be used.
 std::uint64_t imagesLost(const ReasonCounts& capture);
 
-/// Doubts about a run, whatever its input was: frames without a visual update, an empty map, clocks
-/// that were changed, contradictions.
+/// Frames without a visual update, an empty map, changed clocks, contradictions.
 Doubts doubtsOfRun(const RunFacts& facts);
 
 /// " | WARNING: …" with each `what`; "" if there are none.
 std::string endOfLine(const Doubts& doubts);
-/// Prints a warning for each on standard error.
 void printWarnings(const Doubts& doubts);
-/// A list of sentences.
 nlohmann::ordered_json toJson(const Doubts& doubts);
 
 }  // namespace perdure::tools

@@ -13,8 +13,7 @@ namespace perdure::tools {
 /// Measures stages; the time of a nested stage does not count for the outer one.
 class StageTimer {
  public:
-  /// Runs `work` and adds its CPU time (of all threads of the process) and wall time to `stage` as
-  /// one call.
+  /// Adds CPU time (all threads) and wall time of `work` to `stage` as one call.
   template <class Work>
   auto time(const std::string& stage, Work&& work) {
     const Span span(*this, stage);

@@ -1,5 +1,4 @@
-// The subcommands of `perdure`. Each has its own executable in libexec/perdure, which the
-// CMakeLists.txt of its folder declares with perdure_command.
+// The subcommands of `perdure`, each an executable in libexec/perdure (perdure_command).
 #pragma once
 
 #include <filesystem>

@@ -5,8 +5,8 @@
 
 #include "common/base/ids.h"
 #include "tools/data_check/data_check.h"
-#include "tools/evaluate/kitti_score.h"
 #include "tools/evaluate/object_report.h"
+#include "tools/evaluate/object_score.h"
 #include "tools/evaluate/simulated_truth.h"
 #include "tools/evaluate/used_frames.h"
 

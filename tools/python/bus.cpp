@@ -45,8 +45,7 @@ void requireSame(const bus::Options& open, const bus::Options& wanted) {
   }
 }
 
-/// Options of a subscriber, as for the commands: without shared memory, and with the default
-/// identity "subscriber".
+/// Options of a subscriber: without shared memory, identity "subscriber".
 bus::Options optionsOf(const BusSettings& settings) {
   bus::Options options = applied(settings, tools::listenersOptions());
   if (options.identity.empty()) options.identity = "subscriber";
@@ -104,7 +103,6 @@ void refuseTopic(const std::string& topic) {
 
 namespace {
 
-/// A writer of any topic, selected by name.
 class Publisher {
  public:
   /// Raises UnknownTopic.

@@ -1,11 +1,10 @@
 #include <pybind11/stl.h>
-#include <spdlog/sinks/stdout_sinks.h>
 
 #include <condition_variable>
 #include <mutex>
 #include <thread>
 
-#include "common/bus/gaps.h"
+#include "common/bus/once.h"
 #include "common/service/service.h"
 #include "tools/python/bindings.h"
 #include "tools/python/bus.h"
@@ -20,14 +19,6 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds kHangs{10};  // longer than any network needs for a frame
 
-std::shared_ptr<spdlog::logger> makeLog(const std::string& process) {
-  auto log =
-      std::make_shared<spdlog::logger>(process, std::make_shared<spdlog::sinks::stderr_sink_mt>());
-  log->set_pattern("%Y-%m-%d %H:%M:%S.%e %n %l: %v");
-  log->flush_on(spdlog::level::trace);
-  return log;
-}
-
 struct ServiceOptions {
   std::string process, camera;
   std::int32_t strength = 1;
@@ -35,15 +26,14 @@ struct ServiceOptions {
   bool expects = false;  ///< evaluates the filter's predictions
 };
 
-/// Runs the loop of the service in its own thread, so that Health and liveliness continue while
-/// Python processes a frame. It hands over the newest frame and drops older ones.
+/// Runs the service's loop in a thread, so that Health continues; keeps the newest frame.
 class InferenceService {
  public:
   InferenceService(const BusSettings& settings, const ServiceOptions& options,
                    const ModelInfo& model)
       : options_(options),
         context_(options.process, openDomain(serviceOptionsOf(settings, options.process)),
-                 makeLog(options.process)),
+                 service::makeLog(options.process)),
         detections_(context_.writer(bus::kTopic<Detections>,
                                     {.strength = options.strength, .lease_s = options.lease_s})),
         frames_(context_.needs("frames", "mend the camera, or start capture")) {

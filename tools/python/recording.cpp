@@ -13,7 +13,6 @@ namespace {
 
 namespace py = pybind11;
 
-/// A recording that is read once.
 class Recording {
  public:
   /// `topics`: empty means all. Raises UnknownTopic. Throws StartupError.

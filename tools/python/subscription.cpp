@@ -22,8 +22,7 @@ std::optional<Clock::time_point> endAfter(std::optional<double> seconds) {
   return Clock::now() + std::chrono::duration_cast<Clock::duration>(length);
 }
 
-/// Messages of topics in the order of arrival, for one Python thread at a time. It waits without
-/// the GIL and checks for Ctrl-C every 50 ms.
+/// Messages in the order of arrival, for one Python thread; waits without the GIL.
 class Subscription {
  public:
   /// `gone`: also returns disposed instances. Raises UnknownTopic.
@@ -35,8 +34,7 @@ class Subscription {
     for (const auto& reader : readers_) loop_.off(*reader);
   }
 
-  /// (topic, message, whether it was disposed), in the order of arrival; None after the time
-  /// (without a value: no limit) or after close().
+  /// (topic, message, disposed); None after the time (empty: no limit) or after close().
   py::object next(std::optional<double> seconds) {
     if (waits_.exchange(true)) {
       raise(

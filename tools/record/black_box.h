@@ -1,8 +1,13 @@
-// Keeps the last seconds as packed chunks in memory, to be written after a fault.
+// Detects faults, and keeps the last seconds as packed chunks, to be written after one.
 #pragma once
 
+#include <chrono>
 #include <deque>
+#include <map>
+#include <optional>
+#include <string>
 
+#include "common/types/health.h"
 #include "tools/record/segment_writer.h"
 
 namespace perdure::tools {
@@ -28,6 +33,29 @@ class BlackBox {
   const std::uint64_t most_bytes_;
   std::deque<PackedChunk> chunks_;
   std::uint64_t bytes_ = 0, cut_short_ = 0;
+};
+
+/// Detects faults: a process that reports one, or a process that became silent.
+class FaultWatch {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+
+  /// `from`: the first state that is a fault; kFailed, or kDegraded.
+  explicit FaultWatch(HealthState from = HealthState::kFailed) : from_(from) {}
+
+  /// A description, if this message is a process's transition to a fault.
+  std::optional<std::string> onHealth(const Health& health, Time now);
+  /// If more `health` writers missed their lease. An orderly shutdown removes the writer.
+  std::optional<std::string> onSilent(std::size_t silent, Time now);
+
+ private:
+  struct Process {
+    HealthState state = HealthState::kStarting;
+    Time heard{};
+  };
+  const HealthState from_;
+  std::map<std::string, Process> processes_;
+  std::size_t silent_ = 0;
 };
 
 }  // namespace perdure::tools

@@ -19,13 +19,11 @@ void addFileCommands(CLI::App& record);
 /// for readers without delimited XCDR2. Counts messages that cannot be read. Throws StartupError.
 ReasonCounts exportPlain(const std::filesystem::path& from, const std::filesystem::path& to);
 
-/// Converts it to ROS 2 for viewers and `ros2 bag play`: MCAP with profile ros2; the topics are
-/// those of common/ros/mirror.h. As exportPlain otherwise.
+/// Converts to ROS 2: MCAP with profile ros2; topics of common/ros/mirror.h.
 ReasonCounts exportRos2(const std::filesystem::path& from, const std::filesystem::path& to);
 
-/// Completes unfinished recordings, or folders of them, without losing a byte. If bytes are cut
-/// off, the original stays beside it as FILE.before-repair. All files are processed before the
-/// failures are thrown as a StartupError.
+/// Completes unfinished recordings without losing a byte; a cut original stays as
+/// FILE.before-repair. Throws StartupError after all files.
 void repairAll(const std::vector<std::filesystem::path>& paths);
 
 /// Throws StartupError(kData) for a recording without messages, with the reason.

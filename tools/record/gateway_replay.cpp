@@ -85,8 +85,7 @@ GatewayReplay::GatewayReplay(replay::RecordedMessages& recording, const gateway:
 
 GatewayReplay::~GatewayReplay() = default;
 
-/// Measures the relation of sensor time and recorder time; it is linear from the first to the last
-/// message with both.
+/// The relation of sensor time and recorder time, linear between the ends.
 void GatewayReplay::measure() {
   begin_ns_ = recording_.startNs();
   end_ns_ = recording_.endNs();
@@ -186,8 +185,7 @@ void GatewayReplay::recallRig(std::uint64_t log_ns) {
   }
 }
 
-/// Repeats messages for a client that opens a channel: the image of the shown objects, and the
-/// newest of other topics.
+/// For a client that opens a channel: the image of the shown objects, and the newest of others.
 void GatewayReplay::repeatFrames(const gateway::Channels& before) {
   const auto shown = node_->shownTime();
   for (const auto& [topic, messages] : newest_) {
@@ -219,8 +217,7 @@ void GatewayReplay::recallGraph(std::uint64_t log_ns) {
   }
 }
 
-/// Advances to the next objects, so that a paused replay shows them. repeatFrames() adds their
-/// image.
+/// Advances to the next objects, so that a paused replay shows them.
 void GatewayReplay::showFrame() {
   fed_objects_ = false;
   const gateway::Channels wanted = std::exchange(wanted_, {});

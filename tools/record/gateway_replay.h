@@ -1,5 +1,4 @@
-// Replays a recording without a bus in the gateway's page and Foxglove. Clients control play,
-// pause, seek, speed and the next event.
+// Replays a recording without a bus in the page and Foxglove, controlled by clients.
 #pragma once
 
 #include <condition_variable>
@@ -19,16 +18,14 @@ namespace perdure::tools {
 
 class GatewayReplay {
  public:
-  /// Determines the time range of the recording, and starts `start_s` after its first frame. Throws
-  /// StartupError if the recording has nothing to show, if it ends earlier, or if the port is not
-  /// available.
+  /// Starts `start_s` after the first frame. Throws StartupError if there is nothing to show, it
+  /// ends earlier, or the port is not available.
   GatewayReplay(replay::RecordedMessages& recording, const gateway::Config& config,
                 const gateway::PlaybackRequest& start, double start_s = 0.0);
   ~GatewayReplay();
 
   std::uint16_t port() const { return server_->port(); }
   gateway::TimeRange range() const { return {sensorTime(first_.log_ns), sensorTime(last_.log_ns)}; }
-  /// Runs until stop().
   void run();
   void stop();  ///< may be called from any thread
 

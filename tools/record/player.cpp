@@ -31,7 +31,6 @@ bool isHeardBy(const std::string& service, const std::string& topic) {
   return inputs->second.contains(topic.starts_with("frame/") ? "frame/" : topic);
 }
 
-/// The service that publishes events of this kind.
 const char* writerOf(EventKind kind) {
   const bool of_the_map = kind == EventKind::kLoopClosed || kind == EventKind::kLoopWithdrawn ||
                           kind == EventKind::kRelocalised;

@@ -24,16 +24,14 @@ struct PlayOptions {
 
 class Player {
  public:
-  /// Takes about a second to discover the bus. If no topics are named, omits the outputs of
-  /// services that read this recording. Throws StartupError for an unknown topic, a topic that is
-  /// not in the recording, or a topic that another process writes (unless `force`).
+  /// Takes about a second. Without named topics, omits outputs of services that read this
+  /// recording. Throws StartupError for an unknown, absent or (unless `force`) contested topic.
   Player(const bus::Participant& participant, bus::WaitLoop& loop,
          replay::RecordedMessages& recording, const PlayOptions& options);
 
   /// Plays once to the end, or until the loop is stopped.
   void play();
   std::uint64_t played() const { return played_; }
-  /// Messages that could not be played, by topic and reason.
   const ReasonCounts& reasons() const { return reasons_; }
   const std::set<std::string>& topics() const { return topics_; }
   /// Omitted topics with their writer, for example "map/frame (map_store)".

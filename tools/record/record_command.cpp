@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <spdlog/sinks/stdout_sinks.h>
 
 #include <CLI/CLI.hpp>
 #include <csignal>
@@ -25,13 +24,6 @@ struct RecordOptions {
   double seconds = 0;
   bool dump_at_end = false;
 };
-
-std::shared_ptr<spdlog::logger> makeLog(const std::string& process) {
-  auto log =
-      std::make_shared<spdlog::logger>(process, std::make_shared<spdlog::sinks::stderr_sink_mt>());
-  log->set_pattern("%Y-%m-%d %H:%M:%S.%e %n %l: %v");
-  return log;
-}
 
 /// Receives SIGUSR1 by a flag that a timer polls, without an extra thread.
 class DumpSignal {
@@ -86,7 +78,7 @@ void runRecord(RecordOptions& options) {
   SegmentFolder folder(options.out, options.quota, options.keep_free);
   const bool black_box = options.store.last_s > 0;
   const std::string process = black_box ? "black_box" : "record";
-  service::Context context(process, options.bus, makeLog(process));
+  service::Context context(process, options.bus, service::makeLog(process));
   for (const std::string& file : folder.repaired()) {
     context.log().info("{} had been cut off and is whole again", file);
   }

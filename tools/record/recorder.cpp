@@ -49,8 +49,7 @@ Recorder::Recorder(service::Context& context, const RecorderOptions& options, St
       catalogue_(std::make_shared<mcap::Catalogue>()),
       latched_(std::make_shared<std::vector<Latched>>()),
       watch_(options.fault) {
-  // Topics are read in the order of the table, so that simultaneous causes come before their
-  // effects.
+  // In the order of the table: simultaneous causes come before their effects.
   std::vector<std::string> topics = options.topics;
   for (const bus::TopicInfo& info : bus::topicTable()) {
     const bool wanted = options.topics.empty() && info.recorded && !info.name.ends_with('/');

@@ -9,7 +9,7 @@
 #include "common/bus/cdr_reader.h"
 #include "common/bus/discovery.h"
 #include "common/service/service.h"
-#include "tools/record/fault_watch.h"
+#include "tools/record/black_box.h"
 #include "tools/record/store.h"
 
 namespace perdure::tools {
@@ -20,8 +20,7 @@ struct RecorderOptions {
   HealthState fault = HealthState::kFailed;  ///< the first state that is a fault
 };
 
-/// Log times: the system clock at the start, continued by the steady clock, so that clock
-/// corrections have no effect.
+/// The system clock at the start, continued by the steady clock.
 class LogClock {
  public:
   LogClock();

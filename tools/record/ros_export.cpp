@@ -13,8 +13,7 @@ namespace {
 
 namespace mcap = replay::mcap;
 
-/// QoS of a topic's writer in the format of ROS 2's recorder, with the numbers that all releases
-/// read.
+/// QoS of a topic's writer in the format of ROS 2's recorder.
 std::string qosOf(const ros::Outlet& outlet) {
   const std::string forever = "\n    sec: 9223372036\n    nsec: 854775807\n";
   return std::string("- history: 1\n  depth: ") + (outlet.latched ? "1" : "10") +

@@ -13,22 +13,18 @@ namespace perdure::tools {
 
 class SegmentFolder {
  public:
-  /// Creates and locks the folder, and completes files of a killed recorder. `quota` and
-  /// `keep_free` are in bytes; quota 0: none. Throws StartupError if the folder cannot be written,
-  /// or if another recorder uses it.
+  /// Creates and locks the folder, and completes files of a killed recorder. `quota`, `keep_free`:
+  /// bytes; quota 0: none. Throws StartupError.
   SegmentFolder(const std::filesystem::path& folder, std::uint64_t quota, std::uint64_t keep_free);
 
-  /// "FOLDER/perdure-000124-20261122T091658Z.mcap". The number increases independent of the clock.
-  /// `word` is appended after the time: "-fault".
+  /// "FOLDER/perdure-000124-20261122T091658Z.mcap"; `word` after the time: "-fault".
   std::filesystem::path nextFile(std::int64_t wall_ns, const std::string& word);
-  /// Sets the current size of one of its files.
   void sizeIs(const std::filesystem::path& file, std::uint64_t bytes) { sizes_[file] = bytes; }
   void remove(const std::filesystem::path& file);
   /// Removes the oldest files until the quota is met, but never the newest.
   void keepQuota();
   /// Size limit of a file, of this process (`ulimit -f`) and of FAT.
   std::uint64_t largestFile() const;
-  /// Whether enough free space remains after `bytes` more.
   bool hasRoomFor(std::uint64_t bytes) const;
 
   std::uint64_t bytes() const;

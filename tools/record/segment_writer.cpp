@@ -21,8 +21,7 @@ bool SegmentWriter::note(const Result<void>& written) {
   return written.has_value();
 }
 
-/// A file ends after its time, or earlier if the quota would hold too few files of its size, or at
-/// the size limit of files.
+/// A file ends after its time, or at the size limit, or if the quota would hold too few.
 bool SegmentWriter::isOver(const PackedChunk& packed) const {
   constexpr std::uint64_t kFilesOfQuota = 8;
   constexpr std::uint64_t kSummary = 1u << 20;  // bytes: schemas, and 250 for each of 1000 chunks

@@ -1,5 +1,4 @@
-// Writes chunks to files of limited length, each of which can be read alone. After a full disk, it
-// continues when there is space.
+// Writes chunks to files that can be read alone. Continues after a full disk.
 #pragma once
 
 #include <memory>
@@ -38,7 +37,6 @@ class SegmentWriter {
 
   /// Returns false if the chunk could not be written and is lost; problem() has the reason.
   bool add(const PackedChunk& packed);
-  /// Finishes the current file.
   void finish();
 
   /// The problem as a sentence; empty if there is no problem.

@@ -1,5 +1,4 @@
-// Thread of the recorder that packs and writes chunks, or keeps them for a fault. The bus never
-// waits for the disk.
+// Thread that packs and writes chunks, or keeps them for a fault.
 #pragma once
 
 #include <atomic>

@@ -7,8 +7,8 @@
 #include <regex>
 
 #include "common/base/errors.h"
+#include "common/base/files/access.h"
 #include "common/bus/security/identity.h"
-#include "tools/base/files.h"
 #include "tools/security/private_file.h"
 
 namespace perdure::tools {
@@ -38,8 +38,7 @@ void requireName(const std::string& name) {
                          "most 48, and not \"authority\"");
 }
 
-/// Restricts the permissions to `topics`: those that a ros2_driver writes, or that another role
-/// reads.
+/// Restricts the permissions to `topics`.
 void narrow(Permissions& permissions, bus::Role role, const std::vector<std::string>& topics) {
   if (topics.empty()) return;
   if (role != bus::Role::kRos2Driver) {
@@ -64,7 +63,6 @@ void requireTopics(const std::vector<std::string>& topics) {
   }
 }
 
-/// The owner of an existing file or folder.
 std::optional<Owner> ownerOf(const fs::path& path) {
   struct stat status {};
   if (stat(path.c_str(), &status) != 0) return std::nullopt;

@@ -10,9 +10,8 @@
 
 namespace perdure::tools {
 
-/// FOLDER/authority contains the authority's key, which no vehicle needs, and the issued
-/// certificates. FOLDER/NAME is an identity with all files that its host needs
-/// (common/bus/security/identity.h).
+/// FOLDER/authority has the key, which no vehicle needs, and the issued certificates. FOLDER/NAME
+/// is an identity (common/bus/security/identity.h).
 class Authority {
  public:
   /// Creates an authority. Throws StartupError if the folder has one, or cannot be written.
@@ -23,15 +22,13 @@ class Authority {
 
   struct Wanted {
     std::string name, role;
-    /// Topics to read instead of the role's default, including "frame/*"; for a ros2_driver, topics
-    /// to write.
+    /// Topics to read instead of the default, also "frame/*"; for a ros2_driver, to write.
     std::vector<std::string> topics = {};
     std::string owner = {};  ///< user of the files; empty: unchanged, or the current user
   };
   /// Throws StartupError for a used or invalid name, or an unknown role, topic or user.
   void add(const Wanted& wanted, const Validity& validity);
-  /// Issues a new key, certificate and permissions. The old ones stay valid until they expire or
-  /// are revoked.
+  /// Issues new key, certificate and permissions. The old ones stay valid.
   void renew(const std::string& name, const Validity& validity);
   /// Revokes all certificates of this name. Updates the list in each folder here; other hosts need
   /// the new list too. Running processes read it at their next start.

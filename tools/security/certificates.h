@@ -1,5 +1,4 @@
-// X.509 and S/MIME with OpenSSL. Keys are on P-256 and signatures are ECDSA with SHA-256, as
-// DDS-Security requires.
+// X.509 and S/MIME with OpenSSL: P-256 and ECDSA with SHA-256, as DDS-Security requires.
 #pragma once
 
 #include <chrono>
@@ -26,7 +25,6 @@ struct Subject {
 };
 
 bus::Key makeKey();
-/// A self-signed certificate.
 bus::Certificate makeAuthority(EVP_PKEY* key, const Validity& validity);
 
 /// The signing authority. Its certificate and key must outlive it.

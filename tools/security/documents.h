@@ -1,5 +1,4 @@
-// The two documents of DDS-Security (OMG DDS Security 1.1, 9.4). They state the protection of the
-// bus and the rights of each identity, generated from the topic table.
+// The documents of DDS-Security 1.1, 9.4: protection and rights, from the topic table.
 #pragma once
 
 #include <string>
@@ -10,8 +9,7 @@
 
 namespace perdure::tools {
 
-/// For every domain and every vehicle: joining requires a certificate, all data are encrypted, and
-/// every read and write requires a permission.
+/// Joining requires a certificate, data are encrypted, each read and write needs a permission.
 std::string governanceXml();
 
 /// Topics that a role writes and reads; "frame/*" stands for all cameras.

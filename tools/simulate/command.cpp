@@ -4,10 +4,8 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <chrono>
-#include <cstdio>
 #include <iostream>
 #include <memory>
-#include <thread>
 
 #include "common/base/errors.h"
 #include "tools/perdure/commands.h"
@@ -23,7 +21,6 @@ struct CommandLine {
   bool list = false, quiet = false, no_noise = false, no_images = false;
 };
 
-/// Parses "640x480". Throws StartupError(kUsage).
 void readSize(const std::string& text, sim::SceneOptions& world) {
   const char* end = text.data() + text.size();
   const auto width = std::from_chars(text.data(), end, world.width);
@@ -43,7 +40,6 @@ void listScenes() {
   }
 }
 
-/// Shows progress: one updated line on a terminal, otherwise a line for each tenth.
 class ProgressBar {
  public:
   void show(const SimulateProgress& progress) {

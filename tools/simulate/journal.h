@@ -1,5 +1,4 @@
-// Journal of the frames that a run has rendered. The next run continues after an interruption and
-// produces the same bytes. It has a line of JSON for each frame; its numbers are exact.
+// Journal of rendered frames, a line of JSON each, from which the next run continues.
 #pragma once
 
 #include <filesystem>

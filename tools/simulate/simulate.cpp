@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/errors.h"
+#include "common/base/files/access.h"
 #include "common/base/files/folder_lock.h"
-#include "common/sim/truth_files.h"
-#include "tools/base/files.h"
+#include "common/sim/truth.h"
 #include "tools/simulate/journal.h"
 #include "tools/simulate/render/counter_noise.h"
 #include "tools/simulate/render/outline.h"
@@ -67,7 +67,6 @@ FolderLock claim(const fs::path& out, const std::string& description) {
   return lock;
 }
 
-/// The cameras of a run, their pictures, and their progress.
 class Run {
  public:
   Run(const SimulateOptions& options, const sim::Scene& scene)

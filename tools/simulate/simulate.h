@@ -1,5 +1,4 @@
-// One run of the simulator: renders a scene by name, frame by frame, to a dataset folder. A run can
-// be resumed; the same options give the same bytes.
+// Renders a scene to a dataset folder; resumable, deterministic.
 #pragma once
 
 #include <cstdint>
@@ -28,12 +27,10 @@ struct SimulateProgress {
   std::size_t resumed = 0;            ///< frames from an earlier run
 };
 
-/// Returns false if the folder was already complete. Throws StartupError for invalid options, an
-/// unknown scene, or a folder with other content. `report` may be empty.
+/// False if already complete. Throws StartupError.
 bool simulate(const SimulateOptions& options,
               const std::function<void(const SimulateProgress&)>& report);
-/// Renders a given scene. Ignores options.scene and options.seed; options.world must be that
-/// of the scene.
+/// A given scene: options.scene and options.seed are ignored.
 bool simulate(const sim::Scene& scene, const SimulateOptions& options,
               const std::function<void(const SimulateProgress&)>& report);
 

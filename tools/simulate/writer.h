@@ -1,6 +1,5 @@
-// Writes the files of a simulated folder: EuRoC's layout (Burri et al., IJRR 2016) with speed and
-// ground truth beside it. Files are written under a temporary name first, so that incomplete files
-// are never visible.
+// Writes a simulated folder: EuRoC's layout with speed and truth, each file under a temporary name
+// first.
 #pragma once
 
 #include <cstdint>
@@ -30,12 +29,10 @@ std::string visibilityCsv(const std::vector<std::vector<sim::TruthView>>& views_
 /// Rows of the views that the image border truncates.
 std::string insideCsv(const std::vector<std::vector<sim::TruthView>>& views_by_frame);
 
-/// Writes inertial samples, speed and states over [0, scene.seconds], with their sensor.yaml, and
-/// objects_truth.json.
+/// Inertial samples, speed and states with their sensor.yaml, and objects_truth.json.
 void writeSensors(const std::filesystem::path& folder, const sim::Scene& scene);
 
 enum class ImageFormat { kPng, kJpeg };
-/// ".png" or ".jpg".
 std::string extensionOf(ImageFormat format);
 /// Packed rows, `channels` 1 or 3 (BGR).
 void writeImage(const std::filesystem::path& file, int width, int height, int channels,

@@ -10,8 +10,7 @@
 
 namespace perdure {
 
-/// The paths in a folder for which `wanted` returns true, sorted. Empty if the folder is missing.
-/// Throws StartupError if it cannot be read.
+/// The sorted paths in a folder for which `wanted` is true; empty if it is missing.
 std::vector<std::filesystem::path> pathsIn(const std::filesystem::path& folder,
                                            const auto& wanted) {
   std::vector<std::filesystem::path> paths;

@@ -6,8 +6,7 @@
 
 namespace perdure {
 
-/// The first of the candidates with the fewest edits (insert, delete, replace, swap of neighbours).
-/// Empty if all need more than two edits and more than a third of the word's length.
+/// The candidate with the fewest edits; empty if all need more than two and a third of the length.
 std::string nearestWord(const std::string& word, const std::vector<std::string>& candidates);
 
 }  // namespace perdure

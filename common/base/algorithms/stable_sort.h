@@ -1,5 +1,4 @@
-// Stable sorting of large elements by a key. Only keys are compared, and each element moves once.
-// std::stable_sort of such elements takes long to compile and moves each element several times.
+// Stable sorting of large elements by a key: each moves once. std::stable_sort compiles slowly.
 #pragma once
 
 #include <cstddef>
@@ -22,8 +21,7 @@ void stableSortBy(std::vector<T, Allocator>& elements, const KeyOf& keyOf) {
   keys.reserve(elements.size());
   for (const T& element : elements) keys.push_back(keyOf(element));
   ScratchVector<std::size_t> from = stableOrder(keys);
-  // Moves the elements of each cycle of the permutation. The first element waits until its place is
-  // free.
+  // Moves the elements of each cycle of the permutation.
   for (std::size_t first = 0; first < from.size(); ++first) {
     if (from[first] == first) continue;
     T waiting = std::move(elements[first]);

@@ -7,6 +7,8 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <fstream>
+#include <sstream>
 
 namespace perdure {
 namespace {
@@ -23,6 +25,13 @@ std::string userOf(uid_t id) {
 }
 
 }  // namespace
+
+std::string textOf(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
 
 std::string whyUnreadable(const fs::path& file) {
   if (file.empty()) return {};

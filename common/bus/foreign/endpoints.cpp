@@ -122,8 +122,7 @@ ddsi_sertype_ops typeOps() {
   return ops;
 }
 
-/// A DDS type that is defined by its name only, without a key, in XCDR1. It matches by name, as ROS
-/// types do. The caller owns one reference.
+/// A DDS type without a key in XCDR1, which matches by name. The caller owns one reference.
 ddsi_sertype* makeBytesType(const std::string& name) {
   static const ddsi_serdata_ops kMessages = messageOps();
   static const ddsi_sertype_ops kType = typeOps();

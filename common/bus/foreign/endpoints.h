@@ -1,5 +1,4 @@
-// Topics of third-party programs, given by name and type only. Messages are raw CDR bytes; the code
-// that decodes them must check their contents.
+// Topics of third-party programs, given by name and type. Messages are unchecked CDR bytes.
 #pragma once
 
 #include <cstdint>
@@ -31,8 +30,6 @@ class ForeignReader : public AnyReader {
 
   ForeignReader(const Participant& participant, const ForeignTopic& topic);
 
-  /// Passes at most one batch to the handler, in order. Returns true if more messages may be
-  /// available.
   bool drainBatch(const Handler& handler);
 };
 
@@ -41,8 +38,6 @@ class ForeignWriter : public AnyWriter {
   ForeignWriter(const Participant& participant, const ForeignTopic& topic);
   ~ForeignWriter();
 
-  /// `cdr` includes its header. Messages that cannot be written are counted, and the reason is
-  /// returned.
   Result<void> write(std::vector<std::uint8_t> cdr);
 
  private:

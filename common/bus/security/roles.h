@@ -17,8 +17,7 @@ struct RoleName {
   std::string_view name;
 };
 std::span<const RoleName> roleNames();
-/// The default identity of a process, by the name of its participant ("capture", "perdure doctor",
-/// "black_box"). It is used if bus.identity is not set.
+/// The identity of a process if bus.identity is not set, by the name of its participant.
 std::string identityOf(const std::string& process);
 
 }  // namespace perdure::bus

@@ -24,9 +24,8 @@ constexpr double kPavementWidth = 3.25, kHouseDepth = 7.0;
 constexpr double kNoParking = 3.5;  ///< distance from the crossing road's edge
 constexpr double kShareParked = 0.68, kVanShare = 0.16, kReversedShare = 0.12;
 
-/// A block of houses and the objects around it, drawn once and placed many times. Places are
-/// relative to the centre of the block. Its four kerbs are at ± `half`; vehicles stand
-/// on the road beside them.
+/// A block of houses and the objects around it, drawn once and placed many times, relative to its
+/// centre. Its kerbs are at ± `half`.
 class Block {
  public:
   /// Draws houses, trees, poles, parked vehicles, bicycles and a person.
@@ -46,7 +45,6 @@ class Block {
     Eigen::Vector3d size;
     Place place;
   };
-  /// One of the four sides of a block.
   struct Side;
 
   static std::vector<Side> sidesOf(const Eigen::Vector2d& half);
@@ -217,9 +215,8 @@ std::vector<Road> roadsOfBlocks() {
   return roads;
 }
 
-/// The route follows three rows, crosses them along three columns, and returns to the start. It
-/// then repeats the first row, and drives the last one in the opposite direction. Columns and first
-/// corner are random.
+/// The route follows three rows, crosses them along three columns, returns, repeats the first row,
+/// and drives the last one in the opposite direction.
 std::vector<Eigen::Vector2d> turnsAmongBlocks(Dice& dice) {
   const int right = kCrossingsX - 1, top = kCrossingsY - 1;
   const int third = 4 + static_cast<int>(dice.below(2)),
@@ -260,7 +257,6 @@ std::vector<std::size_t> changesOf(Dice& dice) {
   return changes;
 }
 
-/// Places a house at the end of each road, facing the road.
 void closeRoads(const std::vector<Road>& roads, SceneBuilder& builder) {
   constexpr double kDepth = 7.0, kFromEnd = 0.5 * kRoadWidth + 3.3 + 0.5 * kDepth;
   for (const Road& road : roads) {

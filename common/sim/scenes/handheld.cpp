@@ -9,8 +9,7 @@ namespace {
 
 constexpr double kStepHz = 1.8, kWalkingSpeed = 0.8;
 
-/// Steps move the hand vertically and sideways, in proportion to the speed. A resting hand still
-/// trembles slightly.
+/// Steps move the hand vertically and sideways with the speed. A resting hand trembles slightly.
 Eigen::Vector3d handAt(double t_s, double speed) {
   const double walking = std::min(1.0, speed / kWalkingSpeed), step = 2.0 * M_PI * kStepHz * t_s;
   return {0.004 * walking * std::sin(step + 0.7), 0.016 * walking * std::sin(0.5 * step),

@@ -1,5 +1,4 @@
-// Rooms in which an object is not visible for a while: behind another object, or outside the field
-// of view.
+// Rooms in which an object is hidden for a while or outside the field of view.
 #include <algorithm>
 #include <cmath>
 
@@ -33,8 +32,7 @@ RigidTransform standing(const SceneObject& object, const Eigen::Vector2d& point,
                         Eigen::Vector3d(point.x(), point.y(), 0.5 * object.size.z()));
 }
 
-// ---- occlusion: the camera moves sideways from the place where the monitor hides the chair, and
-// back.
+// ---- occlusion: the camera moves sideways and back; the monitor hides the chair.
 
 constexpr double kOcclusionSeconds = 32.0, kOcclusionHeight = 1.45, kWalkX = -3.2;
 

@@ -17,17 +17,14 @@ constexpr double kRandomSeconds = 40.0;
 constexpr double kSmallestPx = 11.0, kLargestPx = 330.0;  ///< longer side; width 320
 constexpr double kFocalAt320 = 190.7;
 
-/// Approximate extent of the outline, seen from any side.
 double extentOf(const SceneObject& object) {
   return std::max(object.size.z(), 0.5 * (object.size.x() + object.size.y()));
 }
 
-/// The ground area for cameras.
 struct Area {
   Eigen::Vector2d low, high;
 };
 
-/// The pose and velocity of the body at a view.
 struct View {
   RigidTransform T_WB;
   Eigen::Vector3d velocity_W = Eigen::Vector3d::Zero(), turn_rate_B = Eigen::Vector3d::Zero();
@@ -154,8 +151,7 @@ View ViewFinder::viewFrom(const Eigen::Vector3d& eye, double yaw, double pitch_d
   return view;
 }
 
-/// Returns a trajectory that passes one view a second, each with its own velocity. The motion
-/// between views is arbitrary.
+/// Passes one view a second, each with its velocity; the motion between is arbitrary.
 Trajectory throughViews(const std::vector<View>& views) {
   constexpr int kControls = 10;  // number per second; the middle seven form the view
   std::vector<RigidTransform> controls;

@@ -1,5 +1,4 @@
-// A loop of four streets around a block, driven twice, or once from rest to rest. Side streets
-// branch off at its corners.
+// A loop of four streets around a block, driven twice, or once from rest to rest.
 #include <algorithm>
 #include <limits>
 
@@ -59,8 +58,7 @@ Drive twoLaps(const GroundPath& loop, double from, double until_s) {
                  kStreetSeconds - 1.0, until_s);
 }
 
-/// A drive stops within one step of the path's points. Its distances are therefore scaled to the
-/// length of the lap.
+/// A drive stops within one step of the path's points: scales it to the length of the lap.
 Drive oneLap(const GroundPath& loop, double from, double until_s) {
   Drive lap = calmest(loop, from, from + loop.length(), loop.length() - 1e-6,
                       kLapSeconds - 2.0 * kStreetRest, until_s);

@@ -1,5 +1,4 @@
-// Streets with front gardens. Hedges and walls hide the cars in the driveways from one direction or
-// from both, and streets are driven twice, in the same direction and in the opposite one.
+// Streets with front gardens: hedges and walls hide cars in driveways; driven both ways.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -19,8 +18,7 @@ constexpr int kSuburbColumns = 4, kSuburbRows = 4;
 constexpr double kShareMoving = 0.02;  ///< share of moving vehicles; drive 00 of KITTI: 7 of 440
 constexpr double kPassing_s = 4.0;     ///< an oncoming car is present for so long before and after
 
-/// Rows 0 and 3 are driven twice in one direction; rows 0 and 2 and the outer columns also in the
-/// opposite one.
+/// Rows 0 and 3 twice in one direction; rows 0 and 2 and the outer columns also back.
 std::vector<Eigen::Vector2d> turnsInSuburb() {
   constexpr std::array kRoute{0, 30, 32, 2, 0, 30, 33, 3, 1, 31, 30, 0, 2, 32, 33, 3};
   std::vector<Eigen::Vector2d> points;
@@ -29,8 +27,7 @@ std::vector<Eigen::Vector2d> turnsInSuburb() {
   return points;
 }
 
-/// A time in the interval around which the body drives straight on for kPassing_s; none if 50
-/// random times fail.
+/// A time around which the body drives straight on for kPassing_s; none if 50 times fail.
 std::optional<double> straightWithin(double from_s, double until_s, SceneBuilder& builder) {
   const Trajectory& body = builder.scene().body;
   for (int attempt = 0; attempt < 50; ++attempt) {

@@ -13,8 +13,7 @@ constexpr double kTownSeconds = 520.0;
 constexpr int kColumns = 6, kRows = 5;
 constexpr std::size_t kVehicles = 500;
 
-/// Crossings where the drive turns: along the rows in alternating directions, then along the
-/// columns.
+/// Crossings where the drive turns: along the rows, then along the columns.
 std::vector<Eigen::Vector2d> turns() {
   std::vector<Eigen::Vector2i> crossings;
   const int right = kColumns - 1, top = kRows - 1;
@@ -37,7 +36,6 @@ std::vector<Eigen::Vector2d> turns() {
   return points;
 }
 
-/// Removes random vehicles until the planned number is left.
 void thinOut(SceneBuilder& builder) {
   auto& objects = builder.scene().objects;
   const auto isVehicle = [](const SceneObject& o) {

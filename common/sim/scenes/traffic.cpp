@@ -1,5 +1,4 @@
-// A street with traffic: a car ahead, oncoming and crossing cars, two cars that leave parking
-// places, one car that arrives and parks, and pedestrians.
+// A street with traffic: a car ahead, oncoming, crossing and parking cars, pedestrians.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -22,8 +21,7 @@ class Traffic {
  public:
   Traffic(SceneBuilder& builder, double seconds) : builder_(builder), seconds_(seconds) {}
 
-  /// Adds an object on its path. Its start is delayed by steps of half a second until it meets no
-  /// other object.
+  /// Delays the start by steps of half a second until the object meets no other one.
   void add(const std::string& class_name, const GroundPath& way, Drive driven) {
     SceneObject thing = builder_.draw(class_name);
     thing.moves = true;
@@ -81,9 +79,8 @@ Drive startingAt(double start_s, Drive driven) {
   return driven;
 }
 
-/// The first car leaves the left kerb and enters the oncoming lane, long before the body arrives.
-/// The second leaves the right kerb and enters the body's lane, about fifteen metres ahead. The
-/// third arrives on the oncoming lane and parks.
+/// The first car leaves the left kerb into the oncoming lane, the second the right kerb, fifteen
+/// metres ahead. The third arrives on the oncoming lane and parks.
 void addParkingManoeuvres(Traffic& traffic, double seconds) {
   const SpeedLimits limits{7.0, 1.5, 1.5, 1.5};
   const double infinity = std::numeric_limits<double>::infinity();

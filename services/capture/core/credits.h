@@ -17,8 +17,7 @@ class Credits {
 
   void expect(const std::string& answerer) { answered_.emplace(answerer, 0); }
   void sent(std::uint64_t sequence) { on_the_way_.push_back(sequence); }
-  /// An answer for a frame also credits all earlier frames, because readers process frames in
-  /// order.
+  /// An answer also credits all earlier frames.
   void credit(const std::string& answerer, std::uint64_t sequence) {
     const auto it = answered_.find(answerer);
     if (it == answered_.end()) return;
@@ -26,7 +25,6 @@ class Credits {
     while (!on_the_way_.empty() && on_the_way_.front() < creditedByAll()) on_the_way_.pop_front();
   }
   bool maySend() const { return answered_.empty() || on_the_way_.size() < window_; }
-  /// Drops the oldest open frame if no answer arrives.
   void giveUp() {
     if (!on_the_way_.empty()) on_the_way_.pop_front();
   }
@@ -43,8 +41,7 @@ class Credits {
   }
 
   std::size_t window_;
-  std::map<std::string, std::uint64_t> answered_;  ///< first sequence number not answered, by
-                                                   ///< answerer
+  std::map<std::string, std::uint64_t> answered_;  ///< first sequence number not answered
   std::deque<std::uint64_t> on_the_way_;
 };
 

@@ -8,15 +8,12 @@
 namespace perdure::capture {
 
 struct RunState {
-  std::string drive;                ///< digest of folder, pace and rate; a different run is not
-                                    ///< continued
-  std::string boot;                 ///< boot id of the machine, because each boot restarts
-                                    ///< CLOCK_MONOTONIC
+  std::string drive;                ///< digest of folder, pace and rate
+  std::string boot;                 ///< boot id, because each boot restarts CLOCK_MONOTONIC
   std::int64_t start_ns = 0;        ///< CLOCK_MONOTONIC at which `origin_ns` was due
   std::int64_t origin_ns = 0;       ///< sensor time of the first message
   std::int64_t last_ns = 0;         ///< sensor time of the last message sent
-  std::uint64_t next_sequence = 0;  ///< clock mode: number after the last frame sent; follow mode:
-                                    ///< first frame without credit
+  std::uint64_t next_sequence = 0;  ///< after the last frame sent, or first without credit
   bool finished = false;
 };
 

@@ -14,7 +14,6 @@
 
 namespace perdure::capture {
 
-/// The configuration of one camera, whose id is in `id`.
 struct CameraSettings : CameraConfig {
   bool id_alone = false;                ///< the id must match one camera only
   std::uint32_t width = 0, height = 0;  ///< pixels, as in the calibration of the rig
@@ -27,11 +26,9 @@ struct CameraSettings : CameraConfig {
 struct CameraShot {
   std::uint32_t sequence = 0;  ///< counted from each opening; lost images leave a gap
   std::int64_t time_ns = 0;    ///< CLOCK_BOOTTIME, middle of the middle row's exposure
-  Result<Frame> frame;         ///< pixels only; fails with "camera_frame_error" and the reasons of
-                               ///< packed()
+  Result<Frame> frame;         ///< pixels only; fails with "camera_frame_error"
 };
 
-/// An image as it is passed on.
 struct CameraImage {
   std::int64_t time_ns = 0;  ///< CLOCK_BOOTTIME, middle of the middle row's exposure
   std::uint64_t number = 0;  ///< continues over openings; lost images leave a gap
@@ -41,12 +38,10 @@ struct CameraImage {
 class CameraSession {
  public:
   virtual ~CameraSession() = default;
-  /// Name for people.
   virtual std::string name() const = 0;
   /// Settings that the camera does not follow, and why; empty if it follows all.
   virtual std::string note() const = 0;
-  /// Whether the camera is unplugged. next() may still return earlier images, and does not wait for
-  /// more.
+  /// Whether the camera is unplugged. next() may still return earlier images without waiting.
   virtual bool gone() const = 0;
   /// Whether the camera works but must be closed and reopened because of another camera.
   virtual bool stepsAside() const { return false; }
@@ -54,8 +49,7 @@ class CameraSession {
   virtual std::optional<CameraShot> next(std::chrono::milliseconds longest) = 0;
 };
 
-/// Fails with "camera_absent"; the detail is a sentence with the fix. Called only if no session is
-/// open.
+/// Fails with "camera_absent" and the fix. Called only if no session is open.
 using OpenCamera = std::function<Result<std::unique_ptr<CameraSession>>()>;
 
 }  // namespace perdure::capture

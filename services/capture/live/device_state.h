@@ -24,7 +24,6 @@ class DeviceState {
 
   /// A sentence with the fix; empty while the device sends data.
   std::string problem() const { return locked(problem_); }
-  /// Name for people; empty without a device.
   std::string name() const { return locked(name_); }
   /// Settings that the device does not follow; empty if it follows all.
   std::string note() const { return locked(note_); }

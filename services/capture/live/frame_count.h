@@ -14,7 +14,6 @@ class FrameNumbers {
   void reopened() { last_.reset(); }
   /// Number of the frame for the driver's 32-bit number.
   std::uint64_t of(std::uint32_t sequence);
-  /// Frames lost just before the last one.
   std::uint64_t lost() const { return lost_; }
 
  private:

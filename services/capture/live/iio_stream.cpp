@@ -7,15 +7,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <sstream>
 
 #include "services/capture/live/clocks.h"
-#include "services/capture/live/iio_text.h"
 
 namespace perdure::capture {
 namespace {
 
-constexpr double kBlock_s = 0.01;       // duration of the samples in one read, which adds to their
-                                        // age
+constexpr double kBlock_s = 0.01;       // duration of the samples in one read
 constexpr unsigned kTimeout_ms = 1000;  // without a sample for this long, the device counts as lost
 
 std::string sayError(ssize_t code) {
@@ -24,8 +23,7 @@ std::string sayError(ssize_t code) {
   return text;
 }
 
-/// First value of an attribute, from the device, otherwise from its first channel of a kind
-/// ("shared by type").
+/// First value of an attribute, from the device or its first channel of a kind.
 std::optional<double> readNumber(const iio_channel* channel, const char* attribute) {
   double value = 0.0;
   if (iio_channel_attr_read_double(channel, attribute, &value) < 0) return std::nullopt;
@@ -43,8 +41,7 @@ std::string readText(const iio_channel* channel, const char* attribute) {
   return trimmed(text);
 }
 
-/// Requests a rate, and returns the rate that the device has set. Many devices support only a few
-/// rates. Empty if the device has no rate attribute.
+/// Requests a rate, and returns the one that the device has set; empty without the attribute.
 std::optional<double> askRate(const iio_device* device, double wanted) {
   constexpr const char* kRate = "sampling_frequency";
   if (!iio_device_find_attr(device, kRate)) return std::nullopt;
@@ -62,7 +59,6 @@ std::optional<double> askRate(const iio_channel* channel, double wanted) {
   return is && *is > 0.0 ? is : std::nullopt;
 }
 
-/// One axis, with the conversion of its integer readings.
 struct Axis {
   iio_channel* channel = nullptr;
   double scale = 1.0, offset = 0.0;
@@ -248,7 +244,6 @@ class IioStream::Device {
     return {};
   }
 
-  /// Time of scan i in a block of `scans`.
   std::optional<std::int64_t> timeOf(ssize_t i, ssize_t scans, std::int64_t now_ns) {
     std::int64_t stamp = 0;
     if (stamp_) {
@@ -358,6 +353,32 @@ void IioStream::flow(Device& device) {
   state_.fails(
       {"imu_lost", fmt::format("the IMU {} at {} gives nothing any more: {}; it is tried again.",
                                device.name(), settings_.uri, sayError(got))});
+}
+
+std::string trimmed(std::string_view text) {
+  constexpr std::string_view kSpace(" \t\r\n\0", 5);
+  const auto first = text.find_first_not_of(kSpace);
+  if (first == std::string_view::npos) return {};
+  return std::string(text.substr(first, text.find_last_not_of(kSpace) + 1 - first));
+}
+
+StampClock stampClockNamed(std::string_view text) {
+  const std::string name = trimmed(text);
+  if (name == "boottime") return StampClock::kBoot;
+  if (name == "monotonic" || name == "monotonic_coarse") return StampClock::kMonotonic;
+  if (name == "realtime" || name == "realtime_coarse") return StampClock::kRealtime;
+  return StampClock::kElsewhere;
+}
+
+std::optional<Eigen::Matrix3d> parseMount(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return c == ',' || c == ';'; }, ' ');
+  std::istringstream in(text);
+  Eigen::Matrix3d R;
+  for (int i = 0; i < 9; ++i) {
+    if (!(in >> R(i / 3, i % 3))) return std::nullopt;
+  }
+  return R;
 }
 
 }  // namespace perdure::capture

@@ -1,12 +1,13 @@
-// Triggered buffer of one IIO device, local or of an iiod in the network. A thread of its own reads
-// it, and reopens it after a loss.
+// Triggered buffer of one IIO device, local or of an iiod. Its thread reopens it after a loss.
 #pragma once
 
+#include <Eigen/Core>
 #include <atomic>
 #include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 
 #include "services/capture/live/device_state.h"
@@ -15,6 +16,18 @@
 struct iio_buffer;
 
 namespace perdure::capture {
+
+/// Removes surrounding white space; sysfs files end in a newline.
+std::string trimmed(std::string_view text);
+
+/// Clock of a device's stamps. kElsewhere: a clock that the host cannot read.
+enum class StampClock { kBoot, kMonotonic, kRealtime, kElsewhere };
+
+StampClock stampClockNamed(std::string_view text);
+
+/// Parses a mount matrix, "1, 0, 0; 0, 1, 0; 0, 0, 1", row by row. Empty if the text is not a
+/// matrix.
+std::optional<Eigen::Matrix3d> parseMount(std::string text);
 
 struct IioSettings {
   std::string uri = "local:";
@@ -26,7 +39,6 @@ struct IioSettings {
   bool gyro = true, accel = true;  ///< required channels
 };
 
-/// Values of one scan of the device.
 struct IioScan {
   std::int64_t time_ns = 0;                    ///< CLOCK_BOOTTIME
   std::optional<Eigen::Vector3d> gyro, accel;  ///< rad/s and m/s²

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "common/base/result.h"
@@ -25,9 +26,8 @@ struct InertialPair {
 /// Interpolates the acceleration at each reading of the gyroscope.
 class ImuPairing {
  public:
-  /// Returns the samples that this reading completes, in order of time. Readings with decreasing
-  /// time are dropped: "imu_out_of_order". Gyroscope readings without accelerations on both sides
-  /// within a tenth of a second are dropped: "imu_unpaired".
+  /// The samples that this reading completes, in order. Decreasing times ("imu_out_of_order") and
+  /// readings without accelerations within .1 s on both sides ("imu_unpaired") are dropped.
   std::vector<InertialPair> gyro(const Triad& reading);
   std::vector<InertialPair> accel(const Triad& reading);
   const ReasonCounts& reasons() const { return reasons_; }
@@ -37,9 +37,18 @@ class ImuPairing {
   std::vector<InertialPair> pairs();
 
   std::deque<Triad> gyro_, accel_;
-  /// Times of the last readings.
   std::int64_t gyro_ns_ = std::numeric_limits<std::int64_t>::min(), accel_ns_ = gyro_ns_;
   ReasonCounts reasons_;
+};
+
+/// Detects wrong stamps of an IMU: data arrive but give no samples.
+class ImuYield {
+ public:
+  /// Takes totals of readings and samples. A sentence if fewer than half became samples.
+  std::string look(std::uint64_t read, std::uint64_t given);
+
+ private:
+  std::uint64_t read_ = 0, given_ = 0;
 };
 
 }  // namespace perdure::capture

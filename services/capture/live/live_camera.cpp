@@ -5,10 +5,9 @@
 namespace perdure::capture {
 namespace {
 
-/// Silence is measured in waits without an image, not in time, because the camera may have sent
-/// images while the process was suspended.
+/// Counts waits without an image, because the process may have been suspended.
 constexpr std::chrono::milliseconds kWait{100};
-constexpr int kSilence = 10;
+constexpr int kSilentIntervals = 10;
 
 }  // namespace
 
@@ -34,7 +33,7 @@ void LiveCamera::flow(CameraSession& session) {
   numbers_.reopened();
   rate_.reopened();
   int silent = 0;
-  while (!stopping_ && !session.stepsAside() && silent < kSilence) {
+  while (!stopping_ && !session.stepsAside() && silent < kSilentIntervals) {
     auto shot = session.next(kWait);
     silent = shot ? 0 : silent + 1;
     if (!shot && session.gone()) break;  // all earlier images have been passed on

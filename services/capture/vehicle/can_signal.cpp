@@ -19,8 +19,7 @@ constexpr double kLargest = 1e30;              // physical value; its square is 
 /// Position of bit k of a signal in DBC's numbering: byte · 8 + bit. Bit 0 is the lowest.
 unsigned positionOf(const CanSignal& s, unsigned k) {
   if (s.little_endian) return s.start + k;
-  // The start bit is the highest. Bits continue down each byte, and then from the top of the next
-  // byte.
+  // The start bit is the highest; bits continue down each byte, then from the next one's top.
   const unsigned from_top = s.length - 1 - k;
   const unsigned sequential = s.start / 8 * 8 + (7 - s.start % 8) + from_top;
   return sequential / 8 * 8 + (7 - sequential % 8);

@@ -6,9 +6,16 @@
 #include <string_view>
 
 #include "common/base/result.h"
-#include "services/capture/vehicle/gnss_fix.h"
 
 namespace perdure::capture {
+
+struct GnssFix {
+  std::int64_t time_ns = 0;                                  ///< CLOCK_BOOTTIME
+  double latitude_deg = 0, longitude_deg = 0, height_m = 0;  ///< WGS 84, above the ellipsoid
+  double sigma_m = 0;            ///< standard deviation of each horizontal axis
+  std::optional<double> speed;   ///< m/s over ground
+  std::optional<double> course;  ///< radians from east, counter-clockwise, (−π, π]
+};
 
 /// Request that is sent once; gpsd then sends reports without further requests.
 inline constexpr std::string_view kGpsdWatch = "?WATCH={\"enable\":true,\"json\":true};\n";

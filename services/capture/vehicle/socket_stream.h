@@ -19,8 +19,7 @@ struct Packet {
   std::int64_t time_ns = 0;  ///< CLOCK_BOOTTIME; the kernel's time of arrival, if available
 };
 
-/// Opens a socket for reading. On failure, the detail is a sentence with the fix; the code is not
-/// used.
+/// Opens a socket for reading. On failure, the detail is a sentence with the fix.
 using OpenSocket = std::function<Result<int>()>;
 
 /// Raw frames with these ids on a CAN interface (SocketCAN), classic and FD. A packet is the
@@ -59,8 +58,7 @@ class SocketStream {
   std::thread thread_;
 };
 
-/// Splits packets into lines. Each complete line is returned once, without its end. A line of more
-/// than 4096 bytes is dropped.
+/// Splits packets into lines without their ends. Lines above 4096 bytes are dropped.
 class Lines {
  public:
   void add(const Packet& packet, const std::function<void(std::string_view, std::int64_t)>& give);

@@ -17,8 +17,7 @@
 
 namespace perdure::capture {
 
-/// Parses a UDP line: "SPEED" or "SPEED SIGMA" in m/s, separated by blanks or a comma. Fails with
-/// "speed_malformed".
+/// Parses "SPEED" or "SPEED SIGMA" in m/s. Fails with "speed_malformed".
 Result<SpeedReading> readSpeedLine(std::string_view line, double sigma, std::int64_t time_ns);
 
 /// Throws StartupError if the configuration has an invalid signal or address.
@@ -38,7 +37,6 @@ class Vehicle {
 
   /// A sentence with the fix; empty while all configured sources send data.
   std::string problem() const;
-  /// Names of the active sources, for people.
   std::string name() const;
   void report(ReasonCounts& counts) const;
 
@@ -59,8 +57,7 @@ class Vehicle {
   std::optional<SpeedReading> said_;  ///< last reading of a datagram's lines
   EarthAnchor anchor_;
   std::atomic<bool> backwards_{false};
-  std::atomic<std::int64_t> speed_ns_, fix_ns_;  ///< time of the last one; initially the time of
-                                                 ///< the start
+  std::atomic<std::int64_t> speed_ns_, fix_ns_;  ///< initially the start
   mutable std::mutex mutex_;                     // protects the members below
   std::optional<WheelSpeed> wheels_;
   ReasonCounts reasons_;

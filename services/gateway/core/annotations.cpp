@@ -18,8 +18,7 @@ using Point = Eigen::Vector2d;
 constexpr int kSamples = 8;  // samples along an edge, because distortion bends it
 enum PointsType { kLineLoop = 2, kLineList = 4 };
 
-/// Adds the visible strokes of the line from a to b (in C), as pairs of end points. For a dashed
-/// line, every other stroke is left out.
+/// Adds the visible strokes of the line from a to b (in C). Dashed: every other one.
 void addStrokes(const CameraModel& camera, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                 bool dashed, std::vector<Point>& strokes) {
   const int samples = dashed ? 2 * kSamples + 1 : kSamples;
@@ -60,7 +59,6 @@ void putLabel(JsonWriter& json, TimePoint time, const Label& label) {
   json.with("background_color", label.colour).end('}');
 }
 
-/// Strokes of the object's cuboid in the image.
 std::vector<Point> projected(const Objects& objects, const ObjectBelief& object,
                              const CameraModel& camera) {
   const RigidTransform T_CW = (objects.T_WB * camera.T_BC()).inverse();

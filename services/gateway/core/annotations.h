@@ -1,7 +1,5 @@
-// Overlays of a camera's image, as foxglove.ImageAnnotations. One overlay has the projected
-// cuboids, dashed if the object is occluded, and the detections, with brightness by likelihood (the
-// paper's figure 1). The other has the objects as regions, with brightness by the likelihood of
-// their class.
+// Overlays of a camera's image, as foxglove.ImageAnnotations: projected cuboids (dashed if
+// occluded) and detections; or regions with brightness by likelihood (figure 1).
 #pragma once
 
 #include <string>
@@ -15,9 +13,8 @@ namespace perdure::gateway {
 std::string imageAnnotations(const Objects& objects, const CameraModel& camera,
                              const Detections* detections);
 
-/// The visible objects as filled regions, with brightness by the likelihood of their class given
-/// the image (the paper's figure 1, middle). The likelihood comes from the box that overlaps the
-/// region, or from inference's answer to the filter's prediction. Black: no likelihood is known.
+/// The visible objects as filled regions, with brightness by the likelihood of their class: of the
+/// box that overlaps the region, or of inference's answer to a prediction. Black: not known.
 /// `model`: of the detections.
 std::string likelihoodRegions(const Objects& objects, const CameraModel& camera,
                               const Detections* detections, const ModelInfo* model);

@@ -1,5 +1,4 @@
-// Channels and services of the gateway, in one table. `advertise`, the schemas, the queues and the
-// README are derived from it.
+// Channels and services of the gateway, in one table.
 #pragma once
 
 #include <cstdint>
@@ -50,8 +49,7 @@ constexpr std::uint32_t cameraChannel(std::size_t camera, CameraPart part) {
 /// Which messages slow clients lose, and which ones late clients receive.
 enum class Delivery {
   kNewest,  ///< the newest message replaces an unsent one; late clients receive it
-  kEach,    ///< a queue that drops, counts and reports the oldest messages; late clients receive
-            ///< the last messages
+  kEach,    ///< drops, counts and reports the oldest messages
 };
 
 struct ChannelInfo {
@@ -61,8 +59,7 @@ struct ChannelInfo {
   Delivery delivery = Delivery::kNewest;
 };
 
-/// JSON schema of this name, which must exist: Foxglove's well-known schemas, from their public
-/// field lists, and Perdure's own, for example "foxglove.Log".
+/// JSON schema of a known name: Foxglove's well-known ones and Perdure's own.
 std::string jsonSchema(std::string_view name);
 
 std::vector<ChannelInfo> channelTable(const std::vector<std::string>& cameras);
@@ -71,8 +68,7 @@ std::vector<ChannelInfo> channelTable(const std::vector<std::string>& cameras);
 ChannelInfo rawChannel(std::uint32_t id, const std::string& topic, const std::string& type,
                        std::string idl);
 
-/// One message of a channel, encoded once for all clients. If `payload` has changes only, `whole`
-/// is for clients that did not get the message before.
+/// A message, encoded once for all clients. `whole`: for clients without the one before.
 struct Encoded {
   std::uint32_t channel = 0;
   TimePoint time;

@@ -4,12 +4,31 @@
 #include <charconv>
 #include <cmath>
 #include <concepts>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 
 namespace perdure::gateway {
+
+/// RFC 4648, with padding.
+inline std::string base64(std::span<const std::uint8_t> bytes) {
+  constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t n = bytes.size() - i;
+    const std::uint32_t word = static_cast<std::uint32_t>(bytes[i] << 16U) |
+                               (n > 1 ? static_cast<std::uint32_t>(bytes[i + 1] << 8U) : 0U) |
+                               (n > 2 ? bytes[i + 2] : 0U);
+    text += kDigits[word >> 18U];
+    text += kDigits[(word >> 12U) & 63U];
+    text += n > 1 ? kDigits[(word >> 6U) & 63U] : '=';
+    text += n > 2 ? kDigits[word & 63U] : '=';
+  }
+  return text;
+}
 
 /// Inserts commas. The caller closes objects and arrays, and writes keys before values.
 class JsonWriter {
@@ -32,8 +51,7 @@ class JsonWriter {
     out_ += "\":";
     return *this;
   }
-  /// Writes a number with `decimals` decimals. A value that is not finite becomes 0, because JSON
-  /// cannot represent it.
+  /// Writes a number with `decimals` decimals; 0 if it is not finite.
   JsonWriter& number(double value, int decimals = 4) {
     comma();
     char buffer[64];
@@ -73,8 +91,7 @@ class JsonWriter {
     out_ += ':';
     return *this;
   }
-  /// Writes a member: a key, and a bool, a number, a text, a list of numbers, or a value of a
-  /// type with a function put(JsonWriter&, value).
+  /// Writes a member: a key and a value, which may be of a type with put(JsonWriter&, value).
   template <class Value, class... Decimals>
   JsonWriter& with(std::string_view name, const Value& value, Decimals... decimals) {
     key(name);

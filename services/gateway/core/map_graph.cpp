@@ -55,7 +55,6 @@ void putLoop(JsonWriter& json, const MapLoop& loop) {
   json.end(']').with("landmarks", loop.landmarks).end('}');
 }
 
-/// Text of [p, yaw] for people.
 std::string metresAndDegrees(const Eigen::Vector4d& v) {
   return fmt::format("{:.3f} {:.3f} {:.3f} m, {:.2f} deg", v[0], v[1], v[2],
                      v[3] * 180.0 / std::numbers::pi);

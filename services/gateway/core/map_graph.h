@@ -17,7 +17,6 @@ class GraphPace {
  public:
   /// The graph may differ from the last answer.
   void changed() { stale_ = true; }
-  /// Whether to query now. `now_ns`: a monotonic time.
   bool due(std::int64_t now_ns);
   void answered(const MapReply& reply, std::int64_t now_ns);
   /// Repeats the query later, if clients still need it.
@@ -35,9 +34,8 @@ MapReply graphOn(const WorldId& map, MapReply reply);
 /// "perdure.MapGraph", in M. `why_none`: a sentence if there is no graph.
 std::string mapGraphJson(const MapReply& graph, const std::string& why_none, TimePoint time);
 
-/// The graph as foxglove.SceneUpdate in the frame `map`. Anchors are spheres, the trajectory
-/// between them is a line, and loops are arches in the colour of their state. Metadata describe
-/// each entity. Each message is complete and replaces the previous one.
+/// The graph as foxglove.SceneUpdate in the frame `map`: spheres, a line, and arches in the colour
+/// of their state, with metadata. Each message is complete.
 std::string mapGraphScene(const MapReply& graph, TimePoint time);
 
 }  // namespace perdure::gateway

@@ -1,5 +1,4 @@
-// The durable map in relation to the working set. Its tiles are in M, the working set is in W, and
-// T_MW of `map/frame` connects them.
+// The durable map in M and the working set in W, connected by T_MW of `map/frame`.
 #pragma once
 
 #include <map>
@@ -14,28 +13,23 @@ namespace perdure::gateway {
 
 class MapLayer {
  public:
-  /// Takes a message of `map/frame`.
   void follow(const MapFrame& frame);
   void put(const MapTile& tile);
   void erase(const MapTile& key);
   /// Clears the tiles, because they are no longer received.
   void clear() { tiles_.clear(); }
   bool empty() const { return tiles_.empty(); }
-  /// Whether tiles or T_MW have changed since the last call.
   bool takeChanged();
 
   /// The newest frame if it belongs to this W; otherwise nullptr.
   const MapFrame* frameOf(const WorldId& world) const;
-  /// Transforms points from W to M. Identity if no frame of this W was received; the map store then
-  /// publishes objects of W unchanged.
+  /// Maps W to M. Identity without a frame of this W: map_store then publishes in W.
   RigidTransform T_MW(const WorldId& world) const;
-  /// M of this W.
   WorldId mapOf(const WorldId& world) const;
 
   struct View {
     std::vector<MapObject> here;  ///< objects in the M of this W
-    std::size_t elsewhere = 0;    ///< number of objects of maps whose transform to this M is
-                                  ///< unknown
+    std::size_t elsewhere = 0;    ///< of maps whose place in this M is not known
   };
   View viewFrom(const WorldId& world) const;
 
@@ -48,7 +42,6 @@ class MapLayer {
 /// The message "perdure.MapFrame".
 std::string mapFrameJson(const MapFrame& frame);
 
-/// Largest number of map objects that are sent.
 inline constexpr std::size_t kMostOfMap = 2000;
 /// The nearest kMostOfMap of `objects`, nearest first. `p_MB`: position of the body in M.
 std::vector<MapObject> nearestTo(const Eigen::Vector3d& p_MB, std::vector<MapObject> objects);

@@ -34,10 +34,8 @@ void endEntity(JsonWriter& json, std::initializer_list<const char*> without);
 /// Writes the list of the primitive type `name` ("cubes", "spheres") with one solid.
 void putSolid(JsonWriter& json, const char* name, const RigidTransform& pose,
               const Eigen::Vector3d& size, const Colour& colour);
-/// Writes the list of lines with one line.
 void putLine(JsonWriter& json, LineType type, double thickness_px,
              const std::vector<Eigen::Vector3d>& points, const Colour& colour);
-/// Writes an item of metadata.
 void putPair(JsonWriter& json, const char* name, const std::string& value);
 
 /// Rotation about the vertical `up`, like the objects' yaw.

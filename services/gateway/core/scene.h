@@ -27,9 +27,8 @@ class Scene {
   std::map<ObjectId, std::string> shown_;  ///< entities
 };
 
-/// The durable map as foxglove.SceneUpdate in the frame `map`: pale cuboids with their names,
-/// dashed if provisional. Each message is complete and replaces the previous one. `objects` are in
-/// M. Those in `working` are left out, because `Scene` shows them.
+/// The durable map as foxglove.SceneUpdate in the frame `map`: pale cuboids, dashed if provisional,
+/// without those in `working`. Each message is complete.
 std::string mapScene(const std::vector<MapObject>& objects, const std::set<ObjectId>& working,
                      TimePoint time);
 

@@ -4,27 +4,13 @@
 
 #include <functional>
 
-#include "common/types/end_of_drive.h"
+#include "common/types/health.h"
 #include "services/gateway/core/json_writer.h"
 
 namespace perdure::gateway {
 namespace {
 
 constexpr double kSilent = 2.5;  // s; Health is sent each second
-
-const char* wordOf(HealthState state) {
-  switch (state) {
-    case HealthState::kStarting:
-      return "starting";
-    case HealthState::kOk:
-      return "ok";
-    case HealthState::kDegraded:
-      return "degraded";
-    case HealthState::kFailed:
-      return "failed";
-  }
-  return "unknown";
-}
 
 double secondsSince(std::int64_t then_ns, std::int64_t now_ns) {
   return then_ns == 0 ? -1.0 : 1e-9 * static_cast<double>(now_ns - then_ns);
@@ -86,7 +72,7 @@ std::string VitalSigns::json(std::int64_t now_ns, const Silence& last) const {
   for (const auto& [name, service] : services_) {
     if (stand_ins_.contains(name)) continue;
     const Health h = shown(service.health, now_ns);
-    json.begin('{').with("process", name).with("state", wordOf(h.state)).with("message", h.message);
+    json.begin('{').with("process", name).with("state", nameOf(h.state)).with("message", h.message);
     json.with("age_s", secondsSince(service.heard_ns, now_ns), 2).with("frames_in", h.frames_in);
     json.with("frames_out", h.frames_out).with("dropped", h.dropped).with("rate_hz", h.rate_hz, 2);
     json.with("cpu", service.cpu, 3).with("rss_mb", 1e-6 * static_cast<double>(h.rss_bytes), 1);
@@ -110,7 +96,7 @@ std::string VitalSigns::healthz(std::int64_t now_ns) const {
     if (name != "gateway" && !silent) ++heard;
     const HealthState state = shown(service.health, now_ns).state;
     if (silent || state != HealthState::kOk) status = "degraded";
-    services.textKey(name).text(silent ? "silent" : wordOf(state));
+    services.textKey(name).text(silent ? "silent" : nameOf(state));
   }
   for (const auto& [name, sentence] : stand_ins_) services.textKey(name).text("stood_in_for");
   services.end('}');

@@ -10,7 +10,6 @@
 
 namespace perdure::gateway {
 
-/// A metric of the gateway, for /metrics.
 struct Figure {
   std::string name, help;
   bool counts = false;  ///< a counter; otherwise a gauge

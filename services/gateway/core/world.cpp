@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "services/gateway/core/base64.h"
+#include "services/gateway/core/json_writer.h"
 #include "services/gateway/core/pieces.h"
 
 namespace perdure::gateway {

@@ -1,5 +1,4 @@
-// Messages from clients of the Foxglove WebSocket protocol (subprotocols foxglove.sdk.v1 and
-// foxglove.websocket.v1). They are parsed and bounded: any bytes give a value or a reason.
+// Messages from clients of the Foxglove WebSocket protocol: any bytes give a value or a reason.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +13,6 @@
 
 namespace perdure::gateway::protocol {
 
-/// Largest number of subscriptions in one message.
 inline constexpr std::size_t kMostSubscriptions = 256;
 
 struct Subscription {
@@ -39,8 +37,7 @@ struct ServiceCall {
 };
 /// Valid messages without effect: connection graph, updates of parameters.
 struct Ignored {};
-/// Valid messages that are refused, because this gateway only displays: "advertise",
-/// "setParameters", messages.
+/// Valid messages that are refused, because this gateway only displays.
 struct NotOffered {
   std::string what;
 };

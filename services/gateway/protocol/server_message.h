@@ -1,6 +1,5 @@
-// Messages from the server of the Foxglove WebSocket protocol. time(), playbackState(),
-// serviceResponse(), assetMissing() and messageHead() return bytes of binary messages. The other
-// functions return JSON texts.
+// Messages from the server of the Foxglove WebSocket protocol, as JSON or as bytes of binary
+// messages.
 #pragma once
 
 #include <array>
@@ -35,7 +34,6 @@ std::string playbackState(const PlaybackState& state);
 std::string serviceResponse(std::uint32_t service, std::uint32_t call, std::string_view json);
 std::string assetMissing(std::uint32_t request, std::string_view message);
 
-/// Header before a channel's payload.
 using MessageHead = std::array<std::uint8_t, 13>;
 MessageHead messageHead(std::uint32_t subscription, TimePoint time);
 

@@ -1,5 +1,4 @@
-// One WebSocket client. It reads the client's messages, and writes the waiting messages one at a
-// time.
+// One WebSocket client; waiting messages are written one at a time.
 #include <array>
 
 #include "services/gateway/web/shared.h"
@@ -7,8 +6,7 @@
 namespace perdure::gateway::web {
 namespace {
 
-/// Closes a connection without waiting until the client has closed its side. Beast's own teardown
-/// waits up to the timeout of a handshake, and then loses the client's error.
+/// Closes a connection without waiting for the client's side, as Beast's own teardown does.
 class Wire : public beast::tcp_stream {
  public:
   explicit Wire(beast::tcp_stream stream) : beast::tcp_stream(std::move(stream)) {}
@@ -152,8 +150,7 @@ void Client::onWritten(beast::error_code error, std::size_t bytes) {
   flush();
 }
 
-/// Closes without a close frame, which would wait behind data that the client does not read. The
-/// client's read then fails, which removes it from the hub.
+/// Closes without a close frame, which would wait behind unread data. The client's read fails.
 void Client::cut(const std::string&) {
   if (cut_) return;
   cut_ = true;

@@ -63,8 +63,7 @@ Result<void> Guard::checkHost(std::string_view host) const {
   const auto& allowed = options_.allowed_hosts;
   const bool listed =
       std::ranges::any_of(allowed, [&](const auto& one) { return lower(one) == name; });
-  // With a token the name is not checked: a foreign page that resolves to this host lacks the
-  // token.
+  // With a token the name is not checked: a foreign page lacks the token.
   const bool guarded = !options_.token.empty() && !name.empty();
   if (guarded || isLoopback(name) || name == options_.address || listed) return {};
   return fail("host_refused", "the Host header names \"" + name.substr(0, 64) +

@@ -152,8 +152,7 @@ void Hub::unsubscribe(Viewer& viewer, std::uint32_t subscription) {
   viewer.outbox_.forget(subscription);
 }
 
-/// A channel without viewers is no longer computed, so its stored messages are cleared before they
-/// become old.
+/// A channel without viewers is not computed, so its stored messages are cleared.
 void Hub::release(std::uint32_t channel) {
   Kept& kept = channels_.at(channel);
   if (--kept.subscriptions == 0) kept.messages.clear();

@@ -1,5 +1,4 @@
-// Subscriptions of all clients, messages for late clients, and service calls. The hub has no
-// sockets; one thread uses it.
+// Subscriptions of all clients, messages for late clients, and service calls; one thread.
 #pragma once
 
 #include <chrono>
@@ -26,7 +25,6 @@ class Viewer {
   Outbox& outbox() { return outbox_; }
   std::uint64_t id() const { return id_; }
 
-  /// Called if a message waits in the outbox.
   virtual void flush() = 0;
   /// Closes the client; `why` is the reason as text.
   virtual void cut(const std::string& why) = 0;
@@ -76,8 +74,7 @@ class Hub {
  private:
   struct Kept {
     ChannelInfo info;
-    std::deque<Encoded> messages;  ///< messages for late clients: the last ones of kEach, the
-                                   ///< newest of kNewest
+    std::deque<Encoded> messages;  ///< for late clients
     std::size_t subscriptions = 0;
   };
   void handle(Viewer& viewer, const protocol::ClientMessage& message);

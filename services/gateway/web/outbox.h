@@ -1,5 +1,4 @@
-// Bounded queue of messages to one client. For Delivery::kNewest, a new message replaces the
-// waiting one; for kEach, the oldest messages are dropped.
+// Bounded queue to one client: kNewest replaces the waiting message, kEach drops the oldest.
 #pragma once
 
 #include <cstdint>
@@ -25,8 +24,7 @@ struct Outgoing {
 
 class Outbox {
  public:
-  /// most_events: limit for each subscription. most_control: limit for messages of the protocol
-  /// itself.
+  /// Limits for each subscription, and for messages of the protocol itself.
   Outbox(std::size_t most_events, std::size_t most_control)
       : most_events_(most_events), most_control_(most_control) {}
 
@@ -35,13 +33,11 @@ class Outbox {
   bool putControl(std::string message, bool text);
   /// Adds the time of the newest message, which replaces a waiting one.
   void putTime(std::string message);
-  /// Removes the waiting messages of this subscription.
   void forget(std::uint32_t subscription);
 
   std::optional<Outgoing> take();
   std::size_t size() const { return waiting_.size(); }
   std::uint64_t dropped() const { return dropped_; }
-  /// Number of events lost since the last call.
   std::uint64_t takeLostEvents();
 
  private:

@@ -10,8 +10,8 @@
 #include "common/base/result.h"
 #include "services/gateway/core/channels.h"
 #include "services/gateway/web/files.h"
+#include "services/gateway/web/guard.h"
 #include "services/gateway/web/hub.h"
-#include "services/gateway/web/options.h"
 
 namespace perdure::gateway::web {
 
@@ -20,8 +20,7 @@ struct Content {
   std::vector<ChannelInfo> channels;
   std::vector<ServiceInfo> services;
   Files files;
-  std::optional<TimeRange> range = std::nullopt;  ///< time range of a recording that clients
-                                                  ///< control
+  std::optional<TimeRange> range = std::nullopt;  ///< of a recording that clients control
 };
 
 struct Stats {
@@ -32,10 +31,8 @@ struct Stats {
 
 class Server {
  public:
-  /// `told` is called in the server's thread. Throws StartupError (69) if the port is not
-  /// available.
+  /// `told` is called in the server's thread. Throws StartupError (69) without the port.
   Server(const Options& options, Content content, Hub::Told told);
-  /// Ends all connections.
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;

@@ -17,7 +17,6 @@
 #include "services/gateway/web/files.h"
 #include "services/gateway/web/guard.h"
 #include "services/gateway/web/hub.h"
-#include "services/gateway/web/options.h"
 
 namespace perdure::gateway::web {
 

@@ -7,7 +7,6 @@
 namespace perdure::inference {
 namespace {
 
-/// Median of the last `count` values.
 double medianOfLast(const std::vector<double>& values, std::size_t count) {
   std::vector<double> last(values.end() - static_cast<std::ptrdiff_t>(count), values.end());
   const auto middle = last.begin() + static_cast<std::ptrdiff_t>(count / 2);

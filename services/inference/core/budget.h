@@ -1,6 +1,5 @@
-// Selects the input size of the network that keeps a frame within a time budget. The size decreases
-// at once if frames take too long. It increases only after many frames below the budget, so that it
-// does not oscillate.
+// Selects the input size that keeps a frame within a time budget. It decreases at once, and
+// increases only after many frames below the budget.
 #pragma once
 
 #include <cstddef>
@@ -10,17 +9,13 @@ namespace perdure::inference {
 
 class Budget {
  public:
-  static constexpr std::size_t kSlow = 5;    ///< number of frames whose median must exceed the
-                                             ///< budget
-  static constexpr std::size_t kQuick = 30;  ///< number of frames whose median must be below the
-                                             ///< budget
+  static constexpr std::size_t kSlow = 5;    ///< frames whose median exceeds the budget
+  static constexpr std::size_t kQuick = 30;  ///< frames whose median is below it
   static constexpr double kRoom = 0.8;       ///< share of the budget that a larger size may take
 
-  /// `shares`: pixels of each size relative to the first one, falling from 1. The time of a frame
-  /// is proportional to them. `budget_ms` 0: always the first size.
+  /// `shares`: pixels of each size relative to the first, falling from 1. `budget_ms` 0: none.
   Budget(double budget_ms, std::vector<double> shares);
 
-  /// Index of the current size.
   std::size_t size() const { return size_; }
   /// Adds the time of a frame at the current size. Returns whether the size has changed.
   bool took(double ms);

@@ -1,5 +1,4 @@
-// Converts beliefs to bytes and back for the database. The format is versioned, little-endian and
-// exact: a double keeps its bits.
+// Converts beliefs to bytes and back, versioned and exact: a double keeps its bits.
 #pragma once
 
 #include <cstdint>
@@ -11,13 +10,11 @@
 
 namespace perdure::map_store {
 
-/// The first two bytes of every blob. A reader refuses unknown versions. Version 1 has no ledger;
-/// version 2 has no pose error in the header.
+/// The first two bytes. Version 1 has no ledger; version 2 has no pose error in the header.
 inline constexpr std::uint16_t kBeliefFormat = 4;
 
 Bytes encodeBelief(const ObjectBelief& belief);
-/// Refuses ("belief_malformed") bytes that are truncated, too long, of another version or without a
-/// class.
+/// Refuses ("belief_malformed") truncated, long, or unknown bytes, or none of a class.
 Result<ObjectBelief> decodeBelief(std::span<const std::uint8_t> bytes);
 
 /// Encodes all members of `objects` except the beliefs.

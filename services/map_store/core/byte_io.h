@@ -1,6 +1,5 @@
-// Converts values to bytes and back for blobs of the database. The format is little-endian and
-// exact: a double keeps its bits. A writer and a reader have the same functions, so that one field
-// list `fields(io, value)` serves both directions.
+// Converts values to bytes and back, little-endian and exact. A writer and a reader have the same
+// functions, so that one list `fields(io, value)` serves both.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,7 +12,6 @@
 #include <vector>
 
 #include "common/base/time.h"
-#include "common/base/time_bounds.h"
 
 namespace perdure::map_store {
 

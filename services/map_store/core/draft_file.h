@@ -1,7 +1,6 @@
 // Writes a database to a draft file and renames it when it is complete.
 #pragma once
 
-#include <filesystem>
 #include <string>
 
 #include "common/base/result.h"

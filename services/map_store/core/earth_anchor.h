@@ -1,5 +1,4 @@
-// The position of M on Earth, as stored in the map's file and the settings: latitude, longitude,
-// height and yaw, in degrees and metres (earth_place.h).
+// The position of M on Earth as in file and settings: latitude, longitude, height, yaw.
 #pragma once
 
 #include <string>

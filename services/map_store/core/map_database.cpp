@@ -26,8 +26,7 @@ std::uint64_t digestOf(std::span<const std::uint8_t> bytes, const WorldId& world
   return digest(text) ^ (world.world * 31 + world.epoch);
 }
 
-/// A statement for many rows of one commit. It is prepared with the first row, because preparing
-/// takes longer than writing a row.
+/// A statement for many rows of one commit, prepared with the first row.
 void runAgain(const Connection& connection, std::optional<Statement>& statement,
               std::string_view sql, const auto&... parameters) {
   if (!statement) statement.emplace(need(connection.prepare(sql)));

@@ -39,18 +39,15 @@ struct Removal {
 
 struct StoredTrack;  // core/track_rows.h
 
-/// The content of one commit. Ids are track ids. `left`: last beliefs of confirmed tracks that left
-/// the working set.
+/// The content of one commit, by track ids. `left`: confirmed tracks that left the working set.
 struct Batch {
   const Objects* working = nullptr;  ///< not null
   std::map<TrackId, PlacedBelief> left;
   std::map<TrackId, Removal> removed;
-  /// Tracks of the working set that the graph placed and that were not detected since. Their stored
-  /// rows do not change.
+  /// Tracks that the graph placed and that were not detected since: stored rows do not change.
   std::set<TrackId> placed = {};
   const mapping::Unsaved* graph = nullptr;  ///< changed parts of the graph; null: no changes
-  /// Which tracks are one object, the changes to this, and the affected tracks. Null: each track is
-  /// an object of its own.
+  /// Which tracks are one object, and the changes. Null: each track is an object of its own.
   const mapping::Identity* identity = nullptr;
   const mapping::Unsaved* facts = nullptr;
   std::set<TrackId> regrouped = {};
@@ -61,8 +58,7 @@ struct Batch {
 struct Written {
   std::vector<ObjectId> objects;  ///< objects that changed, came or left, each once
   std::uint64_t revision = 0;
-  std::uint64_t unsound = 0;  ///< parts of the graph that are not finite; their stored values do
-                              ///< not change
+  std::uint64_t unsound = 0;  ///< not finite; their stored values do not change
 };
 
 struct Found {
@@ -72,7 +68,6 @@ struct Found {
   std::uint64_t malformed = 0;  ///< rows that were left out because their belief could not be read
 };
 
-/// The stored position of an object on the map.
 struct StoredPlace {
   ObjectId id = 0;
   WorldId world;  ///< the W of the position
@@ -90,19 +85,16 @@ class MapReader {
   explicit MapReader(const Connection* connection) : connection_(connection) {}
 
   /// Answers kById, kByClass, kByRadius (nearest first), kByBox and kAll (by id) with at most
-  /// `limit` objects. kByRadius and kByBox search in query.world, or in `newest` if query.world is
-  /// 0.
+  /// `limit` objects, in query.world or `newest`.
   Result<Found> find(const MapQuery& query, const WorldId& newest, std::uint32_t limit) const;
   /// All objects on the map, in full, by id; rows that cannot be read are left out.
   Result<std::vector<PlacedBelief>> beliefs() const;
-  /// The objects nearer than the radius, in full, nearest first.
   Result<Found> inFullNear(const Eigen::Vector3d& centre, double radius, const WorldId& world,
                            std::uint32_t limit) const;
   /// The last belief of a track; nothing if it is not on the map.
   Result<std::optional<PlacedBelief>> beliefOf(TrackId track) const;
   /// Those of the objects `ids` that are on the map, in this order; at most `limit`.
   Result<Found> byIds(const std::vector<ObjectId>& ids, std::size_t limit) const;
-  /// The places of all objects on the map, by id.
   Result<std::vector<StoredPlace>> places() const;
   /// Nothing if the object is not on the map.
   Result<std::optional<StoredPlace>> placeOf(ObjectId id) const;
@@ -126,22 +118,19 @@ class MapReader {
 
 class MapDatabase {
  public:
-  /// Throws StartupError.
   explicit MapDatabase(const StoreOptions& options);
 
   /// Commits everything or nothing; the data is durable on return. Beliefs that did not change, or
   /// whose objects were removed at `working`'s time or later, are not written.
   Result<Written> write(const Batch& batch);
 
-  /// Returns the graph to continue with. The next write of a graph deletes the parts that were left
-  /// out, because their ids are reused.
+  /// The graph to continue with. The next write deletes the parts that were left out.
   Result<SavedGraph> takeGraph();
 
   MapReader reader() const { return MapReader(&connection_); }
   const std::string& notice() const { return notice_; }
 
  private:
-  /// The stored row of a track or an object.
   struct Row {
     std::uint64_t digest = 0;  ///< digest of the belief; 0: not known
     bool stored = false;

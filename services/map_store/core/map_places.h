@@ -1,5 +1,4 @@
-// The positions in M of all objects on the map, in memory. They determine the published squares and
-// answer spatial queries.
+// The positions in M of all objects, which determine squares and answer spatial queries.
 #pragma once
 
 #include <functional>
@@ -22,18 +21,15 @@ class MapPlaces {
   /// Adds or updates an object on the map. `record`: its record in the graph, or null.
   void put(const StoredPlace& stored, const mapping::ObjectRecord* record,
            const mapping::MapFrames& frames);
-  /// Removes an object that left the map.
   void erase(ObjectId id);
-  /// The graph has changed: places all objects as `frames` defines. A square becomes stale if an
-  /// object moved 0.1 m or more since the square was taken.
+  /// Places all objects anew. A square becomes stale if an object moved 0.1 m since it was taken.
   void lay(const mapping::MapFrames& frames);
 
   /// The anchor of an object; 0: it has none, or is not on the map.
   mapping::AnchorId anchorOf(ObjectId id) const;
   /// The objects in this M for kByRadius (nearest first) and kByBox (by id).
   std::vector<ObjectId> find(const MapQuery& query, const WorldId& map) const;
-  /// Squares whose contents have changed since they were last taken, with their ids in order. A
-  /// square without ids is empty.
+  /// Squares that have changed since they were last taken, with their ids; empty: no objects.
   std::map<Square, std::vector<ObjectId>> takeStale();
   std::size_t size() const { return places_.size(); }
 
@@ -43,8 +39,7 @@ class MapPlaces {
     Eigen::Vector3d p_W = Eigen::Vector3d::Zero(), p_M = Eigen::Vector3d::Zero();
     WorldId map;  ///< the M of the position
     bool provisional = false;
-    std::optional<Square> square;  ///< square in which it was published; nothing: beyond all
-                                   ///< squares
+    std::optional<Square> square;  ///< of its publication; nothing: beyond all
     double moved_m = 0.0;          ///< upper bound of its motion since then
   };
   void show(Place& place);
@@ -65,16 +60,13 @@ class MapInM {
   /// Must precede all queries. Loads everything or nothing.
   Result<void> load(mapping::MapFrames frames);
   bool isLoaded() const { return loaded_; }
-  /// Takes the changes of a commit, by ids, directly after it. Rows that cannot be read now are
-  /// read by the next call.
+  /// Takes the changes of a commit. Rows that cannot be read now are read by the next call.
   Result<void> refresh(const std::vector<ObjectId>& changed);
   /// The graph has grown. `moved`: earlier parts of it have moved too.
   void follow(mapping::MapFrames frames, bool moved);
 
-  /// Answers queries by id, class, radius and box, and for all objects, as MapReader::find does, in
-  /// M. Spatial queries search in the M of `newest`.
+  /// As MapReader::find does, in M. Spatial queries search in the M of `newest`.
   Result<Found> find(const MapQuery& query, const WorldId& newest, std::uint32_t limit) const;
-  /// The objects of a square.
   Result<Found> objects(const std::vector<ObjectId>& ids) const;
   std::map<Square, std::vector<ObjectId>> takeStale() { return places_.takeStale(); }
 

@@ -1,5 +1,4 @@
-// The outbox: rows of a map's file that have changed and are not known to be on a fleet's server.
-// The file's triggers write it within the transaction that changes the row.
+// The outbox: changed rows that are not known to be on a fleet's server, written by triggers.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +9,7 @@
 
 namespace perdure::map_store {
 
-/// Numbers of the tables in the outbox. Ends of edges and anchors of sightings come before the rows
-/// that refer to them.
+/// Numbers of the tables in the outbox; referred rows come first.
 enum class OutboxTable : std::int64_t {
   kClasses = 0,
   kAnchors = 1,
@@ -26,8 +24,7 @@ inline constexpr std::int64_t kOutboxTables = 8;
 
 /// The state of an outbox. Each change has a larger number than all earlier ones.
 struct OutboxMark {
-  std::string file;    ///< 32 hexadecimal digits that never change; copies of the file have the
-                       ///< same digits
+  std::string file;    ///< 32 hexadecimal digits; copies have the same
   std::string outbox;  ///< 32 digits that change when the outbox restarts after missed changes
   std::int64_t acknowledged = 0;  ///< entries up to this one were removed
   std::int64_t last = 0;          ///< number of the newest change

@@ -14,9 +14,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// One row for each object that was ever confirmed. `gone` is 0, or 1 + the EventKind that ended the
-// object; the row then stays as history. `belief` is encoded by core/belief_codec.h. The other
-// columns are for queries. `tile_*` follow from x, y and meta.tile_size_m.
+// One row for each object that was ever confirmed. `gone`: 0, or 1 + the EventKind that ended it.
+// `belief`: core/belief_codec.h; other columns are for queries.
 constexpr char kSchema[] = R"sql(
 CREATE TABLE meta(key TEXT PRIMARY KEY, value) WITHOUT ROWID;
 CREATE TABLE objects(
@@ -105,8 +104,7 @@ void create(const Connection& connection) {
   need(transaction.commit());
 }
 
-/// Upgrades a file of an older version. Its tables and beliefs stay valid; some tables are new. All
-/// or nothing.
+/// Upgrades a file of an older version by adding tables. All or nothing.
 void adopt(const Connection& connection, const Identity& identity) {
   if (identity.version == kSchemaVersion) return need(connection.execute(kAddedSchema));
   auto transaction = need(Transaction::begin(connection));

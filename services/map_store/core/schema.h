@@ -1,5 +1,4 @@
-// The map's file is opened, checked and created here. A damaged file is renamed and never
-// overwritten.
+// Opens, checks and creates the map's file. A damaged file is renamed, not overwritten.
 #pragma once
 
 #include <cstdint>
@@ -28,7 +27,6 @@ struct OpenedStore {
   std::string notice;  ///< a sentence if a damaged file was renamed, else empty
 };
 
-/// Application id and version in a database's header.
 struct Identity {
   std::int64_t application = 0, version = 0, tables = 0;
   bool empty() const { return application == 0 && version == 0 && tables == 0; }
@@ -38,8 +36,7 @@ Result<Identity> identityOf(const Connection& connection);
 /// Reads the whole file. Reason of failure: "corrupt" if it is damaged.
 Result<void> wholeFileIsSound(const Connection& connection);
 
-/// Opens the file for the service. Throws StartupError with the fix if the folder is not writable,
-/// the file is not a map of ours, or a newer version wrote it.
+/// Opens the file for the service. Throws StartupError if it cannot be written or is not ours.
 OpenedStore openStore(const StoreOptions& options);
 
 /// Whether the content of a file is the cause, rather than its disk or its folder.

@@ -1,5 +1,4 @@
-// RAII wrappers for SQLite: a connection, prepared statements, and a transaction that rolls back
-// automatically.
+// RAII wrappers for SQLite: connection, prepared statements, transaction.
 #pragma once
 
 #include <cstdint>
@@ -21,9 +20,8 @@ struct sqlite3_stmt;
 
 namespace perdure::map_store {
 
-/// The reason of an SQLite result code: "disk_full", "read_only", "busy", "corrupt",
-/// "not_a_database", "cannot_open", "io_error", "constraint" or "database_error"; the detail is
-/// SQLite's sentence.
+/// The reason of a result code: "disk_full", "read_only", "busy", "corrupt", "not_a_database",
+/// "cannot_open", "io_error", "constraint" or "database_error".
 Reason reasonOf(int code, std::string_view detail);
 
 /// The exit status of a program that ends for this reason: 74 for a failed write, else 69.
@@ -58,8 +56,7 @@ Result<std::invoke_result_t<Run>> attempt(Run run) {
   }
 }
 
-/// One prepared statement. Parameters count from 1, columns from 0. Valid for the lifetime of its
-/// connection.
+/// One prepared statement. Parameters count from 1, columns from 0.
 class Statement {
  public:
   Statement() = default;
@@ -74,7 +71,6 @@ class Statement {
   Statement& bind(int index, std::string_view value);
   Statement& bind(int index, std::span<const std::uint8_t> value);
   Statement& bindNull(int index);
-  /// Binds the values to the parameters from 1.
   Statement& bindAll(const auto&... values) {
     int index = 0;
     (bind(++index, values), ...);
@@ -87,7 +83,6 @@ class Statement {
   Result<void> run() {
     return forEach([](const Statement&) {});
   }
-  /// Calls `take` for each row.
   Result<void> forEach(auto take) {
     for (;;) {
       const auto row = step();
@@ -123,12 +118,10 @@ class Connection {
   static Result<Connection> open(const std::string& path, Mode mode);
 
   Result<Statement> prepare(std::string_view sql) const;
-  /// Runs one statement with the values of its parameters.
   Result<void> run(std::string_view sql, const auto&... values) const {
     return prepare(sql).and_then(
         [&](Statement statement) { return statement.bindAll(values...).run(); });
   }
-  /// Calls `take` for each row of a query with the values of its parameters.
   Result<void> forRows(std::string_view sql, auto take, const auto&... values) const {
     return prepare(sql).and_then(
         [&](Statement rows) { return rows.bindAll(values...).forEach(take); });
@@ -159,8 +152,7 @@ class Connection {
   std::unique_ptr<sqlite3, Close> connection_;
 };
 
-/// Calls `read` as attempt() does, and all its queries see one state of the file. Outside a
-/// transaction a savepoint acts as one.
+/// Calls `read` as attempt() does; all its queries see one state of the file.
 template <class Read>
 Result<std::invoke_result_t<Read>> inOneState(const Connection& connection, Read read) {
   if (auto begun = connection.execute("SAVEPOINT state"); !begun) {

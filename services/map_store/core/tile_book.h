@@ -1,5 +1,4 @@
-// The map in parts for late joiners: squares, divided into tiles of at most kMapTileCapacity
-// objects.
+// The map for late joiners: squares, divided into tiles of at most kMapTileCapacity objects.
 #pragma once
 
 #include <cstdint>

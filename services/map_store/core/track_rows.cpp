@@ -1,6 +1,5 @@
 #include "services/map_store/core/track_rows.h"
 
-#include <string_view>
 #include <utility>
 
 namespace perdure::map_store {

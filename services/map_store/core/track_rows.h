@@ -18,8 +18,7 @@ struct StoredTrack {
 
 std::optional<StoredTrack> readTrack(const Connection& connection, TrackId id);
 void writeTrack(const Connection& connection, const StoredTrack& track);
-/// The track shares its object from now on. Copies the object's row unless the track already has
-/// one.
+/// The track shares its object from now on: copies the object's row if it has none.
 void shareTrack(const Connection& connection, TrackId id);
 void endTrack(const Connection& connection, TrackId id, TimePoint time);
 void deleteTrack(const Connection& connection, TrackId id);

@@ -41,8 +41,7 @@ std::string onlyUtf8(std::string_view text) {
   return clean;
 }
 
-/// The first line of libpq's message. It never holds the password, because no URL has one
-/// (server_url.h).
+/// The first line of libpq's message, without a password (server_url.h).
 std::string firstLine(const char* message) {
   const std::string text = message == nullptr ? "" : message;
   return text.substr(0, text.find('\n'));
@@ -202,8 +201,7 @@ Result<void> Link::finishConnecting() {
   return fail(code, firstLine(message.c_str()));
 }
 
-/// A commit is on the server's disk when it is acknowledged. A transaction ends if the link is
-/// lost.
+/// A commit is on the server's disk when acknowledged. A lost link ends a transaction.
 Result<void> Link::setUp() {
   if (PQsetnonblocking(connection_.get(), 1) != 0) return tl::unexpected<Reason>(lost());
   const std::string milliseconds = std::to_string(patience_.answer.count());

@@ -1,6 +1,8 @@
-// A connection to PostgreSQL with bounded waits: non-blocking libpq behind RAII. Values keep their
-// bits.
+// A connection to PostgreSQL with bounded waits: non-blocking libpq behind RAII.
 #pragma once
+
+#include <sys/eventfd.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <cstdint>
@@ -11,13 +13,33 @@
 #include <string_view>
 #include <vector>
 
+#include "common/base/check.h"
 #include "common/base/result.h"
-#include "services/map_store/fleet/stop.h"
 
 struct pg_conn;
 struct pg_result;
 
 namespace perdure::map_store::fleet {
+
+/// Ends the waits of another thread.
+class Stop {
+ public:
+  Stop() : file_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+    perdure::check(file_ >= 0, "a process has a file descriptor left");
+  }
+  ~Stop() { close(file_); }
+  Stop(const Stop&) = delete;
+  Stop& operator=(const Stop&) = delete;
+  /// May be called from any thread; cannot be undone.
+  void raise() const {
+    const std::uint64_t one = 1;
+    (void)!write(file_, &one, sizeof one);
+  }
+  int file() const { return file_; }  ///< becomes readable once raised
+
+ private:
+  int file_;
+};
 
 /// Time limits of waits. Name resolution uses the limits of the system's resolver.
 struct Patience {
@@ -25,7 +47,6 @@ struct Patience {
   std::chrono::milliseconds answer{20'000};  ///< while nothing is sent or received
 };
 
-/// Parameters of one statement, in order.
 class Values {
  public:
   Values& put(std::int64_t value);
@@ -40,7 +61,6 @@ class Values {
   std::vector<std::optional<std::string>> bytes_;
 };
 
-/// The result of a statement.
 class Answer {
  public:
   explicit Answer(pg_result* result) : result_(result) {}
@@ -59,24 +79,20 @@ class Answer {
   std::unique_ptr<pg_result, Clear> result_;
 };
 
-/// Reasons: "server_unreachable" (no connection, no answer, or the connection was lost),
-/// "server_login" (name, password or database), "server_rights", "server_full", "server_busy",
-/// "server_refused" (any other), "server_overtaken" (another process has written this map
-/// meanwhile), "stopped". After "server_unreachable" and "stopped" the link cannot be used any
-/// more.
+/// Reasons: "server_unreachable", "server_login", "server_rights", "server_full", "server_busy",
+/// "server_refused" (any other), "server_overtaken" (another process wrote this map), "stopped".
+/// After "server_unreachable" and "stopped" the link cannot be used.
 class Link {
  public:
   /// `stop` must outlive the link; raising it ends every wait.
   static Result<Link> open(const std::string& url, const Patience& patience, const Stop& stop);
 
-  /// Runs one statement and returns its answer.
   Result<Answer> ask(const std::string& sql, const Values& values = {});
   /// Runs statements without parameters or answers in one transaction.
   Result<void> run(const std::string& sql);
   Result<void> prepare(const std::string& name, const std::string& sql);
 
-  /// Statements that are sent together: begin, queue, then end. They are one transaction, or part
-  /// of the open one.
+  /// Statements that are sent together: begin, queue, end; one transaction or part of it.
   void beginBatch(bool as_transaction = true);
   void queue(const std::string& prepared, const Values& values);
   /// Success means that the transaction is committed. After "server_unreachable" this is unknown.

@@ -1,5 +1,4 @@
-// Copies maps from a fleet's server to files, and files to the server. Throws StartupError with the
-// fix.
+// Copies maps between a fleet's server and files. Throws StartupError with the fix.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +7,6 @@
 
 namespace perdure::map_store::fleet {
 
-/// One map on the server.
 struct ServerMap {
   std::int64_t number = 0;
   std::string vehicle, file;  ///< name of the map, and identity of the map's file
@@ -20,9 +18,8 @@ struct ServerMap {
 /// Lists the maps on the server by name; for each name, the newest first.
 std::vector<ServerMap> listMaps(const std::string& url);
 
-/// Writes the newest map of `name` to `to`, which must not exist: one complete state, or nothing.
-/// Beliefs and graph are bit-identical to those of the vehicle's file. `unfinished`: also accepts a
-/// map that is still being sent.
+/// Writes the newest map of `name` to `to`, which must not exist: one complete, bit-identical
+/// state, or nothing. `unfinished`: also a map that is still being sent.
 void pullMap(const std::string& url, const std::string& name, const std::string& to,
              bool unfinished = false);
 
@@ -31,9 +28,8 @@ void pullMap(const std::string& url, const std::string& name, const std::string&
 std::vector<std::string> pullVehicles(const std::string& url, const std::string& folder,
                                       bool unfinished = false);
 
-/// Stores `from` as the map `name` on the server, in one transaction. Replaces an earlier map that
-/// was pushed under this name. Refuses names that vehicles use. `from` is only read.
-/// `earth_anchor`: as in parameters.h.
+/// Stores `from` as the map `name`, in one transaction, replacing an earlier pushed one. Refuses
+/// names of vehicles. `earth_anchor`: as in parameters.h.
 void pushMap(const std::string& from, const std::string& url, const std::string& name,
              const std::vector<double>& earth_anchor = {});
 

@@ -95,8 +95,7 @@ Result<void> Pusher::attach(Link& link) {
   });
 }
 
-/// Finds or creates the server's row of this map. If the row is new, or belongs to another outbox,
-/// the map on the server is empty afterwards.
+/// Finds or creates the row of this map; if new or of another outbox, the map there is empty.
 void Pusher::introduce(Link& link) {
   Values values;
   values.put(std::string_view(vehicle_)).put(std::string_view(mark_.file));

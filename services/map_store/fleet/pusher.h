@@ -1,7 +1,6 @@
-// Sends the changes in a map's file to the server, in portions that are one transaction each: the
-// current rows, in the order of their last change. The server reports its last entry, so a portion
-// whose answer was lost is neither repeated nor left out. The whole map is sent if the server has
-// none or has missed changes.
+// Sends the changes in a map's file in portions, one transaction each, in the order of their last
+// change. The server reports its last entry, so nothing is repeated or left out. The whole map is
+// sent if it misses changes.
 #pragma once
 
 #include <cstdint>
@@ -24,17 +23,14 @@ struct Portion {
 
 class Pusher {
  public:
-  /// `earth_anchor`: four numbers (parameters.h), or empty: as in the file. The file is opened
-  /// read-only.
+  /// `earth_anchor`: parameters.h. The file is opened read-only.
   Pusher(std::string file, std::string vehicle, std::vector<double> earth_anchor);
 
-  /// Reads the server's last entry. Must precede the first push on each link, and the first push
-  /// after any failure.
+  /// Reads the server's last entry: before the first push on a link, and after failures.
   Result<void> attach(Link& link);
   /// Sends at most `most_rows` rows. If fewer remain, the portion is smaller, and `whole`.
   Result<Portion> push(Link& link, std::int64_t most_rows);
-  /// Replaces attach and push for a file without outbox: copies `file` to this vehicle's map, in
-  /// one transaction.
+  /// For a file without outbox: copies `file` to this vehicle's map, in one transaction.
   Result<void> replaceAll(Link& link, const std::string& file);
   /// Whether the file has entries that were not sent.
   Result<bool> hasMore() const;

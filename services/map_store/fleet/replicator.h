@@ -1,6 +1,5 @@
 // Keeps a fleet's server up to date with a map's file, in its own thread. The file is the buffer:
-// the service never waits for the server. Entries that the server has not confirmed stay in the
-// file's outbox, even if either side restarts.
+// entries stay in its outbox until they are confirmed.
 #pragma once
 
 #include <chrono>
@@ -9,11 +8,10 @@
 #include <string>
 
 #include "common/base/result.h"
-#include "services/map_store/fleet/parameters.h"
+#include "services/map_store/fleet/server_url.h"
 
 namespace perdure::map_store::fleet {
 
-/// Time limits, and the size of a transaction.
 struct Pace {
   std::chrono::milliseconds connect{10'000};   ///< limit for a connection
   std::chrono::milliseconds answer{20'000};    ///< while nothing is sent or received

@@ -1,5 +1,4 @@
-// The schema `perdure` on the server: a row for each map, the rows of the maps' files, functions,
-// and, with PostGIS, views with geometry.
+// The schema `perdure`: maps, the rows of their files, functions, and views with geometry.
 #pragma once
 
 #include <cstdint>
@@ -15,9 +14,8 @@ inline constexpr char kTilesChannel[] = "perdure_tiles";
 /// Payload: "MAP REVISION VEHICLE", once for each complete commit.
 inline constexpr char kMapsChannel[] = "perdure_maps";
 
-/// Creates missing parts; several processes may call it at once. Returns false without PostGIS (no
-/// geometry). Reasons: those of the link, and "server_schema" (a newer schema, or another
-/// encoding).
+/// Creates missing parts, concurrently if need be. False without PostGIS. Reasons: those of the
+/// link, and "server_schema" (newer schema, other encoding).
 Result<bool> prepareServer(Link& link);
 
 }  // namespace perdure::map_store::fleet

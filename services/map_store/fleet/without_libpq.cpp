@@ -1,5 +1,4 @@
-// Messages of a program without PostgreSQL's library. checkUrl throws first, so the other functions
-// are never called.
+// Messages of a program without PostgreSQL's library; checkUrl throws first.
 #include "common/base/errors.h"
 #include "services/map_store/fleet/map_transfer.h"
 #include "services/map_store/fleet/replicator.h"

@@ -1,5 +1,4 @@
-// Converts Detection2DArray of ROS to detections. It finds their frame, and converts scores to
-// evidence.
+// Converts Detection2DArray of ROS to detections: their frame, and scores as evidence.
 #pragma once
 
 #include <deque>
@@ -12,12 +11,10 @@
 
 namespace perdure::ros2 {
 
-/// Recent frames, by their stamps in ROS.
 class FrameBook {
  public:
   void add(TimePoint ros_stamp, const FrameStamp& stamp);
-  /// Frame within a millisecond of the stamp, for detectors that store stamps as seconds; nullptr
-  /// if there is none.
+  /// Frame within a millisecond of the stamp, for detectors that store stamps as seconds.
   const FrameStamp* find(TimePoint ros_stamp) const;
   bool isAfterAll(TimePoint ros_stamp) const;
 
@@ -29,9 +26,8 @@ class FrameBook {
   std::deque<Entry> frames_;
 };
 
-/// Activations of one box: log-probabilities of clutter and of `classes` classes. A soft-max gives
-/// the same scores if they sum to at most 1. `named`: class and score, 0 < score ≤ 1. Of the
-/// remaining probability, `other_share` goes to classes without a score, and the rest to clutter.
+/// Log-probabilities of clutter and `classes` classes. `named`: class and score, 0 < score ≤ 1. Of
+/// the rest, `other_share` goes to classes without a score.
 std::vector<float> activationsOf(const std::vector<std::pair<std::size_t, double>>& named,
                                  std::size_t classes, double other_share);
 

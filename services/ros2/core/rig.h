@@ -1,5 +1,4 @@
-// Calibration of the vehicle from its drivers: the CameraInfo of each camera, and /tf_static
-// between their frames. A rig file takes precedence over both.
+// Calibration from CameraInfo and /tf_static. A rig file takes precedence.
 #pragma once
 
 #include <optional>
@@ -33,15 +32,12 @@ class Rig {
   void onImuOf(const std::string& frame_id);
   void onOdometryOf(const std::string& child_frame_id);
 
-  /// The calibration once it is complete, and after each change; otherwise empty. Its source is not
-  /// set.
+  /// The calibration once it is complete, and after each change. Its source is not set.
   std::optional<Calibration> news();
-  /// The last complete calibration, if any.
   const std::optional<Calibration>& complete() const { return told_; }
   /// The missing inputs, with the fix; empty if none are missing.
   std::string missing() const;
-  /// Pose of the body in the odometry's child frame; empty if no transform between the two is
-  /// known.
+  /// The body in the odometry's child frame, if a transform between the two is known.
   std::optional<RigidTransform> bodyIn(const std::string& child_frame_id) const;
 
  private:

@@ -1,5 +1,4 @@
-// Gives the second camera's images the stamps of the first camera's images, because both images of
-// a pair are one frame.
+// Gives the second camera's images the stamps of the first one's: a pair is one frame.
 #pragma once
 
 #include <chrono>
@@ -29,8 +28,7 @@ class Stereo {
     });
     return paired;
   }
-  /// Adds a frame of the second camera with its own stamp. Returns it with the stamp of its pair,
-  /// if that has arrived.
+  /// A frame of the second camera with the stamp of its pair, if that has arrived.
   std::optional<Frame> onSecond(Frame frame) {
     for (const FrameStamp& first : firsts_) {
       if (std::chrono::abs(frame.stamp.time - first.time) > kTolerance) continue;

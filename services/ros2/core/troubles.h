@@ -18,7 +18,6 @@ class Troubles {
     if (!reason.detail.empty()) last_ = reason.detail, last_ns_ = now_ns, any_ = true;
   }
   const ReasonCounts& counts() const { return counts_; }
-  /// The first sentence for each reason.
   const std::map<std::string, std::string>& sentences() const { return first_; }
   /// The newest sentence if it is at most `longest_ns` old; otherwise empty.
   std::string newest(std::int64_t now_ns, std::int64_t longest_ns) const {

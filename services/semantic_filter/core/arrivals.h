@@ -1,6 +1,5 @@
-// Arrivals: tracks that the map gives to the working set, and tracks that the map holds to be one
-// object. They are an input of a frame, so a repeated step takes them in again. Derivation of their
-// covariances: tools/docs/maths/pose_error.md.
+// Arrivals: tracks that the map gives to the working set, or holds to be one object. A repeated
+// step takes them again. Derivation: tools/docs/maths/pose_error.md.
 #pragma once
 
 #include <map>

@@ -79,7 +79,6 @@ ScratchVector<TrackVisibility> updateVisibility(Belief& belief, const FrameInput
   return visibilities;
 }
 
-/// Notes a frame in which the track is not visible in its ledger.
 void noteNotVisible(Track& track, Visibility why, TimePoint now, double min_speed) {
   if (track.unused.count() == 0) stopSlowHypotheses(track, min_speed);
   const bool away = why == Visibility::kOutOfView || why == Visibility::kBehind;
@@ -92,13 +91,11 @@ struct ScoredTrack {
   std::size_t track;  ///< index in Belief::tracks
   TrackScore score;
   std::optional<std::size_t> assigned = {};  ///< the box of the frame that is assigned to the track
-  /// The track before its update, if it was confirmed, is static, and a box is near. One bad box
-  /// must not deform the track.
+  /// The track before its update, because one bad box must not deform it.
   std::optional<Track> before = {};
   bool sound = true;  ///< state of its numbers after the update
 };
 
-/// The parts of a step that use the detections.
 struct Step {
   Belief& belief;
   const FrameInput& input;
@@ -114,7 +111,6 @@ struct Step {
   void resolveIdentities(StepReport& report);
 };
 
-/// Predicts and scores the visible tracks.
 ScratchVector<ScoredTrack> Step::scoreAll(const ScratchVector<TrackVisibility>& visibilities) {
   ScratchVector<ScoredTrack> scored;
   scored.reserve(static_cast<std::size_t>(

@@ -1,5 +1,4 @@
-// One step of the semantic filter, from the belief before a frame to that after it (eq. 4, 8, 9).
-// Late frames repeat the steps from the belief before them (core/history.h).
+// One step of the filter (eq. 4, 8, 9). Late frames repeat the steps (core/history.h).
 #pragma once
 
 #include <vector>

@@ -1,5 +1,4 @@
-// The latest frames, each with the belief before it. Late detections therefore give the same
-// posterior as detections in time. The history also has the pose error of each frame.
+// The latest frames with the belief before each, so that late detections give the same posterior.
 #pragma once
 
 #include <cstddef>
@@ -41,7 +40,6 @@ class History {
   HistoryFrame& add(const Odometry& odometry, std::shared_ptr<const CameraModel> camera);
   /// The next frame that is stepped for the first time takes the arrivals in.
   void arrive(std::shared_ptr<const Arrivals> arrivals) { arrivals_ = std::move(arrivals); }
-  /// Steps the newest frame.
   void step();
   /// Steps frame `index` and all stepped ones after it again.
   void stepAgainFrom(std::size_t index);

@@ -226,8 +226,7 @@ Result<void> Estimator::visionUpdate(const FrameInput& input, FrameEstimate& out
   return {};
 }
 
-/// The length of a path whose points have the depth of the scene is as uncertain as that depth. The
-/// whole path has one error, which grows with its length.
+/// The length of a path at the scene's depth is as uncertain as that depth.
 void Estimator::widenBySupposedDepth() {
   const Clone* const last = previous_frame_ ? state_->clone(*previous_frame_) : nullptr;
   if (!last) return;
@@ -247,8 +246,7 @@ void Estimator::report(const FrameInput& input, FrameEstimate& out) {
   const Clone* previous = previous_frame_ ? state_->clone(*previous_frame_) : nullptr;
   const Matrix6d P_now = P.block<6, 6>(newest.at, newest.at);
   if (previous) {
-    // E[e_now e_prevᵀ] equals the cross-covariance with the clone's error after the update. The
-    // update's correction of the clone is uncorrelated with the remaining present error.
+    // E[e_now e_prevᵀ] equals the cross-covariance with the clone's error after the update.
     const Matrix6d cross = P.block<6, 6>(newest.at, previous->at);
     Matrix6d P_before = previous_pose_covariance_;
     P_before.diagonal().array() += 1e-12;

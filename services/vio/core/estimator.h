@@ -19,7 +19,6 @@
 
 namespace perdure::vio {
 
-/// State at which a filter begins, at `time` of the IMU clock.
 struct Start {
   TimePoint time;
   Nav nav;
@@ -65,9 +64,8 @@ class Estimator {
   void start(const Start& start);
   /// Begins with a saved state of the same cameras.
   void restore(const SavedState& saved);
-  /// Checks that a saved state has the same number of cameras, the same shutters and the same
-  /// estimated quantities. Fails with state_other_cameras, state_other_shutter,
-  /// state_other_gyro_scale or state_other_readout.
+  /// Checks that a saved state has the same cameras, shutters and estimated quantities. Fails with
+  /// state_other_cameras, state_other_shutter, state_other_gyro_scale or state_other_readout.
   Result<void> fits(const SavedState& saved) const;
   /// Returns the state for restore(), without world and next_track. Needs started().
   SavedState save() const;
@@ -83,8 +81,7 @@ class Estimator {
   /// Rotation R_B1_B0 of the body from the newest frame to an IMU time, from the gyroscope.
   Eigen::Matrix3d predictRotation(const ImuBuffer& imu, TimePoint to);
 
-  /// Rotation of the body, a rotation vector in B, while the first camera reads out an image taken
-  /// at an IMU time. Before a start it uses the raw rate. Zero for a global shutter.
+  /// Rotation vector in B while the first camera reads out an image; zero for a global shutter.
   Eigen::Vector3d turnOfReadout(const ImuBuffer& imu, TimePoint time);
 
   /// Points of the newest image whose position is known, without descriptors.

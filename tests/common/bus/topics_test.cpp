@@ -6,7 +6,6 @@
 #include <set>
 
 #include "common/bus/domain.h"
-#include "common/bus/gaps.h"
 #include "common/bus/once.h"
 
 namespace perdure::bus {

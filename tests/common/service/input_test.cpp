@@ -1,6 +1,6 @@
-#include "common/service/input.h"
-
 #include <gtest/gtest.h>
+
+#include "common/service/health.h"
 
 namespace perdure::service {
 namespace {

@@ -13,8 +13,8 @@
 
 #include "common/base/subprocess.h"
 #include "common/bus/wait_loop.h"
-#include "common/service/input.h"
-#include "common/types/end_of_drive.h"
+#include "common/service/health.h"
+#include "common/types/health.h"
 #include "tests/common/bus/isolation.h"
 
 namespace perdure::service {

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include "common/math/so3.h"
-#include "common/sim/speed.h"
 
 namespace perdure::sim {
 namespace {

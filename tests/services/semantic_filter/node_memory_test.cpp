@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "services/semantic_filter/object_states.h"
+#include "services/semantic_filter/events.h"
 #include "tests/services/semantic_filter/memory_run.h"
 
 namespace perdure::semantic_filter {

@@ -1,6 +1,6 @@
-#include "tools/demo/latency.h"
-
 #include <gtest/gtest.h>
+
+#include "tools/demo/reporter.h"
 
 namespace perdure::tools {
 namespace {

@@ -1,8 +1,8 @@
+#include "tools/evaluate/object_score.h"
+
 #include <gtest/gtest.h>
 
 #include <numbers>
-
-#include "tools/evaluate/kitti_score.h"
 
 namespace perdure::tools {
 namespace {

@@ -1,5 +1,5 @@
 // Tests `perdure map fuse --url`, which fuses the vehicles' maps on a server.
-#include "tools/map/fuse_fleet.h"
+#include "tools/map/fuse.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

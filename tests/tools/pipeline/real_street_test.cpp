@@ -7,7 +7,7 @@
 
 #include "common/replay/files/text_file.h"
 #include "tests/common/replay/tiny_datasets.h"
-#include "tools/evaluate/kitti_score.h"
+#include "tools/evaluate/object_score.h"
 #include "tools/pipeline/pipeline.h"
 
 namespace perdure::tools {

@@ -13,7 +13,6 @@
 #include "tests/process/support.h"
 #include "tests/tools/record/chunks.h"
 #include "tools/record/black_box.h"
-#include "tools/record/fault_watch.h"
 #include "tools/record/store.h"
 
 namespace perdure::tools {

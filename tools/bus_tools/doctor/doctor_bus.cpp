@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <map>
 
@@ -39,8 +40,7 @@ Finding checkCount(std::size_t participants) {
   return {Verdict::kWarn, text + "; near the limit of 61: another bus.domain parts them"};
 }
 
-/// Finds endpoints that use one of our topics with another type name. DDS drops their samples
-/// silently.
+/// Finds endpoints with another type name, whose samples DDS drops silently.
 Findings checkTypes(const std::vector<bus::RemoteEndpoint>& endpoints, const std::string& prefix) {
   Findings findings;
   for (const bus::RemoteEndpoint& endpoint : endpoints) {
@@ -56,19 +56,11 @@ Findings checkTypes(const std::vector<bus::RemoteEndpoint>& endpoints, const std
 }
 
 Finding findingOf(const Health& health) {
-  const std::string state = health.process + " (pid " + std::to_string(health.pid) + ") ";
-  const std::string message = health.message.empty() ? "" : ": " + health.message;
-  switch (health.state) {
-    case HealthState::kOk:
-      return {Verdict::kOk, state + "is well" + message};
-    case HealthState::kStarting:
-      return {Verdict::kWarn, state + "is starting" + message};
-    case HealthState::kDegraded:
-      return {Verdict::kWarn, state + "is degraded" + message};
-    case HealthState::kFailed:
-      return {Verdict::kFail, state + "has failed" + message};
-  }
-  return {Verdict::kFail, state + "says nothing"};
+  constexpr std::array kVerdicts{Verdict::kWarn, Verdict::kOk, Verdict::kWarn, Verdict::kFail};
+  constexpr std::array kWords{"is starting", "is well", "is degraded", "has failed"};
+  return {kVerdicts.at(static_cast<std::size_t>(health.state)),
+          health.process + " (pid " + std::to_string(health.pid) + ") " +
+              nameAt(kWords, health.state) + (health.message.empty() ? "" : ": " + health.message)};
 }
 
 /// Reports counts that indicate a misconfiguration or lost data; normal filter events are ignored.

@@ -2,11 +2,13 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <iostream>
 #include <memory>
 #include <optional>
 
+#include "common/base/check.h"
 #include "common/base/errors.h"
 #include "common/base/heap.h"
 #include "tools/bus_tools/common.h"
@@ -28,17 +30,7 @@ struct DoctorOptions {
   std::optional<double> rig_seconds;
 };
 
-const char* wordOf(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::kOk:
-      return "OK  ";
-    case Verdict::kWarn:
-      return "WARN";
-    case Verdict::kFail:
-      return "FAIL";
-  }
-  return "FAIL";
-}
+const char* wordOf(Verdict verdict) { return nameAt(std::array{"OK  ", "WARN", "FAIL"}, verdict); }
 
 void stopIfFailed(const Findings& findings, int status = 1) {
   const bool failed = std::ranges::any_of(

@@ -5,7 +5,6 @@
 
 #include "common/replay/dataset.h"
 #include "services/inference/core/network/image_fit.h"
-#include "services/inference/core/upright.h"
 #include "services/inference/model_file.h"
 #include "tools/bus_tools/doctor/doctor.h"
 

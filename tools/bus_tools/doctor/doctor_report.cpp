@@ -1,5 +1,4 @@
 
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
@@ -19,8 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Appends the output of each command under its own heading; a missing command leaves its error
-/// message. Some commands are shell lines with patterns and pipes.
+/// Appends the output of each command under its own heading.
 void writeAnswers(const fs::path& file, std::initializer_list<const char*> commands) {
   for (const char* command : commands) {
     std::ofstream(file, std::ios::app) << "\n$ " << command << '\n'
@@ -57,8 +55,7 @@ void copyConfiguration(const std::string& from, const fs::path& to) {
   }
 }
 
-/// Writes one image of each calibrated camera as PGM or PPM, as far as they arrive within two
-/// seconds.
+/// Writes one image of each camera as PGM or PPM, if they arrive within two seconds.
 void writeImages(const bus::Options& options, const StatusSeen& seen, const fs::path& folder) {
   if (!seen.calibration) return;
   for (const CameraCalibration& camera : seen.calibration->cameras) {

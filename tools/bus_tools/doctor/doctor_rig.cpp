@@ -18,7 +18,6 @@ bool isFatal(const replay::DataFinding& finding) {
   return finding.grade == replay::DataFinding::Grade::kFatal;
 }
 
-/// Whether vio can run on the recording.
 bool isUsable(const replay::DataFindings& of_data) {
   return std::ranges::none_of(of_data, isFatal);
 }
@@ -46,8 +45,7 @@ void checkPosesOf(const Drive& drive, const replay::Recording& recording, Findin
   }
 }
 
-/// Adds findings about the rig from the motion. They are more exact than the other findings about
-/// it.
+/// Adds findings about the rig from the motion, which are the most exact.
 void checkMotionOf(const replay::Recording& recording, replay::DataFindings& of_data,
                    Findings& findings) {
   const auto is_coarse = [](const replay::DataFinding& finding) {

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "common/bus/discovery.h"
-#include "common/types/end_of_drive.h"
+#include "common/types/health.h"
 #include "tools/bus_tools/common.h"
 
 namespace perdure::tools {
@@ -17,21 +17,8 @@ constexpr double kSlow = 0.8;          // share of the expected rate; less is de
 constexpr double kLate = 200.0;        // ms from capture
 
 Level levelOf(HealthState state) {
-  switch (state) {
-    case HealthState::kOk:
-      return Level::kOk;
-    case HealthState::kStarting:
-    case HealthState::kDegraded:
-      return Level::kDegraded;
-    case HealthState::kFailed:
-      return Level::kFailed;
-  }
-  return Level::kFailed;
-}
-
-const char* stateWord(HealthState state) {
-  constexpr const char* kWords[] = {"starting", "ok", "degraded", "failed"};
-  return kWords[static_cast<std::size_t>(state)];
+  if (state == HealthState::kOk) return Level::kOk;
+  return state == HealthState::kFailed ? Level::kFailed : Level::kDegraded;
 }
 
 void addSentence(std::string& text, const std::string& sentence) {
@@ -79,7 +66,7 @@ StatusNode judgeService(const std::string& name, const ServiceSeen* seen, const 
   const Health& h = seen->health;
   node.data = {
       {"pid", h.pid},
-      {"state", stateWord(h.state)},
+      {"state", nameOf(h.state)},
       {"age_s", seen->age_s},
       {"message", h.message},
       {"frames_in", h.frames_in},
@@ -100,7 +87,7 @@ StatusNode judgeService(const std::string& name, const ServiceSeen* seen, const 
   node.text = fmt::format("{:.1f} Hz  in {} out {} dropped {}  {} MB", seen->frames_hz, h.frames_in,
                           h.frames_out, h.dropped, h.rss_bytes >> 20);
   if (seen->cpu >= 0) node.text += fmt::format("  {:.0f} % CPU", 100 * seen->cpu);
-  if (node.level != Level::kOk) node.text = std::string(stateWord(h.state)) + "  " + node.text;
+  if (node.level != Level::kOk) node.text = std::string(nameOf(h.state)) + "  " + node.text;
   if (seen->up_s) {
     node.data["up_s"] = *seen->up_s;
     if (*seen->up_s >= kJustStarted) node.text += "  up " + spanText(*seen->up_s);
@@ -118,8 +105,7 @@ StatusNode judgeService(const std::string& name, const ServiceSeen* seen, const 
   return node;
 }
 
-/// The process that writes the topics of `service` while `service` is silent; empty if there is
-/// none.
+/// The process that writes the topics of a silent `service`, if any.
 std::string standInFor(const StatusSeen& seen, const std::string& service) {
   if (isHeard(seen, service)) return {};
   for (const auto& [name, topic] : seen.topics) {

@@ -1,5 +1,4 @@
-// `perdure status`: judges the observed services, topics and host as one tree. The worst level of a
-// subtree becomes the level of its root.
+// `perdure status`: judges services, topics and host as one tree of worst levels.
 #pragma once
 
 #include <chrono>
@@ -91,15 +90,13 @@ struct StatusSeen {
 };
 
 StatusNode judge(const StatusSeen& seen);
-/// The part of the tree about the map.
 StatusNode judgeMap(const StatusSeen& seen);
 
 const char* levelWord(Level level);
 /// The tree as text lines with branches; `colour` adds terminal colours.
 std::string toText(const StatusNode& node, bool colour);
 nlohmann::ordered_json toJson(const StatusNode& node);
-/// JSON on one line, or indented. Bytes that are not UTF-8 are replaced, because the messages of
-/// processes may contain any bytes.
+/// JSON on one line, or indented. Bytes that are not UTF-8 are replaced.
 std::string dumped(const nlohmann::ordered_json& json, int indent = -1);
 
 /// Reads the state of the host; folders that do not exist are ignored.

@@ -13,8 +13,7 @@ namespace {
 
 constexpr double kSettle = 0.5;  // s; time in which latched samples arrive
 
-/// Time from capture to now, in ms. Below 0 if the message has no stamp or a stamp of another
-/// host's clock.
+/// Time from capture to now, in ms; below 0 without a stamp of this host.
 template <class T>
 double latencyOf(const T& message) {
   constexpr double kLongest = 1e4;  // ms

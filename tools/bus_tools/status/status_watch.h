@@ -1,5 +1,4 @@
-// Reads the topics of a running system for `perdure status`: Health, discovery, and all topics
-// except images, the map and object states.
+// Reads a running system for `perdure status`: Health, discovery, and small topics.
 #pragma once
 
 #include <deque>
@@ -21,7 +20,6 @@ class StatusWatch {
   explicit StatusWatch(const bus::Options& options);
 
   bus::WaitLoop& loop() { return loop_; }
-  /// Sets a handler that is also called for each Health message.
   void onHealth(std::function<void(const Health&)> handler) { on_health_ = std::move(handler); }
   /// The current observations, without the host.
   StatusSeen seen();
@@ -39,8 +37,7 @@ class StatusWatch {
     int restarts = 0;
   };
 
-  /// Whether the first phase is over, in which latched samples arrive that are older than their
-  /// arrival.
+  /// Whether latched samples, older than their arrival, have all arrived.
   bool settled(double now) const;
   template <class T>
   void listen(const bus::Topic<T>& topic);

@@ -63,8 +63,7 @@ class GyroMean {
 /// Pairs of angular rates: of the body and of the camera.
 using Pairs = std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>;
 
-/// Removes the tenth of the pairs with the most different magnitudes. The magnitudes do not depend
-/// on the rotation between body and camera.
+/// Removes the tenth of the pairs with the most different magnitudes.
 void dropUnlike(Pairs& pairs) {
   const auto unlike = [](const auto& pair) {
     return std::abs(pair.first.norm() - pair.second.norm());
@@ -73,8 +72,7 @@ void dropUnlike(Pairs& pairs) {
   pairs.resize(pairs.size() - pairs.size() / 10);
 }
 
-/// The rotation from the camera's rates to the body's, and a constant bias (Kabsch; Wahba's
-/// problem).
+/// Rotation from the camera's rates to the body's, and a bias (Kabsch; Wahba's problem).
 std::optional<Alignment> alignAt(const std::vector<Turn>& turns, const GyroMean& gyro,
                                  double offset) {
   Pairs pairs;

@@ -11,7 +11,6 @@
 
 namespace perdure::calibrate {
 
-/// Pose of the camera at a time of its own clock.
 struct CameraPose {
   double time_s = 0.0;
   RigidTransform T_TC;
@@ -35,8 +34,7 @@ struct Alignment {
 Result<Alignment> alignRates(const std::vector<CameraPose>& poses,
                              const std::vector<ImuReading>& readings, double widest_s);
 
-/// Whether each pose rotated as the gyroscope did, compared with most of its neighbours in time. A
-/// board detected upside down, or a view with an ambiguous pose, did not.
+/// Whether each pose rotated as the gyroscope did; a board detected upside down did not.
 std::vector<bool> agreeing(const std::vector<CameraPose>& poses,
                            const std::vector<ImuReading>& readings, const Alignment& alignment);
 

@@ -24,7 +24,6 @@ Eigen::Vector3d rmsOf(const std::vector<ImuResidual>& all, Eigen::Vector3d ImuRe
   return (sum / static_cast<double>(all.size())).cwiseSqrt();
 }
 
-/// Correlation of each value with the next one.
 double correlationOf(const std::vector<ImuResidual>& all, Eigen::Vector3d ImuResidual::*which) {
   double product = 0.0, square = 0.0;
   for (std::size_t i = 1; i < all.size(); ++i) {
@@ -34,8 +33,7 @@ double correlationOf(const std::vector<ImuResidual>& all, Eigen::Vector3d ImuRes
   return square > 0.0 ? product / square : 0.0;
 }
 
-/// Whether a reading is clipped: the largest value of an axis repeats at least three times in a
-/// row.
+/// Whether a reading is clipped: the largest value of an axis repeats three times in a row.
 bool isSaturated(const std::vector<ImuReading>& readings, Eigen::Vector3d ImuReading::*which,
                  double least) {
   for (int axis = 0; axis < 3; ++axis) {
@@ -51,7 +49,6 @@ bool isSaturated(const std::vector<ImuReading>& readings, Eigen::Vector3d ImuRea
   return false;
 }
 
-/// The longest sequence of views without a gap.
 std::vector<Sighting> longestStretch(const std::vector<Sighting>& all, double gap_s) {
   std::size_t best_from = 0, best_to = 0, from = 0;
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -142,7 +139,6 @@ class CameraImuRun {
     return {};
   }
 
-  /// Computes the initial estimates in closed form.
   Result<void> start() {
     const auto aligned = alignRates(poses_, near_, options_.widest_offset_s);
     if (!aligned) return tl::unexpected(aligned.error());
@@ -169,8 +165,7 @@ class CameraImuRun {
     return {};
   }
 
-  /// Removes views whose rotation contradicts the gyroscope, because all of their corners would be
-  /// wrong.
+  /// Removes views whose rotation contradicts the gyroscope.
   void dropDisagreeing(const Alignment& alignment) {
     const auto good = agreeing(poses_, near_, alignment);
     std::vector<CameraPose> poses;
@@ -183,7 +178,6 @@ class CameraImuRun {
     poses_ = std::move(poses), problem_.sightings = std::move(sightings);
   }
 
-  /// Initialises a spline over the views from the camera poses.
   void placeSpline() {
     auto& x = problem_.x;
     x.spline.interval_s = chooseKnotInterval(near_);
@@ -233,8 +227,7 @@ class CameraImuRun {
     return {};
   }
 
-  /// Sets the standard deviations from the residuals. Those of the IMU are at least the declared
-  /// ones.
+  /// Sets the deviations from the residuals; those of the IMU are at least the declared ones.
   void weigh() {
     std::vector<double> sizes;
     for (const auto& r : problem_.cornerResiduals()) sizes.push_back(r.residual.norm());
@@ -250,8 +243,7 @@ class CameraImuRun {
         std::max(declared_.accel, rmsOf(left, &ImuResidual::accel).norm() / std::sqrt(3.0) * freed);
   }
 
-  /// Factor from the residuals to the noise: the degrees of freedom of the spline reduce the
-  /// residuals.
+  /// Factor from the residuals to the noise, by the degrees of freedom of the spline.
   double freedomOf(std::size_t samples) const {
     const auto n = static_cast<double>(samples);
     const auto controls = static_cast<double>(problem_.x.spline.controls.size());

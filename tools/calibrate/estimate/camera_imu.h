@@ -1,8 +1,6 @@
-// Estimates a camera's pose on an IMU, their time offset, the lens, the biases of the IMU, and
-// gravity from one recording of a board. It is one least-squares problem over a continuous-time
-// trajectory (Furgale, Rehder, Siegwart, "Unified Temporal and Spatial Calibration for Multi-Sensor
-// Systems", IROS 2013). In contrast to the paper, the lens is estimated too, and biases are
-// piecewise linear random walks.
+// Estimates a camera's pose on an IMU, time offset, lens, biases and gravity from a board: one
+// least-squares problem over a continuous-time trajectory (Furgale, Rehder, Siegwart, IROS 2013),
+// here with the lens and biases as random walks.
 #pragma once
 
 #include <Eigen/Core>
@@ -49,8 +47,7 @@ struct ImuResidual {
 struct CameraImu {
   CameraCalibration camera;  ///< includes T_BC and the time offset
   Matrix15d covariance = Matrix15d::Zero();
-  /// Factor by which the covariance is larger than with independent residuals. Residuals that are
-  /// close in time are correlated, because a corner errs together with its neighbours.
+  /// Factor by which correlated residuals enlarge the covariance.
   double widened = 1.0;
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = gyro_bias;  ///< mean biases
   Eigen::Vector3d gyro_bias_sigma = gyro_bias, accel_bias_sigma = gyro_bias;
@@ -71,8 +68,7 @@ struct CameraImu {
 /// calibrate_imu_saturated, calibrate_no_convergence or calibrate_not_observable.
 Result<CameraImu> estimateCameraImu(const CameraImuInput& input, const CameraImuOptions& options);
 
-/// The largest knot spacing, in s, with which a spline fits the samples as well as with the
-/// smallest one.
+/// The largest knot spacing, s, that fits the samples as well as the smallest.
 double chooseKnotInterval(const std::vector<ImuReading>& readings);
 
 }  // namespace perdure::calibrate

@@ -1,5 +1,4 @@
-// The residuals of the camera-IMU problem, for Ceres' automatic derivatives. Rotations are
-// Hamilton quaternions in Eigen's order (x y z w).
+// Residuals for Ceres' automatic derivatives; Hamilton quaternions x y z w.
 #pragma once
 
 #include <ceres/manifold.h>
@@ -7,9 +6,9 @@
 #include <vector>
 
 #include "common/math/so3.h"
+#include "tools/calibrate/estimate/board.h"
 #include "tools/calibrate/estimate/lens.h"
 #include "tools/calibrate/estimate/spline.h"
-#include "tools/calibrate/estimate/views.h"
 
 namespace perdure::calibrate {
 

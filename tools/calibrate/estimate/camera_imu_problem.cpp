@@ -26,9 +26,8 @@ std::vector<double*> controlsOf(Spline& spline, std::size_t k, bool with_places)
   return blocks;
 }
 
-/// Factor by which the covariance grows because residuals are correlated within a cluster. It is
-/// the ratio of the sandwich estimate with clusters to the one with single rows (Liang and Zeger,
-/// 1986). `influence`: effect of each row's unit residual on the estimate.
+/// Factor by which correlation within clusters enlarges the covariance (sandwich estimate, Liang
+/// and Zeger, 1986). `influence`: of each row's unit residual.
 double wideningOf(const Eigen::MatrixXd& influence, const std::vector<double>& residuals,
                   const std::vector<int>& clusters, const Eigen::MatrixXd& covariance) {
   const int last = *std::ranges::max_element(clusters);
@@ -257,8 +256,7 @@ std::vector<double*> CameraImuProblem::calibrationBlocks() {
   return blocks;
 }
 
-// Factorises the sparse normal equations once and computes only the required columns of their
-// inverse.
+// Factorises the normal equations once and computes only the required columns of the inverse.
 Result<CameraImuProblem::Certainty> CameraImuProblem::certainty() {
   const auto blind =
       fail("calibrate_not_observable",

@@ -1,5 +1,4 @@
-// The least-squares problem of camera_imu.h: parameters, residuals and the covariance of a
-// solution.
+// The least-squares problem of camera_imu.h.
 #pragma once
 
 #include <ceres/problem.h>
@@ -27,7 +26,6 @@ struct Unknowns {
   Eigen::Vector3d down_T = Eigen::Vector3d::UnitY();   ///< unit, along gravity
 };
 
-/// Standard deviations of one sample.
 struct Deviations {
   double px = 0.1, gyro = 1e-3, accel = 1e-2, gyro_walk = 1e-5, accel_walk = 1e-3;
 };
@@ -57,7 +55,6 @@ class CameraImuProblem {
     double widened = 1.0;                   ///< see CameraImu::widened
     Eigen::Vector3d gyro_bias, accel_bias;  ///< standard deviations at mid-time
   };
-  /// Fails with calibrate_not_observable.
   Result<Certainty> certainty();
 
  private:

@@ -6,7 +6,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "tools/calibrate/estimate/views.h"
+#include "tools/calibrate/estimate/board.h"
 
 namespace perdure::calibrate {
 namespace {
@@ -22,8 +22,7 @@ double brightness(const cv::Mat& grey, const cv::Point2f& at) {
   return cv::mean(patch)[0];
 }
 
-/// Whether the corners start at the wrong end of the board: OpenCV may start at either end, but the
-/// square after the first corner must be black.
+/// OpenCV may start at either end, but the square after the first corner must be black.
 bool isUpsideDown(const Board& board, const cv::Mat& grey, const std::vector<cv::Point2f>& found) {
   double difference = 0.0;  // expected black minus expected white squares
   for (int row = 0; row + 1 < board.rows; ++row) {
@@ -39,8 +38,7 @@ bool isUpsideDown(const Board& board, const cv::Mat& grey, const std::vector<cv:
   return difference > 0.0;
 }
 
-/// Pattern of black and white around a corner. Returns 1 if the quadrants a + b and -a - b are
-/// black, -1 if they are white, and 0 if opposite quadrants do not match.
+/// 1 if the quadrants a + b and -a - b are black, -1 if white, 0 if opposite ones differ.
 int crossingAt(const cv::Mat& grey, const cv::Point2f& corner, const cv::Point2f& a,
                const cv::Point2f& b) {
   const double one = brightness(grey, corner + a + b), across = brightness(grey, corner - a - b);
@@ -53,8 +51,7 @@ int crossingAt(const cv::Mat& grey, const cv::Point2f& corner, const cv::Point2f
   return darker > lighter ? 1 : -1;
 }
 
-/// Whether every corner is a crossing of squares. A board that is detected one square beside its
-/// true place has a row of corners that are not.
+/// Whether every corner is a crossing; a board detected one square beside has others.
 bool areCrossings(const Board& board, const cv::Mat& grey, const std::vector<cv::Point2f>& found) {
   constexpr float kStep = 0.3F;  // share of a square
   const auto at = [&](int column, int row) {
@@ -77,8 +74,7 @@ std::vector<Corner> findChessboard(const Board& board, const cv::Mat& grey) {
   if (!cv::findChessboardCornersSB(grey, size, found, cv::CALIB_CB_NORMALIZE_IMAGE)) {
     return {};
   }
-  // Refines the corners by the adjacent edges, because the detector is biased by some hundredths of
-  // a pixel.
+  // Refines the corners by the adjacent edges, because the detector is biased.
   double side = 1e9;
   for (std::size_t i = 1; i < found.size(); ++i) {
     side = std::min(side, cv::norm(found[i] - found[i - 1]));
@@ -94,8 +90,7 @@ std::vector<Corner> findChessboard(const Board& board, const cv::Mat& grey) {
   return corners;
 }
 
-/// Refines the corners of a tag, in clockwise order, as crossings of edges. The result is false for
-/// corners that move too far, lie at the image border or are not crossings.
+/// Refines the corners of a tag as crossings of edges; false for corners that are none.
 std::vector<bool> refineCrossings(const cv::Mat& grey, double side_px,
                                   std::vector<cv::Point2f>& pixels) {
   constexpr double kFarthest = 2.0;
@@ -131,8 +126,7 @@ std::vector<Corner> findAprilGrid(const Board& board, const cv::Mat& grey) {
     apriltag_detection_t* tag = nullptr;
     zarray_get(found.get(), i, static_cast<void*>(&tag));
     if (tag->hamming > 0 || tag->id >= board.columns * board.rows) continue;
-    // The order of the library is lower left, lower right, upper right, upper left. Its integer
-    // coordinates are at the corners of pixels.
+    // The library's order: lower left, lower right, upper right, upper left; pixel corners.
     std::vector<cv::Point2f> pixels;
     double side = 1e9;
     for (const int which : {3, 2, 1, 0}) {

@@ -37,8 +37,7 @@ struct CornerCost {
   }
 };
 
-/// Positions of the board's four outer corners in the image, as shares of the image width. They
-/// measure how much views differ.
+/// The board's four outer corners as shares of the image width, to compare views.
 std::optional<Vector8d> outlineOf(const Board& board, const View& view, double width) {
   std::vector<cv::Point2d> plane, image;
   for (const Corner& corner : view.corners) {
@@ -126,7 +125,6 @@ struct ViewState {
   std::vector<bool> good;
 };
 
-/// The least-squares problem over a lens and the poses of the views.
 class Bundle {
  public:
   Bundle(const Board& board, const CameraCalibration& camera, const IntrinsicsOptions& options)
@@ -157,8 +155,7 @@ class Bundle {
     return summary.IsSolutionUsable() && summary.termination_type != ceres::NO_CONVERGENCE;
   }
 
-  /// Removes corners with large residuals, relative to the spread of all residuals (from their
-  /// median).
+  /// Removes corners with large residuals, relative to the median.
   void dropOutliers() {
     std::vector<double> sizes;
     for (const auto& r : residuals()) sizes.push_back(r.residual.norm());

@@ -1,6 +1,5 @@
-// Estimates focal lengths, principal point and distortion from views of a board. The least-squares
-// problem covers the poses of the views and the lens (Zhang, "A Flexible New Technique for Camera
-// Calibration", PAMI 2000). It supports each lens model of common/camera.
+// Estimates focal lengths, principal point and distortion from views of a board (Zhang, PAMI 2000),
+// for each lens model of common/camera.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,14 +8,13 @@
 
 #include "common/base/result.h"
 #include "common/camera/camera_model.h"
-#include "tools/calibrate/estimate/views.h"
+#include "tools/calibrate/estimate/board.h"
 
 namespace perdure::calibrate {
 
 using Vector8d = Eigen::Matrix<double, 8, 1>;
 using Matrix8d = Eigen::Matrix<double, 8, 8>;
 
-/// Residual of a detected corner against its predicted position.
 struct CornerResidual {
   std::uint64_t frame = 0;
   double time_s = 0.0;  ///< time since the first view
@@ -45,8 +43,7 @@ void setLens(const Vector8d& lens, CameraCalibration& camera);
 std::optional<RigidTransform> boardPose(const CameraModel& camera, const Board& board,
                                         const View& view);
 
-/// `camera` provides the name and the image size. Fails with calibrate_few_views or
-/// calibrate_no_convergence; the detail states the fix.
+/// `camera`: name and size. Fails with calibrate_few_views or calibrate_no_convergence.
 Result<Intrinsics> estimateIntrinsics(const Board& board, const std::vector<View>& views,
                                       const CameraCalibration& camera,
                                       const IntrinsicsOptions& options);

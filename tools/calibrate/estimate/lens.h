@@ -1,5 +1,4 @@
-// Projection of a camera as a template for the dual numbers of Ceres. It is the same model as in
-// common/camera.
+// Projection as a template for Ceres' dual numbers, as in common/camera.
 #pragma once
 
 #include <Eigen/Core>

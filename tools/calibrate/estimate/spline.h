@@ -1,6 +1,5 @@
-// Motion of the body as a smooth curve: a uniform cumulative B-spline of order 5 for the rotation,
-// and one for the position (Furgale et al., ICRA 2012; Sommer et al., CVPR 2020). The code is a
-// template for the dual numbers of Ceres.
+// Motion of the body: uniform cumulative B-splines of order 5 for rotation and position (Furgale et
+// al., ICRA 2012; Sommer et al., CVPR 2020), for Ceres' dual numbers.
 #pragma once
 
 #include <Eigen/Core>
@@ -59,8 +58,7 @@ struct Turning {
   Vector3<T> rate;         ///< w_TB_B, rad/s
 };
 
-/// Rotation and angular rate from five control points; u in [0, 1) of the interval. Values slightly
-/// outside are accurate enough for differentiation.
+/// Rotation and angular rate from five control points; u in about [0, 1).
 template <class T>
 Turning<T> rotationAt(const std::array<Eigen::Map<const Eigen::Quaternion<T>>, kOrder>& controls,
                       const T& u, double interval_s) {
@@ -87,7 +85,6 @@ Vector3<T> positionAt(const std::array<Eigen::Map<const Vector3<T>>, kOrder>& co
   return sum;
 }
 
-/// Control points and their times.
 struct Spline {
   double start_s = 0.0, interval_s = 0.05;
   std::vector<RigidTransform> controls;  ///< T_TB

@@ -1,5 +1,5 @@
 // The rig of a camera and an IMU from the motion of any recording, without a board: first from
-// rotations alone (first_guess.h), then jointly with the structure that parallax shows (joint.h).
+// rotations alone, then jointly with the structure that parallax shows (joint.h).
 #pragma once
 
 #include <filesystem>
@@ -8,10 +8,22 @@
 
 #include "common/base/result.h"
 #include "common/replay/data_check.h"
-#include "tools/calibrate/motion/first_guess.h"
 #include "tools/calibrate/motion/joint.h"
+#include "tools/calibrate/motion/track_windows.h"
 
 namespace perdure::calibrate {
+
+struct FirstGuess {
+  CameraCalibration camera;  ///< focal length, T_BC's rotation, time offset
+  double unexplained = 1.0;  ///< share of the image rotation that the gyroscope does not explain
+  double turning_px = 0.0;   ///< RMS rotation between two images
+  double second_px = 0.0;    ///< about the second most rotated axis
+  std::size_t pairs = 0;
+};
+
+/// `camera`: size and name. Focal lengths of 0.4 to 2.5 widths, offsets up to half a second.
+FirstGuess guessFromTurns(const std::vector<TrackWindow>& windows,
+                          const std::vector<ImuSample>& samples, const CameraCalibration& camera);
 
 struct MotionRig {
   Calibration rig;  ///< cam0 and the IMU's noise
@@ -21,21 +33,18 @@ struct MotionRig {
   double second_px = 0.0;  ///< RMS rotation about the second axis between two images
 };
 
-/// Estimates everything from nothing but the image size. Fails with motion_few_images,
-/// motion_blank, motion_apart (images and gyroscope do not rotate together), motion_no_rotation or
-/// motion_unsure, with a detail for users.
+/// Estimates everything from the image size. Fails with motion_few_images, motion_blank,
+/// motion_apart, motion_no_rotation or motion_unsure, with a detail for users.
 Result<MotionRig> rigFromMotion(const replay::Recording& recording, const WindowOptions& options);
 
 /// One line for each parameter: value, standard deviation, and whether the motion shows it.
 std::vector<std::string> linesOf(const MotionRig& found);
 
-/// Writes the rig file of a drive, and returns its linesOf(). Throws StartupError: kData with the
-/// reason if there is no rig to be found.
+/// Writes the rig file of a drive, and returns its linesOf(). Throws StartupError (kData).
 std::vector<std::string> writeMotionRig(const replay::DatasetOptions& drive,
                                         const WindowOptions& options,
                                         const std::filesystem::path& file);
 
-/// Comparison of a recording's own calibration with the motion.
 struct MotionCheck {
   replay::DataFindings findings;  ///< codes: focal_length, time_offset, readout
   /// The motion that the comparison is based on, or why no comparison is possible.

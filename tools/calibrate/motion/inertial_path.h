@@ -1,5 +1,4 @@
-// The path of the body over a fraction of a second as the IMU measures it: rotation, and position
-// except for the initial velocity and gravity, which are unknown.
+// The path of the body as the IMU measures it, except for initial velocity and gravity.
 #pragma once
 
 #include <Eigen/Core>

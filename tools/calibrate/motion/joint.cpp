@@ -54,7 +54,6 @@ class Problem {
   }
   /// Minus the mean force, as if the body did not accelerate.
   Eigen::Vector3d gravityIn(const Window& window) const;
-  /// Squared residuals, in px².
   std::vector<double> squares(const JointState& state, const Window& window) const;
   std::vector<double> allSquares() const;
   double cost(const JointState& state, const Window& window) const;
@@ -233,8 +232,7 @@ JointVector Problem::sigmaOf(const std::vector<Reduced>& all) {
   const JointVector weight = priorWeights();
   const JointMatrix inverse =
       (H + JointMatrix(weight.asDiagonal())).ldlt().solve(JointMatrix::Identity());
-  // Residuals of a fit are smaller than errors: the windows lose the degrees of freedom that the
-  // parameters take.
+  // Residuals of a fit are smaller than errors by the degrees of freedom.
   const double count = static_cast<double>(all.size()), taken = (inverse * H).trace();
   meat *= count / std::max(0.25 * count, count - taken);
   const double excess = (inverse * meat).trace() / taken / unit();

@@ -33,8 +33,7 @@ struct TrackWindows {
   void add(TrackWindows more);
 };
 
-/// Windows of cam0, distributed over the rotation about all axes. Images of another size than the
-/// calibration's are not used.
+/// Windows of cam0, distributed over rotations about all axes.
 TrackWindows trackWindows(const replay::Recording& recording, const WindowOptions& options);
 
 }  // namespace perdure::calibrate

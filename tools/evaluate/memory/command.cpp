@@ -1,5 +1,4 @@
-// `perdure evaluate memory`: checks whether objects that are seen again keep their ids. It judges a
-// run with drift, and a run that starts with the map of another one.
+// `perdure evaluate memory`: whether objects that are seen again keep their ids.
 #include "tools/evaluate/command.h"
 
 #include <fmt/format.h>

@@ -72,7 +72,6 @@ std::map<std::size_t, std::set<std::uint64_t>> seenAgain(const std::vector<Memor
   return again;
 }
 
-/// Distance travelled when the body passed an anchor.
 double wayAt(const std::vector<MemoryFrame>& frames, TimePoint time) {
   const auto after = std::ranges::lower_bound(frames, time, {}, &MemoryFrame::time);
   return after == frames.end() ? frames.back().way_m : after->way_m;

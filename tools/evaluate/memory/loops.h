@@ -1,6 +1,5 @@
-// Checks whether the loops of a map are correct. Measures the error of each loop against the exact
-// relation of its anchors, and the effect of the loops on the trajectory. Also measures the
-// distance travelled among known objects before the first loop closed.
+// Whether the loops of a map are correct, what they change, and the distance travelled among known
+// objects before the first.
 #pragma once
 
 #include <cstdint>
@@ -15,16 +14,13 @@
 namespace perdure::tools {
 
 struct LoopOptions {
-  /// A loop is wrong if its error in the plane exceeds both wrong_m and wrong_sigmas · σ, or if its
-  /// yaw error exceeds wrong_rad.
+  /// A loop is wrong above wrong_m and wrong_sigmas · σ in the plane, or above wrong_rad in yaw.
   double wrong_m = 2.0, wrong_sigmas = 4.0;
   double wrong_rad = 0.17453;
-  /// Limits of a return visit: the least gap without objects of an earlier visit that ends it, and
-  /// the least number of such objects.
+  /// The least gap that ends a return visit, and the least number of known objects in it.
   double gap_m = 30.0;
   std::uint64_t objects = 4;
-  /// Margin before and after a return visit, m of travel. A loop whose later anchor lies within it
-  /// closes the visit.
+  /// Margin of a return visit, m; a loop whose later anchor lies within closes it.
   double anchor_m = 14.0;
 };
 
@@ -42,8 +38,7 @@ struct JudgedLoop {
 
 struct LoopJudgement {
   std::vector<JudgedLoop> loops;  ///< sorted by id
-  std::uint64_t unjudged = 0;     ///< edges of these kinds whose anchors have no true pose or are
-                                  ///< not in the map
+  std::uint64_t unjudged = 0;     ///< without a true pose, or not in the map
 
   std::uint64_t believed() const, wrong() const, wrongBelieved() const;
 };
@@ -51,8 +46,7 @@ struct LoopJudgement {
 LoopJudgement judgeLoops(const mapping::SavedMap& map, const replay::PoseFile& truth,
                          const LoopOptions& options);
 
-/// ATE of the anchor positions, RMSE in m. Each connected part is aligned with ground truth by
-/// position and yaw. Parts with one anchor are omitted.
+/// ATE of the anchors, RMSE in m; each connected part is aligned by position and yaw.
 struct AnchorErrors {
   std::uint64_t anchors = 0;  ///< anchors with a true pose
   double odometry_m = 0.0;    ///< ATE of chained odometry increments, a part for each session
@@ -67,8 +61,7 @@ struct ReturnVisit {
   /// Distance travelled in the visit to the anchor of its first accepted correct loop in the map.
   std::optional<double> closed_after_m;
 };
-/// `frames`: the result of besideTheBody. If a later loop replaced another, the distance counts to
-/// the later one, because the map does not store the other.
+/// `frames`: of besideTheBody. The map does not store loops that later ones replaced.
 std::vector<ReturnVisit> returnVisits(const std::vector<MemoryFrame>& frames,
                                       const std::vector<JudgedLoop>& loops,
                                       const MemoryOptions& memory, const LoopOptions& options);

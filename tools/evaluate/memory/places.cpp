@@ -11,7 +11,6 @@ namespace {
 
 constexpr char kPlacesHeader[] = "place,visit,x,y,z,frames";
 
-/// Adds a row to the places. Returns what is wrong with it, or "".
 std::string addRow(const std::string& text, Places& places) {
   const auto fields = replay::split(text, ',');
   if (fields.size() != 6) {
@@ -41,8 +40,7 @@ std::string addRow(const std::string& text, Places& places) {
   return "an earlier line has this visit of this place; write its frames in one line";
 }
 
-/// An object at a place: the offset from the place to its centre, horizontally along the ray from
-/// the body and to the left of it.
+/// Offset from the place to the object's centre, along the ray from the body and to its left.
 struct ObjectAtPlace {
   std::uint64_t id = 0;
   double along = 0.0, across = 0.0;

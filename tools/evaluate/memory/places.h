@@ -1,5 +1,4 @@
-// Judges the memory of a run on a user's own data: the truth are places of objects at rest, with
-// the frames in which each visit sees them.
+// Judges the memory of a run by places of objects at rest, with the frames of each visit.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +11,6 @@ namespace perdure::tools {
 /// A row of the places' file: where an object is by the sensors of one visit.
 struct PlaceVisit {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< in the frame of the true poses
-  /// Frames in which the detector detects the object.
   std::vector<std::uint64_t> frames;
 };
 using Places = std::map<std::uint64_t, std::map<std::uint64_t, PlaceVisit>>;  ///< by place, visit
@@ -48,8 +46,7 @@ RunEvents readRunEvents(const std::filesystem::path& file);
 
 struct PlaceScore {
   std::uint64_t visited_twice = 0;  ///< places with at least two visits that are long enough
-  /// Places with several visits: those whose first and last visit have the same object, after all
-  /// merges or already during the visit, and places with one of these visits without an object.
+  /// Places with several visits: same object at first and last, during the visit, or without one.
   std::uint64_t kept = 0, kept_in_visit = 0, without = 0;
   std::uint64_t first_asked = 0, first_found = 0;  ///< frames of visit 0 within range
   std::uint64_t later_asked = 0, later_found = 0;

@@ -119,7 +119,6 @@ void scoreIds(const std::vector<Visit>& visits, MemoryScore& score) {
   score.kept += reported.front() == reported.back() ? 1 : 0;
 }
 
-/// The id of each object on the last visit with a report.
 std::map<std::uint64_t, std::uint64_t> lastIds(
     const std::map<std::uint64_t, std::vector<Visit>>& visits) {
   std::map<std::uint64_t, std::uint64_t> ids;

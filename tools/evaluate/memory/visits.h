@@ -1,6 +1,5 @@
-// Checks whether an object that is seen again keeps its id. The reports of a run are matched to
-// ground truth relative to the body, so that drift has no effect. The visits to each true object
-// are then compared.
+// Whether an object that is seen again keeps its id. Reports are matched to truth relative to the
+// body, so that drift has no effect.
 #pragma once
 
 #include <cstdint>
@@ -34,9 +33,8 @@ struct MemoryFrame {
   std::set<std::uint64_t> reported;  ///< ids, matched or not
 };
 
-/// Frames of the run with a pose, in order. Objects count if they never move, are not toys, are
-/// within reach and sufficiently visible. A report matches an object of its class; pairs are
-/// matched one-to-one, greedily by distance in the body frame.
+/// Frames of the run with a pose. Objects count if they never move, are no toys, near and visible.
+/// Reports match by class, one-to-one, greedily by distance.
 std::vector<MemoryFrame> besideTheBody(const SimulatedTruth& truth,
                                        const std::vector<EstimateRow>& rows,
                                        const std::vector<replay::StampedPose>& trajectory,
@@ -50,7 +48,6 @@ struct Visit {
   /// The id of most frames; the smallest one on a tie. Empty if no report matched.
   std::optional<std::uint64_t> id() const;
 };
-/// Visits by true object.
 std::map<std::uint64_t, std::vector<Visit>> visitsOf(const std::vector<MemoryFrame>& frames,
                                                      const MemoryOptions& options);
 
@@ -58,12 +55,10 @@ struct MemoryScore {
   std::uint64_t frames = 0, sightings = 0, matched = 0;
   std::uint64_t late_sightings = 0, late_matched = 0;  ///< counts in the second half of frames
   std::uint64_t objects = 0, seen_twice = 0;
-  /// Objects reported on at least two visits; of these, those with the same id on the first and the
-  /// last visit.
+  /// Objects reported on two visits; of these, those with the same id on first and last.
   std::uint64_t reported_twice = 0, kept = 0;
   std::uint64_t objects_matched = 0, ids = 0, with_more_ids = 0;  ///< ids: summed over objects
-  /// Median displacement in W of the true positions of objects seen twice, from the first visit to
-  /// the last.
+  /// Median displacement in W of objects seen twice, from the first visit to the last.
   double drift_m = 0.0;
 
   double keptShare() const;  ///< 1 if nothing was reported twice
@@ -74,7 +69,6 @@ struct MemoryScore {
 MemoryScore scoreMemory(const SimulatedTruth& truth, const std::vector<MemoryFrame>& frames,
                         const MemoryOptions& options);
 
-/// Score of a run that started with the map of another run.
 struct ReturnScore {
   std::uint64_t ids = 0;    ///< ids that the earlier run reported
   std::uint64_t known = 0;  ///< objects that the earlier run reported and this run sees
@@ -82,7 +76,6 @@ struct ReturnScore {
   std::uint64_t seen = 0, reported = 0;
   std::uint64_t kept = 0;   ///< objects with the id of the last earlier visit
   std::uint64_t wrong = 0;  ///< objects with an id of another object
-  /// Time and place of the first report of a known id.
   struct First {
     double seconds = 0.0, way_m = 0.0;
     std::uint64_t objects = 0;  ///< objects visible up to that frame, inclusive

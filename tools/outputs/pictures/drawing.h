@@ -1,5 +1,4 @@
-// Functions shared by the pictures: colours of classes, solid or dashed lines, and labels that stay
-// inside the picture without overlap.
+// Shared by the pictures: colours of classes, lines, and labels that do not overlap.
 #pragma once
 
 #include <filesystem>
@@ -32,7 +31,6 @@ bool clip(const cv::Rect2d& area, cv::Point2d& a, cv::Point2d& b);
 /// Connects points inside or outside the image; dashes continue across the joints.
 void drawLine(cv::Mat& image, const Polyline& line, const Stroke& stroke);
 void drawClosed(cv::Mat& image, Polyline corners, const Stroke& stroke);
-/// Fills a convex outline, `opacity` in [0, 1].
 void drawFilled(cv::Mat& image, const Polyline& corners, const Colour& colour, double opacity);
 /// Mixes a rectangle of the image with a colour; clips it to the image.
 void tint(cv::Mat& image, const cv::Rect& area, const Colour& colour, double opacity);
@@ -46,9 +44,8 @@ cv::Size sizeOf(const std::string& text, const TextStyle& style = {});
 void drawText(cv::Mat& image, const std::string& text, const cv::Point& at, const Colour& colour,
               const TextStyle& style = {});
 
-/// Place for a rectangle of `size` inside `area`, with its lower left corner preferably at `at`. It
-/// does not overlap the taken ones if there is free space nearby. A rectangle larger than the area
-/// starts at its upper left corner.
+/// Place for a rectangle inside `area`, preferably with its lower left corner at `at`, beside the
+/// taken ones.
 cv::Rect placeFor(const cv::Size& size, const cv::Point& at, const cv::Rect& area,
                   const std::vector<cv::Rect>& taken);
 

@@ -11,7 +11,6 @@
 
 namespace perdure::tools {
 
-/// The most probable class of an object at a frame.
 struct ObjectGlance {
   ObjectId id = 0;
   std::string class_name;
@@ -43,8 +42,7 @@ struct FrameGlance {
   std::vector<DetectionGlance> detections;
 };
 
-/// The corners of an object's box in W. Index bit 0: front or rear; bit 1: left or right; bit 2:
-/// top or bottom.
+/// Corners of an object's box in W. Bits: front or rear, left or right, top or bottom.
 std::array<Eigen::Vector3d, 8> cornersOf(const ObjectGlance& object);
 
 /// Collects by frame; a later message about the same frame replaces the earlier one.

@@ -145,8 +145,7 @@ void drawSeries(Chart& chart, const Evolution& evolution, const Stroke& stroke, 
   end();
 }
 
-/// Upper end of the error axis: covers nearly all of the curves, without extreme values at their
-/// start.
+/// Upper end of the error axis, without extreme values at the start.
 double topOf(const Evolution& evolution) {
   std::vector<double> values;
   for (const auto& point : evolution.points) {

@@ -1,6 +1,5 @@
-// evolution.png: the uncertainty of selected objects over the frames. It shows the position error
-// if ground truth is known, its standard deviation, and the existence. If the map closed loops, a
-// row above shows the error of the body.
+// evolution.png: position error, deviation and existence of selected objects over the frames; if
+// loops closed, a row with the body's error.
 #pragma once
 
 #include <filesystem>
@@ -28,10 +27,8 @@ struct Evolution {
   std::vector<EvolutionPoint> points;
 };
 
-/// Selects at most `most` confirmed objects: the one visible longest in each class except *other*,
-/// then the others visible longest. Ground truth is the nearest track by the median over the frames
-/// in which the object was visible, within 3 m. Pairs are one-to-one, with the smallest distances
-/// first.
+/// At most `most` confirmed objects: the longest visible in each class except *other*, then others.
+/// Truth is the nearest track by the median within 3 m, one-to-one.
 std::vector<Evolution> chooseEvolutions(const DriveLog& log, const PictureTruth* truth,
                                         std::size_t most);
 

@@ -1,5 +1,4 @@
-// The first row of evolution.png: the body's position error in W, and on the map before and after
-// each loop.
+// The first row of evolution.png: the body's error in W, and on the map around each loop.
 #pragma once
 
 #include <cstdint>
@@ -31,8 +30,7 @@ struct BodyErrors {
   std::vector<Mark> marks;
 };
 
-/// `poses`: in W, by frame. Ground truth and all errors are in W, with ground truth aligned at the
-/// start of the run. Returns no points if there was no loop.
+/// `poses`: in W, by frame; truth aligned at the start. No points without a loop.
 BodyErrors bodyErrors(const std::map<std::uint64_t, replay::StampedPose>& poses,
                       const DriveInMap& in_map, std::vector<BodyErrors::Mark> marks,
                       const PictureTruth* truth);

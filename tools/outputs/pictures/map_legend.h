@@ -7,14 +7,11 @@
 namespace perdure::tools {
 
 inline const Colour kDots(170, 165, 160);
-/// Stroke for a loop of the map's graph.
 Stroke loopStroke(bool believed, double text);
 /// Opacity of an object's filled outline, by its visibility at the end.
 double fillOf(Visibility visibility);
-/// Size of map, axes and legend together.
 cv::Size pictureSize(const MapContent& content, const MapView& view);
-/// A bar of view.bar_m metres, which is view.bar_m × view.scale pixels long, with its length as
-/// text.
+/// A bar of view.bar_m metres, with its length as text.
 void drawScaleBar(cv::Mat& picture, const MapView& view);
 void drawMapLegend(cv::Mat& picture, const MapContent& content, const MapView& view);
 

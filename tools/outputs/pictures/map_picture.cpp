@@ -29,8 +29,7 @@ double distanceToWay(const std::vector<Eigen::Vector3d>& path, const Eigen::Vect
   return least;
 }
 
-/// Three times the distance that includes four fifths of the objects, so that a single outlier does
-/// not shrink the map.
+/// Three times the distance that includes four fifths of the objects.
 double usualDistance(const MapContent& content) {
   std::vector<double> distances;
   for (const auto& object : content.objects) {
@@ -58,8 +57,7 @@ void drawEllipse(cv::Mat& picture, const MapView& view, const ObjectGlance& obje
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(
       Eigen::Matrix2d(object.p_covariance.topLeftCorner<2, 2>()));
   const Eigen::Vector2d axes = 2.0 * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt();
-  // Omits ellipses over half of the map: the position of an object that drove out of sight is
-  // unknown.
+  // Omits ellipses over half of the map, of objects out of sight.
   if (!axes.allFinite() || axes.maxCoeff() > 0.5 * (view.high - view.low).minCoeff()) return;
   Polyline line;
   constexpr int kSteps = 48;
@@ -115,7 +113,6 @@ void drawWay(cv::Mat& picture, const MapView& view, const std::vector<Eigen::Vec
   drawLine(picture, line, stroke);
 }
 
-/// Draws a disc at the start and an arrow head at the end.
 void drawEnds(cv::Mat& picture, const MapView& view, const std::vector<Eigen::Vector3d>& path) {
   if (path.empty()) return;
   cv::circle(picture, cv::Point(view.at(flat(path.front()))), thick(view, 5), kInk, cv::FILLED,

@@ -1,6 +1,5 @@
-// map.png: the map from above, as in figures 1 and 4 of the paper. It shows the trajectory, the
-// sparse points, the objects with their uncertainty, and, if known, ground truth in a separate
-// colour.
+// map.png, as figures 1 and 4 of the paper: trajectory, sparse points, objects with uncertainty,
+// ground truth.
 #pragma once
 
 #include <Eigen/Core>
@@ -42,8 +41,7 @@ struct MapView {
   }
 };
 
-/// A view of the trajectory and its surroundings (60 m, less in rooms; half of that for ground
-/// truth).
+/// The trajectory and its surroundings (60 m, less in rooms).
 MapView viewOf(const MapContent& content);
 cv::Mat drawMap(const MapContent& content, const MapView& view);
 /// Returns false if there is neither a trajectory nor an object, or if the file cannot be written.

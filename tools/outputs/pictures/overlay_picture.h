@@ -1,5 +1,4 @@
-// One frame of overlay.mp4: the image with the objects as 3D boxes, solid if visible and dashed if
-// occluded. Beside it, a plan shows the surroundings of the body from above.
+// One frame of overlay.mp4: the image with 3D boxes (dashed: occluded), and a plan.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,10 +21,8 @@ class OverlayPicture {
 
   /// Size of each picture: the scaled image, the plan and the header; even numbers.
   cv::Size size() const;
-  /// Area of the image in the picture.
   cv::Rect imageArea() const;
-  /// `image`: CV_8UC1 or CV_8UC3 in the size of the calibration, not undistorted. `path`: positions
-  /// of the body up to this frame. `start`: the time that is displayed as 0.
+  /// `image`: not undistorted. `path`: up to this frame. `start`: displayed as 0.
   cv::Mat draw(const cv::Mat& image, const FrameGlance& frame,
                const std::vector<Eigen::Vector3d>& path, TimePoint start) const;
 
@@ -40,8 +37,7 @@ class OverlayPicture {
   double scale_;  ///< scale of the image in the picture
 };
 
-/// Range of the plan: the distance in m from the body that includes nine tenths of the visible
-/// confirmed objects. 30 if there were none; at least 4, at most 60.
+/// Range of the plan, m: nine tenths of the visible objects, 4 to 60; 30 without any.
 double usualReach(const DriveLog& log);
 
 }  // namespace perdure::tools

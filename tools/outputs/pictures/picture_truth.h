@@ -26,8 +26,7 @@ struct TruthTrack {
   std::vector<Key> keys;  ///< never empty; sorted by time
   TimePoint present_from = TimePoint::min(), present_until = TimePoint::max();
 
-  /// State at a time. Static objects: the last key until then, or the first one. Moving objects:
-  /// linear interpolation between keys, nothing outside. Empty while the object is absent.
+  /// Static: the last key until then, or the first. Moving: linear between keys. Empty: absent.
   std::optional<Key> at(TimePoint time) const;
 };
 

@@ -76,8 +76,7 @@ PictureTruth truthOfLabels(const std::vector<replay::KittiLabel>& labels,
     const auto pose = poses.find(label.frame);
     if (label.dontCare() || pose == poses.end()) continue;
     const RigidTransform T_WR = pose->second.T_WB * T_RI.inverse();
-    // KITTI's rotation_y is the angle about the camera's y axis from its x axis to the object's
-    // front.
+    // KITTI's rotation_y is the angle about y from the camera's x axis to the front.
     const Eigen::Vector3d ahead_W =
         T_WR.q * Eigen::Vector3d(std::cos(label.rotation_y), 0.0, -std::sin(label.rotation_y));
     TruthTrack& track = tracks[label.track];

@@ -15,8 +15,7 @@ namespace perdure::tools {
 
 using StampedPoses = std::map<std::uint64_t, replay::StampedPose>;  ///< T_WB, by frame
 
-/// Aligns the world of ground truth with W by yaw and position, at the first of `poses` with a
-/// known true pose. Empty if there is none.
+/// Aligns truth with W by yaw and position, at the first of `poses` with a true pose.
 PictureTruth truthOfSimulation(const sim::Truth& truth, const replay::PoseFile& body,
                                const StampedPoses& poses);
 
@@ -25,8 +24,7 @@ PictureTruth truthOfSimulation(const sim::Truth& truth, const replay::PoseFile& 
 PictureTruth truthOfLabels(const std::vector<replay::KittiLabel>& labels,
                            const RigidTransform& T_RI, const StampedPoses& poses);
 
-/// Loads what the folder contains; empty if it contains neither, or if its ground truth is invalid
-/// (the scoring reports that).
+/// What the folder contains; empty if nothing, or if its truth is invalid.
 std::optional<PictureTruth> pictureTruth(const replay::Dataset& dataset,
                                          const replay::DatasetOptions& data,
                                          const StampedPoses& poses);

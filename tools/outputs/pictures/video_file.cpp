@@ -77,7 +77,6 @@ struct VideoFile::Film {
     return drained && ended && file->pb->error >= 0;
   }
 
-  /// Writes the encoded data of the codec to the file.
   bool drain() {
     while (avcodec_receive_packet(codec.get(), packet.get()) >= 0) {
       packet->duration = 1;

@@ -1,6 +1,5 @@
-// An MP4 film of pictures, by FFmpeg's libraries: H.264 (4:2:0, which browsers play), or MPEG-4
-// part 2 without an H.264 encoder. OpenCV's VideoWriter supports x264 only at its medium preset,
-// which takes five times the processor time.
+// An MP4 film by FFmpeg: H.264 (4:2:0), or MPEG-4 part 2. OpenCV's VideoWriter has only x264's
+// medium preset, which takes five times as long.
 #pragma once
 
 #include <cstddef>
@@ -15,18 +14,15 @@ namespace perdure::tools {
 
 class VideoFile {
  public:
-  /// Needs even sides and rate > 0. Reasons: video_no_codec, video_not_written (the file cannot be
-  /// created).
+  /// Even sides, rate > 0. Reasons: video_no_codec, video_not_written.
   static Result<VideoFile> open(const std::filesystem::path& file, const cv::Size& size,
                                 double rate_hz);
   VideoFile(VideoFile&&) noexcept;
   VideoFile& operator=(VideoFile&&) noexcept;
   ~VideoFile();  ///< finishes the film
 
-  /// Appends a picture: CV_8UC3 (blue, green, red) of the film's size. Fails with video_not_written
-  /// if the disk is full.
+  /// CV_8UC3 (BGR) of the film's size. Fails with video_not_written.
   Result<void> write(const cv::Mat& picture);
-  /// Finishes the film. Fails with video_not_written if the disk is full.
   Result<void> finish();
   std::size_t frames() const;
   const std::string& codec() const;  ///< "H.264" or "MPEG-4"

@@ -1,5 +1,4 @@
-// Converts between messages and instances of the Python classes, by the description of common/wire,
-// and gives the description to Python. All functions need the GIL.
+// Converts between messages and Python instances by the description of common/wire. Needs the GIL.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -11,8 +10,6 @@ namespace perdure::python {
 
 /// Matrices become separate numpy arrays; pixels are not copied.
 pybind11::object toPython(std::type_index type, const void* message);
-/// Kinds and shapes are checked here, bounds by the encoder. Raises perdure.Refused with the path
-/// of the field.
 void fromPython(std::type_index type, pybind11::handle from, void* message);
 
 /// T: the type of a topic, or a type that a topic's type contains.
@@ -31,11 +28,9 @@ T fromPython(pybind11::handle from) {
 /// Sets the default values of a struct in an instance of the class with its name.
 void setDefaults(const std::string& name, pybind11::handle instance);
 
-/// {"Objects": [(name, kind, shape or None, unit, item or None), …], …}: every struct of every
-/// topic, after the structs that it contains. Kinds: int, bool, float, str, choice, array, pose,
-/// message, optional_message, optional_float, list, names, counts, bytes, pixels. Item: the
-/// struct's name, or the words of a choice. The classes, their docstrings and their type hints are
-/// generated from it.
+/// {"Objects": [(name, kind, shape or None, unit, item or None), …], …}, structs after those that
+/// they contain. Kinds: int, bool, float, str, choice, array, pose, message, optional_message,
+/// optional_float, list, names, counts, bytes, pixels. Item: struct, or words of a choice.
 pybind11::dict schema();
 
 /// {"objects": "Objects", "frame/": "Frame", …}

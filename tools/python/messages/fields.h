@@ -9,9 +9,8 @@
 
 namespace perdure::python {
 
-/// Calls Self::field(name, value, unit) for the fields whose kind follows from the value's type.
-/// The unit is a text, or the limits. Self has object, optional, list, choice and pixels for the
-/// others.
+/// Calls Self::field(name, value, unit) for fields whose kind follows from the type; Self has
+/// object, optional, list, choice and pixels for others.
 template <class Self>
 class EachField {
  public:

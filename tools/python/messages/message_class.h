@@ -1,5 +1,4 @@
-// The Python classes of messages, which perdure/messages.py creates from the schema: one for each
-// struct of common/wire. All functions need the GIL.
+// The Python classes of messages, which perdure/messages.py creates. Needs the GIL.
 #pragma once
 
 #include <cxxabi.h>

@@ -30,7 +30,6 @@ const char* unitOf(const wire::Limits& limits) {
 
 const char* unitOf(const char* text) { return text; }
 
-/// Kind, shape and item of a field.
 struct Kind {
   const char* name;
   py::object shape = py::none(), item = py::none();
@@ -62,7 +61,6 @@ Kind kindOf(const std::array<std::uint8_t, N>&) {
   return {"bytes", py::make_tuple(N), py::str("uint8")};
 }
 
-/// Lists the fields of one struct.
 class Fields : public EachField<Fields> {
  public:
   void field(const char* name, const auto& d, const auto& unit) {

@@ -113,7 +113,6 @@ class Giver : public EachField<Giver> {
   std::size_t next_ = 0;
 };
 
-/// Conversions of a struct that a topic contains.
 struct Conversion {
   std::string name;
   py::object (*give)(const void* message);

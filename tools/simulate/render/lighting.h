@@ -1,5 +1,4 @@
-// Light on surfaces: sun (the caller traces the shadow ray), sky hemisphere, light reflected by the
-// ground, contact shadows, gloss and haze. Lambert's law.
+// Light on surfaces: sun, sky, ground, contact shadows, gloss, haze. Lambert's law.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,7 +10,6 @@
 
 namespace perdure::tools {
 
-/// Intersection of a ray.
 struct Hit {
   std::uint32_t instance = kNothing;  ///< kNothing: the sky
   std::uint32_t material = 0;
@@ -25,12 +23,10 @@ struct Hit {
 class Lighting {
  public:
   explicit Lighting(const sim::Scene& scene);
-  /// Updates the positions of the objects.
   void setTime(const World& world);
 
   const Eigen::Vector3f& sun() const { return sun_W_; }
-  /// Linear RGB radiance towards the eye. `ray` is the unit direction from the eye, `pixel_angle`
-  /// the angle of a pixel.
+  /// Linear RGB radiance towards the eye. `ray`: unit direction; `pixel_angle`: of a pixel.
   Eigen::Vector3f shade(const Eigen::Vector3f& origin, const Eigen::Vector3f& ray, const Hit& hit,
                         bool in_sun, float pixel_angle) const;
   const Sky& sky() const { return sky_; }

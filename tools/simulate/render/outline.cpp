@@ -38,7 +38,6 @@ class Raster {
         rows_(sizeOf(box.height())),
         cells_(static_cast<std::size_t>(columns_ * rows_)) {}
 
-  /// Converts pixels to cells.
   Eigen::Vector2d cellOf(const Eigen::Vector2d& pixel) const {
     return (pixel - Eigen::Vector2d(x_, y_)) / cell_;
   }

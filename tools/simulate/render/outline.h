@@ -15,7 +15,6 @@
 
 namespace perdure::tools {
 
-/// Outline of an object without occluders.
 struct Outline {
   double area = 0.0;  ///< pixels² of the enlarged plane
   Box box;            ///< box of its corners, within the enlarged plane

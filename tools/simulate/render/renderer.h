@@ -63,7 +63,6 @@ class Renderer {
   struct Place {
     int column = 0, row = 0;
   };
-  /// Rays and the pixels that they contribute to.
   struct Samples {
     Packet packet;
     std::array<Place, kPacket> places;

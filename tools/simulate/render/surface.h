@@ -19,7 +19,6 @@ struct Facet {
   std::uint32_t material = 0;
 };
 
-/// One or more meshes in one frame.
 struct Surface {
   std::vector<Eigen::Vector3f> positions;
   std::vector<std::array<std::uint32_t, 3>> triangles;

@@ -18,7 +18,6 @@ namespace perdure::tools {
 inline constexpr unsigned kPacket = 8;  ///< rays that Embree traces together
 inline constexpr std::uint32_t kNothing = RTC_INVALID_GEOMETRY_ID;
 
-/// An object (or all scenery) in its current pose.
 struct Instance {
   std::shared_ptr<const Surface> surface;
   Eigen::Matrix3f R = Eigen::Matrix3f::Identity();

@@ -20,7 +20,6 @@ class Dice : public sim::Dice {
   int below(int count) {
     return static_cast<int>(sim::Dice::below(static_cast<std::size_t>(count)));
   }
-  /// Seed for the functions in patterns/noise.h.
   std::uint32_t noiseSeed() { return static_cast<std::uint32_t>(seed()); }
 };
 

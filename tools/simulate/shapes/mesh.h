@@ -1,5 +1,4 @@
-// Triangles with normals, texture coordinates and materials, from the shape generators to the
-// renderer. Units are metres, right-handed, counter-clockwise seen from outside.
+// Triangles with normals, texture coordinates and materials; metres, counter-clockwise.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,8 +28,7 @@ struct Mesh {
   std::vector<Material> materials;
 };
 
-/// Mesh in frame O with a bounding box of exactly `object.size`, centred. Throws
-/// std::invalid_argument for an unknown class or shape.
+/// Mesh in O with a centred box of exactly `object.size`. Throws std::invalid_argument.
 Mesh makeObjectMesh(const sim::SceneObject& object);
 Mesh makePropMesh(const sim::Prop& prop);
 /// The ground of the scene in W, with roads, pavements and markings, or the floor of a room.

@@ -1,5 +1,4 @@
-// Builds a mesh part by part: takes faces, and returns smooth normals up to a crease angle and the
-// fitted size.
+// Builds a mesh part by part, with smooth normals up to a crease, fitted to a size.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,12 +19,10 @@ inline constexpr float kPi = std::numbers::pi_v<float>;
 
 class MeshBuilder {
  public:
-  /// `repeat_m` is the width of one texture repeat for faces without texture coordinates. These use
-  /// the two coordinates across the face's main direction.
+  /// `repeat_m`: width of a texture repeat on faces without texture coordinates.
   int material(const Material& material, float repeat_m = 1.0F);
 
-  /// Starts a new part. Faces of different parts share no smooth normals. Faces that meet at more
-  /// than `crease_deg` keep an edge. Inverted meshes are not detected: see `closed`.
+  /// Starts a part, without common smooth normals; edges above `crease_deg` stay.
   void begin(float crease_deg = 40.0F);
   /// Orients the last part so that its volume is positive; for closed parts.
   void closed();

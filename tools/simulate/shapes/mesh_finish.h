@@ -1,5 +1,4 @@
-// Converts loose faces to a mesh: fits the size exactly, smooths normals up to a crease, and merges
-// corners.
+// Loose faces to a mesh: exact size, smooth normals up to a crease, merged corners.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,4 @@
-// The generators, one for each class of object or kind of scenery; `mesh.h` is the public
-// interface.
+// The generators of object classes and scenery, behind `mesh.h`.
 #pragma once
 
 #include <Eigen/Core>

@@ -9,9 +9,8 @@
 
 namespace perdure::tools {
 
-/// Paving, brick, bark, leaves, wood (boards), timber, books, screens and grounds have their own
-/// colours. Plaster, fabric, metal, car paint, skin and markings are nearly white, and are tinted
-/// by the material.
+/// Plaster, fabric, metal, car paint, skin and markings are nearly white and tinted; others have
+/// their own colours.
 enum class TextureKind {
   kAsphalt,
   kPaving,
@@ -38,11 +37,9 @@ enum class TextureKind {
 
 class Texture {
  public:
-  /// size × size texels, tileable; size is a power of two from 1 to 4096, otherwise throws
-  /// std::invalid_argument.
+  /// Tileable; size is a power of two up to 4096, else throws std::invalid_argument.
   Texture(TextureKind kind, std::uint64_t seed, int size = 256);
-  /// Linear RGB, bilinear within and linear between levels; `footprint` is the width of the pixel
-  /// in texture repeats. uv wraps.
+  /// Linear RGB, trilinear; `footprint`: width of the pixel in repeats. uv wraps.
   Eigen::Vector3f sample(const Eigen::Vector2f& uv, float footprint) const;
 
  private:

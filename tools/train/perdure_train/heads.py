@@ -43,14 +43,6 @@ def spread_of(raw):
     return functional.softplus(raw) + 0.01
 
 
-def azimuth_of(raw):
-    """The angle of the most probable bin, corrected by its residual."""
-    bins, residuals = raw.split(BINS, -1)
-    best = bins.argmax(-1, keepdim=True)
-    angle = best.float() * 2 * HALF_BIN + residuals.gather(-1, best) * HALF_BIN
-    return wrapped(angle.squeeze(-1))
-
-
 def wrapped(angle):
     return torch.remainder(angle + math.pi, 2 * math.pi) - math.pi
 

@@ -127,8 +127,4 @@ class Network(nn.Module):
         return outputs
 
 
-def parameters_of(network):
-    return sum(p.numel() for p in network.parameters())
-
-
 TENSORS = [[f"{part}{stride}" for part in ("logits", "box", "azimuth", "spread")] for stride in STRIDES]

@@ -1,5 +1,4 @@
-// Writes the shapes of the classes for the page, once in the build: FOLDER/car.json and others, for
-// BufferGeometryLoader of three.js.
+// Writes the shapes of the classes for the page (BufferGeometryLoader of three.js).
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -53,8 +52,7 @@ Json vectors(const std::vector<float>& values) {
   return {{"itemSize", 3}, {"type", "Float32Array"}, {"array", std::move(array)}};
 }
 
-/// In a box of 1 × 1 × 1 about the origin. The colour is the brightness of each part, relative to
-/// the one with the largest area, which is 1. The page multiplies it by the colour of the class.
+/// In a unit box. The colour is the brightness relative to the largest part.
 Json geometryOf(const tools::Mesh& mesh) {
   Eigen::Vector3f low = mesh.positions.front(), high = low;
   for (const auto& p : mesh.positions) low = low.cwiseMin(p), high = high.cwiseMax(p);

@@ -51,7 +51,6 @@ export class Model {
 
   takeMap(message) {
     this.remembered = new Map([...(this.answer?.objects ?? []), ...message.objects.map((o) => [o.id, o])]);
-    this.onMap = message.all;
     this.elsewhere = message.elsewhere;
   }
 

@@ -1,5 +1,4 @@
-// Builds a scene: assigns ids and looks, and refuses objects that would intersect others or block a
-// road or the body's path.
+// Builds a scene: assigns ids and looks, and refuses objects that would intersect.
 #pragma once
 
 #include <string>
@@ -16,7 +15,6 @@ struct Place {
   Eigen::Vector2d point = Eigen::Vector2d::Zero();
   double yaw = 0.0, low = 0.0;
 };
-/// Pose of the centre of an object with this height.
 RigidTransform poseOf(const Place& place, double height);
 Solid solidAt(const Place& place, const Eigen::Vector3d& size);
 
@@ -29,12 +27,9 @@ class SceneBuilder {
   const SceneOptions& options() const { return options_; }
   double seconds(double by_default) const { return options_.seconds.value_or(by_default); }
 
-  /// Sets the body's motion. Objects with an underside below `height` are not placed within
-  /// `clearance` of its path.
+  /// Objects with an underside below `height` keep `clearance` from the body's path.
   void setBody(Trajectory motion, double seconds, double clearance, double height);
-  /// Reserves a volume, in which nothing is placed from now on.
   void reserve(const Solid& solid) { reserved_.push_back(solid); }
-  /// Reserves the path of a moving object during the scene, so that nothing is placed on it.
   void reserveWay(const SceneObject& object, double until_s, double margin);
 
   SceneObject draw(const std::string& class_name) {

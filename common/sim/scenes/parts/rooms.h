@@ -13,14 +13,12 @@ class Room {
  public:
   Room(SceneBuilder& builder, double length, double width);
 
-  /// A table with `chairs` of 0 to 6 around it and `monitors` of 0 to 2 on it. Returns false if
-  /// there is no space for the table; chairs without space are left out.
+  /// A table with up to 6 `chairs` around it and up to 2 `monitors`. False if there is no space.
   bool putTable(const Eigen::Vector2d& point, double yaw, int chairs, int monitors);
   /// A table at the wall with a monitor on it and a chair in front.
   bool putDesk(const Eigen::Vector2d& at_wall, double inwards);
   /// Places desks, couches, shelves, crates and people along all four walls.
   void furnishWalls();
-  /// Tries to place `count` objects of the class anywhere on the floor.
   void scatter(const std::string& class_name, int count);
   void scatterCrates(int count);
 
@@ -36,8 +34,7 @@ class Room {
   double length_, width_;
 };
 
-/// The motion of a camera in the hand of a walking person: steps, sway and a gaze that oscillates
-/// about the direction of the path.
+/// A camera in the hand of a walking person: steps, sway, and a gaze that oscillates.
 Trajectory handheldMotion(const GroundPath& path, const Drive& drive, double height);
 /// One pose per interval, for a person whose path and gaze are given.
 struct Look {

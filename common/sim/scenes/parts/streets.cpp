@@ -50,8 +50,7 @@ Streets::Streets(SceneBuilder& builder, std::vector<Road> roads, const Furnishin
   builder_.scene().roads = roads_;
 }
 
-/// `across` is the distance from the road's centre line to that side. `yaw` is relative to the
-/// direction of the traffic on that side (right-hand traffic).
+/// `across`: distance from the centre line to that side. `yaw`: relative to its traffic.
 Place Streets::placeAt(const Road& road, int side, double along, double across, double yaw) const {
   const Eigen::Vector2d way = (road.to - road.from).normalized(), left(-way.y(), way.x());
   const double heading = std::atan2(way.y(), way.x()) + (side > 0 ? M_PI : 0.0);
@@ -126,9 +125,8 @@ void Streets::fence(const Road& road, const Place& place, double length) {
       {length, hedge ? 0.6 : 0.2, dice.uniform(1.0, 1.8)}, place);
 }
 
-/// The driveway is at one end of the plot. A hedge or a wall may follow the pavement along the rest
-/// of the plot, and another one may separate the driveway from the neighbour. A car in the driveway
-/// is therefore visible from both directions, from one or from none.
+/// The driveway is at one end of the plot. A hedge or a wall may follow the pavement, and another
+/// may separate the driveway from the neighbour.
 bool Streets::plot(const Road& road, int side, double from, double length) {
   constexpr double kDriveway = 3.2, kHouseDepth = 7.0, kParkingStrip = 2.2;
   Dice& dice = builder_.dice();

@@ -8,7 +8,6 @@
 
 namespace perdure::sim {
 
-/// The kinds and densities of objects along a street. Distances in metres.
 struct Furnishing {
   double mean_gap = 1.6;         ///< gap between parked vehicles
   double free_share = 0.22;      ///< share of empty slots, 5 to 11 m long
@@ -27,11 +26,9 @@ inline constexpr double kRoadWidth = 10.0;  ///< two lanes and two rows of parke
 inline constexpr double kLane = 1.4;        ///< road's centre line to the centre of a lane
 
 inline constexpr double kGridX = 82.0, kGridY = 66.0;  ///< distance between roads
-/// Roads in rows (along x) and columns, which extend slightly beyond the outer crossings. The first
-/// crossing is at the origin.
+/// Roads in rows (along x) and columns. The first crossing is at the origin.
 std::vector<Road> gridOfRoads(int columns, int rows);
-/// The furnishing of a grid of streets: a third of the slots are free, and trees and people are
-/// few.
+/// A third of the slots are free; trees and people are few.
 Furnishing furnishingOfGrid();
 
 /// Straight roads that may cross, with objects on both sides.
@@ -53,7 +50,6 @@ class Streets {
   void fence(const Road& road, const Place& place, double length);
   Place placeAt(const Road& road, int side, double along, double across, double yaw) const;
   bool onAnotherRoad(const Road& road, const Solid& solid, double margin) const;
-  /// Places scenery that does not stand on another road.
   void put(const Road& road, PropKind kind, const Eigen::Vector3d& size, const Place& place);
   void closeEnds(const Road& road);
 
@@ -62,10 +58,8 @@ class Streets {
   Furnishing furnishing_;
 };
 
-/// A path on the right-hand lane that turns at these crossings. The first and the last point are
-/// its ends. Right turns are tighter than left turns.
+/// A path on the right-hand lane that turns at these crossings, from the first to the last.
 GroundPath laneThrough(const std::vector<Eigen::Vector2d>& points);
-/// Draws the direction and strength of sun and sky.
 void drawDaylight(SceneBuilder& builder);
 /// Sets the body as a car with this drive for `seconds`, with a car's sensors, in daylight.
 void putOnWheels(SceneBuilder& builder, const GroundPath& way, const Drive& driven, double seconds,

@@ -14,17 +14,14 @@
 
 namespace perdure::capture {
 
-/// Each camera has its own thread. All members are called from one other thread, which passes on
-/// the cameras' images.
+/// Each camera has its own thread. All members are called from one other thread.
 class LiveCameras {
  public:
-  /// One or two cameras: cam0, cam1. `give` is called on their threads, with the camera's name in
-  /// the frame.
+  /// cam0, cam1. `give` is called on their threads, with the camera's name in the frame.
   LiveCameras(const std::vector<OpenCamera>& cameras, double rate_hz,
               const std::function<void(CameraImage)>& give);
 
-  /// Takes an image and returns the images to publish; with two cameras, these are pairs. `now_ns`:
-  /// CLOCK_BOOTTIME.
+  /// Takes an image and returns the images to publish. `now_ns`: CLOCK_BOOTTIME.
   std::vector<CameraImage> pair(CameraImage image, std::int64_t now_ns);
   /// Returns images whose wait for a partner has ended.
   std::vector<CameraImage> due(std::int64_t now_ns);
@@ -43,7 +40,6 @@ class LiveCameras {
   std::list<LiveCamera> cameras_;
 };
 
-/// Name of camera i: "cam0", "cam1".
 std::string cameraName(std::size_t i);
 
 }  // namespace perdure::capture

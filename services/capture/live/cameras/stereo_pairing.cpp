@@ -12,8 +12,7 @@ namespace {
 
 constexpr double kMostTolerance_ns = 10e6;  // equal to vio's stereo.pair_tolerance
 constexpr double kLeastInterval_ns = 2e6;
-constexpr double kSilence = 4.0;  // intervals without an image after which a camera counts as
-                                  // silent
+constexpr double kSilence = 4.0;  // intervals without an image: a silent camera
 constexpr std::size_t kMostSeconds = 8;
 constexpr std::size_t kJudged = 64;  // images of cam0 per judgement
 constexpr double kTold_ms = 2.0;
@@ -41,8 +40,7 @@ bool CameraTimeline::flows(std::int64_t now_ns, double longest_ns) const {
 
 StereoPairing::StereoPairing(double rate_hz) : asked_ns_(1e9 / rate_hz) {}
 
-/// The shorter interval of both cameras, so that two images of a fast camera cannot match one image
-/// of the other.
+/// The shorter interval, so that two images of a fast camera cannot match one of the other.
 double StereoPairing::intervalNs() const {
   double interval = asked_ns_;
   for (const double period : {first_.period_ns(), second_.period_ns()}) {
@@ -158,8 +156,7 @@ void StereoPairing::judge() {
   alone_ = late_ = 0;
 }
 
-/// Reports the difference again if it has changed much, because the phases of free-running cameras
-/// drift.
+/// Reports the difference again if the phases of free-running cameras have drifted.
 void StereoPairing::judgeDifference() {
   if (apart_ms_.empty()) return note_.clear();
   const auto middle = apart_ms_.begin() + static_cast<std::ptrdiff_t>(apart_ms_.size() / 2);

@@ -12,7 +12,6 @@
 
 namespace perdure::capture {
 
-/// Stamps of one camera.
 class CameraTimeline {
  public:
   /// False if the stamp decreases, or is ahead of `now_ns` by more than `interval_ns`.
@@ -21,7 +20,6 @@ class CameraTimeline {
   std::optional<std::int64_t> last_ns() const { return last_ns_; }
   /// Smoothed time between images; 0: not known.
   double period_ns() const { return period_ns_; }
-  /// Whether an image arrived in the last `longest_ns`.
   bool flows(std::int64_t now_ns, double longest_ns) const;
 
  private:
@@ -30,18 +28,15 @@ class CameraTimeline {
   double period_ns_ = 0.0;
 };
 
-/// Pairs images by the nearest stamp. An image of cam0 waits for its partner no longer than the
-/// tolerance, and is then passed on alone. If cam1 sends no images, it does not wait. Images of
-/// cam1 wait until later images of cam0 arrive, and are then dropped.
+/// An image of cam0 waits for its nearest partner for the tolerance, if cam1 sends images, and is
+/// then passed on alone. Images of cam1 wait until cam0 is later.
 class StereoPairing {
  public:
   explicit StereoPairing(double rate_hz);
 
-  /// Takes an image of cam0 or cam1 and returns the images to publish: cam0 first, then cam1 with
-  /// the same number. `now_ns`: CLOCK_BOOTTIME.
+  /// Takes an image and returns those to publish: cam0 first, cam1 with the same number.
   std::vector<CameraImage> first(CameraImage image, std::int64_t now_ns);
   std::vector<CameraImage> second(CameraImage image, std::int64_t now_ns);
-  /// Returns images whose wait has ended.
   std::vector<CameraImage> due(std::int64_t now_ns);
 
   /// A third of the time between two images, at most vio's own pairing tolerance of 10 ms.
@@ -50,8 +45,7 @@ class StereoPairing {
   const std::string& problem() const { return problem_; }
   /// A sentence if the images of a pair typically differ by more than 2 ms.
   const std::string& note() const { return note_; }
-  /// Counts "stereo_unpaired_cam0", "stereo_unpaired_cam1", "camera_out_of_order_cam0" and
-  /// "…_cam1".
+  /// Counts "stereo_unpaired_cam0" and "…_cam1", "camera_out_of_order_cam0" and "…_cam1".
   const ReasonCounts& reasons() const { return reasons_; }
 
  private:

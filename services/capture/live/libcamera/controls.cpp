@@ -1,11 +1,13 @@
 #include "services/capture/live/libcamera/controls.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <libcamera/control_ids.h>
 #include <libcamera/formats.h>
 #include <libcamera/transform.h>
 #include <libcamera/version.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -15,8 +17,7 @@ namespace {
 namespace controls = libcamera::controls;
 namespace formats = libcamera::formats;
 
-/// The best format first, with the least conversion and full colour. libcamera names the bytes of a
-/// pixel from the last one in memory to the first.
+/// The best format first. libcamera names the bytes of a pixel from the last to the first.
 const std::array<KnownFormat, 11> kFormats = {{
     {formats::RGB888, PixelLayout::kBgr},
     {formats::BGR888, PixelLayout::kRgb},
@@ -63,8 +64,7 @@ class Asking {
   std::string missing_, refused_;
 };
 
-// From libcamera 0.5 on, exposure time and gain each have their own automatic mode, which ignores
-// the manual value. A camera without automatic gain then has no AeEnable.
+// From libcamera 0.5 on, exposure time and gain each have their own automatic mode.
 #if LIBCAMERA_VERSION_MAJOR > 0 || LIBCAMERA_VERSION_MINOR >= 5
 void askManualExposure(Asking& asking) {
   if (!asking.offers(controls::ExposureTimeMode)) {
@@ -112,8 +112,7 @@ libcamera::Transform transformOf(const std::string& flip) {
   return flip == "both" ? libcamera::Transform::HVFlip : libcamera::Transform::Identity;
 }
 
-// Before libcamera 0.2 the configuration has a transform of the upright image; since then it has
-// the resulting orientation.
+// Before libcamera 0.2: a transform of the upright image; since then the orientation.
 #if __has_include(<libcamera/orientation.h>)
 libcamera::Orientation orientationOf(const std::string& flip) {
   return libcamera::Orientation::Rotate0 * transformOf(flip);
@@ -169,6 +168,30 @@ std::string flipRefused(const libcamera::CameraConfiguration& configuration,
                         const std::string& flip) {
   if (flip == "none" || flips(configuration, flip)) return "";
   return "cannot mirror its images as it is mounted; set camera.flip to none, and calibrate it so.";
+}
+
+Result<std::size_t> chooseCamera(const std::vector<std::string>& ids, const std::string& wanted,
+                                 bool alone) {
+  const auto place = [&](auto found) { return static_cast<std::size_t>(found - ids.begin()); };
+  const auto exact = std::ranges::find(ids, wanted);
+  if (exact != ids.end()) return place(exact);
+  const auto has = [&](const std::string& id) { return id.find(wanted) != std::string::npos; };
+  const auto first = std::ranges::find_if(ids, has);
+  const auto n = std::ranges::count_if(ids, has);
+  if (n == 0) {
+    return fail("camera_absent",
+                fmt::format("libcamera sees no camera{} (there are: {}); is it plugged in, and may "
+                            "this user read /dev/video* and /dev/media*?",
+                            wanted.empty() ? "" : " with " + wanted + " in its id",
+                            ids.empty() ? "none" : fmt::format("{}", fmt::join(ids, ", "))));
+  }
+  if (alone && n > 1) {
+    return fail("camera_absent",
+                fmt::format("{} cameras have {} in their ids ({}), and which of them is left may "
+                            "not change; set camera.id and camera.second to whole ids.",
+                            n, wanted, fmt::join(ids, ", ")));
+  }
+  return place(first);
 }
 
 }  // namespace perdure::capture

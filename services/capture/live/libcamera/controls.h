@@ -5,19 +5,26 @@
 #include <libcamera/controls.h>
 #include <libcamera/pixel_format.h>
 
+#include <cstddef>
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "common/base/result.h"
 #include "services/capture/live/camera_session.h"
 #include "services/capture/live/pixels.h"
 
 namespace perdure::capture {
 
+/// Index of the id equal to `wanted`, else of the first that contains it. With `alone`, only one
+/// may contain it. Fails with "camera_absent".
+Result<std::size_t> chooseCamera(const std::vector<std::string>& ids, const std::string& wanted,
+                                 bool alone);
+
 struct AskedControls {
   libcamera::ControlList list;
-  std::string missing;  ///< a sentence on settings that the camera does not offer; empty if it
-                        ///< offers all
+  std::string missing;  ///< settings that the camera does not offer
   std::string refused;  ///< why the camera must not be used, with the fix; empty if it may be used
 };
 
@@ -25,16 +32,13 @@ struct AskedControls {
 AskedControls controlsFor(const CameraSettings& settings, const libcamera::ControlInfoMap& offered);
 
 using KnownFormat = std::pair<libcamera::PixelFormat, PixelLayout>;
-/// Known formats, the best first.
 std::span<const KnownFormat> knownFormats();
 
 /// Requests `camera.flip`; validate() removes it if the camera does not support it.
 void askFlip(libcamera::CameraConfiguration& configuration, const std::string& flip);
-/// Whether the configuration still contains the flip.
 bool flips(const libcamera::CameraConfiguration& configuration, const std::string& flip);
-/// Why images do not follow `camera.flip`, with the fix; empty if they do. With "none", images are
-/// left as delivered. Those of a camera mounted at 90° stay rotated, and are calibrated in this
-/// orientation.
+/// Why images do not follow `camera.flip`, with the fix. With "none", images are left as delivered,
+/// also rotated by 90°.
 std::string flipRefused(const libcamera::CameraConfiguration& configuration,
                         const std::string& flip);
 

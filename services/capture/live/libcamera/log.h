@@ -10,8 +10,7 @@
 
 namespace perdure::capture {
 
-/// Returns a libcamera line "[time] [thread] LEVEL Category file:line words" from its level on, if
-/// the level is warning or more severe. libcamera 0.0.3 cannot set this level for all categories.
+/// A libcamera line "[time] [thread] LEVEL …" from its level on, if it is a warning or worse.
 std::optional<std::string> worthLogging(std::string_view line);
 
 /// Receives libcamera's log during the lifetime of this object. `log` may be called on any thread.
@@ -23,8 +22,7 @@ class LibcameraLog {
   LibcameraLog& operator=(const LibcameraLog&) = delete;
 
  private:
-  /// libcamera writes a whole line at once, from several threads, so nothing is stored between
-  /// writes.
+  /// libcamera writes whole lines from several threads, so nothing is stored between writes.
   class Lines : public std::streambuf {
    public:
     explicit Lines(std::function<void(const std::string&)> log) : log_(std::move(log)) {}

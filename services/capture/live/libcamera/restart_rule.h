@@ -8,15 +8,13 @@
 
 namespace perdure::capture {
 
-/// libcamera detects plugged-in cameras itself, except those that appear before udev has granted
-/// access to their nodes. Its enumerations double with each device that is plugged in.
+/// libcamera misses cameras that appear before udev grants access to their nodes.
 class RestartRule {
  public:
   /// libcamera enumerated the cameras while these nodes existed.
   void started(std::set<std::string> nodes);
   void unplugged() { ++unplugged_; }
-  /// A camera is missing while libcamera runs and these nodes exist. Returns whether libcamera
-  /// should enumerate again, once for the same nodes.
+  /// A camera is missing while these nodes exist: whether to enumerate again, once for them.
   bool missed(const std::set<std::string>& nodes);
 
  private:
@@ -24,8 +22,7 @@ class RestartRule {
   std::size_t misses_ = 0, unplugged_ = 0;
 };
 
-/// Video nodes that this user may open. A node that was removed and created again counts as another
-/// node.
+/// Video nodes that this user may open; a node that was created again is another one.
 std::set<std::string> readableVideoNodes(const std::filesystem::path& folder = "/dev");
 
 }  // namespace perdure::capture

@@ -6,7 +6,6 @@
 #include <iterator>
 #include <utility>
 
-#include "services/capture/live/libcamera/last_of_all.h"
 #include "services/capture/live/libcamera/video_nodes.h"
 
 namespace perdure::capture {
@@ -28,11 +27,9 @@ RunningCamera::RunningCamera(std::shared_ptr<libcamera::CameraManager> manager,
 
 bool RunningCamera::over() { return lastOfAll(*this, &RunningCamera::leave, &RunningCamera::end); }
 
-/// If only the kernel has noticed the removal, stopping the camera would abort the process because
-/// of unreturned requests.
+/// Otherwise stopping the camera would abort the process because of unreturned requests.
 bool RunningCamera::end() {
-  const bool told = gone_ || !running_;  // the signal is not connected if the camera vanished
-                                         // before it ran
+  const bool told = gone_ || !running_;  // no signal if the camera vanished before it ran
   if (!told && openVideoNodeVanished()) return false;
   if (running_) camera_->stop();  // otherwise another program may be running it
   camera_->requestCompleted.disconnect(this);
@@ -89,8 +86,7 @@ void RunningCamera::queue(Request* request) {
   if (!gone_ && !ending_) camera_->queueRequest(request);
 }
 
-/// Runs on libcamera's thread, so it does little work. A request cancelled before the end means
-/// that the camera is gone, or refuses the controls.
+/// Runs on libcamera's thread. A request cancelled early: the camera is gone, or refuses controls.
 void RunningCamera::completed(Request* request) {
   const bool asked = request == asking_;
   if (asked) asking_ = nullptr;
@@ -102,9 +98,8 @@ void RunningCamera::completed(Request* request) {
   }
 }
 
-/// udev reports a node, not a camera. If its report is late, another camera may already have that
-/// node. The camera that libcamera then treats as gone still sends images, and the next one would
-/// abort the process.
+/// udev reports a node, not a camera. If its report is late, another camera may have that node,
+/// still send images, and abort the process.
 void RunningCamera::disconnected() {
   gone_ = true;
   done_.close();
@@ -128,10 +123,8 @@ void RunningCamera::giveBack(Request* request) {
   invokeMethod(&RunningCamera::queue, libcamera::ConnectionTypeQueued, request);
 }
 
-/// libcamera completes requests in the order in which they were queued. The UVC driver reuses the
-/// buffer of a broken image after the other buffers. Their images are delayed until that buffer has
-/// an image, which is the newest but completes first. They then complete together on libcamera's
-/// thread.
+/// libcamera completes requests in the order of their queueing. The UVC driver reuses the buffer of
+/// a broken image last, so later images are delayed and then complete together.
 void RunningCamera::takeTheRest() {
   invokeMethod(&RunningCamera::settle, libcamera::ConnectionTypeBlocking);
   while (const auto more = done_.tryPop()) in_hand_.push_back(*more);

@@ -1,6 +1,7 @@
 // An acquired libcamera camera and its requests.
 #pragma once
 
+#include <libcamera/base/object.h>
 #include <libcamera/libcamera.h>
 
 #include <atomic>
@@ -16,9 +17,16 @@
 
 namespace perdure::capture {
 
-/// libcamera's thread calls slots and reads requests through raw pointers, and calls of
-/// queueRequest() reach it later. Therefore all access to requests and signals is on that thread.
-/// No camera can be unplugged in between, and after over() that thread has no pointers to them.
+/// Calls `leave` and `end` on the object's thread, after all of its earlier messages and those that
+/// they post (queueRequest()). Returns the result of `end`.
+template <class T, class Answer>
+Answer lastOfAll(T& object, void (T::*leave)(), Answer (T::*end)()) {
+  object.invokeMethod(leave, libcamera::ConnectionTypeBlocking);
+  return object.invokeMethod(end, libcamera::ConnectionTypeBlocking);
+}
+
+/// All access to requests and signals is on libcamera's thread, which uses raw pointers: no camera
+/// can be unplugged in between, and after over() no pointers remain.
 class RunningCamera final : public Unended, public libcamera::Object {
  public:
   static constexpr std::size_t kBuffers = 4;
@@ -29,8 +37,7 @@ class RunningCamera final : public Unended, public libcamera::Object {
   RunningCamera& operator=(const RunningCamera&) = delete;
 
   libcamera::Camera& camera() { return *camera_; }
-  /// False if another program uses the camera, or if libcamera still counts it as used by this
-  /// process.
+  /// False if another program, or libcamera for this process, still uses the camera.
   bool acquire();
   /// Allocates a request for each buffer of a configured stream. Fails with "camera_absent".
   Result<void> allocate(libcamera::Stream* stream);
@@ -44,8 +51,7 @@ class RunningCamera final : public Unended, public libcamera::Object {
   bool gone() const { return gone_; }
   /// Whether the camera refuses the controls given at its start.
   bool refused() const { return refused_; }
-  /// Next request in the driver's order. Its image is valid until the request is returned by
-  /// giveBack().
+  /// Next request in the driver's order. Its image is valid until giveBack().
   libcamera::Request* next(std::chrono::milliseconds longest);
   void giveBack(libcamera::Request* request);
 

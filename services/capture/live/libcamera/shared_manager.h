@@ -27,7 +27,6 @@ class Unended {
 
 class SharedManager {
  public:
-  /// `devices`: folder of the video nodes.
   explicit SharedManager(std::function<void(const std::string&)> log,
                          std::filesystem::path devices = "/dev")
       : log_(std::move(log)), devices_(std::move(devices)) {}
@@ -39,16 +38,13 @@ class SharedManager {
   std::unique_lock<std::mutex> opening() { return std::unique_lock(mutex_); }
   /// Returns the manager, which exists as long as one of its cameras is used.
   Result<std::shared_ptr<libcamera::CameraManager>> manager();
-  /// Reports that the manager lacks a required camera. A new manager replaces it once no camera is
-  /// used. The caller must hold one reference to the manager.
+  /// A new manager replaces this one once no camera is used. The caller holds one reference.
   void missing();
-  /// Reports that a camera was unplugged, with the same effect. Otherwise libcamera 0.0.3
-  /// enumerates the cameras 2^n times at the nth device that is plugged in.
+  /// The same for an unplugged camera, because libcamera 0.0.3 enumerates 2^n times.
   void unplugged();
   /// Keeps a camera whose removal udev has not reported yet. A later manager() destroys it once
   /// over() is true. The destructor waits for it for two seconds, and otherwise leaks it.
   void keepUntilOver(std::unique_ptr<Unended> camera);
-  /// Returns whether a removed camera is still stored.
   bool keeps() const;
   /// Increases if the open cameras must be closed briefly.
   unsigned restarts() const { return restarts_; }

@@ -2,18 +2,14 @@
 
 #include <cmath>
 
-#include "services/inference/core/decode/decode_boxes.h"
-#include "services/inference/core/decode/decode_distances.h"
-#include "services/inference/core/decode/decode_perdure.h"
-#include "services/inference/core/decode/decode_yolov5.h"
+#include "services/inference/core/decode/decode_families.h"
 #include "services/inference/core/decode/evidence.h"
 #include "services/inference/core/decode/weigh.h"
 
 namespace perdure::inference {
 namespace {
 
-/// YOLOX: centre (gx + x)·s, size exp(w)·s. FastestDet: centre (gx + tanh x)·s, size σ(w)·input.
-/// YOLO-FastestV2: as YOLOv5, with anchor `a`.
+/// YOLOX: (gx + x)·s, exp(w)·s. FastestDet: (gx + tanh x)·s, σ(w)·input. V2: as YOLOv5.
 Box boxOf(const ModelDescription& model, const Level& level, std::size_t a, int gx, int gy,
           const float* raw, std::size_t step) {
   if (model.family == Family::kYoloFastestV2) return anchoredBox(level, a, gx, gy, raw, step);
@@ -26,8 +22,7 @@ Box boxOf(const ModelDescription& model, const Level& level, std::size_t a, int 
                  sigmoid(h) * model.input.height);
 }
 
-/// YOLOX, FastestDet, and YOLO-FastestV2 with A anchors: planes box (4·A), objectness (A), and
-/// classes (K), which all anchors share, of H×W cells.
+/// YOLOX, FastestDet, YOLO-FastestV2: planes box (4·A), objectness (A), classes (K), H×W cells.
 void decodePlanes(const ModelDescription& model, const DecodeOptions& options, const Level& level,
                   const Tensor* tensors, std::vector<Candidate>& out) {
   const int columns = model.input.width / level.stride, rows = model.input.height / level.stride;

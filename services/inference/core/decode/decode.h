@@ -1,5 +1,4 @@
-// Decodes raw head tensors to boxes with evidence, with one rule for each family of networks (eq.
-// 6, 7).
+// Decodes raw head tensors to boxes with evidence, one rule a family (eq. 6, 7).
 #pragma once
 
 #include <array>
@@ -24,8 +23,7 @@ struct Candidate {
 };
 
 struct DecodeOptions {
-  double score_threshold = 0.05;    ///< boxes with a lower score of their best wanted class are
-                                    ///< left out
+  double score_threshold = 0.05;    ///< of the best wanted class
   std::vector<std::size_t> wanted;  ///< indices of the model's classes to report, in order
 };
 

@@ -1,8 +1,7 @@
-#include "services/inference/core/decode/decode_boxes.h"
-
 #include <cmath>
 #include <string>
 
+#include "services/inference/core/decode/decode_families.h"
 #include "services/inference/core/decode/weigh.h"
 
 namespace perdure::inference {

@@ -1,7 +1,6 @@
-#include "services/inference/core/decode/decode_distances.h"
-
 #include <cmath>
 
+#include "services/inference/core/decode/decode_families.h"
 #include "services/inference/core/decode/weigh.h"
 
 namespace perdure::inference {

@@ -1,4 +1,4 @@
-#include "services/inference/core/decode/decode_perdure.h"
+#include "services/inference/core/decode/decode_families.h"
 
 #include <algorithm>
 #include <cmath>

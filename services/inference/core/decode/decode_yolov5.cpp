@@ -1,5 +1,4 @@
-#include "services/inference/core/decode/decode_yolov5.h"
-
+#include "services/inference/core/decode/decode_families.h"
 #include "services/inference/core/decode/evidence.h"
 #include "services/inference/core/decode/weigh.h"
 

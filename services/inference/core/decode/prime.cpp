@@ -16,7 +16,6 @@ struct Overlap {
   std::size_t index = 0;
 };
 
-/// Finds the box with the largest overlap.
 template <class Boxes>
 Overlap mostOverlapping(const Box& box, const Boxes& others) {
   Overlap most;
@@ -27,7 +26,6 @@ Overlap mostOverlapping(const Box& box, const Boxes& others) {
   return most;
 }
 
-/// Which expectations and which reported boxes have a match.
 struct Meetings {
   std::vector<bool> met, used;
 };
@@ -109,8 +107,7 @@ Candidate fused(const Expectation& expectation, const Candidate& candidate) {
   Candidate result = candidate;
   for (std::size_t i = 0; i < 4; ++i) {
     const double variance = expectation.side_sigma[i] * expectation.side_sigma[i];
-    const double share = variance > 0.0 ? own[i] / (own[i] + variance) : 0.0;  // weight of the
-                                                                               // prediction
+    const double share = variance > 0.0 ? own[i] / (own[i] + variance) : 0.0;  // of the prediction
     sides[i] = share * predicted[i] + (1.0 - share) * box[i];
     result.side_sigma[i] = std::sqrt((1.0 - share) * own[i]);
   }

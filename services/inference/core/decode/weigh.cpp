@@ -9,7 +9,6 @@
 namespace perdure::inference {
 namespace {
 
-/// Access to the column of class k in the scores of one box.
 class Columns {
  public:
   Columns(const ModelDescription& model, const RawScores& raw)
@@ -64,8 +63,7 @@ bool isPlainProduct(const ModelDescription& model) {
   return !model.class_softmax && model.objectness_exponent == 1.0 && model.class_exponent == 1.0;
 }
 
-/// logit(σ(o) σ(c)) = −log(u + e^−c (1 + u)) with u = e^−o. It needs one logarithm for each of a
-/// box's K classes, and is exact, because all terms are positive.
+/// logit(σ(o) σ(c)) = −log(u + e^−c (1 + u)) with u = e^−o: one logarithm a class, exact.
 double logitOfProduct(double u, double c) {
   return u == 0.0 ? c : -std::log(u + std::exp(-c) * (1.0 + u));
 }

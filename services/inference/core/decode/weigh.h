@@ -1,5 +1,4 @@
-// Converts the raw values of one box to its score and its evidence for each class (eq. 6, 7;
-// README, "Clutter"). It handles objectness, classes alone, and a background among the classes.
+// Converts the raw values of one box to its score and evidence (eq. 6, 7; README, "Clutter").
 #pragma once
 
 #include <cstddef>
@@ -10,8 +9,7 @@
 
 namespace perdure::inference {
 
-/// Probabilities of networks without logits are limited to [p, 1 − p] with this p before the logit,
-/// because float32 has no finer steps below 1. The evidence is then within ±16.1.
+/// Applied probabilities are limited to [p, 1 − p], because float32 has no finer steps below 1.
 inline constexpr double kLeastProbability = 1e-7;
 
 /// Raw scores of one box; column k is at scores[k * step].
@@ -21,20 +19,16 @@ struct RawScores {
   std::size_t step;
 };
 
-/// Fills score and activations and returns the best wanted class; empty if the box is below the
-/// threshold. Class k is column k, or k + 1 if the background is first.
-///   p_k = σ(o)^a · q_k^b, q_k sigmoid or soft-max of the classes; without objectness σ(o) = 1
-///   activations[k] = logit(p_k) / T + logit(c)
-/// With a soft-max over classes and background:
-///   p = softmax(o); activations[k] = (o_k − o_background) / T + logit(c), within ±kMaxLogit
-/// `applied` probabilities are first converted to raw values: logit(p), or log p of a soft-max.
+/// Fills score and activations and returns the best wanted class, if above the threshold. p_k =
+/// σ(o)^a · q_k^b, q_k sigmoid or soft-max; without objectness σ(o) = 1; activations[k] =
+/// logit(p_k) / T + logit(c). With a background: p = softmax(o); activations[k] = (o_k −
+/// o_background) / T + logit(c). `applied` probabilities are first converted to raw values.
 std::optional<std::size_t> weigh(const ModelDescription& model, const DecodeOptions& options,
                                  const RawScores& raw, Candidate& candidate);
 
 /// Soft-max of `count` values, `step` apart.
 std::vector<double> softMax(const float* values, std::size_t step, std::size_t count);
 
-/// Box from its centre and size.
 inline Box centred(double cx, double cy, double width, double height) {
   return {cx - width / 2, cy - height / 2, cx + width / 2, cy + height / 2};
 }

@@ -1,6 +1,8 @@
 #include "services/inference/core/network/image_fit.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
@@ -21,8 +23,7 @@ Result<cv::Mat> viewOf(const Frame& frame) {
   return cv::Mat(static_cast<int>(frame.height), static_cast<int>(frame.width), type, data);
 }
 
-/// Converts interleaved 8-bit BGR of the input's size to float planes in the network's colour
-/// order.
+/// Interleaved 8-bit BGR to float planes in the network's colour order.
 cv::Mat toPlanes(const Input& input, const cv::Mat& bgr) {
   const int sizes[] = {1, 3, input.height, input.width};
   cv::Mat blob(4, sizes, CV_32F);
@@ -127,6 +128,18 @@ Result<cv::Mat> makeBlob(const Input& input, const Frame& frame, int quarters) {
   }
   if (canvas.channels() == 1) cv::cvtColor(canvas, canvas, cv::COLOR_GRAY2BGR);
   return toPlanes(input, canvas);
+}
+
+int uprightQuarters(const Eigen::Vector3d& up_C, int present) {
+  constexpr double kQuarter = std::numbers::pi / 2;
+  constexpr double kMargin = std::numbers::pi / 18;  // the turn changes at 45° plus this margin
+  constexpr double kLeast = 0.5;                     // share of `up_C` in the image plane
+  if (!(up_C.head<2>().norm() > kLeast)) return present;
+  // Clockwise turn after which `up_C` points to the top, that is against y.
+  const double turn = -std::atan2(up_C.x(), -up_C.y());
+  const double lean = std::remainder(turn - present * kQuarter, 4 * kQuarter);
+  if (std::abs(lean) <= kQuarter / 2 + kMargin) return present;
+  return (static_cast<int>(std::lround(turn / kQuarter)) + 4) % 4;
 }
 
 }  // namespace perdure::inference

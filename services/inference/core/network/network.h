@@ -1,5 +1,4 @@
-// A network from a file, evaluated for named raw tensors. OpenCV's DNN module runs it, or ONNX
-// Runtime if this build includes it.
+// A network from a file, run by OpenCV's DNN module or ONNX Runtime.
 #pragma once
 
 #include <memory>
@@ -22,7 +21,6 @@ enum class Backend {
 /// Backend of a name, which must be "auto", "opencv" or "onnxruntime".
 Backend backendOf(const std::string& name);
 
-/// Whether this build includes ONNX Runtime.
 bool hasOnnxRuntime();
 
 struct NetworkFile {
@@ -38,13 +36,11 @@ class Network {
   /// `blob` is (1,3,H,W), float32. The tensors are valid until the next call. Fails with
   /// "model_failed" if the network could not be evaluated, or with "model_output_shape".
   virtual Result<std::vector<Tensor>> forward(const cv::Mat& blob) = 0;
-  /// Name and version of the backend, for people.
   virtual std::string backend() const = 0;
 };
 
-/// `threads`: threads of ONNX Runtime; OpenCV uses those of the process (cv::setNumThreads). Fails
-/// with "model_unreadable", "model_without_tensor" or "backend_absent". The detail is a clause that
-/// names the backend and the cause.
+/// `threads`: of ONNX Runtime; OpenCV uses those of the process. Fails with "model_unreadable",
+/// "model_without_tensor" or "backend_absent".
 Result<std::unique_ptr<Network>> loadNetwork(const NetworkFile& file,
                                              const std::vector<std::string>& tensors,
                                              Backend backend = Backend::kAuto, int threads = 1);

@@ -121,8 +121,7 @@ Result<std::unique_ptr<Network>> loadWithOnnxRuntime(const NetworkFile& file,
   if (!file.darknet_weights.empty()) {
     return fail("model_unreadable", kWho + std::string("does not take Darknet files"));
   }
-  // Debian's library registers operators again that ONNX's own library has registered, which logs
-  // an error for each of them.
+  // Debian's library registers operators twice, which logs an error for each.
   const HeldErrors held(
       [](const std::string& line) { return !line.empty() && !line.starts_with("Schema error: "); });
   try {

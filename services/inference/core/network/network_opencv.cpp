@@ -37,8 +37,7 @@ std::string lastOf(const std::vector<std::string>& names, std::size_t count) {
   return text;
 }
 
-/// OpenCV reads past the end of a short .weights file without an error, so its required size is
-/// checked here.
+/// OpenCV reads past the end of a short .weights file without an error.
 Result<void> checkWeights(cv::dnn::Net& net, std::size_t bytes) {
   std::size_t needed = 0;
   for (const std::string& name : net.getLayerNames()) {

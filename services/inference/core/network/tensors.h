@@ -20,7 +20,6 @@ struct Tensor {
 /// A length in expectedShapes() that the network chooses.
 inline constexpr int kAnyLength = -1;
 
-/// A tensor of one level of the heads.
 struct LevelTensor {
   const char* key;           ///< key in model.json
   std::string Level::*name;  ///< member with the tensor's name in the network
@@ -32,15 +31,13 @@ std::vector<LevelTensor> levelTensors(const ModelDescription& model, const Level
 /// Names of the tensors to request from the network, in the order of decode()'s argument.
 std::vector<std::string> tensorNames(const ModelDescription& model);
 
-/// Columns and rows of a level's cells. For the families perdure and nanodet they may extend beyond
-/// the input's border: 240 / 32 gives 8 rows.
+/// Cells of a level; those of perdure and nanodet may extend beyond the input: 240 / 32 gives 8.
 std::pair<int, int> cellsOf(const ModelDescription& model, const Level& level);
 
 /// Number of score columns: the classes, and the background if present.
 std::size_t scoreColumns(const ModelDescription& model);
 
-/// Required shapes of the tensors, in the order of tensorNames(). YOLOv5 heads may also have the
-/// shape (1,A,H,W,5+K).
+/// Shapes in the order of tensorNames(). YOLOv5 heads may also be (1,A,H,W,5+K).
 std::vector<std::vector<int>> expectedShapes(const ModelDescription& model);
 
 /// Fails with "model_output_shape" or "model_output_not_finite".

@@ -28,8 +28,7 @@ bool hasBoxAt(const Detections& list, const Box& box) {
   });
 }
 
-/// Counts boxes without top-down answers, because an answer to a prediction is weak evidence about
-/// the network.
+/// Counts boxes without top-down answers, which are weak evidence about the network.
 std::size_t boxesOf(const Detections& list) {
   return static_cast<std::size_t>(std::count_if(list.detections.begin(), list.detections.end(),
                                                 [](const Detection& d) { return !d.primed; }));

@@ -98,8 +98,7 @@ void Swap::heard(const Detections& detections, Time now) {
   const auto own = findFrame(own_, detections.stamp, stampOfMade);
   if (own != own_.rend()) compare(own->detections, detections);
   judgeNow(now);
-  // The other's result for this frame has been received, so this process may take over from the
-  // next frame on.
+  // The other's result for this frame is here, so this process may take over from the next on.
   if (role_ == Role::kRehearsing && good_ >= kRehearsal) return takeOver(now);
   const bool outbid = role_ == Role::kProbation && now - since_ > 2 * options_.lease &&
                       now - self_at_ > 2 * options_.lease;
@@ -212,8 +211,7 @@ void Swap::sayAgain(Time from, Time now) {
 }
 
 void Swap::tick(Time now) {
-  // Readers learn of a new owner at slightly different times, so results written in the meantime
-  // are repeated.
+  // Readers learn of a new owner at different times, so results are repeated.
   if (again_at_ != Time{} && now >= again_at_) {
     again_at_ = Time{};
     for (const Made& made : own_) {

@@ -1,10 +1,7 @@
-// Takeover of one inference process by another while frames arrive, seen from each of the two. It
-// is a state machine over own results, received results and received notices. It has no clock: each
-// call passes the time. No third process is needed; the process that started the new one may have
-// ended.
-//
-//   new one:   rehearsing ──► on probation ──► plain          gives up: silent, and ends
-//   old one:   plain ──► watches ──► retires                  takes back: outbids the new one
+// Takeover of one inference process by another, as a state machine over own results, received
+// results and notices. Each call passes the time. The new one: rehearsing, on probation, plain; or
+// it gives up and ends. The old one: plain, watches, retires; or it takes back and outbids the new
+// one.
 #pragma once
 
 #include <chrono>
@@ -29,8 +26,7 @@ struct SwapOptions {
 class Swap {
  public:
   static constexpr std::size_t kRehearsal = 15;  ///< plausible frames in a row
-  static constexpr std::size_t kPatience = 150;  ///< number of own results after which a rehearsal
-                                                 ///< is too slow
+  static constexpr std::size_t kPatience = 150;  ///< own results: a rehearsal is too slow
   static constexpr int kFailures = 3;            ///< failures of the network in a row
   using Time = std::chrono::steady_clock::time_point;
 
@@ -54,7 +50,6 @@ class Swap {
   void told(const SwapNotice& notice, Time now);
   /// Call it several times in a lease.
   void tick(Time now);
-  /// Returns the actions since the last call.
   Actions take() { return std::exchange(actions_, {}); }
 
   /// Whether no other writer was received for a lease.
@@ -62,7 +57,6 @@ class Swap {
   bool rehearsing() const { return role_ == Role::kRehearsing; }
   /// Last event, for people; empty if there was none.
   const std::string& message() const { return message_; }
-  /// Counts of roll-backs by reason.
   const ReasonCounts& reasons() const { return reasons_; }
 
  private:
@@ -110,8 +104,7 @@ class Swap {
   InstanceId follows_ = 0;  ///< process that this new process replaces
   std::optional<Watch> watch_;
   std::vector<Detections> again_;
-  Time again_at_{}, again_from_{};  ///< time of the repetition, and the start of the results to
-                                    ///< repeat
+  Time again_at_{}, again_from_{};  ///< of the repetition
 };
 
 }  // namespace perdure::inference

@@ -1,5 +1,4 @@
-// Answers to queries about the graph: the anchors with their poses in M and standard deviations,
-// and the loop closures between them.
+// Answers to queries about the graph: anchors with poses and deviations, and loop closures.
 #pragma once
 
 #include <vector>
@@ -9,13 +8,11 @@
 
 namespace perdure::map_store {
 
-/// The largest number of anchors in an answer, whatever `limit` is. For loop closures the limit is
-/// eight times as large; the newest are chosen.
+/// The largest number of anchors in an answer; eight times as many loop closures.
 inline constexpr std::uint32_t kMostAnchors = 4096;
 
-/// Fills anchors, loops, their counts and `truncated`. They belong to the M of `session`; if
-/// `session` has no anchor, to the M of the newest session. `withdrawn`: loop closures that were
-/// removed from the graph. Those whose id is in use again are left out.
+/// Fills anchors, loops, counts and `truncated`, of the M of `session` or of the newest session.
+/// `withdrawn`: removed loop closures, without ids in use again.
 void putGraph(mapping::Mapper& mapper, const std::vector<mapping::LoopWithdrawal>& withdrawn,
               const WorldId& session, const MapQuery& query, MapReply& reply);
 

@@ -1,5 +1,4 @@
-// Converts the pose graph to bytes and back for the database. As for beliefs, the format is
-// versioned, little-endian and exact.
+// Converts the pose graph to bytes and back, versioned, little-endian and exact.
 #pragma once
 
 #include <cstdint>
@@ -23,8 +22,7 @@ bool isSound(const mapping::Edge& edge);
 bool isSound(const mapping::ObjectRecord& record);
 bool isSound(const mapping::View& view);
 
-// The decoders refuse ("graph_malformed") bytes that are truncated, too long, of another version or
-// unsound.
+// The decoders refuse bytes that are not whole, known and sound ("graph_malformed").
 
 Bytes encodeAnchor(const mapping::Anchor& anchor);
 Result<mapping::Anchor> decodeAnchor(std::span<const std::uint8_t> bytes);

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <map>
 #include <set>
 #include <string>
 #include <string_view>
@@ -23,8 +22,7 @@ void takeRows(const Connection& connection, std::string_view sql, std::uint64_t&
   need(connection.forRows(sql, [&](const Statement& row) { malformed += take(row) ? 0 : 1; }));
 }
 
-/// Reads class names by their numbers, from 0. Names after a gap or a repeated name cannot be
-/// assigned and are left out.
+/// Class names by their numbers. Names after a gap or a repetition are left out.
 void readClasses(const Connection& connection, SavedGraph& graph) {
   auto& classes = graph.map.classes;
   takeRows(connection, "SELECT number, name FROM graph_classes ORDER BY number", graph.malformed,
@@ -110,8 +108,7 @@ void readViews(const Connection& connection, SavedGraph& graph) {
            });
 }
 
-/// Anchors come after their predecessors, so anchors that follow one that was left out are left out
-/// too.
+/// Anchors that follow one that was left out are left out too.
 void leaveOutBrokenChains(SavedGraph& graph) {
   auto& anchors = graph.map.anchors;
   for (auto at = anchors.begin(); at != anchors.end();) {
@@ -156,8 +153,7 @@ void leaveOutDangling(SavedGraph& graph) {
   }
 }
 
-/// Facts of a loop closure that was left out remain valid. If facts are missing (a map from a
-/// server), each object remains one track.
+/// Facts of a loop closure that was left out remain valid. Without facts, each object is one track.
 void takeFacts(SavedGraph& graph, const std::set<mapping::SameObject>& facts) {
   SavedMap& map = graph.map;
   for (mapping::SameObject fact : facts) {
@@ -175,8 +171,7 @@ void takeFacts(SavedGraph& graph, const std::set<mapping::SameObject>& facts) {
   }
 }
 
-/// Fixes the first anchor of each component without a fixed anchor: that anchor, or an edge to it,
-/// may have been left out.
+/// Fixes the first anchor of each component that lost its fixed one.
 void holdEachComponent(SavedMap& map) {
   DisjointSets<AnchorId> components;
   for (const auto& [id, saved] : map.edges) components.join(saved.edge.a, saved.edge.b);

@@ -118,8 +118,7 @@ void bindFact(Statement& to, const mapping::SameObject& fact) {
 
 void bindView(Statement& to, const ViewRow& row) { to.bindAll(row.first, encodeView(row.second)); }
 
-/// Returns the elements of `all` that may be written, and adds the number of the others to
-/// `refused`.
+/// The elements of `all` that may be written; adds the number of the others to `refused`.
 template <class All, class MayBeWritten>
 std::vector<std::reference_wrapper<const typename All::value_type>> soundOnes(
     const All& all, std::uint64_t& refused, MayBeWritten mayBeWritten) {

@@ -1,5 +1,4 @@
-// The tables of the pose graph in the map's file. They are written within a transaction and read as
-// a whole.
+// The tables of the pose graph. They are read as a whole.
 #pragma once
 
 #include <cstdint>
@@ -14,23 +13,19 @@ namespace perdure::map_store {
 /// Maps of older versions have no tables of the graph.
 inline constexpr int kFirstSchemaWithGraph = 3;
 
-/// SQL that creates the tables.
 extern const char* const kGraphSchema;
 /// SQL that creates the later tables if they do not exist: views, and tracks that share an object.
 extern const char* const kAddedSchema;
 
-/// The graph in a file. The ends of edges, the anchors of sightings and predecessors of the same
-/// session exist. One anchor of each component is fixed.
+/// The graph in a file: complete references, one fixed anchor of each component.
 struct SavedGraph {
   mapping::SavedMap map;
-  /// Number of parts that were left out because they, or parts that they depend on, could not be
-  /// read. Some records lost only `earlier`.
+  /// Parts left out because they, or parts that they need, could not be read.
   std::uint64_t malformed = 0;
   std::set<ObjectId> shortened;  ///< records that lost `earlier`
 };
 
-/// Reads one state of the file, even if another process writes to it. Returns an empty graph for
-/// maps of older versions.
+/// Reads one state of the file. Empty for maps of older versions.
 Result<SavedGraph> readGraph(const Connection& connection);
 
 // The functions that write do so within the caller's transaction and throw Failed.
@@ -43,8 +38,7 @@ std::uint64_t writeGraph(const Connection& connection, const mapping::Unsaved& u
 Result<std::set<mapping::SameObject>> readFacts(const Connection& connection);
 void writeFacts(const Connection& connection, const mapping::Unsaved& unsaved);
 
-/// Deletes the rows that readGraph leaves out, because a mapper that starts from the graph reuses
-/// their ids.
+/// Deletes the rows that readGraph leaves out, because their ids are reused.
 void sweepGraph(const Connection& connection);
 
 }  // namespace perdure::map_store

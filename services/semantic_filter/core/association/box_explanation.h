@@ -10,8 +10,7 @@
 
 namespace perdure::semantic_filter {
 
-/// The predicted measurements of one frame, one for each track. Each is computed when it is first
-/// asked for. Belief, input and parameters outlive this object.
+/// The predicted measurements of one frame, computed on demand. Its arguments outlive it.
 class BoxExplanations {
  public:
   BoxExplanations(const Belief& belief, const FrameInput& input, const Parameters& parameters);
@@ -29,14 +28,12 @@ class BoxExplanations {
   ScratchVector<std::optional<std::optional<PredictedBox>>> at_;  ///< outer: computed
 };
 
-/// Adds the partial views of tracks with v = 0 to the clutter of each box (log_partial_views), so
-/// that it is less likely a new object or that of another track. The tracks do not change.
+/// Adds the partial views of tracks with v = 0 to the clutter of each box (log_partial_views).
 void explainPartialViews(const Belief& belief, const ScratchVector<TrackVisibility>& visibilities,
                          FrameInput& input, const Parameters& parameters,
                          const ClassPriors& priors);
 
-/// A box that an occluded track explains far better than any visible one shows that the occluder
-/// was misjudged. The occluded track gets v = visibility.minimum in this frame.
+/// If an occluded track explains a box far better, it gets v = visibility.minimum here.
 void reviseOcclusion(Belief& belief, ScratchVector<TrackVisibility>& visibilities,
                      const FrameInput& input, const Parameters& parameters);
 

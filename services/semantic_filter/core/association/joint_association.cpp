@@ -12,7 +12,6 @@ namespace {
 constexpr int kMaxIterations = 200;
 constexpr double kTolerance = 1e-9;
 
-/// Track j and a box z that it may have made.
 struct Pair {
   Eigen::Index j, z;
   double psi, eta;

@@ -1,5 +1,5 @@
-// The corners of an object's shape before the camera, and their images, for cuboid_projection.
-// Derivation: tools/docs/maths/cuboid_projection.md.
+// The corners of a shape before the camera, and their images
+// (tools/docs/maths/cuboid_projection.md).
 #pragma once
 
 #include <Eigen/Core>
@@ -17,7 +17,6 @@ inline constexpr double kNear = 0.2;  ///< depth of the near plane, m
 
 using PerCorner = std::array<double, Shape::kMostCorners>;
 
-/// The corners of a shape, relative to the camera.
 struct Corners {
   Eigen::Matrix3d R_WO;
   Eigen::Vector3d half;  ///< of length, width, height
@@ -88,7 +87,6 @@ struct SidePoint {
   Eigen::RowVector3d by_C;  ///< of the side's coordinate
 };
 
-/// Sets the derivatives of a side.
 void setSide(ProjectedBox& box, int side, const SidePoint& point, const Projector& from,
              const Corners& corners);
 /// The same of a side that is the image of a corner. With kCut the side is not exact.

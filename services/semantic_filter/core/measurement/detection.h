@@ -1,5 +1,4 @@
-// One box of the network as the filter uses it: box, and log-likelihood ratios by class (paper, eq.
-// 6). Only differences to the clutter activation matter. Derivation:
+// One box of the network: box and log-likelihood ratios by class (paper, eq. 6). Derivation:
 // tools/docs/maths/measurement_likelihood.md.
 #pragma once
 
@@ -33,8 +32,7 @@ using ClassNames = std::set<std::string>;
 /// What the filter keeps of a ModelInfo.
 struct Model {
   std::uint64_t hash = 0;
-  /// Hash of the first model of the same network; what is learned about its boxes belongs to it.
-  /// It differs from `hash` where the list of classes grew.
+  /// Hash of the first model of the same network, to which what is learned belongs.
   std::uint64_t network = 0;
   std::vector<std::string> classes;
   /// the same as `classes`
@@ -71,10 +69,9 @@ void markSidesBesideNearer(std::vector<BoxDetection>& boxes, const View& view);
 /// Returns `hidden` and the sides beside nearer boxes.
 std::array<bool, 4> withSidesBesideNearer(std::array<bool, 4> hidden, const BoxDetection& box);
 
-/// Returns what is wrong with a detection, or nullptr. The names are those that Health counts:
-/// "detections_not_finite", "detections_box_inside_out", "detections_classes_mismatch",
-/// "detections_azimuth_without_sigma". A message with one such detection is refused as a whole,
-/// because what is missing in it would count as a miss.
+/// What is wrong with a detection, as Health counts it, or nullptr: "detections_not_finite",
+/// "detections_box_inside_out", "detections_classes_mismatch", "detections_azimuth_without_sigma".
+/// One such detection refuses the message.
 const char* flawOf(const Detection& detection, const Model& model);
 
 /// Returns nothing for a flawed detection or one without a pixel in the image (width, height: px).

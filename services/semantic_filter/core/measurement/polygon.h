@@ -1,5 +1,4 @@
-// Convex polygons in a plane: hull, area and clipping, for outlines in the image and for footprints
-// (Andrew's monotone chain; Sutherland and Hodgman's clipping).
+// Convex polygons: hull (Andrew's monotone chain), area, clipping (Sutherland and Hodgman).
 #pragma once
 
 #include <Eigen/Core>

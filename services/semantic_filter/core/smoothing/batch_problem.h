@@ -1,6 +1,5 @@
-// Batch problem that a MAP fit solves: residuals, Jacobians and full covariance of all keyframes of
-// a track as one measurement of a cuboid, and the priors (Dellaert, Kaess 2017). map_fit.h
-// describes the model. Derivation: tools/docs/maths/map_fit.md.
+// Residuals, Jacobians and covariance of all keyframes of a track as one measurement of a cuboid,
+// and the priors (Dellaert, Kaess 2017). Derivation: tools/docs/maths/map_fit.md.
 #pragma once
 
 #include <optional>
@@ -35,8 +34,7 @@ class KeyframeBatch {
   const Keyframes& keyframes() const { return *keyframes_; }
   std::size_t size() const { return keyframes_->size(); }
   bool exactPoses() const { return exact_; }
-  /// Computes the covariance that the pose errors cause in all sides, px²; only its lower triangle.
-  /// `J`: derivatives of the sides by the pose error, for each keyframe.
+  /// The covariance that the pose errors cause in all sides, px² (lower triangle).
   void poseCovariance(const ScratchVector<PoseJacobian>& J, SideMatrix& result) const;
   /// Returns the covariance of the present pose error with that of keyframe i.
   const Matrix6d& poseNow(std::size_t i) const { return now_[i]; }
@@ -48,8 +46,7 @@ class KeyframeBatch {
   /// Fills pairs_ and now_ instead.
   void pairUp(const PoseError& now);
 
-  /// Φ_i (from the first keyframe to keyframe i) and Φ_i⁻¹ P_i. Keyframe i and an earlier keyframe
-  /// j have the covariance Φ_i (Φ_j⁻¹ P_j). Empty where a Φ_i has no usable inverse.
+  /// Φ_i (from the first keyframe to keyframe i) and Φ_i⁻¹ P_i; empty without a usable inverse.
   ScratchVector<Matrix6d> onto_, from_;
   ScratchVector<Matrix6d> pairs_;  ///< in that case: the covariances of i and j <= i
   ScratchVector<Matrix6d> now_;    ///< of the present pose error with keyframe i
@@ -67,8 +64,7 @@ using SideRows =
 
 /// The measurement, linearised at one state: four rows for each keyframe.
 struct Stack {
-  /// [J r]: derivatives by geometry (and velocity), and z - h(x), px; 0 for a side that does not
-  /// count.
+  /// [J r]: derivatives, and z - h(x), px; 0 for a side that does not count.
   SideRows rows;
   ScratchVector<PoseJacobian> J_pose;
   ScratchVector<std::array<bool, 4>> counts;
@@ -117,7 +113,6 @@ class BatchProblem {
   std::optional<Stack> linearise(const State& x) const;
   /// Writes into `result` and uses its memory.
   void covariance(const State& x, const Stack& s, SideCovariance& result) const;
-  /// Returns information and gradient of keyframes and priors at x.
   Quadratic quadratic(const State& x, const Gram& gram) const;
   /// Returns -2 log of the priors, without a constant and without the azimuths.
   double priorCost(const State& x) const;
@@ -131,7 +126,6 @@ class BatchProblem {
   ResidualRatio azimuthResidualRatio(const State& x, double yaw_variance) const;
   /// Returns log |Λ / 2π| of the velocity prior; 0 at rest.
   double logSpeedPrior() const;
-  /// Returns log |Λ| of the size prior.
   double logSizePrior() const;
   /// Returns the part of log |R| that belongs to no density: of cut sides and whether they count.
   double logVolumeOfCuts(const Stack& s, const PerKeyframe& inflations) const;
@@ -149,8 +143,7 @@ class BatchProblem {
   /// Return the variances of the sides, px², with the present scales of the network.
   Eigen::Vector4d noise(const Keyframe& k) const;
   Eigen::Vector4d lasting(const Keyframe& k) const;
-  /// Returns the covariance of the sides of keyframe i and an earlier or equal j that white
-  /// acceleration causes between them and the newest keyframe, px².
+  /// Covariance of the sides of keyframes i and j <= i by white acceleration, px².
   Eigen::Matrix4d acceleration(const Stack& s, std::size_t i, std::size_t j) const;
   ScratchVector<AzimuthMatch> azimuths(const State& x) const;
   double azimuthVariance(const Keyframe& k) const;  ///< rad², with the present noise scale

@@ -25,16 +25,14 @@ KeyframeView keyframeViewOf(const Eigen::Vector3d& place, const Keyframe& k) {
           std::log(k.z.height())};
 }
 
-/// Returns the larger of two changes, in correlation lengths: that of the view, and that of the
-/// box, which shows that the object itself moves.
+/// The larger of two changes, in correlation lengths: of the view, and of the box.
 double changeBetween(const KeyframeView& a, const KeyframeView& b, const ViewScales& scales) {
   return std::max(viewChange(a.ray, b.ray, scales),
                   (a.centre - b.centre).norm() / scales.image_angle +
                       std::abs(a.log_height - b.log_height) / scales.log_distance);
 }
 
-/// Returns the keyframe most similar to another. It is never the newest, because a moving object is
-/// estimated at the time of the newest.
+/// The keyframe most similar to another; never the newest.
 std::size_t mostSimilar(const Eigen::Vector3d& place, const Keyframes& all,
                         const ViewScales& scales) {
   ScratchVector<KeyframeView> views;

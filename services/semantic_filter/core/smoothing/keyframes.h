@@ -1,5 +1,4 @@
-// Keyframes of a track: observations that are kept for the batch estimate (Dellaert, Kaess 2017).
-// Derivation: tools/docs/maths/map_fit.md.
+// Observations that are kept for the batch estimate. Derivation: tools/docs/maths/map_fit.md.
 #pragma once
 
 #include "services/semantic_filter/core/belief/track.h"
@@ -7,12 +6,10 @@
 
 namespace perdure::semantic_filter {
 
-/// Adds the keyframe if its view is new, and returns whether. Of more than `parameters.keyframes`,
-/// the one most similar to another goes, but never the newest.
+/// Adds the keyframe if its view is new; of too many, the one most similar to another goes.
 bool addKeyframe(Track& track, Keyframe keyframe, const ViewScales& scales,
                  const SmoothingParameters& parameters);
 
-/// Whether the box of the keyframe fits the hypothesis.
 bool explains(const Hypothesis& h, const Keyframe& keyframe, const FrameContext& frame);
 
 /// Adds the keyframes of b to those of a. Both tracks are one object.

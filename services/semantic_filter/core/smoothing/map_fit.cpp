@@ -76,9 +76,8 @@ bool factorise(const BatchProblem& model, Fit& fit, bool anew) {
   return true;
 }
 
-/// Damping of Levenberg-Marquardt steps. It falls by the ratio of true to predicted gain (Nielsen
-/// 1999). Where the extreme corner changes, the cost has a kink; there a damping that falls after
-/// each success fails at every other step.
+/// Damping of Levenberg-Marquardt steps, which falls by the ratio of true to predicted gain
+/// (Nielsen 1999), because the cost has kinks.
 class Damping {
  public:
   double value() const { return value_; }
@@ -121,8 +120,7 @@ bool descend(const BatchProblem& model, Fit& fit, Damping& damping, double& pred
   return false;
 }
 
-/// Returns the widened covariance of b in all rows. `noise`: widened; 0 for a side that does not
-/// count. For an object at rest.
+/// The widened covariance of b in all rows. `noise`: widened; 0: not counted. At rest.
 SideMatrix lastingPart(const Fit& fit, const PerSide& noise) {
   SideMatrix part = fit.covariance->own.selfadjointView<Eigen::Lower>();
   for (Eigen::Index j = 0; j < fit.inflations.size(); ++j) {

@@ -1,6 +1,5 @@
-// MAP fit: the state of a hypothesis that maximises the posterior given all keyframes at once, by
-// Levenberg-Marquardt (Dellaert, Kaess 2017; Nielsen 1999), with the model of the filter. b, pose
-// errors and accelerations are marginalised. Derivation: tools/docs/maths/map_fit.md.
+// MAP fit of a hypothesis to all keyframes by Levenberg-Marquardt (Dellaert, Kaess 2017; Nielsen
+// 1999). b, pose errors and accelerations are marginalised; tools/docs/maths/map_fit.md.
 #pragma once
 
 #include <memory>
@@ -18,9 +17,8 @@ class MapFit {
  public:
   struct Fit;
 
-  /// Returns nothing if `start` has no projection in a keyframe, if the place stays undetermined,
-  /// or if the fit comes to one of the modes `found`. `like`: a mode of the same batch and motion,
-  /// whose inflations and covariance the fit begins with.
+  /// Nothing if `start` has no projection, the place stays undetermined, or the fit comes to a mode
+  /// in `found`. `like`: a mode whose inflations and covariance the fit begins with.
   static std::optional<MapFit> make(const Hypothesis& start, const KeyframeBatch& batch,
                                     const FrameContext& frame, const MapFit* like = nullptr,
                                     const ScratchVector<const Hypothesis*>& found = {});
@@ -28,19 +26,15 @@ class MapFit {
   const Hypothesis& hypothesis() const { return hypothesis_; }
   /// Returns the share of keyframes that contradict the fit.
   double contradicted() const { return contradictions().cast<double>().mean(); }
-  /// Returns the evidence about the variances of the sides, by restricted likelihood.
-  /// For an object at rest.
+  /// Evidence about the variances of the sides, by restricted likelihood. At rest.
   SideEvidence sideEvidence() const;
-  /// Returns the residuals of the azimuths, by the first assumption; their count: degrees of
-  /// freedom.
+  /// Residuals of the azimuths, by the first assumption; their count: degrees of freedom.
   ResidualRatio azimuthResidualRatio() const;
-  /// Returns the number of sides that count, of all keyframes.
   std::size_t sides() const;
   /// Returns 1 for each keyframe that contradicts the fit, 0 for the others.
   const KeyframeCounts& contradictions() const;
-  /// Returns the log marginal likelihood, log p(boxes | class, motion), by Laplace's method, with
-  /// the t distribution of each keyframe, without a constant. `of_yaw`: for modes of yaw; with the
-  /// azimuths and without the yaw prior around the start.
+  /// The log marginal likelihood log p(boxes | class, motion), by Laplace's method, without a
+  /// constant. `of_yaw`: with the azimuths, without the yaw prior.
   double logEvidence(bool of_yaw = false) const;
   /// Returns the log-odds, by the azimuths, that its yaw is not turned by 180°.
   double logHeading() const;

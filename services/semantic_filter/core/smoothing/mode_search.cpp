@@ -19,8 +19,7 @@ bool sameMode(const Hypothesis& a, const Hypothesis& b) {
          std::min(distance2(a, b), distance2(b, a)) < gates::kSameMode;
 }
 
-/// Returns starts at rest that no hypothesis may have: yaw turned by 45°, 90° and 135°, usual size.
-/// An upper part keeps the size that is seen.
+/// Starts at rest that no hypothesis may have: yaw turned by 45°, 90° and 135°, usual size.
 ScratchVector<Hypothesis> otherStarts(const Hypothesis& best, const ClassPrior& prior) {
   ScratchVector<Hypothesis> starts;
   if (!prior.has_yaw && best.class_name != kOtherClass) return starts;
@@ -34,8 +33,7 @@ ScratchVector<Hypothesis> otherStarts(const Hypothesis& best, const ClassPrior& 
   return starts;
 }
 
-/// Returns the fits of the keyframes by an *other* track as one of a class, from four yaws.
-/// `upper_part`: by what is seen of an object of the class. `like`: a fit of the same batch.
+/// Fits of an *other* track as a class, from four yaws. `upper_part`: of an object of the class.
 ScratchVector<MapFit> fitsAs(const Hypothesis& other, const ClassPrior& prior, bool upper_part,
                              const KeyframeBatch& batch, const FrameContext& frame,
                              const MapFit& as_other) {

@@ -11,7 +11,6 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// How many of the accepted fits contradict each keyframe.
 struct ContradictionCounts {
   int fits = 0;
   KeyframeCounts counts;
@@ -32,8 +31,7 @@ void dropContradicted(Track& track, const ContradictionCounts& contradictions, s
   if (kept.size() >= least) track.batch.keyframes = std::move(kept);
 }
 
-/// Returns the nats by which the boxes of an object at rest enclose its outline, not its cuboid;
-/// nothing without a fit of the other extent.
+/// Nats by which the boxes of an object at rest enclose its outline, not its cuboid.
 std::optional<double> outlineNats(const MapFit& at_rest, const KeyframeBatch& batch,
                                   const FrameContext& frame) {
   constexpr double kMost = 3.0;  // nats; an object of an unusual shape must not decide alone
@@ -47,8 +45,7 @@ std::optional<double> outlineNats(const MapFit& at_rest, const KeyframeBatch& ba
   return std::clamp(as_outlines ? -nats : nats, -kMost, kMost);
 }
 
-/// Fits the hypotheses of one class. Returns the evidence of its best fit at rest
-/// about the network.
+/// Fits the hypotheses of one class. Returns the evidence of its best fit at rest.
 std::optional<NetworkEvidence> refitClass(Track& track, const std::string& name,
                                           const KeyframeBatch& batch, const FrameContext& frame,
                                           bool search, ContradictionCounts& contradictions) {
@@ -94,8 +91,7 @@ std::optional<NetworkEvidence> refitClass(Track& track, const std::string& name,
   return evidence;
 }
 
-/// Returns whether the track is reliable enough to learn about its network: it surely exists and
-/// stands, its class is known, and all its keyframes are of the present network.
+/// Whether the track surely exists and stands, with a known class and the present network.
 bool informsAboutNetwork(const Track& track, const FrameContext& frame) {
   constexpr double kSure = 0.9;
   const Hypothesis& best = track.best();

@@ -1,5 +1,5 @@
-// Refit: when a track is fitted to its keyframes, and the fits of all its hypotheses (Dellaert,
-// Kaess 2017). Derivation: tools/docs/maths/map_fit.md.
+// When a track is fitted to its keyframes, and the fits of all its hypotheses
+// (tools/docs/maths/map_fit.md).
 #pragma once
 
 #include "services/semantic_filter/core/belief/belief.h"
@@ -12,15 +12,13 @@ bool considerKeyframe(Track& track, const BoxDetection& box, const std::array<bo
                       const FrameContext& frame);
 /// Returns the number of new keyframes over the awaited `fresh` share; from 1 on a fit is due.
 double refitNeed(const Track& track, double fresh);
-/// Evidence of one track about the boxes of its network.
 struct NetworkEvidence {
   SideEvidence sides;      ///< of keyframes that no earlier evidence counted; with mode searches
   ResidualRatio azimuths;  ///< of keyframes that no earlier fit counted
   /// Nats for boxes that enclose outlines, not cuboids, by all keyframes; if the frame asks for it.
   std::optional<double> outline_nats = {};
 };
-/// Fits the hypotheses and weighs rest against motion. Returns its evidence
-/// about the network, if it is reliable enough.
+/// Fits the hypotheses and weighs rest against motion. Returns its evidence, if reliable.
 std::optional<NetworkEvidence> refit(Track& track, const FrameContext& frame);
 
 /// Fits the tracks with the largest refitNeed, and learns noise scales and ground from them.

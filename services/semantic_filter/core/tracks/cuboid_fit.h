@@ -1,5 +1,4 @@
-// Fit of a cuboid to one box, for one class and one start of yaw (paper, "Initialization", line
-// 284). Derivation: tools/docs/maths/initiation.md.
+// Fit of a cuboid to one box, for one class and one start of yaw (tools/docs/maths/initiation.md).
 #pragma once
 
 #include <optional>
@@ -17,8 +16,7 @@ struct RangeHint {
   double distance_m = 0.0, sigma_m = 0.0;
 };
 
-/// Returns the weighted centroid, along the ray, of the landmarks inside the box. Weights fall
-/// exponentially from its centre. Returns nothing with fewer than `parameters.min_landmarks`.
+/// Weighted centroid, along the ray, of the landmarks inside the box; nothing with too few.
 std::optional<RangeHint> rangeFromLandmarks(const BoxDetection& detection,
                                             const std::vector<LandmarkDepth>& points,
                                             const InitiationParameters& parameters);

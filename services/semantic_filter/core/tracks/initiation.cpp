@@ -47,8 +47,7 @@ void addMovingCopy(Track& track, const Hypothesis& at_rest, const ClassPrior& pr
   track.hypotheses.push_back(copy);
 }
 
-/// Updates the yaw starts of one class by the azimuth and weighs them. The total weight of the
-/// class stays. The azimuth counts half, because a single one may be far off.
+/// Updates the yaw starts by the azimuth, which counts half; the total weight stays.
 void weighByAzimuth(ScratchVector<Hypothesis>& fits, const BoxDetection& detection,
                     const ClassPrior& prior, const FrameContext& frame) {
   if (!detection.azimuth || !prior.has_yaw) return;
@@ -62,8 +61,7 @@ void weighByAzimuth(ScratchVector<Hypothesis>& fits, const BoxDetection& detecti
   for (auto& h : fits) h.weight *= after > 0.0 ? before / after : 1.0;
 }
 
-/// Returns the log ratio, to log-uniform clutter, of how well the ratio of width to height and the
-/// cost of the fit agree with what was assumed. If a side is cut, only the cost counts.
+/// Log ratio to clutter of the ratio of width to height and the cost (only that if cut).
 double logShapeRatio(const CuboidFit& fit, const ClassPrior& prior, double yaw_sigma,
                      const BoxDetection& detection, const FrameContext& frame) {
   const auto& z = detection.z;
@@ -154,8 +152,7 @@ ScratchVector<Candidate> candidates(const BoxDetection& detection, const FrameCo
   return all;
 }
 
-/// Returns the sum of the frequencies of the network's classes, at most 10. So a class of
-/// frequency 1 has at least a tenth of the prior, however many classes the network has.
+/// The frequencies of the network's classes, at most 10 in sum.
 double frequencies(const FrameContext& frame) {
   double sum = 0.0;
   for (const auto& name : frame.model->classes) sum += frame.priors->of(name).frequency;

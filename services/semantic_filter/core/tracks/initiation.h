@@ -1,5 +1,5 @@
-// Initiation of a track from a box that no track explains (paper, "Initialization", line 284).
-// Derivation: tools/docs/maths/initiation.md.
+// Initiation of a track from a box that no track explains (tools/docs/maths/initiation.md; paper,
+// line 284).
 #pragma once
 
 #include <optional>

@@ -30,8 +30,7 @@ void multiplyPmf(Track& a, const Track& b) {
   normalise(a, ClassEvidence::kMerge);
 }
 
-/// Whether a track of a known class has enough hits to replace an *other* track. A track of a
-/// few boxes, as they occur at the border of the image, does not.
+/// Whether a known track may replace an *other* one: not one of a few boxes at the border.
 bool hasEnoughHits(const Track& known, const Track& other) {
   constexpr std::uint32_t kFewer = 4;  // times fewer hits
   return known.life.once_confirmed || kFewer * known.life.hits >= other.life.hits;

@@ -7,11 +7,8 @@
 
 namespace perdure::semantic_filter {
 
-/// - Merges near hypotheses of the same class and motion.
-/// - Prunes light hypotheses, those of implausible size, and all others if one class dominates.
-/// - Stops moving hypotheses that are slow.
-/// - Gives a static track that its boxes contradict a moving copy, and one misplaced along the ray.
-/// Possibly no hypothesis is left.
+/// Merges near hypotheses; prunes light, implausible and dominated ones; stops slow movers; gives a
+/// contradicted static track a moving and a misplaced copy. Possibly none is left.
 void reduceMixture(Track& track, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

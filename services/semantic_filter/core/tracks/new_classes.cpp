@@ -100,8 +100,7 @@ std::vector<Hypothesis> recastAll(const Track& track, const ClassPrior& prior,
   return all;
 }
 
-/// The hypotheses that enter, at the prior shares of their classes, and how well the size fits each
-/// class relative to the best class (at most 1).
+/// The hypotheses that enter, and how well the size fits each class (at most 1, the best).
 struct Entrants {
   std::vector<Hypothesis> hypotheses;
   ClassNumbers fits;

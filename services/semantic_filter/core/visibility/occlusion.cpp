@@ -25,8 +25,7 @@ struct Span {
   double x, y;
 };
 
-/// A grid of cells that is reused for every painting. A stamp marks the cells of
-/// the present painting, because most cells stay blank.
+/// A grid of cells, reused for every painting; a stamp marks the cells of the present one.
 class DepthBuffer {
  public:
   void begin(double width, double height, double cell_px) {
@@ -195,8 +194,7 @@ void paint(Cell& cell, const Outline& o) {
   cell.transmittance *= 1.0 - o.solidity;
 }
 
-/// Returns the share of the outline's landmarks that lie before the surface of the object.
-/// Landmarks seen at or through it count against (paper, line 190: the co-visibility cue).
+/// The share of the outline's landmarks before the object's surface (paper, line 190).
 double hiddenByPoints(const Outline& o, const Polygon& hull,
                       const std::vector<LandmarkDepth>& points) {
   double before = 0.0, through = 0.0;

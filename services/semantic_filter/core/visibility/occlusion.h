@@ -1,6 +1,5 @@
-// Visible fraction of each track, from a coarse depth buffer of outlines, nearest first (the
-// paper's π that must take occlusions into account, line 182). Derivation:
-// tools/docs/maths/visibility.md.
+// Visible fraction of each track, from a coarse depth buffer of outlines, nearest first (paper,
+// line 182). Derivation: tools/docs/maths/visibility.md.
 #pragma once
 
 #include <array>

@@ -74,8 +74,7 @@ Polygon within(const Eigen::Vector4d& sides, const Polygon& points) {
   return clip(clip(part, 1, sides[1], true), 1, sides[3], false);
 }
 
-/// Returns the visible fraction of the first of `things`; the others hide it. The depth buffer is
-/// finer than that of a frame, because a tenth of a small object decides which frame it is.
+/// The visible fraction of the first of `things`, by a finer depth buffer than a frame's.
 double shareInSight(const ScratchVector<Standing>& things, const View& view,
                     VisibilityParameters parameters) {
   const Projector from(view);
@@ -100,8 +99,7 @@ double shareInSight(const ScratchVector<Standing>& things, const View& view,
   return shareOfFirst(outlines, camera.width(), camera.height(), parameters);
 }
 
-/// Returns the visible fraction from which the first of `things` may be detected. If so much is
-/// visible already and it was not detected, the fraction is required at which a miss counts.
+/// The visible fraction from which the first of `things` may be detected.
 double shareToBeFound(const ScratchVector<Standing>& things, const View& now,
                       const VisibilityParameters& parameters) {
   const double sure = std::max(parameters.minimum, kSliver), least = kMayBeFound * sure;

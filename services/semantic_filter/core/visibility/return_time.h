@@ -1,6 +1,5 @@
-// Reappearance time: when an occluded object is expected to be visible again if the body goes on as
-// it does (paper, line 182 and "Occlusion and Memory"; the method is ours). Derivation:
-// tools/docs/maths/reappearance_time.md.
+// When an occluded object is expected to be visible again if the body goes on (paper, line 182; the
+// method is ours). Derivation: tools/docs/maths/reappearance_time.md.
 #pragma once
 
 #include <optional>
@@ -23,14 +22,12 @@ struct ReappearanceInterval {
   double earliest = 0.0, latest = 0.0;  ///< interval of nine in ten
 };
 
-/// Returns the seconds after the frame until `hidden`, one of `tracks` at rest, comes out from
-/// behind its occluders. Returns nothing if it does not within ten seconds.
+/// Seconds until `hidden`, at rest, comes out from behind its occluders; nothing above ten.
 std::optional<double> expectedReappearance(const std::vector<Track>& tracks, const Track& hidden,
                                            const FrameInput& now, const Way& way,
                                            const VisibilityParameters& parameters);
 
-/// The same with an interval, at fifteen times the cost. The interval includes the errors of the
-/// object's place, of its main occluder, and of the body's velocity.
+/// With an interval by the errors of object, main occluder and velocity; fifteen times the cost.
 std::optional<ReappearanceInterval> reappearanceInterval(const std::vector<Track>& tracks,
                                                          const Track& hidden, const FrameInput& now,
                                                          const Way& way,

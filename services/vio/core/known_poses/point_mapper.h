@@ -1,13 +1,12 @@
-// Maps points from tracks and poses that another program gives, and estimates how the tracks agree
-// with them. It does not access images, threads or clocks. Derivation:
+// Maps points from tracks and given poses, and estimates how they agree. Derivation:
 // tools/docs/maths/vio-known-poses.md.
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
-#include "services/vio/core/agreement.h"
 #include "services/vio/core/state/options.h"
 #include "services/vio/core/state/row_motion.h"
 #include "services/vio/core/tracks/tracks.h"
@@ -15,7 +14,30 @@
 
 namespace perdure::vio {
 
-/// Given pose and motion of the body at one image.
+/// Counts of the tracks of one image, by the result of their triangulation.
+struct Mapped {
+  std::size_t contradicted = 0;  ///< rays that do not meet before the cameras, or fail the gate
+  std::size_t far = 0;           ///< points beyond VisionOptions::max_depth_m
+  std::size_t sure = 0;          ///< landmarks, and tracks that an update has used
+};
+
+/// Whether poses agree with the images, by the tracks with parallax.
+class Agreement {
+ public:
+  enum class Verdict { kGood, kContradicted, kFar };
+
+  /// Adds the next image. scale: residuals relative to those of exact poses, at least 1. moved:
+  /// whether the poses have moved recently. If they have not, the image is ignored.
+  void add(const Mapped& mapped, double scale, bool moved);
+  /// Verdict on about the last two seconds of motion, at 20 Hz.
+  Verdict verdict() const;
+  void clear() { *this = {}; }
+
+ private:
+  double contradicted_ = 0.0, far_ = 0.0, sure_ = 0.0, scale_ = 1.0;
+  std::size_t images_ = 0;
+};
+
 struct KnownPose {
   RigidTransform T_WB;
   Matrix6d covariance = Matrix6d::Zero();                ///< covariance of [θ, p], as in Odometry
@@ -30,8 +52,7 @@ class PointMapper {
               std::vector<RigidTransform> T_BC, std::vector<double> readout_s = {});
 
   void add(const KnownPose& pose, const TrackedFrame& tracked);
-  /// Points of the newest image whose position is known, by rising id, without descriptors, and
-  /// without those that fit the poses much worse.
+  /// Points of the newest image with known position, by rising id, without misfits.
   const std::vector<Landmark>& landmarks() const { return landmarks_; }
   const Mapped& mapped() const { return mapped_; }
   /// Ratio of the tracks' residuals to VisionOptions::sigma_px, at least 1.

@@ -121,7 +121,6 @@ struct Moves {
   std::optional<int> scale_at;
 };
 
-/// Covariance of the navigation error after the step.
 Matrix15d movedNav(const State& state, const Moves& m, const Matrix15d& Q) {
   const auto P = state.P();
   Matrix15d result = m.Phi * P.topLeftCorner<kNavSize, kNavSize>() * m.Phi.transpose() + Q;

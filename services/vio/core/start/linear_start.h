@@ -43,7 +43,6 @@ struct LinearStart {
   double in_front = 0.0;  ///< share of points in front of all cameras that saw them
 };
 
-/// Estimated position of a point in B0.
 struct PointEstimate {
   Eigen::Vector3d f = Eigen::Vector3d::Zero();
   bool known = false;

@@ -37,7 +37,6 @@ double priorCost(const MotionWindow& w, const Options& o) {
              (o.calibration.time_offset_s * o.calibration.time_offset_s);
 }
 
-/// Cost of the increments, the biases and the time offset.
 double inertialCost(const Estimate& e, const Inertial& inertial, const Options& o) {
   double cost = priorCost(e.window, o);
   for (std::size_t i = 0; i < inertial.increments.size(); ++i) {
@@ -146,8 +145,7 @@ double stretchOf(const MotionWindow& w, const VectorXd& dx) {
   return std::clamp(along / square, -kLargestStretch, kLargestStretch);
 }
 
-/// Adds a step. Its scale part, along which the images' cost is constant, is applied as a factor,
-/// which preserves the fit to the images.
+/// Adds a step; its scale part is a factor, which preserves the fit to the images.
 void move(Estimate& e, const VectorXd& dx, const Normal& n) {
   const double stretch = stretchOf(e.window, dx), factor = std::exp(stretch);
   VectorXd rest = dx;

@@ -1,6 +1,5 @@
-// Maximum a posteriori estimate of a window in motion, from images and inertial samples
-// (Levenberg-Marquardt with the points eliminated). Its covariance becomes that of the start.
-// Derivation: tools/docs/maths/vio-starts.md.
+// Maximum a posteriori estimate of a window in motion (Levenberg-Marquardt, points eliminated),
+// whose covariance is the start's; tools/docs/maths/vio-starts.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -60,14 +59,11 @@ struct RefinedWindow {
 /// information is singular. The failures of inertialOf() (motion_terms.h) are passed on.
 Result<RefinedWindow> refine(MotionWindow window, const ImuBuffer& imu, const Options& options);
 
-// In motion_search.cpp: the best minimum of a window. The search begins from at least two initial
-// values and uses the noise estimated from the images.
+// In motion_search.cpp: the best minimum of a window from several initial values.
 
-/// Largest error of a usable velocity, as a share of the largest velocity in the window. The same
-/// limit applies to the distance of other minima that fit about as well.
+/// Largest error of a usable velocity, and distance of other good minima, as a share.
 inline constexpr double kVelocityShare = 0.16;
 
-/// Triangulates the points from the poses of the window.
 void placePoints(MotionWindow& window);
 
 /// Fails as refine() does, and with "start_unobservable" if another minimum fits about as well.

@@ -63,8 +63,7 @@ void keepApart(Minima& minima) {
   }
 }
 
-/// Whether the rotation of the body moves a camera about as far as the translation does. Then the
-/// body may be at rest, and a third search begins there.
+/// Whether rotation moves a camera as far as translation: then a third search begins at rest.
 bool turnMovesCameras(const MotionWindow& window) {
   constexpr double kShare = 0.3;
   double by_turn = 0.0, by_body = 0.0;

@@ -1,5 +1,4 @@
-// Terms of the posterior of a window in motion (motion_refinement.h), and their derivatives with
-// respect to its error. Derivation: tools/docs/maths/vio-starts.md.
+// Terms of the posterior of a window in motion; tools/docs/maths/vio-starts.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,9 +17,8 @@ using Vector9 = Eigen::Matrix<double, 9, 1>;
 /// Residual of a view, in deviations, above which its cost is linear.
 inline constexpr double kHuber = 2.0;
 
-/// Order of the error: parameters of the window, then [θ, p, v] of all poses except the first.
-/// Rotation errors are right multiplied; all other errors are added in B0. The gravity error uses
-/// acrossGravity().
+/// Order of the error: parameters of the window, then [θ, p, v] of all poses but the first.
+/// Rotations right multiplied, others added in B0.
 inline constexpr Eigen::Index kV0 = 0, kGravity = 3, kGyro = 5, kAccel = 8, kOffset = 11,
                               kPoses = 12;
 constexpr Eigen::Index poseAt(std::size_t k) {
@@ -29,9 +27,8 @@ constexpr Eigen::Index poseAt(std::size_t k) {
 /// Adds the error to the window. Points do not change.
 void add(MotionWindow& window, const Eigen::VectorXd& error);
 
-/// A point by bearing and inverse depth, from the camera position at the first pose, in the axes of
-/// its first view. Far points stay linear, and noise may make the inverse depth negative. All rays
-/// begin at the first pose, so that bearings do not depend on the window's scale.
+/// A point by bearing and inverse depth, which may become negative, from the camera at the first
+/// pose, so that bearings do not depend on the scale.
 struct Ray {
   Eigen::Vector3d origin;  // position in B0; fixed
   Eigen::Matrix3d R_B0_C;  // rotation of the camera; fixed
@@ -58,7 +55,6 @@ struct Inertial {
 Result<Inertial> inertialOf(const MotionWindow& window, const ImuBuffer& imu,
                             const ImuNoise& noise);
 
-/// Residual of a view in deviations, and its derivatives.
 struct ViewTerm {
   Eigen::Vector2d r;
   Eigen::Matrix<double, 2, 3> by_ray;
@@ -67,7 +63,6 @@ struct ViewTerm {
   double weight = 1.0;  ///< Huber's weight
 };
 
-/// Empty if the point is behind the camera.
 std::optional<ViewTerm> viewTerm(const Estimate& estimate, std::size_t point,
                                  const WindowView& view, const Inertial& inertial, double sigma_px);
 

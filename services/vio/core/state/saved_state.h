@@ -1,5 +1,4 @@
-// The part of the filter that is saved across restarts, as text: navigation, calibration,
-// covariance.
+// The part of the filter that is saved across restarts, as text.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,8 +1,7 @@
-// State of the filter: navigation, camera-IMU calibration, a window of past poses and points, and
-// the joint covariance of their errors. Paper, eq. 3; MSCKF: Mourikis & Roumeliotis, ICRA 2007.
-// Order of the error: nav [θ, p, v, b_g, b_a]; [θ_BC, p_BC] of each camera; time offset; read-outs
-// and gyroscope scale if estimated; then clones and points in order of insertion. Rotation errors
-// are right multiplied, R = R̂ Exp(θ).
+// State of the filter: navigation, calibration, a window of poses and points, and their joint
+// covariance (eq. 3; MSCKF: Mourikis & Roumeliotis, ICRA 2007). Order of the error: nav [θ, p, v,
+// b_g, b_a]; [θ_BC, p_BC] of each camera; time offset; read-outs and gyroscope scale if estimated;
+// clones and points. R = R̂ Exp(θ).
 #pragma once
 
 #include <Eigen/Core>
@@ -53,16 +52,14 @@ struct Block {
   int at = 0, size = 0;
 };
 
-/// r = H·error + noise of unit covariance. The columns of H are those of `blocks`, in that order. A
-/// non-owning view: the data must outlive it.
+/// r = H·error + noise of unit covariance, with the columns of `blocks`; a non-owning view.
 struct Measurement {
   MatrixView H;
   std::span<const Block> blocks;
   VectorView r;
 };
 
-/// Temporary memory for matrices. It grows to the largest size needed and is reused, so that a
-/// running filter does not allocate. It is not part of the value: copies start without memory.
+/// Reused memory for matrices, so that a running filter does not allocate. Copies start without.
 class Workspace {
  public:
   using Matrix = Eigen::Map<Eigen::MatrixXd, Eigen::Aligned16>;
@@ -93,8 +90,7 @@ inline constexpr int kTheta = 0, kPosition = 3, kVelocity = 6, kGyroBias = 9, kA
 
 class State {
  public:
-  /// readout_s: read-out time of each camera, 0 for a global shutter; empty: all global. The last
-  /// two add non-zero read-outs and the gyroscope's scale to the error.
+  /// readout_s: of each camera, 0 for a global shutter; empty: all global.
   State(const std::vector<RigidTransform>& T_BC, double time_offset_s, int max_clones,
         int max_points, const std::vector<double>& readout_s = {}, bool estimate_readout = false,
         bool estimate_scale = false);
@@ -144,8 +140,7 @@ class State {
   /// Adds a clone of the current pose. rate_B correlates it with the time offset.
   void addClone(std::uint64_t frame, TimePoint image_time, const Eigen::Vector3d& rate_B,
                 bool first_estimates);
-  /// Enlarges the covariance of the current pose and of the newest clone, which is the same pose.
-  /// Deviations are in rad about the body's axes and in m along the world's axes.
+  /// Enlarges the covariance of the current pose and the newest clone, in rad (body) and m (world).
   void widenPose(double rotation, double position_m);
   /// Adds a common error to all positions, m along each axis.
   void widenPositions(double sigma_m);
@@ -165,7 +160,6 @@ class State {
   Result<void> update(std::span<const Measurement> measurements);
   /// Returns H P Hᵀ for an H with the columns of `blocks`.
   Eigen::MatrixXd project(const MatrixView& H, std::span<const Block> blocks) const;
-  /// Returns the covariance of the error of `blocks`.
   Eigen::MatrixXd covarianceOf(std::span<const Block> blocks) const;
   Eigen::MatrixXd covarianceOf(std::initializer_list<Block> blocks) const {
     return covarianceOf(std::span(blocks.begin(), blocks.size()));

@@ -42,8 +42,7 @@ std::array<Pair, 256> makePattern() {
   return pattern;
 }
 
-/// Smooths the patch with a 5×5 box, rounded to whole grey levels; sums along rows first, then
-/// along columns. The box extends beyond the patch into the image.
+/// Smooths the patch with a 5×5 box, which extends beyond the patch, in whole grey levels.
 Smooth smoothAround(const cv::Mat& image, int x, int y) {
   std::array<std::uint16_t, kOuter * kStride> sums{};
   for (std::size_t r = 0; r < kOuter; ++r) {

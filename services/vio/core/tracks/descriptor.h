@@ -1,5 +1,4 @@
-// 256-bit BRIEF descriptor of a patch (Calonder et al., ECCV 2010), by which a landmark is
-// recognised again. It is upright, smoothed by a 5×5 box, and uses a fixed pattern of this project.
+// 256-bit upright BRIEF descriptor (Calonder et al., ECCV 2010), smoothed by a 5×5 box.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,6 +1,5 @@
-// Appearance of a corner at its first observation, and the affine warp, gain and offset since then,
-// by inverse-compositional Gauss-Newton (Baker & Matthews, "Lucas-Kanade 20 years on", IJCV 2004).
-// Comparison with the first image does not accumulate errors.
+// Appearance of a corner at its first observation, and warp, gain and offset since then
+// (inverse-compositional Gauss-Newton, Baker & Matthews, IJCV 2004).
 #pragma once
 
 #include <Eigen/Core>
@@ -22,8 +21,7 @@ class Patch {
   /// Cuts a patch of a CV_8UC1 image. Empty beyond the image or with too little texture.
   static std::optional<Patch> cut(const cv::Mat& image, const cv::Point2f& pixel);
 
-  /// Finds the patch, starting from `seed`, in images each of half the size of the previous. Empty,
-  /// with an unchanged warp, outside the image or without convergence.
+  /// Finds the patch from `seed` in images, each half the size of the previous.
   std::optional<Found> find(const std::vector<cv::Mat>& levels, const cv::Point2f& seed);
 
   /// Current size in pixels relative to the first observation.

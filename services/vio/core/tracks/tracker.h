@@ -1,6 +1,5 @@
-// Tracks corners: pyramidal Lucas-Kanade at half size from the gyroscope's prediction, then
-// comparison with the first observation (patch.h). The second camera has Lucas-Kanade alone. New
-// corners (FAST) fill empty cells of a grid.
+// Tracks corners: pyramidal Lucas-Kanade from the gyroscope's prediction, then comparison with the
+// first observation. New corners (FAST) fill a grid.
 #pragma once
 
 #include <Eigen/Core>
@@ -41,10 +40,8 @@ class Tracker {
  public:
   Tracker(const TrackerOptions& options, const std::vector<CameraModel>& cameras);
 
-  /// Images are CV_8UC1; `second` may be empty. R_now_before: rotation of the body, if known.
-  /// masked: boxes of the first image in which no points are used. turn_of_readout: rotation of the
-  /// body, in its frame, from the first to the last row of the first image. Epipolar lines refer to
-  /// middle rows.
+  /// CV_8UC1; `second` may be empty. R_now_before: of the body, if known. masked: boxes without
+  /// points. turn_of_readout: from first to last row of the first image.
   TrackedFrame track(const cv::Mat& first, const cv::Mat& second,
                      const std::optional<Eigen::Matrix3d>& R_now_before,
                      const std::vector<cv::Rect2f>& masked = {},

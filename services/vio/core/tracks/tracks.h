@@ -43,7 +43,6 @@ struct Observation {
 struct Track {
   std::uint64_t id = 0;
   std::vector<Observation> observations;  ///< oldest first
-  /// Number of image points in all cameras.
   std::size_t views() const;
   bool seenAt(std::uint64_t frame) const {
     return !observations.empty() && observations.back().frame == frame;

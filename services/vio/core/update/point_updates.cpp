@@ -61,7 +61,6 @@ Result<PointRows> rowsOf(const State& state, const PointState& point, const Obse
   return rows;
 }
 
-/// A point of the state that the newest image sees.
 struct Seen {
   std::size_t point;  ///< index in state.points
   const ImagePoint* pixel;
@@ -118,8 +117,7 @@ Innovation innovationOf(const State& state, const PointRows& rows, const ImagePo
           used};
 }
 
-/// The rows of a track that depend on the state alone. A point without parallax whose depth does
-/// not follow from the state gets that of the scene (tools/docs/maths/vio-visual-update.md).
+/// The rows of a track that depend on the state alone (tools/docs/maths/vio-visual-update.md).
 Result<PointSystem> rowsOfTrack(const Track& track, const State& state, const MatrixView& P,
                                 const VisionOptions& options, bool& supposed) {
   const std::vector<Ray> rays = raysOf(track, state, options.sigma_px);

@@ -1,7 +1,5 @@
-// Updates with points that are used once, because their tracks have ended or their oldest view
-// leaves the window (Mourikis & Roumeliotis, ICRA 2007), and with points of the state: delayed
-// initialisation from a full track, and the newest image (Li & Mourikis, RSS 2012: hybrid MSCKF /
-// EKF-SLAM).
+// Updates with points used once (Mourikis & Roumeliotis, ICRA 2007) and with points of the state:
+// delayed initialisation, newest image (Li & Mourikis, RSS 2012).
 #pragma once
 
 #include <vector>
@@ -23,7 +21,6 @@ struct UpdateCounts {
 Result<UpdateCounts> updateMsckf(State& state, const std::vector<const Track*>& tracks,
                                  const VisionOptions& options, ReasonCounts& reasons);
 
-/// Innovation of a point of the state in the newest image.
 struct Innovation {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();     ///< pixel in the first camera
   Eigen::Vector2d residual = Eigen::Vector2d::Zero();  ///< observed minus predicted, px
@@ -32,10 +29,9 @@ struct Innovation {
   bool used = false;                                   ///< passed the gate
 };
 
-/// Updates the state's points with their observations in the newest clone. A point leaves the state
-/// if it fails the gate three times in a row or lies behind the camera. `innovations`, if given, is
-/// filled. If most points fail at once by a wide margin and `may_jump`, the pose covariance is
-/// enlarged by `VisionOptions::jump_*`, the gates are repeated, and "images_jumped" is counted.
+/// Updates the state's points with the newest clone. A point leaves if it fails the gate three
+/// times or lies behind. If most fail by far and `may_jump`, the pose covariance is enlarged and
+/// the gates repeated ("images_jumped").
 Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
                                 const VisionOptions& options, bool may_jump, ReasonCounts& reasons,
                                 std::vector<Innovation>* innovations = nullptr);

@@ -1,6 +1,5 @@
-// Decides whether the body stands still while most of the image moves, as traffic does. An IMU only
-// confirms that a body that stood still has not moved (Skog, Händel, Nilsson, Rantakokko, IEEE TBME
-// 2010). Derivation: tools/docs/maths/vio-rest-and-speed.md.
+// Whether the body stands still in traffic: an IMU only confirms that it has not moved (Skog,
+// Händel, Nilsson, Rantakokko, IEEE TBME 2010). Derivation: tools/docs/maths/vio-rest-and-speed.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,8 +22,7 @@ struct RestExpectation {
 /// Computes the expectation from the filter's attitude and biases, with their covariance.
 RestExpectation restExpectation(const State& state, double gravity);
 
-/// Whether the means over `window` before `now` agree with the expectation, taken `age` ago. False
-/// if the samples do not cover the window.
+/// Whether the means over `window` agree with the expectation, taken `age` ago.
 bool imuRests(const ImuBuffer& imu, TimePoint now, Duration window, const RestExpectation& expected,
               Duration age, const ImuNoise& noise);
 
@@ -37,10 +35,8 @@ class Standstill {
   /// Clears the memory, at a start or after motion.
   void forget() { confirmed_.reset(); }
   bool known() const { return confirmed_.has_value(); }
-  /// The images show that the body stands still at `now`.
   void confirm(TimePoint now, const RestExpectation& expected);
-  /// Whether the IMU shows that a body that stood still has not moved since. A disturbance of up to
-  /// a second without net velocity change only interrupts the standstill.
+  /// Whether the body has not moved since. A disturbance of up to a second only interrupts.
   bool holds(const ImuBuffer& imu, TimePoint now, const ImuNoise& noise);
 
  private:

@@ -1,6 +1,5 @@
-// Position of a point from its rays. Linear least squares minimises the distances to the rays.
-// Gauss-Newton then minimises the reprojection error in inverse-depth coordinates of the newest
-// view.
+// Position of a point from its rays: linear least squares, then Gauss-Newton on the reprojection
+// error in inverse depth.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,13 +28,11 @@ struct Triangulated {
   double rms;                  ///< RMS of the weighted residuals
 };
 
-/// Needs two rays. Fails with "triangulation_…": views, parallel, depth (behind a camera, or too
-/// near), far, condition. With the inverse depth of the scene, parallel rays get the nearest depth
-/// to it that they permit, at most the largest.
+/// Needs two rays. Fails with "triangulation_…": views, parallel, depth, far, condition. Parallel
+/// rays get the scene's inverse depth as far as they permit.
 Result<Triangulated> triangulate(const std::vector<Ray>& rays, const VisionOptions& options,
                                  std::optional<double> scene = {});
 
-/// Rays of a track from the clones that saw it.
 std::vector<Ray> raysOf(const Track& track, const State& state, double sigma_px);
 
 /// Cross-covariance with the pose [θ, p] of a point rigid with T_WB: −R [p_B]× θ + δp + R δp_B.

@@ -51,8 +51,7 @@ std::vector<Block> calibrationAndClones(const State& state);
 Eigen::Vector3d linearisationPoint(const State& state, const Track& track,
                                    const Eigen::Vector3d& p_W);
 
-/// Stacks all views of `track` by clones of the state, with the columns of calibrationAndClones. r
-/// is empty if the point lies behind a camera.
+/// Stacks all views of `track`, in columns of calibrationAndClones. r is empty behind a camera.
 PointSystem stackViews(const Track& track, const State& state, const Eigen::Vector3d& p_W,
                        double sigma_px);
 
@@ -64,8 +63,7 @@ struct InverseDepth {
 };
 InverseDepth inverseDepth(const Track& track, const State& state, const Eigen::Vector3d& p_W);
 
-/// Standard deviation of ρ by the views and the state, where P is the covariance of
-/// calibrationAndClones. Needs separatePoint before. Not finite if the views give no depth.
+/// Deviation of ρ by views and state; P: of calibrationAndClones. After separatePoint.
 double depthSigma(const PointSystem& system, const InverseDepth& depth, const MatrixView& P);
 
 /// Appends the row of the prior: ρ is that of the scene, up to its scatter.

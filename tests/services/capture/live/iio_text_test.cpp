@@ -1,6 +1,6 @@
-#include "services/capture/live/iio_text.h"
-
 #include <gtest/gtest.h>
+
+#include "services/capture/live/iio_stream.h"
 
 namespace perdure::capture {
 namespace {

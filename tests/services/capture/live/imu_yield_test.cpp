@@ -1,6 +1,6 @@
-#include "services/capture/live/imu_yield.h"
-
 #include <gmock/gmock.h>
+
+#include "services/capture/live/imu_pairing.h"
 
 namespace perdure::capture {
 namespace {

@@ -6,8 +6,6 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "services/gateway/core/base64.h"
-
 namespace perdure::gateway {
 namespace {
 

@@ -1,8 +1,8 @@
-#include "services/inference/core/upright.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "services/inference/core/network/image_fit.h"
 
 namespace perdure::inference {
 namespace {

@@ -19,8 +19,7 @@ struct Look {
   bool ledges, bars, bands, shutters, shop;
 };
 
-/// One side of the house. u is to the right along the wall seen from outside, z up, and out is away
-/// from the wall.
+/// One side of the house: u to the right seen from outside, z up, out away from it.
 class Side {
  public:
   Side(MeshBuilder& b, const Look& look, const Vec3& origin, const Vec3& right, float width,
@@ -82,7 +81,6 @@ class Side {
 
   bool shop() const { return front_ && l_.shop && w_ > 5.0F; }
 
-  /// Adds the sign board.
   void shopFront(float storey) {
     const float z = std::min(2.75F, storey - 0.55F), from = 0.06F * w_, to = 0.94F * w_;
     block(from, to, z, z + 0.5F, 0.0F, 0.08F, l_.frame);
@@ -91,7 +89,6 @@ class Side {
                at(to - 0.1F, z + 0.46F, 0.085F), at(from + 0.1F, z + 0.46F, 0.085F), l_.sign);
   }
 
-  /// Adds a piece of wall with one opening.
   void cell(float u, float z, float bay, float storey, bool door, bool ground) {
     const bool display = ground && shop() && !door;
     const float half = 0.5F * (door      ? 1.15F

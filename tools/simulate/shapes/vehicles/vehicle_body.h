@@ -1,5 +1,4 @@
-// The lofted body of a road vehicle: cross-sections along its length, with bonnet, windscreen, roof
-// and rear. Wheel arches are cut out; glass, lights, seams and plates are added.
+// The lofted body of a road vehicle, with wheel arches, glass, lights, seams and plates.
 #pragma once
 
 #include <vector>
@@ -33,8 +32,7 @@ struct BodyMaterials {
   int paint, trim, glass, headlight, taillight, plate, dark;
 };
 
-/// Adds the body from x = +length/2 (front) to −length/2, with the wheels on the ground at z = 0.
-/// `size` in metres.
+/// From x = +length/2 (front) to −length/2, wheels on z = 0. `size` in metres.
 void addBody(MeshBuilder& builder, const BodyProfile& profile, const Vec3& size,
              const BodyMaterials& materials);
 

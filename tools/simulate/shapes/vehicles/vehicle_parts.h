@@ -8,7 +8,6 @@
 
 namespace perdure::tools::shapes {
 
-/// Adds body, wheels, mirrors, handles, and optional roof rails.
 void addVehicle(MeshBuilder& builder, const BodyProfile& profile, const Order& order, Dice& dice,
                 bool roof_rails);
 

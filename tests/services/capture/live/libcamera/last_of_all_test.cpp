@@ -1,6 +1,4 @@
 // Tests the last call to an object of libcamera's thread, with such a thread but without a camera.
-#include "services/capture/live/libcamera/last_of_all.h"
-
 #include <dlfcn.h>
 #include <gmock/gmock.h>
 
@@ -9,6 +7,8 @@
 #include <cstdint>
 #include <string>
 #include <vector>
+
+#include "services/capture/live/libcamera/running_camera.h"
 
 namespace perdure::capture {
 namespace {

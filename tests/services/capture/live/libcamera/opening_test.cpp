@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "services/capture/live/libcamera/camera_choice.h"
+#include "services/capture/live/libcamera/controls.h"
 #include "services/capture/live/libcamera/restart_rule.h"
 
 namespace perdure::capture {

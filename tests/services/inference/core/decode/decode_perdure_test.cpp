@@ -1,4 +1,4 @@
-#include "services/inference/core/decode/decode_perdure.h"
+#include "services/inference/core/decode/decode_families.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
