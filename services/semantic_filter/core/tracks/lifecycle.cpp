@@ -23,11 +23,12 @@ bool forgettable(const Track& o, const TrackParameters& parameters) {
   return invisible && toSeconds(last - o.life.last_seen) > parameters.tentative_s;
 }
 
-/// Whether the track may be a visible confirmed one that was seen in part. It waits until misses
-/// remove that one or a merge joins both.
+/// Whether the track may be an older confirmed one that was seen in part, which is visible or
+/// hidden by this track only. It waits until misses remove that one or a merge joins both.
 bool waits(const Track& o, const std::vector<Track>& tracks, const FrameContext& frame) {
   return std::any_of(tracks.begin(), tracks.end(), [&](const Track& t) {
-    return t.life.confirmed && t.id < o.id && t.visibility.fraction > 0.0 && mayBeOne(t, o, frame);
+    return t.life.confirmed && t.id < o.id && mayBeOne(t, o, frame) &&
+           (t.visibility.fraction > 0.0 || t.visibility.blocked_by == o.id);
   });
 }
 

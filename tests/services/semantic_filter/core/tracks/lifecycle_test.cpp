@@ -32,7 +32,8 @@ TEST_F(Lifecycle, ATrackWithTwoPossiblePlacesIsNotConfirmed) {
 
 TEST_F(Lifecycle, WhatMayBeAnObjectThatWasSeenInPartWaits) {
   // From behind a nearer car, the end of the older one looked like a narrow car.
-  const auto claimed = [&](double beside_m, std::uint64_t older_frames, bool older_confirmed) {
+  const auto claimed = [&](double beside_m, std::uint64_t older_frames, bool older_confirmed,
+                           TrackId hidden_by = 0) {
     Track older = makeObject(1, "car", makeState(20, 0, 0.7, 0, 4, 1.7, 1.5), 0.04);
     older.life.confirmed = older.life.once_confirmed = older_confirmed;
     older.history.detected = older_frames;
@@ -42,6 +43,10 @@ TEST_F(Lifecycle, WhatMayBeAnObjectThatWasSeenInPartWaits) {
       o->existence = {0.97, ExistenceEvidence::kPrior, o->as_of};
     }
     if (!older_confirmed) older.existence = {0.4, ExistenceEvidence::kPrior, older.as_of};
+    if (hidden_by > 0) {
+      older.visibility.fraction = 0.0;
+      older.visibility.blocked_by = hidden_by;
+    }
     std::vector<Track> tracks{older, newer};
     confirmAndDelete(tracks, frame);
     return tracks.back().life.confirmed;
@@ -50,6 +55,8 @@ TEST_F(Lifecycle, WhatMayBeAnObjectThatWasSeenInPartWaits) {
   EXPECT_TRUE(claimed(1.2, 0b11, true)) << "one frame detected both";
   EXPECT_TRUE(claimed(3.0, 0b10, true)) << "it stands beside the older one";
   EXPECT_TRUE(claimed(1.2, 0b10, false)) << "the older one is no longer believed";
+  EXPECT_FALSE(claimed(1.2, 0b10, true, 2)) << "the newer one hides the older one";
+  EXPECT_TRUE(claimed(1.2, 0b10, true, 7)) << "nothing is known of a hidden one";
 }
 
 TEST_F(Lifecycle, DetectionOnAnotherVisitRaisesTheLimitOfExistence) {
