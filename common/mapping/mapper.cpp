@@ -61,7 +61,8 @@ void Mapper::begin(const Odometry& odometry) {
   searched_at_m_ = searched_widely_at_m_ = searched_elsewhere_at_m_ = builder_.way_m();
   seen_ = searched_with_ = 0;
   active_.reset();
-  tentative_.reset();
+  tentative_elsewhere_.reset();
+  tentative_widely_.reset();
   marginals_.reset();
   loop_search_.forget();
   view_builder_.clear();
@@ -99,11 +100,13 @@ void Mapper::replay(const WorldId& session) {
   state_.follow(session);
   dropTentativeLoops();
   active_.reset();
-  tentative_.reset();
+  tentative_elsewhere_.reset();
+  tentative_widely_.reset();
   replays_ = true;
   continueDrift(session);
   tracked_ties_.begin();
-  searched_widely_at_m_ = searched_elsewhere_at_m_ = -parameters_.loop.elsewhere_each_m;
+  searched_widely_at_m_ = searched_elsewhere_at_m_ = learned_at_m_ =
+      -parameters_.loop.elsewhere_each_m;
   loop_search_.forget();
   for (const AnchorId id : way) {
     stand(state_.anchors().at(id));

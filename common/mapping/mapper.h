@@ -172,7 +172,9 @@ class Mapper {
                     std::size_t& points) const;
   std::optional<Recallable> relativeTo(const Anchor& here, const Anchor& a);
   Recallable withRecord(Recallable there, ObjectId id, const ObjectRecord& record) const;
-  bool isAgreedOn(const LoopSearch::Found& found, std::size_t other_pairs);
+  struct Tentative;
+  bool isAgreedOn(const LoopSearch::Found& found, std::optional<Tentative>& before,
+                  std::size_t other_pairs) const;
   void close(const LoopSearch::Found& found);
   void learnDrift();
   bool restsOnActive(const PlaceMatch& match) const;
@@ -200,14 +202,14 @@ class Mapper {
     std::set<std::pair<ObjectId, ObjectId>> pairs;
   };
   std::optional<ActiveLoop> active_;
-  /// The pose of the session by one search, where its place is not known well.
+  /// The pose of the session by one search, where one search does not suffice.
   struct Tentative {
     LevelPose T_MN;
     AnchorId component = 0;
     double way_m = 0.0;
     std::set<std::pair<ObjectId, ObjectId>> pairs;
   };
-  std::optional<Tentative> tentative_;
+  std::optional<Tentative> tentative_elsewhere_, tentative_widely_;  ///< of the two searches
   /// The end of the previous session, until this session is connected with it.
   struct Ended {
     AnchorId anchor = 0, begins = 0;  ///< newest anchor of the previous session, and first one of

@@ -117,7 +117,9 @@ std::optional<LoopSearch::Found> Mapper::searchNearby(const Whereabouts& here, b
     searched_widely_at_m_ = builder_.way_m();
     found = loop_search_.nearby(body(widening_));
     // A match of the active loop's pairs is a less accurate measurement of it.
-    if (found && (restsOnActive(found->match) || !isAgreedOn(*found, kOthers))) {
+    if (found &&
+        (restsOnActive(found->match) || view_search_.contradicts(*found, here, viewOfNow()) ||
+         !isAgreedOn(*found, tentative_widely_, kOthers))) {
       found.reset();
     }
   }
@@ -137,7 +139,7 @@ std::optional<LoopSearch::Found> Mapper::searchElsewhere(const Whereabouts& here
   }
   if (found && view_search_.contradicts(*found, here, viewOfNow())) return std::nullopt;
   if (!found && new_view) found = view_search_.elsewhere(here, viewOfNow());
-  return found && isAgreedOn(*found, 0) ? found : std::nullopt;
+  return found && isAgreedOn(*found, tentative_elsewhere_, 0) ? found : std::nullopt;
 }
 
 /// Searches the connected part of the map first. Searches the other components less often.
@@ -176,27 +178,30 @@ void Mapper::learnDrift() {
   learned_at_m_ = builder_.way_m();
 }
 
-/// In similar streets one search may find the wrong street. A second search uses more objects, at
-/// least `other_pairs` of which the first one did not match.
-bool Mapper::isAgreedOn(const LoopSearch::Found& found, std::size_t other_pairs) {
+/// In similar streets one search may find the wrong street. A second search uses more objects, in
+/// at least `other_pairs` pairs of objects that the first one did not match.
+bool Mapper::isAgreedOn(const LoopSearch::Found& found, std::optional<Tentative>& before,
+                        std::size_t other_pairs) const {
   constexpr double kSame_m = 3.0, kSame_rad = 0.1;
+  const LoopParameters& loop = parameters_.loop;
   const LevelPose T_Nb = state_.graph().pose(builder_.last()->id);
   const AnchorId component = componentsOf(state_.graph()).at(found.home);
-  const Tentative now{found.match.T_MB.mean * T_Nb.inverse(), component, builder_.way_m(),
-                      pairsOf(found.match)};
-  if (tentative_ && tentative_->component == component) {
-    const double apart_m = now.way_m - tentative_->way_m;
-    const LevelError d = difference(tentative_->T_MN * T_Nb, found.match.T_MB.mean);
+  if (before && before->component == component) {
+    const double apart_m = builder_.way_m() - before->way_m;
+    const LevelError d = difference(before->T_MN * T_Nb, found.match.T_MB.mean);
     const bool same = d.head<2>().norm() < kSame_m && std::abs(d[3]) < kSame_rad;
-    const LoopParameters& loop = parameters_.loop;
     if (same && apart_m < loop.agree_within_m) {
-      const auto others =
-          std::count_if(now.pairs.begin(), now.pairs.end(),
-                        [this](const auto& pair) { return !tentative_->pairs.contains(pair); });
+      const auto& known = before->pairs;
+      const auto others = std::ranges::count_if(found.match.pairs, [&](const auto& pair) {
+        return std::ranges::none_of(known, [&](const auto& earlier) {
+          return earlier.first == pair.first || earlier.second == pair.second;
+        });
+      });
       return apart_m >= loop.agree_after_m && static_cast<std::size_t>(others) >= other_pairs;
     }
   }
-  tentative_ = now;
+  before = {found.match.T_MB.mean * T_Nb.inverse(), component, builder_.way_m(),
+            pairsOf(found.match)};
   return false;
 }
 
@@ -218,6 +223,7 @@ void Mapper::close(const LoopSearch::Found& found) {
   }
   if (!match.pairs.empty()) active_ = {id, pairsOf(match)};
   loop_book_.add({id, a, b, match, !found.prior, 0.0}, before, builder_.way_m());
+  tentative_widely_.reset();
   if (builder_.way_m() - learned_at_m_ >= parameters_.loop.elsewhere_each_m) learnDrift();
   graphMoved();
 }

@@ -148,10 +148,11 @@ void checkRate(const Recording& recording, DataFindings& findings) {
 /// later: one of the clocks runs at another rate. A camera of another rate ends when the IMU does.
 void checkOneRate(const Recording& recording, const StampList& imu, const StampList& images,
                   double apart, DataFindings& findings) {
-  constexpr double kLeast = 0.02, kStarts_s = 0.1, kAlike = 0.2;
+  constexpr double kLeast = 0.02, kStarts_s = 0.1, kAlike = 0.2, kShows_s = 0.5;
   const double awaited = apart * toSeconds(between(imu.back(), imu.front())),
                ends = toSeconds(between(images.back(), imu.back()));
-  if (std::abs(apart) < kLeast || std::abs(ends - awaited) > kAlike * std::abs(awaited) ||
+  if (std::abs(apart) < kLeast || !std::isfinite(awaited) || std::abs(awaited) < kShows_s ||
+      std::abs(ends - awaited) > kAlike * std::abs(awaited) ||
       std::abs(toSeconds(between(images.front(), imu.front()))) > kStarts_s)
     return;
   findings.push_back(

@@ -72,7 +72,8 @@ std::string whyNoNetwork(std::string_view bytes) {
   const auto isPrinted = [](unsigned char c) {
     return c >= ' ' || c == '\n' || c == '\r' || c == '\t';
   };
-  if (!text.empty() && std::ranges::all_of(begins, isPrinted) && text[0] != '[' && text[0] != '#') {
+  if (!text.empty() && std::ranges::all_of(begins, isPrinted) && text[0] != '[' && text[0] != '#' &&
+      text[0] != ';') {
     return "is a text that begins with `" +
            std::string(text.substr(0, text.find('\n')).substr(0, 60)) + "`; fetch the file itself";
   }

@@ -233,24 +233,35 @@ double innovationRatio(const std::vector<vio::Innovation>& innovations) {
 
 replay::Recording thinned(replay::Recording recording) {
   constexpr double kMost_rad = 0.05;
-  constexpr Duration kMost = std::chrono::milliseconds(80), kShort = std::chrono::seconds(30);
+  constexpr Duration kMost = std::chrono::milliseconds(110), kShort = std::chrono::seconds(30);
   const auto& frames = recording.frames;
   if (frames.empty() || frames.back().time - frames.front().time < kShort) return recording;
   std::set<std::uint64_t> kept;
   std::optional<TimePoint> last;
   double turned = 0.0;
   auto sample = recording.imu.begin();
-  for (const auto& frame : frames) {
+  std::optional<TimePoint> next;  // of the image after this one
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const auto& frame = frames[i];
     for (; sample != recording.imu.end() && sample->time < frame.time; ++sample) {
       if (sample == recording.imu.begin()) continue;
       turned += sample->gyro.norm() * toSeconds(sample->time - std::prev(sample)->time);
     }
     if (frame.camera != 0) continue;
-    if (last && frame.time - *last < kMost && turned < kMost_rad) continue;
+    next.reset();
+    for (std::size_t k = i + 1; k < frames.size() && !next; ++k) {
+      if (frames[k].camera == 0) next = frames[k].time;
+    }
+    if (last && next && *next - *last < kMost && turned < kMost_rad) continue;
     kept.insert(frame.index);
     last = frame.time, turned = 0.0;
   }
+  const auto all = static_cast<double>(recording.frames.size());
   std::erase_if(recording.frames, [&](const auto& frame) { return !kept.contains(frame.index); });
+  recording.frame_count = kept.size();
+  for (CameraCalibration& camera : recording.calibration.cameras) {
+    camera.rate_hz *= static_cast<double>(recording.frames.size()) / all;
+  }
   return recording;
 }
 

@@ -64,8 +64,8 @@ class RigWatch {
   std::vector<Eigen::Vector3d> gyro_, accel_;
 };
 
-/// The recording without images that follow another one within 80 ms and .05 rad of turning. Vio
-/// needs all images of drives shorter than 30 s; they are unchanged.
+/// The recording with fewer images: at most 110 ms or .05 rad of turning apart, if it has so many.
+/// Vio needs all images of drives shorter than 30 s; they are unchanged.
 replay::Recording thinned(replay::Recording recording);
 
 /// Reads the drive, from its start on, as grey images. Throws StartupError if it has no images or

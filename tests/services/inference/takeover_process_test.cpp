@@ -162,7 +162,7 @@ TEST(InferenceProgram, SaysTheMendAndTheStatusWhereItCannotStart) {
   test::ownNetwork();
   test::Folder folder;
   const std::string program = (test::programs() / "perdure-inference").string();
-  std::ofstream(folder.file("not.onnx")) << "this is no network";
+  std::ofstream(folder.file("not.onnx")) << "\x08\x07this is no network";
   std::ofstream(folder.file("not.onnx.model.json")) << testing::TinyModel{}.json();
   Child garbage({program, "--set", "model.path=" + folder.file("not.onnx")},
                 folder.file("garbage"));

@@ -19,7 +19,7 @@ using ::testing::HasSubstr;
 
 /// Writes only a description, because these tests do not run the network.
 fs::path networkOf(const fs::path& folder, int width, int height) {
-  std::ofstream(folder / "net.onnx") << "no network";
+  std::ofstream(folder / "net.onnx") << "\x08\x07 no network";
   std::ofstream(folder / "net.onnx.model.json")
       << R"({"family": "yolox", "classes": ["car"], "activation": {"class": "sigmoid"},
             "input": {"width": )"

@@ -45,23 +45,22 @@ void checkPosesOf(const Drive& drive, const replay::Recording& recording, Findin
   }
 }
 
-/// Adds findings about the rig from the motion, which are the most exact.
-void checkMotionOf(const replay::Recording& recording, replay::DataFindings& of_data,
+/// Adds findings about the rig from the motion, which are the most exact. Returns whether they
+/// contradict the rig: vio would only show the consequences.
+bool checkMotionOf(const replay::Recording& recording, replay::DataFindings& of_data,
                    Findings& findings) {
   const auto is_coarse = [](const replay::DataFinding& finding) {
     return finding.code == "time_offset" || finding.code == "gyro_factor";
   };
-  if (!std::ranges::all_of(of_data, is_coarse)) return;
-  if (recording.imu.empty() || recording.calibration.cameras.empty()) return;
+  if (!std::ranges::all_of(of_data, is_coarse)) return false;
+  if (recording.imu.empty() || recording.calibration.cameras.empty()) return false;
   const auto check = calibrate::checkMotion(recording);
   if (!check.findings.empty()) of_data = check.findings;
   findings.push_back({Verdict::kOk, check.basis});
-}
-
-/// Vio would only show the consequences of these.
-bool contradictsRig(const replay::DataFinding& finding) {
-  return finding.code == "focal_length" || finding.code == "time_offset" ||
-         finding.code == "readout";
+  return std::ranges::any_of(check.findings, [](const replay::DataFinding& finding) {
+    return finding.code == "focal_length" || finding.code == "time_offset" ||
+           finding.code == "readout";
+  });
 }
 
 /// Returns whether vio can judge the rig by the recording.
@@ -77,15 +76,15 @@ bool checkRecording(const Drive& drive, const replay::Recording& recording, Find
     findings.push_back({Verdict::kOk, "stamps, units, images and axes agree"});
   }
   const bool usable = isUsable(of_data), without_imu = of_layout && !recording.calibration.imu;
-  checkMotionOf(recording, of_data, findings);
+  const bool contradicted = checkMotionOf(recording, of_data, findings);
   addFindings(of_data, findings);
-  if (std::ranges::any_of(of_data, contradictsRig)) {
+  if (usable) checkPosesOf(drive, recording, findings);
+  if (contradicted) {
     findings.push_back({Verdict::kFail,
                         "vio was not run, because the motion contradicts the rig: correct what is "
                         "named above, and check again"});
     return false;
   }
-  if (usable) checkPosesOf(drive, recording, findings);
   if (usable && without_imu) {
     findings.push_back(
         {Verdict::kOk,

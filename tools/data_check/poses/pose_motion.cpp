@@ -84,7 +84,11 @@ DataFindings judgePosesOfCamera(const Poses& poses, const replay::Recording& rec
 DataFindings judgePosesBackwards(const Poses& poses, const replay::Recording& recording) {
   constexpr double kBackwards = -0.95, kForwards_mps = 1.0;
   std::vector<double> speeds;
-  for (const SpeedSample& sample : recording.speed) speeds.push_back(sample.speed);
+  for (const SpeedSample& sample : recording.speed) {
+    const bool within =
+        !poses.empty() && sample.time >= poses.front().time && sample.time <= poses.back().time;
+    if (within) speeds.push_back(sample.speed);
+  }
   const double speed = medianOf(std::move(speeds));
   if (courseOf(poses, 5.0).x() > kBackwards || speed < kForwards_mps) return {};
   return {{Grade::kWarning, "poses_backwards",

@@ -24,12 +24,14 @@ bool forgettable(const Track& o, const TrackParameters& parameters) {
 }
 
 /// Whether the track may be an older confirmed one that was seen in part, which is visible or
-/// hidden by this track only. It waits until misses remove that one or a merge joins both.
+/// hidden by this track. It waits until misses remove that one or a merge joins both, but not for
+/// longer than kMost hits: two objects may overlap by the errors of their estimates.
 bool waits(const Track& o, const std::vector<Track>& tracks, const FrameContext& frame) {
-  return std::any_of(tracks.begin(), tracks.end(), [&](const Track& t) {
-    return t.life.confirmed && t.id < o.id && mayBeOne(t, o, frame) &&
-           (t.visibility.fraction > 0.0 || t.visibility.blocked_by == o.id);
-  });
+  constexpr std::uint32_t kMost = 12;
+  return o.life.hits < kMost && std::any_of(tracks.begin(), tracks.end(), [&](const Track& t) {
+           return t.life.confirmed && t.id < o.id && mayBeOne(t, o, frame) &&
+                  (t.visibility.fraction > 0.0 || t.visibility.blocked_by == o.id);
+         });
 }
 
 }  // namespace
