@@ -159,6 +159,7 @@ class Mapper {
   void stand(const Anchor& anchor);
   void tie();
   void search();
+  std::optional<LoopSearch::Found> searchWidely(const Whereabouts& here);
   std::optional<LoopSearch::Found> searchNearby(const Whereabouts& here, bool new_view);
   std::optional<LoopSearch::Found> searchElsewhere(const Whereabouts& here, bool new_view);
   void rememberLastPlace(const Odometry& next);

@@ -108,22 +108,28 @@ bool Mapper::restsOnActive(const PlaceMatch& match) const {
 
 /// Searches by objects. If they give no match, searches by objects in a wider region, because the
 /// odometry may err more than is assumed, and by appearance, once for each anchor.
+/// Searches with the uncertainty of an odometry that is less accurate than declared. kOthers: with
+/// fewer, a wrong loop remained in one of 16 towns; see drift_scale.md, "Use".
+std::optional<LoopSearch::Found> Mapper::searchWidely(const Whereabouts& here) {
+  constexpr double kWider = 1.5;
+  constexpr std::size_t kOthers = 3;
+  const double since_m = builder_.way_m() - searched_widely_at_m_;
+  if (widening_ < kWider || since_m < parameters_.loop.elsewhere_each_m) return std::nullopt;
+  searched_widely_at_m_ = builder_.way_m();
+  const auto found = loop_search_.nearby(body(widening_));
+  // A match of the active loop's pairs is a less accurate measurement of it.
+  if (!found || restsOnActive(found->match) ||
+      view_search_.contradicts(*found, here, viewOfNow()) ||
+      !isAgreedOn(*found, tentative_widely_, kOthers)) {
+    return std::nullopt;
+  }
+  return found;
+}
+
 std::optional<LoopSearch::Found> Mapper::searchNearby(const Whereabouts& here, bool new_view) {
   auto found = loop_search_.nearby(here);
-  constexpr double kWider = 1.5;
-  constexpr std::size_t kOthers = 3;  // pairs
-  const double since_m = builder_.way_m() - searched_widely_at_m_;
-  if (!found && widening_ > kWider && since_m >= parameters_.loop.elsewhere_each_m) {
-    searched_widely_at_m_ = builder_.way_m();
-    found = loop_search_.nearby(body(widening_));
-    // A match of the active loop's pairs is a less accurate measurement of it.
-    if (found &&
-        (restsOnActive(found->match) || view_search_.contradicts(*found, here, viewOfNow()) ||
-         !isAgreedOn(*found, tentative_widely_, kOthers))) {
-      found.reset();
-    }
-  }
   if (found && view_search_.contradicts(*found, here, viewOfNow())) return std::nullopt;
+  if (!found) found = searchWidely(here);
   if (!found && new_view) found = view_search_.nearby(here, viewOfNow());
   return found;
 }

@@ -52,10 +52,18 @@ void unpack(const fs::path& from, const fs::path& to) {
   if (frames < kVideoFrames) throw std::runtime_error("the list of frames ends too early");
 }
 
+fs::path sceneOf(const GoldenRun& run, const fs::path& folder) {
+  return cachedScene({.scene = run.name}, [&](const fs::path& scene) {
+    perdure({"simulate", "--scene", run.name, "--seed", "1", "--rate", "10", "--no-images",
+             "--encoding", "jpeg", "--quiet", "--out", scene.string()},
+            folder / "simulate.log");
+  });
+}
+
 /// Returns the arguments of `perdure pipeline`, without --out.
 Words inputOf(const GoldenRun& run, const fs::path& folder) {
   if (run.data.empty()) {
-    return {"--data",       cachedScene({.scene = run.name}).string(),
+    return {"--data",       sceneOf(run, folder).string(),
             "--odometry",   "truth",
             "--detections", "simulated",
             "--seed",       "1"};
@@ -102,11 +110,6 @@ const std::vector<std::string>& goldenFiles() {
 void produce(const GoldenRun& run, const fs::path& folder) {
   for (const char* part : {"drive", "now"}) fs::remove_all(folder / part);
   fs::create_directories(folder / "now");
-  if (run.data.empty()) {
-    perdure({"simulate", "--scene", run.name, "--seed", "1", "--rate", "10", "--no-images",
-             "--encoding", "jpeg", "--quiet", "--out", cachedScene({.scene = run.name}).string()},
-            folder / "simulate.log");
-  }
   if (run.pictures) unpack(test::data(run.data), folder / "drive");
   Words arguments{"pipeline", "--quiet", "--out", (folder / "now").string()};
   const Words input = inputOf(run, folder);

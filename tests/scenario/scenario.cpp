@@ -179,13 +179,15 @@ fs::path sceneFolder(const Setting& setting) {
   options.format = tools::ImageFormat::kJpeg;
   options.world.rate_hz = setting.rate_hz;
   if (setting.seconds > 0.0) options.world.seconds = setting.seconds;
-  options.out = cachedScene({.scene = setting.scene,
-                             .seed = setting.seed,
-                             .seconds = setting.seconds,
-                             .rate_hz = setting.rate_hz,
-                             .images = setting.images});
-  tools::simulate(options, {});
-  return options.out;
+  return cachedScene({.scene = setting.scene,
+                      .seed = setting.seed,
+                      .seconds = setting.seconds,
+                      .rate_hz = setting.rate_hz,
+                      .images = setting.images},
+                     [&options](const fs::path& folder) {
+                       options.out = folder;
+                       tools::simulate(options, {});
+                     });
 }
 
 Outcome runScene(const Setting& setting) {

@@ -1,5 +1,8 @@
 #include "tests/scenario/scene_cache.h"
 
+#include <fcntl.h>
+#include <sys/file.h>
+
 #include <algorithm>
 #include <cstdlib>
 #include <fstream>
@@ -8,6 +11,7 @@
 #include <vector>
 
 #include "common/base/ids.h"
+#include "common/base/process/descriptor.h"
 
 namespace perdure::test {
 namespace {
@@ -53,11 +57,16 @@ fs::path cacheFolder() {
 
 }  // namespace
 
-fs::path cachedScene(const SceneName& name) {
-  return cacheFolder() /
-         (name.scene + "-" + std::to_string(name.seed) + "-" +
-          std::to_string(static_cast<int>(name.seconds)) + "-" +
-          std::to_string(static_cast<int>(name.rate_hz)) + (name.images ? "-images" : ""));
+fs::path cachedScene(const SceneName& name, const std::function<void(const fs::path&)>& make) {
+  const fs::path folder = cacheFolder() / (name.scene + "-" + std::to_string(name.seed) + "-" +
+                                           std::to_string(static_cast<int>(name.seconds)) + "-" +
+                                           std::to_string(static_cast<int>(name.rate_hz)) +
+                                           (name.images ? "-images" : ""));
+  const Descriptor lock(
+      open((folder.string() + ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
+  if (flock(lock.get(), LOCK_EX) != 0) throw std::runtime_error("the scene cannot be locked");
+  make(folder);
+  return folder;
 }
 
 }  // namespace perdure::test

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 
 namespace perdure::test {
@@ -16,9 +17,11 @@ struct SceneName {
   bool images = false;
 };
 
-/// Returns the scene's folder in the build folder above this program, even if it does not exist
-/// yet. Images are JPEG. Scenes from other versions of the simulator's sources are removed.
-/// $PERDURE_SOURCE is the root of the sources.
-std::filesystem::path cachedScene(const SceneName& name);
+/// Returns the scene's folder in the build folder above this program. `make` writes the scene into
+/// the folder that it is given, if the folder does not contain it already; images are JPEG. Other
+/// processes that need the same scene wait meanwhile. Scenes from other versions of the simulator's
+/// sources are removed. $PERDURE_SOURCE is the root of the sources.
+std::filesystem::path cachedScene(const SceneName& name,
+                                  const std::function<void(const std::filesystem::path&)>& make);
 
 }  // namespace perdure::test

@@ -143,8 +143,10 @@ class StreetAgain : public ::testing::Test {
     simulation.images = false;
     simulation.format = ImageFormat::kJpeg;
     simulation.world.rate_hz = 10.0;
-    simulation.out = test::cachedScene({.scene = "street"});
-    simulate(simulation, {});
+    test::cachedScene({.scene = "street"}, [&simulation](const fs::path& folder) {
+      simulation.out = folder;
+      simulate(simulation, {});
+    });
     folder() = replay::freshFolder("street_again");
     PipelineOptions options;
     options.data = simulation.out.string();

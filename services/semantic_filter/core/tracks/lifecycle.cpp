@@ -26,6 +26,7 @@ bool forgettable(const Track& o, const TrackParameters& parameters) {
 /// Whether the track may be an older confirmed one that was seen in part, which is visible or
 /// hidden by this track. It waits until misses remove that one or a merge joins both, but not for
 /// longer than kMost hits: two objects may overlap by the errors of their estimates.
+/// Source of the number: merge_and_fusion.md, "Waiting".
 bool waits(const Track& o, const std::vector<Track>& tracks, const FrameContext& frame) {
   constexpr std::uint32_t kMost = 12;
   return o.life.hits < kMost && std::any_of(tracks.begin(), tracks.end(), [&](const Track& t) {

@@ -234,7 +234,7 @@ bool sameKind(const Track& a, const Track& b) {
 }
 
 bool mayBeOne(const Track& a, const Track& b, const FrameContext& frame) {
-  constexpr double kShared = 0.2;  // of the lesser volume
+  constexpr double kShared = 0.2;  // of the lesser volume; merge_and_fusion.md, "Waiting"
   return sameKind(a, b) && !detectedTogether(a, b) &&
          sharedVolume(a.best().x, b.best().x, frame.view.up_W).of_lesser > kShared;
 }
