@@ -57,11 +57,11 @@ struct VisibilityParameters {
   double minimum = 0.25;              ///< a smaller visible fraction counts as 0: no evidence
   double full = 0.7;                  ///< from here on an object is reported as visible
   double solid = 0.4;                 ///< existence from which an object occludes others
-  double unmapped_occluder = 0.5;     ///< its probability in a direction that is new
+  double unmapped_occluder = 0.7;     ///< its probability in a direction that is new
   double hard_to_detect = 0.05;       ///< the same of a view from which detections are rare
   double hard_detection_share = 0.3;  ///< P_D there, relative
   /// View change after which what was learned has fallen to 1/e.
-  double occluder_angle = 0.5;              ///< of the occluder: direction to the object, rad
+  double occluder_angle = 1.2;              ///< of the occluder: direction to the object, rad
   double detectability_angle = 0.15;        ///< of the rest: direction to the object, rad
   double detectability_log_distance = 0.3;  ///< of the rest: logarithm of the distance
 };
