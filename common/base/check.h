@@ -11,7 +11,8 @@ namespace perdure {
 /// Prints "file:line: function: must hold: <what>" to stderr and aborts.
 [[noreturn]] void failCheck(std::string_view what, const std::source_location& where);
 
-/// Aborts unless `condition` is true. Never use it on external input.
+/// Aborts with `what` must hold and the source location unless `condition` is true. Never use it on
+/// external input.
 inline void check(bool condition, std::string_view what,
                   const std::source_location& where = std::source_location::current()) {
   if (!condition) [[unlikely]]

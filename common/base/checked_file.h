@@ -7,7 +7,8 @@
 
 namespace perdure {
 
-/// Writes NAME.part and renames it to NAME at the end. Devices and pipes are written directly.
+/// Writes NAME.part and renames it to NAME when it is closed; an existing file remains until then.
+/// Devices and pipes are written directly.
 class CheckedFile {
  public:
   /// Throws StartupError(kUnavailable) if the file cannot be opened.
@@ -29,7 +30,8 @@ class CheckedFile {
 /// Writes the whole content at once. Throws like CheckedFile.
 void writeChecked(const std::filesystem::path& file, std::string_view content);
 
-/// Flushes a stream. Throws StartupError(kInputOutput) if this or an earlier write failed.
+/// Flushes a stream into `file`, which stays open. Throws StartupError(kInputOutput) if the flush
+/// or an earlier write failed.
 void flushChecked(std::ostream& stream, const std::filesystem::path& file);
 
 /// Throws StartupError(kInputOutput): "FILE: `why` (or the system's reason); free space, …".

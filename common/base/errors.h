@@ -19,7 +19,8 @@ enum class ExitCode : int {
   kConfiguration = 78,  ///< the configuration is wrong
 };
 
-/// Thrown before a service runs, and caught in runService or main. The message states the fix.
+/// Thrown only before a service runs, and caught once in runService (or in main of a tool). The
+/// message states the fix.
 class StartupError : public std::runtime_error {
  public:
   StartupError(ExitCode code, const std::string& message)

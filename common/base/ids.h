@@ -14,12 +14,14 @@ namespace perdure {
 using InstanceId = std::uint64_t;
 InstanceId makeInstanceId();
 
-/// The public id: the lowest id of the object's tracks. Never reused within a map. 0: no object.
+/// The public id of an object: the lowest id of the tracks that the map considers one object. Never
+/// reused within a map. 0 means "no object".
 using ObjectId = std::uint64_t;
 /// The filter's estimate of an object over one or more visits. The id never changes.
 using TrackId = std::uint64_t;
 
-/// Source instance and sequence number identify an image. The rest saves look-ups.
+/// Identifies the image of a message by source instance and sequence number. The other members save
+/// the readers a look-up.
 struct FrameStamp {
   InstanceId source = 0;         ///< the capture process that made the frame
   std::uint64_t sequence = 0;    ///< index of the frame in the drive; continues after a restart

@@ -1,4 +1,5 @@
-// A vector of at most N default-constructible elements without heap memory (as C++26's).
+// A vector of at most N default-constructible elements, stored inside the object without heap
+// memory. It implements a part of C++26's std::inplace_vector.
 #pragma once
 
 #include <array>

@@ -12,7 +12,8 @@
 
 namespace perdure {
 
-/// `code` is a stable snake_case word that Health counts; `detail` states the fix.
+/// The reason for a failure. `code` is a short, stable snake_case word that Health counts; `detail`
+/// states how to fix the cause.
 struct Reason {
   std::string code;
   std::string detail;
@@ -31,7 +32,8 @@ tl::unexpected<Reason> fail(std::string_view code, fmt::format_string<First, Mor
   return fail(code, fmt::format(detail, std::forward<First>(first), std::forward<More>(more)...));
 }
 
-/// Counts of reasons since the start, published in Health; ordered.
+/// Counts of reasons since the start, published in Health. The map is ordered, so that the output
+/// is repeatable.
 class ReasonCounts {
  public:
   void add(const Reason& reason, std::uint64_t count = 1) { add(reason.code, count); }

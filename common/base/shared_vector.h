@@ -1,6 +1,7 @@
-// A vector whose copies share their elements until one is modified (copy on write). Access through
-// a non-const vector counts as modification; use read(). Memory of released elements is reused by
-// later vectors of the thread.
+// A vector whose copies share their elements until one of them is modified (copy on write). Data
+// stored for every frame therefore cost only the changed parts. Access through a non-const vector
+// counts as modification; use read() for reading. Later vectors of the same thread reuse the memory
+// of released elements.
 #pragma once
 
 #include <algorithm>
@@ -43,7 +44,8 @@ class SharedVector {
     static const Vector kEmpty;
     return block_ ? block_->items : kEmpty;
   }
-  /// Unshared elements, with capacity for `room`. Making a copy invalidates references to them.
+  /// Gives write access to unshared elements, with capacity for `room` elements. Making a copy
+  /// invalidates references to elements.
   Vector& write(std::size_t room = 0) {
     if (!block_) {
       block_ = takeBlock();

@@ -1,4 +1,5 @@
-// A program that runs in parallel with this one. No shell is used.
+// A program that runs in parallel with this one. No shell is used; the arguments are passed
+// unchanged.
 #pragma once
 
 #include <sys/types.h>
@@ -27,7 +28,8 @@ std::optional<std::filesystem::path> findProgram(const std::string& name);
 /// The process is killed and waited for at the end of the scope, unless leaveAlone() was called.
 class Subprocess {
  public:
-  /// Throws StartupError(kUnavailable), "PROGRAM cannot be started: why".
+  /// Throws StartupError(kUnavailable), "PROGRAM cannot be started: why", also if the log cannot be
+  /// written.
   explicit Subprocess(const ProgramOptions& options);
   ~Subprocess();
   Subprocess(const Subprocess&) = delete;
@@ -35,7 +37,8 @@ class Subprocess {
 
   pid_t pid() const { return pid_; }
   void signal(int number) const;
-  /// The exit status, or 128 + the signal that ended it. Nothing while it runs.
+  /// The exit status of the process, or 128 + the signal that ended it. Returns nothing while it
+  /// runs.
   std::optional<int> ended();
   int waitForEnd();
   /// Waits for at most `longest` and returns the status as ended() does.
@@ -56,7 +59,8 @@ struct ProgramAnswer {
   bool too_late = false;
 };
 
-/// Returns the output of a program (`options.log` is empty), which is killed after `longest`.
+/// Runs a program to its end and returns its output; `options.log` must be empty. The program is
+/// killed after `longest`. Throws like Subprocess.
 ProgramAnswer runProgram(const ProgramOptions& options,
                          std::chrono::milliseconds longest = std::chrono::hours(1));
 

@@ -8,7 +8,8 @@ namespace perdure {
 
 using Duration = std::chrono::nanoseconds;
 
-/// The clock of the sensors or of a recording. It has no now().
+/// The clock of the sensors or of a recording. It has no now(), because time arrives in messages
+/// only.
 struct SensorClock {
   using rep = std::int64_t;
   using period = std::nano;

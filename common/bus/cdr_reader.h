@@ -21,7 +21,8 @@ class CdrReader : public RawReader {
   CdrReader(const Participant& participant, const std::string& topic)
       : RawReader(participant, topic) {}
 
-  /// Passes at most one batch, in order. True if more messages may be available.
+  /// Passes at most one batch to the handler, in order. Returns true if more messages may be
+  /// available. Disposals are not reported.
   bool drainBatch(const Handler& handler);
 };
 

@@ -20,7 +20,8 @@ using QosPtr = std::unique_ptr<dds_qos_t, QosDeleter>;
 Entity created(dds_entity_t handle, const std::string& what);
 
 /// QoS of a writer. `through`: whether it may use shared memory. Cyclone excludes endpoints that
-/// ignore their own participant, and exclusive writers by their liveliness.
+/// ignore their own participant from shared memory. Exclusive writers are excluded by their
+/// liveliness, and their readers may need messages of their own participant.
 QosPtr writerQos(const Qos& qos, const WriterOptions& options, const SharedMemory& memory,
                  bool through);
 

@@ -45,7 +45,8 @@ Entity builtinReader(const Participant& participant, dds_entity_t topic) {
   return Entity(dds_create_reader(participant.handle(), topic, nullptr, nullptr));
 }
 
-/// The topic without which a service's output is missing; empty: nothing replaces the service.
+/// The topic without which the output of a service is missing; "frame/" stands for any camera.
+/// Empty: no other program can replace the service.
 std::string_view essentialTopicOf(std::string_view service) {
   if (service == "capture") return "frame/";
   if (service == "vio") return "odometry";

@@ -37,17 +37,20 @@ struct Options {
   /// Addresses of the other hosts; empty: hosts are found by multicast.
   std::vector<std::string> peers = {};
 };
-/// Describes the keys bus.*. The variable PERDURE_DOMAIN takes precedence over bus.domain.
+/// Describes bus.interface, bus.peers, bus.domain, bus.vehicle, bus.shared_memory_mb, bus.security
+/// and bus.identity. The variable PERDURE_DOMAIN takes precedence over bus.domain.
 void describe(Options& options, config::Fields& fields);
 
-/// The options of all processes of a host: from the file in PERDURE_BUS (empty: none), else from
-/// bus.yaml in `folder`. Errors in the file are appended to `problems`.
+/// The options shared by all processes of a host. They are read from the file that PERDURE_BUS
+/// names (empty: none), else from bus.yaml in `folder` if it exists. Errors in the file are
+/// appended to `problems`.
 Options commonOptions(const std::string& folder, std::vector<config::Problem>& problems);
 
 /// The options after applying PERDURE_DOMAIN. Throws StartupError (78) if it is no domain.
 Options withEnvironment(Options options);
 
-/// The options as CYCLONEDDS_URI, without security. `locator`: of shared memory; empty: off.
+/// The options in the form of CYCLONEDDS_URI. `locator` is that of shared memory; if it is empty,
+/// shared memory is off. Security is not included, because the participant sets it.
 std::string configurationXml(const Options& options, const std::string& locator = {});
 /// The configuration for third-party programs, with the identity if the options name one.
 std::string foreignXml(const Options& options);
@@ -66,14 +69,16 @@ class Domain {
  public:
   /// Throws StartupError (69) if DDS cannot use the interface.
   explicit Domain(const Options& options);
-  /// A second domain for third-party programs, without shared memory and security. Interfaces are
-  /// separated by commas; empty: all that are up. Throws StartupError (69, 78).
+  /// A second domain in the same process, for third-party programs; its number may be the bus's.
+  /// Interfaces are separated by commas; empty: all that are up. Shared memory and security are
+  /// off. Throws StartupError (69, 78).
   static Domain foreign(Options options);
   /// Returns this domain for participants of another vehicle or with another identity.
   Domain as(std::string vehicle, std::string security, std::string identity) const;
   const Options& options() const { return options_; }
   const SharedMemory& sharedMemory() const { return shared_memory_; }
-  /// The present state of shared memory as text, with a fix; empty if it was not requested.
+  /// The present state of shared memory as text, with a fix if needed. The result is empty if
+  /// shared memory was not requested.
   std::string sharedMemoryText() const;
   /// Returns whether a process that starts now can share memory with this process.
   bool sharesMemory() const;
@@ -92,7 +97,8 @@ class Domain {
 
 class Participant {
  public:
-  /// `process` is the name on the bus. Throws StartupError (69) if DDS refuses the identity.
+  /// `process` is the name that `perdure topics` and `perdure doctor` show. Throws StartupError
+  /// (69) if the identity is not valid for bus.security, or if DDS refuses it.
   Participant(const Domain& domain, const std::string& process);
   std::int32_t handle() const { return participant_->handle(); }
   const SharedMemory& sharedMemory() const { return shared_memory_; }
@@ -100,6 +106,7 @@ class Participant {
   std::shared_ptr<const Entity> keep(Entity entity) const;
   /// "imu" → "perdure/ego/imu".
   std::string wireName(const std::string& topic) const { return prefix_ + topic; }
+  /// The identity of the participant. Returns nothing if bus.security is off.
   const std::optional<Identity>& identity() const { return identity_; }
 
  private:

@@ -33,8 +33,9 @@ std::size_t sizeOf(const ddsi_sertype*, const void* sample) {
   return wire::sizeInPlace(*static_cast<const perdure_msg_Frame*>(sample));
 }
 
-/// Cyclone 0.10.2 finds the size of a message in shared memory by serialising it with its pixels.
-/// After this call the type of this topic of frames computes the size instead.
+/// Cyclone 0.10.2 finds the size of a message in shared memory by serialising it with its pixels,
+/// and discards the result. After this call the type of this topic of frames computes the size
+/// instead. It has no effect if Cyclone's interface differs from the expected one.
 void tellSizesOfFrames(std::int32_t participant, std::int32_t topic) {
   const QosPtr qos = privateQos();
   const Entity reader(dds_create_reader(participant, topic, qos.get(), nullptr));

@@ -56,7 +56,8 @@ class Endpoint {
 class AnyReader : public Endpoint {
  public:
   std::size_t matched() const;
-  /// Adds <topic>_malformed_<reason>, _incompatible_qos, _sample_lost since the start.
+  /// Adds the counts of DDS and of the checks since the start: <topic>_malformed_<reason>,
+  /// _incompatible_qos, _sample_lost.
   void report(ReasonCounts& counts) const;
 
  protected:
@@ -88,7 +89,8 @@ class RawReader : public AnyReader {
  public:
   /// The number of matched writers that missed their lease: killed, stopped or disconnected.
   std::size_t silent() const;
-  /// The highest strength among other matched writers of an exclusive topic, if any.
+  /// The highest strength among the matched writers of an exclusive topic, except `own`. Returns
+  /// nothing if there are no others.
   std::optional<std::int32_t> strongestBut(const RawWriter& own) const;
   /// Also adds _sample_rejected, _in_shared_memory, _writers_silent (present number).
   void report(ReasonCounts& counts) const;
@@ -150,13 +152,16 @@ class Reader : public RawReader {
 class RawWriter : public AnyWriter {
  public:
   std::int32_t strength() const { return strength_; }
+  /// Sets the strength on an exclusive topic. It may be called at any time.
   void setStrength(std::int32_t strength);
+  /// Asserts liveliness without a message, for exclusive topics.
   void assertLiveliness();
   /// The number of times that this writer missed its own lease and was considered dead.
   std::uint64_t livelinessLost() const;
   /// Waits until every matched reader has acknowledged all messages. Returns false on timeout.
   bool waitForAcknowledgement(double seconds);
-  /// Also adds <topic>_refused_<reason>, _liveliness_lost, _left_shared_memory_<reason>.
+  /// Also adds <topic>_refused_<reason> (invalid values of this process), _liveliness_lost,
+  /// _left_shared_memory_<reason>.
   void report(ReasonCounts& counts) const;
 
  protected:
@@ -193,7 +198,8 @@ class Writer : public RawWriter {
     if constexpr (wire::kDecodedInPlace<T>) return writeWire(&sample, sample.pixels._length);
     return writeWire(&sample);
   }
-  /// Releases an exclusive topic: readers receive the writer of the next lower strength.
+  /// Releases an exclusive topic without a key. Until the next write, readers receive the writer
+  /// with the next lower strength.
   void release() {
     typename wire::Type<T>::Wire sample{};
     unregisterWire(&sample);

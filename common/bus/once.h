@@ -38,7 +38,9 @@ class Once {
 /// One counter per topic with numbered stamps: the frames of one camera, or odometry.
 class Gaps {
  public:
-  /// Missing sequence numbers between this message of `source` and the newest one before it.
+  /// The number of sequence numbers that are missing between this message of `source` and the
+  /// newest one before it. Returns 0 for the first message of a source, and for repeated or late
+  /// messages.
   std::uint64_t before(std::uint64_t source, std::uint64_t sequence) {
     const bool follows = any_ && source == source_;
     if (follows && sequence <= newest_) return 0;

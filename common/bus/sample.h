@@ -1,4 +1,5 @@
-// Received messages in place: in shared memory, or complete from the network.
+// Received messages in place: in shared memory, or complete from the network. Internal to
+// common/bus.
 #pragma once
 
 #include <cstddef>

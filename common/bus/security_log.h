@@ -16,7 +16,8 @@ class SecurityLog {
   /// Takes one message of Cyclone's log. Returns false if it does not concern security.
   bool take(const std::string& message);
   /// Adds security_refused_no_certificate (participants), _unknown_authority, _expired, _revoked,
-  /// _certificate (handshakes), _permissions, _writer, _reader.
+  /// _certificate (handshakes; a refused participant retries each second), _permissions, _writer,
+  /// _reader.
   void report(ReasonCounts& counts) const;
   std::map<std::string, std::string> firstDetails() const;
   /// The latest error of this process's own identity.
@@ -32,8 +33,9 @@ class SecurityLog {
   std::string own_;
 };
 
-/// The log of this process, installed by the first call. `discovery` also takes the discovery
-/// trace, which alone names participants without a certificate.
+/// The log of this process, because Cyclone's log has one sink. The first call installs the sink.
+/// `discovery` also takes Cyclone's discovery trace, because only the trace names participants
+/// without a certificate.
 SecurityLog& securityLog(bool discovery = false);
 
 }  // namespace perdure::bus

@@ -1,4 +1,5 @@
-// Shared memory needs a responding RouDi, because Cyclone would otherwise wait and abort.
+// Checks whether messages may use shared memory. RouDi of iceoryx must respond, because Cyclone
+// would otherwise wait for a minute and abort.
 #pragma once
 
 #include <string>
@@ -7,8 +8,9 @@
 
 namespace perdure::bus {
 
-/// A locator that identifies one start of RouDi on this host; processes with the same one share
-/// memory. Reason: "no_roudi".
+/// A Cyclone locator that identifies one start of RouDi on this host. Processes with the same
+/// locator share memory. Others, for example from before a restart of RouDi, communicate over the
+/// network interface. Reason: "no_roudi"; the detail states the fix.
 Result<std::string> sharedMemoryLocator();
 
 }  // namespace perdure::bus

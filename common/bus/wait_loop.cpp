@@ -7,7 +7,8 @@
 
 namespace perdure::bus {
 
-/// The wait set accepts conditions of any participant. `participant`: DDS is initialised.
+/// The wait set belongs to no participant, so that it accepts conditions of any. `participant`
+/// ensures that DDS is initialised.
 WaitLoop::WaitLoop(const Participant&)
     : guard_(dds_create_guardcondition(DDS_CYCLONEDDS_HANDLE)),
       waitset_(dds_create_waitset(DDS_CYCLONEDDS_HANDLE)) {

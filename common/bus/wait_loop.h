@@ -1,5 +1,6 @@
-// The main loop of a service: waits for messages, ticks and wake-ups, and calls handlers in the
-// order of their registration, in the thread that calls run().
+// The main loop of a service. It waits for messages, ticks and wake-ups, and calls handlers in the
+// order of their registration. Handlers run in the thread that calls run(). Readers may belong to
+// several participants in several domains.
 #pragma once
 
 #include <atomic>
@@ -36,7 +37,8 @@ class WaitLoop {
       });
     });
   }
-  /// Removes a reader. Must not be called from a handler of messages or ticks.
+  /// Removes a reader, which may be destroyed afterwards. Must not be called from a handler of
+  /// messages or ticks, because the loop is iterating over the readers then.
   void off(const Endpoint& reader);
   /// The first tick comes after one period; missed ticks are dropped.
   /// The tick is suspended while `wanted` returns false; the loop's thread calls `wanted`.
@@ -48,7 +50,8 @@ class WaitLoop {
   void run();
   /// Waits once, at most for `longest`, and handles what is available.
   void runOnce(std::chrono::nanoseconds longest);
-  /// From any thread, but no signal handler. run() returns after the current handler.
+  /// May be called from any thread, but not from a signal handler. run() returns after the current
+  /// handler; other messages of its batch are dropped.
   void stop();
   bool stopped() const { return stopped_; }
   /// May be called from any thread, but not from a signal handler.

@@ -1,5 +1,6 @@
 // Projection of points of the camera frame (z forward, x right, y down) into pixels, with
-// Jacobians. Lens models as OpenCV and EuRoC define them.
+// Jacobians. Models: pinhole with no, radial-tangential (Brown), rational or equidistant
+// (Kannala-Brandt) distortion, as OpenCV and EuRoC define them.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,14 +19,17 @@ Eigen::Vector2d distortRadTan(DistortionModel model, const LensCoefficients& d,
 
 class CameraModel {
  public:
-  /// Checks that the calibration is usable.
+  /// Checks that the calibration is usable (focal lengths > 0, as many coefficients as the model
+  /// has).
   explicit CameraModel(const CameraCalibration& calibration);
 
-  /// Pixel of a point in C; nothing if z < 1e-3 m or the distortion is not invertible there.
-  /// J_point (2×3) = d pixel / d point.
+  /// Pixel of a point in C. Returns nothing if the point is not in front of the camera (z < 1e-3 m)
+  /// or lies outside the range in which the distortion is invertible. J_point (2×3) = d pixel / d
+  /// point, if given.
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& point_C,
                                          Eigen::Matrix<double, 2, 3>* J_point = nullptr) const;
-  /// Undistorted image point (x/z, y/z) by Newton's iteration; nothing if it does not converge.
+  /// Normalised, undistorted image point (x/z, y/z) of a pixel, by Newton's iteration. Returns
+  /// nothing if the iteration does not converge.
   std::optional<Eigen::Vector2d> unproject(const Eigen::Vector2d& pixel) const;
   /// Distorted pixel of a normalised point; J (2×2) = d pixel / d normalised.
   Eigen::Vector2d distort(const Eigen::Vector2d& normalised, Eigen::Matrix2d* J = nullptr) const;
@@ -51,7 +55,8 @@ class CameraModel {
   RigidTransform T_BC_;
 };
 
-/// True if name, size, lens, pose and times are equal. The nominal rate may differ.
+/// Returns true if name, size, lens, pose on the body and times are exactly equal. The nominal rate
+/// may differ.
 bool sameCamera(const CameraCalibration& a, const CameraCalibration& b);
 
 }  // namespace perdure

@@ -21,7 +21,8 @@ struct WideLens {
   std::array<double, 4> distortion{};     ///< k1 k2 p1 p2 of the unified model (omni-radtan)
 };
 
-/// Pixel of a point in the camera's frame, if it has one. J (2×3) = d pixel / d point.
+/// Pixel of a point in the camera's frame. Returns nothing if the point has no projection. J (2×3)
+/// = d pixel / d point, if given.
 std::optional<Eigen::Vector2d> project(const WideLens& lens, const Eigen::Vector3d& point,
                                        Eigen::Matrix<double, 2, 3>* J = nullptr);
 
@@ -30,8 +31,10 @@ struct EquidistantFit {
   double angle = 0;               ///< radians
 };
 
-/// Sets the equidistant lens in `camera` (whose size is set) that best approximates `lens` up to
-/// 85° off the axis. Reason "intrinsics": no projection, or an error above half a pixel.
+/// Sets the equidistant lens in `camera` (whose size is set) that best approximates `lens` over its
+/// image, up to 85° off the axis. Nothing in Perdure uses larger angles. Reason: "intrinsics", if
+/// the lens does not project into its image, or if the best approximation errs by more than half a
+/// pixel.
 Result<EquidistantFit> fitEquidistant(const WideLens& lens, CameraCalibration& camera);
 
 }  // namespace perdure

@@ -1,4 +1,5 @@
-// One description of a configuration's fields, for reading, validation, printing and tables.
+// One description of a configuration's fields, for reading, validation, printing and the tables of
+// the README files. A service writes `void describe(Config&, config::Fields&)`.
 #pragma once
 
 #include <cstdint>
@@ -10,11 +11,11 @@
 
 namespace perdure::config {
 
-/// Documentation of a field for users. `mend` is the fix at the end of the error message.
+/// Documentation of a field for users. `fix` ends the error message: "…; <fix>".
 struct Doc {
   std::string text;       ///< text in one line
   std::string unit = {};  ///< "rad/s/√Hz", "px", "" for none
-  std::string mend = {};
+  std::string fix = {};
 };
 
 struct Range {
@@ -58,6 +59,7 @@ class Fields {
 
   /// The sentence for a key of earlier versions; empty for other keys.
   std::string formerlyOf(const std::string& key) const;
+  /// Returns whether earlier versions had keys in this group.
   bool wasGroup(const std::string& name) const;
 
   const std::vector<Field>& all() const { return fields_; }
@@ -70,7 +72,7 @@ class Fields {
   bool expert_ = false;
 };
 
-/// One error. str(): "file:line:col: key: value is not > 0 rad/s/√Hz; mend".
+/// One error. str(): "file:line:col: key: value is not > 0 rad/s/√Hz; fix".
 struct Problem {
   std::string file;
   int line = 0, column = 0;  ///< counted from 1; 0 without a position (--set, missing key)
@@ -78,13 +80,16 @@ struct Problem {
   std::string str() const;
 };
 
-/// Reads YAML text into the fields' targets and returns *all* problems at once: syntax, unknown,
-/// missing and repeated keys, types, ranges. Faulty fields retain their defaults.
+/// Reads YAML text into the fields' targets and returns *all* problems at once. Problems are syntax
+/// errors, unknown keys (with the nearest known one), wrong types, values out of range, missing
+/// keys and repeated keys. Targets of faulty fields retain their defaults.
 std::vector<Problem> readYaml(Fields& fields, const std::string& yaml, const std::string& file);
+/// Applies readYaml to the content of a file. A file that cannot be read is a problem too.
 std::vector<Problem> readFile(Fields& fields, const std::string& path);
-/// Applies "key=value" from --set. The value is YAML, or a text without quotes.
+/// Applies "key=value" from --set. The value is YAML; a text needs no quotes.
 std::vector<Problem> assign(Fields& fields, const std::string& assignment);
-/// Problems of required fields that neither a file nor --set has given.
+/// Returns the problems of required fields that neither a file nor --set has given. readYaml and
+/// assign record which fields were given.
 std::vector<Problem> missing(const Fields& fields, const std::string& file);
 
 /// Throws StartupError (78) with one line per problem. Does nothing if there are none.

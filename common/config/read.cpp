@@ -124,8 +124,8 @@ class Reader {
     if (node.IsScalar()) value = node.Tag() == "!" ? quoted(node.Scalar()) : node.Scalar();
     if (node.IsNull()) value = "nothing";
     if (node.IsSequence()) value = "a list";
-    const std::string mend = field.doc.mend.empty() ? "" : "; " + field.doc.mend;
-    problem(node, field.key + ": " + shortened(value) + " is not " + what + mend);
+    const std::string fix = field.doc.fix.empty() ? "" : "; " + field.doc.fix;
+    problem(node, field.key + ": " + shortened(value) + " is not " + what + fix);
   }
 
   std::optional<double> number(const Field& field, const YAML::Node& node) {
@@ -287,8 +287,8 @@ std::vector<Problem> missing(const Fields& fields, const std::string& file) {
   std::vector<Problem> problems;
   for (const Field& field : fields.all()) {
     if (!field.required || field.given) continue;
-    const std::string mend = field.doc.mend.empty() ? field.doc.text : field.doc.mend;
-    problems.push_back({file, 0, 0, field.key + ": is missing; " + mend});
+    const std::string fix = field.doc.fix.empty() ? field.doc.text : field.doc.fix;
+    problems.push_back({file, 0, 0, field.key + ": is missing; " + fix});
   }
   return problems;
 }

@@ -76,8 +76,8 @@ void Mapper::dropTentativeLoops() {
   }
 }
 
-/// The scale of the session's odometry errors: that of its anchors in a replay, which changes
-/// nothing, otherwise the one that its loops show.
+/// Sets the scale of the session's odometry errors. A replay takes that of its anchors, because it
+/// must not change them; otherwise the scale is estimated from the loops.
 void Mapper::continueDrift(const WorldId& session) {
   const auto last = state_.newestOf(session);
   odometry_variance_ = last ? last->scale : DriftVariance();

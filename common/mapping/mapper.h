@@ -203,7 +203,7 @@ class Mapper {
     std::set<std::pair<ObjectId, ObjectId>> pairs;
   };
   std::optional<ActiveLoop> active_;
-  /// The pose of the session by one search, where one search does not suffice.
+  /// The pose of the session by one search, if one search does not suffice.
   struct Tentative {
     LevelPose T_MN;
     AnchorId component = 0;

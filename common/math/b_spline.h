@@ -1,5 +1,5 @@
-// Weights of uniform B-splines of any order, plain and cumulative. Source: Sommer et al., CVPR
-// 2020, eq. 14 and 16.
+// Weights of uniform B-splines of any order, plain and cumulative. Source: Sommer et al.,
+// "Efficient Derivative Computation for Cumulative B-Splines on Lie Groups", CVPR 2020, eq. 14, 16.
 #pragma once
 
 #include <array>
@@ -23,7 +23,8 @@ constexpr double power(double base, int exponent) {
 
 }  // namespace detail
 
-/// Weights of `Order` neighbouring controls as polynomials in s: [control][power] (eq. 14).
+/// Weights of `Order` neighbouring controls as polynomials in s: [control][power of s]. Source:
+/// Sommer et al. 2020, eq. 14 (Qin's general matrix of uniform B-splines).
 template <int Order>
 constexpr std::array<std::array<double, Order>, Order> blendingMatrix() {
   std::array<std::array<double, Order>, Order> m{};

@@ -1,18 +1,21 @@
-// The loops that dominate the run time of a batch with ten to a hundred dimensions, for which
-// Eigen's packing costs more than the sums. On x86-64 also compiled for AVX2, without fused
-// multiply-add, so that results do not depend on the machine.
+// The loops that dominate the run time of a batch with ten to a hundred dimensions. Eigen's packing
+// of blocks of this size costs more than the sums. On x86-64 the functions are also compiled for
+// AVX2, which is used if the machine supports it. Results do not depend on the machine, because
+// fused multiply-add is not used.
 #pragma once
 
 namespace perdure::dense {
 
-/// Stores L of S = L Lᵀ in the lower triangle of an n × n matrix with column stride `stride`; the
-/// rest is undefined. False if S is not positive definite.
+/// Stores L of S = L Lᵀ in the lower triangle of an n × n matrix with column stride `stride`. The
+/// elements above the diagonal are undefined afterwards. Returns false if S is not positive
+/// definite.
 bool factorise(double* S, long stride, long n);
 
 /// B ← L⁻¹ B for an n × m matrix with column stride n.
 void whiten(const double* L, long stride, long n, double* B, long m);
 
-/// The 4 × 4 blocks on and below the diagonal of A B (n × 6, 6 × n); 4 divides n.
+/// The 4 × 4 blocks on and below the diagonal of A B, with A n × 6 and B 6 × n; n is a multiple of
+/// four.
 void multiplySix(const double* A, const double* B, long n, double* product);
 
 /// A Bᵀ with A rows × inner and B columns × inner.

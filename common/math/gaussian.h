@@ -1,5 +1,6 @@
-// Functions for Gaussians: density, symmetry, definiteness, decompositions of covariances. These
-// are compiled once for any size, because instances in each file compile slowly.
+// Functions for Gaussians: density, symmetry, definiteness, and decompositions of covariances. The
+// decompositions are compiled once for any size, because instances for each size and file would
+// take a third of the build time.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,7 +25,8 @@ Eigen::MatrixXd solveSymmetric(const MatrixView& S, const MatrixView& B);
 
 Eigen::MatrixXd inverseSymmetric(const MatrixView& S);
 
-/// B S⁻¹: the regression of B on the variable with covariance S; zero if a pivot < 1e-18.
+/// B S⁻¹ of an m × n matrix B: the regression of B on the variable with covariance S. The result is
+/// zero if S is not positive definite (a pivot below 1e-18).
 Eigen::MatrixXd regressOn(const MatrixView& S, const MatrixView& B);
 
 /// A⁻¹ of any square A; not finite if A is singular.
@@ -50,7 +52,8 @@ using ByColumns =
     Eigen::Matrix<double, Derived::RowsAtCompileTime, Derived::ColsAtCompileTime, Eigen::ColMajor,
                   Derived::MaxRowsAtCompileTime, Derived::MaxColsAtCompileTime>;
 
-/// The factorisation S = L Lᵀ. `Matrix` is the storage of S; fixed sizes need no heap memory.
+/// The factorisation S = L Lᵀ. `Matrix` is the storage type of S; results have the type of the
+/// argument. Data of fixed or bounded size therefore need no heap memory.
 template <class Matrix>
 class Cholesky {
  public:

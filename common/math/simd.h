@@ -1,11 +1,12 @@
-// Vectors of four numbers for the few loops that dominate the run time (GCC's vector types). On
-// x86-64 also compiled for AVX2, without fused multiply-add, so that results do not depend on the
-// machine.
+// Vectors of four numbers for the few loops that dominate the run time of a frame. They use GCC's
+// vector types; without AVX2 the same operations run in two halves. On x86-64 a function may also
+// be compiled for AVX2. Fused multiply-add is not used, so results do not depend on the machine.
 #pragma once
 
 #include <algorithm>
 
-// The loader selects a clone before a sanitizer's run time starts.
+// No clones under a sanitizer, because the loader selects a clone before the sanitizer's run time
+// starts.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
     !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define PERDURE_ALSO_AVX2 __attribute__((target_clones("avx2", "default")))

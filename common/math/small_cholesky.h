@@ -1,4 +1,5 @@
-// S = L Lᵀ for small matrices of fixed size, on the stack.
+// S = L Lᵀ for small matrices of fixed size, which a filter factorises by the thousand. They stay
+// on the stack.
 #pragma once
 
 #include <Eigen/Core>
@@ -6,7 +7,8 @@
 
 namespace perdure {
 
-/// As choleskyInPlace().
+/// Stores L of S = L Lᵀ in S's lower triangle; the upper one is neither read nor written. Returns
+/// false if S is not positive definite; S is then undefined.
 template <int N>
 bool choleskyInPlace(Eigen::Matrix<double, N, N>& S) {
   for (int j = 0; j < N; ++j) {

@@ -94,9 +94,10 @@ struct TrackedObjects {
   static void fields(auto& m, auto& a) { a("header", m.header), a("objects", m.objects); }
 };
 
-/// Confirmed objects in `map` by their most probable class; T_MW is the pose of W in it. The last
-/// eight bytes of the UUID are the id. The orientation is marked unavailable above 1 rad (σ of the
-/// yaw); its sign is known for moving objects only.
+/// Confirmed objects in `map`; T_MW is the pose of W in it. The last eight bytes of the UUID are
+/// the id. Classes unknown to Autoware are UNKNOWN. Pose, covariance and size are those of the most
+/// probable class. The sign of the orientation is known only for moving objects. If the σ of the
+/// yaw is above 1 rad, the orientation is marked as unavailable.
 TrackedObjects trackedObjectsOf(const Objects& objects, const RigidTransform& T_MW);
 
 }  // namespace perdure::ros::autoware

@@ -1,5 +1,6 @@
-// Encodes and decodes ROS messages from arbitrary bytes: CDR of ROS 2 (XCDR1 written; both byte
-// orders and plain XCDR2 read) and the format of ROS 1.
+// Encodes and decodes ROS messages: CDR of ROS 2 and the format of ROS 1. CDR is written as XCDR1
+// with its header of four bytes; both byte orders and plain XCDR2 are read. Input may be arbitrary
+// bytes; memory is allocated only for data that exist.
 #pragma once
 
 #include <algorithm>

@@ -7,8 +7,10 @@
 
 namespace perdure::ros {
 
-/// Size, encoding and pixels. Colours, Bayer patterns and YUV 4:2:2 become BGR. For 16-bit images,
-/// the upper eight of the lower `bits` are used. Reasons: image_encoding, image_malformed.
+/// Size, encoding and pixels. Grey images stay grey; colours, Bayer patterns and YUV 4:2:2 become
+/// BGR. For 16-bit images, the upper eight of the lower `bits` are used. Pixels already in a
+/// frame's format are not copied. Reasons: image_encoding (the detail lists the supported ones),
+/// image_malformed.
 Result<Frame> frameOf(const Image& image, int bits = 16);
 /// An image of mono8 or bgr8 in the frame <camera>_optical. The frame must not be compressed.
 Image imageOf(const Frame& frame);

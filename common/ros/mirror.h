@@ -1,5 +1,5 @@
-// Publishes Perdure's topics as topics of ROS 2. Data that several messages need (calibration,
-// classes, map frame, angular rate) are stored.
+// Publishes Perdure's topics as topics of ROS 2. Data that several messages need are stored:
+// calibration, classes, pose of the odometry in the map, and the latest angular rate.
 #pragma once
 
 #include <functional>
@@ -28,9 +28,11 @@ struct Outlet {
 class Mirror {
  public:
   using Out = std::function<void(const Outlet& outlet, std::vector<std::uint8_t> cdr)>;
-  /// Whether a topic has readers. Without them only latched messages are created.
+  /// Returns whether a topic has readers. Messages without readers are not created, unless the
+  /// topic is latched.
   using Wanted = std::function<bool(const Outlet& outlet)>;
-  /// `prefix` precedes all topics except /tf and /tf_static.
+  /// `prefix` precedes all topics except /tf and /tf_static. Without `wanted` all messages are
+  /// created.
   Mirror(std::string prefix, Out out, Wanted wanted = {})
       : prefix_(std::move(prefix)), out_(std::move(out)), wanted_(std::move(wanted)) {}
 

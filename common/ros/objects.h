@@ -11,8 +11,9 @@
 
 namespace perdure::ros {
 
-/// Confirmed objects in `odom`. Each class is a result with the score existence × probability and
-/// its own Gaussian. The box is that of the most probable class.
+/// Confirmed objects in `odom`. Each possible class is a result: its score is existence × its
+/// probability, and its pose and covariance are those of its own Gaussian. The box is that of the
+/// most probable class.
 Detection3DArray detections3dOf(const Objects& objects);
 /// Detections of a network in an image of `camera`, with the class names of its model, or class
 /// numbers if the model is not known. A score is the probability against clutter and the other
@@ -21,9 +22,11 @@ Detection2DArray detections2dOf(const Detections& detections, const ModelInfo* m
 /// The first marker deletes all earlier ones. Visible objects are solid, others have edges only;
 /// the edges of occluded objects are dashed. Namespaces are the classes.
 MarkerArray markersOf(const Objects& objects);
-/// `imu`: the latest sample, for the angular rate and its variance (huge if not known).
+/// `imu` is the latest sample, for the angular rate. Its variance is that of the gyroscope's noise;
+/// the bias adds little. The variance is huge if the noise or the sample is not known.
 Odometry odometryOf(const perdure::Odometry& odometry, const std::optional<Imu>& imu);
-/// x, y, z and σ of each landmark in `odom`; σ is the field `intensity`, as viewers expect.
+/// x, y, z and σ of each landmark in `odom`. The field of σ has the name `intensity`, which viewers
+/// expect.
 PointCloud2 cloudOf(const Landmarks& landmarks);
 DiagnosticStatus statusOf(const Health& health);
 

@@ -1,4 +1,5 @@
-// Converts ROS sensor messages to Perdure's and back.
+// Converts ROS sensor messages to Perdure's and back: inertial samples, lenses, and transforms
+// between frames.
 #pragma once
 
 #include <map>
@@ -15,8 +16,10 @@ namespace perdure::ros {
 TimePoint timeOf(const Time& time);
 /// The caller sets source and sequence.
 ImuSample sampleOf(const Imu& imu);
-/// Size and lens of the images: from K and D, or from P if they are `rectified`. Binning and region
-/// of interest are applied. Reasons: "not_finite", "uncalibrated", "lens".
+/// Size and lens of the images that the message describes: from K and D, or from P if they are
+/// `rectified`. Binning and region of interest are applied. Name, pose and rate are not set.
+/// Reasons: "not_finite" (NaN or infinity), "uncalibrated" (no focal length), "lens" (unknown model
+/// or number of coefficients), with a sentence.
 Result<CameraCalibration> cameraOf(const CameraInfo& info, bool rectified);
 
 /// The message in the frame imu_link, without orientation. The covariances come from `noise`.

@@ -69,7 +69,7 @@ bool Input::silent(Clock::time_point now) const {
 
 std::string Input::sentence(Clock::time_point now) const {
   return fmt::format("no {} for {:.1f} s; {}", what_, last_ ? secondsBetween(*last_, now) : 0.0,
-                     mend_);
+                     fix_);
 }
 
 }  // namespace perdure::service

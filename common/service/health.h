@@ -1,4 +1,4 @@
-// The health message of a process, and the inputs that it depends on.
+// The health message of a process, published once a second, and the inputs that it depends on.
 #pragma once
 
 #include <atomic>
@@ -48,19 +48,19 @@ class Input {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// `what`: "inertial samples"; `mend`: "mend the IMU, or start capture".
-  Input(std::string what, std::string mend) : what_(std::move(what)), mend_(std::move(mend)) {}
+  /// `what` names the input, "inertial samples"; `fix` ends the message: "start capture".
+  Input(std::string what, std::string fix) : what_(std::move(what)), fix_(std::move(fix)) {}
 
   void heard() { heardAt(Clock::now()); }
   void heardAt(Clock::time_point now);
-  /// True after three quarters of a second, or four periods, without a message. An input that has
-  /// never arrived is not silent.
+  /// Returns true after three quarters of a second without a message, or after four periods if that
+  /// is longer. An input that has never arrived is not silent; the service then waits for it.
   bool silent(Clock::time_point now) const;
-  /// Such as "no inertial samples for 1.2 s; mend the IMU, or start capture".
+  /// The message about the silence: "no inertial samples for 1.2 s; <fix>".
   std::string sentence(Clock::time_point now) const;
 
  private:
-  std::string what_, mend_;
+  std::string what_, fix_;
   std::optional<Clock::time_point> last_;
   std::optional<double> period_s_;  ///< smoothed
 };

@@ -9,7 +9,8 @@ namespace perdure::service {
 double processorSeconds();      ///< CPU time of all threads since the start
 std::uint64_t residentBytes();  ///< memory in use
 
-/// Detects steps of the wall clock: changes that are larger than slewing causes.
+/// Detects steps of the wall clock: changes relative to the time since boot that are larger than
+/// slewing causes.
 class ClockSteps {
  public:
   ClockSteps();
@@ -28,7 +29,8 @@ class ClockSteps {
 void notifyReady();
 void notifyStopping();
 
-/// Client of systemd's watchdog, if it is enabled for this process (WATCHDOG_USEC).
+/// Client of systemd's watchdog, if it is enabled for this process (WATCHDOG_USEC). systemd kills a
+/// process that sends no message within the watchdog's period.
 class Watchdog {
  public:
   using Clock = std::chrono::steady_clock;

@@ -156,7 +156,8 @@ void Context::run() {
   publishHealth();
 }
 
-/// Each completed turn of the loop feeds the watchdog.
+/// Each completed turn of the loop feeds the watchdog. A hanging handler or a stopped process does
+/// not.
 void Context::runLoop() {
   constexpr std::chrono::microseconds kLongest{1'000'000};
   Watchdog watchdog;

@@ -1,4 +1,5 @@
-// The common part of every service's main. README.md in this folder shows an example.
+// The common part of every service's main: options, configuration, log, signals, health, watchdog.
+// README.md in this folder shows an example.
 #pragma once
 
 #include <spdlog/logger.h>
@@ -48,7 +49,8 @@ class Context {
   HealthMeter& health() { return health_; }
   spdlog::logger& log() { return *log_; }
 
-  /// A reader whose messages go to `handler` in the loop's thread.
+  /// A reader whose messages go to `handler` in the loop's thread. Its counts are published in
+  /// Health.
   template <class T>
   bus::Reader<T>& on(const bus::Topic<T>& topic, std::type_identity_t<Sink<T>> handler,
                      std::type_identity_t<Sink<T>> on_gone = {}) {
@@ -65,6 +67,7 @@ class Context {
     endpoints_.push_back(writer);
     return *writer;
   }
+  /// A writer as a node's output. Messages that cannot be written are counted in Health.
   template <class T>
   Sink<T> sink(const bus::Topic<T>& topic) {
     return [&to = writer(topic)](const T& value) { (void)to.write(value); };
@@ -78,12 +81,13 @@ class Context {
 
   /// Declares an input that is necessary for any output. If it arrives and then stops, Health
   /// becomes degraded at once and names it. Its handler calls heard().
-  Input& needs(const std::string& what, const std::string& mend) {
+  Input& needs(const std::string& what, const std::string& fix) {
     if (inputs_.empty()) every(std::chrono::milliseconds(100), [this] { noteSilence(); });
-    return inputs_.emplace_back(what, mend);
+    return inputs_.emplace_back(what, fix);
   }
 
-  /// The watchdog is fed only while `goes_on`, called in the loop's thread, returns true.
+  /// Monitors a separate thread: the watchdog is fed only while `goes_on` returns true. It is
+  /// called in the loop's thread.
   void watch(std::function<bool()> goes_on) { watched_.push_back(std::move(goes_on)); }
 
   void every(std::chrono::nanoseconds period, std::function<void()> tick) {

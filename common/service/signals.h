@@ -1,5 +1,6 @@
-// SIGTERM, SIGINT and SIGHUP end a program in order, in a normal thread. SIGXFSZ is ignored, so a
-// write beyond the largest size of a file fails like one to a full disk.
+// SIGTERM, SIGINT and SIGHUP (the terminal was closed) end a program in order, by a normal call in
+// a normal thread. SIGXFSZ is ignored, so a write beyond the largest size of a file fails like one
+// to a full disk.
 #pragma once
 
 #include <functional>
@@ -7,7 +8,8 @@
 
 namespace perdure::service {
 
-/// Blocks the signals in this thread and those that it starts later. SIGHUP stays ignored if it is.
+/// Blocks the signals in this thread and in all threads that it starts later. Create it first.
+/// SIGHUP stays ignored if it is, as under nohup.
 class BlockedSignals {
  public:
   BlockedSignals();

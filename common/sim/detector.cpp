@@ -88,8 +88,9 @@ struct SimulatedDetector::Sight {
   double bearing = 0.0;  ///< direction of the camera, as seen from the object
 };
 
-/// Standard normal numbers for one observation: a part drawn for each frame, and a fixed function
-/// of object and viewpoint (waves of random phase).
+/// Standard normal numbers for one observation. One part is drawn for each frame. The other part is
+/// a fixed function of object and viewpoint: waves of random phase, whose correlation decreases as
+/// the viewpoint changes.
 class SimulatedDetector::Errors {
  public:
   /// `time`: in units of the time constant of sides; empty: drawn for each frame.

@@ -1,6 +1,10 @@
-// A simulated detector, drawn from the truth: boxes with noise, misses, false alarms, class
-// confusion, azimuths with flips. Activations are exact log-likelihood ratios of a Gaussian feature
-// vector about the mean of the class. Errors from similar viewpoints are correlated.
+// A simulated detector, drawn from the truth. It produces boxes with noise, misses by size and
+// visibility, false alarms, class confusion, and azimuths with flips. It allows tests of the filter
+// without a network.
+//
+// Its class evidence is correct by construction. Each box has a feature vector from a unit Gaussian
+// about the mean of its class (clutter: about the origin). The activations are the exact
+// log-likelihood ratios of that vector. Errors from similar viewpoints are correlated.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,7 +20,8 @@
 
 namespace perdure::sim {
 
-/// Two classes that are confused in a fraction `share` of the observations.
+/// Two classes that are confused in a fraction `share` of the observations of large, visible
+/// objects.
 struct ConfusionPair {
   std::string first, second;
   double share = 0.05;
@@ -28,7 +33,8 @@ struct DetectorModel {
   std::vector<std::string> classes{"car",   "van",          "person",  "bicycle",
                                    "chair", "dining table", "monitor", "couch"};
 
-  // found · σ(log₂(size / half_size_px) / size_octaves) · σ((visible − half_visible) / …).
+  // Detection probability: found · σ(log₂(size / half_size_px) / size_octaves)
+  //                        · σ((visible − half_visible) / visible_softness).
   double found = 0.96;
   double half_size_px = 14.0, size_octaves = 0.25;
   double half_visible = 0.3, visible_softness = 0.06;  ///< fractions of the outline in the image
@@ -40,9 +46,11 @@ struct DetectorModel {
   double shrink_below = 0.6;      ///< fraction below which boxes enclose the visible part only
   /// Share of sides whose deviation is tail_scale times larger.
   double tail_share = 0.0, tail_scale = 5.0;
-  /// Time constant of the sides' errors; 0: drawn again for each frame.
+  /// Time constant of the sides' errors, apart from their persistent share; 0: drawn again for each
+  /// frame.
   double error_time_s = 0.0;
-  /// A tracker continues the box of a hidden object for so long, at constant velocity.
+  /// A tracker continues the box of an object that becomes hidden for this time, at constant
+  /// velocity in the image, s.
   double coast_s = 0.0;
   BoxExtent boxes = BoxExtent::kOutline;
   bool declare_boxes = true;  ///< false: ModelInfo states that the extent of boxes is unknown
@@ -66,7 +74,8 @@ Eigen::MatrixXd classDirections(const DetectorModel& model);
 
 class SimulatedDetector {
  public:
-  /// Throws StartupError(kConfiguration). `camera`: of the views in the truth.
+  /// Throws StartupError(kConfiguration) for invalid numbers. `camera` is the camera whose views
+  /// the truth contains.
   SimulatedDetector(DetectorModel model, Truth truth, const CameraCalibration& camera);
 
   const ModelInfo& info() const { return info_; }

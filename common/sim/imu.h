@@ -1,4 +1,6 @@
-// Simulates an IMU (error model of Kalibr and EuRoC) and the wheel speed of a vehicle.
+// Simulates an IMU in the body: point samples of the exact motion, with the errors of the
+// continuous-time model of Kalibr and EuRoC (white noise and bias random walk, given by densities).
+// Also simulates the wheel speed of a vehicle.
 #pragma once
 
 #include <vector>

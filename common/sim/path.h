@@ -20,7 +20,8 @@ struct PathPoint {
   double curvature = 0.0;  ///< 1/m, left turns positive
 };
 
-/// Lines and arcs, with gradual changes of curvature. An open path continues straight.
+/// Straight lines and arcs, with gradual changes of curvature. A closed path repeats; an open path
+/// continues straight beyond its ends.
 class GroundPath {
  public:
   GroundPath(const std::vector<Corner>& corners, bool closed, double smoothing_m = 4.0);

@@ -1,5 +1,5 @@
-// A scene with exact truth, determined by name, seed and options: objects, motion of the body,
-// sensors. W has z up; the ground is z = 0.
+// A scene with exact truth, determined by name, seed and options: objects and their poses over
+// time, the motion of the body, and its sensors. W has z up; the ground is z = 0.
 #pragma once
 
 #include <Eigen/Core>
@@ -25,10 +25,12 @@ struct SceneObject {
   std::uint64_t look_seed = 0;  ///< colours, textures, details
   Eigen::Vector3d size =
       Eigen::Vector3d::Ones();  ///< length (x of O), width (y), height (z); metres
-  /// Pose of the centre of its box, yaw about +z. O: x forwards, z up, origin in the centre.
+  /// Pose of the centre of its box, yaw about +z. Object frame O: x forwards, z up, origin in the
+  /// centre.
   Trajectory motion{RigidTransform{}};
   bool moves = false;  ///< moves at some time during its presence
-  /// It jumps between two frames, as if moved by a person: two keys without motion between.
+  /// It jumps between two frames, as if moved by a person. The truth has two keys and no motion
+  /// between them. `moves` is set too.
   bool steps = false;
   double present_from_s = -1e9, present_until_s = 1e9;
 
@@ -37,8 +39,9 @@ struct SceneObject {
 
 enum class PropKind { kFacade, kTree, kPole, kHedge, kWall, kKerb, kFloor, kCrate, kShelf };
 
-/// Scenery that can occlude objects but is not in the truth. Long props have x along their length;
-/// their front is −y.
+/// Scenery: visible and able to occlude objects, but not part of the truth. The pose is that of the
+/// centre of its box. Long props (facades, walls, hedges, kerbs, shelves) have x along their
+/// length; their front is −y.
 struct Prop {
   PropKind kind = PropKind::kFacade;
   std::uint64_t look_seed = 0;
@@ -71,7 +74,8 @@ struct SpeedErrors {
   bool noise = true;
 };
 
-/// `calibration` is written to the files; `true_calibration` describes the sensors (tests).
+/// The sensors. `calibration` is written to the sensor.yaml files; `true_calibration` describes the
+/// simulated sensors. The two differ only in tests of calibration.
 struct Rig {
   Calibration calibration, true_calibration;
   std::vector<CameraErrors> cameras;
@@ -98,7 +102,8 @@ struct SceneOptions {
   bool stereo = false, mono8 = false, rolling_shutter = false, noise = true;
   std::uint32_t width = 640, height = 480;
   double rate_hz = 20.0;
-  /// Looks have different seeds for training, testing and use.
+  /// Looks (colours, textures, shapes) have different seeds for training, testing and use. A
+  /// network is therefore never tested on its training data.
   std::string look_set = "use";  ///< use, train, test
 };
 

@@ -1,4 +1,5 @@
-// Upright boxes around objects, and a test for their intersection.
+// Upright boxes around objects, and a test for their intersection. No two objects of a scene may
+// intersect.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,7 +20,8 @@ struct Solid {
   std::array<Eigen::Vector2d, 4> corners() const;
 };
 
-/// The largest gap along separating directions: a lower bound of the distance.
+/// The largest gap between the two along their separating directions. It is a lower bound of the
+/// distance; negative values mean an overlap of at least that size.
 double gapBetween(const Solid& a, const Solid& b);
 bool meet(const Solid& a, const Solid& b, double margin = 0.0);
 /// Distance on the ground from a point to the outline; 0 inside.

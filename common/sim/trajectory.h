@@ -1,5 +1,6 @@
-// The pose of a body with exact derivatives: a uniform quintic B-spline, and a cumulative one of
-// order 5 for the rotation (Sommer et al., CVPR 2020).
+// The pose of a body at any time, with exact derivatives. The position is a uniform quintic
+// B-spline, the rotation a cumulative one of order 5. Source: Sommer et al., "Efficient Derivative
+// Computation for Cumulative B-Splines on Lie Groups", CVPR 2020.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,14 +21,17 @@ struct MotionState {
 
 class Trajectory {
  public:
-  /// Control poses every `interval_s` from `start_s`, which the spline smooths. The ends apply
-  /// outside the range. Adjacent ones are less than half a turn apart. Two poses with a very short
-  /// interval form a step.
+  /// Control poses every `interval_s` from `start_s`, at least one. The spline smooths them and
+  /// does not pass through them. The first and last control apply outside the range.
+  /// Derivatives are continuous up to the rate of the acceleration (C⁴ position, C³ rotation).
+  /// Adjacent controls must be less than half a turn apart. Two poses with a very short interval
+  /// form a step.
   Trajectory(double start_s, double interval_s, std::vector<RigidTransform> control_poses);
   /// A body at rest.
   explicit Trajectory(const RigidTransform& T_WB) : Trajectory(0.0, 1.0, {T_WB}) {}
 
-  /// Valid for any t; at rest from three intervals beyond the first and last controls.
+  /// Valid for any finite t. The body is at rest until three intervals before the first control,
+  /// and from three intervals after the last one.
   MotionState at(double t_s) const;
   RigidTransform poseAt(double t_s) const { return at(t_s).T_WB; }
 

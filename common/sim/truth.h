@@ -1,4 +1,5 @@
-// The truth of a simulated folder. A missing inside_truth.csv counts as an empty file.
+// The truth of a simulated folder: reads and writes objects_truth.json, visibility_truth.csv and
+// inside_truth.csv. A missing inside_truth.csv is treated as an empty file.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,7 +22,8 @@ inline constexpr char kVisibilityHeader[] = "frame,object_id,visible_fraction,x1
 inline constexpr char kInsideTruthFile[] = "inside_truth.csv";
 inline constexpr char kInsideHeader[] = "frame,object_id,x1,y1,x2,y2";
 
-/// The object stays until the next key. If `moves`, it moves straight between keys.
+/// The pose of an object at a time. The object stays there until the next key. If `moves` is set,
+/// it moves on a straight line between keys, which are then dense: ten per second.
 struct TruthKey {
   TimePoint time;
   Eigen::Vector3d centre_W = Eigen::Vector3d::Zero();
@@ -44,7 +46,8 @@ Box clipped(const Box& box, double width, double height);
 /// One object in one frame of cam0. Rows exist for objects whose full outline touches the image.
 struct TruthView {
   std::uint64_t object_id = 0;
-  /// Visible pixels divided by those of the complete outline, also outside the image.
+  /// Number of visible pixels divided by the pixels of the complete outline, including the part
+  /// outside the image.
   double visible_fraction = 0.0;
   Box box;  ///< box of the complete, unoccluded outline, not clipped to the image
   /// Box of the part of that outline inside the image; set if the image border cuts it.

@@ -35,10 +35,10 @@ inline constexpr std::size_t kExistenceEvidences = 14;
 /// ClassLedger::log_odds; new kinds are appended.
 enum class ClassEvidence : std::uint8_t {
   kPrior = 0,   ///< frequency of the class
-  kActivation,  ///< agreement of size and place with the boxes
+  kActivation,  ///< activations of the network in the boxes of the object
   kGeometry,    ///< whether size and place explain the boxes
-  kMiss,        ///< agreement of the motion with the class
-  kMotion,      ///< whether it moves as the class does
+  kMiss,        ///< observations without a detection, which are more likely for some classes
+  kMotion,      ///< whether the object moves as the class does
   kPruning,     ///< hypotheses that were pruned; the others share their weight
   kMerge,       ///< evidence of another track that was merged into this one
   kRestore,     ///< evidence from before this ledger

@@ -15,7 +15,8 @@ std::size_t byteAt(std::string_view bytes, std::size_t at) {
   return at < bytes.size() ? static_cast<unsigned char>(bytes[at]) : 0;
 }
 
-/// Walks over the segments of a JPEG to its end mark; a thumbnail's lies inside a segment.
+/// Walks over the segments of a JPEG to its end mark. A thumbnail's end mark lies inside a segment.
+/// Bytes after the end mark (padding, a vendor's trailer) are not read.
 bool hasJpegEnd(std::string_view bytes) {
   constexpr std::size_t kEnd = 0xD9, kFirstOfNoLength = 0xD0;
   for (std::size_t at = 2; at + 1 < bytes.size();) {

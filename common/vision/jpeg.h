@@ -1,4 +1,5 @@
-// Compresses frames as JPEG and decodes them with TurboJPEG.
+// Compresses frames as JPEG and decodes them with TurboJPEG, for networks without the bandwidth for
+// raw images.
 #pragma once
 
 #include "common/base/result.h"
@@ -10,8 +11,9 @@ namespace perdure::vision {
 /// image_missing, image_malformed (size and bytes disagree), jpeg_failed.
 Result<Frame> compressed(const Frame& frame, int quality);
 
-/// Decodes with packed rows as `wanted`; raw frames are unchanged. Reasons: image_missing,
-/// jpeg_malformed, jpeg_size_wrong (not the frame's own size).
+/// Returns the decoded image with packed rows, in the encoding `wanted`; an uncompressed frame is
+/// unchanged. Reasons: image_missing; jpeg_malformed (truncated, corrupt, not JPEG);
+/// jpeg_size_wrong (not the frame's own width and height).
 Result<Frame> decompressed(const Frame& frame, ImageEncoding wanted);
 /// Decodes in the colours of the compressed image.
 Result<Frame> decompressed(const Frame& frame);

@@ -40,7 +40,8 @@ std::optional<std::size_t> sizeOf(dds_stream_typecode kind) {
   return std::size_t{1} << (kind - DDS_OP_VAL_1BY);
 }
 
-/// Follows a message by Cyclone's operations, as Cyclone does, and reads lengths only.
+/// Follows a message by Cyclone's operations, as Cyclone does, and reads lengths only. The
+/// functions return the next operation, or nullptr for an unknown one.
 class Walk {
  public:
   explicit Walk(std::span<const std::uint8_t> cdr) : cdr_(cdr) {}
@@ -121,8 +122,9 @@ class Walk {
 };
 
 /// Cyclone 0.10.2 aborts if an @appendable struct ends before a member that is itself one
-/// (cyclonedds#1560). Whether the message (XCDR2 accepted by dds_stream_normalize_data(), without
-/// encapsulation) contains all required structs; `ops` describe its type.
+/// (cyclonedds#1560, fixed in later versions). Returns whether the message contains all required
+/// structs. `cdr` is XCDR2 accepted by dds_stream_normalize_data(), without encapsulation; `ops`
+/// describe its type. Also returns false for members of kinds that Perdure's types do not use.
 bool structsArePresent(std::span<const std::uint8_t> cdr, const std::uint32_t* ops) {
   return Walk(cdr).structure(ops);
 }
@@ -141,8 +143,9 @@ Result<CdrSample> CdrSample::read(std::span<const std::uint8_t> message,
   if (version == 0) {
     return fail("bad_encapsulation", std::string("not how ") + type.m_typename + " is encoded");
   }
-  // Cyclone checks and byte-swaps in place, needs aligned memory, and may access up to twice the
-  // size of the data.
+  // Cyclone checks and byte-swaps in place, and requires aligned memory. In XCDR2 it checks for
+  // four bytes per array element even if an element has eight. Byte-swapping may therefore access
+  // up to twice the size of the data.
   const auto payload = message.subspan(kHeader);
   std::vector<std::uint64_t> aligned(2 * payload.size() / sizeof(std::uint64_t) + 1);
   if (!payload.empty()) std::memcpy(aligned.data(), payload.data(), payload.size());

@@ -1,5 +1,6 @@
-// Messages as bytes: four bytes of encapsulation (RTPS 2.5, 10.5), then XCDR1 (final types) or
-// delimited XCDR2, which readers with more or fewer members can read too.
+// Messages as bytes, on the network and in recordings: four bytes of encapsulation (RTPS 2.5,
+// 10.5), then XCDR1 (final types) or delimited XCDR2 (appendable ones). Readers with more or fewer
+// known members can read XCDR2 too. This code needs no DDS participant and no network.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +17,8 @@ namespace perdure::wire {
 /// Owns the generated C struct decoded from bytes.
 class CdrSample {
  public:
-  /// Accepts arbitrary bytes. Reasons: bad_encapsulation, malformed_cdr.
+  /// Accepts arbitrary bytes and reads nothing outside them. Reasons: bad_encapsulation,
+  /// malformed_cdr.
   static Result<CdrSample> read(std::span<const std::uint8_t> message,
                                 const dds_topic_descriptor_t& type);
   const void* get() const { return sample_.get(); }
@@ -35,7 +37,8 @@ std::vector<std::uint8_t> writeCdr(const void* sample, const dds_topic_descripto
 /// The message of an image without its encapsulation; empty if decodeInPlace cannot read it.
 std::span<const std::uint8_t> payloadInPlace(std::span<const std::uint8_t> message);
 
-/// `keeper` owns the memory of `message`, which the pixels refer to.
+/// Decodes a value with all checks, or returns the reason of a failure. `keeper` owns the memory of
+/// `message`, which the pixels refer to.
 template <class T>
 Result<T> decodeCdr(std::span<const std::uint8_t> message, std::shared_ptr<const void> keeper) {
   if constexpr (kDecodedInPlace<T>) {
@@ -59,10 +62,12 @@ Result<std::vector<std::uint8_t>> encodeCdr(const T& value) {
   return writeCdr(&sample, Type<T>::descriptor());
 }
 
-/// The IDL of a type with all types that it needs, without #include; empty if unknown.
+/// The IDL of a type such as "perdure::msg::Objects" with all types that it needs, as one text
+/// without #include. The result is empty if the type is unknown.
 std::string idlOf(std::string_view type_name);
 
-/// The variant of a type in which every struct is final, with the same layout, if any.
+/// The variant of a type such as "perdure::msg::Objects" in which every struct is final, with the
+/// same memory layout. Returns nullptr if the type itself is final, or unknown.
 const dds_topic_descriptor_t* plainTwinOf(const std::string& type_name);
 
 }  // namespace perdure::wire

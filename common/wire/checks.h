@@ -15,7 +15,8 @@ bool inside(double value, const Limits& limits);
 bool isSizeOf(const Frame& frame, std::size_t bytes);
 /// Returns whether `text` is valid UTF-8 without NUL.
 bool isText(std::string_view text);
-/// Positive semi-definite and symmetric within rounding, for any units of the rows.
+/// Returns whether P is symmetric and positive semi-definite within rounding, for any units of its
+/// rows.
 bool isSemiDefinite(const Eigen::Ref<const Eigen::MatrixXd>& P);
 /// Returns whether P is symmetric and positive definite, for any units of its rows.
 bool isDefinite(const Eigen::Ref<const Eigen::MatrixXd>& P);

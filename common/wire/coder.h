@@ -26,7 +26,8 @@ class Coder {
   using Memory = std::conditional_t<kEncodes, Arena&, std::shared_ptr<const void>>;
 
  public:
-  /// The arena of the encoded sequences; or the owner of the decoded message's memory.
+  /// The arena of the encoded sequences; or the owner of the decoded message's memory, whose pixels
+  /// are then not copied.
   explicit Coder(Memory memory) : memory_(std::forward<Memory>(memory)) {}
 
   bool failed() const { return reason_.has_value(); }

@@ -8,8 +8,9 @@
 
 namespace perdure::wire {
 
-/// Fills `wire`, which refers to `cdr` (native byte order, no header, XCDR1 or XCDR2). False if the
-/// data are truncated or the text has no terminator.
+/// Fills `wire`; its camera and pixels refer to `cdr`: native byte order, no header, XCDR1 or XCDR2
+/// (identical for this type, because its members of 8 bytes come first). Returns false if the data
+/// are truncated or the text has no terminator.
 bool frameInPlace(std::span<const std::uint8_t> cdr, perdure_msg_Frame& wire);
 
 /// Size of `wire` as CDR without its header.

@@ -1,4 +1,5 @@
-// Messages as JSON: names of common/types, times in ns, pixels are only counted.
+// Messages as JSON for users and tools. Field names are those of common/types. Times are in
+// nanoseconds, matrices are lists of rows, and pixels are only counted.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -1,5 +1,6 @@
-// Every topic of the system, one line each. Names on the wire are perdure/<vehicle>/<name>. All
-// code that handles all topics expands this list.
+// Every topic of the system, one line each: message, name, quality of service, expected rate,
+// recorded or not, writers and readers. Names on the wire are perdure/<vehicle>/<name>. All code
+// that handles all topics or all messages expands this list.
 #pragma once
 
 #include <algorithm>
@@ -46,7 +47,8 @@ constexpr double leaseFor(double rate_hz) {
   return rate_hz > 0 ? std::max(kShortest, 3.0 / rate_hz) : kShortest;
 }
 
-/// `kDescriptor`: Cyclone's description. `kTwin`: the variant with final structs, if any.
+/// `kDescriptor` is Cyclone's description of the generated struct. `kTwin` is the variant in which
+/// every struct is final, with the same memory layout; null if the type itself is final.
 template <class T, class WireStruct, const dds_topic_descriptor_t* kDescriptor,
           const dds_topic_descriptor_t* kTwin>
 struct TopicRow {
@@ -75,8 +77,9 @@ constexpr Qos bestEffort(int depth) { return {.reliable = false, .depth = depth}
 constexpr Qos latched(int depth, double lease_s = 0.0) {
   return {.depth = depth, .latched = true, .lease_s = lease_s};
 }
-/// A sensor whose gaps end the frame of reference: 10 s at 400 Hz for a stopped reader, and for a
-/// reader that begins, as many samples as the start of vio needs.
+/// A sensor whose gaps end the frame of reference. 10 s at 400 Hz are stored for a stopped reader;
+/// then DDS itself gives it up. A reader that begins receives as many samples as the start of vio
+/// needs.
 constexpr Qos kSensor{.depth = 4096, .latched = true, .late = 512};
 constexpr Qos exclusive(int depth, double rate_hz) {
   return {.depth = depth, .exclusive = true, .lease_s = leaseFor(rate_hz)};

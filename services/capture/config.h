@@ -41,7 +41,8 @@ struct RunConfig {
 };
 
 struct CameraConfig {
-  /// libcamera's ids, or parts of them. No `id`: the first camera; no `second`: one camera.
+  /// libcamera's ids of cam0 and cam1, or parts of them. If `id` is empty, the first camera is
+  /// used; if `second` is empty, there is one camera.
   std::string id, second;
   std::string format = "auto";  ///< libcamera's name, for example "YUYV"; auto: the best available
   double rate_hz = 20.0;

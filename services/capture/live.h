@@ -57,7 +57,7 @@ class Live {
   Sink<SpeedSample> speed_;
   std::string unused_;  ///< cameras of the rig that the configuration does not use
   Calibration rig_;
-  BoundedQueue<Message> queue_{1024, Overflow::kDropOldest};  // seconds of IMU samples
+  BoundedQueue<Message> queue_{1024, Overflow::kDropOldest};  // several seconds of IMU samples
   /// A separate queue, so that a network sender that sends too much causes no loss of images.
   BoundedQueue<Message> from_vehicle_{256, Overflow::kDropOldest};
   std::uint64_t samples_ = 0;

@@ -20,8 +20,9 @@ std::unique_ptr<replay::Dataset> openDrive(const Config& config, InstanceId sour
 class Loader {
  public:
   /// Begins at frame `first`. `notify` is called on the loader's thread after each message. With
-  /// run.on_end "repeat", frame n·frameCount() + i is frame i, later by n lap lengths; reading then
-  /// begins one frame early, with its samples.
+  /// run.on_end "repeat" the drive repeats without end. Frame n·frameCount() + i is then its frame
+  /// i, later by n lap lengths (all frames and the interval between laps). Reading then begins one
+  /// frame early, with the samples of that frame.
   Loader(const Config& config, std::unique_ptr<replay::Dataset> drive, std::uint64_t first,
          std::function<void()> notify);
   ~Loader();

@@ -23,8 +23,9 @@ struct Outputs {
 /// Single-threaded. `now_ns` is CLOCK_MONOTONIC as read by the caller; it never decreases.
 class Node {
  public:
-  /// `period`: time between frames. `resume`: state of an interrupted run. In clock mode, frames
-  /// due meanwhile count as missed_while_away; inertial samples are sent late.
+  /// `period`: usual time between frames. `resume`: state of an interrupted run, whose messages are
+  /// not sent again. In clock mode, frames due in the meantime are counted as missed_while_away,
+  /// and the inertial samples of that time are sent late.
   Node(const Config& config, Duration period, const std::optional<RunState>& resume,
        Outputs outputs);
 
@@ -36,7 +37,8 @@ class Node {
   void offer(replay::Message message) { pending_ = std::move(message); }
   void end() { ended_ = true; }
 
-  /// Sends the pending message if it is due. Returns the time until the next call, if not max().
+  /// Sends the pending message if it is due. Returns the time until the next call; Duration::max():
+  /// until the next offer or answer.
   Duration tick(std::int64_t now_ns);
 
   bool finished() const { return ended_ && !pending_; }

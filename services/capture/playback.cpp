@@ -143,7 +143,8 @@ void Playback::pump() {
   if (node_->finished()) finish();
 }
 
-/// Writes the file if its content changes. Samples alone wait for the next frame.
+/// Writes the file if its content would change. A sample alone does not cause a write until the
+/// next frame, because a few repeated samples do no harm.
 void Playback::saveState() {
   RunState state = node_->state();
   if (config_.run.state.empty() || (state.next_sequence == saved_.next_sequence &&

@@ -16,13 +16,15 @@
 
 namespace perdure::capture {
 
-/// A process is present if it reads frame/cam0 (vio, inference), or any topic (others).
+/// Waits for the readers that must receive the first frame. A process counts as present if it reads
+/// frame/cam0 (vio, inference), or any topic (others).
 class StartGate {
  public:
   using Clock = std::chrono::steady_clock;
   StartGate(const bus::Participant& participant, const StartConfig& config, Clock::time_point now);
 
-  /// Opens half a second after all readers are present, or after the timeout, for good.
+  /// Opens half a second after all readers are present, so that they discover this process too, or
+  /// after the timeout. It then stays open.
   bool open(Clock::time_point now);
   const std::vector<std::string>& missing() const { return missing_; }
 

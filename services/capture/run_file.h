@@ -10,6 +10,7 @@
 namespace perdure::capture {
 
 std::string driveOf(const Config& config);
+/// Identity of the machine's current boot.
 std::string bootId();
 
 /// State of the same run on the same boot. Empty if there is none, or if `config` names no file.

@@ -9,8 +9,8 @@ namespace perdure::gateway {
 namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr std::chrono::seconds kLongBack{2};  // restarted recording or another drive
-constexpr std::chrono::seconds kGap{1};       // longer: the trajectory begins again
+constexpr std::chrono::seconds kLongBack{2};  // larger: restarted recording, or another drive
+constexpr std::chrono::seconds kGap{1};       // sensor time; a longer gap interrupts the trajectory
 
 }  // namespace
 
@@ -211,7 +211,8 @@ void Node::beginAnew(TimePoint time) {
 void Node::onObjects(const Objects& objects, std::int64_t now_ns) {
   last_.objects_ns = now_ns;
   const double latency = 1e-6 * static_cast<double>(now_ns - objects.stamp.captured_ns);
-  constexpr double kLongest = 1e4;  // ms; longer: another host's clock, or a recording
+  constexpr double kLongest = 1e4;  // ms; a longer latency comes from another host's clock, or a
+                                    // recording
   latency_ms_ = objects.stamp.captured_ns > 0 && latency >= 0 && latency < kLongest ? latency : -1;
   take(objects);
 }

@@ -1,4 +1,5 @@
-// The gateway without bus and sockets. Only channels with viewers are computed, once.
+// The gateway without bus and sockets. It converts messages of the bus to messages of channels.
+// Only channels with viewers are computed, and each message only once.
 #pragma once
 
 #include <deque>
@@ -46,7 +47,8 @@ class Node {
   void onDetections(const Detections& detections);
   void onModel(const ModelInfo& model);
   void onObjects(const Objects& objects, std::int64_t now_ns);
-  /// Takes the newest message from before the first viewer.
+  /// Takes the newest message that was sent before the first viewer, for example at the end of a
+  /// drive.
   void onObjectsOfBefore(const Objects& objects);
   void onFrameOfBefore(std::size_t camera, const Frame& frame);
   void onEvent(const Event& event);
@@ -149,7 +151,8 @@ class Node {
   std::optional<Objects> objects_;
   std::optional<ModelInfo> model_;
   std::map<std::string, std::deque<Detections>> detections_;
-  std::set<std::size_t> awaited_;  ///< wait for the detections of objects_' frame
+  std::set<std::size_t> awaited_;  ///< cameras whose annotations wait for the detections of
+                                   ///< objects_' frame
   bool unplaced_ = false;          ///< an event of the whole map was received before the first pose
   std::deque<Happened> events_;
   std::map<ObjectId, Event> returns_;

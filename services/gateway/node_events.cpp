@@ -5,7 +5,7 @@ namespace perdure::gateway {
 namespace {
 
 constexpr std::size_t kMostEvents = 256;
-constexpr std::chrono::seconds kThen{1};  // between an event and its pose
+constexpr std::chrono::seconds kThen{1};  // largest time difference between an event and its pose
 
 }  // namespace
 
@@ -33,7 +33,7 @@ void Node::placeEvents() {
   }
 }
 
-/// The estimate of the object, or the vehicle at that time for events of the whole map.
+/// The position of an event: that of its object, or of the vehicle at that time if it has none.
 std::optional<Eigen::Vector3d> Node::placeOf(const Event& event) const {
   const auto now = body();
   if (!now || event.world != now->world) return std::nullopt;

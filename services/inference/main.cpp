@@ -9,7 +9,7 @@ namespace {
 using namespace perdure;
 
 void run(service::Context& context, const inference::Config& config) {
-  inference::Node node(config, context.instance());  // first, so that frames do not queue up
+  inference::Node node(config, context.instance());  // before loading, so that no frames queue
   context.log().info("network {} with {} classes, hash {}, by {}", node.model().name,
                      node.model().classes.size(), toHex(node.model().hash), node.backend());
   const auto& ownership = config.ownership;

@@ -142,7 +142,8 @@ ImageFit Node::fitTo(const Frame& frame) const {
                quarters_);
 }
 
-/// Each size has its own network. Sizes that the network does not accept are left out.
+/// Each size has its own network, because OpenCV initialises one again when its input changes.
+/// Sizes that the network does not accept are left out.
 void Node::addSmallerSizes(const ModelFile& file) {
   constexpr int kMultiple = 32;  // multiple of all strides
   const Input& full = description_.input;
@@ -267,7 +268,7 @@ Result<Detections> Node::infer(const Frame& frame, const Predictions& expected) 
   return out;
 }
 
-/// In the order of the predictions; activation 0 for those that cannot be reported.
+/// Expectations in the order of the predictions; activation 0: the network cannot report it.
 std::vector<Expectation> Node::expectationsOf(const Predictions& expected,
                                               const Frame& frame) const {
   const ImageFit fit = fitTo(frame);

@@ -25,7 +25,8 @@ class Node {
   /// Loads, warms up and tests the network. Throws StartupError with the fix.
   Node(const Config& config, InstanceId instance);
 
-  /// Of the activations and reported classes, for the present turn of the images.
+  /// Description of the activations and of the reported classes. A turn of the images has a
+  /// description of its own, because boxes have other insets then.
   const ModelInfo& model() const { return info_; }
 
   const ModelDescription& description() const { return description_; }
@@ -35,12 +36,15 @@ class Node {
   void onCalibration(const perdure::Calibration& calibration) { calibration_ = calibration; }
   void onOdometry(const Odometry& odometry);
 
-  /// Boxes in pixels of the frame, not clipped. `expected`: each one without a matching box gets a
-  /// top-down answer (prime.h) if the model is calibrated for it. Fails with "frame_malformed",
-  /// "model_failed", "model_output_shape" or "model_output_not_finite".
+  /// Returns boxes in pixels of the frame, not clipped to the image. An empty list is a valid
+  /// result. `expected`: predicted objects. Each one without a matching box gets a top-down answer
+  /// (core/decode/prime.h), if the model is calibrated for it and the predictions match the frame.
+  /// Fails with "frame_malformed", "model_failed", "model_output_shape" or
+  /// "model_output_not_finite".
   Result<Detections> infer(const Frame& frame, const Predictions& expected = {});
 
-  /// Sets a steady clock in seconds, for Detections::forward_s.
+  /// Sets a steady clock in seconds, for Detections::forward_s, which stays 0 (unknown) without
+  /// one.
   void timeBy(std::function<double()> clock_s) { clock_s_ = std::move(clock_s); }
 
   /// Pixels of each supported input size relative to the network's own, falling from 1.
@@ -49,7 +53,8 @@ class Node {
   /// Input width relative to the network's own.
   double inputScale() const;
 
-  /// All boxes whose best reported class scores `floor`, in pixels of the input, unmerged.
+  /// All boxes whose best reported class scores `floor` or more, in pixels of the network's input,
+  /// before overlaps are merged. Fails like infer().
   Result<std::vector<Candidate>> candidatesIn(const Frame& frame, double floor);
 
  private:

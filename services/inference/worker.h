@@ -90,7 +90,7 @@ class Worker {
   mutable std::mutex mutex_;  ///< protects all following members and the writers
   Ownership ownership_;
   Swap swap_;
-  Clock::time_point hold_until_{};  ///< no results after the strength was lowered
+  Clock::time_point hold_until_{};  ///< no results until then, after the strength was lowered
   bool silent_ = false;
   std::string failure_, last_problem_;
   ReasonCounts reasons_;

@@ -11,14 +11,16 @@
 
 namespace perdure::map_store {
 
-/// "LATITUDE LONGITUDE HEIGHT YAW" of M's origin (WGS 84, degrees, metres), as `perdure map export
-/// --anchor` takes it. `T_MB`: the body's pose at the anchor's time.
+/// "LATITUDE LONGITUDE HEIGHT YAW" of M's origin: degrees of WGS 84, metres above the ellipsoid,
+/// and degrees of M's x axis from east. `perdure map export --anchor` and `store.earth_anchor` use
+/// the same format. `T_MB`: the body's pose at the anchor's time.
 std::string earthAnchorOfMap(const GeoAnchor& anchor, const RigidTransform& T_MB);
 
 /// Waits for the pose at the time of the newest anchor. Not thread-safe.
 class EarthPlace {
  public:
-  /// The pose of W in M at a time of the body, if W is located in the map's M.
+  /// The pose of W in M at a time of the body, by today's graph; nothing if W is not yet located in
+  /// the map's M.
   using FrameAt = std::function<std::optional<RigidTransform>(TimePoint)>;
 
   /// Call it for each calibration. A new anchor restarts the wait.

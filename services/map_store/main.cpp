@@ -42,7 +42,7 @@ class FleetServer {
     failing_ = progress.failing;
     return progress.trouble;
   }
-  /// Sends the last commit if the server accepts it at once.
+  /// Sends the last commit if the server accepts it at once; else it is sent after the next start.
   void finish() {
     if (!replicator_) return;
     constexpr std::chrono::milliseconds kLastWords{300};

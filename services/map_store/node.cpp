@@ -119,7 +119,7 @@ void Node::onObjects(const Objects& objects) {
   newest_ = std::move(next);
   dirty_ = true;
   if (graph_) followGraph();
-  constexpr double kStep_m = 20.0 / 3.0;  // the working set reaches this much farther
+  constexpr double kStep_m = 20.0 / 3.0;  // the filter's working set reaches this much farther
   const bool moved = !near_from_W_ || (newest_->T_WB.p - *near_from_W_).norm() > kStep_m;
   if (moved || !same_filter) sendNear();
 }

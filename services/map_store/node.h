@@ -54,7 +54,8 @@ class Node {
   void onCalibration(const Calibration& calibration) { earth_.onCalibration(calibration); }
   void onLandmarks(const Landmarks& landmarks);
   void onQuery(const MapQuery& query);
-  /// Commits and publishes what is due; at least ten times a second. `now`: monotonic.
+  /// Commits and publishes changes that are due. `now`: a monotonic time with any origin. Must be
+  /// called at least ten times a second.
   void tick(Duration now);
   /// A server has the outbox's entries up to this one; the next commit removes them.
   void onAcknowledged(std::int64_t number) { acknowledged_ = std::max(acknowledged_, number); }

@@ -9,7 +9,8 @@
 
 namespace perdure::ros2 {
 
-/// "same": stamps on the vehicle's common clock. "own": converted by their arrival.
+/// "same": stamps are on the vehicle's common clock. "own": they are on another clock, and are
+/// converted by their times of arrival.
 inline constexpr char kSameClock[] = "same", kOwnClock[] = "own";
 
 struct CameraInput {

@@ -26,7 +26,7 @@ class RosSide {
   void advertise(const ros::Outlet& outlet);
   bool wants(const std::string& topic) const;
   void write(const ros::Outlet& outlet, std::vector<std::uint8_t> cdr);
-  /// Adds a reader. `input`: prefix of its counts. Without `reliable` it is best effort.
+  /// Adds a reader. `input`: prefix of its counts. Best effort (not `reliable`) fits all drivers.
   void read(const std::string& input, const std::string& topic, const std::string& type,
             bool reliable, bool latched, int depth, bus::ForeignReader::Handler handler);
   /// A sentence with the fix if the network changed or an input has no writer; otherwise empty.

@@ -22,11 +22,13 @@ class ModelBook {
   explicit ModelBook(ClassPriors priors = {}) : priors_(std::move(priors)) {}
   const ClassPriors& priors() const { return priors_; }
 
-  /// Reason: "model_contradicts_its_hash". A model that only adds classes is of the same network.
+  /// Reason of failure: "model_contradicts_its_hash". The first model of a hash remains valid. A
+  /// model that only adds classes to the newest one of its name is of the same network.
   Result<void> add(const ModelInfo& info);
   /// Returns nullptr if no model of this hash was added, or if too many were added since.
   std::shared_ptr<const Model> find(std::uint64_t hash) const;
-  /// Detections of this model are used at `time`. Returns a sentence if the newest frame's changes.
+  /// Detections of this known model are used in a frame at `time`. If the frame is the newest and
+  /// the model has changed, returns a sentence that describes the changes.
   std::optional<std::string> use(std::uint64_t hash, TimePoint time);
   /// Returns the hash of the model of the newest frame; 0 before the first.
   std::uint64_t used() const { return used_; }

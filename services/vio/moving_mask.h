@@ -1,5 +1,6 @@
-// Image regions of moving objects, whose points say nothing about the camera's motion. Off by
-// default, because objects depend on vio.
+// Image regions of objects that the object filter reports as moving. Points on them give no
+// information about the motion of the camera. Off by default, so that vio does not depend on a
+// program that needs vio.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -22,7 +23,8 @@ class MovingMask {
   explicit MovingMask(const MovingMaskOptions& options) : options_(options) {}
 
   void onObjects(const Objects& objects);
-  /// Boxes, px, of the moving objects' cuboids at `now`. T_WB: the body in `world`.
+  /// Boxes, px and clipped to the image, of the moving objects' cuboids, propagated to `now`. T_WB:
+  /// the body in `world`. Empty for objects of another world, too old, or of a later time.
   std::vector<cv::Rect2f> boxes(const CameraModel& camera, const WorldId& world,
                                 const RigidTransform& T_WB, TimePoint now) const;
 

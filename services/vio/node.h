@@ -48,7 +48,8 @@ class Node {
   void setWorld(WorldId world) { world_ = world; }
   /// Text for restoreState() in another process; empty before a start.
   std::string saveState() const;
-  /// Resumes at the next frame. Fails with "state_malformed" or "state_other_cameras".
+  /// Resumes at the next frame, unless the saved state is too old. Fails with "state_malformed" or
+  /// "state_other_cameras".
   Result<void> restoreState(const std::string& text);
 
   const ReasonCounts& reasons() const;

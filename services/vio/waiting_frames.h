@@ -20,10 +20,12 @@ class WaitingFrames {
   explicit WaitingFrames(double pair_tolerance_s)
       : tolerance_(durationFromSeconds(pair_tolerance_s)) {}
 
-  /// Adds a frame of the first camera. "frame_duplicate": refused. "frame_reordered": inserted.
-  /// "frame_of_earlier_run": inserted, and frames far ahead are dropped.
+  /// Adds a frame of the first camera. Refuses it with "frame_duplicate". With "frame_reordered" it
+  /// is inserted before others. With "frame_of_earlier_run" it is inserted, and frames that are
+  /// further ahead than transports reorder are dropped.
   Result<void> addFirst(const Frame& frame);
-  /// Fails with "stereo_unpaired" (the oldest unpaired frame was dropped) or "frame_late".
+  /// Adds a frame of the second camera. Fails with "stereo_unpaired" if the oldest unpaired frame
+  /// was dropped, and with "frame_late" if its pair was already taken.
   Result<void> addSecond(const Frame& frame);
   /// Reports an unusable frame of the second camera; why: a sentence.
   void refuseSecond(std::string why) { trouble_ = std::move(why); }
@@ -32,7 +34,8 @@ class WaitingFrames {
   std::size_t size() const { return pairs_.size(); }
   const FramePair& front() const { return pairs_.front(); }
   FramePair take();
-  /// Whether the oldest frame may still receive a partner; not after a later frame or many misses.
+  /// Whether the oldest frame has no partner and may still receive one. False if a later frame of
+  /// either camera has arrived. Also false after many frames without a partner, until one arrives.
   bool frontMayBePaired() const;
   /// One sentence with the fix if several frames in a row found no partner; otherwise empty.
   std::string whyAlone() const;

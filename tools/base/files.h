@@ -11,7 +11,8 @@ namespace perdure::tools {
 /// A folder that its destructor removes with its content.
 class TemporaryFolder {
  public:
-  /// Creates a folder `start`…. On failure, fail(its name) throws; errno has the reason.
+  /// Creates a folder whose path starts with `start`. On failure, fail(its name) throws; errno has
+  /// the reason.
   template <class Fail>
   TemporaryFolder(const std::filesystem::path& start, Fail&& fail) {
     std::string name = start.string() + "XXXXXX";

@@ -12,7 +12,8 @@ class App;
 
 namespace perdure::tools {
 
-/// Adds the options of bus.*, with defaults from the services' bus.yaml.
+/// Adds --interface, --peers, --domain, --vehicle, --security and --identity. The defaults come
+/// from bus.yaml in the services' configuration folder.
 void addBusOptions(CLI::App& command, bus::Options& options);
 
 /// Runs the loop until it is stopped, a signal arrives, or `seconds` have passed (0: no limit).

@@ -78,7 +78,8 @@ std::vector<CornerResidual> residualsOf(const std::vector<vio::Innovation>& inno
   return all;
 }
 
-/// RMS in px of the pattern that both halves of the drive share; 0 if not significant.
+/// RMS in px of the residual pattern that both halves of the drive share; 0 if not significant. One
+/// half alone proves nothing, because the residuals of a track are correlated.
 double patternOf(const CameraCalibration& camera, const std::vector<CornerResidual>& residuals) {
   constexpr std::size_t kEnough = 20;  // least corners in a half
   constexpr double kSure = 3.0;        // least standard deviations
@@ -107,7 +108,8 @@ constexpr Bars kTurned{0.4 / kDegrees, 1.0 / kDegrees}, kShifted_m{0.015, 0.04},
 /// Judges how far vio moved a quantity, compared with the standard deviation of vio.
 Judgement judgeMove(const char* what, double moved, double sigma, const Bars& bars,
                     const std::string& shown, const std::string& remedy) {
-  // A move counts if vio is certain of it and the true value is out of the good range.
+  // A move is ignored if vio is not certain of it, or if the true value may be within the good
+  // range.
   const bool sure = moved > 3.0 * sigma && moved - sigma > bars.good;
   return judged(sure ? gradeOf(moved, bars.good, bars.bad) : Grade::kGood,
                 fmt::format("vio sees the {} {} off the rig", what, shown), remedy);
@@ -157,7 +159,8 @@ double againstOf(const RigCheck& check) {
 
 constexpr double kFewAgainst = 0.05, kManyAgainst = 0.2;
 
-/// Reports several deviations with one common cause as one.
+/// Reports several deviations with one common cause as one, because their separate values are
+/// meaningless.
 void judgeAllAtOnce(const Judgements& place, const Judgement& gravity, Judgements& all) {
   const auto isOff = [](const Judgement& one) { return one.grade != Grade::kGood; };
   const auto off = std::ranges::count_if(place, isOff) + (isOff(gravity) ? 1 : 0);

@@ -72,14 +72,16 @@ replay::Recording thinned(replay::Recording recording);
 /// samples that can be read.
 RigCheck checkRig(replay::Dataset& drive, const RigCheckOptions& options);
 
-/// Median of the normalised innovations squared over its expectation (1: consistent).
+/// Median of the normalised innovations squared over its expected value (1 for a consistent
+/// filter).
 double innovationRatio(const std::vector<vio::Innovation>& innovations);
 /// Judges the run of vio, and calls judgeBelief if the run was good enough.
 Judgements judgeRig(const RigCheck& check);
 /// Judges the estimates of lens, pose and IMU, or reports that the data are too few.
 Judgements judgeBelief(const RigCheck& check);
 
-/// Whether the cameras contradict each other so much that a run with the first alone is useful.
+/// Whether the two cameras contradict each other so much that a run with the first camera alone is
+/// useful. judgeSecond judges that run; it returns nothing if that run contradicts as well.
 bool isSecondSuspect(const RigCheck& check);
 Judgements judgeSecond(const RigCheck& both, const RigCheck& alone);
 

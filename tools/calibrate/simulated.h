@@ -23,7 +23,8 @@ struct SimulatedOptions {
   bool shake = true;  ///< false: slow motion only, for intrinsics alone
 };
 
-/// The rig holds the truth and, as `calibration`, a data sheet that is slightly off.
+/// The scene's rig holds the ground truth and, as `calibration`, the values of a data sheet. These
+/// are off by a few per cent, degrees and centimetres, and have no time offset.
 struct SimulatedCalibration {
   SimulatedOptions options;
   sim::Scene scene;

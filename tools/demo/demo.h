@@ -22,8 +22,9 @@ class Demo {
   Demo(const Demo&) = delete;
   Demo& operator=(const Demo&) = delete;
 
-  /// Runs until the drive has ended, --seconds are over, or an interruption. Ends the services
-  /// (unless --keep) and writes the outputs. Throws StartupError.
+  /// Runs until the drive has ended and all data are processed, --seconds are over, or the demo is
+  /// interrupted. Then it ends the services in order (unless --keep is given) and writes the
+  /// outputs. Throws StartupError if a service cannot run.
   void run();
   /// Keeps everything running after the drive if --keep is given, until interrupted; then ends it.
   void keep();

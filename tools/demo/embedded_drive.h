@@ -20,7 +20,8 @@ std::filesystem::path embeddedDriveFolder(const std::filesystem::path& cache);
 std::filesystem::path embeddedDrive(const std::filesystem::path& cache,
                                     const std::function<void(const SimulateProgress&)>& report);
 
-/// The only network in ROOT/models/demo, else in ROOT/models. Throws StartupError(kUsage).
+/// The only network (.onnx) in ROOT/models/demo, or else in ROOT/models. Throws
+/// StartupError(kUsage) if there is none, or more than one.
 std::string embeddedModel(const std::filesystem::path& root);
 
 }  // namespace perdure::tools

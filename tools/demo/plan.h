@@ -54,7 +54,8 @@ DemoFolders prepareFolders(const DemoOptions& options);
 /// Shape points for each class, from the filter's configuration in ROOT. Throws StartupError.
 std::map<std::string, std::vector<Eigen::Vector3d>> shapesFor(const DemoOptions& options);
 
-/// The services in the order of kServices. Throws StartupError.
+/// Plans the services in the order of kServices. Throws StartupError if a program is missing or
+/// --rate is invalid.
 std::vector<ServicePlan> planServices(const DemoOptions& options, const DemoFolders& folders);
 
 /// perdure-gateway on this port of the loopback interface; empty if it is not installed.

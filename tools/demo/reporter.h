@@ -63,7 +63,8 @@ class ServiceCounts {
 
 class Reporter {
  public:
-  /// Subscribes to the topics; the caller runs `loop`. `shapes`: of the filter's class priors.
+  /// Subscribes to the topics. `loop` must outlive the reporter, and the caller runs it. `shapes`
+  /// come from the filter's class priors, for a network whose boxes enclose outlines.
   Reporter(const bus::Participant& participant, bus::WaitLoop& loop, OutputWriter& outputs,
            std::map<std::string, ShapePoints> shapes);
 

@@ -21,9 +21,10 @@ class Supervisor {
   Supervisor(const Supervisor&) = delete;
   Supervisor& operator=(const Supervisor&) = delete;
 
-  /// Starts failed services again; call it often. At once after a first good second; else five
-  /// tries with pauses of 1 to 4 s. Throws StartupError with the last line of the log, or if the
-  /// service cannot start.
+  /// Starts failed services again; call it often. A service that failed after its first second is
+  /// started at once, without a limit. A service that failed earlier is tried five times, with
+  /// pauses of 1, 2, 3 and 4 seconds. Throws StartupError with the last line of its log if all
+  /// tries failed, or if its exit status says that it cannot start.
   void watch();
   /// Requests the end with SIGTERM and returns at once; it is not started again.
   void stop(const std::string& service);

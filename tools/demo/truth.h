@@ -15,8 +15,9 @@ struct TruthFiles {
   std::string sequence;
 };
 
-/// By --truth and --truth-sequence; else a folder kitti_tracking near a KITTI drive. Empty without
-/// labels. Throws StartupError.
+/// Takes --truth and --truth-sequence. For a KITTI drive that is also a tracking sequence, it
+/// otherwise searches a folder kitti_tracking near the data. Empty if there are no labels. Throws
+/// StartupError if --truth was given and has none.
 std::optional<TruthFiles> findTruth(const DemoOptions& options);
 
 /// Copies labels and calibration to OUT/truth and compares the tables of OUT with them: recall,

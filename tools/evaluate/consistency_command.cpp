@@ -27,7 +27,7 @@ struct Consistency {
   std::optional<OdometryScore> odometry;
 };
 
-/// From the truth's world to the run's, by yaw and position at their first common pose.
+/// Transform from the truth's world to the run's, by yaw and position at their first common pose.
 RigidTransform alignedAtTheStart(const SimulatedTruth& truth,
                                  const std::vector<replay::StampedPose>& trajectory) {
   for (const auto& pose : trajectory) {

@@ -29,7 +29,7 @@ struct MapBelief {
 /// Throws StartupError(kUnavailable) if the file is missing or invalid.
 std::vector<MapBelief> readBeliefs(const std::filesystem::path& file);
 
-/// Normalised squared errors with `dof` degrees of freedom each.
+/// Normalised squared errors with `dof` degrees of freedom each; χ² if they are consistent.
 struct Anees {
   std::string what;
   int dof = 1;
@@ -82,8 +82,9 @@ struct ConsistencyScore {
   std::uint64_t objects = 0, left_out = 0;  ///< left_out: without a partner, or moving
 };
 
-/// Each static object with existence above one half and the nearest true object of its class within
-/// `within` metres that is nearer to no other belief.
+/// Compares each static object with existence above one half and a class name. Its partner is the
+/// nearest true object of that class within `within` metres that is not nearer to another belief.
+/// T_WT transforms the ground truth's world to the map's.
 ConsistencyScore scoreConsistency(const std::vector<MapBelief>& beliefs, const sim::Truth& truth,
                                   const RigidTransform& T_WT, double within);
 

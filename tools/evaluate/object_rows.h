@@ -27,9 +27,10 @@ struct EstimateRow {
 /// Throws StartupError(kData) that names each invalid line.
 std::vector<EstimateRow> readObjectRows(const std::filesystem::path& file);
 
-/// The body's pose by frame index: rows tie times to frames; without rows, multiples of 0.1 s
-/// (KITTI tracking). Between ties, frames are consecutive or by time. `used`: the frames of the run
-/// if it skipped some.
+/// The body's pose by frame index. A trajectory contains times only. The CSV rows tie times to
+/// frames; without rows, stamps that are multiples of 0.1 s from 0 (KITTI tracking) give the frame.
+/// Rows between two ties are consecutive frames, or are assigned by time if that is impossible.
+/// `used`: the frames of the run if it skipped some; rows are then consecutive in these.
 std::map<std::uint64_t, RigidTransform> posesByFrame(
     const std::vector<replay::StampedPose>& poses, const std::vector<EstimateRow>& rows,
     const std::optional<std::set<std::uint64_t>>& used = {});

@@ -31,8 +31,9 @@ inline constexpr double kMinHeight_px = 25.0;  ///< least height of a counted bo
 
 using PosesByFrame = std::map<std::uint64_t, RigidTransform>;  ///< T_WB
 
-/// Tracks that are static: medians of first and last fifth within 1.5 m, no point beyond 2 m of the
-/// median. Frames without a pose are omitted.
+/// Tracks that are static in the world: the medians of their first and last fifth are less than 1.5
+/// m apart. No point is more than 2 m from the overall median. Frames without a pose are omitted; a
+/// track without any pose is not static.
 std::set<std::int64_t> staticTracks(const std::vector<replay::KittiLabel>& labels,
                                     const RigidTransform& T_RI, const PosesByFrame& poses);
 

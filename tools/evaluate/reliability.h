@@ -25,10 +25,12 @@ struct Reliability {
 
   /// Bins of equal width over [0, 1].
   std::vector<ReliabilityBin> bins(std::size_t count = 10) const;
-  /// Expected calibration error: Σ |believed − observed| of the bins, weighted by share.
+  /// Expected calibration error: Σ |believed − observed| of the bins, weighted by their share of
+  /// the claims.
   double calibrationError(std::size_t bins = 10) const;
   double brier() const;  ///< mean of (stated probability − outcome)²
-  /// 1 − brier() over the score of a constant forecast; 0 if all claims are equal.
+  /// 1 − brier() divided by the score of a constant forecast of the observed share; 0 if all claims
+  /// are true or all are false.
   double skill() const;
 };
 

@@ -27,10 +27,14 @@ bool isSimulated(const std::filesystem::path& folder);
 /// Throws StartupError(kUnavailable) with the missing file and the fix.
 SimulatedTruth readSimulatedTruth(const std::filesystem::path& folder);
 
-/// Frames up to the last one of the trajectory, in the camera frame, headings relative to the body.
-/// Counted: static objects of `class_name` (empty: all but `toy`), nine tenths visible, completely
-/// in the image, at least 25 px tall; others are ignored, except toys. Rows of `other` or another
-/// class are omitted.
+/// Frames up to the last one of the trajectory, in the camera frame. Ground truth is transformed by
+/// the exact state, rows by the trajectory, and headings are about the vertical relative to the
+/// body.
+///
+/// Counted objects have any class except `toy` (or `class_name`, if given) and never move. They are
+/// at least nine tenths visible, completely in the image, and at least 25 px tall. Other objects
+/// are ignored, except toys: an estimate at a toy is a false alarm. Rows of class `other` state no
+/// class and are omitted, as are rows of classes other than `class_name`.
 struct SimulatedRun {
   std::map<std::uint64_t, ScoredFrame> frames;
   std::uint64_t estimates = 0;  ///< number of examined rows

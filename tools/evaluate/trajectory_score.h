@@ -20,7 +20,8 @@ enum class Alignment {
   kStart,  ///< position and yaw of the first pose only
 };
 
-/// T_GE · estimate ≈ truth, by least squares of positions, or the first pair.
+/// T_GE with T_GE · estimate ≈ truth, by least squares of positions, or from the first pair only.
+/// Needs at least one pair.
 RigidTransform align(const std::vector<PosePair>& pairs, Alignment alignment);
 
 struct SegmentError {

@@ -18,12 +18,14 @@ using UsedFrames = std::set<std::uint64_t>;
 
 /// `frames` of report.json: their number, and [first, last, step] of each run of frames.
 nlohmann::ordered_json framesToJson(const UsedFrames& frames);
-/// Reads RUN/report.json; empty without frames. Throws StartupError if they are invalid.
+/// Reads RUN/report.json; empty if it is missing or has no frames. Throws StartupError if the
+/// frames are invalid.
 std::optional<UsedFrames> usedFramesOf(const std::filesystem::path& run);
 /// Number of frames of the data from one used frame to the next; 1 if there are fewer than two.
 double strideOf(const UsedFrames& frames);
 
-/// Frames without a pose from the first pose to the last: misses, or skipped by --every.
+/// Number of frames without a pose between the first pose and the last one. If the used frames are
+/// unknown, these are either misses or frames that --every skipped.
 std::size_t withoutPose(const std::vector<TimePoint>& frames,
                         const std::vector<replay::StampedPose>& poses);
 

@@ -1,6 +1,9 @@
-// Copies topics to and from DDS implementations without XCDR2: `objects` and `events` as
-// perdure/ego/final/…, and `model` and `detections` from there. Types: idl/ with final structs,
-// module perdure::fin. eval "$(perdure env)" && final_gateway [strength]
+// Copies topics to and from DDS implementations without XCDR2 (Fast DDS before 3, RTI Connext
+// before 6). It publishes `objects` and `events` as perdure/ego/final/…, and reads `model` and
+// `detections` from there. Their types are those of idl/ with every struct final, in the module
+// perdure::fin.
+// Usage (strength 30 overrides perdure-inference):
+//   eval "$(perdure env)" && final_gateway [strength]
 #include <dds/dds.h>
 
 #include <cstdlib>

@@ -13,15 +13,17 @@
 
 namespace perdure::tools {
 
-/// Repeats a query of map_store until a reply arrives, because DDS drops requests before matching.
-/// Fails with "no_map_store" or "no_answer".
+/// Queries map_store over the bus. Waits until reader and writer are matched, because DDS drops
+/// earlier requests silently. Then repeats the same request until a reply arrives. After
+/// `patience_s`, fails with "no_map_store" or "no_answer".
 Result<MapReply> askMapStore(const bus::Participant& participant, MapQuery query,
                              double patience_s);
 
 /// Frame of the objects from a map's file: the consistent frame M, or the stored frame W.
 enum class MapFrameChoice { kM, kW };
 
-/// Reads a map's file. Positions are in query.world, else in M or W of the newest session.
+/// Reads a map's file, which a service may use at the same time. Searches positions in query.world;
+/// without one, in the M or W of the newest session.
 MapReply askMapFile(const std::string& path, const MapQuery& query,
                     MapFrameChoice frame = MapFrameChoice::kM);
 /// The graph of a map's file, in the form of a running map_store. Throws StartupError.

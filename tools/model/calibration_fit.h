@@ -21,9 +21,10 @@ struct Softening {
   double temperature = 1.0, bias = 0.0;
 };
 
-/// The T, and b if the Bayesian information criterion improves, of maximum likelihood (Guo et al.,
-/// ICML 2017), convex in β = 1/T and b; Newton's method. T within [0.05, 20]. No change without
-/// boxes of both kinds.
+/// The T, and b if it is significant, that maximise the likelihood of the labels. Source: Guo et
+/// al., "On calibration of modern neural networks", ICML 2017. The cost is convex in β = 1/T and b,
+/// and is minimised by Newton's method. b is used if it improves the Bayesian information
+/// criterion. T is within [0.05, 20]. Returns no change unless there are boxes of both kinds.
 Softening fitSoftening(const std::vector<BoxOutcome>& boxes);
 
 struct Reliability {
@@ -40,18 +41,21 @@ struct Reliability {
 Reliability reliabilityOf(const std::vector<BoxOutcome>& boxes,
                           const std::vector<Softening>& calibrations);
 
-/// Each box from the boxes of other folds, contiguous fifths of the frames.
+/// Fits a calibration for each box from the boxes of the other folds. A fold is a contiguous fifth
+/// of the frames, because consecutive frames are similar.
 std::vector<Softening> crossValidated(const std::vector<BoxOutcome>& boxes, std::size_t frames);
 
 /// Share of the boxes that are clutter, limited to [0.01, 0.99].
 double clutterRateOf(const std::vector<BoxOutcome>& boxes);
 
-/// Whether the object exists, and the log-odds of the best candidate near it, if any.
+/// Outcome for a predicted measurement without a box: whether the object exists, and the posterior
+/// log-odds of its class by the best candidate near it, if there is one.
 struct PrimedOutcome {
   bool there = false;
   std::optional<double> odds;
 };
-/// Logistic regression of `there` on the odds, without prior; empty below 40 of either kind.
+/// Logistic regression of `there` on the odds. Its result without the share of true places is the
+/// log-likelihood ratio. Empty if there are fewer than 40 of either kind.
 std::optional<inference::PrimedCalibration> fitPrimed(const std::vector<PrimedOutcome>& places,
                                                       double floor);
 

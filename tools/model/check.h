@@ -1,5 +1,7 @@
-// Checks OpenCV 4.6's outputs of an imported network for a noise picture against numpy's, because
-// it computes some operators wrongly. Without OpenCV: ONNX Runtime on both files.
+// Checks that OpenCV computes an imported network correctly, because OpenCV 4.6 computes some
+// operators wrongly without an error. Compares its outputs for a noise picture with those of numpy.
+// If OpenCV lacks operators, it compares ONNX Runtime on the imported file with ONNX Runtime on the
+// original file.
 #pragma once
 
 #include <filesystem>
@@ -16,7 +18,8 @@ struct Answers {
   std::string by;           ///< the computing library: OpenCV or ONNX Runtime
 };
 
-/// `reference`: of the import. Throws StartupError (78) if it fails, (69) if a file is missing.
+/// `reference`: the folder that the import wrote. Throws StartupError (78) if the network cannot be
+/// loaded or run, or (69) if a file is missing.
 Answers checkAnswers(const std::filesystem::path& network, const std::filesystem::path& reference);
 
 }  // namespace perdure::tools

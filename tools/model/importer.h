@@ -29,8 +29,9 @@ struct ImportOptions {
   std::vector<std::string> arguments{};  ///< options of the Python part
 };
 
-/// Import, comparison, test picture, output files. Throws StartupError, or CLI::RuntimeError with
-/// the status of the Python part; then no file is written.
+/// The complete `perdure model import`: import, comparison, test picture, output files. Prints the
+/// results. Throws StartupError, or CLI::RuntimeError with the status of the Python part, which has
+/// reported the error; then no file is written.
 void importAndLook(const ImportOptions& options);
 
 }  // namespace perdure::tools

@@ -29,7 +29,8 @@ struct KnownNetwork {
   nlohmann::json keys;  ///< additional keys of model.json
 };
 
-/// The networks of `list`, or the program's own. Throws StartupError (69, 78).
+/// The networks of `list`, or of the program's own list if that is empty. Throws StartupError if
+/// the list is missing (69) or inconsistent (78).
 std::vector<KnownNetwork> knownNetworks(const std::filesystem::path& list);
 
 /// Lower-case hexadecimal. Throws StartupError(kUnavailable) if the file cannot be read.

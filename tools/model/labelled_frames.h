@@ -50,15 +50,24 @@ std::optional<Box> boxAround(const Eigen::Vector3d& centre_W, double yaw,
                              const Eigen::Vector3d& size, const RigidTransform& T_CW,
                              const CameraModel& camera);
 
-/// Ignores objects visible below a quarter, or smaller than `least_px`; omits those below a
-/// twentieth; for KITTI, also occluded (2, 3), truncated and DontCare. Throws StartupError (69).
+/// Ignores objects whose visible share is below a quarter, or whose longer side is below `least_px`
+/// (pixels of the image); omits those below a twentieth. For KITTI, ignores objects that are
+/// largely occluded (2, 3) or truncated, and DontCare regions. Throws StartupError (69) with the
+/// missing file and the fix.
 LabelledData readLabelled(const LabelRequest& request, const replay::ClassAliases& aliases,
                           double least_px);
 
-/// Uses the objects of a run as labels. `request.labels` is OUT of `perdure pipeline` over the same
-/// frames: objects of the final map are expected where they are not occluded.  Boxes of uncertain,
-/// truncated, occluded or small objects, and beside an object, are ignored. Only classes with
-/// twenty views are judged. Other boxes count as clutter. Throws StartupError (69).
+/// Uses the objects of a run as labels, for calibration without manual labels.
+///
+/// `request.labels` is OUT of `perdure pipeline` over the same frames. Objects of its final map
+/// (objects_final.csv) are expected in each frame in which they are not occluded.
+///
+/// Boxes of objects that are uncertain, truncated, largely occluded or small are ignored. Boxes
+/// beside an object are ignored too, because sizes of the map have errors. Only classes with at
+/// least twenty views are judged. Boxes of moving objects, and of objects missing from the map,
+/// count as clutter.
+///
+/// Throws StartupError (69) with the fix if there are too few data.
 LabelledData readMapLabels(const LabelRequest& request, std::unique_ptr<replay::Dataset> dataset,
                            const replay::ClassAliases& aliases, double least_px);
 

@@ -27,7 +27,8 @@ struct Look {
   int input_width = 0, input_height = 0;
 };
 
-/// Without `frame`, a grey ramp of the input's size. Throws StartupError.
+/// Uses a grey ramp of the input's size if `frame` is null. Throws StartupError if the network or
+/// its model.json cannot be used.
 Look lookAt(const std::filesystem::path& network, const Frame* frame, double threshold);
 
 /// Throws StartupError (64) unless the name is that of a PNG or JPEG.

@@ -43,10 +43,13 @@ class ObjectHistory {
 
   /// Confirmed, static, present objects that are not occluded, by frame and id.
   std::vector<ObjectRow> inst() const;
-  /// Rows with the surviving id and the last estimate, from the first detection with r ≥ 0.1, in
-  /// the frames in which the object projects into the image and is not occluded (by the estimate
-  /// then, or less than 0.6 visible beside the last estimates). Objects that ended moving or
-  /// deleted have none, nor do movers before they stopped.
+  /// Rows with the surviving id after merges and the last estimate. They start at the first
+  /// detection with existence r of at least 0.1. A frame has a row if the object projects into the
+  /// image and is not occluded. Occluded means: estimated so at the time, or less than 0.6 visible
+  /// beside the last estimates of nearer objects.
+  ///
+  /// Objects that ended as moving or deleted have no rows. An object that moved before it stopped
+  /// at its last position has no rows until then.
   std::vector<ObjectRow> finalRows() const;
   /// The last belief of each confirmed object that was neither deleted nor merged, by id.
   std::vector<ObjectBelief> lastBeliefs() const;

@@ -39,10 +39,12 @@ class OutputWriter {
   void onLandmarks(const Landmarks& landmarks);
   /// Ground truth for the pictures, in W; to be called before finish().
   void setTruth(PictureTruth truth) { truth_ = std::move(truth); }
-  /// Writes map.png, map.geojson and trajectory_map.tum in M; before finish().
+  /// Writes map.png and map.geojson in M, and trajectory_map.tum with the trajectory of the map's
+  /// final graph. To be called before finish().
   void setInMap(DriveInMap in_map) { in_map_ = std::move(in_map); }
 
-  /// Writes the files that are not written as messages arrive. Throws StartupError(kInputOutput).
+  /// Writes all files except events.jsonl and odometry.csv, which are written as messages arrive.
+  /// Throws StartupError(kInputOutput) with the file that is incomplete.
   void finish();
   /// Writes an additional file: timing.json, report.json.
   void writeJson(const std::string& name, const nlohmann::ordered_json& json) const;

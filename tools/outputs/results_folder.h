@@ -7,9 +7,10 @@
 
 namespace perdure::tools {
 
-/// Without a run it is written directly; else files go to a subfolder `unfinished` and replace the
-/// earlier ones at the end. A failure removes the subfolder, or a new, empty folder. Other
-/// processes cannot write meanwhile.
+/// A folder without a run is written directly. Otherwise files are written to a subfolder
+/// `unfinished`, and replace the earlier ones when the run has ended. If the run fails, the
+/// subfolder is removed, and so is a new folder that stayed empty. Other processes cannot write to
+/// the folder meanwhile.
 class ResultsFolder {
  public:
   /// Throws StartupError(kUnavailable) if another process writes, or remains cannot be removed.

@@ -20,8 +20,9 @@ struct BusSettings {
 /// Options of a service: with shared memory, identity of its name. Throws StartupError.
 bus::Options serviceOptionsOf(const BusSettings& settings, const std::string& process);
 
-/// The domain of these options. DDS opens one in each process, with the permissions of the first
-/// identity, so a second call returns the same. Throws StartupError for other options.
+/// The domain of these options. DDS opens a domain once in each process and restricts all
+/// participants to the permissions of the first identity. A second call therefore returns the same
+/// domain. Throws StartupError if the open domain has other options.
 bus::Domain openDomain(const bus::Options& options);
 
 class Bus {

@@ -185,7 +185,8 @@ void GatewayReplay::recallRig(std::uint64_t log_ns) {
   }
 }
 
-/// For a client that opens a channel: the image of the shown objects, and the newest of others.
+/// Repeats messages for a client that opens a channel: the image of the shown objects, and the
+/// newest message of each other topic.
 void GatewayReplay::repeatFrames(const gateway::Channels& before) {
   const auto shown = node_->shownTime();
   for (const auto& [topic, messages] : newest_) {

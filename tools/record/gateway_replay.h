@@ -18,8 +18,9 @@ namespace perdure::tools {
 
 class GatewayReplay {
  public:
-  /// Starts `start_s` after the first frame. Throws StartupError if there is nothing to show, it
-  /// ends earlier, or the port is not available.
+  /// Determines the time range of the recording, and starts `start_s` after its first frame. Throws
+  /// StartupError if the recording has nothing to show, if it ends earlier, or if the port is not
+  /// available.
   GatewayReplay(replay::RecordedMessages& recording, const gateway::Config& config,
                 const gateway::PlaybackRequest& start, double start_s = 0.0);
   ~GatewayReplay();

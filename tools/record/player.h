@@ -24,8 +24,9 @@ struct PlayOptions {
 
 class Player {
  public:
-  /// Takes about a second. Without named topics, omits outputs of services that read this
-  /// recording. Throws StartupError for an unknown, absent or (unless `force`) contested topic.
+  /// Takes about a second to discover the bus. If no topics are named, omits the outputs of
+  /// services that read this recording. Throws StartupError for an unknown topic, a topic that is
+  /// not in the recording, or a topic that another process writes (unless `force`).
   Player(const bus::Participant& participant, bus::WaitLoop& loop,
          replay::RecordedMessages& recording, const PlayOptions& options);
 

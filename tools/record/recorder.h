@@ -20,7 +20,7 @@ struct RecorderOptions {
   HealthState fault = HealthState::kFailed;  ///< the first state that is a fault
 };
 
-/// The system clock at the start, continued by the steady clock.
+/// Log times: the system clock at the start, continued by the steady clock.
 class LogClock {
  public:
   LogClock();

@@ -13,8 +13,9 @@ namespace perdure::tools {
 
 class SegmentFolder {
  public:
-  /// Creates and locks the folder, and completes files of a killed recorder. `quota`, `keep_free`:
-  /// bytes; quota 0: none. Throws StartupError.
+  /// Creates and locks the folder, and completes files of a killed recorder. `quota` and
+  /// `keep_free` are in bytes; quota 0: none. Throws StartupError if the folder cannot be written,
+  /// or if another recorder uses it.
   SegmentFolder(const std::filesystem::path& folder, std::uint64_t quota, std::uint64_t keep_free);
 
   /// "FOLDER/perdure-000124-20261122T091658Z.mcap"; `word` after the time: "-fault".

@@ -10,8 +10,9 @@
 
 namespace perdure::tools {
 
-/// FOLDER/authority has the key, which no vehicle needs, and the issued certificates. FOLDER/NAME
-/// is an identity (common/bus/security/identity.h).
+/// FOLDER/authority contains the authority's key, which no vehicle needs, and the issued
+/// certificates. FOLDER/NAME is an identity with all files that its host needs
+/// (common/bus/security/identity.h).
 class Authority {
  public:
   /// Creates an authority. Throws StartupError if the folder has one, or cannot be written.
@@ -28,7 +29,7 @@ class Authority {
   };
   /// Throws StartupError for a used or invalid name, or an unknown role, topic or user.
   void add(const Wanted& wanted, const Validity& validity);
-  /// Issues new key, certificate and permissions. The old ones stay valid.
+  /// Issues new key, certificate and permissions. The old ones stay valid until expiry.
   void renew(const std::string& name, const Validity& validity);
   /// Revokes all certificates of this name. Updates the list in each folder here; other hosts need
   /// the new list too. Running processes read it at their next start.

@@ -27,7 +27,8 @@ struct SimulateProgress {
   std::size_t resumed = 0;            ///< frames from an earlier run
 };
 
-/// False if already complete. Throws StartupError.
+/// Returns false if the folder was already complete. Throws StartupError for invalid options, an
+/// unknown scene, or a folder with other content. `report` may be empty.
 bool simulate(const SimulateOptions& options,
               const std::function<void(const SimulateProgress&)>& report);
 /// A given scene: options.scene and options.seed are ignored.

@@ -124,7 +124,8 @@ void writeImage(const fs::path& file, int width, int height, int channels,
                 const std::vector<std::uint8_t>& pixels, ImageFormat format) {
   const cv::Mat image(height, width, channels == 3 ? CV_8UC3 : CV_8UC1,
                       const_cast<std::uint8_t*>(pixels.data()));
-  // zlib's level 1 with run lengths after SUB: twice as fast, smaller.
+  // Empty settings make OpenCV use zlib's level 1 with run lengths after the filter SUB. This is
+  // twice as fast as level 1 alone, with smaller files.
   std::vector<int> settings;
   if (format == ImageFormat::kJpeg) settings = {cv::IMWRITE_JPEG_QUALITY, 95};
   std::vector<std::uint8_t> bytes;

@@ -6,7 +6,8 @@
 
 namespace perdure {
 
-/// The candidate with the fewest edits; empty if all need more than two and a third of the length.
+/// The candidate with the fewest edits (insert, delete, replace, swap of neighbours); the first of
+/// several. Empty if all need more than two edits and more than a third of the word's length.
 std::string nearestWord(const std::string& word, const std::vector<std::string>& candidates);
 
 }  // namespace perdure

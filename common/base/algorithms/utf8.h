@@ -6,7 +6,8 @@
 
 namespace perdure {
 
-/// Bytes of the character at the start of `text` (not empty); 0 if it is not valid UTF-8.
+/// Length in bytes of the character at the start of `text`, which is not empty. Returns 0 if it is
+/// invalid: truncated, overlong, a surrogate, or beyond U+10FFFF.
 inline std::size_t lengthOfCharacter(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned char first = byte(0);

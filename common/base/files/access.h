@@ -6,14 +6,16 @@
 
 namespace perdure {
 
-/// The content; empty if the file cannot be read.
+/// The content of the file. Returns an empty string if the file cannot be read.
 std::string textOf(const std::filesystem::path& file);
 
-/// Why this process may not read a file, with owner, mode and fix; empty if it may, or if it is
-/// absent. The place is the file or the first of its folders that may not be entered.
+/// "PLACE may not be read by USER: permission denied; …" with owner, mode and the fix. The place is
+/// the file, or the first of its folders that this process may not enter. Empty if it may read the
+/// file, or if there is none.
 std::string whyUnreadable(const std::filesystem::path& file);
 
-/// The same for a folder, or for the first entry in it, at any depth, that may not be read.
+/// Returns the same text for a folder, or for the first entry in it, at any depth, that may not be
+/// read.
 std::string whyUnreadableIn(const std::filesystem::path& folder);
 
 }  // namespace perdure

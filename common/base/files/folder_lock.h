@@ -15,8 +15,9 @@ std::string lockerOf(const std::filesystem::path& path);
 /// Locks the folder until this object or the process ends.
 class FolderLock {
  public:
-  /// Creates the folder. Throws StartupError(kUnavailable) if it cannot be written, or if another
-  /// process holds it. On file systems without locks the folder is not reserved.
+  /// Creates the folder if it is missing. Throws StartupError(kUnavailable) if it cannot be created
+  /// or written, or if another process holds it. On file systems without locks the folder is not
+  /// reserved.
   explicit FolderLock(std::filesystem::path folder);
 
   /// Whether the folder was neither removed nor replaced since.

@@ -1,4 +1,5 @@
-// Filters lines that libraries write to std::cerr during the lifetime of an object.
+// Filters the lines that are written to std::cerr during the lifetime of an object, for libraries
+// that print irrelevant warnings.
 #pragma once
 
 #include <functional>
@@ -10,7 +11,8 @@ namespace perdure {
 
 class HeldErrors {
  public:
-  /// `worth` decides whether a line is passed on. Only one object may exist in a process.
+  /// `worth` decides whether a line, without its line end, is passed on. Only one object may exist
+  /// in a process.
   explicit HeldErrors(std::function<bool(const std::string&)> worth);
   ~HeldErrors();
   HeldErrors(const HeldErrors&) = delete;

@@ -1,4 +1,5 @@
-// Topics of third-party programs, given by name and type. Messages are unchecked CDR bytes.
+// Topics of third-party programs, given by name and type. Messages are raw CDR bytes; the code that
+// decodes them must check their contents.
 #pragma once
 
 #include <cstdint>
@@ -30,6 +31,8 @@ class ForeignReader : public AnyReader {
 
   ForeignReader(const Participant& participant, const ForeignTopic& topic);
 
+  /// Passes at most one batch to the handler, in order. Returns true if more messages may be
+  /// available.
   bool drainBatch(const Handler& handler);
 };
 
@@ -38,6 +41,8 @@ class ForeignWriter : public AnyWriter {
   ForeignWriter(const Participant& participant, const ForeignTopic& topic);
   ~ForeignWriter();
 
+  /// `cdr` includes its header. Messages that cannot be written are counted, and the reason is
+  /// returned.
   Result<void> write(std::vector<std::uint8_t> cdr);
 
  private:

@@ -1,4 +1,5 @@
-// An identity under DDS-Security: a folder that `perdure security` creates.
+// An identity under DDS-Security: a folder with a certificate, its key, its permissions, and the
+// authority that verifies other identities. `perdure security` creates these folders.
 #pragma once
 
 #include <chrono>
@@ -25,12 +26,15 @@ struct Identity {
   std::chrono::system_clock::time_point from, until;
 };
 
-/// Reads the folder and repeats the checks of DDS with clear messages: files, key, owner, issuer,
-/// revocation, validity. Codes: file_missing, file_unreadable, key_open, key_wrong,
-/// authority_wrong, revoked, not_yet_valid, expired, file_malformed.
+/// Reads the folder and repeats the checks of DDS with clear error messages. Files must exist and
+/// be readable. The key must belong to the certificate and be readable by its owner only. The
+/// certificate must be issued by this authority, not revoked, and valid now.
+/// Codes: file_missing, file_unreadable, key_open, key_wrong, authority_wrong, revoked,
+/// not_yet_valid, expired, file_malformed. The detail states the fix.
 Result<Identity> readIdentity(const std::string& folder);
 
-/// The identity as properties of a participant's QoS, and as XML for CYCLONEDDS_URI.
+/// The identity as properties of a participant's QoS ("dds.sec.auth.private_key", …), and as XML
+/// for CYCLONEDDS_URI.
 std::vector<std::pair<std::string, std::string>> securityProperties(const std::string& folder);
 std::string securityXml(const std::string& folder);
 

@@ -1,4 +1,5 @@
-// A nearby toy car, as large in the image as a real one; seen in motion or from one side.
+// A nearby toy car, as large in the image as a real car at a distance. It is seen during a sideways
+// motion, or not seen from another side.
 #include <cmath>
 
 #include "common/sim/scenes/parts/rigs.h"

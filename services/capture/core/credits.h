@@ -17,7 +17,8 @@ class Credits {
 
   void expect(const std::string& answerer) { answered_.emplace(answerer, 0); }
   void sent(std::uint64_t sequence) { on_the_way_.push_back(sequence); }
-  /// An answer also credits all earlier frames.
+  /// An answer for a frame also credits all earlier frames, because readers process frames in
+  /// order.
   void credit(const std::string& answerer, std::uint64_t sequence) {
     const auto it = answered_.find(answerer);
     if (it == answered_.end()) return;

@@ -8,12 +8,13 @@
 namespace perdure::capture {
 
 struct RunState {
-  std::string drive;                ///< digest of folder, pace and rate
+  std::string drive;                ///< digest of folder, pace and rate; other runs do not resume
   std::string boot;                 ///< boot id, because each boot restarts CLOCK_MONOTONIC
   std::int64_t start_ns = 0;        ///< CLOCK_MONOTONIC at which `origin_ns` was due
   std::int64_t origin_ns = 0;       ///< sensor time of the first message
   std::int64_t last_ns = 0;         ///< sensor time of the last message sent
-  std::uint64_t next_sequence = 0;  ///< after the last frame sent, or first without credit
+  std::uint64_t next_sequence = 0;  ///< clock mode: number after the last frame sent; follow mode:
+                                    ///< first frame without credit
   bool finished = false;
 };
 

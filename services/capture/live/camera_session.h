@@ -26,7 +26,8 @@ struct CameraSettings : CameraConfig {
 struct CameraShot {
   std::uint32_t sequence = 0;  ///< counted from each opening; lost images leave a gap
   std::int64_t time_ns = 0;    ///< CLOCK_BOOTTIME, middle of the middle row's exposure
-  Result<Frame> frame;         ///< pixels only; fails with "camera_frame_error"
+  Result<Frame> frame;         ///< pixels only; fails with "camera_frame_error" and the reasons of
+                               ///< packed()
 };
 
 struct CameraImage {
@@ -41,7 +42,8 @@ class CameraSession {
   virtual std::string name() const = 0;
   /// Settings that the camera does not follow, and why; empty if it follows all.
   virtual std::string note() const = 0;
-  /// Whether the camera is unplugged. next() may still return earlier images without waiting.
+  /// Whether the camera is unplugged. next() may still return earlier images, and does not wait for
+  /// more.
   virtual bool gone() const = 0;
   /// Whether the camera works but must be closed and reopened because of another camera.
   virtual bool stepsAside() const { return false; }

@@ -10,7 +10,8 @@
 
 namespace perdure::capture {
 
-/// CLOCK_BOOTTIME plus the offset of the wall clock at the start, so that stamps never jump.
+/// CLOCK_BOOTTIME, which cannot be set, plus the offset of the wall clock at the start. Setting the
+/// wall clock later does not change the stamps.
 class HostClock {
  public:
   HostClock();
@@ -26,20 +27,23 @@ class HostClock {
   std::int64_t to_wall_ns_;
 };
 
-/// Difference to − from, by the pair of readings that took the least time.
+/// Difference to − from. It uses the pair of readings that took the least time, because a thread
+/// may be interrupted for milliseconds between two readings.
 std::int64_t clockDifference(const std::function<std::int64_t()>& from,
                              const std::function<std::int64_t()>& to);
 
 /// Time of the middle of the middle row's exposure. `start_ns`: start of the first row's exposure.
 std::int64_t middleOfExposure(std::int64_t start_ns, std::int64_t exposure_us, double readout_s);
 
-/// V4L2 stamps with CLOCK_MONOTONIC, libcamera specifies CLOCK_BOOTTIME: the stamp belongs to the
-/// clock whose current reading is nearer.
+/// Converts a camera's stamp to CLOCK_BOOTTIME. V4L2 stamps with CLOCK_MONOTONIC, although
+/// libcamera specifies CLOCK_BOOTTIME. The two differ by the time that the machine was suspended.
+/// The stamp is attributed to the clock whose current reading is nearer.
 std::int64_t cameraStampToBoot(std::int64_t stamp_ns, std::int64_t monotonic_ns,
                                std::int64_t boot_ns);
 
-/// Maps a remote clock by stamped messages: the least delay of the last seconds counts as zero. The
-/// constant delay is part of the camera's time offset.
+/// Maps a remote clock, known only from stamped messages. Messages have a varying delay; the least
+/// delay of the last seconds counts as zero. The remaining constant delay is part of the camera's
+/// time offset, which vio estimates.
 class ClockMap {
  public:
   /// Adds a message with stamp `theirs_ns` that arrived at `ours_ns`.

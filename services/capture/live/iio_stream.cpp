@@ -41,7 +41,8 @@ std::string readText(const iio_channel* channel, const char* attribute) {
   return trimmed(text);
 }
 
-/// Requests a rate, and returns the one that the device has set; empty without the attribute.
+/// Requests a rate, and returns the rate that the device has set, because many devices support only
+/// a few rates. Empty if the device has no rate attribute.
 std::optional<double> askRate(const iio_device* device, double wanted) {
   constexpr const char* kRate = "sampling_frequency";
   if (!iio_device_find_attr(device, kRate)) return std::nullopt;

@@ -1,4 +1,5 @@
-// Triggered buffer of one IIO device, local or of an iiod. Its thread reopens it after a loss.
+// Triggered buffer of one IIO device, local or of an iiod in the network. A separate thread reads
+// it, and reopens it after a loss.
 #pragma once
 
 #include <Eigen/Core>

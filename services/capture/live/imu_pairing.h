@@ -26,8 +26,9 @@ struct InertialPair {
 /// Interpolates the acceleration at each reading of the gyroscope.
 class ImuPairing {
  public:
-  /// The samples that this reading completes, in order. Decreasing times ("imu_out_of_order") and
-  /// readings without accelerations within .1 s on both sides ("imu_unpaired") are dropped.
+  /// Returns the samples that this reading completes, in order of time. Readings with decreasing
+  /// time are dropped: "imu_out_of_order". Gyroscope readings without accelerations on both sides
+  /// within a tenth of a second are dropped: "imu_unpaired".
   std::vector<InertialPair> gyro(const Triad& reading);
   std::vector<InertialPair> accel(const Triad& reading);
   const ReasonCounts& reasons() const { return reasons_; }
@@ -41,10 +42,12 @@ class ImuPairing {
   ReasonCounts reasons_;
 };
 
-/// Detects wrong stamps of an IMU: data arrive but give no samples.
+/// Checks whether the readings of an IMU become samples. With wrong stamps, data arrive but give no
+/// samples.
 class ImuYield {
  public:
-  /// Takes totals of readings and samples. A sentence if fewer than half became samples.
+  /// Takes the totals of readings and of samples made from them. Returns a sentence if fewer than
+  /// half of the readings since the last call became samples; otherwise empty.
   std::string look(std::uint64_t read, std::uint64_t given);
 
  private:

@@ -5,7 +5,8 @@
 namespace perdure::capture {
 namespace {
 
-/// Counts waits without an image, because the process may have been suspended.
+/// Silence is measured in waits without an image, not in time, because the camera may have sent
+/// images while the process was suspended.
 constexpr std::chrono::milliseconds kWait{100};
 constexpr int kSilentIntervals = 10;
 

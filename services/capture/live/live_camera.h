@@ -19,8 +19,9 @@ class LiveCamera {
   LiveCamera(const LiveCamera&) = delete;
   LiveCamera& operator=(const LiveCamera&) = delete;
 
-  /// Counts "camera_absent" (failed openings), "camera_lost", "camera_silent", "camera_frame_lost",
-  /// "camera_frame_error", "camera_reopened", and the reasons of packed().
+  /// Counts "camera_absent" (failed openings), "camera_lost", "camera_silent" (images stopped),
+  /// "camera_frame_lost", "camera_frame_error", "camera_reopened" (because of another camera), and
+  /// the reasons of packed().
   const DeviceState& state() const { return state_; }
 
  private:

@@ -20,16 +20,18 @@ struct CanSignal {
   std::string unit;                   ///< unit as written; empty: none
 };
 
-/// Parses "ID LINE": a DBC id in decimal (bit 31: 29 bits) or hexadecimal, and an SG_ line or its
-/// part after the colon: `0x1a0 7|16@0+ (0.01,0) [0|655.35] "km/h"`. Range, unit and receivers are
-/// optional. Fails with "can_signal".
+/// Parses "ID LINE". ID is decimal as in a DBC file (bit 31 set for 29 bits), or hexadecimal (29
+/// bits above 0x7ff). LINE is an SG_ line or its part after the colon: `0x1a0 7|16@0+ (0.01,0)
+/// [0|655.35] "km/h"`. Range, unit and receivers are optional. Fails with "can_signal" and a
+/// sentence on the error.
 Result<CanSignal> parseCanSignal(const std::string& text);
 
 /// Raw bits, sign extended. Fails with "speed_can_short" if the frame has too few bytes.
 Result<std::int64_t> rawValueOf(const CanSignal& signal, std::span<const std::uint8_t> data);
 
-/// Physical value. Fails with "speed_can_short", or "speed_can_invalid" outside the signal's range
-/// and for "not available": all ones, or the least signed number, from eight bits on.
+/// Physical value. Fails with "speed_can_short", or with "speed_can_invalid" if the value is
+/// outside the signal's range. It also fails for the pattern "not available": all ones, or the
+/// least signed number, from eight bits on.
 Result<double> valueOf(const CanSignal& signal, std::span<const std::uint8_t> data);
 
 }  // namespace perdure::capture

@@ -23,14 +23,16 @@ struct EarthPlace {
   double sigma_m = 0;  ///< standard deviation of each horizontal axis
 };
 
-/// Position with a heading: the course over ground on a straight drive (two seconds, faster than 2
-/// m/s, courses within 2°). A vehicle that drives backwards has no heading.
+/// Position with a heading. The heading is the course over ground on a straight drive. This needs
+/// fixes over two seconds, faster than 2 m/s, with courses within 2°. A vehicle that drives
+/// backwards has no heading. Single-threaded.
 class EarthAnchor {
  public:
   explicit EarthAnchor(AnchorSettings settings) : settings_(settings) {}
 
-  /// Returns the first position, later ones with at most half the best sigma, and similar ones
-  /// after half a minute. `backwards`: from the wheels.
+  /// Returns the first position, and later positions whose sigma is at most half the best sigma
+  /// returned. After half a minute, it also returns a position with a similar sigma. `backwards`:
+  /// from the wheels.
   std::optional<EarthPlace> offer(const GnssFix& fix, bool backwards);
 
  private:

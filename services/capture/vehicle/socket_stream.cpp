@@ -29,7 +29,8 @@ std::int64_t arrivalOf(msghdr& message) {
   return HostClock::nowNs();
 }
 
-/// A stream returns zero bytes at its end, but a datagram may be empty.
+/// Whether the socket is a stream. A stream returns zero bytes at its end, but a datagram may be
+/// empty.
 bool isStream(int socket) {
   int type = 0;
   socklen_t size = sizeof type;

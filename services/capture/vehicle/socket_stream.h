@@ -58,7 +58,8 @@ class SocketStream {
   std::thread thread_;
 };
 
-/// Splits packets into lines without their ends. Lines above 4096 bytes are dropped.
+/// Splits packets into lines. Each complete line is returned once, without its end. A line of more
+/// than 4096 bytes is dropped.
 class Lines {
  public:
   void add(const Packet& packet, const std::function<void(std::string_view, std::int64_t)>& give);

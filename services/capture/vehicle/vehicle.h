@@ -17,7 +17,8 @@
 
 namespace perdure::capture {
 
-/// Parses "SPEED" or "SPEED SIGMA" in m/s. Fails with "speed_malformed".
+/// Parses a UDP line: "SPEED" or "SPEED SIGMA" in m/s, separated by blanks or a comma. Fails with
+/// "speed_malformed".
 Result<SpeedReading> readSpeedLine(std::string_view line, double sigma, std::int64_t time_ns);
 
 /// Throws StartupError if the configuration has an invalid signal or address.

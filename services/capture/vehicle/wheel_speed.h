@@ -19,17 +19,20 @@ struct SpeedReading {
   double sigma = 0.0;        ///< m/s, standard deviation
 };
 
-/// Factor from m/s, km/h, mph, kn (or their usual names) to m/s. Fails with "speed_unit".
+/// Factor from a unit to m/s: m/s, km/h, mph, kn and their usual other names. Fails with
+/// "speed_unit".
 Result<double> metresPerSecond(const std::string& unit);
 
 struct WheelSettings {
   std::vector<CanSignal> wheels;     ///< at least one; the reading is their mean
   std::optional<CanSignal> reverse;  ///< indicates that the vehicle drives backwards
   double reverse_value = 1.0;        ///< physical value of `reverse` when driving backwards
-  double sigma = 0.05;               ///< m/s, of one wheel, without its resolution
+  double sigma = 0.05;               ///< m/s, standard deviation of one wheel, without its
+                                     ///< resolution
 };
 
-/// Parses the texts of `speed.can`. `reverse`: "ID LINE == VALUE", or empty. Throws StartupError.
+/// Parses the texts of the configuration (config.h, `speed.can`). `reverse`: "ID LINE == VALUE", or
+/// empty. Throws StartupError.
 WheelSettings wheelSettings(const std::vector<std::string>& signals, const std::string& reverse,
                             double sigma);
 
@@ -38,9 +41,11 @@ class WheelSpeed {
  public:
   explicit WheelSpeed(WheelSettings settings);
 
-  /// Returns a reading, with the mean of their times, once each wheel has sent a value. If one
-  /// sends twice before another, only those received count ("speed_can_partial"). The variance has
-  /// `sigma`, resolution and differences. "speed_can_no_reverse": none for three seconds.
+  /// Takes a frame of the bus. It returns a reading once each wheel has sent a value, with the mean
+  /// of their times. If one wheel sends twice before another, the reading uses only the wheels
+  /// received ("speed_can_partial"). The variance of the mean includes `sigma`, the resolution and
+  /// the differences between wheels. If `reverse` was not received for three seconds,
+  /// "speed_can_no_reverse" is counted.
   std::optional<SpeedReading> frame(std::uint32_t id, bool extended,
                                     std::span<const std::uint8_t> data, std::int64_t time_ns);
   const ReasonCounts& reasons() const { return reasons_; }

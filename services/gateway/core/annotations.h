@@ -1,5 +1,7 @@
-// Overlays of a camera's image, as foxglove.ImageAnnotations: projected cuboids (dashed if
-// occluded) and detections; or regions with brightness by likelihood (figure 1).
+// Overlays of a camera's image, as foxglove.ImageAnnotations. One overlay has the projected
+// cuboids, dashed if the object is occluded, and the detections, with brightness by likelihood (the
+// paper's figure 1). The other has the objects as regions, with brightness by the likelihood of
+// their class.
 #pragma once
 
 #include <string>

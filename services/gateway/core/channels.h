@@ -49,7 +49,7 @@ constexpr std::uint32_t cameraChannel(std::size_t camera, CameraPart part) {
 /// Which messages slow clients lose, and which ones late clients receive.
 enum class Delivery {
   kNewest,  ///< the newest message replaces an unsent one; late clients receive it
-  kEach,    ///< drops, counts and reports the oldest messages
+  kEach,    ///< drops, counts and reports the oldest messages; late clients receive the last ones
 };
 
 struct ChannelInfo {
@@ -68,7 +68,8 @@ std::vector<ChannelInfo> channelTable(const std::vector<std::string>& cameras);
 ChannelInfo rawChannel(std::uint32_t id, const std::string& topic, const std::string& type,
                        std::string idl);
 
-/// A message, encoded once for all clients. `whole`: for clients without the one before.
+/// One message of a channel, encoded once for all clients. If `payload` has changes only, `whole`
+/// is for clients that did not get the message before.
 struct Encoded {
   std::uint32_t channel = 0;
   TimePoint time;

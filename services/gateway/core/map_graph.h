@@ -34,8 +34,9 @@ MapReply graphOn(const WorldId& map, MapReply reply);
 /// "perdure.MapGraph", in M. `why_none`: a sentence if there is no graph.
 std::string mapGraphJson(const MapReply& graph, const std::string& why_none, TimePoint time);
 
-/// The graph as foxglove.SceneUpdate in the frame `map`: spheres, a line, and arches in the colour
-/// of their state, with metadata. Each message is complete.
+/// The graph as foxglove.SceneUpdate in the frame `map`. Anchors are spheres, the trajectory is a
+/// line, and loops are arches in the colour of their state. Metadata describe each entity. Each
+/// message is complete and replaces the previous one.
 std::string mapGraphScene(const MapReply& graph, TimePoint time);
 
 }  // namespace perdure::gateway

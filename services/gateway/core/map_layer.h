@@ -23,13 +23,15 @@ class MapLayer {
 
   /// The newest frame if it belongs to this W; otherwise nullptr.
   const MapFrame* frameOf(const WorldId& world) const;
-  /// Maps W to M. Identity without a frame of this W: map_store then publishes in W.
+  /// Transforms points from W to M. Identity if no frame of this W was received; map_store then
+  /// publishes objects of W unchanged.
   RigidTransform T_MW(const WorldId& world) const;
   WorldId mapOf(const WorldId& world) const;
 
   struct View {
     std::vector<MapObject> here;  ///< objects in the M of this W
-    std::size_t elsewhere = 0;    ///< of maps whose place in this M is not known
+    std::size_t elsewhere = 0;    ///< number of objects of maps whose transform to this M is
+                                  ///< unknown
   };
   View viewFrom(const WorldId& world) const;
 

@@ -27,8 +27,8 @@ class Scene {
   std::map<ObjectId, std::string> shown_;  ///< entities
 };
 
-/// The durable map as foxglove.SceneUpdate in the frame `map`: pale cuboids, dashed if provisional,
-/// without those in `working`. Each message is complete.
+/// The durable map as foxglove.SceneUpdate in the frame `map`: pale cuboids, dashed if provisional.
+/// `objects` are in M; those in `working` are left out. Each message is complete.
 std::string mapScene(const std::vector<MapObject>& objects, const std::set<ObjectId>& working,
                      TimePoint time);
 

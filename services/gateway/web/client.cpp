@@ -6,7 +6,8 @@
 namespace perdure::gateway::web {
 namespace {
 
-/// Closes a connection without waiting for the client's side, as Beast's own teardown does.
+/// Closes a connection without waiting until the client has closed its side. Beast's own teardown
+/// waits up to the timeout of a handshake, and then loses the client's error.
 class Wire : public beast::tcp_stream {
  public:
   explicit Wire(beast::tcp_stream stream) : beast::tcp_stream(std::move(stream)) {}

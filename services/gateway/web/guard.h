@@ -35,9 +35,10 @@ class Guard {
 
   /// Fails with host_refused if the Host header does not name this gateway.
   Result<void> checkHost(std::string_view host) const;
-  /// Fails with origin_refused. Browsers send an origin; that of the own page is the host.
+  /// Fails with origin_refused. An empty origin does not come from a browser; an origin with the
+  /// same host and port is the gateway's own page.
   Result<void> checkOrigin(std::string_view origin, std::string_view host) const;
-  /// Fails with token_wrong. The token is in the target's query, or given as "Bearer …".
+  /// Fails with token_wrong. The token is in the target's query, or "Bearer …". Constant time.
   Result<void> checkToken(std::string_view target, std::string_view authorization) const;
 
  private:

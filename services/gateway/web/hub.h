@@ -25,6 +25,7 @@ class Viewer {
   Outbox& outbox() { return outbox_; }
   std::uint64_t id() const { return id_; }
 
+  /// Called if a message waits in the outbox.
   virtual void flush() = 0;
   /// Closes the client; `why` is the reason as text.
   virtual void cut(const std::string& why) = 0;
@@ -74,7 +75,8 @@ class Hub {
  private:
   struct Kept {
     ChannelInfo info;
-    std::deque<Encoded> messages;  ///< for late clients
+    std::deque<Encoded> messages;  ///< for late clients: the last ones of kEach, the newest of
+                                   ///< kNewest
     std::size_t subscriptions = 0;
   };
   void handle(Viewer& viewer, const protocol::ClientMessage& message);

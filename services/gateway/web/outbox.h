@@ -24,7 +24,7 @@ struct Outgoing {
 
 class Outbox {
  public:
-  /// Limits for each subscription, and for messages of the protocol itself.
+  /// most_events: limit for each subscription. most_control: for messages of the protocol.
   Outbox(std::size_t most_events, std::size_t most_control)
       : most_events_(most_events), most_control_(most_control) {}
 
@@ -38,6 +38,7 @@ class Outbox {
   std::optional<Outgoing> take();
   std::size_t size() const { return waiting_.size(); }
   std::uint64_t dropped() const { return dropped_; }
+  /// Number of events lost since the last call.
   std::uint64_t takeLostEvents();
 
  private:

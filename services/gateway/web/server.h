@@ -20,7 +20,8 @@ struct Content {
   std::vector<ChannelInfo> channels;
   std::vector<ServiceInfo> services;
   Files files;
-  std::optional<TimeRange> range = std::nullopt;  ///< of a recording that clients control
+  std::optional<TimeRange> range = std::nullopt;  ///< time range of a recording that clients
+                                                  ///< control
 };
 
 struct Stats {
@@ -31,7 +32,7 @@ struct Stats {
 
 class Server {
  public:
-  /// `told` is called in the server's thread. Throws StartupError (69) without the port.
+  /// `told` is called in the server's thread. Throws StartupError (69) if the port is taken.
   Server(const Options& options, Content content, Hub::Told told);
   ~Server();
   Server(const Server&) = delete;

@@ -1,5 +1,5 @@
-// Selects the input size that keeps a frame within a time budget. It decreases at once, and
-// increases only after many frames below the budget.
+// Selects the input size of the network that keeps a frame within a time budget. It decreases at
+// once, and increases only after many frames below the budget, to avoid oscillation.
 #pragma once
 
 #include <cstddef>
@@ -9,11 +9,12 @@ namespace perdure::inference {
 
 class Budget {
  public:
-  static constexpr std::size_t kSlow = 5;    ///< frames whose median exceeds the budget
-  static constexpr std::size_t kQuick = 30;  ///< frames whose median is below it
+  static constexpr std::size_t kSlow = 5;    ///< frames whose median must exceed the budget
+  static constexpr std::size_t kQuick = 30;  ///< frames whose median must be below the budget
   static constexpr double kRoom = 0.8;       ///< share of the budget that a larger size may take
 
-  /// `shares`: pixels of each size relative to the first, falling from 1. `budget_ms` 0: none.
+  /// `shares`: pixels of each size relative to the first one, falling from 1. The time of a frame
+  /// is proportional to them. `budget_ms` 0: always the first size.
   Budget(double budget_ms, std::vector<double> shares);
 
   std::size_t size() const { return size_; }

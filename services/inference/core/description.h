@@ -44,17 +44,21 @@ struct Input {
 /// One resolution of the head, with the names of its raw (pre-activation) tensors.
 struct Level {
   int stride = 0;  ///< pixels of input per cell
-  /// YOLOX, FastestDet: (1,4,H,W), (1,1,H,W), (1,K,H,W). V2: (1,4·A,H,W), (1,A,H,W), (1,K,H,W).
+  /// YOLOX and FastestDet: three tensors (1,4,H,W), (1,1,H,W), (1,K,H,W). YOLO-FastestV2: for A
+  /// anchors (1,4·A,H,W), (1,A,H,W), and one (1,K,H,W) for all of them.
   std::string box, objectness, classes;
-  /// YOLO-Fastest: (1,H,W,A·(5+K)) and A anchors (pixels of input). YOLOv5: (1,A·(5+K),H,W) or
-  /// (1,A,H,W,5+K). YOLOv8: (1,4·bins+K,H,W), or two tensors. NanoDet: (1,K+4·bins,H,W).
+  /// YOLO-Fastest: one tensor (1,H,W,A·(5+K)) and A anchors (width, height, pixels of input).
+  /// YOLOv5: (1,A·(5+K),H,W) or (1,A,H,W,5+K), and anchors. YOLOv8: (1,4·bins+K,H,W), or `box` and
+  /// `classes` as two tensors. NanoDet: (1,K+4·bins,H,W), classes first.
   std::string tensor;
   std::vector<std::pair<double, double>> anchors;
-  /// Perdure: (1,4,H,W), (1,1+K,H,W) background first; azimuth (1,2·bins,H,W), spread (1,4,H,W).
+  /// Perdure: `box` (1,4,H,W) and logits (1,1+K,H,W), background first. If the model has them,
+  /// azimuth (1,2·bins,H,W) and spread (1,4,H,W).
   std::string logits, azimuth, spread;
 };
 
-/// Outputs for all levels at once: either `predictions`, or `boxes` and `scores`.
+/// Outputs for all levels at once, by the names of the tensors: either `predictions`, or `boxes`
+/// and `scores`. Levels then have no tensors of their own.
 struct Outputs {
   std::string predictions;    ///< YOLOv5 (1,N,5+K), YOLOv8 (1,4+K,N), NanoDet (1,N,K+4·bins)
   std::string boxes, scores;  ///< (1,N,4) and (1,N,C); YOLOv8 (1,4,N) and (1,K,N)
@@ -66,11 +70,11 @@ struct BoxForm {
   enum class Kind {
     kCentre,   ///< centre x, y, width, height
     kCorners,  ///< x1, y1, x2, y2
-    kOffsets,  ///< relative to a prior
+    kOffsets,  ///< relative to a prior: centre in its sizes, logarithm of the ratio of sizes
   };
   Kind kind = Kind::kCentre;
   bool y_first = false;                          ///< each pair is (y, x)
-  bool shares = false;                           ///< of the input's sides; else pixels
+  bool shares = false;                           ///< relative to the input's sides; else pixels
   std::vector<std::array<double, 4>> priors;     ///< centre x, y, width, height, in shares
   std::array<double, 2> variances = {0.1, 0.2};  ///< factors of the offsets of centre and size
 };
@@ -78,14 +82,15 @@ struct BoxForm {
 /// Which score column, if any, is the background.
 enum class Background { kNone, kFirst, kLast };
 
-/// Of the best candidate near a predicted place without a reported box (prime.h): posterior
-/// log-odds s give `offset` + `slope`·s nats; without one of score `floor`, `nothing`.
+/// Calibration of the best candidate near a predicted place without a reported box
+/// (core/decode/prime.h). Posterior log-odds s of its class give `offset` + `slope`·s nats for the
+/// object. Without a candidate of score `floor` or more, the result is `nothing`.
 struct PrimedCalibration {
   double floor = 0.0;  ///< in (0, 1), below the score threshold; 0: not fitted, no top-down answers
   double slope = 0.0, offset = 0.0, nothing = 0.0;
 };
 
-/// From the network's score to a log-likelihood ratio against clutter (evidence.h).
+/// Calibration from the score to a log-likelihood ratio against clutter (decode/evidence.h).
 struct Calibration {
   double temperature = 1.0;   ///< > 0; above 1 the network is overconfident
   double clutter_rate = 0.5;  ///< in (0, 1): share of the reported boxes that are clutter
@@ -121,7 +126,7 @@ struct ModelDescription {
   double cell_offset = 0.5;  ///< YOLOv8, NanoDet: the reference point of a cell is (g + offset)·s
   Azimuth azimuth;
   double reach = 0.0;         ///< perdure: cells by which a cell's centre may lie outside its box
-  double spread_scale = 0.0;  ///< perdure: spread to standard deviation; 0: none
+  double spread_scale = 0.0;  ///< perdure: factor from spread to standard deviation; 0: no spread
   double box_sigma = 0.0;  ///< standard deviation of a side relative to the box's size; 0: unknown
   BoxExtent boxes = BoxExtent::kUnknown;
   bool upright = true;  ///< images may be turned upright (core/network/image_fit.h)

@@ -10,11 +10,12 @@
 
 namespace perdure::map_store {
 
-/// The first two bytes. Version 1 has no ledger; version 2 has no pose error in the header.
+/// The first two bytes of every blob; readers refuse unknown versions. Version 1 has no ledger;
+/// version 2 has no pose error in the header.
 inline constexpr std::uint16_t kBeliefFormat = 4;
 
 Bytes encodeBelief(const ObjectBelief& belief);
-/// Refuses ("belief_malformed") truncated, long, or unknown bytes, or none of a class.
+/// Refuses ("belief_malformed") truncated, too long, classless or unknown-version bytes.
 Result<ObjectBelief> decodeBelief(std::span<const std::uint8_t> bytes);
 
 /// Encodes all members of `objects` except the beliefs.

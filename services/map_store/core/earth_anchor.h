@@ -1,4 +1,5 @@
-// The position of M on Earth as in file and settings: latitude, longitude, height, yaw.
+// The position of M on Earth, as stored in the map's file and the settings: latitude, longitude,
+// height and yaw, in degrees and metres (earth_place.h).
 #pragma once
 
 #include <string>

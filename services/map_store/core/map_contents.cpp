@@ -20,8 +20,9 @@ using mapping::MapContents;
 using mapping::Origin;
 using mapping::StoredObject;
 
-// `map_first` and `map_second`: digests of the first session's first anchor, and of its first two.
-// Changes: kind 0 gone, 1 moved, in M of `map_world`.
+// `map_first` and `map_second` are digests that identify the map of an object: of the first
+// session's first anchor, and of its first two. Changes: objects that one drive detected and
+// another one did not find again. kind 0: gone, 1: moved. The position is in M of `map_world`.
 constexpr char kFusionSchema[] = R"sql(
 CREATE TABLE provenance(
   map_first INTEGER NOT NULL, map_second INTEGER NOT NULL, old_id INTEGER NOT NULL,

@@ -20,13 +20,15 @@ struct WholeMap {
   std::uint64_t malformed = 0;
 };
 
-/// Reads one state of the file without the working set: no object is visible. Graph or provenance
-/// are empty if an older map has none.
+/// Reads one state of the file, even if a service writes to it. Graph or provenance are empty if an
+/// older map has none. The filter's working set is not read: its confirmed tracks are among the
+/// objects, and no object is visible.
 Result<WholeMap> readWholeMap(const Connection& connection);
 
-/// Writes a new file, complete and synced, or nothing, with the tables `provenance` and `changes`.
-/// `path` must not exist unless `replace`. `max_size_mb` 0: no limit. Throws StartupError with the
-/// fix.
+/// Writes a new file, complete and synced, or nothing. `path` must not exist unless `replace` is
+/// true. Until it is renamed, the draft is `path`.part. The tables `provenance` and `changes` are
+/// added; mapping::Origin and mapping::Change describe their columns. `max_size_mb`: the largest
+/// size of the file; 0: no limit. Throws StartupError with the fix.
 void writeWholeMap(const WholeMap& map, const std::string& path, bool replace,
                    std::int64_t max_size_mb = 0);
 

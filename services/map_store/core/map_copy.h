@@ -5,8 +5,9 @@
 
 namespace perdure::map_store {
 
-/// Copies one committed state of `from` to `to`, which must not exist: complete and synced, or not
-/// at all. Throws StartupError with the fix.
+/// Copies the map `from` to `to`, which must not exist: complete and synced, or not at all. `from`
+/// is only read; a service may write to it meanwhile. The copy has the state that was committed
+/// when it began. Older schemas are not upgraded. Throws StartupError with the fix.
 void copyMap(const std::string& from, const std::string& to);
 
 }  // namespace perdure::map_store

@@ -47,7 +47,8 @@ struct Batch {
   /// Tracks that the graph placed and that were not detected since: stored rows do not change.
   std::set<TrackId> placed = {};
   const mapping::Unsaved* graph = nullptr;  ///< changed parts of the graph; null: no changes
-  /// Which tracks are one object, and the changes. Null: each track is an object of its own.
+  /// Defines the tracks that are one object, the changes to this, and the affected tracks. Null:
+  /// each track is an object of its own.
   const mapping::Identity* identity = nullptr;
   const mapping::Unsaved* facts = nullptr;
   std::set<TrackId> regrouped = {};
@@ -58,7 +59,7 @@ struct Batch {
 struct Written {
   std::vector<ObjectId> objects;  ///< objects that changed, came or left, each once
   std::uint64_t revision = 0;
-  std::uint64_t unsound = 0;  ///< not finite; their stored values do not change
+  std::uint64_t unsound = 0;  ///< parts of the graph that are not finite; their stored values stay
 };
 
 struct Found {
@@ -85,10 +86,11 @@ class MapReader {
   explicit MapReader(const Connection* connection) : connection_(connection) {}
 
   /// Answers kById, kByClass, kByRadius (nearest first), kByBox and kAll (by id) with at most
-  /// `limit` objects, in query.world or `newest`.
+  /// `limit` objects. kByRadius and kByBox search in query.world, or in `newest` if it is 0.
   Result<Found> find(const MapQuery& query, const WorldId& newest, std::uint32_t limit) const;
   /// All objects on the map, in full, by id; rows that cannot be read are left out.
   Result<std::vector<PlacedBelief>> beliefs() const;
+  /// The objects nearer than the radius, in full, nearest first.
   Result<Found> inFullNear(const Eigen::Vector3d& centre, double radius, const WorldId& world,
                            std::uint32_t limit) const;
   /// The last belief of a track; nothing if it is not on the map.
@@ -124,7 +126,7 @@ class MapDatabase {
   /// whose objects were removed at `working`'s time or later, are not written.
   Result<Written> write(const Batch& batch);
 
-  /// The graph to continue with. The next write deletes the parts that were left out.
+  /// The graph to continue with. The next write deletes left-out parts: their ids are reused.
   Result<SavedGraph> takeGraph();
 
   MapReader reader() const { return MapReader(&connection_); }

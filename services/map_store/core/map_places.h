@@ -22,14 +22,15 @@ class MapPlaces {
   void put(const StoredPlace& stored, const mapping::ObjectRecord* record,
            const mapping::MapFrames& frames);
   void erase(ObjectId id);
-  /// Places all objects anew. A square becomes stale if an object moved 0.1 m since it was taken.
+  /// Places all objects again, as `frames` defines after a change of the graph. A square becomes
+  /// stale if an object moved 0.1 m or more since the square was taken.
   void lay(const mapping::MapFrames& frames);
 
   /// The anchor of an object; 0: it has none, or is not on the map.
   mapping::AnchorId anchorOf(ObjectId id) const;
   /// The objects in this M for kByRadius (nearest first) and kByBox (by id).
   std::vector<ObjectId> find(const MapQuery& query, const WorldId& map) const;
-  /// Squares that have changed since they were last taken, with their ids; empty: no objects.
+  /// Squares that changed since they were last taken, with their ids in order; empty: no ids.
   std::map<Square, std::vector<ObjectId>> takeStale();
   std::size_t size() const { return places_.size(); }
 
@@ -39,7 +40,7 @@ class MapPlaces {
     Eigen::Vector3d p_W = Eigen::Vector3d::Zero(), p_M = Eigen::Vector3d::Zero();
     WorldId map;  ///< the M of the position
     bool provisional = false;
-    std::optional<Square> square;  ///< of its publication; nothing: beyond all
+    std::optional<Square> square;  ///< square in which it was published; nothing: beyond all
     double moved_m = 0.0;          ///< upper bound of its motion since then
   };
   void show(Place& place);
@@ -65,7 +66,8 @@ class MapInM {
   /// The graph has grown. `moved`: earlier parts of it have moved too.
   void follow(mapping::MapFrames frames, bool moved);
 
-  /// As MapReader::find does, in M. Spatial queries search in the M of `newest`.
+  /// Answers queries by id, class, radius and box, and for all objects, as MapReader::find does, in
+  /// M. Spatial queries search in the M of `newest`.
   Result<Found> find(const MapQuery& query, const WorldId& newest, std::uint32_t limit) const;
   Result<Found> objects(const std::vector<ObjectId>& ids) const;
   std::map<Square, std::vector<ObjectId>> takeStale() { return places_.takeStale(); }

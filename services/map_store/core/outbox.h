@@ -9,7 +9,7 @@
 
 namespace perdure::map_store {
 
-/// Numbers of the tables in the outbox; referred rows come first.
+/// Numbers of the tables in the outbox. References of a row are in tables with lower numbers.
 enum class OutboxTable : std::int64_t {
   kClasses = 0,
   kAnchors = 1,
@@ -24,7 +24,7 @@ inline constexpr std::int64_t kOutboxTables = 8;
 
 /// The state of an outbox. Each change has a larger number than all earlier ones.
 struct OutboxMark {
-  std::string file;    ///< 32 hexadecimal digits; copies have the same
+  std::string file;    ///< 32 hexadecimal digits that never change; copies have the same
   std::string outbox;  ///< 32 digits that change when the outbox restarts after missed changes
   std::int64_t acknowledged = 0;  ///< entries up to this one were removed
   std::int64_t last = 0;          ///< number of the newest change

@@ -14,8 +14,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// One row for each object that was ever confirmed. `gone`: 0, or 1 + the EventKind that ended it.
-// `belief`: core/belief_codec.h; other columns are for queries.
+// One row for each object that was ever confirmed. `gone` is 0, or 1 + the EventKind that ended the
+// object; the row then stays as history. `belief` is encoded by core/belief_codec.h. The other
+// columns are for queries. `tile_*` follow from x, y and meta.tile_size_m.
 constexpr char kSchema[] = R"sql(
 CREATE TABLE meta(key TEXT PRIMARY KEY, value) WITHOUT ROWID;
 CREATE TABLE objects(

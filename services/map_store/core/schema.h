@@ -36,7 +36,8 @@ Result<Identity> identityOf(const Connection& connection);
 /// Reads the whole file. Reason of failure: "corrupt" if it is damaged.
 Result<void> wholeFileIsSound(const Connection& connection);
 
-/// Opens the file for the service. Throws StartupError if it cannot be written or is not ours.
+/// Opens the file for the service. Throws StartupError with the fix if the folder is not writable,
+/// the file is not a map of ours, or a newer version wrote it.
 OpenedStore openStore(const StoreOptions& options);
 
 /// Whether the content of a file is the cause, rather than its disk or its folder.

@@ -56,7 +56,7 @@ Result<std::invoke_result_t<Run>> attempt(Run run) {
   }
 }
 
-/// One prepared statement. Parameters count from 1, columns from 0.
+/// One prepared statement, valid while its connection is. Parameters count from 1, columns from 0.
 class Statement {
  public:
   Statement() = default;
@@ -152,7 +152,8 @@ class Connection {
   std::unique_ptr<sqlite3, Close> connection_;
 };
 
-/// Calls `read` as attempt() does; all its queries see one state of the file.
+/// Calls `read` as attempt() does, and all its queries see one state of the file. Outside a
+/// transaction a savepoint acts as one.
 template <class Read>
 Result<std::invoke_result_t<Read>> inOneState(const Connection& connection, Read read) {
   if (auto begun = connection.execute("SAVEPOINT state"); !begun) {

@@ -79,9 +79,11 @@ class Answer {
   std::unique_ptr<pg_result, Clear> result_;
 };
 
-/// Reasons: "server_unreachable", "server_login", "server_rights", "server_full", "server_busy",
-/// "server_refused" (any other), "server_overtaken" (another process wrote this map), "stopped".
-/// After "server_unreachable" and "stopped" the link cannot be used.
+/// Reasons: "server_unreachable" (no connection, no answer, or the connection was lost),
+/// "server_login" (name, password or database), "server_rights", "server_full", "server_busy",
+/// "server_refused" (any other), "server_overtaken" (another process has written this map
+/// meanwhile), "stopped". After "server_unreachable" and "stopped" the link cannot be used any
+/// more.
 class Link {
  public:
   /// `stop` must outlive the link; raising it ends every wait.

@@ -18,8 +18,9 @@ struct ServerMap {
 /// Lists the maps on the server by name; for each name, the newest first.
 std::vector<ServerMap> listMaps(const std::string& url);
 
-/// Writes the newest map of `name` to `to`, which must not exist: one complete, bit-identical
-/// state, or nothing. `unfinished`: also a map that is still being sent.
+/// Writes the newest map of `name` to `to`, which must not exist: one complete state, or nothing.
+/// Beliefs and graph are bit-identical to those of the vehicle's file. `unfinished`: also accepts a
+/// map that is still being sent.
 void pullMap(const std::string& url, const std::string& name, const std::string& to,
              bool unfinished = false);
 
@@ -28,8 +29,9 @@ void pullMap(const std::string& url, const std::string& name, const std::string&
 std::vector<std::string> pullVehicles(const std::string& url, const std::string& folder,
                                       bool unfinished = false);
 
-/// Stores `from` as the map `name`, in one transaction, replacing an earlier pushed one. Refuses
-/// names of vehicles. `earth_anchor`: as in parameters.h.
+/// Stores `from` as the map `name` on the server, in one transaction. Replaces an earlier map that
+/// was pushed under this name. Refuses names that vehicles use. `from` is only read.
+/// `earth_anchor`: as in parameters.h.
 void pushMap(const std::string& from, const std::string& url, const std::string& name,
              const std::vector<double>& earth_anchor = {});
 

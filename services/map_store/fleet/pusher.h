@@ -1,6 +1,7 @@
-// Sends the changes in a map's file in portions, one transaction each, in the order of their last
-// change. The server reports its last entry, so nothing is repeated or left out. The whole map is
-// sent if it misses changes.
+// Sends the changes in a map's file to the server, in portions that are one transaction each: the
+// current rows, in the order of their last change. The server reports its last entry, so a portion
+// whose answer was lost is neither repeated nor left out. The whole map is sent if the server has
+// none or has missed changes.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +27,8 @@ class Pusher {
   /// `earth_anchor`: parameters.h. The file is opened read-only.
   Pusher(std::string file, std::string vehicle, std::vector<double> earth_anchor);
 
-  /// Reads the server's last entry: before the first push on a link, and after failures.
+  /// Reads the server's last entry. Must precede the first push on each link, and the first push
+  /// after any failure.
   Result<void> attach(Link& link);
   /// Sends at most `most_rows` rows. If fewer remain, the portion is smaller, and `whole`.
   Result<Portion> push(Link& link, std::int64_t most_rows);

@@ -90,7 +90,8 @@ struct Replicator::Work {
   mutable std::mutex mutex;
   std::condition_variable woken, advanced;
   bool stopping = false;
-  std::uint64_t wakes = 1, served = 0;  ///< wakes, and those whose changes are sent
+  std::uint64_t wakes = 1, served = 0;  ///< number of wakes, and of those whose changes are all
+                                        ///< sent
   std::optional<Clock::time_point> woken_at;
   Progress progress;
 

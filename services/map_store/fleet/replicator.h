@@ -1,5 +1,6 @@
 // Keeps a fleet's server up to date with a map's file, in its own thread. The file is the buffer:
-// entries stay in its outbox until they are confirmed.
+// the service never waits for the server. Entries that the server has not confirmed stay in the
+// file's outbox, even if either side restarts.
 #pragma once
 
 #include <chrono>

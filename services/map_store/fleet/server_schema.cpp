@@ -11,8 +11,9 @@ namespace {
 /// Only one process at a time creates the schema.
 constexpr char kLock[] = "SELECT pg_advisory_xact_lock(1346720324)";
 
-// A map belongs to one file of one vehicle. `sent`: the last outbox entry. While next_table is
-// below 7, the whole file is being sent, up to row next_id of that table.
+// A map belongs to one file under one vehicle's name. `sent`: the server has the file's outbox
+// entries up to this one. While next_table is below 7, the whole file is being sent, and has
+// arrived up to row next_id of that table.
 constexpr char kMaps[] = R"sql(
 CREATE TABLE perdure.about(version bigint NOT NULL);
 CREATE TABLE perdure.maps(
@@ -108,8 +109,9 @@ CREATE VIEW perdure.objects_in_map AS
     NOT EXISTS (SELECT 1 FROM perdure.anchors a WHERE a.map = o.map)));
 )sql";
 
-// M's origin is at (latitude, longitude, height), x turned by yaw from east; as common/earth.
-// EPSG:4978 is ECEF, 4979 is WGS 84. @: schema of PostGIS.
+// M's origin is at (latitude, longitude, height); its x axis is turned by yaw from east. Conversion
+// by ECEF as in common/earth/geodesy.cpp. EPSG:4978 is ECEF, 4979 is WGS 84 with heights. @ is the
+// schema of PostGIS.
 constexpr char kOnEarth[] = R"sql(
 CREATE FUNCTION perdure.on_earth(x float8, y float8, z float8, latitude float8, longitude float8,
     above float8, yaw float8) RETURNS @geometry LANGUAGE sql IMMUTABLE PARALLEL SAFE AS $$

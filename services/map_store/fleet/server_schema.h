@@ -14,8 +14,9 @@ inline constexpr char kTilesChannel[] = "perdure_tiles";
 /// Payload: "MAP REVISION VEHICLE", once for each complete commit.
 inline constexpr char kMapsChannel[] = "perdure_maps";
 
-/// Creates missing parts, concurrently if need be. False without PostGIS. Reasons: those of the
-/// link, and "server_schema" (newer schema, other encoding).
+/// Creates missing parts; several processes may call it at once. Returns false without PostGIS (no
+/// geometry). Reasons: those of the link, and "server_schema" (a newer schema, or another
+/// encoding).
 Result<bool> prepareServer(Link& link);
 
 }  // namespace perdure::map_store::fleet

@@ -16,13 +16,15 @@ struct Parameters {
 /// Whether this program was built with PostgreSQL's library.
 bool isBuilt();
 
-/// Throws StartupError (78): not a URL of PostgreSQL, a password in it, no library. `key`: its
-/// setting or option. The message does not repeat the URL.
+/// Throws StartupError (78) with the fix: not a URL of PostgreSQL, a password in it, no library.
+/// `key`: the setting or option that has the URL ("store.url", "--url"). The message does not
+/// repeat the URL, so that a password in it does not reach a log.
 void checkUrl(const std::string& url, const std::string& key);
 
-/// 1 to 100 bytes, no "/", no control characters, no leading dot; else StartupError (78).
+/// Checks the name of a map, on the server and as a file: 1 to 100 bytes, no "/", no control
+/// characters, no leading dot. Throws StartupError (78).
 void checkName(const std::string& name, const std::string& key);
-/// Empty, or four numbers that form a valid place; else StartupError (78).
+/// Accepts an empty vector, or four numbers (parameters.h) of a place; else StartupError (78).
 void checkEarthAnchor(const std::vector<double>& anchor, const std::string& key);
 
 /// Checks all parameters; does nothing without a server.

@@ -14,7 +14,7 @@ namespace perdure::ros2 {
 class FrameBook {
  public:
   void add(TimePoint ros_stamp, const FrameStamp& stamp);
-  /// Frame within a millisecond of the stamp, for detectors that store stamps as seconds.
+  /// Frame within 1 ms of the stamp (some detectors store seconds); nullptr if there is none.
   const FrameStamp* find(TimePoint ros_stamp) const;
   bool isAfterAll(TimePoint ros_stamp) const;
 
@@ -26,8 +26,9 @@ class FrameBook {
   std::deque<Entry> frames_;
 };
 
-/// Log-probabilities of clutter and `classes` classes. `named`: class and score, 0 < score ≤ 1. Of
-/// the rest, `other_share` goes to classes without a score.
+/// Activations of one box: log-probabilities of clutter and of `classes` classes. A soft-max gives
+/// the same scores if they sum to at most 1. `named`: class and score, 0 < score ≤ 1. Of the
+/// remaining probability, `other_share` goes to classes without a score, and the rest to clutter.
 std::vector<float> activationsOf(const std::vector<std::pair<std::size_t, double>>& named,
                                  std::size_t classes, double other_share);
 

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::size_t kSeconds = 10;
-constexpr char kElsewhere[] = "perdure";  ///< frames not from the bridge
+constexpr char kElsewhere[] = "perdure";  ///< input name of frames not from the bridge
 
 std::string spanText(std::int64_t ns) {
   return fmt::format("{:.6g} s", static_cast<double>(std::llabs(ns)) * 1e-9);

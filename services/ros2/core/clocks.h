@@ -41,11 +41,14 @@ class Clocks {
   /// Adds an input, once and before its stamps. `shared`: its stamps are on the common clock.
   void addInput(const std::string& input, bool shared);
 
-  /// Converts a stamp to the common clock; `now_ns`: its arrival. Times of one input increase.
-  /// Fails with stamp_missing, stamp_malformed, stamp_elsewhere (another clock), stamp_not_newer or
-  /// clock_unknown. A clock becomes the common one if two inputs agree on it, if one keeps it for
-  /// half a second, or if it is the only one, and if more inputs agree on it than on the previous
-  /// one.
+  /// Converts a stamp to the common clock; `now_ns` is its time of arrival. Times of one input
+  /// increase. Fails with stamp_missing, stamp_malformed, stamp_elsewhere (on another clock than
+  /// the other inputs) or stamp_not_newer. It fails with clock_unknown if there is no common clock
+  /// yet, or if the offset of an own clock is not known yet.
+  ///
+  /// A clock becomes the common one if two inputs agree on it, if one input keeps it for half a
+  /// second, or if there is only one input. More inputs must agree on it than on the previous
+  /// clock. A single wrong stamp, first or later, therefore has no effect.
   Result<TimePoint> place(const std::string& input, const ros::Time& stamp, std::int64_t now_ns);
   /// Adds a time of the common clock from another source.
   void observeCommon(TimePoint time, std::int64_t now_ns);

@@ -21,11 +21,12 @@ class PoseTrack {
  public:
   PoseTrack(const PoseTrackOptions& options, WorldId world) : options_(options), world_(world) {}
 
-  /// `T_child_body`: the body in the message's child frame. Fails with not_finite, no_rotation or
-  /// covariance. With jumped, or decreasing times, a new epoch begins.
+  /// Adds an odometry message. `T_child_body`: pose of the body in the message's child frame. Fails
+  /// with not_finite, no_rotation or covariance. With jumped, the message is used, in a new epoch.
+  /// Decreasing times also begin a new epoch.
   Result<void> onOdometry(const ros::Odometry& message, TimePoint time,
                           const RigidTransform& T_child_body);
-  /// Adds a frame that needs a pose. With frames_waiting the oldest one is dropped.
+  /// Adds a frame that needs a pose. Fails with "late" if too many wait; the oldest is dropped.
   Result<void> onFrame(const FrameStamp& stamp);
   /// Poses of the frames that can be interpolated now, in order of the frames. Frames before the
   /// first message, or in a gap of half a second, get no pose; `untold` counts them.

@@ -1,5 +1,6 @@
-// Arrivals: tracks that the map gives to the working set, or holds to be one object. A repeated
-// step takes them again. Derivation: tools/docs/maths/pose_error.md.
+// Arrivals: tracks that the map gives to the working set, and tracks that the map merges. They are
+// an input of a frame, so a repeated step takes them again. Derivation of their covariances:
+// tools/docs/maths/pose_error.md.
 #pragma once
 
 #include <map>

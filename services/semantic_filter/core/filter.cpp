@@ -91,7 +91,8 @@ struct ScoredTrack {
   std::size_t track;  ///< index in Belief::tracks
   TrackScore score;
   std::optional<std::size_t> assigned = {};  ///< the box of the frame that is assigned to the track
-  /// The track before its update, because one bad box must not deform it.
+  /// The track before its update, if it was confirmed, is static, and a box is near. One bad box
+  /// must not deform the track.
   std::optional<Track> before = {};
   bool sound = true;  ///< state of its numbers after the update
 };

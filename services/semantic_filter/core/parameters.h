@@ -38,7 +38,8 @@ struct ClutterParameters {
 };
 
 struct PoseParameters {
-  /// Random walk added to the pose error, whatever the odometry reports.
+  /// Random walk added to the pose error, whatever covariance the odometry reports. Exact poses
+  /// have none.
   double walk_position = 0.005;   ///< m/√m
   double walk_rotation = 0.0002;  ///< rad/√m
 };
@@ -60,7 +61,8 @@ struct VisibilityParameters {
   double unmapped_occluder = 0.7;     ///< its probability in a direction that is new
   double hard_to_detect = 0.05;       ///< the same of a view from which detections are rare
   double hard_detection_share = 0.3;  ///< P_D there, relative
-  /// View change after which what was learned has fallen to 1/e.
+  /// View change after which the learned values have fallen to 1/e. A hedge hides an object from a
+  /// whole side, at any distance; a detector fails from single views.
   double occluder_angle = 1.2;              ///< of the occluder: direction to the object, rad
   double detectability_angle = 0.15;        ///< of the rest: direction to the object, rad
   double detectability_log_distance = 0.3;  ///< of the rest: logarithm of the distance
@@ -162,8 +164,9 @@ struct Parameters {
   MemoryParameters memory;
 };
 
-/// Squared Mahalanobis distances beyond which two things are not the same. In brackets: dimensions,
-/// and the probability that a Gaussian residual is beyond.
+/// Gates: squared Mahalanobis distances beyond which two things are not the same. In brackets:
+/// dimensions, and the probability that a Gaussian residual is beyond. The gate of a box is
+/// box.gate, that of two hypotheses tracks.hypothesis_merge.
 namespace gates {
 
 // A box and a hypothesis.

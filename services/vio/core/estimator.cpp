@@ -246,7 +246,8 @@ void Estimator::report(const FrameInput& input, FrameEstimate& out) {
   const Clone* previous = previous_frame_ ? state_->clone(*previous_frame_) : nullptr;
   const Matrix6d P_now = P.block<6, 6>(newest.at, newest.at);
   if (previous) {
-    // E[e_now e_prevᵀ] equals the cross-covariance with the clone's error after the update.
+    // E[e_now e_prevᵀ] equals the cross-covariance with the clone's error after the update. The
+    // update's correction of the clone is uncorrelated with the remaining present error.
     const Matrix6d cross = P.block<6, 6>(newest.at, previous->at);
     Matrix6d P_before = previous_pose_covariance_;
     P_before.diagonal().array() += 1e-12;

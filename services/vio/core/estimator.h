@@ -81,7 +81,8 @@ class Estimator {
   /// Rotation R_B1_B0 of the body from the newest frame to an IMU time, from the gyroscope.
   Eigen::Matrix3d predictRotation(const ImuBuffer& imu, TimePoint to);
 
-  /// Rotation vector in B while the first camera reads out an image; zero for a global shutter.
+  /// Rotation of the body, a rotation vector in B, while the first camera reads out an image taken
+  /// at an IMU time. Before a start it uses the raw rate. Zero for a global shutter.
   Eigen::Vector3d turnOfReadout(const ImuBuffer& imu, TimePoint time);
 
   /// Points of the newest image whose position is known, without descriptors.

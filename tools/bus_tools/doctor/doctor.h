@@ -22,8 +22,9 @@ std::string toText(const Findings& findings);
 
 /// Checks the host: receive buffers, the interface, large datagrams over loopback, the clock.
 Findings checkHost(const bus::Options& options);
-/// Checks RouDi if images use shared memory: it responds, and its largest chunk (`roudi_toml`)
-/// holds an image of bus.shared_memory_mb.
+/// Checks RouDi if images are sent through shared memory: RouDi responds, and its largest chunk
+/// holds an image of bus.shared_memory_mb. The chunk size is read from `roudi_toml` if the file is
+/// readable. Returns nothing without shared memory.
 Findings checkSharedMemory(const bus::Options& options, const std::string& roudi_toml);
 /// Checks the identities in bus.security, and whether an authority is stored beside them.
 Findings checkSecurity(const bus::Options& options);
@@ -47,10 +48,12 @@ Findings checkRigBy(const Drive& drive, std::optional<double> seconds = {});
 
 /// model.path of inference.yaml in the folder; empty if it is not set.
 std::string configuredNetwork(const std::string& folder);
-/// Warns if more than a third of the network's input would be padding. Throws StartupError.
+/// Warns if more than a third of a letterboxed network's input would be padding for images of cam0.
+/// Throws StartupError as the service does.
 Findings checkNetworkShape(const Drive& drive, const std::string& network);
 
-/// Writes a fixed copy of a recording to `folder` and checks it. Throws StartupError.
+/// Writes a copy of a recording to `folder` with every certain fault fixed, and checks the copy.
+/// Reports progress on standard error. Throws StartupError as writeDrive does.
 Findings fixRecording(const Drive& given, const std::string& folder);
 
 /// The largest bus.shared_memory_mb in the folder's files; 0 if none is set.

@@ -96,7 +96,8 @@ const char* levelWord(Level level);
 /// The tree as text lines with branches; `colour` adds terminal colours.
 std::string toText(const StatusNode& node, bool colour);
 nlohmann::ordered_json toJson(const StatusNode& node);
-/// JSON on one line, or indented. Bytes that are not UTF-8 are replaced.
+/// JSON on one line, or indented. Bytes that are not UTF-8 are replaced, because messages of
+/// processes may contain any bytes.
 std::string dumped(const nlohmann::ordered_json& json, int indent = -1);
 
 /// Reads the state of the host; folders that do not exist are ignored.

@@ -63,7 +63,8 @@ class GyroMean {
 /// Pairs of angular rates: of the body and of the camera.
 using Pairs = std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>;
 
-/// Removes the tenth of the pairs with the most different magnitudes.
+/// Removes the tenth of the pairs with the most different magnitudes, because magnitudes do not
+/// depend on the rotation between body and camera.
 void dropUnlike(Pairs& pairs) {
   const auto unlike = [](const auto& pair) {
     return std::abs(pair.first.norm() - pair.second.norm());

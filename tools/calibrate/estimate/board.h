@@ -1,5 +1,6 @@
-// A chessboard, or a grid of AprilTags (36h11) with black squares between, as Kalibr's. Frame T:
-// first corner, x along columns, y along rows, z away from the viewer; metres.
+// Calibration boards: a chessboard, or a grid of AprilTags (family 36h11) with black squares
+// between the corners of the tags, as Kalibr uses. Board frame T: origin at the first corner, x
+// along columns, y along rows, z away from the viewer; metres. A camera in front of it has z < 0.
 #pragma once
 
 #include <Eigen/Core>
@@ -27,7 +28,8 @@ struct Board {
   std::string text() const;
 
   std::size_t cornerCount() const;
-  /// Chessboard: row by row. Grid: tag by tag, each clockwise from the upper left.
+  /// Chessboard: corners row by row. Grid: tag by tag from the first row. The corners of a tag are
+  /// clockwise in the viewer's sight, from the upper left.
   Eigen::Vector3d corner(std::size_t id) const;
   /// Upper left and lower right end of the printed area, including a white margin.
   Eigen::Vector2d printFrom() const;

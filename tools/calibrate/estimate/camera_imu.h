@@ -47,7 +47,8 @@ struct ImuResidual {
 struct CameraImu {
   CameraCalibration camera;  ///< includes T_BC and the time offset
   Matrix15d covariance = Matrix15d::Zero();
-  /// Factor by which correlated residuals enlarge the covariance.
+  /// Factor by which the covariance exceeds that of independent residuals. Residuals close in time
+  /// are correlated, because the errors of neighbouring corners are.
   double widened = 1.0;
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = gyro_bias;  ///< mean biases
   Eigen::Vector3d gyro_bias_sigma = gyro_bias, accel_bias_sigma = gyro_bias;

@@ -26,8 +26,9 @@ std::vector<double*> controlsOf(Spline& spline, std::size_t k, bool with_places)
   return blocks;
 }
 
-/// Factor by which correlation within clusters enlarges the covariance (sandwich estimate, Liang
-/// and Zeger, 1986). `influence`: of each row's unit residual.
+/// Factor by which the covariance grows because residuals are correlated within a cluster. It is
+/// the ratio of the sandwich estimate with clusters to the one with single rows (Liang and Zeger,
+/// 1986). `influence`: effect of each row's unit residual on the estimate.
 double wideningOf(const Eigen::MatrixXd& influence, const std::vector<double>& residuals,
                   const std::vector<int>& clusters, const Eigen::MatrixXd& covariance) {
   const int last = *std::ranges::max_element(clusters);

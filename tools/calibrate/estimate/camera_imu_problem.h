@@ -55,6 +55,7 @@ class CameraImuProblem {
     double widened = 1.0;                   ///< see CameraImu::widened
     Eigen::Vector3d gyro_bias, accel_bias;  ///< standard deviations at mid-time
   };
+  /// Fails with calibrate_not_observable.
   Result<Certainty> certainty();
 
  private:

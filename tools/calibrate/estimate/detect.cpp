@@ -38,7 +38,8 @@ bool isUpsideDown(const Board& board, const cv::Mat& grey, const std::vector<cv:
   return difference > 0.0;
 }
 
-/// 1 if the quadrants a + b and -a - b are black, -1 if white, 0 if opposite ones differ.
+/// Pattern of black and white around a corner. Returns 1 if the quadrants a + b and -a - b are
+/// black, -1 if they are white, and 0 if opposite quadrants do not match.
 int crossingAt(const cv::Mat& grey, const cv::Point2f& corner, const cv::Point2f& a,
                const cv::Point2f& b) {
   const double one = brightness(grey, corner + a + b), across = brightness(grey, corner - a - b);
@@ -74,7 +75,7 @@ std::vector<Corner> findChessboard(const Board& board, const cv::Mat& grey) {
   if (!cv::findChessboardCornersSB(grey, size, found, cv::CALIB_CB_NORMALIZE_IMAGE)) {
     return {};
   }
-  // Refines the corners by the adjacent edges, because the detector is biased.
+  // Refines the corners by the adjacent edges, because the detector's bias is some hundredths px.
   double side = 1e9;
   for (std::size_t i = 1; i < found.size(); ++i) {
     side = std::min(side, cv::norm(found[i] - found[i - 1]));
@@ -126,7 +127,8 @@ std::vector<Corner> findAprilGrid(const Board& board, const cv::Mat& grey) {
     apriltag_detection_t* tag = nullptr;
     zarray_get(found.get(), i, static_cast<void*>(&tag));
     if (tag->hamming > 0 || tag->id >= board.columns * board.rows) continue;
-    // The library's order: lower left, lower right, upper right, upper left; pixel corners.
+    // The library's order: lower left, lower right, upper right, upper left. Its integer
+    // coordinates are at the corners of pixels.
     std::vector<cv::Point2f> pixels;
     double side = 1e9;
     for (const int which : {3, 2, 1, 0}) {

@@ -33,14 +33,16 @@ struct MotionRig {
   double second_px = 0.0;  ///< RMS rotation about the second axis between two images
 };
 
-/// Estimates everything from the image size. Fails with motion_few_images, motion_blank,
-/// motion_apart, motion_no_rotation or motion_unsure, with a detail for users.
+/// Estimates all quantities; the only prior knowledge is the image size. Fails with
+/// motion_few_images, motion_blank, motion_apart (images and gyroscope do not rotate together),
+/// motion_no_rotation or motion_unsure, with a detail for users.
 Result<MotionRig> rigFromMotion(const replay::Recording& recording, const WindowOptions& options);
 
 /// One line for each parameter: value, standard deviation, and whether the motion shows it.
 std::vector<std::string> linesOf(const MotionRig& found);
 
-/// Writes the rig file of a drive, and returns its linesOf(). Throws StartupError (kData).
+/// Writes the rig file of a drive, and returns its linesOf(). Throws StartupError (kData) with the
+/// reason if no rig is found.
 std::vector<std::string> writeMotionRig(const replay::DatasetOptions& drive,
                                         const WindowOptions& options,
                                         const std::filesystem::path& file);

@@ -1,6 +1,7 @@
-// Robust least squares over lens, pose of the camera, time offset, readout and gyroscope bias, from
-// tracked corners. Velocity and gravity of each window and inverse depths are eliminated (Schur
-// complement).
+// Robust least squares over lens, rotation and position of the camera on the IMU, time offset,
+// readout and gyroscope bias, from tracked corners. The body moves as the IMU measures; each window
+// has its own initial velocity and gravity, and each corner its own inverse depth. All of these are
+// eliminated (Schur complement). Corners without parallax constrain the rotation only.
 #pragma once
 
 #include <Eigen/Core>

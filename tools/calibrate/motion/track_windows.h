@@ -33,7 +33,8 @@ struct TrackWindows {
   void add(TrackWindows more);
 };
 
-/// Windows of cam0, distributed over rotations about all axes.
+/// Windows of cam0, distributed over the rotation about all axes. Images of another size than the
+/// calibration's are not used.
 TrackWindows trackWindows(const replay::Recording& recording, const WindowOptions& options);
 
 }  // namespace perdure::calibrate

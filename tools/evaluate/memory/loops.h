@@ -1,5 +1,5 @@
-// Whether the loops of a map are correct, what they change, and the distance travelled among known
-// objects before the first.
+// Checks whether the loops of a map are correct, their effect on the trajectory, and the distance
+// travelled among known objects before the first loop.
 #pragma once
 
 #include <cstdint>
@@ -14,13 +14,16 @@
 namespace perdure::tools {
 
 struct LoopOptions {
-  /// A loop is wrong above wrong_m and wrong_sigmas · σ in the plane, or above wrong_rad in yaw.
+  /// A loop is wrong if its error in the plane exceeds both wrong_m and wrong_sigmas · σ, or if its
+  /// yaw error exceeds wrong_rad.
   double wrong_m = 2.0, wrong_sigmas = 4.0;
   double wrong_rad = 0.17453;
-  /// The least gap that ends a return visit, and the least number of known objects in it.
+  /// Limits of a return visit: the least gap without objects of an earlier visit that ends it, and
+  /// the least number of such objects.
   double gap_m = 30.0;
   std::uint64_t objects = 4;
-  /// Margin of a return visit, m; a loop whose later anchor lies within closes it.
+  /// Margin before and after a return visit, m of travel. A loop closes the visit if its later
+  /// anchor lies within the margin.
   double anchor_m = 14.0;
 };
 
@@ -38,7 +41,7 @@ struct JudgedLoop {
 
 struct LoopJudgement {
   std::vector<JudgedLoop> loops;  ///< sorted by id
-  std::uint64_t unjudged = 0;     ///< without a true pose, or not in the map
+  std::uint64_t unjudged = 0;     ///< edges without a true pose of their anchors, or not in the map
 
   std::uint64_t believed() const, wrong() const, wrongBelieved() const;
 };
@@ -46,7 +49,8 @@ struct LoopJudgement {
 LoopJudgement judgeLoops(const mapping::SavedMap& map, const replay::PoseFile& truth,
                          const LoopOptions& options);
 
-/// ATE of the anchors, RMSE in m; each connected part is aligned by position and yaw.
+/// ATE of the anchor positions, RMSE in m. Each connected part is aligned with ground truth by
+/// position and yaw. Parts with one anchor are omitted.
 struct AnchorErrors {
   std::uint64_t anchors = 0;  ///< anchors with a true pose
   double odometry_m = 0.0;    ///< ATE of chained odometry increments, a part for each session
@@ -61,7 +65,8 @@ struct ReturnVisit {
   /// Distance travelled in the visit to the anchor of its first accepted correct loop in the map.
   std::optional<double> closed_after_m;
 };
-/// `frames`: of besideTheBody. The map does not store loops that later ones replaced.
+/// `frames`: the result of besideTheBody. If a later loop replaced another, the distance counts for
+/// the later one, because the map does not store the other.
 std::vector<ReturnVisit> returnVisits(const std::vector<MemoryFrame>& frames,
                                       const std::vector<JudgedLoop>& loops,
                                       const MemoryOptions& memory, const LoopOptions& options);

@@ -46,7 +46,8 @@ RunEvents readRunEvents(const std::filesystem::path& file);
 
 struct PlaceScore {
   std::uint64_t visited_twice = 0;  ///< places with at least two visits that are long enough
-  /// Places with several visits: same object at first and last, during the visit, or without one.
+  /// Places with several visits: with the same object at the first and the last visit, after all
+  /// merges or already during the visit, and without an object at one of these visits.
   std::uint64_t kept = 0, kept_in_visit = 0, without = 0;
   std::uint64_t first_asked = 0, first_found = 0;  ///< frames of visit 0 within range
   std::uint64_t later_asked = 0, later_found = 0;

@@ -33,8 +33,9 @@ struct MemoryFrame {
   std::set<std::uint64_t> reported;  ///< ids, matched or not
 };
 
-/// Frames of the run with a pose. Objects count if they never move, are no toys, near and visible.
-/// Reports match by class, one-to-one, greedily by distance.
+/// Frames of the run with a pose, in order. Objects count if they never move, are not toys, are
+/// within reach and sufficiently visible. A report matches an object of its class; pairs are
+/// matched one-to-one, greedily by distance in the body frame.
 std::vector<MemoryFrame> besideTheBody(const SimulatedTruth& truth,
                                        const std::vector<EstimateRow>& rows,
                                        const std::vector<replay::StampedPose>& trajectory,

@@ -26,7 +26,8 @@ struct DriveInMap {
   std::map<ObjectId, RigidTransform> objects;
   std::vector<Eigen::Vector3d> anchors_M;
   std::vector<LoopLine> loops;
-  /// Position of the body by frame as the map estimated it then.
+  /// Position of the body by frame as the map estimated it at that time, in the axes of the
+  /// session's start.
   std::map<std::uint64_t, Eigen::Vector3d> then;
 
   /// Pose of the body in M; T_MW is interpolated between anchors.

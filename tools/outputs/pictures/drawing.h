@@ -44,8 +44,9 @@ cv::Size sizeOf(const std::string& text, const TextStyle& style = {});
 void drawText(cv::Mat& image, const std::string& text, const cv::Point& at, const Colour& colour,
               const TextStyle& style = {});
 
-/// Place for a rectangle inside `area`, preferably with its lower left corner at `at`, beside the
-/// taken ones.
+/// Place for a rectangle of `size` inside `area`, with its lower left corner preferably at `at`. It
+/// does not overlap the taken ones if there is free space nearby. A rectangle larger than the area
+/// starts at its upper left corner.
 cv::Rect placeFor(const cv::Size& size, const cv::Point& at, const cv::Rect& area,
                   const std::vector<cv::Rect>& taken);
 

@@ -27,8 +27,10 @@ struct Evolution {
   std::vector<EvolutionPoint> points;
 };
 
-/// At most `most` confirmed objects: the longest visible in each class except *other*, then others.
-/// Truth is the nearest track by the median within 3 m, one-to-one.
+/// Selects at most `most` confirmed objects: the one visible longest in each class except *other*,
+/// then the others visible longest. Ground truth is the nearest track by the median over the frames
+/// in which the object was visible, within 3 m. Pairs are one-to-one, with the smallest distances
+/// first.
 std::vector<Evolution> chooseEvolutions(const DriveLog& log, const PictureTruth* truth,
                                         std::size_t most);
 

@@ -30,7 +30,8 @@ struct BodyErrors {
   std::vector<Mark> marks;
 };
 
-/// `poses`: in W, by frame; truth aligned at the start. No points without a loop.
+/// `poses`: in W, by frame. Ground truth and all errors are in W, with ground truth aligned at the
+/// start of the run. Returns no points if there was no loop.
 BodyErrors bodyErrors(const std::map<std::uint64_t, replay::StampedPose>& poses,
                       const DriveInMap& in_map, std::vector<BodyErrors::Mark> marks,
                       const PictureTruth* truth);

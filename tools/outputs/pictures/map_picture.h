@@ -41,7 +41,7 @@ struct MapView {
   }
 };
 
-/// The trajectory and its surroundings (60 m, less in rooms).
+/// A view of the trajectory and its surroundings (60 m, less in rooms; half of that for truth).
 MapView viewOf(const MapContent& content);
 cv::Mat drawMap(const MapContent& content, const MapView& view);
 /// Returns false if there is neither a trajectory nor an object, or if the file cannot be written.

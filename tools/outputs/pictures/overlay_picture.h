@@ -22,7 +22,8 @@ class OverlayPicture {
   /// Size of each picture: the scaled image, the plan and the header; even numbers.
   cv::Size size() const;
   cv::Rect imageArea() const;
-  /// `image`: not undistorted. `path`: up to this frame. `start`: displayed as 0.
+  /// `image`: CV_8UC1 or CV_8UC3 in the size of the calibration, not undistorted. `path`: positions
+  /// of the body up to this frame. `start`: the time that is displayed as 0.
   cv::Mat draw(const cv::Mat& image, const FrameGlance& frame,
                const std::vector<Eigen::Vector3d>& path, TimePoint start) const;
 
@@ -37,7 +38,8 @@ class OverlayPicture {
   double scale_;  ///< scale of the image in the picture
 };
 
-/// Range of the plan, m: nine tenths of the visible objects, 4 to 60; 30 without any.
+/// Range of the plan: the distance in m from the body that includes nine tenths of the visible
+/// confirmed objects. 30 if there were none; at least 4, at most 60.
 double usualReach(const DriveLog& log);
 
 }  // namespace perdure::tools

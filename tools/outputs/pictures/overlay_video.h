@@ -21,8 +21,9 @@ class OverlayWriter {
   OverlayWriter(std::filesystem::path file, const CameraCalibration& camera, double rate_hz,
                 const OverlaySettings& settings);
 
-  /// Adds a frame, in order of time. Reasons: image_missing, image_malformed, image_size (differs
-  /// from the calibration), and those of VideoFile.
+  /// Adds a frame; frames must be sorted by time. Opens the file at the first one. Reasons:
+  /// image_missing, image_malformed (viewOf), image_size (differs from the calibration), and those
+  /// of VideoFile (then nothing is written).
   Result<void> add(const Frame& frame, const FrameGlance& glance);
   /// Finishes the film. Reason video_not_written.
   Result<void> finish() { return video_ ? video_->finish() : Result<void>(); }
@@ -41,8 +42,9 @@ class OverlayWriter {
   TimePoint start_;
 };
 
-/// Draws each frame of the log whose image still exists. Returns a sentence about the result or
-/// failure. `progress`: frames done, total.
+/// Draws each frame of the log whose image is still in the folder. Returns a sentence about the
+/// result or the reason of a failure; missing images or codecs do not throw. Calls `progress` with
+/// the frames completed and the total.
 std::string writeOverlay(const DriveLog& log, const replay::DatasetOptions& data,
                          const std::filesystem::path& file,
                          const std::function<void(std::size_t, std::size_t)>& progress);

@@ -26,7 +26,8 @@ struct TruthTrack {
   std::vector<Key> keys;  ///< never empty; sorted by time
   TimePoint present_from = TimePoint::min(), present_until = TimePoint::max();
 
-  /// Static: the last key until then, or the first. Moving: linear between keys. Empty: absent.
+  /// State at a time. Static objects: the last key until then, or the first one. Moving objects:
+  /// linear interpolation between keys, nothing outside. Empty while the object is absent.
   std::optional<Key> at(TimePoint time) const;
 };
 

@@ -15,7 +15,8 @@ namespace perdure::tools {
 
 using StampedPoses = std::map<std::uint64_t, replay::StampedPose>;  ///< T_WB, by frame
 
-/// Aligns truth with W by yaw and position, at the first of `poses` with a true pose.
+/// Aligns the world of ground truth with W by yaw and position, at the first of `poses` with a
+/// known true pose. Empty if there is none.
 PictureTruth truthOfSimulation(const sim::Truth& truth, const replay::PoseFile& body,
                                const StampedPoses& poses);
 
@@ -24,7 +25,8 @@ PictureTruth truthOfSimulation(const sim::Truth& truth, const replay::PoseFile& 
 PictureTruth truthOfLabels(const std::vector<replay::KittiLabel>& labels,
                            const RigidTransform& T_RI, const StampedPoses& poses);
 
-/// What the folder contains; empty if nothing, or if its truth is invalid.
+/// Loads the truth of a dataset folder. Empty if it has none, or if it is invalid (the scoring
+/// reports that).
 std::optional<PictureTruth> pictureTruth(const replay::Dataset& dataset,
                                          const replay::DatasetOptions& data,
                                          const StampedPoses& poses);

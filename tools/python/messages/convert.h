@@ -28,9 +28,11 @@ T fromPython(pybind11::handle from) {
 /// Sets the default values of a struct in an instance of the class with its name.
 void setDefaults(const std::string& name, pybind11::handle instance);
 
-/// {"Objects": [(name, kind, shape or None, unit, item or None), …], …}, structs after those that
-/// they contain. Kinds: int, bool, float, str, choice, array, pose, message, optional_message,
-/// optional_float, list, names, counts, bytes, pixels. Item: struct, or words of a choice.
+/// {"Objects": [(name, kind, shape or None, unit, item or None), …], …}: every struct of every
+/// topic, after the structs that it contains. Kinds: int, bool, float, str, choice, array, pose,
+/// message, optional_message, optional_float, list, names, counts, bytes, pixels. Item: the
+/// struct's name, or the words of a choice. The classes, their docstrings and their type hints are
+/// generated from it.
 pybind11::dict schema();
 
 /// {"objects": "Objects", "frame/": "Frame", …}

@@ -25,7 +25,8 @@ class Lens {
   Eigen::Vector3f direction(int column, int row, float dx, float dy) const;
   /// Angle between neighbouring pixels at the image centre, radians.
   float pixelAngle() const { return pixel_angle_; }
-  /// Pixel of any point with z > 0; beyond the distortion's range, extended radially.
+  /// Pixel of any point with z > 0. Outside the range of the distortion, the outermost valid pixel
+  /// in that direction is extended radially with the focal length.
   Eigen::Vector2d projectBeyond(const Eigen::Vector3d& point_C) const;
 
  private:

@@ -19,10 +19,12 @@ inline constexpr float kPi = std::numbers::pi_v<float>;
 
 class MeshBuilder {
  public:
-  /// `repeat_m`: width of a texture repeat on faces without texture coordinates.
+  /// `repeat_m` is the width of one texture repeat for faces without texture coordinates. These use
+  /// the two coordinates across the face's main direction.
   int material(const Material& material, float repeat_m = 1.0F);
 
-  /// Starts a part, without common smooth normals; edges above `crease_deg` stay.
+  /// Starts a new part. Faces of different parts share no smooth normals. Faces that meet at more
+  /// than `crease_deg` keep an edge. Inverted meshes are not detected: see `closed`.
   void begin(float crease_deg = 40.0F);
   /// Orients the last part so that its volume is positive; for closed parts.
   void closed();

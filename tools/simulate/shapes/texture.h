@@ -37,7 +37,8 @@ enum class TextureKind {
 
 class Texture {
  public:
-  /// Tileable; size is a power of two up to 4096, else throws std::invalid_argument.
+  /// size × size texels, tileable; size is a power of two from 1 to 4096, otherwise throws
+  /// std::invalid_argument.
   Texture(TextureKind kind, std::uint64_t seed, int size = 256);
   /// Linear RGB, trilinear; `footprint`: width of the pixel in repeats. uv wraps.
   Eigen::Vector3f sample(const Eigen::Vector2f& uv, float footprint) const;

@@ -52,7 +52,8 @@ Json vectors(const std::vector<float>& values) {
   return {{"itemSize", 3}, {"type", "Float32Array"}, {"array", std::move(array)}};
 }
 
-/// In a unit box. The colour is the brightness relative to the largest part.
+/// A mesh in a unit box about the origin. The colour is the brightness of each part, relative to
+/// the largest one; the page multiplies it by the colour of the class.
 Json geometryOf(const tools::Mesh& mesh) {
   Eigen::Vector3f low = mesh.positions.front(), high = low;
   for (const auto& p : mesh.positions) low = low.cwiseMin(p), high = high.cwiseMax(p);

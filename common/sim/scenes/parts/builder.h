@@ -1,4 +1,5 @@
-// Builds a scene: assigns ids and looks, and refuses objects that would intersect.
+// Builds a scene: assigns ids and looks, and refuses objects that would intersect others or block a
+// road or the body's path.
 #pragma once
 
 #include <string>
@@ -27,7 +28,8 @@ class SceneBuilder {
   const SceneOptions& options() const { return options_; }
   double seconds(double by_default) const { return options_.seconds.value_or(by_default); }
 
-  /// Objects with an underside below `height` keep `clearance` from the body's path.
+  /// Sets the body's motion. Objects with an underside below `height` are not placed within
+  /// `clearance` of its path.
   void setBody(Trajectory motion, double seconds, double clearance, double height);
   void reserve(const Solid& solid) { reserved_.push_back(solid); }
   void reserveWay(const SceneObject& object, double until_s, double margin);

@@ -8,7 +8,8 @@ namespace perdure::sim {
 
 enum class Carrier { kVehicle, kHand };
 
-/// Cameras (two with options.stereo), IMU, speed of a vehicle. `pitch_down`: tilt, radians.
+/// Cameras (two with options.stereo: 0.5 m apart on a vehicle, 0.12 m if handheld), IMU, and the
+/// speed of a vehicle. `pitch_down` is the camera's tilt in the body, radians.
 Rig makeRig(Carrier carrier, const SceneOptions& options, Dice& dice, double pitch_down);
 
 /// Height of the camera above the body's origin.

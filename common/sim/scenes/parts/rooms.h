@@ -13,7 +13,8 @@ class Room {
  public:
   Room(SceneBuilder& builder, double length, double width);
 
-  /// A table with up to 6 `chairs` around it and up to 2 `monitors`. False if there is no space.
+  /// A table with `chairs` of 0 to 6 around it and `monitors` of 0 to 2 on it. Returns false if
+  /// there is no space for the table; chairs without space are left out.
   bool putTable(const Eigen::Vector2d& point, double yaw, int chairs, int monitors);
   /// A table at the wall with a monitor on it and a chair in front.
   bool putDesk(const Eigen::Vector2d& at_wall, double inwards);

@@ -58,7 +58,8 @@ class Streets {
   Furnishing furnishing_;
 };
 
-/// A path on the right-hand lane that turns at these crossings, from the first to the last.
+/// A path on the right-hand lane that turns at these crossings. The first and the last point are
+/// its ends. Right turns are tighter than left turns.
 GroundPath laneThrough(const std::vector<Eigen::Vector2d>& points);
 void drawDaylight(SceneBuilder& builder);
 /// Sets the body as a car with this drive for `seconds`, with a car's sensors, in daylight.

@@ -14,10 +14,12 @@
 
 namespace perdure::capture {
 
-/// Each camera has its own thread. All members are called from one other thread.
+/// Each camera has its own thread. All members are called from one other thread, which passes on
+/// the cameras' images.
 class LiveCameras {
  public:
-  /// cam0, cam1. `give` is called on their threads, with the camera's name in the frame.
+  /// One or two cameras: cam0, cam1. `give` is called on their threads, with the camera's name in
+  /// the frame.
   LiveCameras(const std::vector<OpenCamera>& cameras, double rate_hz,
               const std::function<void(CameraImage)>& give);
 

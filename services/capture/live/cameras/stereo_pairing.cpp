@@ -156,7 +156,8 @@ void StereoPairing::judge() {
   alone_ = late_ = 0;
 }
 
-/// Reports the difference again if the phases of free-running cameras have drifted.
+/// Reports the difference again if it has changed much, because the phases of free-running cameras
+/// drift.
 void StereoPairing::judgeDifference() {
   if (apart_ms_.empty()) return note_.clear();
   const auto middle = apart_ms_.begin() + static_cast<std::ptrdiff_t>(apart_ms_.size() / 2);

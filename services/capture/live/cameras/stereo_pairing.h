@@ -28,13 +28,15 @@ class CameraTimeline {
   double period_ns_ = 0.0;
 };
 
-/// An image of cam0 waits for its nearest partner for the tolerance, if cam1 sends images, and is
-/// then passed on alone. Images of cam1 wait until cam0 is later.
+/// Pairs images by the nearest stamp. An image of cam0 waits for its partner no longer than the
+/// tolerance, and is then passed on alone. If cam1 sends no images, it does not wait. Images of
+/// cam1 wait until later images of cam0 arrive, and are then dropped.
 class StereoPairing {
  public:
   explicit StereoPairing(double rate_hz);
 
-  /// Takes an image and returns those to publish: cam0 first, cam1 with the same number.
+  /// Takes an image of cam0 or cam1 and returns the images to publish: cam0 first, then cam1 with
+  /// the same number. `now_ns`: CLOCK_BOOTTIME.
   std::vector<CameraImage> first(CameraImage image, std::int64_t now_ns);
   std::vector<CameraImage> second(CameraImage image, std::int64_t now_ns);
   std::vector<CameraImage> due(std::int64_t now_ns);

@@ -17,7 +17,8 @@ namespace {
 namespace controls = libcamera::controls;
 namespace formats = libcamera::formats;
 
-/// The best format first. libcamera names the bytes of a pixel from the last to the first.
+/// The best format first, with the least conversion and full colour. libcamera names the bytes of a
+/// pixel from the last one in memory to the first.
 const std::array<KnownFormat, 11> kFormats = {{
     {formats::RGB888, PixelLayout::kBgr},
     {formats::BGR888, PixelLayout::kRgb},
@@ -64,7 +65,8 @@ class Asking {
   std::string missing_, refused_;
 };
 
-// From libcamera 0.5 on, exposure time and gain each have their own automatic mode.
+// From libcamera 0.5 on, exposure time and gain each have their own automatic mode, which ignores
+// the manual value. A camera without automatic gain then has no AeEnable.
 #if LIBCAMERA_VERSION_MAJOR > 0 || LIBCAMERA_VERSION_MINOR >= 5
 void askManualExposure(Asking& asking) {
   if (!asking.offers(controls::ExposureTimeMode)) {
@@ -112,7 +114,8 @@ libcamera::Transform transformOf(const std::string& flip) {
   return flip == "both" ? libcamera::Transform::HVFlip : libcamera::Transform::Identity;
 }
 
-// Before libcamera 0.2: a transform of the upright image; since then the orientation.
+// Before libcamera 0.2 the configuration has a transform of the upright image; since then it has
+// the resulting orientation.
 #if __has_include(<libcamera/orientation.h>)
 libcamera::Orientation orientationOf(const std::string& flip) {
   return libcamera::Orientation::Rotate0 * transformOf(flip);

@@ -17,14 +17,15 @@
 
 namespace perdure::capture {
 
-/// Index of the id equal to `wanted`, else of the first that contains it. With `alone`, only one
-/// may contain it. Fails with "camera_absent".
+/// Index in `ids` of the id equal to `wanted`, else of the first id that contains it. With `alone`,
+/// only one id may contain it, so that left and right are not exchanged. Fails with "camera_absent"
+/// and the fix.
 Result<std::size_t> chooseCamera(const std::vector<std::string>& ids, const std::string& wanted,
                                  bool alone);
 
 struct AskedControls {
   libcamera::ControlList list;
-  std::string missing;  ///< settings that the camera does not offer
+  std::string missing;  ///< settings that the camera does not offer; empty if it offers all
   std::string refused;  ///< why the camera must not be used, with the fix; empty if it may be used
 };
 
@@ -37,8 +38,9 @@ std::span<const KnownFormat> knownFormats();
 /// Requests `camera.flip`; validate() removes it if the camera does not support it.
 void askFlip(libcamera::CameraConfiguration& configuration, const std::string& flip);
 bool flips(const libcamera::CameraConfiguration& configuration, const std::string& flip);
-/// Why images do not follow `camera.flip`, with the fix. With "none", images are left as delivered,
-/// also rotated by 90°.
+/// Why images do not follow `camera.flip`, with the fix; empty if they do. With "none", images are
+/// left as delivered. Those of a camera mounted at 90° stay rotated, and are calibrated in this
+/// orientation.
 std::string flipRefused(const libcamera::CameraConfiguration& configuration,
                         const std::string& flip);
 

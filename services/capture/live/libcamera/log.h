@@ -10,7 +10,8 @@
 
 namespace perdure::capture {
 
-/// A libcamera line "[time] [thread] LEVEL …" from its level on, if it is a warning or worse.
+/// Returns a libcamera line "[time] [thread] LEVEL Category file:line words" from its level on, if
+/// the level is warning or more severe. libcamera 0.0.3 cannot set this level for all categories.
 std::optional<std::string> worthLogging(std::string_view line);
 
 /// Receives libcamera's log during the lifetime of this object. `log` may be called on any thread.

@@ -8,13 +8,15 @@
 
 namespace perdure::capture {
 
-/// libcamera misses cameras that appear before udev grants access to their nodes.
+/// libcamera detects plugged-in cameras itself, except those that appear before udev has granted
+/// access to their nodes. Its enumerations double with each device that is plugged in.
 class RestartRule {
  public:
   /// libcamera enumerated the cameras while these nodes existed.
   void started(std::set<std::string> nodes);
   void unplugged() { ++unplugged_; }
-  /// A camera is missing while these nodes exist: whether to enumerate again, once for them.
+  /// A camera is missing while libcamera runs and these nodes exist. Returns whether libcamera
+  /// should enumerate again, once for the same nodes.
   bool missed(const std::set<std::string>& nodes);
 
  private:

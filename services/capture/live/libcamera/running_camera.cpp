@@ -27,7 +27,8 @@ RunningCamera::RunningCamera(std::shared_ptr<libcamera::CameraManager> manager,
 
 bool RunningCamera::over() { return lastOfAll(*this, &RunningCamera::leave, &RunningCamera::end); }
 
-/// Otherwise stopping the camera would abort the process because of unreturned requests.
+/// If only the kernel has noticed the removal, stopping the camera would abort the process because
+/// of unreturned requests.
 bool RunningCamera::end() {
   const bool told = gone_ || !running_;  // no signal if the camera vanished before it ran
   if (!told && openVideoNodeVanished()) return false;
@@ -98,8 +99,9 @@ void RunningCamera::completed(Request* request) {
   }
 }
 
-/// udev reports a node, not a camera. If its report is late, another camera may have that node,
-/// still send images, and abort the process.
+/// udev reports a node, not a camera. If its report is late, another camera may already have that
+/// node. The camera that libcamera then treats as gone still sends images, and the next one would
+/// abort the process.
 void RunningCamera::disconnected() {
   gone_ = true;
   done_.close();
@@ -123,8 +125,10 @@ void RunningCamera::giveBack(Request* request) {
   invokeMethod(&RunningCamera::queue, libcamera::ConnectionTypeQueued, request);
 }
 
-/// libcamera completes requests in the order of their queueing. The UVC driver reuses the buffer of
-/// a broken image last, so later images are delayed and then complete together.
+/// libcamera completes requests in the order in which they were queued. The UVC driver reuses the
+/// buffer of a broken image after the other buffers. Their images are delayed until that buffer has
+/// an image, which is the newest but completes first. They then complete together on libcamera's
+/// thread.
 void RunningCamera::takeTheRest() {
   invokeMethod(&RunningCamera::settle, libcamera::ConnectionTypeBlocking);
   while (const auto more = done_.tryPop()) in_hand_.push_back(*more);

@@ -17,16 +17,18 @@
 
 namespace perdure::capture {
 
-/// Calls `leave` and `end` on the object's thread, after all of its earlier messages and those that
-/// they post (queueRequest()). Returns the result of `end`.
+/// Calls `leave` and then `end` on the object's thread, and returns the result of `end`. Earlier
+/// messages of that thread, and those that they post (queueRequest()), are processed first, because
+/// libcamera would process them later, with raw pointers. After `leave`, the object must not post.
 template <class T, class Answer>
 Answer lastOfAll(T& object, void (T::*leave)(), Answer (T::*end)()) {
   object.invokeMethod(leave, libcamera::ConnectionTypeBlocking);
   return object.invokeMethod(end, libcamera::ConnectionTypeBlocking);
 }
 
-/// All access to requests and signals is on libcamera's thread, which uses raw pointers: no camera
-/// can be unplugged in between, and after over() no pointers remain.
+/// libcamera's thread calls slots and reads requests through raw pointers. Therefore all access to
+/// requests and signals is on that thread. No camera can be unplugged in between, and after over()
+/// that thread has no pointers to them.
 class RunningCamera final : public Unended, public libcamera::Object {
  public:
   static constexpr std::size_t kBuffers = 4;

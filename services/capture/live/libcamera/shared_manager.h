@@ -38,9 +38,11 @@ class SharedManager {
   std::unique_lock<std::mutex> opening() { return std::unique_lock(mutex_); }
   /// Returns the manager, which exists as long as one of its cameras is used.
   Result<std::shared_ptr<libcamera::CameraManager>> manager();
-  /// A new manager replaces this one once no camera is used. The caller holds one reference.
+  /// Reports that the manager lacks a required camera. A new manager replaces it once no camera is
+  /// used. The caller must hold one reference to the manager.
   void missing();
-  /// The same for an unplugged camera, because libcamera 0.0.3 enumerates 2^n times.
+  /// Reports that a camera was unplugged, with the same effect. Otherwise libcamera 0.0.3
+  /// enumerates the cameras 2^n times at the nth device that is plugged in.
   void unplugged();
   /// Keeps a camera whose removal udev has not reported yet. A later manager() destroys it once
   /// over() is true. The destructor waits for it for two seconds, and otherwise leaks it.

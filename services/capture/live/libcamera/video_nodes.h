@@ -12,7 +12,8 @@ bool openVideoNodeVanished(const std::filesystem::path& descriptors = "/proc/sel
 /// Descriptors of the nodes that stream into buffers, between a camera's start and stop.
 std::set<int> videoNodesWithBuffers(const std::filesystem::path& descriptors = "/proc/self/fd");
 
-/// Replaces the descriptor's file by one without data. The owner still closes it.
+/// Replaces the file of the descriptor by one that never has data and refuses video requests. The
+/// owner of the descriptor still closes it.
 void takeAway(int descriptor);
 
 }  // namespace perdure::capture

@@ -9,7 +9,8 @@
 namespace perdure::inference {
 namespace {
 
-/// YOLOX: (gx + x)·s, exp(w)·s. FastestDet: (gx + tanh x)·s, σ(w)·input. V2: as YOLOv5.
+/// YOLOX: centre (gx + x)·s, size exp(w)·s. FastestDet: centre (gx + tanh x)·s, size σ(w)·input.
+/// YOLO-FastestV2: as YOLOv5, with anchor `a`.
 Box boxOf(const ModelDescription& model, const Level& level, std::size_t a, int gx, int gy,
           const float* raw, std::size_t step) {
   if (model.family == Family::kYoloFastestV2) return anchoredBox(level, a, gx, gy, raw, step);

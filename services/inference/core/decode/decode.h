@@ -1,4 +1,4 @@
-// Decodes raw head tensors to boxes with evidence, one rule a family (eq. 6, 7).
+// Decodes raw head tensors to boxes with evidence, by one rule for each family (eq. 6, 7).
 #pragma once
 
 #include <array>
@@ -23,7 +23,7 @@ struct Candidate {
 };
 
 struct DecodeOptions {
-  double score_threshold = 0.05;    ///< of the best wanted class
+  double score_threshold = 0.05;    ///< least score of a box's best wanted class
   std::vector<std::size_t> wanted;  ///< indices of the model's classes to report, in order
 };
 

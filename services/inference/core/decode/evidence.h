@@ -1,6 +1,8 @@
-// Scores as log-likelihood ratios to clutter (eq. 7; README, "Clutter"). For a score p of class k,
-// activations[k] = logit(p) / T + b + logit(c), with the temperature T, the bias b, and the share c
-// of clutter among the reported boxes.
+// Scores as log-likelihood ratios (eq. 7: activations before the soft-max, one of them clutter).
+// Clutter is the reference: activations[0] = 0. For a score p of class k,
+//   activations[k] = logit(p) / T + b + logit(c),
+// with the temperature T, the bias b, and the share c of clutter among the reported boxes; README,
+// "Clutter".
 #pragma once
 
 #include <algorithm>

@@ -26,6 +26,7 @@ Overlap mostOverlapping(const Box& box, const Boxes& others) {
   return most;
 }
 
+/// The expectations and the reported boxes that have a match.
 struct Meetings {
   std::vector<bool> met, used;
 };
@@ -107,7 +108,8 @@ Candidate fused(const Expectation& expectation, const Candidate& candidate) {
   Candidate result = candidate;
   for (std::size_t i = 0; i < 4; ++i) {
     const double variance = expectation.side_sigma[i] * expectation.side_sigma[i];
-    const double share = variance > 0.0 ? own[i] / (own[i] + variance) : 0.0;  // of the prediction
+    // The weight of the prediction.
+    const double share = variance > 0.0 ? own[i] / (own[i] + variance) : 0.0;
     sides[i] = share * predicted[i] + (1.0 - share) * box[i];
     result.side_sigma[i] = std::sqrt((1.0 - share) * own[i]);
   }

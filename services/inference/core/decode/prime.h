@@ -1,7 +1,10 @@
 // Top-down likelihood: the network's output at places where objects are predicted but no box was
-// reported (eq. 7; README, "Top-down"). As near any place some candidate has a low score, the ratio
-// compares the best one near a place with the object and near one without. PrimedCalibration holds
-// it.
+// reported (eq. 7 takes the likelihood at the predicted projection; README, "Top-down").
+//
+// The best of many candidates is a selection, because near any place some candidate has a low
+// score. The likelihood ratio therefore compares two cases in which no box was reported: the best
+// candidate near a place with the object, and near a place without one. PrimedCalibration holds
+// this ratio; `perdure model calibrate` fits it with the same selection.
 #pragma once
 
 #include <array>
@@ -19,7 +22,8 @@ namespace perdure::inference {
 struct Expectation {
   Box box;                             ///< pixels of the network's input
   std::size_t activation = 1;          ///< index of its class in Candidate::activations
-  std::array<double, 4> side_sigma{};  ///< of the prediction, pixels of the input
+  std::array<double, 4> side_sigma{};  ///< standard deviation of the prediction, pixels of the
+                                       ///< input
 };
 
 /// Answer to an expectation without a matching reported box.
@@ -32,9 +36,13 @@ struct PrimedAnswer {
 /// Smallest IoU at which a reported box matches an expectation, or a candidate is near it.
 inline constexpr double kMet = 0.6, kNear = 0.4;
 
-/// Matches reported boxes and expectations one to one, by falling overlap. A candidate belongs to
-/// the expectation or unmatched reported box that it overlaps most. Each expectation takes its best
-/// candidate: log-odds of the class − ½ Σ d² / σ², with σ of prediction and box together. In the
+/// Matches reported boxes and expectations one to one, by falling overlap. The boxes of several
+/// objects in a row are often merged into one, but their candidates are separate. A candidate
+/// therefore belongs to the expectation that it overlaps most, independent of merging. If it
+/// overlaps an unmatched reported box more, it belongs to that box.
+///
+/// Each expectation takes its best candidate by activation and position: the highest log-odds of
+/// the class − ½ Σ d² / σ², with σ of the prediction and of the box together. The result is in the
 /// order of the expectations.
 std::vector<PrimedAnswer> prime(const Calibration& calibration,
                                 const std::vector<Expectation>& expected,
@@ -50,7 +58,8 @@ double primedLogRatio(const PrimedCalibration& primed, const PrimedAnswer& answe
 /// Time for which predictions are valid after their frame.
 inline constexpr double kPrimedHorizon_s = 0.5;
 
-/// Whether camera and source match, and the predictions' frame is at most kPrimedHorizon_s older.
+/// Whether the predictions match the frame's camera and source. Their frame must not be later than
+/// this frame, and at most kPrimedHorizon_s older.
 bool fitsFrame(const Predictions& predictions, const Frame& frame);
 
 Box movedOn(const Prediction& prediction, double after);

@@ -9,7 +9,8 @@
 
 namespace perdure::inference {
 
-/// Applied probabilities are limited to [p, 1 − p], because float32 has no finer steps below 1.
+/// Probabilities of networks without logits are limited to [p, 1 − p] with this p before the logit,
+/// because float32 has no finer steps below 1. The evidence is then within ±16.1.
 inline constexpr double kLeastProbability = 1e-7;
 
 /// Raw scores of one box; column k is at scores[k * step].
@@ -19,10 +20,13 @@ struct RawScores {
   std::size_t step;
 };
 
-/// Fills score and activations and returns the best wanted class, if above the threshold. p_k =
-/// σ(o)^a · q_k^b, q_k sigmoid or soft-max; without objectness σ(o) = 1; activations[k] =
-/// logit(p_k) / T + logit(c). With a background: p = softmax(o); activations[k] = (o_k −
-/// o_background) / T + logit(c). `applied` probabilities are first converted to raw values.
+/// Fills score and activations and returns the best wanted class; empty if the box is below the
+/// threshold. Class k is column k, or k + 1 if the background is first.
+///   p_k = σ(o)^a · q_k^b, q_k sigmoid or soft-max of the classes; without objectness σ(o) = 1
+///   activations[k] = logit(p_k) / T + logit(c)
+/// With a soft-max over classes and background:
+///   p = softmax(o); activations[k] = (o_k − o_background) / T + logit(c), within ±kMaxLogit
+/// `applied` probabilities are first converted to raw values: logit(p), or log p of a soft-max.
 std::optional<std::size_t> weigh(const ModelDescription& model, const DecodeOptions& options,
                                  const RawScores& raw, Candidate& candidate);
 

@@ -12,12 +12,14 @@
 
 namespace perdure::inference {
 
-/// The sides (x1, y1, x2, y2) after clockwise quarter turns of the image, 0 to 4.
+/// Returns the values of the sides (x1, y1, x2, y2) after clockwise quarter turns of the image.
+/// `quarters`: 0 to 4.
 std::array<double, 4> turned(const std::array<double, 4>& sides, int quarters);
 /// Returns a box after such turns of an image of this size.
 Box turned(const Box& box, int quarters, double width, double height);
 
-/// Pixels of the image, turned clockwise by `quarters`, to the input: x · scale_x + offset_x.
+/// Maps pixels of the image to pixels of the input. The image is turned clockwise by `quarters`;
+/// then x_input = x_turned · scale_x + offset_x.
 struct ImageFit {
   double scale_x = 1, scale_y = 1, offset_x = 0, offset_y = 0;
   int width = 0, height = 0;  ///< size of the scaled image, without padding
@@ -36,7 +38,8 @@ ImageFit fitOf(const Input& input, int image_width, int image_height, int quarte
 /// Share of the input outside the image; 0 without letterbox.
 double paddedShare(const Input& input, int image_width, int image_height, int quarters = 0);
 
-/// Input blob (1,3,H,W) of float32. Fails with "frame_malformed" if size and data differ.
+/// Input blob (1,3,H,W) of float32. Mono images are repeated in all three channels. Fails with
+/// "frame_malformed" if the frame's size does not match its data.
 Result<cv::Mat> makeBlob(const Input& input, const Frame& frame, int quarters = 0);
 
 /// Clockwise quarter turns, 0 to 3. `up_C`: against gravity. `present` stays until the image leans

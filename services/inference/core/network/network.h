@@ -1,4 +1,4 @@
-// A network from a file, run by OpenCV's DNN module or ONNX Runtime.
+// A network from a file, run by OpenCV's DNN module, or ONNX Runtime if this build has it.
 #pragma once
 
 #include <memory>
@@ -39,8 +39,9 @@ class Network {
   virtual std::string backend() const = 0;
 };
 
-/// `threads`: of ONNX Runtime; OpenCV uses those of the process. Fails with "model_unreadable",
-/// "model_without_tensor" or "backend_absent".
+/// `threads`: threads of ONNX Runtime; OpenCV uses those of the process (cv::setNumThreads). Fails
+/// with "model_unreadable", "model_without_tensor" or "backend_absent". The detail is a clause that
+/// names the backend and the cause.
 Result<std::unique_ptr<Network>> loadNetwork(const NetworkFile& file,
                                              const std::vector<std::string>& tensors,
                                              Backend backend = Backend::kAuto, int threads = 1);

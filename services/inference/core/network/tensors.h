@@ -31,13 +31,13 @@ std::vector<LevelTensor> levelTensors(const ModelDescription& model, const Level
 /// Names of the tensors to request from the network, in the order of decode()'s argument.
 std::vector<std::string> tensorNames(const ModelDescription& model);
 
-/// Cells of a level; those of perdure and nanodet may extend beyond the input: 240 / 32 gives 8.
+/// Columns and rows of a level. Perdure and nanodet may exceed the input: 240 / 32 gives 8.
 std::pair<int, int> cellsOf(const ModelDescription& model, const Level& level);
 
 /// Number of score columns: the classes, and the background if present.
 std::size_t scoreColumns(const ModelDescription& model);
 
-/// Shapes in the order of tensorNames(). YOLOv5 heads may also be (1,A,H,W,5+K).
+/// Required shapes, in the order of tensorNames(). YOLOv5 heads may also be (1,A,H,W,5+K).
 std::vector<std::vector<int>> expectedShapes(const ModelDescription& model);
 
 /// Fails with "model_output_shape" or "model_output_not_finite".

@@ -23,8 +23,9 @@ class Judge {
   void learn(const ModelInfo& model);
   /// Compares one frame. Certain boxes of the old process count if the new network has their class.
   void compare(const Detections& elder, const Detections& newcomer);
-  /// "unknown_model", "empty" (no boxes), "elsewhere" (few at the old process's certain boxes) or
-  /// "flood" (ten times the boxes).
+  /// Returns "unknown_model", "empty" (no boxes although the old process has certain ones),
+  /// "elsewhere" (boxes, but very few at the certain boxes of the old process) or "flood" (ten
+  /// times the boxes).
   std::optional<Reason> complaint() const;
   void reset();
 

@@ -1,4 +1,5 @@
-// Strength with which a result may be written: late processes must not take the topic back.
+// Strength with which a result may be written. A process that was considered dead, or that is late,
+// must not take the topic back with old results. It first writes with a strength below the others.
 #pragma once
 
 #include <chrono>
@@ -8,10 +9,14 @@
 
 namespace perdure::inference {
 
-/// `strength` for the owner, one less for the standby, kOutOfForm after a loss of form: a missed
-/// lease, a result older than the lease, or kFailures failures in a row. Form returns after
-/// kGoodResults good results in a row and kLeases leases. A process that resumes finds many old
-/// frames: it is then a spare, and does not take the topic from another.
+/// The strength is `strength` for the owner and one less for the standby. After a loss of form it
+/// is kOutOfForm, so that any healthy process takes precedence. Form is lost by a missed lease
+/// (`losses` increased), a result older than the lease, or kFailures failures of the network in a
+/// row.
+///
+/// Form returns after kGoodResults good results in a row, and after at least kLeases leases. A
+/// process that resumes after a suspension finds many old frames that appear new to it. It is then
+/// a spare: it does not take the topic from another process that writes.
 class Ownership {
  public:
   static constexpr std::int64_t kOutOfForm = 0;
@@ -25,8 +30,9 @@ class Ownership {
   /// Ownership of a rehearsing process: always below all others.
   static Ownership unheard(Duration lease) { return {kOutOfForm - 1, false, lease}; }
 
-  /// Call it before each write. `age`: since this process received the frame. `losses`: expired
-  /// leases of its writer. `alone`: no other writer is received.
+  /// Returns the strength; call it before each write. `age`: time since this process received the
+  /// frame. `losses`: number of expired leases of its writer since the start. `alone`: no other
+  /// writer is received.
   std::int64_t strengthFor(Time now, Duration age, std::uint64_t losses, bool alone) {
     failures_ = 0;
     if (losses > losses_ || age > lease_) {

@@ -1,7 +1,10 @@
-// Takeover of one inference process by another, as a state machine over own results, received
-// results and notices. Each call passes the time. The new one: rehearsing, on probation, plain; or
-// it gives up and ends. The old one: plain, watches, retires; or it takes back and outbids the new
-// one.
+// Takeover of one inference process by another while frames arrive, seen from each of the two. It
+// is a state machine over own results, received results and received notices. It has no clock: each
+// call passes the time. No third process is needed; the process that started the new one may have
+// ended.
+//
+//   new one:   rehearsing ──► on probation ──► plain          gives up: silent, and ends
+//   old one:   plain ──► watches ──► retires                  takes back: outbids the new one
 #pragma once
 
 #include <chrono>
@@ -26,7 +29,8 @@ struct SwapOptions {
 class Swap {
  public:
   static constexpr std::size_t kRehearsal = 15;  ///< plausible frames in a row
-  static constexpr std::size_t kPatience = 150;  ///< own results: a rehearsal is too slow
+  static constexpr std::size_t kPatience = 150;  ///< number of own results after which a rehearsal
+                                                 ///< is too slow
   static constexpr int kFailures = 3;            ///< failures of the network in a row
   using Time = std::chrono::steady_clock::time_point;
 
@@ -104,7 +108,7 @@ class Swap {
   InstanceId follows_ = 0;  ///< process that this new process replaces
   std::optional<Watch> watch_;
   std::vector<Detections> again_;
-  Time again_at_{}, again_from_{};  ///< of the repetition
+  Time again_at_{}, again_from_{};  ///< time of the repetition, and start of the results to repeat
 };
 
 }  // namespace perdure::inference

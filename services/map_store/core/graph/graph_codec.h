@@ -22,7 +22,8 @@ bool isSound(const mapping::Edge& edge);
 bool isSound(const mapping::ObjectRecord& record);
 bool isSound(const mapping::View& view);
 
-// The decoders refuse bytes that are not whole, known and sound ("graph_malformed").
+// The decoders refuse ("graph_malformed") bytes that are truncated, too long, of another version or
+// unsound.
 
 Bytes encodeAnchor(const mapping::Anchor& anchor);
 Result<mapping::Anchor> decodeAnchor(std::span<const std::uint8_t> bytes);

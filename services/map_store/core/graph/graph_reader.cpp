@@ -153,7 +153,8 @@ void leaveOutDangling(SavedGraph& graph) {
   }
 }
 
-/// Facts of a loop closure that was left out remain valid. Without facts, each object is one track.
+/// Facts of a loop closure that was left out remain valid. If facts are missing (a map from a
+/// server), each object is one track.
 void takeFacts(SavedGraph& graph, const std::set<mapping::SameObject>& facts) {
   SavedMap& map = graph.map;
   for (mapping::SameObject fact : facts) {
@@ -171,7 +172,8 @@ void takeFacts(SavedGraph& graph, const std::set<mapping::SameObject>& facts) {
   }
 }
 
-/// Fixes the first anchor of each component that lost its fixed one.
+/// Fixes the first anchor of each component without a fixed anchor, because that anchor or an edge
+/// to it may have been left out.
 void holdEachComponent(SavedMap& map) {
   DisjointSets<AnchorId> components;
   for (const auto& [id, saved] : map.edges) components.join(saved.edge.a, saved.edge.b);

@@ -17,15 +17,16 @@ extern const char* const kGraphSchema;
 /// SQL that creates the later tables if they do not exist: views, and tracks that share an object.
 extern const char* const kAddedSchema;
 
-/// The graph in a file: complete references, one fixed anchor of each component.
+/// The graph in a file. The ends of edges, the anchors of sightings and predecessors of the same
+/// session exist. One anchor of each component is fixed.
 struct SavedGraph {
   mapping::SavedMap map;
-  /// Parts left out because they, or parts that they need, could not be read.
+  /// Number of parts left out because they, or parts that they depend on, could not be read.
   std::uint64_t malformed = 0;
   std::set<ObjectId> shortened;  ///< records that lost `earlier`
 };
 
-/// Reads one state of the file. Empty for maps of older versions.
+/// Reads one state of the file, even during writes. Returns an empty graph for older maps.
 Result<SavedGraph> readGraph(const Connection& connection);
 
 // The functions that write do so within the caller's transaction and throw Failed.

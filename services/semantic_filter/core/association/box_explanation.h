@@ -10,7 +10,8 @@
 
 namespace perdure::semantic_filter {
 
-/// The predicted measurements of one frame, computed on demand. Its arguments outlive it.
+/// The predicted measurements of one frame, one for each track, computed when first needed. Belief,
+/// input and parameters must outlive this object.
 class BoxExplanations {
  public:
   BoxExplanations(const Belief& belief, const FrameInput& input, const Parameters& parameters);
@@ -28,12 +29,14 @@ class BoxExplanations {
   ScratchVector<std::optional<std::optional<PredictedBox>>> at_;  ///< outer: computed
 };
 
-/// Adds the partial views of tracks with v = 0 to the clutter of each box (log_partial_views).
+/// Adds the partial views of tracks with v = 0 to the clutter of each box (log_partial_views). The
+/// box is then less likely a new object or that of another track. The tracks do not change.
 void explainPartialViews(const Belief& belief, const ScratchVector<TrackVisibility>& visibilities,
                          FrameInput& input, const Parameters& parameters,
                          const ClassPriors& priors);
 
-/// If an occluded track explains a box far better, it gets v = visibility.minimum here.
+/// If an occluded track explains a box far better than any visible one, the occluder was misjudged.
+/// The occluded track gets v = visibility.minimum in this frame.
 void reviseOcclusion(Belief& belief, ScratchVector<TrackVisibility>& visibilities,
                      const FrameInput& input, const Parameters& parameters);
 

@@ -1,5 +1,6 @@
-// Joint association: marginals of the one-to-one association by loopy belief propagation (Williams,
-// Lau, IEEE T-AES 2014), with existence (Musicki, Evans, IEEE T-AES 2004). Derivation:
+// Joint association: marginals of the one-to-one association of boxes and tracks by loopy belief
+// propagation (Williams, Lau, IEEE T-AES 2014), with existence (Musicki, Evans, IEEE T-AES 2004).
+// It replaces the weights that the paper sets by hand ("Data Association"). Derivation:
 // tools/docs/maths/joint_association.md.
 #pragma once
 

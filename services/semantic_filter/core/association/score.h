@@ -73,13 +73,15 @@ std::array<bool, 4> hiddenSides(const TrackScore& score, std::size_t box,
 /// Returns ψ: "it made this box" against "none, or does not exist". `box`: in TrackScore::boxes.
 double associationWeight(const Track& track, const TrackScore& score, std::size_t box);
 
-/// The tempering exponent τ: the information of one more observation after n correlated ones,
-/// I(n+1) - I(n), I(n) = n / (ρ n + 1 - ρ); tools/docs/maths/class_and_existence_update.md.
+/// Returns the tempering exponent τ, because observations from one viewpoint share the errors of
+/// the network: the information of one more after n correlated ones, I(n+1) - I(n) with I(n) = n /
+/// (ρ n + 1 - ρ). Derivation: tools/docs/maths/class_and_existence_update.md.
 double temperingExponent(double observations, double correlation);
 
-/// Applies what the network says at a predicted measurement without a box (paper, eq. 7), as
-/// evidence of existence only; tools/docs/maths/joint_association.md, "Top-down likelihood".
-/// `log_ratio`: by class of the model, which must know the track's best class.
+/// Applies the network's answer at a predicted measurement without a box (paper, eq. 7;
+/// services/inference/README.md, "Top-down"), as evidence of existence only. Derivation:
+/// tools/docs/maths/joint_association.md, "Top-down likelihood". `log_ratio`: by class of the
+/// model; if the model does not know the track's best class, nothing changes.
 void applyTopDown(TrackScore& score, const Track& track, const std::vector<double>& log_ratio,
                   const FrameContext& frame);
 

@@ -40,7 +40,8 @@ double gateThreshold(double gate, int dof) {
   return quantile[dof];
 }
 
-/// How far the predicted side lies inside the observed one, px; a censored side is at or beyond it.
+/// How far the predicted side lies inside the observed one, px. The true side lies at or beyond a
+/// censored side: left and top at smaller coordinates, right and bottom at larger ones.
 double within(const BoxMeasurement& z, const ProjectedBox& predicted, int side) {
   const double d = predicted.sides[side] - z.sides[side];
   return side < 2 ? d : -d;

@@ -1,5 +1,6 @@
-// Measurement likelihood L_k(z) against clutter (paper, eq. 6 and 7). A measured side has a density
-// (px⁻¹); a censored one a probability that the true side lies beyond. Derivation:
+// Measurement likelihood L_k(z): how much better a hypothesis explains a box than clutter does
+// (paper, eq. 6 and 7). A measured side has a density (px⁻¹); of a censored side, cut by the border
+// or a nearer object, only the probability that the true side lies beyond is known. Derivation:
 // tools/docs/maths/measurement_likelihood.md.
 #pragma once
 
@@ -45,8 +46,9 @@ SideError sideError(const BoxParameters& parameters, const BoxNoise& noise);
 /// Returns the deviation of b, the part that stays with the object while the view stays.
 SideError lastingError(const BoxParameters& parameters, const BoxNoise& noise);
 
-/// The measurement of a box in an image of width × height pixels. Sides at the border are censored.
-/// The variance is of the noise; deviations given by the network cover noise and b.
+/// Returns the measurement of a box in an image of width × height pixels. Sides at the image border
+/// are censored. The variance is that of the noise only, because the share of b is in the state. A
+/// deviation that the network gives covers noise and b together.
 BoxMeasurement measure(const Box& box, double width, double height, const BoxParameters& parameters,
                        const BoxNoise& noise = {});
 /// Returns the deviation of b, in widths and heights, for a box of this size in pixels.
@@ -73,9 +75,10 @@ struct BoxScore {
   int part = -1;  ///< side where a partial view ends within the object; -1: none
 };
 
-/// log t(z; h(x), S) with `tail` degrees of freedom and censoring. `hidden` by a nearer object: the
-/// box spans the object (`amodal`) or ends anywhere in it. Something unmapped may hide one more
-/// side (`part`). Nothing outside the gate.
+/// Returns log t(z; h(x), S), with `tail` degrees of freedom and censoring. If a nearer object
+/// hides a side (`hidden`), the box spans the whole object all the same (`amodal`) or ends anywhere
+/// within it. Something unmapped may hide one more side (`part`). Returns nothing outside the gate,
+/// or if no side can be compared.
 std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& predicted,
                                  const Eigen::Matrix4d& covariance,
                                  const std::array<bool, 4>& hidden,

@@ -1,5 +1,6 @@
-// Predicted box of an object in its cuboid, with Jacobians (b = π(g s) of eq. 7). Derivation:
-// tools/docs/maths/cuboid_projection.md. z is against gravity; at yaw 0 the length is along x of W.
+// Predicted box of an object in its cuboid: the box around the images of its corners, with
+// Jacobians (b = π(g s) of the paper's eq. 7). Derivation: tools/docs/maths/cuboid_projection.md.
+// The cuboid is upright: its z axis is against gravity. At yaw 0 its length is along x of W.
 #pragma once
 
 #include <Eigen/Core>
@@ -41,13 +42,15 @@ struct BoxStyle {
   Shape shape = cuboidShape();  ///< the part of the cuboid that the box encloses
 };
 
-/// The box that the network should report: the shape with b of the hypothesis and the offset of the
-/// style; where the border cuts it, of the part inside.
+/// Returns the box that the network should report: that of the shape, with b of the hypothesis and
+/// the offset of the style. If the border cuts the shape, the other two sides are those of the part
+/// inside. A side beyond the border stays there.
 std::optional<ProjectedBox> projectObserved(const State& x, const Projector& from,
                                             const BoxStyle& style, double heading = 0.0);
 
-/// The yaw in W (rad) from KITTI's alpha = rotation_y - atan2(x, z) of an object at `centre_W`.
-/// Derivation: tools/docs/maths/azimuth_and_heading.md.
+/// Returns the yaw in W (rad) from KITTI's alpha of an object at `centre_W`. alpha = rotation_y -
+/// atan2(x, z) of the centre, in the gravity-levelled camera frame. Derivation:
+/// tools/docs/maths/azimuth_and_heading.md.
 double yawFromAzimuth(double azimuth, const Eigen::Vector3d& centre_W, const View& view);
 
 }  // namespace perdure::semantic_filter

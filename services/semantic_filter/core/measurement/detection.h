@@ -1,4 +1,5 @@
-// One box of the network: box and log-likelihood ratios by class (paper, eq. 6). Derivation:
+// One box of the network as the filter uses it: box, and log-likelihood ratios by class (paper, eq.
+// 6). Only differences to the clutter activation matter. Derivation:
 // tools/docs/maths/measurement_likelihood.md.
 #pragma once
 
@@ -32,7 +33,8 @@ using ClassNames = std::set<std::string>;
 /// What the filter keeps of a ModelInfo.
 struct Model {
   std::uint64_t hash = 0;
-  /// Hash of the first model of the same network, to which what is learned belongs.
+  /// Hash of the first model of the same network. The filter stores the learned properties of its
+  /// boxes by it. It differs from `hash` if the list of classes grew.
   std::uint64_t network = 0;
   std::vector<std::string> classes;
   /// the same as `classes`
@@ -69,9 +71,10 @@ void markSidesBesideNearer(std::vector<BoxDetection>& boxes, const View& view);
 /// Returns `hidden` and the sides beside nearer boxes.
 std::array<bool, 4> withSidesBesideNearer(std::array<bool, 4> hidden, const BoxDetection& box);
 
-/// What is wrong with a detection, as Health counts it, or nullptr: "detections_not_finite",
-/// "detections_box_inside_out", "detections_classes_mismatch", "detections_azimuth_without_sigma".
-/// One such detection refuses the message.
+/// Returns the name of the first fault of a detection, as counted in Health, or nullptr:
+/// "detections_not_finite", "detections_box_inside_out", "detections_classes_mismatch" or
+/// "detections_azimuth_without_sigma". A message with one such detection is refused as a whole,
+/// because a missing detection would count as a miss.
 const char* flawOf(const Detection& detection, const Model& model);
 
 /// Returns nothing for a flawed detection or one without a pixel in the image (width, height: px).

@@ -21,11 +21,13 @@ struct PoseError {
   Matrix6d covariance = Matrix6d::Zero();
   /// Product of the transitions of all frames. A track of product A has C (B A⁻¹)ᵀ at product B.
   Matrix6d product = Matrix6d::Identity();
-  /// The covariance is what odometry reports, which may shrink. A walk only grows.
+  /// The covariance is that of the odometry. Corrections shrink it, so that cross-covariances
+  /// (belief/pose_correlation.h) may become too large for it. A walk only grows.
   bool reported = false;
 };
 
-/// Brings `error` to the frame of `odometry`. Without `last_T_WB` a walk adds nothing.
+/// Brings `error` from the frame before to the frame of `odometry`. `last_T_WB`: pose of the frame
+/// before; without one a walk adds nothing.
 void advancePoseError(PoseError& error, const Odometry& odometry,
                       const std::optional<RigidTransform>& last_T_WB,
                       const PoseParameters& parameters);
@@ -121,7 +123,8 @@ struct FrameContext {
   double moverShare(const ClassPrior& prior) const {
     return movers ? movers->of(prior) : prior.moving;
   }
-  /// The present styles if the network of an earlier frame is the same.
+  /// Returns the styles of the boxes of an earlier frame: the present ones if its network is the
+  /// same, because the extent of the boxes is estimated.
   const BoxStyles& stylesOf(const FrameView& from) const {
     return styles && from.noise_scale.model == noise_scale.model ? *styles : *from.styles;
   }

@@ -9,7 +9,8 @@ namespace {
 
 constexpr std::size_t kMostReferences = 20000;  // about 8 MB
 
-/// The map has the track, or will have it with the next commit, also an unconfirmed one.
+/// The map has the track, or will have it with the next commit. A track may be unconfirmed now
+/// because its position relative to the body is too uncertain. Its stored row remains useful.
 bool onTheMap(const Track& track) {
   return track.life.confirmed || (track.life.once_confirmed && track.existence >= 0.5);
 }

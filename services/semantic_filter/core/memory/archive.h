@@ -1,5 +1,6 @@
-// Which tracks leave the working set for the map store (the paper's semantic map, line 288), once
-// it reports that they are on disk.
+// Archive: selects the tracks that leave the working set for the map store (the paper's semantic
+// map, line 288). No track leaves before the map store reports that it is on disk. Without a map
+// store, or with a slow one, the working set grows and nothing is lost.
 #pragma once
 
 #include <algorithm>
@@ -21,14 +22,16 @@ class Archive {
     std::vector<TrackId> archived;   ///< at rest and on the map, until they are recalled
     std::vector<TrackId> forgotten;  ///< never confirmed, or moving and out of view
   };
-  /// After the step of a frame at `now`. Tracks detected in frames from `oldest` on stay.
+  /// Must be called after the step of a frame at `now`, with the body at p_WB. Tracks that were
+  /// detected in frames from `oldest` on stay, because these frames may be stepped again.
   Leaving leaving(const std::vector<Track>& tracks, const Eigen::Vector3d& p_WB, TimePoint now,
                   TimePoint oldest);
 
   /// The map has everything on disk that was published up to `time`.
   void onKept(TimePoint time) { kept_ = std::max(kept_, time); }
   TimePoint kept() const { return kept_; }
-  /// Distance up to which the map gives objects, m; 0: none. Tracks leave at a greater one.
+  /// The distance from the body up to which the map gives objects, m; 0: none. Tracks leave at a
+  /// greater distance, so that they do not come and go.
   double nearRadius() const;
 
   /// Stores the product that the cross-covariance of an archived track refers to. The map lacks it.

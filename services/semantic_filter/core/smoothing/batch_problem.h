@@ -34,7 +34,8 @@ class KeyframeBatch {
   const Keyframes& keyframes() const { return *keyframes_; }
   std::size_t size() const { return keyframes_->size(); }
   bool exactPoses() const { return exact_; }
-  /// The covariance that the pose errors cause in all sides, px² (lower triangle).
+  /// Computes the covariance that the pose errors cause in all sides, px²; only its lower triangle.
+  /// `J`: derivatives of the sides by the pose error, for each keyframe.
   void poseCovariance(const ScratchVector<PoseJacobian>& J, SideMatrix& result) const;
   /// Returns the covariance of the present pose error with that of keyframe i.
   const Matrix6d& poseNow(std::size_t i) const { return now_[i]; }
@@ -46,7 +47,8 @@ class KeyframeBatch {
   /// Fills pairs_ and now_ instead.
   void pairUp(const PoseError& now);
 
-  /// Φ_i (from the first keyframe to keyframe i) and Φ_i⁻¹ P_i; empty without a usable inverse.
+  /// Φ_i (from the first keyframe to keyframe i) and Φ_i⁻¹ P_i. Keyframe i and an earlier keyframe
+  /// j have the covariance Φ_i (Φ_j⁻¹ P_j). Empty if a Φ_i has no usable inverse.
   ScratchVector<Matrix6d> onto_, from_;
   ScratchVector<Matrix6d> pairs_;  ///< in that case: the covariances of i and j <= i
   ScratchVector<Matrix6d> now_;    ///< of the present pose error with keyframe i
@@ -143,7 +145,8 @@ class BatchProblem {
   /// Return the variances of the sides, px², with the present scales of the network.
   Eigen::Vector4d noise(const Keyframe& k) const;
   Eigen::Vector4d lasting(const Keyframe& k) const;
-  /// Covariance of the sides of keyframes i and j <= i by white acceleration, px².
+  /// Returns the covariance of the sides of keyframe i and an earlier or equal j that white
+  /// acceleration causes between them and the newest keyframe, px².
   Eigen::Matrix4d acceleration(const Stack& s, std::size_t i, std::size_t j) const;
   ScratchVector<AzimuthMatch> azimuths(const State& x) const;
   double azimuthVariance(const Keyframe& k) const;  ///< rad², with the present noise scale

@@ -32,7 +32,8 @@ double changeBetween(const KeyframeView& a, const KeyframeView& b, const ViewSca
                       std::abs(a.log_height - b.log_height) / scales.log_distance);
 }
 
-/// The keyframe most similar to another; never the newest.
+/// Returns the keyframe most similar to another. It is never the newest, because a moving object is
+/// estimated at the time of the newest.
 std::size_t mostSimilar(const Eigen::Vector3d& place, const Keyframes& all,
                         const ViewScales& scales) {
   ScratchVector<KeyframeView> views;

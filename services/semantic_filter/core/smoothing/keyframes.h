@@ -6,7 +6,8 @@
 
 namespace perdure::semantic_filter {
 
-/// Adds the keyframe if its view is new; of too many, the one most similar to another goes.
+/// Adds the keyframe if its view is new, and returns whether it did. If there are more than
+/// `parameters.keyframes`, the one most similar to another is removed, but never the newest.
 bool addKeyframe(Track& track, Keyframe keyframe, const ViewScales& scales,
                  const SmoothingParameters& parameters);
 

@@ -76,8 +76,9 @@ bool factorise(const BatchProblem& model, Fit& fit, bool anew) {
   return true;
 }
 
-/// Damping of Levenberg-Marquardt steps, which falls by the ratio of true to predicted gain
-/// (Nielsen 1999), because the cost has kinks.
+/// Damping of Levenberg-Marquardt steps. It falls by the ratio of true to predicted gain (Nielsen
+/// 1999). The cost has a kink at a change of the extreme corner. A damping that falls after each
+/// success would fail there at every other step.
 class Damping {
  public:
   double value() const { return value_; }
@@ -120,7 +121,8 @@ bool descend(const BatchProblem& model, Fit& fit, Damping& damping, double& pred
   return false;
 }
 
-/// The widened covariance of b in all rows. `noise`: widened; 0: not counted. At rest.
+/// Returns the widened covariance of b in all rows, for an object at rest. `noise`: widened; 0 for
+/// a side that does not count.
 SideMatrix lastingPart(const Fit& fit, const PerSide& noise) {
   SideMatrix part = fit.covariance->own.selfadjointView<Eigen::Lower>();
   for (Eigen::Index j = 0; j < fit.inflations.size(); ++j) {

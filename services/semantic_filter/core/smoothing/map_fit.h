@@ -17,8 +17,9 @@ class MapFit {
  public:
   struct Fit;
 
-  /// Nothing if `start` has no projection, the place stays undetermined, or the fit comes to a mode
-  /// in `found`. `like`: a mode whose inflations and covariance the fit begins with.
+  /// Returns nothing if `start` has no projection in a keyframe, if the place stays undetermined,
+  /// or if the fit comes to one of the modes `found`. `like`: a mode of the same batch and motion,
+  /// whose inflations and covariance the fit begins with.
   static std::optional<MapFit> make(const Hypothesis& start, const KeyframeBatch& batch,
                                     const FrameContext& frame, const MapFit* like = nullptr,
                                     const ScratchVector<const Hypothesis*>& found = {});
@@ -26,15 +27,18 @@ class MapFit {
   const Hypothesis& hypothesis() const { return hypothesis_; }
   /// Returns the share of keyframes that contradict the fit.
   double contradicted() const { return contradictions().cast<double>().mean(); }
-  /// Evidence about the variances of the sides, by restricted likelihood. At rest.
+  /// Returns the evidence about the variances of the sides, by restricted likelihood, for an object
+  /// at rest.
   SideEvidence sideEvidence() const;
-  /// Residuals of the azimuths, by the first assumption; their count: degrees of freedom.
+  /// Returns the residuals of the azimuths, by the first assumption; their count is the degrees of
+  /// freedom.
   ResidualRatio azimuthResidualRatio() const;
   std::size_t sides() const;
   /// Returns 1 for each keyframe that contradicts the fit, 0 for the others.
   const KeyframeCounts& contradictions() const;
-  /// The log marginal likelihood log p(boxes | class, motion), by Laplace's method, without a
-  /// constant. `of_yaw`: with the azimuths, without the yaw prior.
+  /// Returns the log marginal likelihood, log p(boxes | class, motion), by Laplace's method, with
+  /// the t distribution of each keyframe, without a constant. `of_yaw`: for modes of yaw; with the
+  /// azimuths and without the yaw prior around the start.
   double logEvidence(bool of_yaw = false) const;
   /// Returns the log-odds, by the azimuths, that its yaw is not turned by 180°.
   double logHeading() const;

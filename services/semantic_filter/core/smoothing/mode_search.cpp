@@ -19,7 +19,8 @@ bool sameMode(const Hypothesis& a, const Hypothesis& b) {
          std::min(distance2(a, b), distance2(b, a)) < gates::kSameMode;
 }
 
-/// Starts at rest that no hypothesis may have: yaw turned by 45°, 90° and 135°, usual size.
+/// Returns starts at rest with other yaws, turned by 45°, 90° and 135°, and of usual size. An upper
+/// part keeps the observed size.
 ScratchVector<Hypothesis> otherStarts(const Hypothesis& best, const ClassPrior& prior) {
   ScratchVector<Hypothesis> starts;
   if (!prior.has_yaw && best.class_name != kOtherClass) return starts;
@@ -33,7 +34,9 @@ ScratchVector<Hypothesis> otherStarts(const Hypothesis& best, const ClassPrior& 
   return starts;
 }
 
-/// Fits of an *other* track as a class, from four yaws. `upper_part`: of an object of the class.
+/// Returns the fits of the keyframes of an *other* track as one of a class, from four yaws.
+/// `upper_part`: by the visible upper part of an object of the class. `like`: a fit of the same
+/// batch.
 ScratchVector<MapFit> fitsAs(const Hypothesis& other, const ClassPrior& prior, bool upper_part,
                              const KeyframeBatch& batch, const FrameContext& frame,
                              const MapFit& as_other) {

@@ -31,7 +31,8 @@ void dropContradicted(Track& track, const ContradictionCounts& contradictions, s
   if (kept.size() >= least) track.batch.keyframes = std::move(kept);
 }
 
-/// Nats by which the boxes of an object at rest enclose its outline, not its cuboid.
+/// Returns the nats by which the boxes of an object at rest enclose its outline, not its cuboid;
+/// nothing without a fit of the other extent.
 std::optional<double> outlineNats(const MapFit& at_rest, const KeyframeBatch& batch,
                                   const FrameContext& frame) {
   constexpr double kMost = 3.0;  // nats; an object of an unusual shape must not decide alone

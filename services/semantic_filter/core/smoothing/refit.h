@@ -18,7 +18,8 @@ struct NetworkEvidence {
   /// Nats for boxes that enclose outlines, not cuboids, by all keyframes; if the frame asks for it.
   std::optional<double> outline_nats = {};
 };
-/// Fits the hypotheses and weighs rest against motion. Returns its evidence, if reliable.
+/// Fits the hypotheses and weighs rest against motion. Returns the evidence about the network, if
+/// the track is reliable enough.
 std::optional<NetworkEvidence> refit(Track& track, const FrameContext& frame);
 
 /// Fits the tracks with the largest refitNeed, and learns noise scales and ground from them.

@@ -1,4 +1,5 @@
-// Fit of a cuboid to one box, for one class and one start of yaw (tools/docs/maths/initiation.md).
+// Fit of a cuboid to one box, for one class and one start of yaw (paper, "Initialization", line
+// 284). Derivation: tools/docs/maths/initiation.md.
 #pragma once
 
 #include <optional>
@@ -16,7 +17,8 @@ struct RangeHint {
   double distance_m = 0.0, sigma_m = 0.0;
 };
 
-/// Weighted centroid, along the ray, of the landmarks inside the box; nothing with too few.
+/// Returns the weighted centroid, along the ray, of the landmarks inside the box. Weights fall
+/// exponentially from its centre. Returns nothing with fewer than `parameters.min_landmarks`.
 std::optional<RangeHint> rangeFromLandmarks(const BoxDetection& detection,
                                             const std::vector<LandmarkDepth>& points,
                                             const InitiationParameters& parameters);

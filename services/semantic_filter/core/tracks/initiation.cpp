@@ -47,7 +47,8 @@ void addMovingCopy(Track& track, const Hypothesis& at_rest, const ClassPrior& pr
   track.hypotheses.push_back(copy);
 }
 
-/// Updates the yaw starts by the azimuth, which counts half; the total weight stays.
+/// Updates the yaw starts of one class by the azimuth and weighs them. The total weight of the
+/// class stays. The azimuth counts half, because a single one may be far off.
 void weighByAzimuth(ScratchVector<Hypothesis>& fits, const BoxDetection& detection,
                     const ClassPrior& prior, const FrameContext& frame) {
   if (!detection.azimuth || !prior.has_yaw) return;
@@ -61,7 +62,8 @@ void weighByAzimuth(ScratchVector<Hypothesis>& fits, const BoxDetection& detecti
   for (auto& h : fits) h.weight *= after > 0.0 ? before / after : 1.0;
 }
 
-/// Log ratio to clutter of the ratio of width to height and the cost (only that if cut).
+/// Returns the log-likelihood ratio of the box's shape to log-uniform clutter: of the ratio of
+/// width to height, and of the cost of the fit. If a side is cut, only the cost counts.
 double logShapeRatio(const CuboidFit& fit, const ClassPrior& prior, double yaw_sigma,
                      const BoxDetection& detection, const FrameContext& frame) {
   const auto& z = detection.z;
@@ -152,7 +154,8 @@ ScratchVector<Candidate> candidates(const BoxDetection& detection, const FrameCo
   return all;
 }
 
-/// The frequencies of the network's classes, at most 10 in sum.
+/// Returns the sum of the frequencies of the network's classes, at most 10. A class of frequency 1
+/// then has at least a tenth of the prior, for any number of classes.
 double frequencies(const FrameContext& frame) {
   double sum = 0.0;
   for (const auto& name : frame.model->classes) sum += frame.priors->of(name).frequency;

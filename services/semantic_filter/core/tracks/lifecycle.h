@@ -1,5 +1,5 @@
-// Confirmation and deletion of tracks (paper, "Termination");
-// tools/docs/maths/re_identification.md.
+// Confirmation and deletion of tracks (paper, "Termination"; Bar-Shalom, Li 2001). Derivation of
+// the thresholds: tools/docs/maths/re_identification.md.
 #pragma once
 
 #include <vector>
@@ -9,12 +9,15 @@
 
 namespace perdure::semantic_filter {
 
-/// Whether the track surely exists and its best hypothesis is placed, as re-identification needs.
+/// Whether the track surely exists and its best hypothesis is placed. Re-identification needs no
+/// more; confirmation also needs that all hypotheses agree on the place.
 bool established(const Track& track, const FrameContext& frame);
-/// Withdraws the confirmation of unseen movers whose place is no longer known.
+/// Withdraws the confirmation of tracks that were not seen since they moved on to a place that is
+/// no longer known.
 void withdrawLostMovers(std::vector<Track>& tracks, const FrameInput& frame,
                         const Parameters& parameters);
-/// Confirms tracks at a known place. Removes and returns those below the threshold.
+/// Confirms visible tracks that surely exist at a known place, and withdraws the confirmation if
+/// either is lost. Removes and returns the tracks whose existence fell below the threshold.
 std::vector<Track> confirmAndDelete(std::vector<Track>& tracks, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

@@ -30,7 +30,8 @@ void multiplyPmf(Track& a, const Track& b) {
   normalise(a, ClassEvidence::kMerge);
 }
 
-/// Whether a known track may replace an *other* one: not one of a few boxes at the border.
+/// Whether a track of a known class has enough hits to replace an *other* track. Tracks of a few
+/// boxes, as at the border of the image, do not.
 bool hasEnoughHits(const Track& known, const Track& other) {
   constexpr std::uint32_t kFewer = 4;  // times fewer hits
   return known.life.once_confirmed || kFewer * known.life.hits >= other.life.hits;

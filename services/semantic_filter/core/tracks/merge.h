@@ -30,9 +30,11 @@ bool mayBeOne(const Track& a, const Track& b, const FrameContext& frame);
 /// Whether class and motion allow that both are one object.
 bool sameKind(const Track& a, const Track& b);
 
+/// Merges track b into a. Both must be of one object.
 void mergeTwo(Track& a, Track& b, const FrameContext& frame);
 
-/// Fuses two beliefs with independent errors, but for the size prior and the pose error.
+/// Fuses two beliefs about one object. Their errors are independent, except for the size prior and
+/// the pose error (`P_pose`); each of these counts once.
 Hypothesis fuse(const Hypothesis& a, const Hypothesis& b, const ClassPrior& prior,
                 const Matrix6d& P_pose);
 

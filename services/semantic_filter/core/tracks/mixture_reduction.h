@@ -7,8 +7,11 @@
 
 namespace perdure::semantic_filter {
 
-/// Merges near hypotheses; prunes light, implausible and dominated ones; stops slow movers; gives a
-/// contradicted static track a moving and a misplaced copy. Possibly none is left.
+/// - Merges near hypotheses of the same class and motion.
+/// - Prunes light hypotheses, those of implausible size, and all others if one class dominates.
+/// - Stops moving hypotheses that are slow.
+/// - Adds a moving copy, and one misplaced along the ray, to a contradicted static track.
+/// Possibly no hypothesis is left.
 void reduceMixture(Track& track, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

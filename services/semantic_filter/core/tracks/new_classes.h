@@ -1,5 +1,6 @@
-// The classes of a new network enter the existing tracks at their prior, with the geometry of the
-// track, at the next detection. Derivation: tools/docs/maths/new_classes.md.
+// New classes: the classes of a new network enter the tracks that exist, at their prior and with
+// the geometry of the track, when the track is next detected. (The paper, line 279, has a fixed set
+// of classes.) Derivation: tools/docs/maths/new_classes.md.
 #pragma once
 
 #include "services/semantic_filter/core/association/score.h"

@@ -41,7 +41,8 @@ bool confirmedOrEstablished(const Track& o, const FrameContext& frame) {
   return o.life.confirmed || established(o, frame);
 }
 
-/// Whether a moving track begins at once with almost the last box of the missing one.
+/// Whether the first box of a moving track is almost the last one of the missing track, and follows
+/// at once. Both are then one object, even if misplaced or deformed.
 bool takesOver(const Track& new_track, const Track& missing) {
   constexpr double kAtOnce_s = 0.5, kSameBox = 0.5;  // kSameBox: intersection over union
   if (!new_track.best().moving || !new_track.history.first_box || !missing.history.last_box)

@@ -1,5 +1,6 @@
-// A new track is an old object that was moved, drove off, or was missed for too long (paper, line
-// 288). Derivation: tools/docs/maths/re_identification.md.
+// Re-identification: a new track is an old object that was moved, drove off, or was missed for too
+// long (paper, line 288; moving objects are out of its scope, line 68). Derivation:
+// tools/docs/maths/re_identification.md.
 #pragma once
 
 #include <vector>
@@ -12,8 +13,9 @@ namespace perdure::semantic_filter {
 void keepDeleted(std::vector<Track>& recently_deleted, std::vector<Track> deleted, TimePoint now,
                  const TrackParameters& parameters);
 
-/// Gives new tracks the ids and the past of missing ones, nearest pairs first. In the old place
-/// both beliefs are merged; else the new one holds.
+/// Gives new tracks the ids and the past of missing ones, nearest pairs first; their own ids are
+/// absorbed. The derivation lists the cases. If the new track stands in the old place, both beliefs
+/// are merged; otherwise the new one applies.
 std::vector<MergeRecord> reidentify(std::vector<Track>& tracks,
                                     std::vector<Track>& recently_deleted,
                                     const FrameContext& frame);

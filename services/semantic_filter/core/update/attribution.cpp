@@ -24,7 +24,8 @@ double temperedLog(const Track& track, const ClassNumbers& pmf, const ScratchVec
   return std::log(mean);
 }
 
-/// The nats of a miss that an unmapped occluder excuses: A = s + (1 - s) A'.
+/// Returns the nats of a miss that an unmapped occluder excuses. With probability s it hides the
+/// object, so that a miss is certain: A = s + (1 - s) A', where A' is A without the occluder.
 double excusedByOccluder(const Track& track, const ClassNumbers& pmf, const AllShares& shares,
                          double exponent) {
   constexpr double kLeast = 1e-6;
@@ -42,7 +43,8 @@ double excusedByOccluder(const Track& track, const ClassNumbers& pmf, const AllS
   return std::isfinite(nats) ? std::max(nats, 0.0) : 0.0;
 }
 
-/// log(A / A without g_k): the same boxes from a network that cannot tell classes from clutter.
+/// Returns log(A / A without g_k) of a class. "Without g_k": the same boxes from a network that
+/// cannot tell classes from clutter.
 double activationNats(const Track& track, const AllShares& shares, const std::string& class_name,
                       const ScratchVector<std::size_t>& gated,
                       const std::vector<BoxDetection>& boxes, const FrameContext& frame) {

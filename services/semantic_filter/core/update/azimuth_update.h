@@ -1,5 +1,6 @@
-// The network's azimuth as a measurement of the length axis (modulo 180°) and of the heading.
-// Derivation: tools/docs/maths/azimuth_and_heading.md.
+// The network's azimuth as a measurement of the length axis (modulo 180°) and of the heading: it
+// changes yaw, heading and the weights of yaw modes. (The paper uses azimuths at initiation only:
+// "Initialization", line 284.) Derivation: tools/docs/maths/azimuth_and_heading.md.
 #pragma once
 
 #include <vector>
@@ -24,8 +25,9 @@ double headingOdds(const AzimuthMatch& match);
 /// Returns the deviation of an azimuth before learning. `told`: by the network; rad.
 double azimuthSigma(double told, const ClassPrior& prior);
 
-/// Updates the yaw (modulo 180°) by an EKF and the heading by its log-odds. Returns the likelihood
-/// of the azimuth, 1/rad, for the weights of yaw modes.
+/// Updates the yaw (modulo 180°) by an EKF and the heading by its log-odds. `azimuth`, `sigma`:
+/// rad. `weight`: in (0, 1]. Returns the likelihood of the azimuth, 1/rad. It is for the weights of
+/// yaw modes only.
 double updateWithAzimuth(Hypothesis& h, double azimuth, double sigma, double weight,
                          const FrameContext& frame);
 

@@ -9,8 +9,10 @@
 
 namespace perdure::semantic_filter {
 
-/// The posterior given that box `z` is the object's. `repetition`: factor >= 1 on the variance of
-/// repeated noise. `hidden`: sides not to compare. `at_prior`: projection of the prior, if known.
+/// Returns the posterior given that box `z` is the object's. `repetition`: factor >= 1 on the
+/// variance of the sides, for noise that repeats that of the last detection; an outlier is widened
+/// further. `hidden`: sides that are not compared because something hides them. `at_prior`:
+/// projection of the prior, if it is known.
 Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
                          const std::array<bool, 4>& hidden, double repetition,
                          const FrameContext& frame, const ProjectedBox* at_prior = nullptr);

@@ -7,9 +7,10 @@
 
 namespace perdure::semantic_filter {
 
-/// Stores what the boxes alone say of the ground (GroundContact), and updates the hypothesis by the
-/// ground, without what track `id` says of it. Returns log p(underside | ground) against a uniform
-/// one, nats; 0 for unknown ground.
+/// Stores the evidence of the boxes alone about the ground (GroundContact). Then updates the
+/// hypothesis by the ground below it, as far as objects of its class stand on the ground. The
+/// evidence of track `id` itself is left out. Returns log p(underside | ground) against an
+/// underside that is uniform within ground.span_m, nats; 0 if the ground is unknown.
 double updateWithGround(Hypothesis& h, ObjectId id, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

@@ -39,7 +39,8 @@ void predictBias(Hypothesis& h, const std::optional<RigidTransform>& last, const
   h.P.diagonal().segment<4>(kBias) += (1.0 - correlation * correlation) * sigma.cwiseAbs2();
 }
 
-/// Removes moving hypotheses whose position is lost, with their share of the existence.
+/// Removes moving hypotheses whose position is lost, because they would explain any box. Existence
+/// is multiplied by the share of the others.
 void dropLostHypotheses(Track& track, TimePoint now, double lost_sigma_m) {
   double kept = 0.0;
   for (const auto& h : track.hypotheses.read()) {

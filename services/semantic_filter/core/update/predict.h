@@ -1,4 +1,5 @@
-// Prediction of a track to the time and view of a frame (tools/docs/maths/state_and_mixture.md).
+// Prediction of a track, when it is next visible, to the time and view of a frame (Bar-Shalom, Li
+// 2001, ch. 6). Derivation: tools/docs/maths/state_and_mixture.md.
 #pragma once
 
 #include "services/semantic_filter/core/belief/track.h"

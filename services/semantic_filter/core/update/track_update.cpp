@@ -119,7 +119,8 @@ void countDirection(Track& track, const RigidTransform& T_WC) {
   }
 }
 
-/// Counts an observation at rest for the size at which P_D is halved; a miss when detected later.
+/// Counts an observation of a confirmed object at rest for the size at which P_D is halved. A miss
+/// counts when the object is detected later.
 void countForDetectionSize(Track& track, const TrackScore& score, bool detected, double exponent,
                            const FrameContext& frame) {
   const auto& predicted = score.hypotheses.front().predicted;
@@ -136,7 +137,8 @@ void countForDetectionSize(Track& track, const TrackScore& score, bool detected,
   if (detected) d.proven += std::exchange(d.missed, {});
 }
 
-/// Factor on the noise of a box that repeats that of the last detection, by the view change.
+/// Returns the factor on the noise of a box whose noise repeats that of the last detection. It is
+/// that of a stationary first-order process whose correlation falls with the view change.
 double noiseRepetition(const Track& track, const FrameContext& frame) {
   if (track.views.detected_from.observations <= 0.0) return 1.0;
   const double scale = frame.parameters->box.noise_view;
@@ -146,7 +148,8 @@ double noiseRepetition(const Track& track, const FrameContext& frame) {
   return (1.0 + correlation) / std::max(1.0 - correlation, 1e-6);
 }
 
-/// The share of an observation between rest and motion, because errors are correlated.
+/// Returns the share of an observation that counts between rest and motion, `seconds` after the
+/// last one: errors of consecutive boxes are correlated, and a velocity can fit them.
 double motionExponent(double seconds) {
   // Boxes of a tracker on KITTI: .6, .44, .3 and .13 after .1, .2, .3 and .5 s.
   constexpr double kCorrelation = 0.8, kSeconds = 0.3;
@@ -190,8 +193,9 @@ struct Exponents {
   double classes = 1.0, motion = 1.0;
 };
 
-/// π ∝ π A. A counts in full among hypotheses that differ by geometry only, else with the
-/// exponents. Returns the prior means of A.
+/// π ∝ π A. A counts in full among hypotheses that differ by geometry only, with the exponents
+/// between rest and motion of a class and between classes (there also for existence). Returns the
+/// prior means of A.
 MeanA updateWeights(Track& track, const AllShares& shares, const Exponents& tempering) {
   struct Class {
     Group all, motion[2];
@@ -220,8 +224,9 @@ MeanA updateWeights(Track& track, const AllShares& shares, const Exponents& temp
   return mean;
 }
 
-/// Protects yaw modes that a mode search has weighed: one that explains this observation about as
-/// well as the best keeps at least `least` of its class.
+/// Protects yaw modes that a mode search has weighed by all keyframes, because later observations
+/// alone could end true modes. One that explains this observation about as well as the best keeps
+/// at least `least` of its class, whose weight stays.
 void keepSearchedModes(std::vector<Hypothesis>& hs, const AllShares& shares, double least) {
   constexpr double kComparable = 0.05;  // least ratio to the largest A of the class
   struct Class {
@@ -246,9 +251,10 @@ void keepSearchedModes(std::vector<Hypothesis>& hs, const AllShares& shares, dou
   }
 }
 
-/// Two accounts; the smaller one is believed. "It is a real object": views share mistakes of the
-/// network, so A counts with τ. "It is still there": A counts in full, and one hit shows that the
-/// misses before it were mistakes.
+/// Existence has two log-odds; the smaller one counts. "It is a real object": observations from one
+/// viewpoint share the mistakes of the network, hits as well as misses, so A counts with the
+/// exponent τ. "It is still there": a patch of wall that resembles a chair does not go away, so A
+/// counts in full, and one hit shows that the misses before it were mistakes of the network.
 double existenceAfter(Track& track, const MeanA& mean_A, double certain) {
   const auto logOdds = [](double p) { return std::log(p / (1.0 - p)); };
   const double most = logOdds(certain), now = logOdds(std::min<double>(track.existence, certain));
@@ -260,8 +266,9 @@ double existenceAfter(Track& track, const MeanA& mean_A, double certain) {
   return 1.0 / (1.0 + std::exp(-std::min(real, still)));
 }
 
-/// Updates PMF, existence and detectability by one observation, from the same A. Leaves the weights
-/// unnormalised. Returns the new existence.
+/// Updates PMF, existence and detectability by one observation, from the same A. `detected`: a box
+/// is probably the track's. Leaves the weights unnormalised. Returns the new existence, at most
+/// `existenceCeiling`.
 double updateClassAndExistence(Track& track, const AllShares& shares, const Exponents& tempering,
                                bool detected, const Parameters& parameters) {
   const MeanA mean_A = updateWeights(track, shares, tempering);

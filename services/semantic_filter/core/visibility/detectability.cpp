@@ -9,7 +9,8 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// The stationary probability that an unmapped static object hides the track from this camera.
+/// Returns the stationary probability that an unmapped static object hides the track from this
+/// camera. Up to a distance at which it was detected from this direction, nothing does.
 double stationaryOccluder(const Track& track, const RigidTransform& T_WC, const ViewWalk& walk) {
   const Eigen::Vector3d ray = track.best().x.head<3>() - T_WC.p;
   const double azimuth = std::atan2(ray.y(), ray.x()), distance = ray.norm();
@@ -24,7 +25,8 @@ double stationaryOccluder(const Track& track, const RigidTransform& T_WC, const 
   return walk.unmapped_occluder * (1.0 - free);
 }
 
-/// Moves the probability `s` of an occluder to a view: on one ray, occluders only pass or come.
+/// Moves the probability `s` of an occluder to a view in which its stationary value is `now` and
+/// not `before`: on the way along one ray, occluders are only passed, or only come between.
 double alongTheRay(double s, double before, double now) {
   return now <= before ? (before > 0.0 ? s * now / before : s)
                        : s + (1.0 - s) * (now - before) / (1.0 - before);

@@ -7,7 +7,8 @@
 
 namespace perdure::semantic_filter {
 
-/// The factor on v P_D, behind unmapped occluders and for objects hard to detect.
+/// Returns the factor on v P_D. Behind an unmapped occluder the object is not detected. For an
+/// object that is hard to detect, the share `hard_detection_share` of P_D is left.
 double detectableShare(const Track& track, double hard_detection_share);
 
 /// Returns P_D of a class for a fully visible object. `size_px`: root of its box's area.

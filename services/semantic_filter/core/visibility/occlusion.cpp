@@ -194,7 +194,8 @@ void paint(Cell& cell, const Outline& o) {
   cell.transmittance *= 1.0 - o.solidity;
 }
 
-/// The share of the outline's landmarks before the object's surface (paper, line 190).
+/// Returns the share of the outline's landmarks that lie before the surface of the object.
+/// Landmarks at or behind it count against (paper, line 190: the co-visibility cue).
 double hiddenByPoints(const Outline& o, const Polygon& hull,
                       const std::vector<LandmarkDepth>& points) {
   double before = 0.0, through = 0.0;

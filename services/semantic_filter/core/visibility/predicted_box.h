@@ -1,5 +1,5 @@
-// Predicted measurement for inference: a Gaussian in the four sides of the box (paper, eq. 7).
-// Derivation: tools/docs/maths/joint_association.md, "Top-down likelihood".
+// Predicted measurement that inference evaluates: a Gaussian in the four sides of the box (paper,
+// eq. 7: b = π(g s)). Derivation: tools/docs/maths/joint_association.md, "Top-down likelihood".
 #pragma once
 
 #include <optional>
@@ -14,7 +14,8 @@ struct ComingFrame {
   double seconds = 0.0;  ///< after the present one
 };
 
-/// The expected box with the velocity of its sides (px/s); nothing if r·π·v is below 0.05.
+/// Returns the box that the network should report, with the velocity of its sides (px/s) towards
+/// `coming`; nothing if r·π·v is below 0.05 or nothing is before the camera.
 std::optional<Prediction> predictionOf(const Track& track, const FrameInput& now,
                                        const std::optional<ComingFrame>& coming);
 

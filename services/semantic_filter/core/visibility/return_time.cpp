@@ -99,7 +99,8 @@ double shareInSight(const ScratchVector<Standing>& things, const View& view,
   return shareOfFirst(outlines, camera.width(), camera.height(), parameters);
 }
 
-/// The visible fraction from which the first of `things` may be detected.
+/// Returns the visible fraction from which the first of `things` may be detected. If so much is
+/// visible already without a detection, the fraction at which a miss counts is required.
 double shareToBeFound(const ScratchVector<Standing>& things, const View& now,
                       const VisibilityParameters& parameters) {
   const double sure = std::max(parameters.minimum, kSliver), least = kMayBeFound * sure;

@@ -1,5 +1,6 @@
-// When an occluded object is expected to be visible again if the body goes on (paper, line 182; the
-// method is ours). Derivation: tools/docs/maths/reappearance_time.md.
+// Reappearance time: when an occluded object is expected to be visible again if the body keeps its
+// motion (paper, line 182 and "Occlusion and Memory"; the method is ours). Derivation:
+// tools/docs/maths/reappearance_time.md.
 #pragma once
 
 #include <optional>
@@ -22,12 +23,14 @@ struct ReappearanceInterval {
   double earliest = 0.0, latest = 0.0;  ///< interval of nine in ten
 };
 
-/// Seconds until `hidden`, at rest, comes out from behind its occluders; nothing above ten.
+/// Returns the seconds after the frame until `hidden`, one of `tracks` at rest, comes out from
+/// behind its occluders. Returns nothing if it does not within ten seconds.
 std::optional<double> expectedReappearance(const std::vector<Track>& tracks, const Track& hidden,
                                            const FrameInput& now, const Way& way,
                                            const VisibilityParameters& parameters);
 
-/// With an interval by the errors of object, main occluder and velocity; fifteen times the cost.
+/// The same with an interval, at fifteen times the cost. The interval includes the errors of the
+/// object's place, of its main occluder, and of the body's velocity.
 std::optional<ReappearanceInterval> reappearanceInterval(const std::vector<Track>& tracks,
                                                          const Track& hidden, const FrameInput& now,
                                                          const Way& way,

@@ -15,22 +15,26 @@ struct ImuReading {
   TimePoint time;
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero();   ///< rad/s, with bias
   Eigen::Vector3d accel = Eigen::Vector3d::Zero();  ///< m/s², with bias
-  /// Time between the valid samples of an interpolation; 0 between two valid samples.
+  /// Time between the two valid samples from which the interval up to this reading is interpolated.
+  /// 0 if the interval itself lies between two valid samples.
   double gyro_span_s = 0.0, accel_span_s = 0.0;
 };
 
 class ImuBuffer {
  public:
-  /// Refuses "imu_not_finite", "imu_duplicate" or "imu_out_of_order". "imu_gyro_saturated" or
-  /// "imu_accel_saturated" (twice the same large value): stored, but both values are not used.
+  /// Refuses a sample with "imu_not_finite", "imu_duplicate" or "imu_out_of_order". With
+  /// "imu_gyro_saturated" or "imu_accel_saturated" (the same large value twice on an axis) the
+  /// sample is stored, but its saturated value and the one before are not used.
   Result<void> add(const ImuReading& reading);
   bool empty() const { return raw_.empty(); }
   TimePoint first() const { return raw_.front().time; }
   TimePoint last() const { return raw_.back().time; }
-  /// Readings at `from`, at all samples between, and at `to`; the nearest one outside the samples.
+  /// Readings at `from`, at all samples between, and at `to` (from < to). Outside the samples the
+  /// nearest one is used. Empty if the buffer is empty.
   std::vector<ImuReading> between(TimePoint from, TimePoint to) const;
   /// Writes the same readings into `readings` and reuses its memory.
   void between(TimePoint from, TimePoint to, std::vector<ImuReading>& readings) const;
+  /// Longest time without a sample inside [from, to].
   Duration longestGap(TimePoint from, TimePoint to) const;
   /// Median interval of the newest samples; empty for fewer than three samples.
   std::optional<Duration> period() const;

@@ -1,6 +1,7 @@
-// Inertial propagation between two images: Runge-Kutta 4 in the first body frame with exact
-// derivatives (Forster et al., TRO 2017), transition at first estimates (Li & Mourikis, IJRR 2013;
-// Huang et al., IJRR 2010).
+// Inertial propagation of the state between two images. Runge-Kutta 4 integrates the increment in
+// the body frame at the start of the interval, with the exact derivative of each step (Forster et
+// al., TRO 2017). Samples are interpolated linearly. The transition is then evaluated at first
+// estimates (Li & Mourikis, IJRR 2013; Huang et al., IJRR 2010).
 #pragma once
 
 #include <Eigen/Core>
@@ -38,7 +39,8 @@ Eigen::Quaterniond integrateRotation(const std::vector<ImuReading>& readings,
                                      const Eigen::Vector3d& gyro_bias,
                                      const Eigen::Vector3d& gyro_scale = Eigen::Vector3d::Ones());
 
-/// Motion of the body from `half` before `time` to `half` after it. `readings`: memory for reuse.
+/// Motion of the body from `half` before `time` to `half` after it; `nav` is the state at `time`.
+/// Beyond the samples the nearest value is used. `readings`: memory for reuse.
 RowMotion rowMotion(const Nav& nav, const ImuBuffer& imu, TimePoint time, Duration half,
                     double gravity, std::vector<ImuReading>& readings,
                     const Eigen::Vector3d& gyro_scale = Eigen::Vector3d::Ones());
@@ -46,7 +48,8 @@ RowMotion rowMotion(const Nav& nav, const ImuBuffer& imu, TimePoint time, Durati
 /// Navigation state after the increment; gravity in m/s², along −z of W.
 Nav predict(const Nav& nav, const ImuIncrement& increment, double gravity);
 
-/// Transition of the error [θ, p, v, b_g, b_a] in W, linearised at the state `from`.
+/// Transition of the navigation error [θ, p, v, b_g, b_a] from `from` to `to` in W. Linearises at
+/// the rotation, position and velocity of `from`.
 Matrix15d transition(const Nav& from, const Nav& to, const ImuIncrement& increment,
                      const Eigen::Matrix3d& R_W_B0, double gravity);
 

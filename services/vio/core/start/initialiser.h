@@ -15,7 +15,8 @@ namespace perdure::vio {
 /// Fails with "start_window_short", "start_force_not_gravity" or "start_turning".
 Result<Start> startAtRest(const ImuBuffer& imu, TimePoint now, const Options& options);
 
-/// Start with the speed along body x. Fails with "start_window_short" or "start_force_not_gravity".
+/// Start at `now` with the speed along body x. `speeds` around `now` give the acceleration. Fails
+/// with "start_window_short" or "start_force_not_gravity".
 Result<Start> startWithSpeed(const ImuBuffer& imu, TimePoint now, const SpeedReading& speed,
                              const std::vector<SpeedSample>& speeds, const Options& options);
 

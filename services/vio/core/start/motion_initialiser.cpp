@@ -159,7 +159,8 @@ std::vector<WindowPoint> windowPoints(const std::vector<const TrackedFrame*>& tr
   return points;
 }
 
-/// State at the newest pose. Its W is the level frame that is rotated least.
+/// State at the newest pose, from the error [θ, v, gravity, b_g, b_a] of a window. Its W is the
+/// level frame that is rotated least, because yaw 0 is discontinuous if x points up.
 Nav navOf(const MotionWindow& w, const Eigen::Matrix<double, kWindowError, 1>& error,
           const Eigen::Quaterniond& level) {
   const WindowPose& last = w.poses.back();

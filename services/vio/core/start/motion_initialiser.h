@@ -18,8 +18,9 @@ class MotionInitialiser {
   /// Adds a frame. If its time is not later than the last one, a new window begins.
   void add(const FrameInput& input, TimePoint imu_time);
   void clear() { frames_.clear(), failed_.reset(); }
-  /// Start at the newest frame. Fails with "start_window_short", "start_few_tracks",
-  /// "start_no_parallax", "start_force_not_gravity", "start_unobservable" or "start_inconsistent".
+  /// Start at the newest frame, once the window has grown enough since the last search. Fails with
+  /// "start_window_short", "start_few_tracks", "start_no_parallax", "start_force_not_gravity",
+  /// "start_unobservable" or "start_inconsistent".
   Result<Start> start(const ImuBuffer& imu, const std::vector<CameraModel>& cameras);
 
  private:

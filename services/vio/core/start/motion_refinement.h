@@ -59,9 +59,10 @@ struct RefinedWindow {
 /// information is singular. The failures of inertialOf() (motion_terms.h) are passed on.
 Result<RefinedWindow> refine(MotionWindow window, const ImuBuffer& imu, const Options& options);
 
-// In motion_search.cpp: the best minimum of a window from several initial values.
+// Defined in motion_search.cpp: the best minimum of a window from several initial values.
 
-/// Largest error of a usable velocity, and distance of other good minima, as a share.
+/// Largest error of a usable velocity, as a share of the largest velocity in the window. The same
+/// limit applies to the distance of other minima that fit about as well.
 inline constexpr double kVelocityShare = 0.16;
 
 void placePoints(MotionWindow& window);

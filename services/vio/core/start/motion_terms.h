@@ -17,8 +17,9 @@ using Vector9 = Eigen::Matrix<double, 9, 1>;
 /// Residual of a view, in deviations, above which its cost is linear.
 inline constexpr double kHuber = 2.0;
 
-/// Order of the error: parameters of the window, then [θ, p, v] of all poses but the first.
-/// Rotations right multiplied, others added in B0.
+/// Order of the error: parameters of the window, then [θ, p, v] of all poses except the first.
+/// Rotation errors are right multiplied; all other errors are added in B0. The gravity error uses
+/// acrossGravity().
 inline constexpr Eigen::Index kV0 = 0, kGravity = 3, kGyro = 5, kAccel = 8, kOffset = 11,
                               kPoses = 12;
 constexpr Eigen::Index poseAt(std::size_t k) {
@@ -27,8 +28,9 @@ constexpr Eigen::Index poseAt(std::size_t k) {
 /// Adds the error to the window. Points do not change.
 void add(MotionWindow& window, const Eigen::VectorXd& error);
 
-/// A point by bearing and inverse depth, which may become negative, from the camera at the first
-/// pose, so that bearings do not depend on the scale.
+/// A point by bearing and inverse depth, from the camera position at the first pose, in the axes of
+/// its first view. Far points stay linear, and noise may make the inverse depth negative. All rays
+/// begin at the first pose, so that bearings do not depend on the window's scale.
 struct Ray {
   Eigen::Vector3d origin;  // position in B0; fixed
   Eigen::Matrix3d R_B0_C;  // rotation of the camera; fixed
@@ -63,6 +65,7 @@ struct ViewTerm {
   double weight = 1.0;  ///< Huber's weight
 };
 
+/// Empty if the point is behind the camera.
 std::optional<ViewTerm> viewTerm(const Estimate& estimate, std::size_t point,
                                  const WindowView& view, const Inertial& inertial, double sigma_px);
 

@@ -18,7 +18,8 @@ class SpeedHistory {
 
   /// Refuses "speed_not_finite" and "speed_out_of_order".
   Result<void> add(const SpeedSample& sample);
-  /// Interpolates between samples at most two ages apart, else the nearest with a larger sigma.
+  /// Interpolates between samples at most two ages apart, or returns the nearest with a larger
+  /// sigma. Empty if that is too old.
   std::optional<SpeedReading> at(TimePoint time) const;
   bool reaches(TimePoint time) const { return !samples_.empty() && samples_.back().time >= time; }
   std::vector<SpeedSample> samples() const { return {samples_.begin(), samples_.end()}; }

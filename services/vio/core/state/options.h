@@ -13,7 +13,8 @@ struct ImuNoise {
   double accel_walk = 3.0e-3;  ///< m/s³/√Hz
   /// Factor on all four densities in propagation, for errors beyond rest; not in the rest tests.
   double inflation = 1.0;
-  /// Samples with a longer interval are momentary: interpolation adds noise.
+  /// Samples with a longer interval are treated as momentary values, not averages. The error of
+  /// linear interpolation between them is added to the noise.
   double interpolation_from_s = 0.02;
   double interpolation_gyro = 0.005;  ///< rad/s per sample, lower limit of that error
   double interpolation_accel = 0.1;   ///< m/s² per sample, lower limit of that error
@@ -45,7 +46,8 @@ struct VisionOptions {
   /// Deviation of the inverse depth of a point without parallax, relative to its mean.
   double scene_scatter = 0.7;
 
-  /// Of a point without parallax: the limits are at two deviations of the scene's depth.
+  /// Mean inverse depth of a point without parallax, and the deviation of its logarithm for the
+  /// whole scene. The two depth limits are at two deviations.
   double sceneInverse() const { return 1.0 / std::sqrt(min_depth_m * max_depth_m); }
   double sceneSigma() const { return 0.25 * std::log(max_depth_m / min_depth_m); }
 };

@@ -1,5 +1,6 @@
-// Pose of a camera while one row is exposed, relative to the middle row (Li, Kim, Mourikis, ICRA
-// 2013; Li & Mourikis, IJRR 2014). Derivation: tools/docs/maths/vio-rolling-shutter.md.
+// Pose of a camera while one row of a rolling-shutter image is exposed, relative to the body at the
+// middle row (Li, Kim, Mourikis, ICRA 2013; Li & Mourikis, IJRR 2014). Here the IMU's motion within
+// an image is in the body's frame and exact. Derivation: tools/docs/maths/vio-rolling-shutter.md.
 #pragma once
 
 #include <Eigen/Core>

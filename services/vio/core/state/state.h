@@ -1,7 +1,8 @@
-// State of the filter: navigation, calibration, a window of poses and points, and their joint
-// covariance (eq. 3; MSCKF: Mourikis & Roumeliotis, ICRA 2007). Order of the error: nav [θ, p, v,
-// b_g, b_a]; [θ_BC, p_BC] of each camera; time offset; read-outs and gyroscope scale if estimated;
-// clones and points. R = R̂ Exp(θ).
+// State of the filter: navigation, camera-IMU calibration, a window of past poses and points, and
+// the joint covariance of their errors. Paper, eq. 3; MSCKF: Mourikis & Roumeliotis, ICRA 2007.
+// Order of the error: nav [θ, p, v, b_g, b_a]; [θ_BC, p_BC] of each camera; time offset; read-outs
+// and gyroscope scale if estimated; then clones and points in order of insertion. Rotation errors
+// are right multiplied, R = R̂ Exp(θ).
 #pragma once
 
 #include <Eigen/Core>
@@ -90,7 +91,8 @@ inline constexpr int kTheta = 0, kPosition = 3, kVelocity = 6, kGyroBias = 9, kA
 
 class State {
  public:
-  /// readout_s: of each camera, 0 for a global shutter; empty: all global.
+  /// readout_s: read-out time of each camera, 0 for a global shutter; empty: all global. The last
+  /// two add non-zero read-outs and the gyroscope's scale to the error.
   State(const std::vector<RigidTransform>& T_BC, double time_offset_s, int max_clones,
         int max_points, const std::vector<double>& readout_s = {}, bool estimate_readout = false,
         bool estimate_scale = false);
@@ -140,7 +142,8 @@ class State {
   /// Adds a clone of the current pose. rate_B correlates it with the time offset.
   void addClone(std::uint64_t frame, TimePoint image_time, const Eigen::Vector3d& rate_B,
                 bool first_estimates);
-  /// Enlarges the covariance of the current pose and the newest clone, in rad (body) and m (world).
+  /// Enlarges the covariance of the current pose and of the newest clone, which is the same pose.
+  /// Deviations are in rad about the body's axes and in m along the world's axes.
   void widenPose(double rotation, double position_m);
   /// Adds a common error to all positions, m along each axis.
   void widenPositions(double sigma_m);

@@ -21,7 +21,8 @@ class Patch {
   /// Cuts a patch of a CV_8UC1 image. Empty beyond the image or with too little texture.
   static std::optional<Patch> cut(const cv::Mat& image, const cv::Point2f& pixel);
 
-  /// Finds the patch from `seed` in images, each half the size of the previous.
+  /// Finds the patch, starting from `seed`, in images each of half the size of the previous. Empty,
+  /// with an unchanged warp, outside the image or without convergence.
   std::optional<Found> find(const std::vector<cv::Mat>& levels, const cv::Point2f& seed);
 
   /// Current size in pixels relative to the first observation.

@@ -40,8 +40,10 @@ class Tracker {
  public:
   Tracker(const TrackerOptions& options, const std::vector<CameraModel>& cameras);
 
-  /// CV_8UC1; `second` may be empty. R_now_before: of the body, if known. masked: boxes without
-  /// points. turn_of_readout: from first to last row of the first image.
+  /// Images are CV_8UC1; `second` may be empty. R_now_before: rotation of the body, if known.
+  /// masked: boxes of the first image in which no points are used. turn_of_readout: rotation of the
+  /// body, in its frame, from the first to the last row of the first image. Epipolar lines refer to
+  /// middle rows.
   TrackedFrame track(const cv::Mat& first, const cv::Mat& second,
                      const std::optional<Eigen::Matrix3d>& R_now_before,
                      const std::vector<cv::Rect2f>& masked = {},

@@ -117,7 +117,8 @@ Innovation innovationOf(const State& state, const PointRows& rows, const ImagePo
           used};
 }
 
-/// The rows of a track that depend on the state alone (tools/docs/maths/vio-visual-update.md).
+/// The rows of a track that depend on the state alone. A point without parallax gets the depth of
+/// the scene, unless the state gives one (tools/docs/maths/vio-visual-update.md).
 Result<PointSystem> rowsOfTrack(const Track& track, const State& state, const MatrixView& P,
                                 const VisionOptions& options, bool& supposed) {
   const std::vector<Ray> rays = raysOf(track, state, options.sigma_px);

@@ -29,9 +29,10 @@ struct Innovation {
   bool used = false;                                   ///< passed the gate
 };
 
-/// Updates the state's points with the newest clone. A point leaves if it fails the gate three
-/// times or lies behind. If most fail by far and `may_jump`, the pose covariance is enlarged and
-/// the gates repeated ("images_jumped").
+/// Updates the state's points with their observations in the newest clone. A point leaves the state
+/// if it fails the gate three times in a row or lies behind the camera. `innovations`, if given, is
+/// filled. If most points fail at once by a wide margin and `may_jump`, the pose covariance is
+/// enlarged by `VisionOptions::jump_*`, the gates are repeated, and "images_jumped" is counted.
 Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
                                 const VisionOptions& options, bool may_jump, ReasonCounts& reasons,
                                 std::vector<Innovation>* innovations = nullptr);

@@ -22,7 +22,8 @@ struct RestExpectation {
 /// Computes the expectation from the filter's attitude and biases, with their covariance.
 RestExpectation restExpectation(const State& state, double gravity);
 
-/// Whether the means over `window` agree with the expectation, taken `age` ago.
+/// Whether the means over `window` before `now` agree with the expectation, taken `age` ago. False
+/// if the samples do not cover the window.
 bool imuRests(const ImuBuffer& imu, TimePoint now, Duration window, const RestExpectation& expected,
               Duration age, const ImuNoise& noise);
 
@@ -35,8 +36,10 @@ class Standstill {
   /// Clears the memory, at a start or after motion.
   void forget() { confirmed_.reset(); }
   bool known() const { return confirmed_.has_value(); }
+  /// The images show that the body stands still at `now`.
   void confirm(TimePoint now, const RestExpectation& expected);
-  /// Whether the body has not moved since. A disturbance of up to a second only interrupts.
+  /// Whether the IMU shows that a body that stood still has not moved since. A disturbance of up to
+  /// a second without net velocity change only interrupts the standstill.
   bool holds(const ImuBuffer& imu, TimePoint now, const ImuNoise& noise);
 
  private:

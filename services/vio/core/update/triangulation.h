@@ -28,8 +28,9 @@ struct Triangulated {
   double rms;                  ///< RMS of the weighted residuals
 };
 
-/// Needs two rays. Fails with "triangulation_…": views, parallel, depth, far, condition. Parallel
-/// rays get the scene's inverse depth as far as they permit.
+/// Needs two rays. Fails with "triangulation_…": views, parallel, depth (behind a camera, or too
+/// near), far, condition. With the inverse depth of the scene, parallel rays get the nearest depth
+/// to it that they permit, at most the largest.
 Result<Triangulated> triangulate(const std::vector<Ray>& rays, const VisionOptions& options,
                                  std::optional<double> scene = {});
 

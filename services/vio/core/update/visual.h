@@ -51,7 +51,8 @@ std::vector<Block> calibrationAndClones(const State& state);
 Eigen::Vector3d linearisationPoint(const State& state, const Track& track,
                                    const Eigen::Vector3d& p_W);
 
-/// Stacks all views of `track`, in columns of calibrationAndClones. r is empty behind a camera.
+/// Stacks all views of `track` by clones of the state, with the columns of calibrationAndClones. r
+/// is empty if the point lies behind a camera.
 PointSystem stackViews(const Track& track, const State& state, const Eigen::Vector3d& p_W,
                        double sigma_px);
 
@@ -63,7 +64,8 @@ struct InverseDepth {
 };
 InverseDepth inverseDepth(const Track& track, const State& state, const Eigen::Vector3d& p_W);
 
-/// Deviation of ρ by views and state; P: of calibrationAndClones. After separatePoint.
+/// Standard deviation of ρ by the views and the state, where P is the covariance of
+/// calibrationAndClones. Needs separatePoint before. Not finite if the views give no depth.
 double depthSigma(const PointSystem& system, const InverseDepth& depth, const MatrixView& P);
 
 /// Appends the row of the prior: ρ is that of the scene, up to its scatter.

@@ -32,7 +32,7 @@ struct BodyMaterials {
   int paint, trim, glass, headlight, taillight, plate, dark;
 };
 
-/// From x = +length/2 (front) to −length/2, wheels on z = 0. `size` in metres.
+/// Adds the body from x = +length/2 (front) to −length/2, with wheels on z = 0. `size`: metres.
 void addBody(MeshBuilder& builder, const BodyProfile& profile, const Vec3& size,
              const BodyMaterials& materials);
 
