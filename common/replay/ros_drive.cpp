@@ -299,17 +299,17 @@ class RosDriveReader {
   }
 
   CameraCalibration cameraBy(const std::string& name, const RosCamera& camera) const {
-    const std::string mend = "; write " + name +
-                             " into a rig file (`perdure calibrate` makes one) "
-                             "and give it with --rig";
+    const std::string fix = "; write " + name +
+                            " into a rig file (`perdure calibrate` makes one) "
+                            "and give it with --rig";
     if (!camera.info) {
       stop("no camera_info goes with " + camera.topics.image + ": the lens of " + name +
-           " is not known" + damage() + mend);
+           " is not known" + damage() + fix);
     }
     auto calibration = ros::cameraOf(*camera.info, camera.topics.rectified);
     if (!calibration) {
       stop(camera.topics.image + ": " + calibration.error().detail + " (on " + camera.topics.info +
-           ")" + mend);
+           ")" + fix);
     }
     if (imu_.empty()) return *calibration;
     const std::string& frame =

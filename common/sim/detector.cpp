@@ -38,15 +38,15 @@ void checkModel(const DetectorModel& m) {
   if (!share(m.found) || !share(m.flip_share) || !share(m.persistent_share) ||
       !share(m.least_separation) || !share(m.side_correlation) || !share(m.shrink_below) ||
       !share(m.tail_share)) {
-    refuse("shares are not within 0 and 1; mend the one that is not");
+    refuse("shares are not within 0 and 1; fix that value");
   }
   if (!(m.half_size_px > 0 && m.size_octaves > 0 && m.visible_softness > 0 &&
         m.false_smallest_px > 0 && m.azimuth_sigma > 0 && m.separation > 0)) {
-    refuse("sizes, softnesses, separation or azimuth_sigma are not above 0; mend the one");
+    refuse("sizes, softnesses, separation or azimuth_sigma are not above 0; fix that value");
   }
   if (!(m.box_share >= 0 && m.box_floor_px >= 0 && m.false_per_frame >= 0 &&
         m.false_per_frame <= 100 && m.latency_s >= 0)) {
-    refuse("box errors, latency or false alarms are below 0 (or over 100 a frame); mend the one");
+    refuse("box errors, latency or false alarms are below 0 (or over 100 a frame); fix that value");
   }
   if (!(m.tail_scale >= 1 && m.error_time_s >= 0 && m.coast_s >= 0)) {
     refuse("tail_scale is below 1, or error_time or coast below 0; change the one that is");

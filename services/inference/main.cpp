@@ -30,7 +30,7 @@ void run(service::Context& context, const inference::Config& config) {
   bus::Gaps gaps;
   context.on(bus::kTopic<ModelInfo>, [&](const ModelInfo& model) { worker->learn(model); });
   context.on(bus::kTopic<SwapNotice>, [&](const SwapNotice& notice) { worker->told(notice); });
-  auto& frames = context.needs("frames", "mend the camera, or start capture");
+  auto& frames = context.needs("frames", "fix the camera, or start capture");
   context.on(bus::frameTopic(config.detection.camera), [&](const Frame& frame) {
     frames.heard();
     const auto missed = gaps.before(frame.stamp.source, frame.stamp.sequence);

@@ -14,21 +14,21 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string readBytes(const fs::path& path, const std::string& what, const std::string& mend) {
+std::string readBytes(const fs::path& path, const std::string& what, const std::string& fix) {
   if (const auto why = whyUnreadable(path); !why.empty()) {
     throw StartupError(ExitCode::kUnavailable, why);
   }
   std::error_code error;
   if (!fs::is_regular_file(path, error)) {
     const char* why = fs::is_directory(path, error) ? " is a folder; " : " is missing; ";
-    throw StartupError(ExitCode::kUnavailable, what + " " + path.string() + why + mend);
+    throw StartupError(ExitCode::kUnavailable, what + " " + path.string() + why + fix);
   }
   std::ifstream in(path, std::ios::binary);
   std::ostringstream bytes;
   bytes << in.rdbuf();
   if (!in || bytes.str().empty()) {
     throw StartupError(ExitCode::kUnavailable,
-                       what + " " + path.string() + " is empty or cannot be read; " + mend);
+                       what + " " + path.string() + " is empty or cannot be read; " + fix);
   }
   return std::move(bytes).str();
 }

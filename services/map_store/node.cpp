@@ -49,7 +49,7 @@ Objects byTrack(Objects objects) {
   return objects;
 }
 
-std::string mendOf(const Reason& reason) {
+std::string fixOf(const Reason& reason) {
   if (reason.code == "disk_full") return "free space, or raise store.max_size";
   if (reason.code == "read_only") return "make store.path writable for this user";
   if (reason.code == "busy") return "end the other program that writes the map";
@@ -253,7 +253,7 @@ MapReply Node::answer(const MapQuery& query) {
 
 void Node::blame(const Reason& reason) {
   reasons_.add(reason);
-  failure_ = "The map cannot be written or read (" + reason.detail + "); " + mendOf(reason) + ".";
+  failure_ = "The map cannot be written or read (" + reason.detail + "); " + fixOf(reason) + ".";
 }
 
 }  // namespace perdure::map_store

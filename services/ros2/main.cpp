@@ -220,7 +220,7 @@ class Inwards {
       });
     }
     if (config_.odometry.given()) {
-      auto& poses = context_.needs("odometry of ROS", "start the node that says it again");
+      auto& poses = context_.needs("odometry of ROS", "start the node that publishes it");
       read<ros::Odometry>("odometry", config_.odometry.topic, kPoses,
                           [this, &poses](const auto& m) {
                             poses.heard();

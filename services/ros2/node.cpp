@@ -186,8 +186,8 @@ void Node::onImu(const ros::Imu& imu, std::int64_t now_ns) {
   if (!(sample.gyro.norm() < kMostGyro) || !(sample.accel.norm() < kMostAccel)) {
     return troubles_.add("imu",
                          {"not_finite",
-                          "inertial samples have numbers that are none or beyond any "
-                          "sensor; they are left out: mend the driver"},
+                          "inertial samples have values that are not finite or beyond any "
+                          "sensor; they are left out: fix the driver"},
                          now_ns);
   }
   const auto time = placed("imu", imu.header, now_ns);

@@ -34,7 +34,7 @@ class InVain {
 /// Frames after which Health reports the reason; fewer for another size, of which one may remain.
 inline constexpr int kInVain = 10;
 inline constexpr int kOtherSizes = 2;
-inline constexpr char kNoImage[] = "images cannot be read; mend the camera";
+inline constexpr char kNoImage[] = "images cannot be read; fix the camera";
 
 /// Whether the speed was refused for most of the last second.
 class SpeedDoubt {

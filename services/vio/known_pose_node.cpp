@@ -19,7 +19,7 @@ constexpr char kNoStart[] = "the poses may not be used yet: their program has no
 constexpr char kContradicted[] =
     "the poses do not fit what the camera sees: they are of another body or in other axes than "
     "T_BS of the calibration says, inverted (T_BW for T_WB), on another clock, or nearly all that "
-    "is seen moves; mend T_BS or the program that gives the poses";
+    "is seen moves; fix T_BS or the program that gives the poses";
 constexpr char kFar[] =
     "nearly all points lie beyond vision.max_depth; raise it, or see that the poses are in metres";
 
@@ -62,8 +62,7 @@ std::string KnownPoseNode::status() const {
   if (!cameras_) return "waits for the calibration; start capture";
   if (!other_size_.sentence().empty()) return other_size_.sentence();
   if (!in_vain_.sentence().empty()) return in_vain_.sentence();
-  if (!last_image_ && waiting_.empty())
-    return "waits for frames; start capture, or mend the camera";
+  if (!last_image_ && waiting_.empty()) return "waits for frames; start capture, or fix the camera";
   if (!last_) return "waits for poses of its frames; start what publishes odometry";
   if (auto wrong = statusOfPoses(); !wrong.empty()) return wrong;
   if (auto unknown = unknownCamera(config_, *calibration_); !unknown.empty()) return unknown;

@@ -24,7 +24,7 @@ class FrameInput {
         reasons_(reasons),
         once_(config.cameras.size()),
         gaps_(config.cameras.size()) {
-    auto& frames = context.needs("frames", "mend the camera, or start capture");
+    auto& frames = context.needs("frames", "fix the camera, or start capture");
     for (std::size_t i = 0; i < config.cameras.size(); ++i) {
       context.on(bus::frameTopic(config.cameras[i]), [this, &context, &frames, i](const Frame& m) {
         if (!once_[i].first(m.stamp.source, m.stamp.sequence)) {
@@ -84,7 +84,7 @@ void estimate(service::Context& context, const vio::Config& config) {
     }
   }
   connect(context, config, node, own);
-  auto& samples = context.needs("inertial samples", "mend the IMU, or start capture");
+  auto& samples = context.needs("inertial samples", "fix the IMU, or start capture");
   context.on(bus::kTopic<ImuSample>, [&](const ImuSample& m) {
     samples.heard();
     node.onImu(m);

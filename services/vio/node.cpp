@@ -93,8 +93,8 @@ std::string Node::whyAlone() const {
 std::string Node::status() const {
   if (!cameras_) return "waits for the calibration; start capture";
   if (!in_vain_.sentence().empty()) return in_vain_.sentence();
-  if (imu_.empty()) return "waits for inertial samples; start capture, or mend the IMU";
-  if (!last_image_) return "waits for frames; start capture, or mend the camera";
+  if (imu_.empty()) return "waits for inertial samples; start capture, or fix the IMU";
+  if (!last_image_) return "waits for frames; start capture, or fix the camera";
   if (!started() && last_start_reason_ == "start_picture_moves_imu_does_not") {
     return "has no start yet: the IMU is at rest or moves evenly, and most of the picture moves; "
            "let traffic pass, or drive off";

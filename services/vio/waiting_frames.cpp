@@ -87,7 +87,7 @@ std::string WaitingFrames::whyAlone() const {
   if (alone_ < static_cast<int>(kAlone)) return {};
   return "goes on with one camera, for no image of the second one fits: " +
          (trouble_.empty() ? "none comes" : trouble_) +
-         "; mend that camera, or set stereo.enabled to false";
+         "; fix that camera, or set stereo.enabled to false";
 }
 
 void WaitingFrames::clear() {

@@ -302,7 +302,7 @@ TEST_F(LongStrangers, WithAnExpiredCertificateDoNotComeToLife) {
   expectUnheard();
 }
 
-TEST(LongIdentity, ThatEndsEndsItsServiceWithTheMend) {
+TEST(LongIdentity, ThatEndsEndsItsServiceWithTheFix) {
   ClosedBus bus;
   const auto now = std::chrono::system_clock::now();
   bus.authority().add({.name = "brief", .role = "map_store"}, {now - 1h, now + 5s});

@@ -77,10 +77,10 @@ void compare(const MapBelief& belief, const sim::TruthObject& object, const Rigi
 }  // namespace
 
 std::vector<MapBelief> readBeliefs(const std::filesystem::path& file) {
-  constexpr char kMend[] = "`perdure pipeline` writes it";
+  constexpr char kFix[] = "`perdure pipeline` writes it";
   std::ifstream stream(file);
   if (!stream) {
-    throw StartupError(ExitCode::kUnavailable, "{} cannot be read; {}", file.string(), kMend);
+    throw StartupError(ExitCode::kUnavailable, "{} cannot be read; {}", file.string(), kFix);
   }
   std::vector<MapBelief> beliefs;
   try {
@@ -88,7 +88,7 @@ std::vector<MapBelief> readBeliefs(const std::filesystem::path& file) {
     for (const auto& object : root.at("objects")) beliefs.push_back(beliefOf(object));
   } catch (const nlohmann::json::exception& error) {
     throw StartupError(ExitCode::kData, fmt::format("{} is no objects.json ({}); {}", file.string(),
-                                                    error.what(), kMend));
+                                                    error.what(), kFix));
   }
   return beliefs;
 }

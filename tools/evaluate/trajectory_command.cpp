@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 using replay::PoseFile;
 using replay::PoseFormat;
 
-constexpr char kTruthMend[] = "--truth takes a file of poses or a dataset folder";
+constexpr char kTruthFix[] = "--truth takes a file of poses or a dataset folder";
 
 struct TrajectoryOptions {
   std::string truth, sequence, tum, data, align = "yaw";
@@ -78,7 +78,7 @@ Truth readTruth(const TrajectoryOptions& options) {
                          options.truth + " holds no true trajectory; give a pose file to --truth");
     }
   }
-  truth.poses = withTimes(own ? *own : PoseFile::read(options.truth, kTruthMend), truth.frames);
+  truth.poses = withTimes(own ? *own : PoseFile::read(options.truth, kTruthFix), truth.frames);
   return truth;
 }
 

@@ -30,12 +30,12 @@ void throwUnplaced(const fs::path& file, const std::error_code& error) {
 }  // namespace
 
 TemporaryFolder temporaryFolder(const fs::path& parent, const std::string& prefix,
-                                const std::string& mend) {
+                                const std::string& fix) {
   return {parent / prefix, [&](const std::string&) {
             const int why = errno;
             if (why == ENOSPC || why == EDQUOT) throwUnwritten(parent, std::strerror(why));
             throw StartupError(ExitCode::kUnavailable, "nothing can be written into {} ({}); {}",
-                               parent.string(), std::strerror(why), mend);
+                               parent.string(), std::strerror(why), fix);
           }};
 }
 

@@ -11,7 +11,7 @@ namespace perdure::tools {
 
 /// A folder in `parent`. Throws StartupError: kInputOutput (disk full) or kUnavailable.
 TemporaryFolder temporaryFolder(const std::filesystem::path& parent, const std::string& prefix,
-                                const std::string& mend);
+                                const std::string& fix);
 
 /// Holds files on the same disk until they are moved to a folder, which need not exist yet.
 class Staging {

@@ -14,7 +14,7 @@ namespace {
 struct Rule {
   const char* code;
   std::uint64_t one_of;
-  const char *what, *mend;
+  const char *what, *fix;
 };
 
 constexpr Rule kRules[] = {
@@ -36,7 +36,7 @@ constexpr Rule kRules[] = {
      "see its unit (m/s), its stamps and the IMU, or leave it away (vio.speed.enabled=false)"},
 };
 
-std::string sentenceOf(const Doubt& doubt) { return doubt.what + ": " + doubt.mend; }
+std::string sentenceOf(const Doubt& doubt) { return doubt.what + ": " + doubt.fix; }
 
 }  // namespace
 
@@ -54,7 +54,7 @@ Doubts doubtsOfRun(const RunFacts& facts) {
     const std::uint64_t times = facts.vio.of(rule.code);
     if (rule.one_of * times <= facts.frames) continue;
     doubts.push_back(
-        {fmt::format("{} at {} of {} frames", rule.what, times, facts.frames), rule.mend});
+        {fmt::format("{} at {} of {} frames", rule.what, times, facts.frames), rule.fix});
   }
   if (const std::uint64_t times = facts.vio.of("reset"); times > 0) {
     doubts.push_back({fmt::format("vio lost its way {} times and began anew", times),

@@ -11,7 +11,7 @@ namespace perdure::tools {
 
 struct Doubt {
   std::string what;  ///< short text for the last line
-  std::string mend;  ///< causes and fixes
+  std::string fix;   ///< causes and fixes
 };
 using Doubts = std::vector<Doubt>;
 

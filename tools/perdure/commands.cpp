@@ -20,7 +20,7 @@ constexpr CommandEntry kCommands[] = {
     {"hz", "measure the rate of a topic, once a second"},
     {"echo", "print a topic's messages as JSON lines"},
     {"env", "print the DDS configuration as shell variables: eval \"$(perdure env)\""},
-    {"doctor", "check host, bus and services: a line each with OK, WARN or FAIL and the mend"},
+    {"doctor", "check host, bus and services: a line each with OK, WARN or FAIL and the fix"},
     {"status", "services, sensors, topics and the host as one tree; the worst state dominates"},
 };
 

@@ -35,7 +35,7 @@ std::string listOf(const ReasonCounts& reasons) {
 }
 
 /// The fix for vio's reason for not starting.
-std::string mendOfStart(const ReasonCounts& reasons) {
+std::string fixOfStart(const ReasonCounts& reasons) {
   std::string most;
   std::uint64_t times = 0;
   for (const auto& [code, n] : reasons.all()) {
@@ -186,7 +186,7 @@ void Pipeline::refuseNothing() const {
   if (counts_.odometry == 0) {
     const ReasonCounts reasons = vio_ ? vio_->reasons() : ReasonCounts();
     refuse(fmt::format("no pose came of {} frames ({}{}{}): {}", counts_.frames, counted,
-                       counted.empty() ? "" : "; ", listOf(reasons), mendOfStart(reasons)));
+                       counted.empty() ? "" : "; ", listOf(reasons), fixOfStart(reasons)));
   }
   if (options_.detections == "none") return;
   // Objects existed during the run, so an empty map at the end is no fault of the data.

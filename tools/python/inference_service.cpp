@@ -36,7 +36,7 @@ class InferenceService {
                  service::makeLog(options.process)),
         detections_(context_.writer(bus::kTopic<Detections>,
                                     {.strength = options.strength, .lease_s = options.lease_s})),
-        frames_(context_.needs("frames", "mend the camera, or start capture")) {
+        frames_(context_.needs("frames", "fix the camera, or start capture")) {
     model_ = model;
     model_.instance = context_.instance();
     const auto told = context_.writer(bus::kTopic<ModelInfo>).write(model_);

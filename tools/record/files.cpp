@@ -148,9 +148,9 @@ void addFileCommands(CLI::App& record) {
       "--check", options->check,
       "unpack every chunk, which takes as long as reading it all: its counts are of what "
       "can be read, not of what the index says");
-  CLI::App* mend = record.add_subcommand("repair", "finish files of a recorder that was killed");
-  mend->add_option("paths", options->paths, "files, or folders of them")->required();
-  mend->callback([options] { repairAll({options->paths.begin(), options->paths.end()}); });
+  CLI::App* fix = record.add_subcommand("repair", "finish files of a recorder that was killed");
+  fix->add_option("paths", options->paths, "files, or folders of them")->required();
+  fix->callback([options] { repairAll({options->paths.begin(), options->paths.end()}); });
   CLI::App* plain = record.add_subcommand(
       "export", "copy into one file that readers without XCDR2 understand too");
   plain->add_option("from", options->from, "a file, or a folder of them")->required();

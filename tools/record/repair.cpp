@@ -57,7 +57,7 @@ void refuseDamaged(const fs::path& file, const mcap::Reader& reader) {
   if (reader.damage().empty()) return;
   throw StartupError(
       ExitCode::kData,
-      "{}; repair cannot mend that, and the file stays as it is: {} messages of it are read",
+      "{}; this cannot be repaired, and the file is not changed: {} messages of it are read",
       mcap::sentenceOfDamage(file, reader), reader.statistics().messages);
 }
 

@@ -14,8 +14,8 @@ namespace {
 /// Lines `name: numbers` or `name numbers`; the official tracking files use both.
 class Entries {
  public:
-  Entries(const std::filesystem::path& file, std::string_view mend) : file_(file) {
-    for (const auto& line : readLines(file, mend)) {
+  Entries(const std::filesystem::path& file, std::string_view fix) : file_(file) {
+    for (const auto& line : readLines(file, fix)) {
       const auto fields = split(line.text, ' ');
       std::string name(fields[0]);
       if (name.ends_with(':')) name.pop_back();
@@ -114,10 +114,10 @@ KittiCalibration readTrackingCalibration(const std::filesystem::path& file) {
 }
 
 KittiCalibration readRawCalibration(const std::filesystem::path& folder) {
-  const std::string mend = "unpack KITTI's calibration of that day beside or above the drive";
-  const Entries cameras(folder / "calib_cam_to_cam.txt", mend);
-  const Entries velo(folder / "calib_velo_to_cam.txt", mend);
-  const Entries imu(folder / "calib_imu_to_velo.txt", mend);
+  const std::string fix = "unpack KITTI's calibration of that day beside or above the drive";
+  const Entries cameras(folder / "calib_cam_to_cam.txt", fix);
+  const Entries velo(folder / "calib_velo_to_cam.txt", fix);
+  const Entries imu(folder / "calib_imu_to_velo.txt", fix);
   KittiCalibration calibration;
   calibration.P2 = cameras.projection("P_rect_02");
   calibration.P3 = cameras.projection("P_rect_03");

@@ -112,8 +112,8 @@ PoseFile::PoseFile(PoseFormat format, std::vector<StampedPose> poses, std::vecto
   check(steps_.empty() || steps_.size() == poses_.size(), "each pose has a step, or none has");
 }
 
-PoseFile PoseFile::read(const std::filesystem::path& file, std::string_view mend) {
-  const auto lines = readLines(file, mend);
+PoseFile PoseFile::read(const std::filesystem::path& file, std::string_view fix) {
+  const auto lines = readLines(file, fix);
   Complaints wrong(file);
   std::vector<StampedPose> poses;
   PoseSteps steps;

@@ -30,9 +30,9 @@ class PoseFile {
   /// and times that do not increase.
   /// Lines that begin with '#' are comments, and a first line without numbers is a header. Either
   /// may give another column order, or eight columns of a larger number (poseColumnsOf), or columns
-  /// with the covariances of the steps (files/pose_steps.h). Names of angles are refused. `mend`:
-  /// the fix if the file cannot be read.
-  static PoseFile read(const std::filesystem::path& file, std::string_view mend = kMend);
+  /// with the covariances of the steps (files/pose_steps.h). Names of angles are refused. The
+  /// message ends with `fix` if the file cannot be read.
+  static PoseFile read(const std::filesystem::path& file, std::string_view fix = kFix);
   /// `steps`: for each pose, or none, the covariance of the step to it (files/pose_steps.h).
   PoseFile(PoseFormat format, std::vector<StampedPose> poses, std::vector<Matrix6d> steps = {});
 
@@ -58,7 +58,7 @@ class PoseFile {
   std::optional<Place> placeOf(std::uint64_t frame, TimePoint time,
                                Duration max_gap = kMaxGap) const;
   std::optional<Place> placeAtTime(TimePoint time, Duration max_gap) const;
-  static constexpr std::string_view kMend = "--odometry takes `vio`, `truth` or a file of poses";
+  static constexpr std::string_view kFix = "--odometry takes `vio`, `truth` or a file of poses";
   PoseFormat format_;
   std::vector<StampedPose> poses_;
   std::vector<Matrix6d> steps_;

@@ -46,13 +46,13 @@ std::string similarTo(const std::filesystem::path& path) {
 
 }  // namespace
 
-std::vector<TextLine> readLines(const std::filesystem::path& path, std::string_view mend) {
+std::vector<TextLine> readLines(const std::filesystem::path& path, std::string_view fix) {
   std::ifstream file(path);
   const bool folder = std::filesystem::is_directory(path);
   if (!file || folder) {
     refuseUnreadable(path);
     throw StartupError(ExitCode::kUnavailable, "{} {}; {}", path.c_str(),
-                       folder ? "is a folder" : "cannot be read", mend);
+                       folder ? "is a folder" : "cannot be read", fix);
   }
   std::vector<TextLine> lines;
   std::string text;
@@ -73,7 +73,7 @@ void refuseUnreadable(const std::filesystem::path& path) {
   }
 }
 
-void throwMissing(const std::filesystem::path& path, std::string_view what, std::string_view mend) {
+void throwMissing(const std::filesystem::path& path, std::string_view what, std::string_view fix) {
   refuseUnreadable(path);
   const std::string similar = std::filesystem::exists(path) ? "" : similarTo(path);
   if (!similar.empty()) {
@@ -83,7 +83,7 @@ void throwMissing(const std::filesystem::path& path, std::string_view what, std:
         "form (composed or decomposed); rename it",
         what, path.c_str(), similar);
   }
-  throw StartupError(ExitCode::kUnavailable, "{} is missing: {}; {}", what, path.c_str(), mend);
+  throw StartupError(ExitCode::kUnavailable, "{} is missing: {}; {}", what, path.c_str(), fix);
 }
 
 std::string_view trim(std::string_view text) {

@@ -17,8 +17,8 @@ struct TextLine {
 };
 
 /// Non-empty lines, without a UTF-8 byte order mark. UTF-16 is refused (kData). Throws
-/// StartupError(kUnavailable) if the file cannot be read; `mend` is the sentence with the fix.
-std::vector<TextLine> readLines(const std::filesystem::path& path, std::string_view mend);
+/// StartupError(kUnavailable) if the file cannot be read; the message ends with `fix`.
+std::vector<TextLine> readLines(const std::filesystem::path& path, std::string_view fix);
 
 /// Throws StartupError(kUnavailable) if the permissions of the file or of a folder above forbid to
 /// read it.
@@ -28,10 +28,10 @@ void refuseUnreadable(const std::filesystem::path& path);
 /// Unicode (é as one code point, or as e and an accent) are equal.
 std::string withoutAccents(std::string_view text);
 
-/// Throws StartupError(kUnavailable): "`what` is missing: `path`; `mend`". The mend
-/// is the name that is there instead, if it differs only in case or Unicode form.
+/// Throws StartupError(kUnavailable): "`what` is missing: `path`; `fix`". If a
+/// file exists whose name differs only in case or Unicode form, the message names it instead.
 [[noreturn]] void throwMissing(const std::filesystem::path& path, std::string_view what,
-                               std::string_view mend);
+                               std::string_view fix);
 
 std::string_view trim(std::string_view text);
 std::string toLower(std::string_view text);

@@ -47,7 +47,7 @@ Files::Files(const fs::path& folder) {
     if (bytes > kMostBytes) {
       throw StartupError(ExitCode::kUnavailable, folder.string() +
                                                      " holds more than 64 MiB, which no page of "
-                                                     "this gateway does; mend page.folder");
+                                                     "this gateway does; fix page.folder");
     }
     auto file = std::make_shared<File>();
     file->type = typeOf(entry.path());

@@ -21,7 +21,7 @@ bool sync(const std::filesystem::path& path) {
   return synced;
 }
 
-std::string mendOf(const Reason& reason) {
+std::string fixOf(const Reason& reason) {
   if (reason.code == "disk_full") return "free space there, or name a file on another disk.";
   if (reason.code == "io_error") return "look at the disk there, or name a file on another one.";
   return "name a file in a folder that this user may write.";
@@ -31,7 +31,7 @@ std::string mendOf(const Reason& reason) {
 
 void cannotWriteMap(const std::string& path, const Reason& reason) {
   throw StartupError(exitCodeOf(reason), "The map " + path + " cannot be written (" + reason.code +
-                                             ": " + reason.detail + "); " + mendOf(reason));
+                                             ": " + reason.detail + "); " + fixOf(reason));
 }
 
 DraftFile::DraftFile(const std::string& path) : final_(path), path_(path + ".part") { remove(); }

@@ -35,7 +35,7 @@ CREATE VIRTUAL TABLE positions USING rtree(id, x0, x1, y0, y1, z0, z1);
 CREATE TABLE working(position INTEGER PRIMARY KEY, id INTEGER NOT NULL, belief BLOB);
 )sql";
 
-std::string mendOfUse(const Reason& reason) {
+std::string fixOfUse(const Reason& reason) {
   if (reason.code == "disk_full") return "free space, or raise store.max_size.";
   if (reason.code == "io_error") return "see the disk and the size limit of files (ulimit -f).";
   if (reason.code == "busy") return "end the other program that writes it.";
@@ -44,7 +44,7 @@ std::string mendOfUse(const Reason& reason) {
 
 [[noreturn]] void cannotUse(const std::string& path, const Reason& reason) {
   throw StartupError(exitCodeOf(reason), "The map " + path + " cannot be used (" + reason.code +
-                                             ": " + reason.detail + "); " + mendOfUse(reason));
+                                             ": " + reason.detail + "); " + fixOfUse(reason));
 }
 
 /// A file that begins neither like SQLite nor with zeros belongs to another program.
@@ -73,16 +73,15 @@ std::string setAside(const std::string& path) {
 constexpr char kOtherPath[] = "set store.path to another file";
 constexpr char kGiveMap[] = "give the file that map_store writes (its store.path)";
 
-void refuseForeign(const std::string& path, const Identity& identity, const std::string& mend) {
+void refuseForeign(const std::string& path, const Identity& identity, const std::string& fix) {
   if (identity.application != kApplicationId) {
-    throw StartupError(ExitCode::kConfiguration,
-                       path + " is not a map of Perdure's; " + mend + ".");
+    throw StartupError(ExitCode::kConfiguration, path + " is not a map of Perdure's; " + fix + ".");
   }
   if (identity.version > kSchemaVersion) {
     throw StartupError(ExitCode::kConfiguration,
                        "The map " + path + " has schema " + std::to_string(identity.version) +
                            ", this program knows up to " + std::to_string(kSchemaVersion) +
-                           "; use the newer Perdure, or " + mend + ".");
+                           "; use the newer Perdure, or " + fix + ".");
   }
 }
 

@@ -22,7 +22,7 @@ constexpr int kRowsAtOnce = 2000;
 /// Replaces a file's identity for maps that were pushed; there is one for each name.
 constexpr char kPushed[] = "pushed";
 
-std::string mendOf(const Reason& reason) {
+std::string fixOf(const Reason& reason) {
   if (reason.code == "server_login") {
     return "correct user and database in --url, and the password in its passfile";
   }
@@ -40,7 +40,7 @@ std::string mendOf(const Reason& reason) {
 
 [[noreturn]] void giveUp(const std::string& what, const Reason& reason) {
   throw StartupError(exitCodeOf(reason), what + " (" + reason.code + ": " + reason.detail + "); " +
-                                             mendOf(reason) + ".");
+                                             fixOf(reason) + ".");
 }
 
 template <class T>

@@ -23,7 +23,7 @@ constexpr char kNoPostgis[] =
     "The server has no PostGIS, so its maps have no geometry; install postgresql-15-postgis-3 "
     "there and let its administrator run CREATE EXTENSION postgis in the database.";
 
-std::string mendOf(const std::string& code) {
+std::string fixOf(const std::string& code) {
   if (code == "server_unreachable") {
     return "see that the server runs and that store.url leads to it";
   }
@@ -178,7 +178,7 @@ void Replicator::Work::fail(const Reason& reason) {
   progress.trouble = fmt::format(
       "The map has not been sent to the fleet's server for {} s ({}: {}). What changes is kept in "
       "store.path and sent when that is over; {}.",
-      since.count(), reason.code, reason.detail, mendOf(reason.code));
+      since.count(), reason.code, reason.detail, fixOf(reason.code));
 }
 
 bool Replicator::Work::rest(std::optional<Clock::duration> time) {

@@ -97,7 +97,7 @@ BoxesRead boxesOf(const ros::Detection2DArray& message, const std::vector<std::s
     const auto box = boxOf(one.bbox);
     if (!box) {
       refuse("box_malformed",
-             "a box has no size, is turned, or has numbers that are none; the "
+             "a box has no size, is turned, or has values that are not finite; the "
              "detector has to give pixels, upright");
       continue;
     }

@@ -155,7 +155,7 @@ Result<TimePoint> Clocks::place(const std::string& name, const ros::Time& stamp,
                                      "when they are taken");
   }
   if (stamp.sec < 0 || stamp.nanosec >= kSecond) {
-    return fail("stamp_malformed", "stamps of " + name + " are no times; mend the driver");
+    return fail("stamp_malformed", "stamps of " + name + " are not times; fix the driver");
   }
   const std::int64_t stamp_ns = stamp.sec * kSecond + stamp.nanosec;
   hear(input, now_ns - stamp_ns, now_ns);

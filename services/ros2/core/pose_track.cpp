@@ -21,7 +21,8 @@ Eigen::Vector3d vectorOf(const ros::Vector3& v) { return {v.x, v.y, v.z}; }
 /// Empty if the covariance is zero, or has the value for "not known".
 Result<std::optional<Matrix6>> covarianceOf(const std::array<double, 36>& numbers) {
   const Matrix6 given = Eigen::Map<const Matrix6>(numbers.data());
-  if (!given.allFinite()) return fail("covariance", "the covariance has numbers that are none");
+  if (!given.allFinite())
+    return fail("covariance", "the covariance has values that are not finite");
   const double most = given.diagonal().maxCoeff(), least = given.diagonal().minCoeff();
   if (most <= 0.0 || most >= kUnknownVariance || numbers[0] == -1.0) return std::nullopt;
   const Matrix6 even = (given + given.transpose()) / 2;
@@ -42,7 +43,7 @@ Result<void> PoseTrack::onOdometry(const ros::Odometry& message, TimePoint time,
   const std::array<double, 7> numbers{p.x, p.y, p.z, q.x, q.y, q.z, q.w};
   if (!std::ranges::all_of(numbers, [](double x) { return std::isfinite(x); }) || !v.allFinite() ||
       !w.allFinite()) {
-    return fail("not_finite", "odometry has numbers that are none; it is left out");
+    return fail("not_finite", "odometry has values that are not finite; it is left out");
   }
   const double norm = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
   if (!(std::abs(norm - 1.0) < 0.02)) {
@@ -101,8 +102,8 @@ Result<void> PoseTrack::onFrame(const FrameStamp& stamp) {
   frames_.pop_front();
   ++untold_;
   return fail("late",
-              "frames wait for odometry that does not come; start the node that says it, "
-              "or mend its stamps");
+              "frames wait for odometry that does not come; start the node that "
+              "publishes it, or fix its stamps");
 }
 
 std::optional<Odometry> PoseTrack::at(TimePoint time) const {

@@ -57,7 +57,7 @@ Result<void> Rig::onInfo(std::size_t index, const ros::CameraInfo& info) {
   if (!lens) return tl::unexpected(lens.error());
   if (!finite(*lens) || lens->width == 0 || lens->height == 0) {
     return fail("uncalibrated", camera.is.info_topic +
-                                    " has numbers that are none, or no size; "
+                                    " has values that are not finite, or no size; "
                                     "calibrate the camera again");
   }
   camera.info = info;

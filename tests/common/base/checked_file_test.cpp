@@ -30,7 +30,7 @@ class CheckedFileTest : public testing::Test {
     try {
       action();
     } catch (const StartupError& error) {
-      EXPECT_THAT(error.what(), testing::HasSubstr(";")) << "the mend follows";
+      EXPECT_THAT(error.what(), testing::HasSubstr(";")) << "the fix follows";
       return error.code();
     }
     return ExitCode::kOk;

@@ -85,7 +85,7 @@ TEST_F(PackedRecording, OfRosIsUnpackedForAsLongAsItIsRead) {
   EXPECT_EQ(beside->frameCount(), 5u);
 }
 
-TEST_F(PackedRecording, ThatCannotBeUnpackedSaysTheMendAndLeavesNothing) {
+TEST_F(PackedRecording, ThatCannotBeUnpackedSaysTheFixAndLeavesNothing) {
   const Twin twin = twinOf("ros_unpackable");
   const fs::path folder = freshFolder("ros_unpackable_packed"), file = packed(twin.file, folder);
   const auto error = [&] {

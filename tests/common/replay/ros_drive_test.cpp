@@ -262,7 +262,7 @@ TEST(RosDrive, AMessageWhoseTimeIsNoNumberIsLeftOutAndCounted) {
   EXPECT_EQ(recorded.reasons().of("stamp_malformed"), 2U);
 }
 
-TEST(RosDrive, WhatIsNoRecordingIsRefusedWithTheMend) {
+TEST(RosDrive, WhatIsNoRecordingIsRefusedWithTheFix) {
   const fs::path folder = freshFolder("ros_none");
   writeText(folder / "a.bag", "#ROSBAG V1.2\n");
   writeText(folder / "b.bag", "something else");
@@ -316,7 +316,7 @@ TEST(RosTopics, OfTwoThatAreAPairTheLeftOneIsFirst) {
   EXPECT_EQ(chosen.imu, "");
 }
 
-TEST(RosTopics, HalvesOfAnInertialUnitAreNoneAndTheMendIsSaid) {
+TEST(RosTopics, HalvesOfAnInertialUnitAreNoneAndTheFixIsSaid) {
   auto topics = topicsOfTypes({{"/camera/color/image_raw", "Image"},
                                {"/camera/accel/sample", "Imu"},
                                {"/camera/gyro/sample", "Imu"}});

@@ -74,7 +74,7 @@ TEST(SevenScenes, GravityOfSensorYamlGoesBeforeThePlanes) {
   EXPECT_EQ(Dataset::open({.path = folder})->calibration().cameras.front().fy, 501.0);
 }
 
-TEST(SevenScenes, WithoutDepthTheMendIsSaid) {
+TEST(SevenScenes, WithoutDepthTheFixIsSaid) {
   const fs::path folder = tinySevenScenes("no_depth");
   for (const char* name : {"0", "1", "2"}) {
     fs::remove(folder / ("frame-00000" + std::string(name) + ".depth.png"));

@@ -79,7 +79,7 @@ TEST_F(Service, ExplainsItselfAndRefusesAWrongCommandLine) {
   EXPECT_EQ(runProbe({"--config", "/nonexistent.yaml"}).status, 78);
 }
 
-TEST_F(Service, SaysWhatToMendWhereItCannotStart) {
+TEST_F(Service, SaysWhatToFixWhereItCannotStart) {
   const ProgramAnswer outcome = runProbe({"--set", "bus.interface=nosuch0"});
   EXPECT_EQ(outcome.status, 69);
   EXPECT_THAT(outcome.output, HasSubstr("bus.interface names an interface"));

@@ -220,7 +220,7 @@ TEST(Ros2Inwards, StatusSaysThatTheBridgeStandsIn) {
   EXPECT_GT(nodeOf(tree, "frame/cam0")["rate_hz"], 5) << "by the bridge's Health";
 }
 
-TEST(Ros2InwardsWrong, IsCountedAndSaysTheMend) {
+TEST(Ros2InwardsWrong, IsCountedAndSaysTheFix) {
   BridgeRig rig;
   rig.startBridge(kAll);
   Bus bus(rig);

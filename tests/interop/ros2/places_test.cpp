@@ -64,8 +64,7 @@ bool run(const Folder& folder, const std::string& script) {
 
 /// Returns whether a node that starts now receives a message of the bridge within five seconds.
 bool meets(const Folder& folder, std::vector<std::string> command) {
-  command.insert(command.end(),
-                 {std::getenv("PERDURE_ROS_LISTENER"), "0", "/perdure/diagnostics"});
+  command.insert(command.end(), {std::getenv("PERDURE_ROS_LISTENER"), "0", "/perdure/diagnostics"});
   const Child node(command, folder.file("node"));
   return eventually(5s, [&] { return !node.log().empty(); });
 }
@@ -95,7 +94,7 @@ TEST(Ros2Places, DefaultNodesMeetTheBridgeOnAHostWithTwoCardsAndOnAnother) {
   })) << rig.sentence();
 }
 
-TEST(Ros2Places, WhatCannotBeIsRefusedWithTheMend) {
+TEST(Ros2Places, WhatCannotBeIsRefusedWithTheFix) {
   EXPECT_THAT(refusal({"in.imu.topic=/imu"}, 78), HasSubstr("camera and IMU come from one source"));
   EXPECT_THAT(refusal({"in.cam0.image=camera/image"}, 78), HasSubstr("is no topic of ROS"));
   EXPECT_THAT(refusal({"in.detections.topic=/boxes"}, 78),

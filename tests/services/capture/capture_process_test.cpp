@@ -194,7 +194,7 @@ TEST_F(CaptureProcess, CountsATruncatedImageAndAGapOfTheImuInHealth) {
   EXPECT_EQ(last_health_.reasons["imu_gap"], 1u);
 }
 
-TEST(CaptureProgram, SaysTheMendAndTheStatusWhereItCannotStart) {
+TEST(CaptureProgram, SaysTheFixAndTheStatusWhereItCannotStart) {
   test::ownNetwork();
   test::Folder folder;
   const std::string program = (test::programs() / "perdure-capture").string();

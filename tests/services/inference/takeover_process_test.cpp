@@ -158,7 +158,7 @@ TEST_F(Takeover, AnOrderedEndLosesNoFrame) {
   EXPECT_LE(unusedFrom(told_at), 1);
 }
 
-TEST(InferenceProgram, SaysTheMendAndTheStatusWhereItCannotStart) {
+TEST(InferenceProgram, SaysTheFixAndTheStatusWhereItCannotStart) {
   test::ownNetwork();
   test::Folder folder;
   const std::string program = (test::programs() / "perdure-inference").string();

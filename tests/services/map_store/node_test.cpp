@@ -338,7 +338,7 @@ TEST_F(MapStoreNode, CountsObjectsThatHaveNoPlaceAndKeepsTheOthers) {
   EXPECT_EQ(node->reasons().of("object_invalid"), 2u);
 }
 
-TEST_F(MapStoreNode, CountsAFullDiskSaysTheMendAndStillHasWhatWasWritten) {
+TEST_F(MapStoreNode, CountsAFullDiskSaysTheFixAndStillHasWhatWasWritten) {
   config_.max_size_mb = 1;
   const auto node = start();
   std::vector<ObjectBelief> cars;

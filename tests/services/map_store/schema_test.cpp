@@ -279,7 +279,7 @@ TEST(Schema, LeavesAnOlderMapAsItWasWhereItCannotBeTakenOver) {
   EXPECT_EQ(MapDatabase({path}).reader().beliefs().value().size(), 400u);
 }
 
-TEST(Schema, SaysTheMendWhereTheFolderCannotBeMade) {
+TEST(Schema, SaysTheFixWhereTheFolderCannotBeMade) {
   const TemporaryFolder folder;
   std::ofstream(folder.file("file")) << "x";
   const auto refusal = refusalOf([&] { openStore({folder.file("file/map.sqlite")}); });

@@ -93,7 +93,7 @@ TEST_F(CalibrateRun, AFolderOfPicturesGivesTheLensAlone) {
   EXPECT_EQ(replay::readRig(folder_ / "lens" / "rig.yaml").cameras[0].width, truth.width);
 }
 
-TEST_F(CalibrateRun, AnotherBoardIsNotFoundAndTheMendIsSaid) {
+TEST_F(CalibrateRun, AnotherBoardIsNotFoundAndTheFixIsSaid) {
   ReadOptions read;
   read.data = folder_ / "drive";
   read.every = 10;

@@ -86,7 +86,7 @@ TEST(RigCheck, ATimeOffsetComesWithTheValueToSet) {
   EXPECT_THAT(worst(check).text, HasSubstr("set time_offset_s to 0.0160"));
 }
 
-TEST(RigCheck, WhatIsOffAtOnceIsNoMend) {
+TEST(RigCheck, WhatIsOffAtOnceIsNoFix) {
   RigCheck check = goodCheck();
   check.turned = {0.0, 0.012, 0.0};
   check.later_s = 0.012;
@@ -98,7 +98,7 @@ TEST(RigCheck, WhatIsOffAtOnceIsNoMend) {
   }
 }
 
-TEST(RigCheck, WhereMuchContradictsNumbersAreNoMend) {
+TEST(RigCheck, WhereMuchContradictsNumbersAreNoFix) {
   RigCheck check = goodCheck();
   check.contradicted = 150;
   check.turned = {0.0, 0.085, 0.0};

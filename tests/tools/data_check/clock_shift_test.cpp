@@ -105,7 +105,7 @@ TEST(ClockRate, IsFoundAndAConstantShiftIsNone) {
   }
 }
 
-TEST(ClockShift, IsNamedWithItsCauseAndItsMend) {
+TEST(ClockShift, IsNamedWithItsCauseAndItsFix) {
   const auto textOf = [](double shift) { return shiftFinding(shift, camera()).front().text; };
   EXPECT_THAT(textOf(-37.0), HasSubstr("37 s ahead of that of the IMU by their turning, as TAI"));
   EXPECT_THAT(textOf(-18.0), HasSubstr("as GPS time is ahead of UTC by 18 s: subtract"));

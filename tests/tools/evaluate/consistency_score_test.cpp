@@ -163,7 +163,7 @@ TEST(Consistency, HonestOdometryHasAneesOneInEachEpochsWorld) {
   EXPECT_NEAR(scoreOdometry(fast, circle()).velocity.mean(), 1.0 + 7.5 * 7.5 / 3.0, 2.0);
 }
 
-TEST(Consistency, AFileThatIsNoneIsRefusedWithTheMend) {
+TEST(Consistency, AFileThatIsNoneIsRefusedWithTheFix) {
   const auto folder = replay::freshFolder("consistency");
   const auto errorOf = [&] {
     return replay::startupErrorOf([&] { readBeliefs(folder / "objects.json"); });

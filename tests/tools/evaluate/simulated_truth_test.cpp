@@ -132,7 +132,7 @@ TEST(SimulatedTruth, FramesAfterTheTrajectorysEndAreNotAskedThoseBeforeItsStartA
   EXPECT_EQ(scoreFrames(run.frames, {}).cells[2][2].truth, 2U);
 }
 
-TEST(SimulatedTruth, AFolderWithoutTruthIsRefusedWithTheMend) {
+TEST(SimulatedTruth, AFolderWithoutTruthIsRefusedWithTheFix) {
   const auto root = replay::tinyEuroc("no_truth");
   EXPECT_THAT(replay::startupErrorOf([&] { readSimulatedTruth(root); }),
               HasSubstr("perdure simulate"));

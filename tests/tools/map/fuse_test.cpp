@@ -145,7 +145,7 @@ TEST_F(FuseFiles, AFileComesBackAsItWasWritten) {
   EXPECT_TRUE(beliefBytes(out("again")) == beliefBytes(out()));
 }
 
-TEST_F(FuseFiles, RefuseWithTheMend) {
+TEST_F(FuseFiles, RefuseWithTheFix) {
   const std::string a = first();
   EXPECT_THAT(whyRefused({{a, folder.file("nowhere")}, out()}, ExitCode::kUnavailable),
               AllOf(HasSubstr("There is no map"), HasSubstr("nowhere")));

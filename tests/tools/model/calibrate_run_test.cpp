@@ -75,22 +75,22 @@ class CalibrateRun : public testing::Test {
   double error_before_ = 0.0;
 };
 
-TEST_F(CalibrateRun, MendsANetworkWhoseEvidenceWasSpoiledAndInferenceTakesTheFile) {
+TEST_F(CalibrateRun, RepairsANetworkWhoseEvidenceWasSpoiledAndInferenceTakesTheFile) {
   const auto committed = read(models_ / "model.json");
   const auto sound = calibrated(committed, "sound");
   const double sound_error = error_before_;
   auto spoiled_model = committed;
   spoiled_model["calibration"]["temperature"] = 4.0;
   spoiled_model["calibration"].erase("primed");
-  const auto mended = calibrated(spoiled_model, "spoiled");
+  const auto repaired = calibrated(spoiled_model, "spoiled");
   EXPECT_GT(error_before_, sound_error + 0.05) << "what was spoiled is seen";
-  const auto &a = sound["calibration"], &b = mended["calibration"];
+  const auto &a = sound["calibration"], &b = repaired["calibration"];
   EXPECT_NEAR(a["temperature"].get<double>(), b["temperature"].get<double>(), 1e-3);
   EXPECT_NEAR(a["clutter_rate"].get<double>(), b["clutter_rate"].get<double>(), 1e-3);
   EXPECT_GT(b["temperature"].get<double>(), 0.3);
   EXPECT_LT(b["temperature"].get<double>(), 1.5);
   EXPECT_GT(b["primed"]["slope"].get<double>(), 0.0);
-  EXPECT_EQ(mended["levels"], committed["levels"]) << "the rest of the file stays";
+  EXPECT_EQ(repaired["levels"], committed["levels"]) << "the rest of the file stays";
 
   inference::Config config;
   config.model.path = network_.string();
@@ -110,7 +110,7 @@ TEST_F(CalibrateRun, TheMapOfARunStandsInForLabels) {
   auto spoiled = read(models_ / "model.json");
   spoiled["calibration"] = {{"temperature", 0.2}, {"clutter_rate", 0.5}};
   const double before = likelihoodByTruth(street, spoiled);
-  const fs::path description = folder_ / "spoiled.json", mended = folder_ / "mended.json";
+  const fs::path description = folder_ / "spoiled.json", repaired = folder_ / "repaired.json";
   const ProgramAnswer mapped =
       run({"pipeline", "--quiet", "--data", street.string(), "--odometry", "truth", "--detections",
            "model", "--model", network_.string(), "--out", out.string(), "--set",
@@ -118,9 +118,9 @@ TEST_F(CalibrateRun, TheMapOfARunStandsInForLabels) {
   ASSERT_EQ(mapped.status, 0) << mapped.output;
   const ProgramAnswer fitted = run({"model", "calibrate", network_.string(), "--quiet", "--frames",
                                     street.string(), "--labels", out.string(), "--description",
-                                    description.string(), "--out", mended.string()});
+                                    description.string(), "--out", repaired.string()});
   ASSERT_EQ(fitted.status, 0) << fitted.output;
-  const auto model = read(mended);
+  const auto model = read(repaired);
   EXPECT_GT(likelihoodByTruth(street, model), 0.8 * before) << "nats a box, below 0: " << before;
   EXPECT_EQ(model.value("box_sigma", 0.0), spoiled.value("box_sigma", 0.0))
       << "the sides of the map's boxes are no measure of a network's";

@@ -63,7 +63,7 @@ TEST(CalibrationFile, WhatIsNoJsonIsRefused) {
   EXPECT_THROW(withCalibration("{", someResult()), StartupError);
 }
 
-TEST(LabelledFrames, AFolderWithoutLabelsIsToldHowToMend) {
+TEST(LabelledFrames, AFolderWithoutLabelsIsToldHowToFix) {
   const fs::path folder =
       fs::temp_directory_path() / ("perdure_unlabelled_" + std::to_string(getpid()));
   fs::create_directories(folder);

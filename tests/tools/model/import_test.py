@@ -106,7 +106,7 @@ class Inputs(Importing):
         nodes = [helper.make_node("Conv", [name, "w"], [f"{name}_out"], strides=[8, 8]) for name in inputs]
         return self.graph(nodes, {f"{name}_out": None for name in inputs}, {"w": weight}, inputs)
 
-    def test_channels_last_bytes_batches_and_open_sizes_have_their_mends(self):
+    def test_channels_last_bytes_batches_and_open_sizes_have_their_fixes(self):
         cases = [(dict(shape=(1, 64, 64, 3)), "has its channels last; export with [1,3,height,width]"),
                  (dict(shape=(1, 1, 64, 64)), "has 1 channels"),
                  (dict(kind=TensorProto.UINT8), "is uint8; export with float32"),

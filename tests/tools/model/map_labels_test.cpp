@@ -95,7 +95,7 @@ TEST_F(MapLabels, IgnoresWhatIsDoubtfulCutHiddenOrSmall) {
   }
 }
 
-TEST_F(MapLabels, WhatIsSeenTooRarelyIsRefusedWithTheMend) {
+TEST_F(MapLabels, WhatIsSeenTooRarelyIsRefusedWithTheFix) {
   runFound({kFour[0], kFour[1], kFour[2]});
   EXPECT_THAT(replay::startupErrorOf([&] { (void)read(); }), HasSubstr("over a longer drive"));
   runFound(kFour);

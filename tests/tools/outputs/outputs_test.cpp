@@ -6,8 +6,8 @@
 #include <sstream>
 
 #include "common/base/errors.h"
-#include "tests/support/camera.h"
 #include "common/earth/geodesy.h"
+#include "tests/support/camera.h"
 #include "tools/outputs/object_history.h"
 #include "tools/outputs/output_writer.h"
 #include "tools/outputs/stage_timer.h"
@@ -271,7 +271,7 @@ TEST(OutputWriter, WithAMapTheMapsFilesAreInMAndTheTablesStayInW) {
   EXPECT_THAT(textOf(folder / "objects_inst.csv"), HasSubstr(",8.0000,2.0000,"));
 }
 
-TEST(OutputWriter, SaysTheMendWhereTheFolderCannotBeMade) {
+TEST(OutputWriter, SaysTheFixWhereTheFolderCannotBeMade) {
   try {
     const OutputWriter writer("/proc/nowhere/out", "0000");
     FAIL() << "a folder in /proc was made";

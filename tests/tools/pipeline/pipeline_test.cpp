@@ -325,7 +325,7 @@ TEST(Pipeline, FramesWithoutAPoseAreCountedAndLeaveNoLine) {
   EXPECT_EQ(pipeline.reasons().at("pipeline").of("frame_without_pose"), 10U);
 }
 
-TEST(Pipeline, WhatCannotStartSaysTheMend) {
+TEST(Pipeline, WhatCannotStartSaysTheFix) {
   const auto street = makeStreet("errors");
   auto options = streetOptions(street, "out");
   options.detections = "simulated";

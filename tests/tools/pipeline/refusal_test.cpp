@@ -167,8 +167,8 @@ TEST(PipelineRefusal, AnEmptyMapWithDetectionsIsNoSuccess) {
   EXPECT_THAT(endOf(options), testing::Pair(HasSubstr("the camera moved by 0.4 m"), 65));
 }
 
-TEST(PipelineRefusal, WhatWasMendedIsInTheReport) {
-  const auto root = makeTurningDrive("mended");
+TEST(PipelineRefusal, WhatWasRepairedIsInTheReport) {
+  const auto root = makeTurningDrive("repaired");
   for (const auto& entry : fs::directory_iterator(root / "mav0/cam0/data")) {
     fs::rename(entry.path(), fs::path(entry.path()).replace_extension(".PNG"));
   }

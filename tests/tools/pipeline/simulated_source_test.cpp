@@ -91,7 +91,7 @@ TEST(SimulatedDetections, LateOnesGiveThePosteriorOfThoseOnTime) {
   EXPECT_THAT(objectsWith("0"), HasSubstr("\"id\""));
 }
 
-TEST(SimulatedDetections, WhatCannotBeIsSaidWithTheMend) {
+TEST(SimulatedDetections, WhatCannotBeIsSaidWithTheFix) {
   const auto root = tinySimulated("wrong");
   auto options = optionsFor(root, "out");
   const auto error = [&] { return startupErrorOf([&] { Pipeline pipeline(options); }); };

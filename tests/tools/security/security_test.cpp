@@ -57,7 +57,7 @@ TEST_F(Security, MakesIdentitiesThatAreFitAndWhoseFilesAreForTheirOwnerAlone) {
   }
 }
 
-TEST_F(Security, SaysOfAnIdentityThatIsNotFitWhyAndTheMend) {
+TEST_F(Security, SaysOfAnIdentityThatIsNotFitWhyAndTheFix) {
   struct Case {
     const char* code;
     std::function<void(const std::string& folder)> spoil;

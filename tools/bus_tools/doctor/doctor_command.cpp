@@ -146,9 +146,10 @@ void setUpDoctor(CLI::App& command) {
       ->check(not_empty)
       ->type_name("FILE");
   command
-      .add_option("--fix", options->copy,
-                  "with --data: a new folder for a copy with what is sure mended (units, columns "
-                  "exchanged, T_BS the wrong way round, order and stamps, the rig of --rig)")
+      .add_option(
+          "--fix", options->copy,
+          "with --data: a new folder for a repaired copy (units, exchanged columns, inverted T_BS, "
+          "order and stamps, the rig of --rig)")
       ->needs("--data")
       ->check(not_empty)
       ->type_name("FOLDER");

@@ -8,8 +8,8 @@
 #include "tools/calibrate/motion/from_motion.h"
 #include "tools/calibrate/rig_check.h"
 #include "tools/data_check/data_check.h"
-#include "tools/data_check/mended_copy.h"
-#include "tools/data_check/mended_text.h"
+#include "tools/data_check/repaired_copy.h"
+#include "tools/data_check/repaired_text.h"
 
 namespace perdure::tools {
 namespace {
@@ -143,22 +143,22 @@ Findings checkRigBy(const Drive& drive, std::optional<double> seconds) {
 }
 
 Findings fixRecording(const Drive& given, const std::string& folder) {
-  const MendedText text(given.data);
+  const RepairedText text(given.data);
   const auto dataset =
       replay::Dataset::open({.path = text.drive(), .sequence = given.sequence, .rig = given.rig});
-  const MendedDrive drive = mendDrive(dataset->recording());
+  const RepairedDrive drive = repairDrive(dataset->recording());
   Findings findings;
-  for (const auto& mend : text.mends()) findings.push_back({Verdict::kOk, mend});
+  for (const auto& fix : text.fixes()) findings.push_back({Verdict::kOk, fix});
   for (const auto& note : dataset->recording().notes) findings.push_back({Verdict::kOk, note});
   for (const auto& [reason, count] : dataset->recording().reasons.all()) {
     findings.push_back(
         {Verdict::kOk, "counted while reading: " + reason + ", " + std::to_string(count)});
   }
-  for (const auto& mend : drive.mends) findings.push_back({Verdict::kOk, mend});
+  for (const auto& fix : drive.fixes) findings.push_back({Verdict::kOk, fix});
   if (findings.empty() && given.rig.empty()) {
     addFindings(drive.left, findings);
     if (isUsable(drive.left)) {
-      findings.push_back({Verdict::kOk, "there is nothing to mend; no copy is written"});
+      findings.push_back({Verdict::kOk, "there is nothing to fix; no copy is written"});
     } else {
       findings.push_back({Verdict::kWarn, "no correction of this is certain; no copy is written"});
     }

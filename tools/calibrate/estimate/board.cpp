@@ -16,12 +16,12 @@ namespace {
 
 constexpr int kTagModules = 8;  ///< modules of 36h11: six of data and the black border
 constexpr int kMostTags = 587;  ///< size of the family
-constexpr char kMend[] =
+constexpr char kFix[] =
     "give chessboard:COLUMNSxROWS:SQUARE (inner corners, metres) such as chessboard:9x6:0.03, or "
     "aprilgrid:COLUMNSxROWS:TAG[:GAP] such as aprilgrid:6x6:0.088:0.3";
 
 [[noreturn]] void wrong(const std::string& text, const std::string& what) {
-  throw StartupError(ExitCode::kUsage, "--board `" + text + "` " + what + "; " + kMend);
+  throw StartupError(ExitCode::kUsage, "--board `" + text + "` " + what + "; " + kFix);
 }
 
 /// Black modules of each tag of the family, row by row.

@@ -25,7 +25,7 @@ constexpr double kInDegrees = 180.0 / M_PI;
 
 /// A convention in which poses may have been written.
 struct Reading {
-  const char *code, *what, *mend;
+  const char *code, *what, *fix;
   bool w_first, inverted, of_camera;
 
   Quaternion body(const Quaternion& written, const Quaternion& q_BC) const {
@@ -155,21 +155,21 @@ std::optional<Wrong> wrongReading(const std::vector<Step>& steps, const Quaterni
 
 /// The finding with its fix. Rotations alone do not distinguish an inverse from a quaternion that
 /// is conjugated.
-DataFinding mended(Wrong wrong, const std::vector<StampedPose>& poses,
-                   const replay::Recording& recording) {
+DataFinding repaired(Wrong wrong, const std::vector<StampedPose>& poses,
+                     const replay::Recording& recording) {
   const Reading& reading = *wrong.likely.front();
-  std::string names = namesOf(wrong.likely), mend = reading.mend;
+  std::string names = namesOf(wrong.likely), fix = reading.fix;
   if (reading.inverted && !reading.w_first) {
     const Inversion how = howInverted(poses, recording, reading.of_camera);
-    if (how == Inversion::kUnsure) mend = kEither;
+    if (how == Inversion::kUnsure) fix = kEither;
     if (how == Inversion::kQuaternion) {
       wrong.finding.code = "poses_conjugated";
       names = "conjugated, while their positions are right";
-      mend = kConjugate;
+      fix = kConjugate;
     }
-    if (how != Inversion::kPose && reading.of_camera) mend += fmt::format("; and {}", kAxes);
+    if (how != Inversion::kPose && reading.of_camera) fix += fmt::format("; and {}", kAxes);
   }
-  wrong.finding.text += names + ": " + mend;
+  wrong.finding.text += names + ": " + fix;
   return wrong.finding;
 }
 
@@ -324,7 +324,7 @@ DataFindings judgePosesByGyro(const std::vector<StampedPose>& poses,
   if (auto findings = judgePoseTurning(poses, gyro_turns); !findings.empty()) return findings;
   for (const auto& steps : all) {
     if (auto wrong = wrongReading(steps, q_BC, kLimits, kGyro)) {
-      return {mended(std::move(*wrong), poses, recording)};
+      return {repaired(std::move(*wrong), poses, recording)};
     }
   }
   if (const auto grows = growingOffset(poses, gyro, camera, kLimits)) {
@@ -370,7 +370,7 @@ DataFindings judgePosesByImages(const std::vector<StampedPose>& poses,
   }
   const Quaternion q_BC = camera.T_BC.q;
   if (auto wrong = wrongReading(steps, q_BC, limits, kImages)) {
-    return {mended(std::move(*wrong), poses, recording)};
+    return {repaired(std::move(*wrong), poses, recording)};
   }
   if (auto finding = otherAxes(steps, q_BC, limits, kImages)) return {*finding};
   return {};

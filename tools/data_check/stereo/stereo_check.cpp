@@ -177,7 +177,7 @@ class StereoJudge {
     return warning(
         "stereo_stamps",
         fmt::format("the images of {} turn as those of {} do {:.2f} s {}: its stamps, or "
-                    "the names of its images, are {:.2f} s too {}; mend them, T_BS "
+                    "the names of its images, are {:.2f} s too {}; fix them, T_BS "
                     "cannot be judged before",
                     name, first_.calibration().name, std::abs(*late),
                     *late > 0 ? "sooner" : "later", std::abs(*late), *late > 0 ? "late" : "early"));
@@ -190,13 +190,13 @@ class StereoJudge {
     if (given.count < kFewestMatches) return {};
     const Turned turned = turnOf(matches, T_C1C0_);
     const RigidTransform turn(expQuaternion(turned.by), Vector3d::Zero());
-    const Fit mended = fitOf(matches, turn * T_C1C0_, fx);
+    const Fit repaired = fitOf(matches, turn * T_C1C0_, fx);
     const bool wrong = given.off_px > kFarOff_px || given.isBehind();
     // Rotation about the vertical axis between the images looks like parallax of both signs.
     const bool mixed = given.behind > kFewestMatches && 3 * given.behind > given.before;
-    if (!wrong && !mixed && !isTurned(turned, given, mended)) return {};
+    if (!wrong && !mixed && !isTurned(turned, given, repaired)) return {};
     if (auto late = judgeStamps(); !late.empty()) return late;
-    if (isTurned(turned, given, mended)) return judgeTurned(turned, given);
+    if (isTurned(turned, given, repaired)) return judgeTurned(turned, given);
     const std::string of = fmt::format("T_BS of {}", second_.calibration().name);
     const std::string& name0 = first_.calibration().name;
     if (given.off_px > kFarOff_px) {
@@ -215,12 +215,12 @@ class StereoJudge {
 
   /// Whether a rotation of cam1 explains the misfit with certainty and places the points in front
   /// of the cameras.
-  static bool isTurned(const Turned& turned, const Fit& given, const Fit& mended) {
+  static bool isTurned(const Turned& turned, const Fit& given, const Fit& repaired) {
     constexpr double kLeast_rad = 1.0 / kDegreesOfTurn, kSurely = 6.0, kFits_px = 2.0;
     const double angle = turned.by.norm();
     if (angle < kLeast_rad || angle < kSurely * turned.sigma.norm()) return false;
-    const bool better = mended.off_px < 0.5 * given.off_px || given.isBehind();
-    return better && mended.off_px < kFits_px && mended.isBefore();
+    const bool better = repaired.off_px < 0.5 * given.off_px || given.isBehind();
+    return better && repaired.off_px < kFits_px && repaired.isBefore();
   }
 
   DataFindings judgeTurned(const Turned& turned, const Fit& given) const {

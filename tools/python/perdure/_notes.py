@@ -111,5 +111,5 @@ NOTES = {
     "Health": "How a process is, once a second.",
     "Health.rate_hz": "Hz, of frames_out",
     "Health.cpu_s": "s, since the start",
-    "Health.message": "what is wrong, and the mend",
+    "Health.message": "what is wrong, and the fix",
 }

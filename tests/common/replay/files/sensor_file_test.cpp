@@ -61,7 +61,7 @@ TEST(SensorFileOfOthers, FiveAndEightCoefficientsAreTaken) {
   EXPECT_THAT(errorOfYaml(lens("equi", "[1, 2, 3, 4, 5]")), HasSubstr("has not 4 numbers"));
 }
 
-TEST(SensorFileOfOthers, ALensThatIsNotReadIsNamedWithTheMend) {
+TEST(SensorFileOfOthers, ALensThatIsNotReadIsNamedWithTheFix) {
   EXPECT_THAT(errorOfYaml(std::string(kPlace) + kSize + "camera_model: scaramuzza\n"),
               HasSubstr("pinhole-equi"));
   EXPECT_THAT(errorOfYaml(std::string(kPlace) + kSize + "camera_model: ds\n"),

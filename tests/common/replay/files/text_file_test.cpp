@@ -52,7 +52,7 @@ TEST(TextFile, AHeaderHoldsNoNumber) {
     EXPECT_FALSE(isHeader({"tx", field}));
 }
 
-TEST(TextFile, AMissingFileIsNamedWithTheMend) {
+TEST(TextFile, AMissingFileIsNamedWithTheFix) {
   const auto error = startupErrorOf([] { readLines("/nowhere/x.csv", "make it"); });
   EXPECT_THAT(error, HasSubstr("/nowhere/x.csv"));
   EXPECT_THAT(error, HasSubstr("make it"));

@@ -89,7 +89,7 @@ std::size_t messagesIn(RosSource& bag) {
   return count;
 }
 
-TEST(LongBagBounds, MoreThanAGiBOfOverlappingChunksIsRefusedWithTheMend) {
+TEST(LongBagBounds, MoreThanAGiBOfOverlappingChunksIsRefusedWithTheFix) {
   const fs::path file = bagOf("bag_overlap", 20, true);
   EXPECT_LT(fs::file_size(file), 1U << 20U) << "what is small on the disk";
   const auto bag = openBag(file);

@@ -141,7 +141,7 @@ TEST_F(Stream, TakesTheDeviceAndTheTriggerThatAreNamed) {
   EXPECT_THAT(stream_->state().name(), HasSubstr("bmi_gyro"));
 }
 
-TEST_F(Stream, SaysWhatIsMissingAndTheMend) {
+TEST_F(Stream, SaysWhatIsMissingAndTheFix) {
   open();
   ASSERT_TRUE(waitFor([&] { return stream_->state().reasons().of("imu_absent") > 0; }));
   EXPECT_THAT(stream_->state().problem(), HasSubstr("no IIO context at ip:" + address_));

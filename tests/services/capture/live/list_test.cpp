@@ -90,7 +90,7 @@ TEST(ListOfSensors, AnIiodsDeviceIsNamed) {
   EXPECT_EQ(yaml["imu"]["uri"].as<std::string>(), "ip:127.0.7.41");
 }
 
-TEST(ListOfSensors, AHostThatDoesNotAnswerIsAProblemWithTheMend) {
+TEST(ListOfSensors, AHostThatDoesNotAnswerIsAProblemWithTheFix) {
   const Seen seen = lookAround("ip:127.0.0.1:1");
   EXPECT_TRUE(seen.imus.empty());
   ASSERT_FALSE(seen.problems.empty());

@@ -103,7 +103,7 @@ TEST(SocketStream, OpensAgainWhatWasClosed) {
   ASSERT_TRUE(waitFor([&] { return opened == 3; }));
 }
 
-TEST(SocketStream, SaysTheMendWhereItCannotBeOpened) {
+TEST(SocketStream, SaysTheFixWhereItCannotBeOpened) {
   const auto why = [](const OpenSocket& open) {
     const auto opened = open();
     if (opened) ::close(*opened);

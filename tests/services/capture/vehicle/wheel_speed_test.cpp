@@ -82,7 +82,7 @@ TEST(WheelSpeed, KnowsUnits) {
   }
 }
 
-TEST(WheelSpeed, RefusesAConfigurationWithTheMend) {
+TEST(WheelSpeed, RefusesAConfigurationWithTheFix) {
   const auto why = [](const std::vector<std::string>& signals, const std::string& reverse = "") {
     try {
       (void)wheelSettings(signals, reverse, 0.05);

@@ -351,7 +351,7 @@ TEST(VitalSigns, TellNoFaultOfServicesWhoseDriveHasEnded) {
   Health vio;
   vio.process = "vio";
   vio.state = HealthState::kDegraded;
-  vio.message = "no frames for 9.0 s; mend the camera, or start capture";
+  vio.message = "no frames for 9.0 s; fix the camera, or start capture";
   vio.reasons["input_silent"] = 1;
   signs.onHealth(vio, kNow);
   EXPECT_EQ(json::parse(signs.healthz(kNow))["services"]["vio"], "degraded");

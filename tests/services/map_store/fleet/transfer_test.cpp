@@ -75,7 +75,7 @@ TEST(FleetTransfer, AMapThatIsPushedAndPulledIsTheSame) {
   EXPECT_TRUE(maps[0].whole);
 }
 
-TEST(FleetTransfer, WhatCannotBePulledIsSaidWithTheMend) {
+TEST(FleetTransfer, WhatCannotBePulledIsSaidWithTheFix) {
   auto* server = PERDURE_SERVER_OR_SKIP();
   const TemporaryFolder folder;
   const std::string url = server->makeDatabase(), to = folder.file("to");

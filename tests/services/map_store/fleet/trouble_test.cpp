@@ -183,10 +183,10 @@ void refuseObjects(PostgresServer& server, const std::string& url, const std::st
           "EACH ROW EXECUTE FUNCTION refuse()");
 }
 
-TEST(FleetTrouble, AFullDiskAndARefusalAreSaidAndOverOnceMended) {
+TEST(FleetTrouble, AFullDiskAndARefusalAreSaidAndOverOnceRepaired) {
   auto* server = PERDURE_SERVER_OR_SKIP();
   struct Case {
-    const char *state, *code, *mend;
+    const char *state, *code, *fix;
   };
   for (const Case& each : {Case{"53100", "server_full", "free space on the server"},
                            Case{"23514", "server_refused", "see the server's log"}}) {
@@ -199,7 +199,7 @@ TEST(FleetTrouble, AFullDiskAndARefusalAreSaidAndOverOnceMended) {
     vehicle.step(2);
     ASSERT_TRUE(test::eventually([&] { return vehicle.fleet().progress().failing == each.code; }))
         << vehicle.fleet().progress().trouble;
-    EXPECT_THAT(vehicle.fleet().progress().trouble, HasSubstr(each.mend));
+    EXPECT_THAT(vehicle.fleet().progress().trouble, HasSubstr(each.fix));
     for (std::uint64_t n = 3; n <= 6; ++n) vehicle.step(n);
     EXPECT_EQ(vehicle.node().commits(), 6u);
     EXPECT_EQ(server->number(url, "SELECT count(*) FROM perdure.objects"), 1);

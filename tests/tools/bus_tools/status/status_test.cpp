@@ -270,7 +270,7 @@ TEST(Status, ADriveThatHasEndedIsNoFaultOfTheServicesThatWaitForMore) {
     auto& service = seen.services[name];
     service.frames_hz = 0.0;
     service.health.state = HealthState::kDegraded;
-    service.health.message = "no frames for 60.0 s; mend the camera, or start capture";
+    service.health.message = "no frames for 60.0 s; fix the camera, or start capture";
     service.health.reasons["input_silent"] = 1;
   };
   for (const char* name : {"vio", "inference", "semantic_filter"}) silence(name);
@@ -280,7 +280,7 @@ TEST(Status, ADriveThatHasEndedIsNoFaultOfTheServicesThatWaitForMore) {
   seen.services["capture"].health.message = "end of drive";
   EXPECT_EQ(judge(seen).level, Level::kOk) << toText(judge(seen), false);
   EXPECT_THAT(find(judge(seen), "vio").text, HasSubstr("nothing more comes: end of drive"));
-  EXPECT_THAT(find(judge(seen), "vio").text, Not(HasSubstr("mend the camera")));
+  EXPECT_THAT(find(judge(seen), "vio").text, Not(HasSubstr("fix the camera")));
   EXPECT_EQ(toJson(find(judge(seen), "vio"))["ended"], true);
   seen.services["vio"].health.reasons.clear();
   EXPECT_EQ(dominating(seen, "vio"), Level::kDegraded) << "something else is wrong with it";

@@ -119,14 +119,14 @@ TEST(CameraImu, AGapWithoutTheBoardLeavesTheLongerStretch) {
   expectTruth(c, *found);
 }
 
-void expectRefusal(const CameraImuInput& input, const std::string& code, const std::string& mend) {
+void expectRefusal(const CameraImuInput& input, const std::string& code, const std::string& fix) {
   const auto found = estimateCameraImu(input, {});
   ASSERT_FALSE(found) << code;
   EXPECT_EQ(found.error().code, code) << found.error().detail;
-  EXPECT_NE(found.error().detail.find(mend), std::string::npos) << found.error().detail;
+  EXPECT_NE(found.error().detail.find(fix), std::string::npos) << found.error().detail;
 }
 
-TEST(CameraImu, SaysWhatIsMissingAndTheMend) {
+TEST(CameraImu, SaysWhatIsMissingAndTheFix) {
   const Case whole = caseOf(kSmallGrid, 12);
   Case c = whole;
   c.input.samples.clear();

@@ -112,7 +112,7 @@ TEST_F(Pairing, APhaseBeyondTheToleranceIsNotPairedAndIsAProblem) {
     first(n);
     second(n);
   }
-  EXPECT_EQ(pairing_.problem(), "") << "mended";
+  EXPECT_EQ(pairing_.problem(), "") << "repaired";
 }
 
 TEST_F(Pairing, ACameraWhoseImagesComeTooLateIsAProblemOfItsOwn) {

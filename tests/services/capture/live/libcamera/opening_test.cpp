@@ -29,7 +29,7 @@ TEST(CameraChoice, AWholeIdGoesBeforeAPartOfAnother) {
   EXPECT_EQ(chooseCamera(ids, "usb-1:046d", true), 1u);
 }
 
-TEST(CameraChoice, OfTwoCamerasAnIdThatBothHaveIsRefusedWithTheMend) {
+TEST(CameraChoice, OfTwoCamerasAnIdThatBothHaveIsRefusedWithTheFix) {
   EXPECT_EQ(chooseCamera(kIds, "imx", true), 2u);
   const auto both = chooseCamera(kIds, "046d", true);
   ASSERT_FALSE(both);

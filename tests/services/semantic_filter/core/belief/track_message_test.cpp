@@ -38,11 +38,11 @@ TEST(TrackMessage, ACovarianceThatRoundingMadeIndefiniteIsRepairedAndOthersAreNo
   object.hypotheses[0].P.topLeftCorner<7, 7>() = P;
   Eigen::LLT<Matrix7d> before(P);
   ASSERT_EQ(before.info(), Eigen::NumericalIssue);
-  const Matrix7d mended = toBelief(object, makePriors(), 0.7).best().covariance;
-  EXPECT_EQ(Eigen::LLT<Matrix7d>(mended).info(), Eigen::Success);
-  EXPECT_EQ(mended, mended.transpose());
+  const Matrix7d repaired = toBelief(object, makePriors(), 0.7).best().covariance;
+  EXPECT_EQ(Eigen::LLT<Matrix7d>(repaired).info(), Eigen::Success);
+  EXPECT_EQ(repaired, repaired.transpose());
   const Vector7d sigma = P.diagonal().cwiseSqrt();
-  const Matrix7d scaled = (mended - P).cwiseQuotient(sigma * sigma.transpose());
+  const Matrix7d scaled = (repaired - P).cwiseQuotient(sigma * sigma.transpose());
   EXPECT_LT(scaled.cwiseAbs().maxCoeff(), 1e-6);
 }
 

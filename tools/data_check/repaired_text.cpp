@@ -1,4 +1,4 @@
-#include "tools/data_check/mended_text.h"
+#include "tools/data_check/repaired_text.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -136,7 +136,7 @@ bool isOf(const WholeUnit& unit, const Table& table) {
   return stamp && *stamp >= unit.least && *stamp <= unit.most;
 }
 
-bool mendStamps(Table& table, const WholeUnit& whole, std::vector<std::string>& mends) {
+bool repairStamps(Table& table, const WholeUnit& whole, std::vector<std::string>& fixes) {
   std::size_t places = placesShort(table);
   if (places == 0 && isOf(whole, table)) places = whole.places;
   if (places == 0) return false;
@@ -151,7 +151,7 @@ bool mendStamps(Table& table, const WholeUnit& whole, std::vector<std::string>& 
     }
     row[0] = *std::move(stamp);
   }
-  mends.push_back(
+  fixes.push_back(
       fmt::format("{}: the stamps are nanoseconds now (they were {})", table.file.string(), unit));
   return true;
 }
@@ -253,7 +253,7 @@ std::optional<Six> byQuaternion(const Table& table, std::size_t columns) {
   return rest;
 }
 
-bool mendColumns(Table& table, std::vector<std::string>& mends) {
+bool repairColumns(Table& table, std::vector<std::string>& fixes) {
   std::map<std::size_t, std::size_t> counts;
   for (const auto& row : table.rows) ++counts[row.size()];
   const auto usual = std::max_element(counts.begin(), counts.end(),
@@ -278,7 +278,7 @@ bool mendColumns(Table& table, std::vector<std::string>& mends) {
   table.head.clear();
   std::vector<std::size_t> numbers = *six;
   for (auto& n : numbers) ++n;
-  mends.push_back(fmt::format(
+  fixes.push_back(fmt::format(
       "{}: of its {} columns {} are taken as w_x, w_y, w_z, a_x, a_y, a_z, the others left out",
       table.file.string(), columns, fmt::join(numbers, ", ")));
   return true;
@@ -302,7 +302,7 @@ void linkAll(const fs::path& from, const fs::path& to, const std::string& withou
 
 }  // namespace
 
-MendedText::MendedText(const fs::path& given) : drive_(given) {
+RepairedText::RepairedText(const fs::path& given) : drive_(given) {
   const fs::path absolute = fs::absolute(given).lexically_normal();
   const fs::path folder = absolute.has_filename() ? absolute : absolute.parent_path();
   const fs::path mav0 = folder.filename() == "mav0" ? folder : folder / "mav0";
@@ -314,13 +314,13 @@ MendedText::MendedText(const fs::path& given) : drive_(given) {
     const fs::path file = sensor.path() / "data.csv";
     if (!fs::is_regular_file(file, error)) continue;
     Table table = tableOf(file);
-    const bool stamps = mendStamps(table, whole, mends_);
+    const bool stamps = repairStamps(table, whole, fixes_);
     const bool columns =
-        sensor.path().filename().string().starts_with("imu") && mendColumns(table, mends_);
+        sensor.path().filename().string().starts_with("imu") && repairColumns(table, fixes_);
     if (stamps || columns) changed.push_back(std::move(table));
   }
   if (changed.empty()) return;
-  temporary_.emplace(fs::temp_directory_path() / "perdure-mended-", [](const std::string& name) {
+  temporary_.emplace(fs::temp_directory_path() / "perdure-repaired-", [](const std::string& name) {
     throw StartupError(ExitCode::kUnavailable, name + " cannot be made; is the disk full?");
   });
   drive_ = temporary_->path() / "drive";

@@ -1,6 +1,6 @@
 // Tests tables that need a fix before they can be read: stamps in seconds, orientations among the
 // columns.
-#include "tools/data_check/mended_text.h"
+#include "tools/data_check/repaired_text.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -40,7 +40,7 @@ std::string inSeconds(const std::string& line) {
   return stamp.substr(0, stamp.size() - 9) + "." + stamp.substr(stamp.size() - 9) + line.substr(at);
 }
 
-void expectSound(const MendedText& text) {
+void expectSound(const RepairedText& text) {
   const auto recording = Dataset::open({.path = text.drive()})->recording();
   const auto sound = Dataset::open({.path = makeTurningDrive("text_sound")})->recording();
   ASSERT_EQ(recording.imu.size(), sound.imu.size());
@@ -54,14 +54,14 @@ void expectSound(const MendedText& text) {
   EXPECT_TRUE(fs::exists(recording.frames.back().path));
 }
 
-TEST(MendedText, SoundFoldersAreLeftAlone) {
+TEST(RepairedText, SoundFoldersAreLeftAlone) {
   const auto root = makeTurningDrive("text");
-  const MendedText text(root);
+  const RepairedText text(root);
   EXPECT_EQ(text.drive(), root);
-  EXPECT_THAT(text.mends(), IsEmpty());
+  EXPECT_THAT(text.fixes(), IsEmpty());
 }
 
-TEST(MendedText, WholeMillisecondsAreKnownByTheRatesOfImuAndCamera) {
+TEST(RepairedText, WholeMillisecondsAreKnownByTheRatesOfImuAndCamera) {
   const auto root = makeTurningDrive("text_whole_ms");
   for (const char* sensor : {"cam0", "imu0"}) {
     rewrite(root / "mav0" / sensor / "data.csv", [](const std::string& line) {
@@ -69,32 +69,32 @@ TEST(MendedText, WholeMillisecondsAreKnownByTheRatesOfImuAndCamera) {
       return line.substr(0, at - 6) + line.substr(at);
     });
   }
-  const MendedText text(root);
-  EXPECT_THAT(text.mends(), testing::Each(HasSubstr("they were milliseconds")));
-  EXPECT_EQ(text.mends().size(), 2U);
+  const RepairedText text(root);
+  EXPECT_THAT(text.fixes(), testing::Each(HasSubstr("they were milliseconds")));
+  EXPECT_EQ(text.fixes().size(), 2U);
   expectSound(text);
 }
 
-TEST(MendedText, StampsInSecondsBecomeNanosecondsExactly) {
+TEST(RepairedText, StampsInSecondsBecomeNanosecondsExactly) {
   const auto root = makeTurningDrive("text_seconds");
   rewrite(root / "mav0/imu0/data.csv", inSeconds);
   EXPECT_THROW(Dataset::open({.path = root}), StartupError);
   fs::path gone;
   {
-    const MendedText text(root);
-    EXPECT_THAT(text.mends(), ElementsAre(HasSubstr("they were seconds")));
+    const RepairedText text(root);
+    EXPECT_THAT(text.fixes(), ElementsAre(HasSubstr("they were seconds")));
     expectSound(text);
     gone = text.drive();
   }
   EXPECT_FALSE(fs::exists(gone));
   // Also changes the camera's stamps, and gives the folder as mav0/.
   rewrite(root / "mav0/cam0/data.csv", inSeconds);
-  const MendedText both(root / "mav0/");
-  EXPECT_EQ(both.mends().size(), 2U);
+  const RepairedText both(root / "mav0/");
+  EXPECT_EQ(both.fixes().size(), 2U);
   expectSound(both);
 }
 
-TEST(MendedText, StampsInSecondsMayHaveAnExponent) {
+TEST(RepairedText, StampsInSecondsMayHaveAnExponent) {
   const auto root = makeTurningDrive("text_exponent");
   const auto file = root / "mav0/imu0/data.csv";
   rewrite(file, [](const std::string& line) {  // 1234567890 becomes 1.234567890e+00
@@ -104,13 +104,13 @@ TEST(MendedText, StampsInSecondsMayHaveAnExponent) {
            line.substr(at);
   });
   {
-    const MendedText text(root);
-    EXPECT_THAT(text.mends(), ElementsAre(HasSubstr("they were seconds")));
+    const RepairedText text(root);
+    EXPECT_THAT(text.fixes(), ElementsAre(HasSubstr("they were seconds")));
     expectSound(text);
   }
   std::ofstream(file, std::ios::app) << "-1.5e+00,0,0,0,0,0,9.8\n";
   try {
-    const MendedText negative(root);
+    const RepairedText negative(root);
     FAIL() << "it was taken";
   } catch (const StartupError& e) {
     EXPECT_THAT(e.what(), HasSubstr(file.string()));
@@ -118,36 +118,36 @@ TEST(MendedText, StampsInSecondsMayHaveAnExponent) {
   }
 }
 
-TEST(MendedText, AQuaternionAmongTheColumnsIsLeftOut) {
+TEST(RepairedText, AQuaternionAmongTheColumnsIsLeftOut) {
   const auto root = makeTurningDrive("text_quaternion");
   rewrite(root / "mav0/imu0/data.csv", [](const std::string& line) {
     const auto at = line.find(',');
     return line.substr(0, at) + ",0.6,0,0.8,0" + line.substr(at);
   });
-  const MendedText text(root);
-  EXPECT_THAT(text.mends(), ElementsAre(HasSubstr("columns 6, 7, 8, 9, 10, 11 are taken")));
+  const RepairedText text(root);
+  EXPECT_THAT(text.fixes(), ElementsAre(HasSubstr("columns 6, 7, 8, 9, 10, 11 are taken")));
   expectSound(text);
   // Accelerations in g: no group of three columns measures gravity in m/s².
   rewrite(root / "mav0/imu0/data.csv", [](const std::string& line) {
     return line.substr(0, line.find(',')) + ",0.6,0,0.8,0,0.1,0.2,0.3,0,0.1,1";
   });
-  EXPECT_THROW(MendedText{root}, StartupError);
+  EXPECT_THROW(RepairedText{root}, StartupError);
 }
 
-TEST(MendedText, AxesInAnotherOrderAreRefused) {
+TEST(RepairedText, AxesInAnotherOrderAreRefused) {
   const auto root = makeTurningDrive("text_axes");
   rewrite(
       root / "mav0/imu0/data.csv", [](const std::string& line) { return line + ",0"; },
       "#timestamp,w_z [rad/s],w_y [rad/s],w_x [rad/s],a_x,a_y,a_z,roll");
   try {
-    const MendedText text(root);
+    const RepairedText text(root);
     FAIL() << "it was taken";
   } catch (const StartupError& e) {
     EXPECT_THAT(e.what(), HasSubstr("`w_z [rad/s]` stands where the axis x is awaited"));
   }
 }
 
-TEST(MendedText, TenColumnsNeedAHeadThatNamesThem) {
+TEST(RepairedText, TenColumnsNeedAHeadThatNamesThem) {
   const auto ten = [](const std::string& line) {  // accelerations, angles, rates of turn
     std::istringstream in(line);
     std::vector<std::string> words;
@@ -158,13 +158,13 @@ TEST(MendedText, TenColumnsNeedAHeadThatNamesThem) {
   const auto root = makeTurningDrive("text_ten");
   const auto file = root / "mav0/imu0/data.csv";
   rewrite(file, ten, "#timestamp,a_x,a_y,a_z,roll,pitch,yaw,w_x,w_y,w_z");
-  const MendedText text(root);
-  EXPECT_THAT(text.mends(), ElementsAre(HasSubstr("8, 9, 10, 2, 3, 4")));
+  const RepairedText text(root);
+  EXPECT_THAT(text.fixes(), ElementsAre(HasSubstr("8, 9, 10, 2, 3, 4")));
   expectSound(text);
   rewrite(
       file, [](const std::string& line) { return line; }, "#numbers");
   try {
-    const MendedText unsure(root);
+    const RepairedText unsure(root);
     FAIL() << "it was taken";
   } catch (const StartupError& e) {
     EXPECT_THAT(e.what(), HasSubstr("Name all of them in its first line"));

@@ -10,9 +10,9 @@
 
 namespace perdure::tools {
 
-struct MendedDrive {
+struct RepairedDrive {
   replay::Recording recording;
-  std::vector<std::string> mends;  ///< one sentence for each fix
+  std::vector<std::string> fixes;  ///< one sentence for each fix
   replay::DataFindings left;       ///< findings that remain
 };
 
@@ -20,7 +20,7 @@ struct MendedDrive {
 /// It fixes the units of forces (accel_in_g, accel_in_mg, accel_in_mm) and of rates
 /// (gyro_in_degrees), exchanged columns (imu_columns_exchanged), and an inverted T_BS of cam0
 /// (T_BS_inverted).
-MendedDrive mendDrive(replay::Recording recording);
+RepairedDrive repairDrive(replay::Recording recording);
 
 /// Reports how many of all images are written.
 using CopyProgress = std::function<void(std::size_t done, std::size_t all)>;

@@ -1,4 +1,4 @@
-#include "tools/data_check/mended_copy.h"
+#include "tools/data_check/repaired_copy.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -21,17 +21,17 @@ using tests::makeTurningDrive;
 using tests::TurningDrive;
 
 fs::path newFolder(const std::string& name) {
-  const fs::path folder = fs::temp_directory_path() / "perdure_mended" / name;
+  const fs::path folder = fs::temp_directory_path() / "perdure_repaired" / name;
   fs::remove_all(folder);
   return folder;
 }
 
 /// Writes the fixed copy of a drive and reads it again.
-replay::Recording mended(const std::string& name, const TurningDrive& drive,
-                         std::size_t mends = 1) {
-  const auto root = makeTurningDrive("to_mend_" + name, drive);
-  const MendedDrive result = mendDrive(Dataset::open({.path = root})->recording());
-  EXPECT_THAT(result.mends, SizeIs(mends));
+replay::Recording repaired(const std::string& name, const TurningDrive& drive,
+                           std::size_t fixes = 1) {
+  const auto root = makeTurningDrive("to_fix_" + name, drive);
+  const RepairedDrive result = repairDrive(Dataset::open({.path = root})->recording());
+  EXPECT_THAT(result.fixes, SizeIs(fixes));
   EXPECT_THAT(result.left, SizeIs(0));
   const fs::path copy = newFolder(name);
   EXPECT_EQ(writeDrive(result.recording, copy), 0U);
@@ -39,7 +39,7 @@ replay::Recording mended(const std::string& name, const TurningDrive& drive,
 }
 
 replay::Recording sound() {
-  return Dataset::open({.path = makeTurningDrive("to_mend_sound")})->recording();
+  return Dataset::open({.path = makeTurningDrive("to_fix_sound")})->recording();
 }
 
 /// Returns the largest difference between the samples of two recordings.
@@ -54,10 +54,10 @@ double largestDifference(const replay::Recording& a, const replay::Recording& b)
   return largest;
 }
 
-TEST(MendedCopy, AForceInGIsOneInMetresAndTheImagesAreTheSame) {
+TEST(RepairedCopy, AForceInGIsOneInMetresAndTheImagesAreTheSame) {
   TurningDrive drive;
   drive.change = [](ImuSample& s) { s.accel /= 9.80665; };
-  const auto copy = mended("g", drive), truth = sound();
+  const auto copy = repaired("g", drive), truth = sound();
   EXPECT_LT(largestDifference(copy, truth), 1e-6);
   ASSERT_EQ(copy.frames.size(), truth.frames.size());
   for (std::size_t i = 0; i < copy.frames.size(); ++i) {
@@ -67,38 +67,38 @@ TEST(MendedCopy, AForceInGIsOneInMetresAndTheImagesAreTheSame) {
   EXPECT_EQ(copy.calibration.cameras.front().fx, truth.calibration.cameras.front().fx);
 }
 
-TEST(MendedCopy, SeveralFaultsAreMendedOneAfterTheOther) {
+TEST(RepairedCopy, SeveralFaultsAreRepairedOneAfterTheOther) {
   TurningDrive drive;
   drive.change = [](ImuSample& s) {
     s.accel /= 9.80665;
     s.gyro *= 180.0 / M_PI;
   };
-  EXPECT_LT(largestDifference(mended("two", drive, 2), sound()), 1e-6);
+  EXPECT_LT(largestDifference(repaired("two", drive, 2), sound()), 1e-6);
 }
 
-TEST(MendedCopy, ColumnsAreExchangedAndTheTransformIsTurnedRound) {
+TEST(RepairedCopy, ColumnsAreExchangedAndTheTransformIsTurnedRound) {
   TurningDrive exchanged;
   exchanged.change = [](ImuSample& s) { std::swap(s.gyro, s.accel); };
-  EXPECT_LT(largestDifference(mended("columns", exchanged), sound()), 1e-6);
+  EXPECT_LT(largestDifference(repaired("columns", exchanged), sound()), 1e-6);
   TurningDrive inverted;
   inverted.written_T_BC = tests::trueCameraPlace().inverse();
-  const auto copy = mended("inverted", inverted);
+  const auto copy = repaired("inverted", inverted);
   const RigidTransform off =
       copy.calibration.cameras.front().T_BC.inverse() * tests::trueCameraPlace();
   EXPECT_LT(logSo3(off.R()).norm() + off.p.norm(), 1e-6);
 }
 
-TEST(MendedCopy, WhatIsNotSureIsLeftAndSaid) {
+TEST(RepairedCopy, WhatIsNotSureIsLeftAndSaid) {
   TurningDrive drive;
   drive.change = [](ImuSample& s) { s.gyro *= M_PI / 180.0; };  // for an unknown reason
-  const auto root = makeTurningDrive("to_mend_unsure", drive);
-  const MendedDrive result = mendDrive(Dataset::open({.path = root})->recording());
-  EXPECT_THAT(result.mends, SizeIs(0));
+  const auto root = makeTurningDrive("to_fix_unsure", drive);
+  const RepairedDrive result = repairDrive(Dataset::open({.path = root})->recording());
+  EXPECT_THAT(result.fixes, SizeIs(0));
   ASSERT_THAT(result.left, SizeIs(1));
   EXPECT_EQ(result.left.front().code, "gyro_too_small");
 }
 
-TEST(MendedCopy, AFolderThatHoldsSomethingIsNotTouched) {
+TEST(RepairedCopy, AFolderThatHoldsSomethingIsNotTouched) {
   const fs::path folder = newFolder("full");
   fs::create_directories(folder);
   std::ofstream(folder / "mine") << "1";
@@ -112,7 +112,7 @@ TEST(MendedCopy, AFolderThatHoldsSomethingIsNotTouched) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1);
 }
 
-TEST(MendedCopy, TheDriveItselfIsNotWrittenInto) {
+TEST(RepairedCopy, TheDriveItselfIsNotWrittenInto) {
   const auto recording = sound();
   const fs::path images = fs::path(recording.frames.front().path).parent_path();
   for (const fs::path& copy : {images / "copy", images.parent_path() / "copy"}) {
@@ -127,7 +127,7 @@ TEST(MendedCopy, TheDriveItselfIsNotWrittenInto) {
   }
 }
 
-TEST(MendedCopy, AnImageThatIsGoneIsLeftOutAndCounted) {
+TEST(RepairedCopy, AnImageThatIsGoneIsLeftOutAndCounted) {
   auto recording = sound();
   recording.frames.front().path = "/nonexistent.png";
   const fs::path folder = newFolder("gone");

@@ -13,20 +13,20 @@
 namespace perdure::tools {
 
 /// A folder of links to a drive, with its fixed tables. The destructor removes it.
-class MendedText {
+class RepairedText {
  public:
   /// Writes nothing if no such fix is needed. Throws StartupError: kData if a fix is needed but
   /// uncertain, kUnavailable if the folder cannot be created.
-  explicit MendedText(const std::filesystem::path& drive);
+  explicit RepairedText(const std::filesystem::path& drive);
 
   /// The folder to read: `drive` itself if nothing was fixed.
   const std::filesystem::path& drive() const { return drive_; }
-  const std::vector<std::string>& mends() const { return mends_; }  ///< one sentence for each fix
+  const std::vector<std::string>& fixes() const { return fixes_; }  ///< one sentence for each fix
 
  private:
   std::filesystem::path drive_;
   std::optional<TemporaryFolder> temporary_;
-  std::vector<std::string> mends_;
+  std::vector<std::string> fixes_;
 };
 
 }  // namespace perdure::tools

@@ -1,4 +1,4 @@
-#include "tools/data_check/mended_copy.h"
+#include "tools/data_check/repaired_copy.h"
 
 #include <fmt/format.h>
 
@@ -29,47 +29,46 @@ void forEachSample(Recording& recording, const std::function<void(ImuSample&)>& 
   for (ImuSample& sample : recording.imu) change(sample);
 }
 
-struct Mend {
+struct Fix {
   const char *code, *sentence;
   void (*apply)(Recording&);
 };
 
-constexpr std::array kMends{
-    Mend{"accel_in_g", "the accelerometer's columns are multiplied by 9.80665 (they were in g)",
-         [](Recording& r) { forEachSample(r, [](ImuSample& s) { s.accel *= kGravity; }); }},
-    Mend{"accel_in_mg",
-         "the accelerometer's columns are multiplied by 0.00980665 (they were in mg)",
-         [](Recording& r) { forEachSample(r, [](ImuSample& s) { s.accel *= 1e-3 * kGravity; }); }},
-    Mend{"accel_in_mm", "the accelerometer's columns are divided by 1000 (they were in mm/s²)",
-         [](Recording& r) { forEachSample(r, [](ImuSample& s) { s.accel *= 1e-3; }); }},
-    Mend{"gyro_in_degrees",
-         "the gyroscope's columns are multiplied by 0.0174533 (they were in degrees per second)",
-         [](Recording& r) { forEachSample(r, [](ImuSample& s) { s.gyro *= kRadians; }); }},
-    Mend{"imu_columns_exchanged", "the gyroscope's columns are before the accelerometer's now",
-         [](Recording& r) { forEachSample(r, [](ImuSample& s) { std::swap(s.gyro, s.accel); }); }},
-    Mend{"clock_wrapped", "the stamps go on where a counter came round",
-         [](Recording& r) {
-           std::erase_if(r.clock_changes, [](const auto& change) {
-             return change.kind == replay::ClockChange::Kind::kCounter;
-           });
-         }},
-    Mend{"clock_set", "the stamps go on where the clock was set",
-         [](Recording& r) {
-           std::erase_if(r.clock_changes, [](const auto& change) { return change.common; });
-         }},
-    Mend{"clock_shift", "the stamps of the images are on the clock of the IMU",
-         [](Recording& r) { shiftImages(shiftOfClocks(r).value_or(0.0), r); }},
-    Mend{"T_BS_inverted", "T_BS of cam0 is inverted: the camera in the frame of the IMU",
-         [](Recording& r) {
-           auto& T_BC = r.calibration.cameras.front().T_BC;
-           T_BC = T_BC.inverse();
-         }},
+constexpr std::array kFixes{
+    Fix{"accel_in_g", "the accelerometer's columns are multiplied by 9.80665 (they were in g)",
+        [](Recording& r) { forEachSample(r, [](ImuSample& s) { s.accel *= kGravity; }); }},
+    Fix{"accel_in_mg", "the accelerometer's columns are multiplied by 0.00980665 (they were in mg)",
+        [](Recording& r) { forEachSample(r, [](ImuSample& s) { s.accel *= 1e-3 * kGravity; }); }},
+    Fix{"accel_in_mm", "the accelerometer's columns are divided by 1000 (they were in mm/s²)",
+        [](Recording& r) { forEachSample(r, [](ImuSample& s) { s.accel *= 1e-3; }); }},
+    Fix{"gyro_in_degrees",
+        "the gyroscope's columns are multiplied by 0.0174533 (they were in degrees per second)",
+        [](Recording& r) { forEachSample(r, [](ImuSample& s) { s.gyro *= kRadians; }); }},
+    Fix{"imu_columns_exchanged", "the gyroscope's columns are before the accelerometer's now",
+        [](Recording& r) { forEachSample(r, [](ImuSample& s) { std::swap(s.gyro, s.accel); }); }},
+    Fix{"clock_wrapped", "the stamps go on where a counter came round",
+        [](Recording& r) {
+          std::erase_if(r.clock_changes, [](const auto& change) {
+            return change.kind == replay::ClockChange::Kind::kCounter;
+          });
+        }},
+    Fix{"clock_set", "the stamps go on where the clock was set",
+        [](Recording& r) {
+          std::erase_if(r.clock_changes, [](const auto& change) { return change.common; });
+        }},
+    Fix{"clock_shift", "the stamps of the images are on the clock of the IMU",
+        [](Recording& r) { shiftImages(shiftOfClocks(r).value_or(0.0), r); }},
+    Fix{"T_BS_inverted", "T_BS of cam0 is inverted: the camera in the frame of the IMU",
+        [](Recording& r) {
+          auto& T_BC = r.calibration.cameras.front().T_BC;
+          T_BC = T_BC.inverse();
+        }},
 };
 
-const Mend* mendOf(const replay::DataFindings& findings, const std::set<std::string>& done) {
+const Fix* fixOf(const replay::DataFindings& findings, const std::set<std::string>& done) {
   for (const auto& finding : findings) {
-    for (const Mend& mend : kMends) {
-      if (mend.code == finding.code && !done.contains(finding.code)) return &mend;
+    for (const Fix& fix : kFixes) {
+      if (fix.code == finding.code && !done.contains(finding.code)) return &fix;
     }
   }
   return nullptr;
@@ -181,14 +180,14 @@ void refuseSource(const Recording& recording, const fs::path& copy) {
 
 }  // namespace
 
-MendedDrive mendDrive(replay::Recording recording) {
-  MendedDrive drive{std::move(recording), {}, {}};
+RepairedDrive repairDrive(replay::Recording recording) {
+  RepairedDrive drive{std::move(recording), {}, {}};
   std::set<std::string> done;
   drive.left = checkDrive(drive.recording, {});
-  while (const Mend* mend = mendOf(drive.left, done)) {
-    mend->apply(drive.recording);
-    done.insert(mend->code);
-    drive.mends.emplace_back(mend->sentence);
+  while (const Fix* fix = fixOf(drive.left, done)) {
+    fix->apply(drive.recording);
+    done.insert(fix->code);
+    drive.fixes.emplace_back(fix->sentence);
     drive.left = checkDrive(drive.recording, {});
   }
   return drive;
