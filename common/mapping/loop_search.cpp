@@ -230,7 +230,13 @@ std::optional<LoopSearch::Found> LoopSearch::nearby(const Whereabouts& body) con
   const double sigma_m = planeSigma(T_ba.covariance);
   const MapIndex index(std::move(around.objects), std::move(around.driven), parameters_.place);
   auto match = bestMatch(seen, index, prior, parameters_.place);
-  if (!match || !isBelieved(*match, sigma_m)) return std::nullopt;
+  if (!match) return std::nullopt;
+  // A match far from the prior position means that the position was not known that well.
+  const LevelError off = difference(prior.mean, match->T_MB.mean);
+  const bool far = off.dot(prior.covariance.ldlt().solve(off)) > parameters_.graph.kernel;
+  if (!isBelieved(*match, far ? std::max(sigma_m, parameters_.loop.near_m) : sigma_m)) {
+    return std::nullopt;
+  }
   Found found{std::move(*match), 0, prior, sigma_m};
   restOnOneVisit(found, index.objects(), around.homes, seen, body.state, parameters_.loop.visit_m);
   return found;

@@ -12,18 +12,18 @@ namespace {
 
 using namespace test;
 
-/// A straight drive there and back. The body detects ten objects of its start again, as new ones,
-/// at places that are displaced by the error of the odometry.
+/// A straight drive there and back. The body detects objects of its start again, as new ones, at
+/// places that are displaced by the error of the odometry.
 class Return {
  public:
-  explicit Return(const Eigen::Vector3d& error)
+  explicit Return(const Eigen::Vector3d& error, ObjectId objects = 10)
       : state_(parameters_, {}), way_(parameters_.anchor) {
     for (int i = 0; i <= 300; ++i) drive(i <= 150 ? i : 300 - i, i <= 150 ? 0.0 : kPi);
     relative_ = std::make_unique<Marginals>(state_.graph(), way_.last()->id);
     const LevelPose here = state_.graph().pose(way_.last()->id);
     std::mt19937 random(5);
     std::uniform_real_distribution<double> any(-20.0, 20.0);
-    for (ObjectId id = 1; id <= 10; ++id) {
+    for (ObjectId id = 1; id <= objects; ++id) {
       const Eigen::Vector3d p(any(random), any(random), 0.5);
       put(id, {1, placed(id, p)}, 0.0);
       put(id + 100, {way_.last()->id, placed(id + 100, here.inverse() * (p + error))},
@@ -87,6 +87,16 @@ TEST(LoopSearch, FindsTheSameInBothRegionsWhereTheErrorIsSmall) {
   const auto narrow = back.find(1.0), wide = back.find(4.0);
   ASSERT_TRUE(narrow && wide);
   EXPECT_EQ(narrow->match.pairs, wide->match.pairs);
+}
+
+/// Few objects suffice if they agree with a well known position, but not to contradict it.
+TEST(LoopSearch, AMatchFarFromAWellKnownPositionNeedsMoreEvidence) {
+  const double sigma_m = Return(Eigen::Vector3d::Zero()).find(1.0)->sigma_m;
+  ASSERT_LT(sigma_m, Parameters().loop.near_m);
+  const Eigen::Vector3d across = sigma_m * Eigen::Vector3d::UnitY();
+  EXPECT_TRUE(Return(3.0 * across, 2).find(1.0));
+  EXPECT_FALSE(Return(3.3 * across, 2).find(1.0));
+  EXPECT_TRUE(Return(3.3 * across, 3).find(1.0));
 }
 
 }  // namespace
