@@ -233,7 +233,9 @@ std::optional<LoopSearch::Found> LoopSearch::nearby(const Whereabouts& body) con
   if (!match) return std::nullopt;
   // A match far from the prior position means that the position was not known that well.
   const LevelError off = difference(prior.mean, match->T_MB.mean);
-  const bool far = off.dot(prior.covariance.ldlt().solve(off)) > parameters_.graph.kernel;
+  const bool far =
+      squaredMahalanobis(off, Eigen::Matrix4d(prior.covariance + match->T_MB.covariance)) >
+      parameters_.loop.far_chi2;
   if (!isBelieved(*match, far ? std::max(sigma_m, parameters_.loop.near_m) : sigma_m)) {
     return std::nullopt;
   }

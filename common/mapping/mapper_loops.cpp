@@ -106,17 +106,16 @@ bool Mapper::restsOnActive(const PlaceMatch& match) const {
                                 [&](const auto& pair) { return active_->pairs.contains(pair); });
 }
 
-/// Searches by objects. If they give no match, searches by objects in a wider region, because the
-/// odometry may err more than is assumed, and by appearance, once for each anchor.
-/// Searches with the uncertainty of an odometry that is less accurate than declared. kOthers: with
-/// fewer, a wrong loop remained in one of 16 towns; see drift_scale.md, "Use".
+/// Searches with the uncertainty of an odometry that is less accurate than declared. A second
+/// search must confirm the match by kOthers other pairs: with fewer, a wrong loop remained in one
+/// of 16 towns (drift_scale.md, "Use").
 std::optional<LoopSearch::Found> Mapper::searchWidely(const Whereabouts& here) {
   constexpr double kWider = 1.5;
-  constexpr std::size_t kOthers = 3;
+  constexpr std::size_t kOthers = 3;  // pairs
   const double since_m = builder_.way_m() - searched_widely_at_m_;
   if (widening_ < kWider || since_m < parameters_.loop.elsewhere_each_m) return std::nullopt;
   searched_widely_at_m_ = builder_.way_m();
-  const auto found = loop_search_.nearby(body(widening_));
+  auto found = loop_search_.nearby(body(widening_));
   // A match of the active loop's pairs is a less accurate measurement of it.
   if (!found || restsOnActive(found->match) ||
       view_search_.contradicts(*found, here, viewOfNow()) ||
@@ -126,6 +125,8 @@ std::optional<LoopSearch::Found> Mapper::searchWidely(const Whereabouts& here) {
   return found;
 }
 
+/// Searches by objects. If they give no match, searches by objects in a wider region, because the
+/// odometry may err more than is assumed, and by appearance, once for each anchor.
 std::optional<LoopSearch::Found> Mapper::searchNearby(const Whereabouts& here, bool new_view) {
   auto found = loop_search_.nearby(here);
   if (found && view_search_.contradicts(*found, here, viewOfNow())) return std::nullopt;

@@ -47,6 +47,9 @@ struct LoopParameters {
   double nats = 8.0;       ///< least score above the second best pose, beyond the prior's
   double near_m = 1.6;     ///< deviation of the body's position below which near_nats applies
   double near_nats = 2.5;  ///< least score of the assignment of objects, in place of nats
+  /// A match farther from that position needs `nats`, because the position was not known that well
+  /// (χ² with 4 degrees of freedom, .99).
+  double far_chi2 = 13.3;
   double far_m = 2.5;      ///< above this deviation four objects are required
   /// Least number of objects observed again under their old ids that link the body to earlier
   /// places. The second value is the largest deviation of the resulting position, as a fraction of

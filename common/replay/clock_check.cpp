@@ -67,7 +67,7 @@ void checkCount(const char* of, const StampList& stamps, DataFindings& findings)
   findings.push_back(
       {StampGrade::kFatal, "stamps_count",
        fmt::format(
-           "the stamps of the {} ({} … {}) count them and are no times: write when each was "
+           "the stamps of the {} ({} … {}) count them and are not times: write when each was "
            "taken, in nanoseconds, on the clock of the other sensors",
            of, first, toNanoseconds(stamps.back()))});
 }

@@ -85,7 +85,7 @@ bool WaitingFrames::frontMayBePaired() const {
 
 std::string WaitingFrames::whyAlone() const {
   if (alone_ < static_cast<int>(kAlone)) return {};
-  return "goes on with one camera, for no image of the second one fits: " +
+  return "continues with one camera, because no image of the second one fits: " +
          (trouble_.empty() ? "none comes" : trouble_) +
          "; fix that camera, or set stereo.enabled to false";
 }

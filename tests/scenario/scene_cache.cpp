@@ -4,7 +4,9 @@
 #include <sys/file.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
@@ -62,9 +64,11 @@ fs::path cachedScene(const SceneName& name, const std::function<void(const fs::p
                                            std::to_string(static_cast<int>(name.seconds)) + "-" +
                                            std::to_string(static_cast<int>(name.rate_hz)) +
                                            (name.images ? "-images" : ""));
-  const Descriptor lock(
-      open((folder.string() + ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
-  if (flock(lock.get(), LOCK_EX) != 0) throw std::runtime_error("the scene cannot be locked");
+  const std::string file = folder.string() + ".lock";
+  const Descriptor lock(open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
+  if (!lock.open() || flock(lock.get(), LOCK_EX) != 0) {
+    throw std::runtime_error(file + " cannot be locked: " + std::strerror(errno));
+  }
   make(folder);
   return folder;
 }

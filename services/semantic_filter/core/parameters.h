@@ -58,7 +58,7 @@ struct VisibilityParameters {
   double minimum = 0.25;              ///< a smaller visible fraction counts as 0: no evidence
   double full = 0.7;                  ///< from here on an object is reported as visible
   double solid = 0.4;                 ///< existence from which an object occludes others
-  double unmapped_occluder = 0.7;     ///< its probability in a direction that is new
+  double unmapped_occluder = 0.7;     ///< its probability far from the directions of detections
   double hard_to_detect = 0.05;       ///< the same of a view from which detections are rare
   double hard_detection_share = 0.3;  ///< P_D there, relative
   /// View change after which the learned values have fallen to 1/e. A hedge hides an object from a

@@ -91,7 +91,7 @@ std::vector<Corner> findChessboard(const Board& board, const cv::Mat& grey) {
   return corners;
 }
 
-/// Refines the corners of a tag as crossings of edges; false for corners that are none.
+/// Refines the corners of a tag as crossings of edges; false for points that are not corners.
 std::vector<bool> refineCrossings(const cv::Mat& grey, double side_px,
                                   std::vector<cv::Point2f>& pixels) {
   constexpr double kFarthest = 2.0;

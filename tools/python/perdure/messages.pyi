@@ -453,7 +453,7 @@ class Health(Message):
     instance: int  # int
     pid: int  # int
     state: Literal["starting", "ok", "degraded", "failed"]  # starting | ok | degraded | failed
-    message: str  # what is wrong, and the mend
+    message: str  # what is wrong, and the fix
     frames_in: int  # int
     frames_out: int  # int
     dropped: int  # int
