@@ -231,11 +231,10 @@ std::optional<LoopSearch::Found> LoopSearch::nearby(const Whereabouts& body) con
   const MapIndex index(std::move(around.objects), std::move(around.driven), parameters_.place);
   auto match = bestMatch(seen, index, prior, parameters_.place);
   if (!match) return std::nullopt;
-  // A match far from the prior position means that the position was not known that well.
+  // A match far from the prior position means that the position was not known that well. The error
+  // of the match is not added, because that of a wrong match is large.
   const LevelError off = difference(prior.mean, match->T_MB.mean);
-  const bool far =
-      squaredMahalanobis(off, Eigen::Matrix4d(prior.covariance + match->T_MB.covariance)) >
-      parameters_.loop.far_chi2;
+  const bool far = squaredMahalanobis(off, prior.covariance) > parameters_.loop.far_chi2;
   if (!isBelieved(*match, far ? std::max(sigma_m, parameters_.loop.near_m) : sigma_m)) {
     return std::nullopt;
   }
