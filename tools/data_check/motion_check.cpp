@@ -193,7 +193,7 @@ std::optional<double> betterOffset(const std::vector<Turn>& turns, const TurnInt
   };
   double best = std::min(kExplained, leftAt(camera.time_offset_s) / clearly);
   std::optional<double> offset;
-  bool inside = false;  // false if the optimum may be outside the search range
+  bool inside = false;  // whether the optimum is inside the search range
   const int steps = static_cast<int>(std::lround(100.0 * most_s));
   for (int step = -steps; step <= steps; ++step) {
     const double later = camera.time_offset_s + 0.01 * step;
