@@ -18,7 +18,7 @@ struct LoopClosure {
   EdgeId id = 0;
   AnchorId a = 0, b = 0;  ///< b: the anchor of the body
   PlaceMatch match;
-  bool joins = false;         ///< connects a session without a place to the map
+  bool joins = false;         ///< links a separate component to the map
   double correction_m = 0.0;  ///< change of the position of b in M when it was accepted
 };
 
