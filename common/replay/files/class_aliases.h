@@ -10,7 +10,7 @@ namespace perdure::replay {
 
 class ClassAliases {
  public:
-  /// Converts to lower case only.
+  /// Without aliases, names are only converted to lower case.
   ClassAliases() = default;
   /// Reads `config/class_aliases.yaml`: `canonical: [alias, …]`. Throws StartupError: kUnavailable
   /// if the file is missing, kConfiguration with file:line:col if it is invalid.

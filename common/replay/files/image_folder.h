@@ -18,7 +18,7 @@ class ImageFolder {
  public:
   explicit ImageFolder(std::filesystem::path folder);
 
-  /// Finds an image by its name; otherwise by the last part of the name with another extension or
+  /// Finds an image by its path in the list; otherwise by its file name with another extension or
   /// none, in other case or Unicode form; otherwise by the stamp. Returns nothing if no image
   /// matches.
   std::optional<std::filesystem::path> find(std::string_view name, TimePoint stamp);
@@ -34,9 +34,9 @@ class ImageFolder {
 
  private:
   std::filesystem::path folder_;
-  std::map<std::string, std::string, std::less<>> by_stem_;  ///< file names
+  std::map<std::string, std::string, std::less<>> by_stem_;  ///< file names by stem
   std::map<std::string, std::string>
-      by_form_;  ///< stems in lower case, without accents; "" if ambiguous
+      by_form_;  ///< stems by their form in lower case without accents; "" if ambiguous
   std::map<std::string, std::size_t> other_endings_;
   std::size_t dead_links_ = 0;
   std::string first_dead_;

@@ -74,7 +74,7 @@ std::optional<PoseColumns> poseColumnsOf(const std::vector<std::string_view>& na
 }
 
 bool namesAngles(const std::vector<std::string_view>& names) {
-  bool angles = false, quaternion = false, time = false;  // false for comments in prose
+  bool angles = false, quaternion = false, time = false;  // all remain false for a comment in prose
   for (const auto& written : names) {
     std::string name = plainName(written);
     time = time || isTime(name) || name.ends_with("stamp");
