@@ -83,7 +83,8 @@ class Choice {
     }
   }
 
-  /// Image topics without their compressed variants. If a camera has several, only the raw one.
+  /// Image topics; a topic and its compressed variant count as one. If a camera has several, and
+  /// one of them is image_raw, only that one is included.
   std::vector<std::string> candidates() const {
     std::map<std::string, std::vector<std::string>> by_camera;
     for (const auto& topic : ofTypes(topics_, {kImage, kCompressed})) {

@@ -39,7 +39,7 @@ std::string toLower(std::string_view text);
 std::vector<std::string_view> split(std::string_view text, char separator);
 /// The separator of the fields in a line: comma if present, else semicolon, else ' '.
 char separatorOf(std::string_view line);
-/// Fields split by this separator, without empty fields at the end of the line.
+/// Fields of a line, split by separatorOf(), without empty fields at the end.
 std::vector<std::string_view> fieldsOf(std::string_view line);
 
 /// The whole text as a finite number. Returns nothing if characters remain, or for infinity and

@@ -45,7 +45,7 @@ class RecordedMessages {
     std::uint64_t messages = 0;
   };
 
-  /// kEach: every chunk is unpacked at once, so that topics() describes the readable part.
+  /// kEach unpacks every chunk at once, so that topics() describes the readable part.
   enum class Chunks { kByIndex, kEach };
   /// Opens a .mcap file, or a folder that contains such files. Compressed files (.mcap.zstd) are
   /// unpacked. Throws StartupError with the fix.
@@ -72,12 +72,13 @@ class RecordedMessages {
   struct ChunkPlace {
     std::size_t file = 0;
     const mcap::ChunkIndex* index = nullptr;
-    std::uint64_t number = 0;  ///< number of the message in the order of the files
+    std::uint64_t number = 0;  ///< number of the chunk in the order of the files
   };
   struct Pending {
     RecordedMessage message;
     std::uint64_t order = 0;
-    bool operator<(const Pending& other) const {  // the top of the queue is the largest
+    bool operator<(
+        const Pending& other) const {  // the top of the queue is the largest, here the earliest
       return std::tie(message.log_ns, order) > std::tie(other.message.log_ns, other.order);
     }
   };

@@ -152,7 +152,8 @@ std::optional<RosMessage> RosMessages::next() {
   return message;
 }
 
-/// Zstd frames are recognised by their first bytes, which CDR never has.
+/// Unpacks a message if it is a zstd frame. It is recognised by its first bytes, which CDR never
+/// has.
 bool RosMessages::unpack(RosMessage& message) {
   static constexpr std::uint64_t kLargest = 1u << 30;
   if (topics_.at(message.topic).encoding != ros::Encoding::kCdr || !isZstd(message.data)) {

@@ -45,7 +45,7 @@ class RosSource {
   virtual std::optional<RosMessage> next() = 0;
   /// Notes for users about unpacked files and about files that were joined.
   virtual std::vector<std::string> notes() const { return {}; }
-  /// Recording time of the first message; the next function returns that of the last one.
+  /// Recording time of the first message. endNs() returns that of the last one.
   std::uint64_t startNs() const { return start_ns_; }
   std::uint64_t endNs() const { return end_ns_; }
 
@@ -60,15 +60,16 @@ class RosSource {
   std::uint64_t start_ns_ = UINT64_MAX, end_ns_ = 0;
 };
 
-/// These functions throw StartupError with the fix.
+/// openBag() opens a bag of ROS 1, openDb3() a SQLite file of ROS 2. Both throw StartupError with
+/// the fix.
 std::unique_ptr<RosSource> openBag(const std::filesystem::path& file);
 std::unique_ptr<RosSource> openDb3(const std::filesystem::path& file);
 
-/// All files of a recording.
+/// The merged messages of all files of a recording.
 class RosMessages : public RosSource {
  public:
-  /// Returns whether the path is such a file, or a folder with such files. Recordings of Perdure
-  /// are excluded.
+  /// Returns whether the path is a file of these formats, or a folder with such files. Recordings
+  /// of Perdure are excluded.
   static bool looksLikeOne(const std::filesystem::path& path);
   /// Throws StartupError with the fix.
   explicit RosMessages(const std::filesystem::path& path);
@@ -87,7 +88,7 @@ class RosMessages : public RosSource {
   }
 
  private:
-  /// The next message of all sources, as recorded.
+  /// The earliest of the sources' next messages, as recorded.
   std::optional<RosMessage> nextRecorded();
   /// Decompresses messages of rosbag2's `compression_mode: MESSAGE`. Returns false if a message is
   /// damaged, which is counted.

@@ -17,7 +17,8 @@ class Unpacked {
  public:
   explicit Unpacked(std::uint64_t most)
       : most_(most), step_(most < kStep ? static_cast<std::size_t>(most) + 1 : kStep) {}
-  /// Allows one byte beyond the limit, so that a longer stream is detected.
+  /// Returns whether there is room for more data. One byte beyond the limit is allowed, so that a
+  /// longer stream is detected.
   bool wantsMore() const { return used_ <= most_; }
   std::uint8_t* room() {
     if (used_ == bytes_.size()) bytes_.resize(used_ + step_);
