@@ -1,4 +1,4 @@
-// // `perdure calibrate`: calibrates from a board or from motion, or imports other calibrations.
+// `perdure calibrate`: calibrates from a board or from motion, or imports other calibrations.
 #include <fmt/format.h>
 #include <unistd.h>
 

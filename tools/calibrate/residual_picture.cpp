@@ -19,7 +19,7 @@ constexpr int kImageWidth = 720, kChartWidth = 760, kMargin = 70, kTop = 50;
 const Colour kSmall(190, 160, 60), kLarge(40, 60, 220);
 const Colour kFirst(200, 120, 30), kSecond(40, 150, 60), kThird(50, 60, 210);
 
-/// /// Draws residuals as dots that are redder if larger, and the mean of each cell as an arrow.
+/// Draws residuals as dots that are redder if larger, and the mean of each cell as an arrow.
 void drawImage(cv::Mat& picture, const cv::Rect& area, const CameraCalibration& camera,
                const std::vector<CornerResidual>& residuals, double sigma) {
   const double scale = static_cast<double>(area.width) / camera.width;

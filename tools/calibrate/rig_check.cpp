@@ -20,7 +20,7 @@ namespace {
 constexpr double kDegrees = 180.0 / M_PI;
 constexpr std::size_t kFewest = 500;  // least number of innovations for a judgement
 
-/// /// Runs vio over the drive in one thread.
+/// Runs vio over the drive in one thread.
 class Watched {
  public:
   Watched(const RigCheckOptions& options, const replay::Dataset& dataset)
@@ -69,7 +69,7 @@ class Watched {
   std::size_t samples_ = 0;
 };
 
-/// /// Converts accepted innovations to corner residuals over the image.
+/// Converts accepted innovations to corner residuals over the image.
 std::vector<CornerResidual> residualsOf(const std::vector<vio::Innovation>& innovations) {
   std::vector<CornerResidual> all;
   for (const auto& i : innovations) {
@@ -78,8 +78,8 @@ std::vector<CornerResidual> residualsOf(const std::vector<vio::Innovation>& inno
   return all;
 }
 
-/// /// RMS in px of the residual pattern that both halves of the drive share; 0 if not significant.
-/// A pattern in one half may come from a single track, whose residuals are correlated.
+/// RMS in px of the residual pattern that both halves of the drive share; 0 if not significant. A
+/// pattern in one half may come from a single track, whose residuals are correlated.
 double patternOf(const CameraCalibration& camera, const std::vector<CornerResidual>& residuals) {
   constexpr std::size_t kEnough = 20;  // least number of corners in each half
   constexpr double kSure = 3.0;        // least significance in standard deviations
@@ -98,17 +98,17 @@ double patternOf(const CameraCalibration& camera, const std::vector<CornerResidu
   return mean > kSure * sigma ? std::sqrt(mean) : 0.0;
 }
 
-/// /// Limits of deviations of a camera's pose and time offset: good up to `good`, bad above `bad`.
+/// Limits of deviations of a camera's pose and time offset: good up to `good`, bad above `bad`.
 struct Bars {
   double good, bad;
 };
 constexpr Bars kTurned{0.4 / kDegrees, 1.0 / kDegrees}, kShifted_m{0.015, 0.04},
     kLater_s{2e-3, 8e-3};
 
-/// /// Judges a quantity by vio's deviation from the rig, compared with vio's standard deviation.
+/// Judges a quantity by vio's deviation from the rig, compared with vio's standard deviation.
 Judgement judgeMove(const char* what, double moved, double sigma, const Bars& bars,
                     const std::string& shown, const std::string& remedy) {
-  // // Ignores a deviation if vio is uncertain of it, or if the true value may be within the good
+  // Ignores a deviation if vio is uncertain of it, or if the true value may be within the good
   // range.
   const bool sure = moved > 3.0 * sigma && moved - sigma > bars.good;
   return judged(sure ? gradeOf(moved, bars.good, bars.bad) : Grade::kGood,
@@ -117,7 +117,7 @@ Judgement judgeMove(const char* what, double moved, double sigma, const Bars& ba
 
 constexpr char kNoRemedy[] = "correct nothing before the causes above are excluded";
 
-/// /// Judges the camera's pose and time offset. `sole`: no other cause explains a deviation.
+/// Judges the camera's pose and time offset. `sole`: no other cause explains a deviation.
 Judgements judgePlaceOf(const RigCheck& check, bool lens_fits, bool sole) {
   Judgements all;
   const char* again =
@@ -159,8 +159,8 @@ double againstOf(const RigCheck& check) {
 
 constexpr double kFewAgainst = 0.05, kManyAgainst = 0.2;
 
-/// /// Reports several deviations as one if they have one cause, because their values have no
-/// meaning then.
+/// Reports several deviations as one if they have one cause, because their values have no meaning
+/// then.
 void judgeAllAtOnce(const Judgements& place, const Judgement& gravity, Judgements& all) {
   const auto isOff = [](const Judgement& one) { return one.grade != Grade::kGood; };
   const auto off = std::ranges::count_if(place, isOff) + (isOff(gravity) ? 1 : 0);

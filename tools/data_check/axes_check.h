@@ -1,4 +1,4 @@
-// // Checks whether the gyroscope's axes are mirrored: exchanged or negated, so that no T_BS can
+// Checks whether the gyroscope's axes are mirrored: exchanged or negated, so that no T_BS can
 // describe them.
 #pragma once
 
@@ -9,8 +9,8 @@
 
 namespace perdure::tools {
 
-/// /// Code: gyro_axes. Judges each axis of the body separately, so that an axis with little
-/// rotation counts too. Returns nothing if the rotation is too small.
+/// Code: gyro_axes. Judges each axis of the body separately, so that an axis with little rotation
+/// counts too. Returns nothing if the rotation is too small.
 replay::DataFindings judgeAxes(const std::vector<Turn>& turns,
                                const std::vector<ImuSample>& samples,
                                const CameraCalibration& camera);

@@ -13,10 +13,10 @@ namespace {
 using replay::DataFinding;
 using replay::Recording;
 
-/// /// Step of the tested shifts; a rotation of a carried camera takes much longer.
+/// Step of the tested shifts; a rotation of a carried camera takes much longer.
 constexpr double kStep_s = 0.01;
 
-/// /// Integral of the rates on a grid. Rotations between two images are so small that rates can be
+/// Integral of the rates on a grid. Rotations between two images are so small that rates can be
 /// summed.
 class TurnGrid {
  public:
@@ -54,7 +54,7 @@ class TurnGrid {
   std::vector<int> holes_;
 };
 
-/// /// A rotation of the images, in B, between two cells of the grid.
+/// A rotation of the images, in B, between two cells of the grid.
 struct CellTurn {
   std::int64_t from, to;
   Eigen::Vector3d of_images;
@@ -62,7 +62,7 @@ struct CellTurn {
 
 using CellTurns = std::vector<CellTurn>;
 
-/// /// Returns nothing if there are too few turns, or if they are too small for a comparison.
+/// Returns nothing if there are too few turns, or if they are too small for a comparison.
 CellTurns cellsOf(const std::vector<Turn>& turns, const TurnGrid& gyro,
                   const CameraCalibration& camera) {
   constexpr std::size_t kFewest = 24;
@@ -89,8 +89,8 @@ struct ClockLine {
   }
 };
 
-/// /// Share of the images' rotation that the gyroscope does not explain, without the means. 1 if
-/// the gyroscope's samples cover less than half of the turns.
+/// Share of the images' rotation that the gyroscope does not explain, without the means. 1 if the
+/// gyroscope's samples cover less than half of the turns.
 double unexplainedAt(const CellTurns& turns, const TurnGrid& gyro, const ClockLine& line) {
   Eigen::Vector3d images = Eigen::Vector3d::Zero(), off = Eigen::Vector3d::Zero();
   double images_squared = 0.0, off_squared = 0.0;
@@ -109,8 +109,7 @@ double unexplainedAt(const CellTurns& turns, const TurnGrid& gyro, const ClockLi
   return std::min(1.0, (off_squared - off.squaredNorm() / n) / std::max(1e-18, all));
 }
 
-/// /// A match explains all but a share kMostLeft; the second best one leaves kTimesLeft times as
-/// much.
+/// A match explains all but a share kMostLeft; the second best one leaves kTimesLeft times as much.
 constexpr double kMostLeft = 0.3, kTimesLeft = 2.0;
 
 }  // namespace
@@ -173,8 +172,7 @@ replay::DataFindings rateFinding(double rate, const CameraCalibration& camera) {
 
 namespace {
 
-/// /// A shift of over a second, rounded to whole seconds if it has a known cause such as leap
-/// seconds.
+/// A shift of over a second, rounded to whole seconds if it has a known cause such as leap seconds.
 std::optional<double> longShift(const std::vector<Turn>& along, const Recording& recording) {
   constexpr double kLeast_s = 1.0;
   const CameraCalibration& camera = recording.calibration.cameras.front();

@@ -1,4 +1,4 @@
-// // Checks of a recording that pipeline, demo and doctor run before they process it.
+// Checks of a recording that pipeline, demo and doctor run before they process it.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -8,7 +8,7 @@
 
 namespace perdure::tools {
 
-/// /// Runs the checks of common/replay. Compares the rotations of images and IMU if `use` contains
+/// Runs the checks of common/replay. Compares the rotations of images and IMU if `use` contains
 /// both. Images are read only if `use.images` is set; this takes some tenths of a second.
 replay::DataFindings checkDrive(const replay::Recording& recording, const replay::DataUse& use);
 
@@ -20,7 +20,7 @@ replay::DataFindings checkPoses(const replay::Recording& recording, const replay
 /// A list of {grade, code, text}.
 nlohmann::ordered_json toJson(const replay::DataFindings& findings);
 
-/// /// Prints the recording's notes and doubtful findings on standard error, one per line.
+/// Prints the recording's notes and doubtful findings on standard error, one per line.
 void printDoubts(const replay::Recording& recording, const replay::DataFindings& findings);
 
 }  // namespace perdure::tools

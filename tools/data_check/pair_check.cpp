@@ -38,7 +38,7 @@ void checkFiles(const Recording& recording, std::size_t camera, replay::DataFind
            100.0 * static_cast<double>(missing) / static_cast<double>(all), first)});
 }
 
-/// /// Median time in s from a stamp of cam0 to the nearest of cam1, for the text about unpaired
+/// Median time in s from a stamp of cam0 to the nearest of cam1, for the text about unpaired
 /// frames.
 double apartOf(const std::vector<TimePoint>& first, const std::vector<TimePoint>& second) {
   const bool overlap = second.front() <= first.back() && first.front() <= second.back();

@@ -60,7 +60,7 @@ void checkIntrinsics(const CameraCalibration& camera, DataFindings& findings) {
                       : "whether they are of images of another size, or of images that were cut")});
 }
 
-/// /// Share of the pixels, sampled on a grid, that no direction in front of the camera reaches,
+/// Share of the pixels, sampled on a grid, that no direction in front of the camera reaches,
 /// because the distorted radius decreases again.
 double shareOfFolds(const CameraCalibration& calibration) {
   constexpr int kGrid = 24;
@@ -76,7 +76,7 @@ double shareOfFolds(const CameraCalibration& calibration) {
 }
 
 void checkLens(const CameraCalibration& camera, DataFindings& findings) {
-  // // A fitted lens model often folds outside the area that the board's corners covered.
+  // A fitted lens model often folds outside the area that the board's corners covered.
   constexpr double kFew = 0.05, kMost = 0.5;
   if (camera.width == 0 || camera.height == 0) return;
   const double folds = shareOfFolds(camera);

@@ -1,4 +1,4 @@
-// // Calibration boards: a chessboard, or a grid of AprilTags (family 36h11) with black squares
+// Calibration boards: a chessboard, or a grid of AprilTags (family 36h11) with black squares
 // between the corners of the tags, as in Kalibr. Board frame T, in metres: origin at the first
 // corner, x along columns, y along rows, z away from the viewer. A camera in front of the board has
 // z < 0.
@@ -29,11 +29,10 @@ struct Board {
   std::string text() const;
 
   std::size_t cornerCount() const;
-  /// /// Position of a corner in T. A chessboard's corners are numbered row by row, a grid's tag by
-  /// tag from the first row. The corners of a tag are clockwise for the viewer, from the upper
-  /// left.
+  /// Position of a corner in T. A chessboard's corners are numbered row by row, a grid's tag by tag
+  /// from the first row. The corners of a tag are clockwise for the viewer, from the upper left.
   Eigen::Vector3d corner(std::size_t id) const;
-  /// /// printFrom() and printTo(): upper left and lower right corner of the printed area with its
+  /// printFrom() and printTo(): upper left and lower right corner of the printed area with its
   /// margin.
   Eigen::Vector2d printFrom() const;
   Eigen::Vector2d printTo() const;
@@ -43,7 +42,7 @@ struct Board {
   double pitch() const { return size_m * (1.0 + gap); }
 };
 
-/// /// A page to print at 100 %, with a scale bar and the board's description.
+/// A page to print at 100 %, with a scale bar and the board's description.
 std::string boardSvg(const Board& board);
 
 struct Corner {
@@ -57,8 +56,8 @@ struct View {
   std::vector<Corner> corners;
 };
 
-/// /// The corners of the board in a grey image, to a few hundredths of a pixel; empty if there is
-/// no board.
+/// The corners of the board in a grey image, to a few hundredths of a pixel; empty if there is no
+/// board.
 std::vector<Corner> findCorners(const Board& board, const cv::Mat& grey);
 
 }  // namespace perdure::calibrate

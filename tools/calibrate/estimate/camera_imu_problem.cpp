@@ -18,7 +18,7 @@ constexpr double kGyroBiasPrior = 0.5, kAccelBiasPrior = 2.0;  // rad/s, m/s²
 double* turnOf(Spline& spline, std::size_t i) { return spline.controls[i].q.coeffs().data(); }
 double* placeOf(Spline& spline, std::size_t i) { return spline.controls[i].p.data(); }
 
-/// /// The control points of segment k: five rotations and, if `with_places`, five positions.
+/// The control points of segment k: five rotations and, if `with_places`, five positions.
 std::vector<double*> controlsOf(Spline& spline, std::size_t k, bool with_places) {
   std::vector<double*> blocks;
   for (std::size_t i = 0; i < kOrder; ++i) blocks.push_back(turnOf(spline, k + i));
@@ -26,8 +26,8 @@ std::vector<double*> controlsOf(Spline& spline, std::size_t k, bool with_places)
   return blocks;
 }
 
-/// /// Factor by which correlated residuals within clusters enlarge the covariance. It is the ratio
-/// of the sandwich estimate with clusters to the one with single rows (Liang and Zeger, 1986).
+/// Factor by which correlated residuals within clusters enlarge the covariance. It is the ratio of
+/// the sandwich estimate with clusters to the one with single rows (Liang and Zeger, 1986).
 /// `influence`: effect of each row's unit residual on the estimate.
 double wideningOf(const Eigen::MatrixXd& influence, const std::vector<double>& residuals,
                   const std::vector<int>& clusters, const Eigen::MatrixXd& covariance) {
@@ -49,7 +49,7 @@ Eigen::SparseMatrix<double> toEigen(const ceres::CRSMatrix& m) {
                                 m.rows.data(), m.cols.data(), m.values.data());
 }
 
-/// /// The residuals, and the Jacobian of all free parameters with those of `last` at the end.
+/// The residuals, and the Jacobian of all free parameters with those of `last` at the end.
 Eigen::SparseMatrix<double> jacobianWithLast(ceres::Problem& problem,
                                              const std::vector<double*>& last,
                                              std::vector<double>& residuals) {
@@ -235,7 +235,7 @@ Eigen::Vector3d CameraImuProblem::biasMean(const std::vector<Eigen::Vector3d>& b
   return sum / static_cast<double>(bias.size());
 }
 
-/// /// The cluster (an interval of kCluster) of each row of the Jacobian, in the order of build().
+/// The cluster (an interval of kCluster) of each row of the Jacobian, in the order of build().
 std::vector<int> CameraImuProblem::clusterOfRows() const {
   std::vector<int> clusters;
   const auto add = [&](double t, std::size_t rows) {

@@ -1,4 +1,4 @@
-// // Projection of common/camera as a template for Ceres' dual numbers.
+// Projection of common/camera as a template for Ceres' dual numbers.
 #pragma once
 
 #include <Eigen/Core>

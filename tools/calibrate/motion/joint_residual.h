@@ -1,4 +1,4 @@
-// // The residuals of joint.h, for doubles and dual numbers.
+// The residuals of joint.h, for doubles and dual numbers.
 #pragma once
 
 #include <ceres/jet.h>
@@ -33,7 +33,7 @@ using Shared = Eigen::Matrix<double, kShared, 1>;
 using SharedMatrix = Eigen::Matrix<double, kShared, kShared>;
 using Own = Eigen::Matrix<double, kOwn, 1>;
 
-/// /// Data of one window: its unknowns, and the results of the last linearisation.
+/// Data of one window: its unknowns, and the results of the last linearisation.
 struct Window {
   const TrackWindow* tracks;
   TimePoint from;               ///< start of its inertial path, before the first image
@@ -41,7 +41,7 @@ struct Window {
   std::vector<double> inverse;  ///< inverse depths
 };
 
-/// /// The unknowns as T: doubles, or dual numbers with derivatives by a small step.
+/// The unknowns as T: doubles, or dual numbers with derivatives by a small step.
 template <class T>
 struct Unknowns {
   Vec3<T> turn, bias, place, velocity, gravity;
@@ -86,7 +86,7 @@ Unknowns<T> unknownsOf(const JointState& state, const Own& own) {
   return u;
 }
 
-/// /// Returns R v. A cast of R to dual numbers would take several times as long.
+/// Returns R v. A cast of R to dual numbers would take several times as long.
 template <class T>
 Vec3<T> rotated(const Eigen::Matrix3d& R, const Vec3<T>& v) {
   const auto row = [&](int i) { return R(i, 0) * v.x() + R(i, 1) * v.y() + R(i, 2) * v.z(); };
@@ -98,7 +98,7 @@ Vec3<T> scaled(const Eigen::Vector3d& v, const T& factor) {
   return {v.x() * factor, v.y() * factor, v.z() * factor};
 }
 
-/// /// State of the body at the exposure of a pixel. Its time may differ by a small offset.
+/// State of the body at the exposure of a pixel. Its time may differ by a small offset.
 template <class T>
 struct BodyAt {
   Eigen::Matrix3d R;
@@ -131,7 +131,7 @@ BodyAt<T> bodyAt(const InertialPath& path, double stamp_s, const Eigen::Vector2d
   return body;
 }
 
-/// /// Ray of a pixel, with derivatives by the lens from a last Newton step in T.
+/// Ray of a pixel, with derivatives by the lens from a last Newton step in T.
 template <class T>
 std::optional<Vec3<T>> rayOf(const CameraModel& lens, const Eigen::Vector2d& pixel,
                              const Unknowns<T>& u) {
@@ -146,7 +146,7 @@ std::optional<Vec3<T>> rayOf(const CameraModel& lens, const Eigen::Vector2d& pix
   return Vec3<T>(start.x() + step.x(), start.y() + step.y(), T(1.0));
 }
 
-/// /// Calls `each(residual)`, in pixels, for every image of a track after the first.
+/// Calls `each(residual)`, in pixels, for every image of a track after the first.
 template <class T, class Each>
 void forResiduals(const Window& window, std::size_t k, const InertialPath& path,
                   const CameraModel& lens, const JointState& state, const Unknowns<T>& u,

@@ -1,4 +1,4 @@
-// // Tracks corners through short runs of images in which the camera rotates most.
+// Tracks corners through short runs of images in which the camera rotates most.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,7 +8,7 @@
 
 namespace perdure::calibrate {
 
-/// /// Pixels of one corner in two or more consecutive images, from the window's first image on.
+/// Pixels of one corner in two or more consecutive images, from the window's first image on.
 using Track = std::vector<Eigen::Vector2d>;
 
 struct TrackWindow {
@@ -33,8 +33,8 @@ struct TrackWindows {
   void add(TrackWindows more);
 };
 
-/// /// Windows of cam0, chosen so that they rotate about all axes. Images with another size than
-/// the calibration's are not used.
+/// Windows of cam0, chosen so that they rotate about all axes. Images with another size than the
+/// calibration's are not used.
 TrackWindows trackWindows(const replay::Recording& recording, const WindowOptions& options);
 
 }  // namespace perdure::calibrate

@@ -73,7 +73,7 @@ TurnPairs pairsOf(const std::vector<Step>& steps, const Reading& reading, const 
   return {reference, given};
 }
 
-/// /// Pairs of poses `seconds` apart; the times of the poses plus `later_s` are those of the
+/// Pairs of poses `seconds` apart; the times of the poses plus `later_s` are those of the
 /// gyroscope.
 std::vector<Step> stepsOf(const std::vector<StampedPose>& poses, const TurnIntegral& gyro,
                           double seconds, double later_s) {
@@ -119,7 +119,7 @@ struct Wrong {
   DataFinding finding;
 };
 
-/// /// Returns the conventions under which the poses agree with the sensor, unless they agree as
+/// Returns the conventions under which the poses agree with the sensor, unless they agree as
 /// written.
 std::optional<Wrong> wrongReading(const std::vector<Step>& steps, const Quaternion& q_BC,
                                   const Limits& limits, const Sensor& sensor) {
@@ -134,7 +134,7 @@ std::optional<Wrong> wrongReading(const std::vector<Step>& steps, const Quaterni
     best = std::min(best, pairsOf(steps, reading, q_BC).disagreement());
   }
   if (best >= limits.explained) return std::nullopt;
-  // // If the body rotates about one axis only, exchanged axes may resemble an inverse.
+  // If the body rotates about one axis only, exchanged axes may resemble an inverse.
   constexpr double kFits = 0.005, kClearly = 3.0;
   if (best > kFits && given.disagreementBy(given.bestRotation()) < best / kClearly) {
     return std::nullopt;
@@ -155,8 +155,8 @@ std::optional<Wrong> wrongReading(const std::vector<Step>& steps, const Quaterni
            100.0 * (1.0 - best))}};
 }
 
-/// /// The finding with its fix. Positions decide between an inverted pose and a conjugated
-/// quaternion, because their rotations are equal.
+/// The finding with its fix. Positions decide between an inverted pose and a conjugated quaternion,
+/// because their rotations are equal.
 DataFinding repaired(Wrong wrong, const std::vector<StampedPose>& poses,
                      const replay::Recording& recording) {
   const Reading& reading = *wrong.likely.front();
@@ -212,8 +212,7 @@ std::optional<DataFinding> otherAxes(const std::vector<Step>& steps, const Quate
           100.0 * (1.0 - left), axesText(R), sensor.else_see)};
 }
 
-/// /// Returns the time in s to add to the poses' times, if it explains their rotations clearly
-/// better.
+/// Returns the time in s to add to the poses' times, if it explains their rotations clearly better.
 std::optional<double> betterTime(const std::vector<StampedPose>& poses, const TurnIntegral& gyro,
                                  const CameraCalibration& camera, const Limits& limits) {
   constexpr double kStep_s = 0.3, kMost_s = 2.0, kEach_s = 0.02, kShown = 0.2, kClearly = 3.0;
@@ -235,7 +234,7 @@ std::optional<double> betterTime(const std::vector<StampedPose>& poses, const Tu
   return offset;
 }
 
-/// /// Time offsets of the poses in their first and in their last third. They differ if the poses'
+/// Time offsets of the poses in their first and in their last third. They differ if the poses'
 /// clock is too fast or too slow.
 struct GrowingOffset {
   double first_s, last_s, per_second;
@@ -277,7 +276,7 @@ std::optional<GrowingOffset> growingOffset(const std::vector<StampedPose>& poses
   return GrowingOffset{offset[0], offset[1], (offset[1] - offset[0]) / apart};
 }
 
-/// /// Reports poses of another drive: no change of axes explains their rotations.
+/// Reports poses of another drive: no change of axes explains their rotations.
 std::optional<DataFinding> nothingInCommon(const std::vector<Step>& steps, const Quaternion& q_BC,
                                            const Limits& limits) {
   constexpr double kMuch_rad = 0.1, kAlien = 0.9, kStillAlien = 0.7, kAlike = 3.0;

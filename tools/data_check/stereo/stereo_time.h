@@ -1,4 +1,4 @@
-// // Checks whether the stamps of two cameras have the same clock. Both cameras rotate at the same
+// Checks whether the stamps of two cameras have the same clock. Both cameras rotate at the same
 // time, and translation affects both image rotations nearly equally.
 #pragma once
 
