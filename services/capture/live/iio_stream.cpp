@@ -23,7 +23,7 @@ std::string sayError(ssize_t code) {
   return text;
 }
 
-/// First value of an attribute, from the device or its first channel of a kind.
+/// Returns a numeric attribute of a channel, or nothing if it cannot be read.
 std::optional<double> readNumber(const iio_channel* channel, const char* attribute) {
   double value = 0.0;
   if (iio_channel_attr_read_double(channel, attribute, &value) < 0) return std::nullopt;

@@ -27,9 +27,9 @@ struct InertialPair {
 /// Interpolates the acceleration at each reading of the gyroscope.
 class ImuPairing {
  public:
-  /// Return the samples that this reading completes, in order of time. A reading whose time
-  /// decreases is dropped and counted as "imu_out_of_order". A gyroscope reading without an
-  /// acceleration within 0.1 s on either side is dropped and counted as "imu_unpaired".
+  /// Return the samples that this reading completes, in order of time. A reading whose time does
+  /// not increase is dropped and counted as "imu_out_of_order". A gyroscope reading that is not
+  /// between two accelerations at most 0.1 s apart is dropped and counted as "imu_unpaired".
   std::vector<InertialPair> gyro(const Triad& reading);
   std::vector<InertialPair> accel(const Triad& reading);
   const ReasonCounts& reasons() const { return reasons_; }

@@ -25,7 +25,7 @@ constexpr OnePlane kOnePlane[] = {
     {PixelLayout::kYuyv, 2, cv::COLOR_YUV2GRAY_YUY2, cv::COLOR_YUV2BGR_YUY2},
     {PixelLayout::kUyvy, 2, cv::COLOR_YUV2GRAY_UYVY, cv::COLOR_YUV2BGR_UYVY}};
 
-/// Returns nullptr for the layouts with several planes, whose colour planes have half the size.
+/// Returns nullptr for JPEG, and for layouts with separate colour planes, which have half the size.
 const OnePlane* onePlaneOf(PixelLayout layout) {
   const auto* found = std::ranges::find(kOnePlane, layout, &OnePlane::layout);
   return found == std::end(kOnePlane) ? nullptr : found;

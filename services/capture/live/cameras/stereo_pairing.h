@@ -14,7 +14,7 @@ namespace perdure::capture {
 
 class CameraTimeline {
  public:
-  /// Returns whether the image is in order. Its stamp must not decrease, and must not be ahead of
+  /// Returns whether the image is in order. Its stamp must increase, and must not be ahead of
   /// `now_ns` by more than `interval_ns`.
   bool takes(const CameraImage& image, std::int64_t now_ns, double interval_ns);
   /// Returns the stamp of the last image, even if that image was out of order; nothing before the

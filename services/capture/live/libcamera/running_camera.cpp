@@ -32,7 +32,7 @@ bool RunningCamera::over() { return lastOfAll(*this, &RunningCamera::leave, &Run
 bool RunningCamera::end() {
   const bool told = gone_ || !running_;  // no signal if the camera vanished before it ran
   if (!told && openVideoNodeVanished()) return false;
-  if (running_) camera_->stop();  // if it is not running here, another program may run it
+  if (running_) camera_->stop();  // if not running, another program may use it
   camera_->requestCompleted.disconnect(this);
   camera_->disconnected.disconnect(this);
   requests_.clear();
