@@ -223,8 +223,8 @@ class Ignore : public YAML::EventHandler {
   YAML::Mark start;
 };
 
-/// The position of text that follows the first document, if any. (YAML::LoadAll of 0.7 may loop
-/// forever on malformed text, and YAML::Load ignores text after the first document.)
+/// Returns the position of the second document, if any. YAML::LoadAll of 0.7 may loop forever on
+/// malformed text, and YAML::Load ignores text after the first document.
 std::optional<YAML::Mark> afterFirstDocument(const std::string& yaml) {
   std::istringstream stream(yaml);
   YAML::Parser parser(stream);

@@ -72,7 +72,7 @@ enum class Encoding { kCdr, kRos1 };
 /// Reads the values of a message in order. After the first missing value it reads no further.
 class BytesReader {
  public:
-  /// `keeper` owns the memory of `bytes`; images refer to it without a copy.
+  /// `keeper` owns the memory of `bytes`. Images refer to this memory without a copy.
   BytesReader(std::span<const std::uint8_t> bytes, Encoding encoding,
               std::shared_ptr<const void> keeper);
 
@@ -128,7 +128,7 @@ std::vector<std::uint8_t> cdrOf(const Struct auto& message) {
   return bytes;
 }
 
-/// Reason "malformed": the bytes end before the message.
+/// Decodes a message. Reason: "malformed" if the bytes end before the message.
 template <Struct M>
 Result<M> messageOf(std::span<const std::uint8_t> bytes, Encoding encoding,
                     std::shared_ptr<const void> keeper) {

@@ -48,10 +48,10 @@ using AreSame = std::function<bool(std::size_t, std::size_t)>;
 /// Orders the stamps of a sensor and corrects the changes of its clock. A step back, or a step of
 /// over a day ahead, is a change of the clock if the stamps increase regularly on both sides. It is
 /// not one if the stamps after it fill a gap before it (lines in another order) or repeat samples
-/// before it. A counter that wrapped is recognised by its length. If more than eight clocks seem to
-/// be set, the list consists of overlapping batches, and no change is assumed. `known` has the
-/// changes of the recording's other sensors; by them a clock that was set back by a few intervals
-/// is recognised.
+/// before it. A counter that wrapped is recognised by its length. If the clock seems to be set more
+/// than eight times, the list consists of overlapping batches, and no change is assumed. `known`
+/// has the changes of the recording's other sensors; by them a clock that was set back by a few
+/// intervals is recognised.
 ///
 /// Other stamps out of order are removed as strays if they are few, far outside their neighbours'
 /// stamps, and do not fill a gap elsewhere. They are few if they are a fiftieth of all or at most
