@@ -143,8 +143,8 @@ struct Said {
   bool asked = false;
 };
 
-/// Returns the probability that the detection in `region` is of the object's class rather than
-/// clutter, given even prior odds. Returns nothing if there is no such detection.
+/// Returns the probability of the object's class against clutter, given even prior odds, for the
+/// detection in `region` or for the answer to the object's prediction; nothing if there is neither.
 std::optional<Said> saidOf(const ObjectBelief& object, const Box& region,
                            const Detections& detections, const ModelInfo& model) {
   constexpr double kLeastOverlap = 0.3;

@@ -7,7 +7,7 @@ namespace perdure::gateway::web {
 namespace {
 
 /// Closes a connection without waiting until the client has closed its side. Beast's own teardown
-/// waits for up to the timeout of a handshake, and then replaces the client's error.
+/// waits for up to the timeout of a handshake, and then loses the client's error.
 class Wire : public beast::tcp_stream {
  public:
   explicit Wire(beast::tcp_stream stream) : beast::tcp_stream(std::move(stream)) {}

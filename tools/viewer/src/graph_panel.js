@@ -39,7 +39,7 @@ function loopWords(l) {
     <p class="dim">in axes of anchor ${l.a}; ${known ? '± standard deviation of the measurement' : 'how well it was measured is not known'}</p>`;
 }
 
-/** HTML of a part {kind, id}; "" if the graph does not contain it any more. */
+/** Returns HTML about a part {kind, id}; "" if it is not in the graph any more. */
 export function wordsOfPart(part, graph) {
   const found = (part.kind === 'anchor' ? graph?.anchors : graph?.loops)?.find((x) => x.id === part.id);
   if (!found) return '';

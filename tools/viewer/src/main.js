@@ -244,7 +244,7 @@ function figures(now) {
   return items.map(([k, v, c]) => `<div class="${c}"><dt>${k}</dt><dd>${v}</dd></div>`).join('');
 }
 
-/** Caption under the image, or text instead of it. */
+/** Returns the caption of the image, or the text shown instead of an image. */
 function captionOf(state) {
   if (camera.figure.classList.contains('has-image')) {
     return wordsOfImage(state, model.time - camera.shownTime);

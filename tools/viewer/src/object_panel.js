@@ -102,8 +102,8 @@ export class ObjectPanel {
     return b && at ? `${Math.hypot(at[0] - b[0], at[1] - b[1], at[2] - b[2]).toFixed(1)} m` : '–';
   }
 
-  /** Position in W; null: unknown. Replies of the store, and objects only on the map, are in
-      M. */
+  /** Returns the position in W, or null if unknown. Replies of the store, and objects only on the
+      map, are converted from M. */
   here(o) {
     return this.model.objects.has(o.id) ? o.c : this.model.placeInW({ memory: 'long_term', ...o, elsewhere: this.model.find(o.id)?.elsewhere });
   }
@@ -204,8 +204,8 @@ export class ObjectPanel {
     return `<h3>Where it is in ${frame}, and how large</h3><p class="dim">± one standard deviation</p><table>${rows.map(([k, v]) => `<tr><td class="dim">${k}</td><td>${v}</td></tr>`).join('')}</table>`;
   }
 
-  /** For the most probable class: correlations as colours, and the covariance of the pair under
-      the pointer. */
+  /** Shows, for the most probable class, the correlations as colours, and the covariance of the
+      pair under the pointer. */
   covariance() {
     const P = this.full?.classes?.[0]?.covariance;
     if (!P) return '';

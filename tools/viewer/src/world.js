@@ -8,7 +8,7 @@ import { colourOf, looksLike } from './words.js';
 const MOST_LABELS = 40, MOST_MARKS = 100, SLOW_MS = 120, ANSWERED_MS = 150;
 
 export class World {
-  /** `onPick(id)` of an object, 0: nothing; `onPart({kind, id})` of the graph. */
+  /** Calls `onPick(id)` on selection of an object (0: none), `onPart({kind, id})` of the graph. */
   constructor(canvas, labels, onPick, onPart) {
     this.canvas = canvas;
     this.labels = labels;
@@ -162,7 +162,7 @@ export class World {
     this.dirty = true;
   }
 
-  /** A pole at a place where a loop was closed or retracted, or the session was localised.
+  /** Adds a pole where a loop was closed or retracted, or the session was localised.
       `world` is the W of `at`, because events may arrive before the first objects of their W. */
   addMark(at, colour, world) {
     const pole = new THREE.Mesh(new THREE.CylinderGeometry(0.05, 0.05, 3, 8).rotateX(Math.PI / 2), new THREE.MeshBasicMaterial({ color: colour }));
@@ -256,7 +256,7 @@ export class World {
     const positions = new Float32Array(3 * n), colours = new Float32Array(3 * n), colour = new THREE.Color();
     for (let i = 0; i < n; ++i) {
       positions.set(values.subarray(4 * i, 4 * i + 3), 3 * i);
-      // Brightness increases with the accuracy of the point.
+      // More accurate points are brighter.
       const known = 1 / (1 + 2 * values[4 * i + 3]);
       colour.setHSL(0.42, 0.55, 0.18 + 0.5 * known).toArray(colours, 3 * i);
     }
@@ -281,7 +281,7 @@ export class World {
     if (this.took >= SLOW_MS) this.restsUntil = Math.max(this.restsUntil, performance.now() + ANSWERED_MS);
   }
 
-  /** A line from the selected object to its occluder. */
+  /** Shows a line from the selected object to its occluder. */
   showBlocker() {
     const thing = this.things.get(this.chosen), by = thing && this.things.get(thing.object.blocked_by);
     this.blocker.visible = Boolean(by);
@@ -300,7 +300,7 @@ export class World {
     this.dirty = true;
   }
 
-  /** Selects by boxes, including those of occluded objects, because touch is inexact. */
+  /** Selects an object by its box, even if occluded, because touch is inexact. */
   pick(e) {
     if (this.orbit.travelled > 6) return;
     const box = this.canvas.getBoundingClientRect();
@@ -338,8 +338,7 @@ export class World {
     ++this.drawn;
   }
 
-  /** If drawing is slow, leaves half of the time to lists and clicks, and uses larger
-      pixels. */
+  /** If drawing is slow, uses larger pixels, and leaves half of the time to lists and clicks. */
   keepPace(now) {
     if (this.drewAt === undefined) return;
     const took = now - this.drewAt; // time until the next frame
