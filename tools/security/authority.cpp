@@ -38,8 +38,7 @@ void requireName(const std::string& name) {
                          "most 48, and not \"authority\"");
 }
 
-/// Restricts the permissions to `topics`. Throws StartupError for a topic that the role does not
-/// permit.
+/// Restricts the permissions to `topics`. Throws StartupError if a ros2_driver may not write one.
 void narrow(Permissions& permissions, bus::Role role, const std::vector<std::string>& topics) {
   if (topics.empty()) return;
   if (role != bus::Role::kRos2Driver) {

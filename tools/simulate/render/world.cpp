@@ -19,7 +19,7 @@ void* bufferOf(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::
   return buffer;
 }
 
-/// Objects of equal look and size share one surface.
+/// Objects of equal class, shape, look and size share one surface.
 using Look = std::tuple<std::string, std::string, std::uint64_t, std::array<double, 3>>;
 
 Look lookOf(const sim::SceneObject& object) {
