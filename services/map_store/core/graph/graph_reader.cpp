@@ -154,8 +154,8 @@ void leaveOutDangling(SavedGraph& graph) {
   }
 }
 
-/// Adds the facts. Those of a loop closure that was left out become final. An object without facts
-/// gets sightings of one track; a map from a server has no facts.
+/// Adds the facts. Those of a loop closure that was left out become final. Sightings of an object
+/// without facts get its id as track id, because a map from a server has no facts.
 void takeFacts(SavedGraph& graph, const std::set<mapping::SameObject>& facts) {
   SavedMap& map = graph.map;
   for (mapping::SameObject fact : facts) {
