@@ -9,7 +9,7 @@ namespace perdure::gateway {
 namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr std::chrono::seconds kLongBack{2};  // larger: restarted recording, or another drive
+constexpr std::chrono::seconds kLongBack{2};  // a larger step back: another recording or drive
 constexpr std::chrono::seconds kGap{1};       // sensor time; a longer gap interrupts the trajectory
 
 }  // namespace

@@ -50,7 +50,7 @@ constexpr std::uint32_t cameraChannel(std::size_t camera, CameraPart part) {
 /// Selects the messages that slow clients lose, and the messages that late clients receive.
 enum class Delivery {
   kNewest,  ///< the newest message replaces an unsent one; late clients receive it
-  kEach,    ///< drops, counts and reports the oldest messages; late clients receive the last ones
+  kEach,    ///< the oldest waiting ones are dropped and counted; late clients receive the last
 };
 
 struct ChannelInfo {

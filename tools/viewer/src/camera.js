@@ -1,4 +1,4 @@
-// The camera image with annotations of the same frame, matched by their time.
+// Shows the camera image with the annotations of the same frame, which are matched by time.
 import { readImage, seconds } from './connection.js';
 
 const KEPT = 12; // limit of images that wait for annotations

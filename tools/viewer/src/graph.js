@@ -1,4 +1,4 @@
-// The graph of the map in three dimensions, in M: anchors, trajectory, loops.
+// Draws the graph of the map in three dimensions, in M: anchors, trajectory and loops.
 import * as THREE from './vendor/three.module.js';
 import { LOOPS, lookOfLoop } from './words.js';
 

@@ -1,4 +1,4 @@
-// Describes an anchor or a loop of the map's graph in words.
+// Describes an anchor or a loop of the map's graph in HTML.
 import { LOOPS, escaped, lookOfLoop } from './words.js';
 
 const metres = (x) => `${Math.abs(x) < 0.0005 ? '0' : x.toFixed(Math.abs(x) < 1 ? 3 : 2)} m`;

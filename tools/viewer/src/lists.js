@@ -149,7 +149,7 @@ export class EventLog {
     if (event.at) line.dataset.at = event.at.join();
     let words = escaped(event.words) + (event.detail ? ` <span class="dim">${escaped(event.detail)}</span>` : '');
     for (const id of new Set([event.object_id, event.other_id])) {
-      // Skips digits inside a number, such as 0.1 s.
+      // Does not link an id's digits inside a number, such as 0.1 s.
       if (id) words = words.replace(new RegExp(`(?<![\\d.])${id}(?!\\.?\\d)`), `<a data-object="${id}">${id}</a>`);
     }
     line.innerHTML = `<time>${wordsOfTime(time, this.model.origin)}</time><span>${words}</span>`;

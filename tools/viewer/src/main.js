@@ -1,4 +1,4 @@
-// Assembles the page: messages update the model, which updates map, lists and panels.
+// Assembles the page. Messages update the model, and the model updates map, lists and panels.
 import { CameraView } from './camera.js';
 import { Connection } from './connection.js';
 import { EventLog, ObjectList, renderServices } from './lists.js';
@@ -293,6 +293,6 @@ function now4(rate) {
   return true;
 }
 
-// State of the page, for tests.
+// The state of the page, which tests read.
 window.perdure = { model, world, camera, connection, choose, choosePart, opened: performance.now() };
 refresh();

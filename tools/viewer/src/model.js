@@ -1,4 +1,4 @@
-// State of the page: the newest data, and the history of the objects since the page was opened.
+// The state of the page: the newest data, and the objects' history since the page was opened.
 
 const RATE_MS = 5000;
 
@@ -22,13 +22,13 @@ export class Model {
     const time = frame.timestamp.sec + 1e-9 * frame.timestamp.nsec;
     const world = `${frame.world}/${frame.epoch}`;
     if (this.world !== undefined && this.world !== world) this.history.clear();
-    const another = this.frame && time < this.time - 2; // whether a recording starts again
+    const another = this.frame && time < this.time - 2; // whether a recording has restarted
     if (another) this.history.clear();
     this.world = world;
     this.time = time;
     this.frame = frame;
     this.objects = new Map(objects.map((o) => [o.id, o]));
-    if (this.heardAt > 0) this.live = true; // ignores the first one, which may be old
+    if (this.heardAt > 0) this.live = true; // not for the first message, which may be old
     this.heardAt = now;
     this.arrivals.push(now);
     while (this.arrivals[0] < now - RATE_MS) this.arrivals.shift();
@@ -44,7 +44,7 @@ export class Model {
     if (samples.length > 1500) samples.shift();
   }
 
-  /** Clears the data of another time after a jump to another position of a recording. */
+  /** Clears the data after a jump to another position of a recording. */
   jumped() {
     this.history.clear();
   }
@@ -61,7 +61,7 @@ export class Model {
     for (const [id, o] of this.answer.objects) this.remembered.set(id, o);
   }
 
-  /** T_MW as [x y z qx qy qz qw] if it belongs to the displayed W; otherwise W is M. */
+  /** T_MW as [x y z qx qy qz qw] if it belongs to the displayed W; otherwise the identity. */
   T_MW() {
     const f = this.mapFrame;
     return f && this.world === `${f.world}/${f.epoch}` ? f.T_MW : [0, 0, 0, 0, 0, 0, 1];
@@ -127,7 +127,7 @@ export function troubleOf(model, connection, now) {
   if (heard.length === 0 && silent > 2) {
     return ['stale', 'No service is heard: do they run, with the same bus.domain, bus.interface and bus.vehicle as the gateway? (perdure status)'];
   }
-  // A new client receives the last objects once.
+  // A new client receives the last `objects` once, even if they are old.
   const last = silent > 2 || !model.live;
   if (last && capture?.message === 'end of drive') return ['stale', 'The drive has ended: this is the last state.'];
   if (silent > 2) {

@@ -1,4 +1,4 @@
-// All data of one object, requested from the gateway twice a second while the panel is open.
+// Shows all data of one object. While open, requests them from the gateway twice a second.
 import { classWords, colourOf, escaped, existenceWords, isHidden, isInSight, percent, visibilityWords } from './words.js';
 
 const EVERY_MS = 500;
@@ -24,7 +24,7 @@ export class ObjectPanel {
     this.element.innerHTML = '<p class="empty">Click on an object in the map or in the list.</p>';
   }
 
-  /** Shows a part of the map's graph in the same place: `words` returns HTML at each render. */
+  /** Shows a part of the map's graph instead of an object. `words` returns its HTML. */
   showPart(words) {
     this.clear();
     this.part = words;
@@ -170,7 +170,7 @@ export class ObjectPanel {
       <tr><td></td><td class="n"><b>${signed(sum)}</b></td><td><b>log-odds: ${percent(1 / (1 + Math.exp(-sum)))}</b></td></tr></table>`;
   }
 
-  /** Explains why the most probable class leads the next one. */
+  /** Explains why the most probable class is more probable than the next one. */
   margins() {
     const [first, second] = this.full?.classes ?? [];
     const ledger = this.full?.ledger ?? {}, ousted = this.full?.ousted;

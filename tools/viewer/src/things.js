@@ -1,4 +1,4 @@
-// One object in the 3D map: its shape or box, its outline, its ellipsoid.
+// Draws one object in the 3D map: its shape or box, its outline and its ellipsoid.
 import * as THREE from './vendor/three.module.js';
 import { shapeOf } from './meshes.js';
 import { colourOf, isHidden, isInSight } from './words.js';

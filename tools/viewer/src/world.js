@@ -1,4 +1,4 @@
-// The map in three dimensions: ground, trajectory, vehicle, points and objects, with their names.
+// Draws the map in three dimensions: ground, trajectory, vehicle, points, and objects with names.
 import * as THREE from './vendor/three.module.js';
 import { Graph } from './graph.js';
 import { Orbit } from './orbit.js';
@@ -34,7 +34,7 @@ export class World {
     this.addGround();
     this.addVehicle();
     this.addLines();
-    this.map = new THREE.Group(); // M in W
+    this.map = new THREE.Group(); // has the pose of M in W
     this.graph = new Graph(this.map);
     this.marks = new THREE.Group();
     this.scene.add(this.map, this.marks);
@@ -55,7 +55,8 @@ export class World {
   }
 
   addGround() {
-    // In short pieces, because some browsers draw lines that pass behind the camera incorrectly.
+    // Lines are in short pieces, because some browsers draw lines incorrectly that pass behind the
+    // camera.
     const half = 150, step = 5, points = [];
     for (let a = -half; a <= half; a += step) {
       for (let b = -half; b < half; b += step) points.push(a, b, 0, a, b + step, 0, b, a, 0, b + step, a, 0);
@@ -154,7 +155,7 @@ export class World {
     this.setMapFrame(model.T_MW());
   }
 
-  /** Places M relative to W: the working set stays, and the map moves when a loop is closed. */
+  /** Sets the pose of M in W. When a loop is closed, the map moves and the working set stays. */
   setMapFrame([x, y, z, ...q]) {
     this.map.quaternion.fromArray(q).invert();
     this.map.position.set(-x, -y, -z).applyQuaternion(this.map.quaternion);
@@ -325,7 +326,7 @@ export class World {
     else this.onPick(best.id);
   }
 
-  /** Draws if something has changed; to be called for each animation frame. */
+  /** Draws if something has changed. Must be called for each animation frame. */
   draw() {
     const now = performance.now();
     this.keepPace(now);
