@@ -18,7 +18,7 @@ struct Config {
   std::vector<std::string> cameras{"cam0", "cam1"};  ///< for main: cameras whose frames are read
   std::string odometry = "estimated";                ///< or "given": by another program
   bool stereo = true;                                ///< use the second camera, if present
-  bool prefer_calibration = true;                    ///< use IMU noise of the calibration, if present
+  bool prefer_calibration = true;                    ///< use the calibration's IMU noise if present
   double imu_inflation = 3.0;      ///< factor on the IMU's noise densities in propagation
   double gyro_scale = 0.01;        ///< standard deviation of the gyroscope's scale
   double imu_slack_s = 0.0;        ///< time after a frame up to which samples must exist

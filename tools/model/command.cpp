@@ -77,7 +77,7 @@ void seal(const fs::path& network) {
   writeChecked(description, json.dump(1) + "\n");
 }
 
-/// Runs the Python part and checks its network in OpenCV.
+/// Runs the Python part and checks the network that it wrote.
 void importTo(const fs::path& out, const Staging& staging, const ImportOptions& request) {
   const TemporaryFolder reference = temporaryFolder(fs::temp_directory_path(), "perdure-model-",
                                                     "set TMPDIR to a folder that you may write");

@@ -12,7 +12,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kGauge = 1e-4;        // rad and m; small, because the start's yaw and position define W
+constexpr double kGauge = 1e-4;        // rad, m; the start's yaw and position define W
 constexpr double kMaxTurn = 0.3;       // rad/s; a larger mean rate at rest is a turn
 constexpr double kSpeedWindow = 0.5;   // s; the force is averaged over this time
 constexpr double kForceTolerance = 3;  // m/s², for the length of the mean force
