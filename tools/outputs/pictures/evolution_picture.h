@@ -36,7 +36,8 @@ std::vector<Evolution> chooseEvolutions(const DriveLog& log, const PictureTruth*
 
 /// Draws a row for each object, and above them a row for `body` if it has points.
 cv::Mat drawEvolutions(const std::vector<Evolution>& evolutions, const BodyErrors& body = {});
-/// Writes the picture. Returns false if no object was selected, or if the file cannot be written.
+/// Draws and writes the picture; returns false if there is nothing to draw. Throws
+/// StartupError(kInputOutput) if the file cannot be written.
 bool writeEvolution(const DriveLog& log, const PictureTruth* truth, const BodyErrors& body,
                     const std::filesystem::path& file);
 

@@ -45,8 +45,8 @@ struct MapView {
 /// truth is included up to half of that distance.
 MapView viewOf(const MapContent& content);
 cv::Mat drawMap(const MapContent& content, const MapView& view);
-/// Draws and writes the map. Returns false if there is neither a trajectory nor an object, or if
-/// the file cannot be written.
+/// Draws and writes the map. Returns false if there is neither a trajectory nor an object. Throws
+/// StartupError(kInputOutput) if the file cannot be written.
 bool writeMap(const MapContent& content, const std::filesystem::path& file);
 
 }  // namespace perdure::tools

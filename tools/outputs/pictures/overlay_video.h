@@ -23,7 +23,7 @@ class OverlayWriter {
 
   /// Adds a frame; frames must be sorted by time. The first call opens the file. Fails with
   /// image_missing, image_malformed (see viewOf), image_size if the size differs from the
-  /// calibration, or a reason of VideoFile. A failed call writes nothing.
+  /// calibration, or a reason of VideoFile if the film cannot be written.
   Result<void> add(const Frame& frame, const FrameGlance& glance);
   /// Finishes the film. Fails with video_not_written.
   Result<void> finish() { return video_ ? video_->finish() : Result<void>(); }
@@ -43,8 +43,8 @@ class OverlayWriter {
 };
 
 /// Draws each frame of the log whose image is still in the folder. Returns a sentence with the
-/// result or the reason of a failure; does not throw for missing images or codecs. Calls `progress`
-/// with the number of completed frames and the total.
+/// result, or with the reason if images or codecs are missing. Throws StartupError(kInputOutput) if
+/// the film is incomplete. Calls `progress` with the number of completed frames and the total.
 std::string writeOverlay(const DriveLog& log, const replay::DatasetOptions& data,
                          const std::filesystem::path& file,
                          const std::function<void(std::size_t, std::size_t)>& progress);
