@@ -101,7 +101,7 @@ MapNear Node::nearNow() {
 /// Adds near objects that are not in the working set, recalled ones that the graph has moved since,
 /// and known tracks that a loop identified with objects of the working set.
 void Node::putNearByGraph(MapNear& near) {
-  std::map<TrackId, bool> working;  // recalled
+  std::map<TrackId, bool> working;  // value: ObjectBelief::recalled
   std::set<ObjectId> present;
   for (const ObjectBelief& belief : newest_->objects) {
     working[belief.id] = belief.recalled;

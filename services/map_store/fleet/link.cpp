@@ -48,7 +48,7 @@ std::string firstLine(const char* message) {
   return text.substr(0, text.find('\n'));
 }
 
-/// The SQLSTATE in a verbose message: "FATAL:  28P01: password …".
+/// Returns the SQLSTATE in a verbose message, for example "FATAL:  28P01: password …".
 std::string stateIn(const std::string& message) {
   for (std::size_t at = message.find(":  "); at != std::string::npos;
        at = message.find(":  ", at + 1)) {
