@@ -448,7 +448,7 @@ DataFindings checkClocks(const Recording& recording, const DataUse& use) {
   // Without an IMU, frame numbers may replace times, as in KITTI tracking.
   if (!of_imu || images.empty()) return findings;
   const auto factor = factorOfStamps(imu, images);
-  if (factor == 1) {  // also true for 1 kHz samples with stamps in whole ms
+  if (factor == 1) {  // excludes 1 kHz samples in whole ms, which increase by 1 as counts do
     checkCount("images", images, findings);
     checkCount("samples of the IMU", imu, findings);
   } else {

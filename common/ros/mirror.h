@@ -45,7 +45,7 @@ class Mirror {
   void onCalibration(const Calibration& calibration);  ///< publishes tf_static, camera_info
   void onFrame(const Frame& frame);  ///< publishes image_raw or image_raw/compressed, camera_info
   void onImage(const Frame& frame);  ///< publishes images only, without camera_info
-  std::string imageTopic(const std::string& camera) const {  ///< image_raw
+  std::string imageTopic(const std::string& camera) const {  ///< topic image_raw
     return prefix_ + "/" + camera + "/image_raw";
   }
   void onImu(const ImuSample& sample);

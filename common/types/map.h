@@ -24,8 +24,8 @@ struct MapObject {
   std::uint32_t hits = 0;
   Visibility visibility = Visibility::kOutOfView;
   Memory memory = Memory::kWorking;
-  /// The session is not yet located on the earlier map, so this may be a second row of a known
-  /// object.
+  /// True if the session is not yet located on the earlier map. This may then be a second row of a
+  /// known object.
   bool provisional = false;
 };
 

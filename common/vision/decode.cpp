@@ -10,7 +10,7 @@ namespace {
 
 using std::string_view_literals::operator""sv;
 
-/// Byte `at` as a number; 0 behind the end.
+/// Byte `at` as a number; 0 after the end.
 std::size_t byteAt(std::string_view bytes, std::size_t at) {
   return at < bytes.size() ? static_cast<unsigned char>(bytes[at]) : 0;
 }

@@ -178,7 +178,7 @@ class ClockWalk {
 
  private:
   static constexpr std::size_t kMostSet =
-      8;  ///< clocks that were set; overlapping batches are more
+      8;  ///< most times that a clock is set; overlapping batches have more steps
   /// Steps back are changes of the clock only if there is at most one per this number of stamps.
   static constexpr std::size_t kOrdered = 20;
   static constexpr int kLost = 20;  ///< longest gap of lost samples, in intervals

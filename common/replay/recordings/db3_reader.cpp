@@ -58,7 +58,7 @@ class Db3 : public RosSource {
         last_ns_ = log_ns;
         return message();
       }
-      // Text sorts after all numbers; a damaged index may give any order.
+      // Times stored as text follow all numbers; a damaged index may give any order.
       count({"stamp_malformed", path_.string() +
                                     ": a message whose time is no whole number, or goes "
                                     "back; it is left out"});
