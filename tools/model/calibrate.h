@@ -27,7 +27,7 @@ struct CalibrationResult {
   std::size_t frames = 0, boxes = 0, targets = 0, targets_found = 0;
   double false_boxes = 0.0;                          ///< mean number per frame, above the threshold
   std::size_t asked_there = 0, asked_elsewhere = 0;  ///< number of places in the fit
-  double primed_nats_there = 0.0, primed_nats_elsewhere = 0.0;  ///< mean nats; the second is below 0
+  double primed_nats_there = 0.0, primed_nats_elsewhere = 0.0;  ///< mean nats; second below 0
   bool has_primed = false;
   double box_sigma = 0.0;                                    ///< 0: too few clear boxes
   std::map<std::string, std::array<double, 4>> side_insets;  ///< insets of frequent classes

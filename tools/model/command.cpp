@@ -84,7 +84,7 @@ void importTo(const fs::path& out, const Staging& staging, const ImportOptions& 
   const fs::path made = staging.path() / out.filename();
   ImportRequest wanted{request.network, made, out,
                        request.unchecked ? fs::path() : reference.path(), request.arguments};
-  if (!request.image.empty()) {  // needed for "--input camera"
+  if (!request.image.empty()) {  // "--input camera" needs the image
     const Frame picture = readPicture(request.image);
     wanted.arguments.push_back(fmt::format("--camera={}x{}", picture.width, picture.height));
   }
