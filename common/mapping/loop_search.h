@@ -86,7 +86,7 @@ class LoopSearch {
   /// Searches the component of the session that ended, around its last position. Returns a match
   /// that needs no second search.
   std::optional<Found> nearLast(const Whereabouts& body, const LastPlace& last) const;
-  /// Call it if the graph or the objects of other components have changed.
+  /// Clears the index of the other components. Call it if the graph or their objects have changed.
   void forget() { others_.clear(); }
 
  private:

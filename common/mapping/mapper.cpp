@@ -125,7 +125,7 @@ void Mapper::onOdometry(const Odometry& odometry) {
   const auto before = builder_.last();
   auto anchor = builder_.add(odometry, state_.nextAnchor());
   if (!anchor) return;
-  if (before) {  // objects and landmarks observed from that anchor until now
+  if (before) {  // its view has the landmarks observed since that anchor
     state_.putView(before->id,
                    view_builder_.viewFrom(before->T_WA, builder_.way_m(),
                                           builder_.way_m() - before->way_m + kOverlap_m));

@@ -67,7 +67,7 @@ void Mapper::join(const LoopClosure& loop) {
     const ObjectRecord *of_known = state_.recordOfTrack(known),
                        *of_seen = state_.recordOfTrack(seen);
     const bool both = of_known && of_seen && !of_known->gone && !of_seen->gone;
-    if (known == seen || !both) continue;  // one may be gone since the loop was found
+    if (known == seen || !both) continue;  // a track may have ended since the search
     const auto [survivor, absorbed] =
         std::minmax({identity.objectOf(known), identity.objectOf(seen)});
     const SameObject fact{loop.id, known, seen};
@@ -160,8 +160,7 @@ void Mapper::search() {
   if (!found) found = searchElsewhere(here, new_view);
   if (!found) return;
   const bool by_objects = !found->match.pairs.empty();
-  if (by_objects && active_ && active_->pairs == pairsOf(found->match)) return;  // the loop exists
-                                                                                 // already
+  if (by_objects && active_ && active_->pairs == pairsOf(found->match)) return;  // no new pair
   close(*found);
 }
 

@@ -30,7 +30,7 @@ namespace perdure::map_store {
 /// be stored.
 inline constexpr ObjectId kIdReserve = 4096;
 
-/// Returns why the query cannot be answered; empty if it can.
+/// Returns the reason why the query cannot be answered; empty if it can be answered.
 std::string faultOf(const MapQuery& query);
 
 struct Outputs {

@@ -153,7 +153,7 @@ std::optional<ViewMatch> matchViews(const View& stored, const View& seen) {
   match.points = static_cast<std::size_t>(std::count_if(
       pairs.begin(), pairs.end(), [&](const Alike& p) { return agrees(p, match.T_AB.mean); }));
   if (match.points < kLeastAgreeing || !isCovariance(match.T_AB.covariance)) return std::nullopt;
-  // Each proposal uses two points.
+  // Two points define the pose, so only the others are evidence.
   const auto others = static_cast<double>(match.points - 2);
   match.nats = -(logChoose(pairs.size(), 2) + logChoose(pairs.size() - 2, match.points - 2) +
                  others * std::log(chanceOf(pairs)));

@@ -22,7 +22,7 @@ class Provenance {
   /// The map must have a session and outlive this object. Objects may be added to it later.
   explicit Provenance(const MapContents& map);
 
-  /// The identity of the object in other maps, from its id in this map.
+  /// Returns the origin that identifies an object of this map in other maps.
   Origin nameOf(ObjectId id) const;
   /// All origins of the object, including this map if it has observed the object since. If the
   /// object has not ended, includes the origins of objects merged into it.

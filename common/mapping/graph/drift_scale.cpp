@@ -52,7 +52,7 @@ DriftScale::Measured DriftScale::measuredBy(const Edge& loop) const {
   return {a, b, error, turnedBy(R, loop.T_ab.covariance)};
 }
 
-/// Covariance of the odometry's errors of two relative poses, for a scale of 1.
+/// Covariance between the odometry's errors of the T_ab of two loops, for a scale of 1.
 Eigen::Matrix4d DriftScale::sharedError(const Measured& x, const Measured& y) const {
   const std::size_t from = std::max(x.a, y.a), to = std::min(x.b, y.b);
   if (from >= to) return Eigen::Matrix4d::Zero();

@@ -41,7 +41,7 @@ struct StoredTrack;  // core/track_rows.h
 
 /// The content of one commit, by track ids.
 struct Batch {
-  const Objects* working = nullptr;  ///< not null
+  const Objects* working = nullptr;      ///< not null
   std::map<TrackId, PlacedBelief> left;  ///< confirmed tracks that left the working set
   std::map<TrackId, Removal> removed;
   /// Tracks that the graph placed and that were not detected since. Their stored rows do not

@@ -31,7 +31,7 @@ struct SavedGraph {
 /// older schema.
 Result<SavedGraph> readGraph(const Connection& connection);
 
-// The functions that write do so within the caller's transaction and throw Failed.
+// The write functions run within the caller's transaction and throw Failed.
 
 /// Writes the changes. Does not write unsound parts (graph_codec.h), whose stored rows remain, and
 /// returns their number. Does not write records of unconfirmed objects.
