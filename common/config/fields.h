@@ -88,7 +88,7 @@ struct Problem {
 std::vector<Problem> readYaml(Fields& fields, const std::string& yaml, const std::string& file);
 /// Applies readYaml to the content of a file. A file that cannot be read is a problem too.
 std::vector<Problem> readFile(Fields& fields, const std::string& path);
-/// Applies "key=value" from --set. The value is YAML; a text needs no quotes.
+/// Applies "key=value" from --set. The value is YAML, but text needs no quotes.
 std::vector<Problem> assign(Fields& fields, const std::string& assignment);
 /// Returns the problems of required fields that neither a file nor --set has given. readYaml and
 /// assign record which fields were given.

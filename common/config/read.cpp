@@ -78,7 +78,7 @@ class Reader {
     } else if (!isGroup(name) && !fields_.wasGroup(name)) {
       problem(key, name + ": is not a known key" + suggestion(name));
     } else if (value.IsMap()) {
-      seen_.erase(name);  // a group may continue under a second heading; keys must not repeat
+      seen_.erase(name);  // a group may have several headings, but each key only once
       readGroup(value, name + ".");
     } else if (!value.IsNull()) {
       problem(value, name + ": is a group of keys, not a value; its first key is " +

@@ -49,7 +49,7 @@ StampList stampsOfCamera(const Recording& recording) {
 bool checkEqual(const char* of, std::uint64_t repeated, std::size_t kept, DataFindings& findings) {
   const auto all = repeated + kept;
   const bool unusable = 10 * kept < all;
-  // A list with each line twice has lost no data.
+  // A list that contains each line twice has lost no data.
   if (2 * repeated <= all || repeated < 3) return false;
   findings.push_back(
       {unusable ? StampGrade::kFatal : StampGrade::kWarning, "stamps_equal",

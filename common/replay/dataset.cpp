@@ -108,7 +108,7 @@ std::optional<Reader> readerOf(const std::filesystem::path& folder) {
   return std::nullopt;
 }
 
-/// Refuses a dataset folder that holds a recording file too.
+/// Refuses a dataset folder that also contains a recording file.
 [[noreturn]] void refuseBoth(const std::filesystem::path& folder) {
   std::string file, part;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {

@@ -103,8 +103,8 @@ class Dataset {
   /// (image_missing, image_truncated, image_corrupt, image_size) and skipped; their index is not
   /// reused. At equal times the order is imu, speed, cam0, cam1.
   std::optional<Message> next();
-  /// Counts so far; imu_gap (more than 3.5 usual intervals) is counted with the sample after the
-  /// gap.
+  /// Returns the counts so far. An imu_gap (more than 3.5 usual intervals) is counted with the
+  /// sample after the gap.
   const ReasonCounts& reasons() const { return reasons_; }
   /// The problem counted last, as text for users.
   const std::string& lastProblem() const { return last_problem_; }

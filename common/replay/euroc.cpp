@@ -95,7 +95,7 @@ void readSpeed(const fs::path& folder, Recording& recording) {
 /// The list of a camera's frames, with the paths of its images.
 class FrameList {
  public:
-  /// `look`: whether to check that the images exist.
+  /// If `look` is true, the images must exist; close() checks this.
   FrameList(const fs::path& folder, bool look)
       : folder_(folder), look_(look), images_(look ? folder / "data" : fs::path()) {}
 
@@ -110,8 +110,8 @@ class FrameList {
     return found ? found->string() : written.string();
   }
 
-  /// Throws if none of the listed images exists. Otherwise notes images that were found under other
-  /// names.
+  /// Throws StartupError if none of the listed images exists. Otherwise notes images that were
+  /// found under other names.
   void close(Recording& recording) const {
     if (!look_ || named_ == 0) return;
     const std::string images = (folder_ / "data").string();

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 using ImageGrade = DataFinding::Grade;
 using FileList = std::vector<const Recording::FrameFile*>;
 
-/// Classification of a camera's images without reading them.
+/// A camera's image files, classified without reading them.
 struct Listed {
   std::size_t all = 0, missing = 0;
   FileList empty, whole;  ///< sorted by time; images of a recording count as whole

@@ -58,7 +58,7 @@ std::optional<TimePoint> parseStamp(const std::string& text) {
   return TimePoint(since + Duration(*fraction));
 }
 
-/// Line k contains the stamp of record k. Returns nothing for lines that are empty or not a stamp.
+/// Reads the stamps; line k has that of record k. An entry is empty if its line is no stamp.
 std::vector<std::optional<TimePoint>> readStamps(const fs::path& file) {
   std::vector<std::optional<TimePoint>> stamps;
   for (const auto& line : readLines(file, "KITTI keeps timestamps.txt in each sensor's folder")) {

@@ -39,7 +39,7 @@ Recording readKittiRaw(const DatasetOptions& options);
 Recording readKittiTracking(const DatasetOptions& options);
 Recording readSevenScenes(const DatasetOptions& options);
 
-/// FOLDER/NAME.png, .jpg or .jpeg, whichever exists; else FOLDER/NAME.png.
+/// Returns FOLDER/NAME.png, .jpg or .jpeg, whichever exists; otherwise FOLDER/NAME.png.
 std::filesystem::path imagePath(const std::filesystem::path& folder, const std::string& name);
 /// Width and height of the first image that can be decoded. Returns nothing if there is none.
 std::optional<std::pair<std::uint32_t, std::uint32_t>> firstImageSize(

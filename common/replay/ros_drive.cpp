@@ -21,7 +21,7 @@ namespace {
 
 constexpr char kTransforms[] = "/tf_static";
 
-/// A message of a sensor.
+/// The times of a sensor's message.
 struct Arrival {
   TimePoint time;  ///< stamp of the header; corrected at the end (files/stamp_order.h)
   std::uint64_t log_ns = 0, place = 0;  ///< as in RosMessage
@@ -101,7 +101,7 @@ class RosImages {
   std::uint64_t next_ = 0;  ///< images with this number and above are not read yet
 };
 
-/// The information about one camera in the recording.
+/// The data of one camera in the recording.
 struct RosCamera {
   CameraTopics topics;
   std::vector<RosImage> images = {};

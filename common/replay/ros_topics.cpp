@@ -158,8 +158,8 @@ class Choice {
     return alone && all.size() == 1 ? all.front() : "";
   }
 
-  /// The second topic, if a driver publishes accelerometer and gyroscope separately. RealSense's
-  /// driver uses /camera/accel/sample and /camera/gyro/sample.
+  /// Returns the topic of the other sensor if a driver publishes accelerometer and gyroscope
+  /// separately. RealSense's driver uses /camera/accel/sample and /camera/gyro/sample.
   std::string otherHalfOf(const std::string& topic) const {
     for (const auto& [half, other] : {std::pair("accel", "gyro"), std::pair("gyro", "accel")}) {
       const auto at = topic.rfind(half);

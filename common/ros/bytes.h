@@ -23,7 +23,7 @@ template <class M>
 concept Struct = requires {
   M::kType;
 };
-/// A number, a Boolean value or a byte, aligned to its size.
+/// A number, a Boolean value or a byte. In a message it is aligned to its size.
 template <class X>
 concept Plain = std::is_arithmetic_v<X> || std::same_as<X, std::byte>;
 

@@ -32,9 +32,9 @@ std::array<double, 36> poseCovarianceOf(const ClassBelief& belief, const Eigen::
 TransformStamped transformOf(TimePoint time, const std::string& parent, const std::string& child,
                              const RigidTransform& T);
 
-/// map → odom and odom → base_link.
+/// The transforms map → odom and odom → base_link.
 TFMessage movingFrames(TimePoint time, const RigidTransform& T_MW, const RigidTransform& T_WB);
-/// base_link → imu_link, and for each camera base_link → link → optical.
+/// The transforms base_link → imu_link, and for each camera base_link → link → optical.
 TFMessage fixedFrames(const Calibration& calibration);
 
 }  // namespace perdure::ros

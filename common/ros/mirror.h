@@ -59,7 +59,7 @@ class Mirror {
   void onHealth(const Health& health);
 
  private:
-  /// `make()` creates the message; it is called only if a reader exists.
+  /// Publishes the message that `make()` creates, if the topic is latched or has readers.
   void say(const std::string& topic, auto make, bool latched = false);
   template <class M>
   Outlet outletOf(const std::string& topic, bool latched = false) const;

@@ -19,8 +19,9 @@ Detection3DArray detections3dOf(const Objects& objects);
 /// numbers if the model is not known. A score is the probability against clutter and the other
 /// classes; scores under 1 % are left out. Answers to predictions are excluded.
 Detection2DArray detections2dOf(const Detections& detections, const ModelInfo* model);
-/// The first marker deletes all earlier ones. Visible objects are solid, others have edges only;
-/// the edges of occluded objects are dashed. Namespaces are the classes.
+/// Markers of the confirmed objects. The first one deletes all earlier markers. Visible objects
+/// are solid, others have edges only; the edges of occluded objects are dashed. Namespaces are the
+/// classes.
 MarkerArray markersOf(const Objects& objects);
 /// The angular rate is that of `imu`, the latest sample. Its variance is that of the gyroscope's
 /// noise, because the bias adds little; it is kUnknownVariance if the noise or the sample is not

@@ -143,7 +143,8 @@ Result<cv::Mat> decodeDepthFile(const std::string& path) {
 }
 
 int usedBits(const std::string& path) {
-  if (!std::filesystem::is_regular_file(path)) return 16;  // OpenCV would print an error to stderr
+  if (!std::filesystem::is_regular_file(path))
+    return 16;  // otherwise OpenCV prints an error to stderr
   if (hasEightBits(headOf(path))) return 16;
   try {
     return bitsOf(cv::imread(path, kSixteenGrey));

@@ -16,7 +16,7 @@ class ClassAliases {
   /// if the file is missing, kConfiguration with file:line:col if it is invalid.
   static ClassAliases load(const std::filesystem::path& file);
 
-  /// The canonical, lower-case name. An unlisted name is only converted to lower case.
+  /// Returns the canonical, lower-case name. An unlisted name is only converted to lower case.
   std::string canonical(std::string_view name) const;
 
  private:

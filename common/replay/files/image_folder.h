@@ -11,7 +11,7 @@
 
 namespace perdure::replay {
 
-/// Returns true for the extensions of images.
+/// Returns whether a file has the extension of an image.
 bool isImageName(const std::filesystem::path& file);
 
 class ImageFolder {
@@ -29,7 +29,7 @@ class ImageFolder {
   /// Describes the other contents of a folder without images: broken links, or files with other
   /// extensions. Returns "" if it has neither.
   std::string others() const;
-  /// Number of images found by another name than the written one.
+  /// Number of images that find() found by another name than the one in the list.
   std::size_t foundOtherwise() const { return found_otherwise_; }
 
  private:

@@ -21,7 +21,7 @@ class Entries {
       std::string name(fields[0]);
       if (name.ends_with(':')) name.pop_back();
       const auto numbers = parseNumbers({fields.begin() + 1, fields.end()});
-      if (numbers) entries_[name] = *numbers;  // dates have no numbers
+      if (numbers) entries_[name] = *numbers;  // skips dates
     }
   }
 

@@ -24,8 +24,8 @@ struct KittiCalibration {
   CameraCalibration camera(const std::string& name) const;
 };
 
-/// Throws StartupError that names the file or entry and the fix: kUnavailable if it is missing,
-/// kData if it is invalid.
+/// Reads calib/SEQUENCE.txt. Throws StartupError that names the file or entry and the fix:
+/// kUnavailable if it is missing, kData if it is invalid.
 KittiCalibration readTrackingCalibration(const std::filesystem::path& file);
 /// Reads the three files in `folder` and throws like readTrackingCalibration().
 KittiCalibration readRawCalibration(const std::filesystem::path& folder);

@@ -27,7 +27,7 @@ bool isTime(const std::string& name) {
                         "timestamp_ns", "time_ns", "t_ns", "stamp_ns"});
 }
 
-/// Index of the name among t x y z qx qy qz qw. Returns nothing for other names.
+/// Returns the index of a name in t x y z qx qy qz qw. Returns nothing for other names.
 std::optional<std::size_t> columnOf(const std::string& name) {
   if (isTime(name)) return kTime;
   constexpr std::string_view kAxes = "xyzw";

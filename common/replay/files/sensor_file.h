@@ -22,7 +22,7 @@ class SensorFile {
   /// key is repeated. The other functions throw if a value is missing or invalid.
   explicit SensorFile(const std::filesystem::path& file);
 
-  /// A map that was made from a file; `name` is for messages.
+  /// Uses a map that was read from a file; messages contain `name`.
   SensorFile(std::string name, YAML::Node root) : name_(std::move(name)), root_(std::move(root)) {
     refuseKeysThatComeTwice();
   }
@@ -33,7 +33,7 @@ class SensorFile {
   std::vector<double> numbers(const char* key, std::size_t count) const;
   /// Returns the number under `key`. Requires a value of at least `low`.
   double number(const char* key, double low) const;
-  /// Returns `otherwise` if the key is missing.
+  /// As above, but returns `otherwise` if the key is missing.
   double number(const char* key, double low, double otherwise) const;
   std::string text(const char* key) const;
   /// Numbers of a list, of a list of rows, or of `data` below the key. Returns nothing if the key
@@ -48,7 +48,7 @@ class SensorFile {
   RigidTransform T_IB() const;
   const YAML::Node& root() const { return root_; }
   [[noreturn]] void wrong(const std::string& key, const std::string& what) const;
-  /// Adds a sentence for each key that was not read and is not known as irrelevant.
+  /// Adds a sentence for each key that was not read and is not known to be irrelevant.
   void noteUnknownKeys(std::vector<std::string>& notes,
                        std::initializer_list<std::string_view> of_no_use = {}) const;
 

@@ -21,7 +21,7 @@ std::string whyNoStamp(std::string_view text);
 
 /// a − b, limited to ±292 years, because a file may contain any stamps.
 Duration between(TimePoint a, TimePoint b);
-/// n · d, with the same limit.
+/// n · d, limited to ±292 years.
 Duration multipleOf(std::int64_t n, Duration d);
 
 }  // namespace perdure::replay

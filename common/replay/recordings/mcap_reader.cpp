@@ -353,7 +353,7 @@ Result<void> Reader::finish() {
   const bool lacks_index =
       !chunks.empty() && chunks.back().index_offsets.size() != last_index_.size();
   std::optional<ChunkIndex> last;
-  std::uint64_t end = whole_ <= kMagic.size() ? 0 : whole_;  // 0: rewrite all
+  std::uint64_t end = whole_ <= kMagic.size() ? 0 : whole_;  // 0: rewrite the whole file
   if (lacks_index) {
     last = chunks.back();
     last->index_length = 0;

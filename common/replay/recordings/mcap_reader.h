@@ -42,7 +42,7 @@ class Reader {
   std::uint64_t size() const { return file_.size(); }
   /// Number of bytes after the last complete chunk of an unfinished file.
   std::uint64_t cutBytes() const { return size() - whole_; }
-  /// Damage found by a scan.
+  /// The damaged chunks found by a scan or by check().
   const std::vector<Damage>& damage() const { return damage_; }
   /// Unpacks every chunk of the summary. damage() is then complete, and chunks() and statistics()
   /// describe the readable part.
@@ -92,7 +92,7 @@ class Reader {
 /// …".
 std::string sentenceOfDamage(const std::filesystem::path& file, const Reader& reader);
 
-/// A sentence that another recording follows the first one in `file`, with the fix.
+/// States that another recording follows the first one in `file`, with the fix.
 std::string sentenceOfFollowed(const std::filesystem::path& file);
 
 /// Visits the messages in a chunk's records. Returns false if they are damaged; earlier messages

@@ -51,7 +51,7 @@ struct Chunk {
 
   std::size_t bytes() const;  ///< approximate memory
 };
-/// Compresses by zstd at the fastest level.
+/// Compresses a draft with zstd at the fastest level.
 Chunk pack(const Draft& draft);
 
 /// Returns the exit status for a reason of Writer.
@@ -73,7 +73,7 @@ class Writer {
   Result<void> append(const Chunk& chunk, const Catalogue& catalogue);
   /// Writes the missing message indexes of a chunk in the file.
   Result<void> appendIndex(ChunkIndex& chunk, const Draft::Index& index);
-  /// Writes the summary; failures as in append().
+  /// Writes the summary. Fails as append() does.
   Result<void> finish();
   /// Returns after all written data are on disk.
   void sync() const;

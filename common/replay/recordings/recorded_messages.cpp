@@ -115,7 +115,7 @@ void RecordedMessages::openFile(const fs::path& path, Chunks look,
   start_ns_ = std::min(start_ns_, part.start_ns);
   end_ns_ = std::max(end_ns_, part.end_ns);
   parts.push_back(std::move(part));
-  reader->letGo();  // a folder may have more segments than a process may open
+  reader->letGo();  // a folder may have more segments than a process may open at once
   files_.push_back(*std::move(reader));
 }
 

@@ -61,8 +61,8 @@ class RecordedMessages {
   /// Notes for users about unpacked files and about files that were joined.
   std::vector<std::string> notes() const;
 
-  /// Restarts with these topics only (all if `wanted` is empty), without chunks that end before
-  /// `from_ns`.
+  /// Restarts with the topics for which `wanted` is true (all if it is empty), without chunks that
+  /// end before `from_ns`.
   void rewind(std::function<bool(const std::string& topic)> wanted = {}, std::uint64_t from_ns = 0);
   /// The next message by log time. Returns nothing at the end. Messages repeated by the recorder at
   /// the start of each segment (calibration, model) are returned once.

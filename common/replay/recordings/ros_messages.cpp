@@ -18,8 +18,8 @@ bool isRosEncoding(const std::string& schema_encoding) {
          schema_encoding == "ros1msg";
 }
 
-/// MCAP of ROS 1 and ROS 2. The schema identifies the version, because converters write arbitrary
-/// profiles.
+/// An MCAP file of ROS 1 or ROS 2. The schema identifies the version, because converters write
+/// arbitrary profiles.
 class McapSource : public RosSource {
  public:
   explicit McapSource(const fs::path& path) : messages_(path) {

@@ -40,7 +40,7 @@ class RosSource {
   /// Counts of damaged or truncated data so far.
   const ReasonCounts& reasons() const { return reasons_; }
   const std::string& lastProblem() const { return last_problem_; }
-  /// Restarts with these topics only, without data that ended before `from_ns`.
+  /// Restarts with the topics in `wanted` only, without data that end before `from_ns`.
   virtual void rewind(const std::set<std::string>& wanted, std::uint64_t from_ns) = 0;
   virtual std::optional<RosMessage> next() = 0;
   /// Notes for users about unpacked files and about files that were joined.
@@ -75,13 +75,13 @@ class RosMessages : public RosSource {
   explicit RosMessages(const std::filesystem::path& path);
 
   std::vector<std::string> notes() const override;
-  /// The counts of all files.
+  /// The sum of the counts of all files.
   ReasonCounts reasons() const;
   std::string lastProblem() const;
   void rewind(const std::set<std::string>& wanted, std::uint64_t from_ns = 0) override;
   std::optional<RosMessage> next() override;
 
-  /// Decodes a message as M. Reason: "malformed".
+  /// Decodes a message as M. Reason: "malformed" if its bytes end too early.
   template <class M>
   Result<M> valueOf(const RosMessage& message) const {
     return ros::messageOf<M>(message.data, topics_.at(message.topic).encoding, message.keeper);

@@ -45,7 +45,7 @@ std::vector<std::uint8_t> unpackedBz2(std::span<const std::uint8_t> packed, std:
   Unpacked unpacked(most);
   bz_stream stream{};
   if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) return {};
-  // The library does not write to its input; its interface lacks const.
+  // The library does not write to its input, although its interface has no const.
   stream.next_in = reinterpret_cast<char*>(const_cast<std::uint8_t*>(packed.data()));
   stream.avail_in = static_cast<unsigned int>(packed.size());
   int state = BZ_OK;

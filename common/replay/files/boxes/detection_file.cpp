@@ -128,7 +128,7 @@ void refuseCorners(const DetectionFileOptions& options, const std::vector<TextLi
       options.file.c_str(), second ? "2 to 5 with a score behind them" : "3 to 6");
 }
 
-/// Returns an empty string, or the error in the numbers of the row.
+/// Writes the numbers into `row`. Returns the error in them, or an empty string.
 std::string fillBox(const Box& box, double score, const DetectionFileOptions& options,
                     DetectionFile::Row& row) {
   if (box.x2 <= box.x1 || box.y2 <= box.y1) {
