@@ -111,7 +111,7 @@ struct InitiationParameters {
 struct TrackParameters {
   double confirm = 0.95;          ///< existence that confirms a track
   std::int64_t confirm_hits = 3;  ///< detections that a confirmation requires
-  double confirm_sigma_m = 2.0;   ///< largest deviation relative to the body; withdrawn at 1.5 times it
+  double confirm_sigma_m = 2.0;   ///< largest deviation relative to the body; lost at 1.5 times it
   double certain = 0.99;          ///< upper limit of existence, so that misses count
   double certain_again = 0.999;   ///< the same after a detection on another visit
   double delete_below = 0.02;     ///< existence below which a track is deleted
@@ -136,11 +136,11 @@ struct SmoothingParameters {
   std::int64_t least = 5;       ///< with fewer keyframes the state of the EKF stays
   double fresh = 0.3;           ///< share of new keyframes that requires another fit
   std::int64_t per_frame = 2;   ///< tracks that are fitted in one frame
-  std::int64_t patience = 3;   ///< largest factor by which fits with little effect become rarer
-  double new_view = 0.12;      ///< least view change between keyframes, in bias lengths
-  double place = 0.2;          ///< largest position deviation of a fit, relative to the distance
-  double contradicted = 0.2;   ///< share of keyframes that may contradict a fit
-  double least_weight = 0.02;  ///< of a hypothesis that is fitted
+  std::int64_t patience = 3;    ///< largest factor by which fits with little effect become rarer
+  double new_view = 0.12;       ///< least view change between keyframes, in bias lengths
+  double place = 0.2;           ///< largest position deviation of a fit, relative to the distance
+  double contradicted = 0.2;    ///< share of keyframes that may contradict a fit
+  double least_weight = 0.02;   ///< of a hypothesis that is fitted
 };
 
 struct MemoryParameters {

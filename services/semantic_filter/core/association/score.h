@@ -50,7 +50,7 @@ struct HypothesisScore {
   std::optional<PredictedBox> predicted;
   double detection_probability = 0.0;  ///< v P_D: probability that the network reports the object
   double undetected = 0.0;             ///< v (1 - P_D): visible, but not reported
-  double no_box = 1.0;  ///< A without a box: 1 - v P_D, as changed by a top-down answer
+  double no_box = 1.0;              ///< A without a box: 1 - v P_D, as changed by a top-down answer
   ScratchVector<BoxMatch> matches;  ///< one for each of TrackScore::boxes
   double expected = 0.0;            ///< v P_D without the detection rate of earlier visits
   /// number of earlier observations with correlated errors, given this hypothesis

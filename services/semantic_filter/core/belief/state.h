@@ -38,7 +38,7 @@ struct Hypothesis {
   CrossPose C = CrossPose::Zero();
   double heading_log_odds = 0.0;  ///< log-odds that the yaw is not turned by 180°
   double speed_prior_ratio =
-      1.0;  ///< moving: ratio of the prior of its speed to the initial Gaussian
+      1.0;                      ///< moving: ratio of the prior of its speed to the initial Gaussian
   bool modes_searched = false;  ///< a mode search of yaw has weighed it by all keyframes
   GroundContact ground_contact = {};
 

@@ -83,7 +83,7 @@ struct SizeEvidence {
 /// Causes of a P_D of this track that differs from that of its class.
 struct Detectability {
   double unmapped_occluder = 0.0;  ///< probability that something not on the map hides the object
-  double hard_to_detect = 0.0;  ///< that nothing hides it, but it is seldom detected from here
+  double hard_to_detect = 0.0;     ///< that nothing hides it, but it is seldom detected from here
   Directions seen_from = Directions::Zero();  ///< in W, on earlier visits
   Directions seen_now = Directions::Zero();   ///< in W, on this visit
   SizeEvidence missed;  ///< of the misses since the last detection; the object may be gone
