@@ -1,4 +1,4 @@
-// Visits the message descriptions in common/wire, for the conversions and for the schema.
+// Visits the message descriptions in common/types, for the conversions and for the schema.
 #pragma once
 
 #include <set>
