@@ -1,4 +1,4 @@
-// Converts messages to and from Python instances by the descriptions in common/types. Needs the GIL.
+// Converts messages to and from Python instances as described in common/types. Needs the GIL.
 #pragma once
 
 #include <pybind11/pybind11.h>
