@@ -21,9 +21,8 @@ using inference::Candidate;
 
 constexpr double kSame = 0.5;       // least IoU of a box and the object that it matches
 constexpr double kOnIgnored = 0.7;  // least share of a box inside an ignored one
-constexpr double kApart =
-    0.3;  // a place is empty if its IoU with every true box is below this
-constexpr double kClear = 0.8;  // least probability of a box whose sides are measured
+constexpr double kApart = 0.3;      // a place is empty if its IoU with every true box is below this
+constexpr double kClear = 0.8;      // least probability of a box whose sides are measured
 constexpr double kLarge_px = 40.0, kFull_px = 12.0;  // pixels of the input
 constexpr std::size_t kLeastInsets = 20, kLeastSides = 40;
 constexpr int kRounds = 3;

@@ -38,7 +38,7 @@ struct FrameInput {
   std::optional<double> motion_px;  ///< median image motion over the last frames
   std::optional<SpeedReading> speed;
   std::optional<double> most_motion_px = {};  ///< 0.8 quantile of the points' image motion
-  double still_share = 0.0;  ///< share of points that have not moved for a second
+  double still_share = 0.0;                   ///< share of points that have not moved for a second
 };
 
 struct FrameEstimate {
