@@ -25,7 +25,7 @@ class BoundedQueue {
     check(capacity > 0, "a queue holds at least one element");
   }
 
-  /// Returns false if the queue is closed.
+  /// Appends the value. Returns false if the queue is closed.
   bool push(T value) {
     std::unique_lock lock(mutex_);
     if (policy_ == Overflow::kBlock) {
@@ -48,7 +48,7 @@ class BoundedQueue {
     return takeFront();
   }
 
-  /// Waits for an element, at most for `longest`.
+  /// Waits for an element, at most for `longest`. Returns nothing if there is still none.
   std::optional<T> popWithin(std::chrono::nanoseconds longest) {
     std::unique_lock lock(mutex_);
     not_empty_.wait_for(lock, longest, [&] { return closed_ || !queue_.empty(); });

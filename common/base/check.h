@@ -11,15 +11,15 @@ namespace perdure {
 /// Prints "file:line: function: must hold: <what>" to stderr and aborts.
 [[noreturn]] void failCheck(std::string_view what, const std::source_location& where);
 
-/// Aborts with `what` must hold and the source location unless `condition` is true. Never use it on
-/// external input.
+/// If `condition` is false, calls failCheck(), which prints `what` and the source location and
+/// aborts. Do not use it for external input.
 inline void check(bool condition, std::string_view what,
                   const std::source_location& where = std::source_location::current()) {
   if (!condition) [[unlikely]]
     failCheck(what, where);
 }
 
-/// The name of an enumerator of an enumeration without gaps from 0.
+/// Returns the name of an enumerator. The enumerators must have the values 0 to N − 1.
 template <std::size_t N>
 const char* nameAt(const std::array<const char*, N>& names, auto enumerator) {
   const auto position = static_cast<std::size_t>(enumerator);

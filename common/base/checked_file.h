@@ -19,7 +19,8 @@ class CheckedFile {
   ~CheckedFile();
 
   std::ostream& stream() { return stream_; }
-  /// If a write failed, removes the temporary file and throws StartupError(kInputOutput).
+  /// Completes the file. If a write failed, removes the temporary file and throws
+  /// StartupError(kInputOutput).
   void close();
 
  private:
@@ -34,7 +35,8 @@ void writeChecked(const std::filesystem::path& file, std::string_view content);
 /// or an earlier write failed.
 void flushChecked(std::ostream& stream, const std::filesystem::path& file);
 
-/// Throws StartupError(kInputOutput): "FILE: `why` (or the system's reason); free space, …".
+/// Throws StartupError(kInputOutput) with the message "FILE: `why`; free space, …". If `why` is
+/// empty, the reason is that of errno.
 [[noreturn]] void throwUnwritten(const std::filesystem::path& file, std::string_view why = {});
 
 }  // namespace perdure

@@ -3,9 +3,9 @@
 
 namespace perdure {
 
-/// Makes the process retain up to 64 MB of freed memory. By default glibc returns it and requests
-/// it again within each frame, at one page fault per 4 kB. Call it in main(). No effect without
-/// glibc.
+/// Makes the process retain up to 64 MB of freed memory. By default glibc returns this memory and
+/// requests it again within each frame, at one page fault per 4 kB. Call this function in main().
+/// It has no effect without glibc.
 void keepFreedMemory();
 
 }  // namespace perdure

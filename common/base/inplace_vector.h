@@ -16,7 +16,7 @@ class InplaceVector {
 
   InplaceVector() = default;
 
-  /// Checked: exceeding N elements is a programming error.
+  /// Appends a copy of `value`. Aborts if the vector already has N elements.
   void push_back(const T& value) {
     check(size_ < N, "an InplaceVector holds no more than its capacity");
     items_[size_++] = value;

@@ -22,7 +22,7 @@ struct Free {
   }
 };
 
-/// Pages that were never used need no memory.
+/// The memory of a thread's scopes. The system provides its pages only when they are first used.
 struct Block {
   std::unique_ptr<std::byte, Free> memory;
   std::size_t used = 0;

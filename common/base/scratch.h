@@ -1,6 +1,6 @@
-// Memory for data that an estimator needs within one step only. Containers take it from a block of
-// the thread, which is freed as a whole at the end of the step. In a steady state the heap is not
-// used.
+// Memory for data that an estimator needs within one step only. Containers take memory from a block
+// that belongs to the thread and is freed as a whole at the end of the step. After the first step,
+// the heap is not used.
 //
 //   void step() {
 //     const ScratchScope scope;       // frees all memory taken from here on at its end
@@ -34,7 +34,7 @@ class ScratchScope {
 
 namespace scratch {
 
-/// Memory aligned for every scalar and for vectors of 32 bytes.
+/// Returns memory that is aligned for every scalar and for vectors of 32 bytes.
 void* take(std::size_t bytes);
 /// Frees memory taken from the heap. Other memory is freed at the end of its scope.
 void giveBack(void* memory);

@@ -17,7 +17,7 @@ class SharedBytes {
       : keeper_(bytes), bytes_(bytes ? std::span(*bytes) : std::span<const std::uint8_t>()) {}
   SharedBytes(std::shared_ptr<std::vector<std::uint8_t>> bytes)
       : SharedBytes(std::shared_ptr<const std::vector<std::uint8_t>>(std::move(bytes))) {}
-  /// `keeper` owns the memory that `bytes` refers to.
+  /// `keeper` owns the memory to which `bytes` refers.
   SharedBytes(std::shared_ptr<const void> keeper, std::span<const std::uint8_t> bytes)
       : keeper_(std::move(keeper)), bytes_(bytes) {}
 

@@ -1,7 +1,7 @@
-// A vector whose copies share their elements until one of them is modified (copy on write). Data
-// stored for every frame therefore cost only the changed parts. Access through a non-const vector
-// counts as modification; use read() for reading. Later vectors of the same thread reuse the memory
-// of released elements.
+// A vector whose copies share their elements until one copy is modified (copy on write). If such
+// vectors are stored for every frame, only the modified ones need memory. Access through a
+// non-const vector counts as modification; use read() for reading. Later vectors of the same thread
+// reuse the memory of released elements.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 
 namespace perdure {
 
-/// Copies must not be written from several threads at once.
+/// Copies that share elements must not be modified by several threads at the same time.
 template <class T>
 class SharedVector {
  public:
@@ -44,15 +44,15 @@ class SharedVector {
     static const Vector kEmpty;
     return block_ ? block_->items : kEmpty;
   }
-  /// Gives write access to unshared elements, with capacity for `room` elements. Making a copy
-  /// invalidates references to elements.
+  /// Returns the elements for modification. If they are shared, they are copied first, which
+  /// invalidates references to elements. `room` is the capacity of a new or copied vector.
   Vector& write(std::size_t room = 0) {
     if (!block_) {
       block_ = takeBlock();
       block_->items.reserve(room);
     } else if (block_->owners.load(std::memory_order_acquire) > 1) {
       Block* own = takeBlock();
-      // Reserve room to grow. Blocks are reused, so that they soon have enough capacity.
+      // Reserves room to grow. Blocks are reused, so they soon have enough capacity.
       own->items.reserve(std::max(room, std::bit_ceil(block_->items.size() + 1)));
       own->items = block_->items;
       leave();
@@ -87,7 +87,8 @@ class SharedVector {
   using Spare = std::vector<std::unique_ptr<Block>>;
   static constexpr std::size_t kMostSpare = 512;
 
-  /// The spare blocks of the thread; null if the thread is ending and they are destroyed.
+  /// Returns the spare blocks of the thread; null if they are already destroyed at the end of the
+  /// thread.
   static Spare* spare() {
     struct Kept {
       Spare blocks;

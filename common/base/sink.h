@@ -1,4 +1,5 @@
-// Destination of a node's results: DDS in a service; another node or a file within one process.
+// The destination of a node's results: DDS in a service, or another node or a file in a program
+// that runs several nodes.
 #pragma once
 
 #include <functional>

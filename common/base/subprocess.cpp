@@ -36,7 +36,8 @@ struct Pipe {
   }
 };
 
-/// "NAME=value" strings: the environment of this process with the values of `more`.
+/// Returns the environment of this process, with the variables of `more` added or replaced, as
+/// "NAME=value" strings.
 std::vector<std::string> environmentWith(const std::map<std::string, std::string>& more) {
   std::vector<std::string> words;
   for (char** entry = environ; *entry != nullptr; ++entry) {
@@ -54,12 +55,12 @@ std::vector<char*> pointersTo(std::vector<std::string>& words) {
   return pointers;
 }
 
-/// Data of the child, prepared before fork, because only system calls are safe after it.
+/// Data of the child. They are prepared before fork(), because after it only system calls are safe.
 struct Start {
   const ProgramOptions& options;
   std::string program;
   int output;  ///< -1: the output of this process
-  int report;  ///< pipe for errno if the program cannot be run
+  int report;  ///< pipe that receives errno if the program cannot be run
   std::vector<std::string> words = options.command,
                            variables = environmentWith(options.environment);
   std::vector<char*> arguments = pointersTo(words), environment = pointersTo(variables);
@@ -90,7 +91,7 @@ struct Start {
   _exit(127);
 }
 
-/// Returns the id of the child process after its execve has succeeded.
+/// Starts the program and returns its process id. Throws StartupError if it cannot be started.
 pid_t launch(const ProgramOptions& options, int output) {
   check(!options.command.empty(), "a command names its program");
   const auto program = findProgram(options.command[0]);
@@ -114,7 +115,7 @@ int statusOf(int wait_status) {
   return WIFEXITED(wait_status) ? WEXITSTATUS(wait_status) : 128 + WTERMSIG(wait_status);
 }
 
-/// Reads until the other end is closed. Returns false if that takes longer than `end`.
+/// Reads until the other end of `fd` is closed. Returns false if it is still open at `end`.
 bool readAll(int fd, std::string& text, Clock::time_point end) {
   char buffer[4096];
   for (;;) {
@@ -202,7 +203,7 @@ ProgramAnswer runProgram(const ProgramOptions& options, std::chrono::millisecond
   ProgramAnswer answer;
   answer.too_late = !readAll(output.read_end.get(), answer.output, end);
   int status = 0;
-  // The output is closed, but the process may still run for a while.
+  // The process may run on after it has closed its output.
   while (!answer.too_late && waitpid(pid, &status, WNOHANG) == 0) {
     answer.too_late = Clock::now() >= end;
     std::this_thread::sleep_for(kStep);

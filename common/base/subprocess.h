@@ -22,14 +22,15 @@ struct ProgramOptions {
   bool ends_with_parent = false;   ///< the program receives SIGTERM if this process ends first
 };
 
-/// The path of the program: `name` itself if it has a '/', else the first match in PATH.
+/// Returns the path of the program: `name` itself if it contains a '/', otherwise the first match
+/// in PATH. Returns nothing if PATH has no match.
 std::optional<std::filesystem::path> findProgram(const std::string& name);
 
-/// The process is killed and waited for at the end of the scope, unless leaveAlone() was called.
+/// The destructor kills the process and waits for its end, unless leaveAlone() was called.
 class Subprocess {
  public:
-  /// Throws StartupError(kUnavailable), "PROGRAM cannot be started: why", also if the log cannot be
-  /// written.
+  /// Throws StartupError(kUnavailable) with "PROGRAM cannot be started: REASON" if the program
+  /// cannot be run or the log cannot be written.
   explicit Subprocess(const ProgramOptions& options);
   ~Subprocess();
   Subprocess(const Subprocess&) = delete;
@@ -37,8 +38,8 @@ class Subprocess {
 
   pid_t pid() const { return pid_; }
   void signal(int number) const;
-  /// The exit status of the process, or 128 + the signal that ended it. Returns nothing while it
-  /// runs.
+  /// Returns the exit status of the process, or 128 + the signal that ended it. Returns nothing
+  /// while the process runs.
   std::optional<int> ended();
   int waitForEnd();
   /// Waits for at most `longest` and returns the status as ended() does.

@@ -23,12 +23,13 @@ constexpr TimePoint fromNanoseconds(std::int64_t ns) { return TimePoint(Duration
 constexpr std::int64_t toNanoseconds(TimePoint t) { return t.time_since_epoch().count(); }
 constexpr double toSeconds(Duration d) { return static_cast<double>(d.count()) * 1e-9; }
 constexpr double toSeconds(TimePoint t) { return toSeconds(t.time_since_epoch()); }
-/// Rounds to the nearest nanosecond; |s| < 9e9 s.
+/// Converts seconds, |s| < 9e9, to a duration, rounded to the nearest nanosecond.
 constexpr Duration durationFromSeconds(double s) {
   return Duration(static_cast<std::int64_t>(s * 1e9 + (s < 0 ? -0.5 : 0.5)));
 }
 
-/// Nanoseconds within 146 years of the clock's zero: the difference of any two fits into 64 bits.
+/// Returns true if the time is within 146 years of the clock's zero. The difference of two such
+/// times fits into 64 bits.
 constexpr bool isTime(std::int64_t ns) {
   constexpr std::int64_t kLast = std::int64_t{1} << 62;
   return ns > -kLast && ns < kLast;

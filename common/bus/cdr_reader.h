@@ -10,8 +10,8 @@
 namespace perdure::bus {
 
 struct CdrMessage {
-  std::span<const std::uint8_t> bytes;  ///< common/wire/cdr.h; valid during the call
-  std::int64_t written_ns = 0;          ///< system clock of the writer
+  std::span<const std::uint8_t> bytes;  ///< as in common/wire/cdr.h; valid during the call
+  std::int64_t written_ns = 0;          ///< time of writing on the writer's system clock
 };
 
 class CdrReader : public RawReader {

@@ -16,12 +16,13 @@ struct QosDeleter {
 };
 using QosPtr = std::unique_ptr<dds_qos_t, QosDeleter>;
 
-/// The entity of a handle that DDS returned. Throws StartupError if it is an error.
+/// Returns the entity of a handle. Throws StartupError if the handle is an error code of DDS;
+/// `what` names the entity in the message.
 Entity created(dds_entity_t handle, const std::string& what);
 
-/// QoS of a writer. `through`: whether it may use shared memory. Cyclone excludes endpoints that
-/// ignore their own participant from shared memory. Exclusive writers are excluded by their
-/// liveliness, and their readers may need messages of their own participant.
+/// Returns the QoS of a writer. Unless `through`, the writer ignores its own participant, because
+/// Cyclone then does not use shared memory. Exclusive writers do not ignore it: their liveliness
+/// already excludes shared memory, and their own process may read the topic.
 QosPtr writerQos(const Qos& qos, const WriterOptions& options, const SharedMemory& memory,
                  bool through);
 

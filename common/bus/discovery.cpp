@@ -45,8 +45,8 @@ Entity builtinReader(const Participant& participant, dds_entity_t topic) {
   return Entity(dds_create_reader(participant.handle(), topic, nullptr, nullptr));
 }
 
-/// The topic without which the output of a service is missing; "frame/" stands for any camera.
-/// Empty: no other program can replace the service.
+/// Returns the topic that a replacement of the service must write; "frame/" stands for any camera.
+/// Returns "" if no other program can replace the service.
 std::string_view essentialTopicOf(std::string_view service) {
   if (service == "capture") return "frame/";
   if (service == "vio") return "odometry";
@@ -58,7 +58,7 @@ std::string_view essentialTopicOf(std::string_view service) {
 
 bool standsIn(std::string_view service, std::string_view topic, std::string_view process) {
   const std::string_view essential = essentialTopicOf(service);
-  // services do not replace each other
+  // Perdure's services do not replace each other.
   constexpr std::string_view kOurs[] = {"capture", "vio", "inference", "semantic_filter",
                                         "map_store"};
   if (essential.empty() || process.empty()) return false;

@@ -13,7 +13,7 @@ namespace perdure::bus {
 struct RemoteEndpoint {
   std::string wire_name;  ///< "perdure/ego/imu"
   std::string type_name;
-  std::string process;  ///< name of its participant, if it has one
+  std::string process;  ///< name of its participant; empty if it has none
   bool writer = false;
 };
 
@@ -24,16 +24,18 @@ bool standsIn(std::string_view service, std::string_view topic, std::string_view
 struct StandIn {
   std::string process, topic;
 };
-/// The process that replaces `service`, if any. Topics in the result are named without `prefix`.
+/// Returns the process that replaces `service`, if any, and the topic by which it was found,
+/// without `prefix`.
 std::optional<StandIn> standInFor(std::string_view service,
                                   const std::vector<RemoteEndpoint>& endpoints,
                                   const std::string& prefix);
 
-/// Observes discovery. It takes about a second until a running system is fully discovered.
+/// Lists the participants and endpoints that DDS has discovered. The discovery of a running system
+/// takes about a second.
 class Discovery {
  public:
   explicit Discovery(const Participant& participant);
-  /// Names of the participants, including this process; "" for one without a name.
+  /// Returns the names of the participants, including this one; "" for one without a name.
   std::vector<std::string> participants();
   std::vector<RemoteEndpoint> endpoints();
 

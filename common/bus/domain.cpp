@@ -17,11 +17,11 @@
 namespace perdure::bus {
 namespace {
 
-/// Highest index of a participant without multicast. It limits the number of processes on one host.
+/// The highest index of a participant. It limits the number of processes on one host.
 constexpr int kMaxParticipantIndex = 60;
 constexpr double kMostSharedMemory = 256;  // MB; common/types/description.h allows no larger images
 
-/// The ids of Cyclone's domains are per process, those on the network are not.
+/// Cyclone's id, in this process only, of the domain for third-party programs.
 constexpr std::int64_t kForeignId = 1000;
 
 std::string indexXml() {
@@ -30,7 +30,7 @@ std::string indexXml() {
 }
 
 std::string loopbackXml() {
-  // Unicast only. Fragments and buffers are large, because no data can be lost between hosts.
+  // Loopback uses unicast only. Fragments are large, because loopback loses no data.
   return "<General><Interfaces><NetworkInterface name=\"lo\"/></Interfaces>"
          "<AllowMulticast>false</AllowMulticast>"
          "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize></General>"
@@ -38,12 +38,12 @@ std::string loopbackXml() {
          indexXml() + "<Peers><Peer Address=\"127.0.0.1\"/></Peers></Discovery>";
 }
 
-/// Data lost between hosts are requested and sent again within a frame's period. Cyclone's default
-/// of 100 ms would double the age of an image at each lost fragment.
+/// Requests and resends lost data within a frame's period. With Cyclone's default of 100 ms, each
+/// lost fragment would double the age of an image.
 constexpr char kResendSoon[] =
     "<NackDelay>5ms</NackDelay><HeartbeatInterval>20ms</HeartbeatInterval>";
 
-/// Hosts that multicast does not reach, and processes of this host, are addressed by unicast.
+/// Returns the unicast addresses of this host and of `peers`; "" without peers.
 std::string peersXml(const std::string& interface, const std::vector<std::string>& peers) {
   if (peers.empty()) return {};
   std::string xml = "<Peers><Peer Address=\"" + addressOf(interface) + "\"/>";
@@ -51,10 +51,10 @@ std::string peersXml(const std::string& interface, const std::vector<std::string
   return xml + "</Peers>";
 }
 
-/// A host is found again soon after an absence longer than the lease (10 s), not in half a minute.
+/// After an absence longer than the lease (10 s), a host is found within 2 s, not within 30 s.
 constexpr char kMeetSoon[] = "<SPDPInterval>2s</SPDPInterval>";
 
-/// Third-party programs get large messages by unicast, as Fast DDS sends them.
+/// Third-party programs (`foreign`) use multicast for discovery only, like Fast DDS.
 std::string networkXml(const Options& options, bool foreign) {
   std::string xml = "<General><Interfaces>";
   std::istringstream interfaces(options.interface);
@@ -93,7 +93,7 @@ std::string identityFolder(const Options& options, const std::string& process) {
          (options.identity.empty() ? identityOf(process) : options.identity);
 }
 
-/// CYCLONEDDS_URI, if set and not empty.
+/// Returns CYCLONEDDS_URI, or nullptr if it is not set or empty.
 const char* givenConfiguration() {
   const char* uri = std::getenv("CYCLONEDDS_URI");
   return uri != nullptr && *uri != '\0' ? uri : nullptr;
@@ -103,7 +103,8 @@ bool isPlainName(const std::string& name) {
   return !name.empty() && name.find_first_of("<>&\"' \t\n") == std::string::npos;
 }
 
-/// `group`: of the keys, "bus" or "ros".
+/// Throws StartupError if an interface or a peer is not a name. `group`: prefix of the keys in the
+/// message, "bus" or "ros".
 void requireNames(const std::string& group, const Options& options) {
   if (!isPlainName(options.interface)) {
     throw StartupError(ExitCode::kConfiguration, group + ".interface: \"" + options.interface +
@@ -116,7 +117,7 @@ void requireNames(const std::string& group, const Options& options) {
   }
 }
 
-/// The entity is deleted before its parent.
+/// Returns an entity that keeps its parent alive, and is deleted before it.
 std::shared_ptr<const Entity> keptBy(std::shared_ptr<const Entity> parent, Entity entity) {
   struct Kept {
     std::shared_ptr<const Entity> parent;  // destroyed last
@@ -126,7 +127,8 @@ std::shared_ptr<const Entity> keptBy(std::shared_ptr<const Entity> parent, Entit
   return {kept, &kept->entity};
 }
 
-/// Data in shared memory are neither encrypted nor restricted to some participants.
+/// Throws StartupError if both security and shared memory are on: data in shared memory are neither
+/// encrypted nor restricted to some participants.
 void refuseOpenMemory(const Options& options) {
   if (options.security.empty() || options.shared_memory_mb == 0) return;
   throw StartupError(ExitCode::kConfiguration,
@@ -140,7 +142,7 @@ SharedMemory findSharedMemory(const Options& options) {
   if (givenConfiguration() != nullptr) {
     return {{}, "CYCLONEDDS_URI, which is set, goes before bus.shared_memory_mb"};
   }
-  constexpr std::size_t kAround = 1024;  // size of a message without its pixels, at most
+  constexpr std::size_t kAround = 1024;  // bytes; largest size of a message without pixels
   const auto locator = sharedMemoryLocator();
   if (!locator) return {{}, locator.error().detail};
   return {*locator, {}, (static_cast<std::size_t>(options.shared_memory_mb) << 20) - kAround};
@@ -165,8 +167,8 @@ std::int32_t createDomain(const Options& options, const std::string& locator) {
           (given != nullptr ? ", and CYCLONEDDS_URI, which is set, goes before it" : ""));
 }
 
-/// Assigns the identity in `folder` to a participant. Its properties take precedence over the
-/// security settings in CYCLONEDDS_URI.
+/// Assigns the identity in `folder` to a participant. The properties of the identity take
+/// precedence over the security settings in CYCLONEDDS_URI.
 Identity secure(dds_qos_t& qos, const std::string& folder) {
   const auto identity = readIdentity(folder);
   if (!identity) {
@@ -255,7 +257,7 @@ Options withEnvironment(Options options) {
 }
 
 std::string configurationXml(const Options& options, const std::string& locator) {
-  // The trace is passed to securityLog() and not written to a file.
+  // securityLog() receives the trace, so it is not written to a file.
   return domainXml(options, locator,
                    options.security.empty() ? ""
                                             : "<Tracing><Category>discovery</Category>"
@@ -282,7 +284,7 @@ Domain::Domain(Options options, std::int64_t id, Entity domain)
 Domain Domain::foreign(Options options) {
   options.security.clear();
   if (givenConfiguration() != nullptr) {
-    // Cyclone itself opens this domain, for its participant.
+    // Cyclone itself opens the domain for the first participant.
     options.interface = "CYCLONEDDS_URI";
     return {options, options.domain, Entity()};
   }

@@ -25,34 +25,36 @@ class Entity {
   std::int32_t handle_;
 };
 
-inline constexpr int kMaxDomain = 230;  ///< the port numbers of DDS end there
+inline constexpr int kMaxDomain = 230;  ///< for higher domains DDS has no port numbers
 
 struct Options {
   std::string interface = "lo";
   std::int64_t domain = 0;
   std::string vehicle = "ego";
-  std::int64_t shared_memory_mb = 0;  ///< largest image sent through shared memory; 0: not used
+  std::int64_t shared_memory_mb = 0;  ///< MB, largest image in shared memory; 0: none
   std::string security = {};          ///< folder of the identities; empty: no security
   std::string identity = {};          ///< a folder in `security`; empty: by process name
   /// Addresses of the other hosts; empty: hosts are found by multicast.
   std::vector<std::string> peers = {};
 };
 /// Describes bus.interface, bus.peers, bus.domain, bus.vehicle, bus.shared_memory_mb, bus.security
-/// and bus.identity. The variable PERDURE_DOMAIN takes precedence over bus.domain.
+/// and bus.identity.
 void describe(Options& options, config::Fields& fields);
 
-/// The options shared by all processes of a host. They are read from the file that PERDURE_BUS
-/// names (empty: none), else from bus.yaml in `folder` if it exists. Errors in the file are
-/// appended to `problems`.
+/// Returns the options shared by all processes of a host, from the file that PERDURE_BUS names. If
+/// PERDURE_BUS is not set, reads bus.yaml in `folder`, if it exists; if it is empty, reads no file.
+/// Errors in the file are appended to `problems`.
 Options commonOptions(const std::string& folder, std::vector<config::Problem>& problems);
 
-/// The options after applying PERDURE_DOMAIN. Throws StartupError (78) if it is no domain.
+/// Returns the options with the domain of PERDURE_DOMAIN, if that variable is set. Throws
+/// StartupError (78) if its value is not a domain.
 Options withEnvironment(Options options);
 
-/// The options in the form of CYCLONEDDS_URI. `locator` is that of shared memory; if it is empty,
-/// shared memory is off. Security is not included, because the participant sets it.
+/// Returns the options as a value of CYCLONEDDS_URI. `locator`: the locator of shared memory;
+/// empty: off. The identity is not included, because the participant sets it.
 std::string configurationXml(const Options& options, const std::string& locator = {});
-/// The configuration for third-party programs, with the identity if the options name one.
+/// Returns the options as a value of CYCLONEDDS_URI for third-party programs, including the
+/// identity if the options name one.
 std::string foreignXml(const Options& options);
 
 /// The state of shared memory at the start.
@@ -63,22 +65,23 @@ struct SharedMemory {
   bool on() const { return !locator.empty(); }
 };
 
-/// One per process, and a second one for third-party programs. If CYCLONEDDS_URI is set, it
-/// replaces bus.interface and bus.shared_memory_mb, as is usual for Cyclone.
+/// The DDS domain. A process has one for the bus, and may have a second one for third-party
+/// programs. CYCLONEDDS_URI, if set, replaces bus.interface, bus.peers and bus.shared_memory_mb.
 class Domain {
  public:
   /// Throws StartupError (69) if DDS cannot use the interface.
   explicit Domain(const Options& options);
-  /// A second domain in the same process, for third-party programs; its number may be the bus's.
-  /// Interfaces are separated by commas; empty: all that are up. Shared memory and security are
-  /// off. Throws StartupError (69, 78).
+  /// Returns a second domain in the same process, for third-party programs. It may have the number
+  /// of the bus. Interfaces are separated by commas; empty: all that are up. Shared memory and
+  /// security are off. Throws StartupError: 69 if DDS cannot use an interface, 78 if a name is
+  /// invalid.
   static Domain foreign(Options options);
   /// Returns this domain for participants of another vehicle or with another identity.
   Domain as(std::string vehicle, std::string security, std::string identity) const;
   const Options& options() const { return options_; }
   const SharedMemory& sharedMemory() const { return shared_memory_; }
-  /// The present state of shared memory as text, with a fix if needed. The result is empty if
-  /// shared memory was not requested.
+  /// Returns the present state of shared memory as text, with a fix if needed; empty if shared
+  /// memory was not requested.
   std::string sharedMemoryText() const;
   /// Returns whether a process that starts now can share memory with this process.
   bool sharesMemory() const;
@@ -91,7 +94,7 @@ class Domain {
 
   Options options_;
   SharedMemory shared_memory_;
-  std::int64_t id_;  ///< number of the domain in this process
+  std::int64_t id_;  ///< Cyclone's id of the domain in this process
   std::shared_ptr<const Entity> domain_;
 };
 
@@ -102,11 +105,11 @@ class Participant {
   Participant(const Domain& domain, const std::string& process);
   std::int32_t handle() const { return participant_->handle(); }
   const SharedMemory& sharedMemory() const { return shared_memory_; }
-  /// An entity of this participant. It keeps the participant alive.
+  /// Returns `entity` as a shared pointer that keeps this participant alive.
   std::shared_ptr<const Entity> keep(Entity entity) const;
   /// "imu" → "perdure/ego/imu".
   std::string wireName(const std::string& topic) const { return prefix_ + topic; }
-  /// The identity of the participant. Returns nothing if bus.security is off.
+  /// Returns the identity of this participant, or nothing if bus.security is off.
   const std::optional<Identity>& identity() const { return identity_; }
 
  private:

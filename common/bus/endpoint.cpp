@@ -20,7 +20,7 @@ dds_duration_t duration(double seconds) {
   return seconds > 0 ? static_cast<dds_duration_t>(seconds * 1e9) : DDS_INFINITY;
 }
 
-/// QoS of endpoints that match each other only; manual liveliness excludes shared memory.
+/// Returns a QoS whose endpoints match only each other. Manual liveliness excludes shared memory.
 QosPtr privateQos() {
   QosPtr qos(dds_create_qos());
   dds_qset_partition1(qos.get(), "perdure/size");
@@ -34,8 +34,8 @@ std::size_t sizeOf(const ddsi_sertype*, const void* sample) {
 }
 
 /// Cyclone 0.10.2 finds the size of a message in shared memory by serialising it with its pixels,
-/// and discards the result. After this call the type of this topic of frames computes the size
-/// instead. It has no effect if Cyclone's interface differs from the expected one.
+/// and discards the result. This call makes the topic's type compute the size instead. `topic` must
+/// be a topic of frames. The call has no effect if Cyclone behaves differently than expected.
 void tellSizesOfFrames(std::int32_t participant, std::int32_t topic) {
   const QosPtr qos = privateQos();
   const Entity reader(dds_create_reader(participant, topic, qos.get(), nullptr));
@@ -45,7 +45,8 @@ void tellSizesOfFrames(std::int32_t participant, std::int32_t topic) {
   sample.camera = none;
   ddsi_serdata* data = nullptr;
   dds_sample_info_t info;
-  // A message within the process arrives before the write ends, and gives access to its type.
+  // A message to a reader of the same process arrives before dds_write() returns. The message
+  // refers to the type.
   if (dds_write(writer.handle(), &sample) != DDS_RETCODE_OK ||
       dds_takecdr(reader.handle(), &data, 1, &info, DDS_ANY_STATE) != 1) {
     return;
@@ -60,7 +61,7 @@ void tellSizesOfFrames(std::int32_t participant, std::int32_t topic) {
   ddsi_serdata_unref(data);
 }
 
-/// `through` as for writerQos().
+/// Returns the QoS of both readers and writers. `through`: see writerQos().
 QosPtr commonQos(const Qos& qos, const SharedMemory& memory, bool through) {
   constexpr double kMaxBlocking = 0.1;
   QosPtr result(dds_create_qos());
@@ -77,7 +78,7 @@ QosPtr commonQos(const Qos& qos, const SharedMemory& memory, bool through) {
   return result;
 }
 
-/// Readers request the weakest liveliness, so that they match every writer.
+/// Returns the QoS of a reader, with the weakest liveliness, so that it matches every writer.
 QosPtr readerQos(const Qos& qos, const SharedMemory& memory, ReadFrom from) {
   const bool of_before = from == ReadFrom::kKept;  // shared memory does not store earlier messages
   QosPtr result = commonQos(qos, memory, qos.shared_memory && !of_before);
@@ -92,8 +93,9 @@ const TopicInfo& infoOf(const std::string& topic) {
   return *info;
 }
 
-/// Shared memory is refused for topics with keys or latching, because Cyclone 0.10.2 loses messages
-/// or crashes. It is also refused under security, because it has no access control.
+/// Throws StartupError if the entity uses shared memory but must not. With topics that have keys or
+/// are latched, Cyclone 0.10.2 would lose messages or crash. Security forbids shared memory, which
+/// has no access control.
 void checkSharing(const Participant& participant, const Entity& entity, const std::string& topic,
                   const Qos& qos) {
   if (participant.identity() && dds_is_shared_memory_available(entity.handle())) {
@@ -362,7 +364,8 @@ void RawWriter::report(ReasonCounts& counts) const {
   add(counts, "liveliness_lost", livelinessLost());
 }
 
-/// From now on the readers receive the topic over the network interface.
+/// Replaces the writer by one that sends over the network interface, and waits for its readers for
+/// at most half a second.
 void RawWriter::leaveSharedMemory(const Reason& reason) {
   constexpr dds_duration_t kPatience = DDS_MSECS(500), kPause = DDS_MSECS(5);
   const std::size_t readers = matched();
@@ -374,8 +377,8 @@ void RawWriter::leaveSharedMemory(const Reason& reason) {
   }
 }
 
-/// RouDi connects a writer to its readers up to 100 ms after DDS has matched them, and earlier
-/// messages are lost. The first message with readers waits for that.
+/// Waits before the first message with readers. RouDi connects a writer to its readers up to 100 ms
+/// after DDS has matched them; earlier messages are lost.
 void RawWriter::awaitJoin() {
   constexpr dds_duration_t kJoin = DDS_MSECS(200);
   if (!in_shared_memory_ || joined_ || matched() == 0) return;

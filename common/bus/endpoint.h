@@ -19,9 +19,9 @@
 namespace perdure::bus {
 
 struct WriterOptions {
-  /// For exclusive topics: readers receive the running writer of the highest strength.
+  /// For exclusive topics: readers receive messages of the live writer with the highest strength.
   std::int32_t strength = 0;
-  double lease_s = 0.0;  ///< lease of the liveliness; 0: as in the topic table
+  double lease_s = 0.0;  ///< lease of the liveliness; 0: that of the topic table
 };
 
 /// Common base of readers and writers: a DDS entity, a name for its counts, and refusals.
@@ -29,7 +29,7 @@ class Endpoint {
  public:
   const std::string& topic() const { return topic_; }
   std::int32_t handle() const { return handle_; }
-  /// The detail of the first refusal of each kind, by the name of its count. It states the fix.
+  /// Returns the detail, with the fix, of the first refusal of each kind, by the name of its count.
   std::map<std::string, std::string> firstDetails() const;
 
  protected:
@@ -37,10 +37,10 @@ class Endpoint {
   const std::shared_ptr<const Entity>& entity() const { return entity_; }
   void replace(std::shared_ptr<const Entity> entity);
   void count(const char* what, const Reason& reason);
-  /// Adds "<topic>_<what>" if it is not 0.
+  /// Adds `n` to the count "<topic>_<what>" if `n` is not 0.
   void add(ReasonCounts& counts, const char* what, std::uint64_t n) const;
   void addRefusals(ReasonCounts& counts) const;
-  /// Counts a failure of DDS as <topic>_<what>_<error>.
+  /// Returns the reason of a failure of DDS, and counts it as <topic>_<what>_<error>.
   Result<void> outcome(const char* what, std::int32_t code);
 
  private:
@@ -52,23 +52,23 @@ class Endpoint {
   std::map<std::string, std::string> first_details_;
 };
 
-/// A reader of Perdure's or of foreign messages.
+/// A reader of Perdure's messages or of those of third-party programs.
 class AnyReader : public Endpoint {
  public:
   std::size_t matched() const;
   /// Adds the counts of DDS and of the checks since the start: <topic>_malformed_<reason>,
-  /// _incompatible_qos, _sample_lost.
+  /// _incompatible_qos and _sample_lost.
   void report(ReasonCounts& counts) const;
 
  protected:
   using Endpoint::Endpoint;
 };
 
-/// A writer of Perdure's or of foreign messages.
+/// A writer of Perdure's messages or of those of third-party programs.
 class AnyWriter : public Endpoint {
  public:
   std::size_t matched() const;
-  /// Adds <topic>_write_<error>, _incompatible_qos.
+  /// Adds the counts <topic>_write_<error> and _incompatible_qos.
   void report(ReasonCounts& counts) const;
 
  protected:
@@ -87,22 +87,23 @@ enum class ReadFrom {
 
 class RawReader : public AnyReader {
  public:
-  /// The number of matched writers that missed their lease: killed, stopped or disconnected.
+  /// The number of matched writers that missed their lease, because they were killed, stopped or
+  /// disconnected.
   std::size_t silent() const;
-  /// The highest strength among the matched writers of an exclusive topic, except `own`. Returns
-  /// nothing if there are no others.
+  /// Returns the highest strength among the matched writers of an exclusive topic, except `own`.
+  /// Returns nothing if there are no other writers.
   std::optional<std::int32_t> strongestBut(const RawWriter& own) const;
-  /// Also adds _sample_rejected, _in_shared_memory, _writers_silent (present number).
+  /// Also adds _sample_rejected, _in_shared_memory, and the present number of _writers_silent.
   void report(ReasonCounts& counts) const;
 
  protected:
   RawReader(const Participant& participant, const std::string& topic,
             ReadFrom from = ReadFrom::kNow);
-  /// Takes the available messages, at most one batch. Returns true if more may be available.
+  /// Takes at most one batch of the available messages. Returns true if more may be available.
   bool takeBatch(const std::function<void(const void* wire)>& on_value,
                  const std::function<void(const void* wire)>& on_gone);
   using InPlace = std::function<void(std::span<const std::uint8_t>, std::shared_ptr<const void>)>;
-  /// Takes messages without copying them. Each stays valid as long as its keeper.
+  /// Takes messages without copying them. Each message stays valid while its keeper exists.
   bool takeBatchInPlace(const InPlace& on_value);
 
  private:
@@ -160,13 +161,14 @@ class RawWriter : public AnyWriter {
   std::uint64_t livelinessLost() const;
   /// Waits until every matched reader has acknowledged all messages. Returns false on timeout.
   bool waitForAcknowledgement(double seconds);
-  /// Also adds <topic>_refused_<reason> (invalid values of this process), _liveliness_lost,
+  /// Also adds <topic>_refused_<reason> (invalid values of this process), _liveliness_lost and
   /// _left_shared_memory_<reason>.
   void report(ReasonCounts& counts) const;
 
  protected:
   RawWriter(const Participant& participant, const std::string& topic, const WriterOptions& options);
-  /// `bytes`: size of the pixels. If they do not fit into shared memory, the writer stops using it.
+  /// Writes a message whose pixels have `bytes` bytes. If they do not fit into shared memory, the
+  /// writer changes to the network permanently.
   Result<void> writeWire(const void* wire, std::size_t bytes = 0);
   Result<void> disposeWire(const void* wire);
   void unregisterWire(const void* wire);
@@ -188,7 +190,7 @@ class Writer : public RawWriter {
   Writer(const Participant& participant, const Topic<T>& topic, const WriterOptions& options = {})
       : RawWriter(participant, topic.name, options) {}
 
-  /// Values that cannot be written are counted, and the reason is returned.
+  /// Writes a value. If the value cannot be written, counts and returns the reason.
   Result<void> write(const T& value) {
     typename wire::Type<T>::Wire sample;
     if (auto encoded = wire::encode(value, sample, arena_); !encoded) {
@@ -204,10 +206,11 @@ class Writer : public RawWriter {
     typename wire::Type<T>::Wire sample{};
     unregisterWire(&sample);
   }
-  /// Disposes the instance with this value's key, also for late joiners. Only the key is read.
+  /// Disposes the instance with the key of `key`; other fields are not read. Late joiners receive
+  /// neither the instance nor the disposal.
   Result<void> dispose(const T& key) {
     typename wire::Type<T>::Wire sample;
-    (void)wire::encode(key, sample, arena_);  // other fields need not be valid
+    (void)wire::encode(key, sample, arena_);  // fields other than the key may be invalid
     return disposeWire(&sample);
   }
 

@@ -5,10 +5,11 @@
 
 namespace perdure::bus {
 
-/// Names of the interfaces that are up and have an IPv4 address, as "lo,eth0": loopback first, at
-/// most as many as Cyclone uses.
+/// Returns the names of the interfaces that are up and have an IPv4 address, for example "lo,eth0".
+/// Loopback is first; the number is limited to what Cyclone supports.
 std::string interfacesUp();
-/// The IPv4 address of an interface; its name if it has none, so that Cyclone reports the error.
+/// Returns the IPv4 address of an interface. If it has none, returns its name, and Cyclone then
+/// reports the error.
 std::string addressOf(const std::string& interface);
 
 }  // namespace perdure::bus

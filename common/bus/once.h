@@ -1,4 +1,4 @@
-// Drops repeated messages. Messages of one frame may arrive twice around a change of the writer.
+// Detects repeated and missing messages. A message may arrive twice when the writer changes.
 #pragma once
 
 #include <cstdint>
@@ -35,12 +35,11 @@ class Once {
   std::uint64_t repeated_ = 0;
 };
 
-/// One counter per topic with numbered stamps: the frames of one camera, or odometry.
+/// Counts missing sequence numbers. Use one object for each camera's frames, and one for odometry.
 class Gaps {
  public:
-  /// The number of sequence numbers that are missing between this message of `source` and the
-  /// newest one before it. Returns 0 for the first message of a source, and for repeated or late
-  /// messages.
+  /// Returns how many sequence numbers are missing between the newest earlier message of `source`
+  /// and this one. Returns 0 for the first message of a source, and for repeated or late messages.
   std::uint64_t before(std::uint64_t source, std::uint64_t sequence) {
     const bool follows = any_ && source == source_;
     if (follows && sequence <= newest_) return 0;

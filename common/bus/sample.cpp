@@ -29,7 +29,7 @@ class Held {
   std::span<const std::uint8_t> cdr() const {
     if (!inSharedMemory()) return {static_cast<const std::uint8_t*>(part_.iov_base), part_.iov_len};
     const iceoryx_header_t* header = iceoryx_header_from_chunk(data_->iox_chunk);
-    // Only types of fixed size are stored unserialised, in their C layout.
+    // Only types of fixed size, which frames are not, are stored in their C layout.
     if (header->shm_data_state != IOX_CHUNK_CONTAINS_SERIALIZED_DATA) return {};
     return {static_cast<const std::uint8_t*>(data_->iox_chunk), header->data_size};
   }

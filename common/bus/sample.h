@@ -1,5 +1,5 @@
-// Received messages in place: in shared memory, or complete from the network. Internal to
-// common/bus.
+// Access to received messages without copying them, in shared memory or in Cyclone's buffers.
+// Internal to common/bus.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@ inline constexpr std::size_t kBatch = 64;  ///< messages taken at once
 struct RawSample {
   std::span<const std::uint8_t> cdr;  ///< CDR without header, in native byte order
   bool in_shared_memory = false;
-  std::shared_ptr<const void> keeper;  ///< owner of `cdr` and of its reader
+  std::shared_ptr<const void> keeper;  ///< owns the memory of `cdr` and keeps the reader
 };
 
 /// Takes at most `most` samples. The result is empty if no sample is available.

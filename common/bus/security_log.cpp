@@ -13,7 +13,7 @@ struct Kind {
   const char* says;
   const char* count;
 };
-/// Messages of Cyclone 0.10.2; the first match applies.
+/// Parts of Cyclone 0.10.2's messages, and the count of each. The first match applies.
 constexpr std::array kKinds{
     Kind{"Non secure remote ", "no_certificate"},
     Kind{"unable to get local issuer certificate", "unknown_authority"},
@@ -28,10 +28,10 @@ constexpr std::array kKinds{
     Kind{"does not allow remote topic", "writer"},
     Kind{"does not allow remote reader", "reader"},
 };
-/// Messages about this process's own identity.
+/// Parts of the messages about this process's own identity.
 constexpr std::array kOwn{"validating local", "Local topic permission denied",
                           "validate local identity", "Could not load security"};
-/// Message about a process that is about to end, or that was refused already.
+/// Part of a message that is ignored: the process is about to end, or was refused already.
 constexpr const char* kNothing = "Remote secure participant ";
 
 bool contains(const std::string& text, const char* words) {
@@ -59,7 +59,8 @@ void takeTrace(void* log, const dds_log_data_t* data) {
 
 }  // namespace
 
-/// An unknown participant counts once, although each of its endpoints is refused repeatedly.
+/// Returns true for the first message about a participant. A participant counts once, although each
+/// of its endpoints is refused repeatedly.
 bool SecurityLog::isNewcomer(const std::string& message) {
   constexpr std::size_t kMost = 1024;
   constexpr std::string_view kBefore = "remote writer ";  // "remote reader " has the same length

@@ -16,11 +16,11 @@ class SecurityLog {
   /// Takes one message of Cyclone's log. Returns false if it does not concern security.
   bool take(const std::string& message);
   /// Adds security_refused_no_certificate (participants), _unknown_authority, _expired, _revoked,
-  /// _certificate (handshakes; a refused participant retries each second), _permissions, _writer,
-  /// _reader.
+  /// _certificate (handshakes; a refused participant retries each second), _permissions, _writer
+  /// and _reader.
   void report(ReasonCounts& counts) const;
   std::map<std::string, std::string> firstDetails() const;
-  /// The latest error of this process's own identity.
+  /// Returns Cyclone's latest error message about this process's own identity.
   std::string own() const;
 
  private:
@@ -33,9 +33,9 @@ class SecurityLog {
   std::string own_;
 };
 
-/// The log of this process, because Cyclone's log has one sink. The first call installs the sink.
-/// `discovery` also takes Cyclone's discovery trace, because only the trace names participants
-/// without a certificate.
+/// Returns the only log of this process; Cyclone supports a single log sink, which the first call
+/// installs. If `discovery`, that call also installs a sink for Cyclone's discovery trace, because
+/// only the trace names participants without a certificate.
 SecurityLog& securityLog(bool discovery = false);
 
 }  // namespace perdure::bus

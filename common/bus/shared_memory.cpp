@@ -56,7 +56,7 @@ Result<std::string> sharedMemoryLocator() {
                 "RouDi answers, but its memory /dev/shm/iceoryx_mgmt is not in sight; "
                 "services and RouDi need the same /dev/shm");
   }
-  // Each start of RouDi creates a new file. Files of two hosts may have equal numbers.
+  // Each start of RouDi creates a file with a new inode. The boot id distinguishes hosts.
   const std::uint64_t identity =
       digest(fmt::format("{} {} {}", bootId(), segment.st_dev, segment.st_ino));
   std::string locator = "iceoryx/00:00:00:00:00:00:00:00";

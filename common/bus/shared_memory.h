@@ -8,9 +8,10 @@
 
 namespace perdure::bus {
 
-/// A Cyclone locator that identifies one start of RouDi on this host. Processes with the same
-/// locator share memory. Others, for example from before a restart of RouDi, communicate over the
-/// network interface. Reason: "no_roudi"; the detail states the fix.
+/// Returns a Cyclone locator that identifies the running RouDi. Processes with equal locators share
+/// memory. Processes with different ones, for example after a restart of RouDi, communicate over
+/// the network interface. Fails with "no_roudi" if RouDi does not respond; the detail states the
+/// fix.
 Result<std::string> sharedMemoryLocator();
 
 }  // namespace perdure::bus

@@ -19,17 +19,17 @@ struct TopicInfo {
   Qos qos;
   double rate_hz = 0.0;  ///< nominal, for a 10 Hz camera and a 100 Hz IMU; 0: on change
   bool recorded = true;
-  /// Roles of the topic, with those that read or write every topic.
+  /// The roles that may write or read the topic, including those with access to every topic.
   Roles writers = {}, readers = {};
 
   std::string typeName() const;
 };
 
 std::span<const TopicInfo> topicTable();
-/// The row of a topic, such as "imu" or "frame/cam0". Returns nullptr if the topic does not exist.
+/// Returns the row of a topic such as "imu" or "frame/cam0", or nullptr for unknown topics.
 const TopicInfo* findTopic(std::string_view name);
 
-/// The expected rate for a camera and an IMU with these rates; 0: on change.
+/// Returns the expected rate of a topic if camera and IMU have these rates; 0: on change.
 double expectedRate(const TopicInfo& info, double camera_hz, double imu_hz);
 
 /// A topic's name with the type of its messages.
@@ -44,12 +44,12 @@ inline const Topic<T> kTopic{std::string(wire::nameOfTopic<T>())};
 
 inline Topic<Frame> frameTopic(const std::string& camera) { return {kTopic<Frame>.name + camera}; }
 
-/// Returns whether the row `row` of the table is that of a topic.
+/// Returns whether `row`, a name in the table, is the row of `topic`.
 inline bool isRowOf(std::string_view row, std::string_view topic) {
   return row.ends_with('/') ? topic.starts_with(row) && topic != row : topic == row;
 }
 
-/// Calls visit(Topic<T>) with the type of a name. Returns false if the name is unknown.
+/// Calls visit(Topic<T>) for the topic `name`, with its type. Returns false if the name is unknown.
 template <class Visit>
 bool withTopic(const std::string& name, Visit visit) {
   bool found = false;

@@ -7,8 +7,8 @@
 
 namespace perdure::bus {
 
-/// The wait set belongs to no participant, so that it accepts conditions of any. `participant`
-/// ensures that DDS is initialised.
+/// The wait set belongs to no participant, so that it accepts the conditions of all participants.
+/// The argument ensures that DDS is initialised.
 WaitLoop::WaitLoop(const Participant&)
     : guard_(dds_create_guardcondition(DDS_CYCLONEDDS_HANDLE)),
       waitset_(dds_create_waitset(DDS_CYCLONEDDS_HANDLE)) {
@@ -66,7 +66,7 @@ std::chrono::nanoseconds WaitLoop::untilNextTick(std::chrono::nanoseconds longes
 void WaitLoop::handleMessages() {
   for (const Source& source : sources_) {
     if (stopped_) return;
-    // Drain one batch of each source, so that a flood on one topic does not starve the others.
+    // Drain one batch of each source, so that a busy topic does not block the others.
     if (dds_triggered(source.condition.handle()) > 0) source.drain();
   }
 }

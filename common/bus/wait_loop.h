@@ -37,24 +37,25 @@ class WaitLoop {
       });
     });
   }
-  /// Removes a reader, which may be destroyed afterwards. Must not be called from a handler of
-  /// messages or ticks, because the loop is iterating over the readers then.
+  /// Removes a reader, which may then be destroyed. Must not be called from a handler of messages
+  /// or ticks, because the loop iterates over the readers while it calls these handlers.
   void off(const Endpoint& reader);
-  /// The first tick comes after one period; missed ticks are dropped.
-  /// The tick is suspended while `wanted` returns false; the loop's thread calls `wanted`.
+  /// Calls `tick` once per `period`; missed ticks are dropped. No ticks occur while `wanted`,
+  /// called in the loop's thread, returns false.
   void every(std::chrono::nanoseconds period, std::function<void()> tick,
              std::function<bool()> wanted = {});
-  /// The handler runs in the loop's thread soon after wake(). Several wake-ups may become one call.
+  /// Sets a handler that runs in the loop's thread after wake(). Several wake-ups may cause one
+  /// call.
   void onWake(std::function<void()> handler) { on_wake_ = std::move(handler); }
 
   void run();
   /// Waits once, at most for `longest`, and handles what is available.
   void runOnce(std::chrono::nanoseconds longest);
-  /// May be called from any thread, but not from a signal handler. run() returns after the current
-  /// handler; other messages of its batch are dropped.
+  /// Ends run() after the current handler; the remaining messages of its batch are dropped. May be
+  /// called from any thread, but not from a signal handler.
   void stop();
   bool stopped() const { return stopped_; }
-  /// May be called from any thread, but not from a signal handler.
+  /// Wakes the loop. May be called from any thread, but not from a signal handler.
   void wake();
 
  private:

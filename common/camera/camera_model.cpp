@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kMinDepth = 1e-3;
 
-/// A radial factor as a function of the squared radius, and its derivative.
+/// The value of a radial factor and its derivative with respect to the squared radius.
 struct Radial {
   double value, slope;
 };

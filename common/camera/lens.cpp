@@ -9,7 +9,7 @@ bool isOneOf(const std::string& name, std::initializer_list<const char*> names) 
   return std::any_of(names.begin(), names.end(), [&](const char* one) { return name == one; });
 }
 
-/// Brown's model has four coefficients, five with k3, or eight (rational).
+/// Sets Brown's model, which has four coefficients, five with k3, or eight (rational).
 Result<void> setRadial(CameraCalibration& camera, std::vector<double> values) {
   while (values.size() > 8 && values.back() == 0.0)
     values.pop_back();  // thin prism and tilt terms that are zero

@@ -15,7 +15,7 @@ namespace {
 constexpr double kWidest = 85.0 * std::numbers::pi / 180.0;
 constexpr double kMostError = 0.5;  // px
 
-/// The divisor of x and y, with its gradient `slope`.
+/// The divisor of x and y in the projection, with its gradient `slope`.
 struct Divisor {
   double value = 0;
   Eigen::Vector3d slope = Eigen::Vector3d::Zero();
@@ -42,7 +42,7 @@ Divisor divisorOf(const WideLens& lens, const Eigen::Vector3d& p) {
 
 struct Sample {
   double angle;
-  Eigen::Vector2d side, pixel;  ///< side: the direction in the image
+  Eigen::Vector2d side, pixel;  ///< side: unit vector of the direction in the image
 };
 
 /// Directions that are visible in the image, evenly distributed over it.

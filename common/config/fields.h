@@ -14,7 +14,7 @@ namespace perdure::config {
 /// Documentation of a field for users. `fix` ends the error message: "…; <fix>".
 struct Doc {
   std::string text;       ///< text in one line
-  std::string unit = {};  ///< "rad/s/√Hz", "px", "" for none
+  std::string unit = {};  ///< such as "rad/s/√Hz"; "" for no unit
   std::string fix = {};
 };
 
@@ -33,13 +33,14 @@ struct Field {
                               std::vector<std::string>*>;
   std::string key;  ///< dotted key, such as "tracker.max_points"
   Target target;
-  Range range;                       ///< range of numbers, and of each number in a list
+  Range range;                       ///< range of a number, or of each number in a list
   std::vector<std::string> choices;  ///< allowed values of strings; empty: any
   std::size_t length = 0;            ///< required length of lists; 0: any
-  bool required = false;             ///< required in the file or by --set
+  bool required = false;             ///< the file or --set must give a value
   bool expert = false;               ///< intended for experts
   Doc doc;
-  bool given = false;  ///< set by readYaml and assign, even if the value was refused
+  bool given =
+      false;  ///< set by readYaml and assign if the key is given, even if the value was refused
 };
 
 class Fields {
@@ -54,10 +55,11 @@ class Fields {
   void texts(std::string key, std::vector<std::string>& target, Doc doc);
   void require();
   void expert(bool on) { expert_ = on; }
-  /// Refuses a key of earlier versions with this sentence: "is now tracks.confirm".
+  /// Declares a key of earlier versions. Reading refuses it with `sentence`: "is now
+  /// tracks.confirm".
   void formerly(std::string key, std::string sentence);
 
-  /// The sentence for a key of earlier versions; empty for other keys.
+  /// Returns the sentence given to formerly() for this key, otherwise "".
   std::string formerlyOf(const std::string& key) const;
   /// Returns whether earlier versions had keys in this group.
   bool wasGroup(const std::string& name) const;
@@ -72,7 +74,7 @@ class Fields {
   bool expert_ = false;
 };
 
-/// One error. str(): "file:line:col: key: value is not > 0 rad/s/√Hz; fix".
+/// One error. str() returns "file:line:col: key: value is not > 0 rad/s/√Hz; fix".
 struct Problem {
   std::string file;
   int line = 0, column = 0;  ///< counted from 1; 0 without a position (--set, missing key)
@@ -86,7 +88,7 @@ struct Problem {
 std::vector<Problem> readYaml(Fields& fields, const std::string& yaml, const std::string& file);
 /// Applies readYaml to the content of a file. A file that cannot be read is a problem too.
 std::vector<Problem> readFile(Fields& fields, const std::string& path);
-/// Applies "key=value" from --set. The value is YAML; a text needs no quotes.
+/// Applies "key=value" from --set. The value is YAML, but text needs no quotes.
 std::vector<Problem> assign(Fields& fields, const std::string& assignment);
 /// Returns the problems of required fields that neither a file nor --set has given. readYaml and
 /// assign record which fields were given.

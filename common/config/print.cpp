@@ -41,7 +41,8 @@ std::string commentOf(const Field& field) {
   return text;
 }
 
-/// The fields whose keys begin with `prefix`; groups in order of first appearance, each once.
+/// Returns the YAML of the fields whose keys begin with `prefix`. Each group appears once, at the
+/// place of its first field.
 std::string yamlOf(const Fields& fields, const std::string& prefix, const std::string& indent) {
   std::string text;
   std::set<std::string> groups;

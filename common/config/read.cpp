@@ -78,7 +78,7 @@ class Reader {
     } else if (!isGroup(name) && !fields_.wasGroup(name)) {
       problem(key, name + ": is not a known key" + suggestion(name));
     } else if (value.IsMap()) {
-      seen_.erase(name);  // a group may continue under a second heading; keys must not repeat
+      seen_.erase(name);  // a group may have several headings, but each key only once
       readGroup(value, name + ".");
     } else if (!value.IsNull()) {
       problem(value, name + ": is a group of keys, not a value; its first key is " +
@@ -223,8 +223,8 @@ class Ignore : public YAML::EventHandler {
   YAML::Mark start;
 };
 
-/// The position of text that follows the first document, if any. (YAML::LoadAll of 0.7 may loop
-/// forever on malformed text, and YAML::Load ignores text after the first document.)
+/// Returns the position of the second document, if any. YAML::LoadAll of 0.7 may loop forever on
+/// malformed text, and YAML::Load ignores text after the first document.
 std::optional<YAML::Mark> afterFirstDocument(const std::string& yaml) {
   std::istringstream stream(yaml);
   YAML::Parser parser(stream);

@@ -7,13 +7,14 @@
 
 namespace perdure::config {
 
-/// "a, b, c".
+/// The allowed values of a field: "a, b, c".
 std::string choicesText(const Field& field);
 /// The shortest decimal number that reads back to the same double.
 std::string numberText(double value);
-/// "> 0", "≥ 1", "0 … 5", or empty for any value. The unit is appended if there is one.
+/// A range followed by its unit, if any: "> 0 m", "≥ 1", "0 … 5". Returns "" if any value is
+/// allowed.
 std::string rangeText(const Range& range, const std::string& unit);
-/// A double-quoted YAML scalar.
+/// The text as a double-quoted YAML scalar.
 std::string quoted(const std::string& text);
 
 }  // namespace perdure::config

@@ -14,12 +14,13 @@ struct Geodetic {
 };
 
 Eigen::Vector3d toEcef(const Geodetic& g);
-/// Requires |ecef| of at least 1000 km.
+/// Requires a distance from the earth's centre, |ecef|, of at least 1000 km.
 Geodetic fromEcef(const Eigen::Vector3d& ecef);
 /// The rotation whose columns are east, north and up at g, in ECEF.
 Eigen::Matrix3d enuAxes(const Geodetic& g);
 
-/// Maps points of W to the ellipsoid, based on the pose of the body in W at the time of the anchor.
+/// Converts points of W to geodetic coordinates, given the pose of the body at the time of the
+/// anchor.
 class GeoReference {
  public:
   GeoReference(const GeoAnchor& anchor, const RigidTransform& T_WB_at_anchor);

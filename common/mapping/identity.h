@@ -1,6 +1,6 @@
-// Which tracks are one object. The facts are stored, and the object ids follow from them. The
-// object id of a track is the lowest id among the tracks that facts connect with it. A fact from a
-// loop closure ends with this loop closure; nothing else must be undone.
+// Stores which tracks are one object, as facts. The object id of a track is the lowest id among the
+// tracks that facts connect with it. A fact from a loop closure is removed with this loop closure,
+// and the object ids follow.
 #pragma once
 
 #include <compare>
@@ -15,7 +15,7 @@ namespace perdure::mapping {
 
 /// Two tracks are one object.
 struct SameObject {
-  EdgeId loop = 0;  ///< loop closure that shows it; 0: found by the filter, which is final
+  EdgeId loop = 0;  ///< loop closure that shows it; 0: found by the filter, and final
   TrackId a = 0, b = 0;
   auto operator<=>(const SameObject&) const = default;
 };
@@ -23,7 +23,7 @@ struct SameObject {
 /// Two objects became one, or were separated again.
 struct MergeOrder {
   EdgeId loop = 0;
-  ObjectId survivor = 0;  ///< the older one, with the lower id
+  ObjectId survivor = 0;  ///< the object with the lower id
   ObjectId absorbed = 0;
 };
 
@@ -33,19 +33,19 @@ class Identity {
   explicit Identity(std::set<SameObject> facts);
 
   void add(const SameObject& fact);
-  /// Ends the facts of a loop closure.
+  /// Removes the facts of a loop closure.
   void endLoop(EdgeId loop);
   /// Moves the facts of a loop closure to the one that replaces it.
   void replaceLoop(EdgeId loop, EdgeId by);
 
   ObjectId objectOf(TrackId track) const;
-  /// The tracks of an object that has several, in order; empty for all other objects.
+  /// Returns the tracks, by id, of an object that has several; empty for other objects.
   const std::vector<TrackId>& tracksOf(ObjectId object) const;
   const std::set<SameObject>& facts() const { return facts_; }
   std::vector<SameObject> factsOf(EdgeId loop) const;
   /// The objects that have several tracks.
   const std::map<ObjectId, std::vector<TrackId>>& shared() const { return tracks_of_; }
-  /// Whether a fact names the track.
+  /// Whether a fact connects the track with another one.
   bool isShared(TrackId track) const { return object_of_.contains(track); }
 
  private:

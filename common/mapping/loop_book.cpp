@@ -7,7 +7,7 @@ std::vector<EdgeId> LoopBook::begin() {
   for (const auto& [id, entry] : entries_) {
     if (!entry.told) waiting.push_back(id);
   }
-  entries_.clear();  // reported loop closures are found by their edges in the graph
+  entries_.clear();  // judge() finds reported loop closures by their edges in the graph
   return waiting;
 }
 

@@ -14,8 +14,7 @@
 namespace perdure::mapping {
 namespace {
 
-/// Bound on a place's uncertainty, relative to its uncertainty from the first anchor of its
-/// component.
+/// Bound on the uncertainty from any anchor, relative to that from the component's first anchor.
 constexpr double kFarther = 1.5;
 
 /// A prior as wide as the map, for a body whose position on the map is unknown.
@@ -42,15 +41,16 @@ const PlacedObject& withId(const std::vector<PlacedObject>& objects, ObjectId id
                        [id](const PlacedObject& o) { return o.id == id; });
 }
 
-/// By how much T_ba is less certain than the transform to the nearest anchor. The relative
-/// positions of the objects near both anchors are uncertain by this amount.
+/// Returns by how much the variance of T_ba exceeds that of the transform to the nearest anchor,
+/// m². Relative positions of objects near the two anchors have this uncertainty.
 double varianceBeyond(const LevelGaussian& T_ba, const LevelGaussian& nearest) {
   const double sigma = planeSigma(T_ba.covariance), least = planeSigma(nearest.covariance);
   return std::max(0.0, sigma * sigma - least * least);
 }
 
-/// An edge relates the body to the anchors of one visit. Objects of other visits changed the match
-/// by their relative positions in M, which no object measured. Their part is removed here.
+/// Computes the match again from the objects of one visit, and sets `home`. An edge relates the
+/// body to anchors of one visit. Objects of other visits affected the match by their relative
+/// positions in M, which no object measured.
 void restOnOneVisit(LoopSearch::Found& found, const std::vector<PlacedObject>& objects,
                     const std::map<ObjectId, AnchorId>& homes,
                     const std::vector<PlacedObject>& seen, const MapState& state, double visit_m) {
@@ -103,7 +103,7 @@ bool Whereabouts::isOld(const ObjectRecord& record, double visit_m) const {
   return record.session != here().session || std::abs(way.way_m() - record.way_m) > visit_m;
 }
 
-/// A session's anchors have consecutive ids.
+/// Uses that the anchors of a session have consecutive ids.
 std::vector<AnchorId> Whereabouts::anchorsOfVisit(double visit_m) const {
   std::vector<AnchorId> ids;
   const auto& all = state.anchors();
@@ -162,8 +162,8 @@ std::vector<std::pair<double, AnchorId>> anchorsOfBefore(const Whereabouts& body
   return anchors;
 }
 
-/// Objects that were detected on this visit, in the frame of the body's newest anchor. Leaves out
-/// objects that are known from earlier visits.
+/// Returns the objects detected on this visit, in the frame of the body's newest anchor. Leaves out
+/// objects known from earlier visits. Returns nothing if none was detected within fresh_m.
 std::vector<PlacedObject> LoopSearch::seenOfLate(const Whereabouts& body) const {
   std::vector<PlacedObject> seen;
   bool fresh = false;
@@ -180,7 +180,7 @@ std::vector<PlacedObject> LoopSearch::seenOfLate(const Whereabouts& body) const 
   return seen;
 }
 
-/// Confirmed objects that were last detected from the anchor before this visit.
+/// Confirmed objects whose last sighting before this visit belongs to the anchor.
 std::set<ObjectId> LoopSearch::objectsSeenFrom(AnchorId anchor, const Whereabouts& body) const {
   std::set<ObjectId> ids;
   for (const ObjectId object : body.state.seenFrom(anchor)) {
@@ -243,7 +243,8 @@ std::optional<LoopSearch::Found> LoopSearch::nearby(const Whereabouts& body) con
   return found;
 }
 
-/// If the body's position is well known, only the pairs of objects are in question.
+/// Requires less evidence the better the body's position is known, because only the pairs of
+/// objects can then be wrong.
 bool LoopSearch::isBelieved(const PlaceMatch& match, double sigma_m) const {
   const LoopParameters& loop = parameters_.loop;
   const bool near = sigma_m < loop.near_m;
@@ -287,8 +288,8 @@ std::optional<LoopSearch::Found> LoopSearch::nearLast(const Whereabouts& body,
   return Found{std::move(*match), home, std::nullopt, kNowhere};
 }
 
-/// Compares the match with chance, given the number of possible poses in the prior, and with the
-/// second-best pose.
+/// Returns whether one search suffices: the match has enough evidence against chance, given the
+/// number of possible poses in the prior, and against the second-best pose.
 bool LoopSearch::isSureAtOnce(const PlaceMatch& match) const {
   const LoopParameters& loop = parameters_.loop;
   return match.pairs.size() >= loop.least_elsewhere &&

@@ -1,4 +1,4 @@
-// Searches for the body's position among objects of earlier visits and other sessions. Finds which
+// Estimates the pose of the body from objects of earlier visits and other sessions, and finds which
 // of them the body detects now.
 #pragma once
 
@@ -22,46 +22,46 @@ struct Whereabouts {
   const AnchorBuilder& way;
   const Marginals& relative;  ///< transforms relative to the body's newest anchor
   double widening = 1.0;      ///< factor on the standard deviations of these transforms
-  double deviation_m = 0.0;   ///< in the plane, from the first anchor of its component
+  double deviation_m = 0.0;   ///< σ of the body in the plane, from its component's first anchor
   bool others_only = false;   ///< search only among objects of other sessions
 
   const Anchor& here() const { return *way.last(); }
-  /// T_body,anchor; nothing if no path leads to the anchor.
+  /// The pose of the anchor relative to the body's newest anchor, with widened covariance; nothing
+  /// if no path leads to the anchor.
   std::optional<LevelGaussian> to(AnchorId anchor) const;
   /// Whether the search includes objects that were detected from the anchor.
   bool asks(AnchorId anchor) const;
-  /// Whether the object is of another session, or was not detected within the last `visit_m`
-  /// travelled.
+  /// Whether the last detection was in another session, or more than `visit_m` of travel ago.
   bool isOld(const ObjectRecord& record, double visit_m) const;
-  /// Anchors of the session within this distance travelled, in order.
+  /// Anchors of the session within `visit_m` of travel from the body, in order.
   std::vector<AnchorId> anchorsOfVisit(double visit_m) const;
-  /// Objects that were detected within this distance travelled, by id.
+  /// Objects that were last detected within `visit_m` of travel from the body, by id.
   std::vector<ObjectId> objectsOfVisit(double visit_m) const;
 };
 
-/// The last sighting of an object before this visit; nothing if the object is new.
+/// Returns the last sighting of an object before this visit; null if the object is new.
 const Sighting* sightingOfBefore(const ObjectRecord& record, const Whereabouts& body,
                                  double visit_m);
-/// Whether both anchors are of one session, less than visit_m of travel apart. No object measured
-/// the relative pose of anchors of different visits.
+/// Whether both anchors are of one session, less than `visit_m` of travel apart. Objects do not
+/// measure the relative pose of anchors of different visits.
 bool isOneVisit(const MapState& state, AnchorId a, AnchorId b, double visit_m);
-/// Transforms the object to M.
+/// Transforms the object of a sighting to M.
 PlacedObject inM(const MapState& state, const Sighting& sighting);
 
-/// The last position before the odometry lost its frame of reference. It is a prior for locating
+/// The last position before the odometry lost its frame of reference. It is the prior for locating
 /// the next session.
 struct LastPlace {
   AnchorId anchor = 0;  ///< newest anchor of the session that ended
   AnchorId begins = 0;  ///< F, the first anchor of the next session
-  LevelGaussian T_MF;   ///< in the M of the component of `anchor`; the yaw is unknown
+  LevelGaussian T_MF;   ///< M: of the component of `anchor`; the yaw is unknown
 };
 
-/// T_Mb relative to an anchor, without the anchor's own error in M.
+/// Returns T_Mb with its error relative to the anchor a, without that anchor's own error in M.
 LevelGaussian bodyByGraph(const Whereabouts& body, const LevelGaussian& T_ba);
 
-/// Anchors of earlier visits within the body's uncertainty, nearest first, with their distance in
-/// the plane. The uncertainty is that from the first anchor of the component, because nearer
-/// anchors are better known.
+/// Returns anchors of earlier visits within reach of the body, nearest first, with their distance
+/// in the plane, m. The reach includes the body's uncertainty from the first anchor of its
+/// component, which bounds that from nearer anchors.
 std::vector<std::pair<double, AnchorId>> anchorsOfBefore(const Whereabouts& body,
                                                          const Parameters& parameters);
 
@@ -70,21 +70,23 @@ class LoopSearch {
   explicit LoopSearch(const Parameters& parameters) : parameters_(parameters) {}
 
   struct Found {
-    PlaceMatch match;                    ///< T_MB in the M of the component of the match
-    AnchorId home = 0;                   ///< the anchor of most of the known objects
-    std::optional<LevelGaussian> prior;  ///< by odometry and graph; nothing: no prior position
-    double sigma_m = 0.0;                ///< deviation of the prior in the plane
+    PlaceMatch match;                    ///< match.T_MB is in the M of the matched component
+    AnchorId home = 0;                   ///< anchor of known objects, at which the loop closure
+                                         ///< ends
+    std::optional<LevelGaussian> prior;  ///< T_MB by odometry and graph; nothing: no prior position
+    double sigma_m = 0.0;                ///< standard deviation of the prior in the plane
   };
 
-  /// Searches the part of the map that is connected with the body. Returns a match that is
-  /// accepted.
+  /// Searches the part of the map that is connected with the body. Returns a match only if its
+  /// evidence suffices.
   std::optional<Found> nearby(const Whereabouts& body) const;
-  /// Searches the components of the graph that are not connected with the body's session.
+  /// Searches the components of the graph that are not connected with the body. The match needs a
+  /// second one that agrees.
   std::optional<Found> elsewhere(const Whereabouts& body);
   /// Searches the component of the session that ended, around its last position. Returns a match
   /// that needs no second search.
   std::optional<Found> nearLast(const Whereabouts& body, const LastPlace& last) const;
-  /// Call it if the graph or the objects of other components have changed.
+  /// Clears the index of the other components. Call it if the graph or their objects have changed.
   void forget() { others_.clear(); }
 
  private:

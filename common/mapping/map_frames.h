@@ -1,6 +1,6 @@
 // Transforms objects into M, the frame in which the map is consistent. An object is stored in the W
-// of the session that observed it last. The anchor at its last detection gives the pose of W in M:
-// T_MW = T_MA T_WA⁻¹.
+// of the session that observed it last. The anchor A of its last detection determines the pose of W
+// in M: T_MW = T_MA T_WA⁻¹.
 //
 // M of a component of the graph is the W of the session of its first anchor. Its z axis points
 // against gravity.
@@ -22,22 +22,23 @@ struct FrameInMap {
   bool provisional = false;  ///< the session is not linked to the map's first anchor yet
 };
 
-/// Uses the graph as it is at construction.
+/// Computes the poses at construction; later changes of the graph have no effect.
 class MapFrames {
  public:
   MapFrames() = default;
   MapFrames(const PoseGraph& graph, const std::map<AnchorId, Anchor>& anchors);
   explicit MapFrames(const MapState& state) : MapFrames(state.graph(), state.anchors()) {}
 
-  /// The anchor that an object's stored data belong to; 0: none. `world` is its W, and `last_seen`
-  /// the time of its last detection. The anchor is that of the record, if the record is of the same
-  /// detection. Otherwise it is the last anchor of the session at that time.
+  /// Returns the anchor of an object's stored belief; 0 if its session has no anchor. `world` is
+  /// the W of the belief, `last_seen` the time of its last detection. The anchor is that of the
+  /// record if the record is of the same detection, else the session's last anchor at that time.
   AnchorId anchorOf(const ObjectRecord* record, const WorldId& world, TimePoint last_seen) const;
 
-  /// The frame near an anchor. Without an anchor, or for an unknown one, M is `world`, and W is M.
+  /// Returns the frame near an anchor. If the anchor is 0 or unknown, M is `world` and T_MW is the
+  /// identity.
   FrameInMap at(AnchorId anchor, const WorldId& world) const;
 
-  /// The M of a session's newest anchor; the session's own W if it has no anchor.
+  /// Returns the M of a session's newest anchor; the session's W if it has no anchor.
   WorldId mapOf(const WorldId& session) const;
 
  private:

@@ -19,7 +19,7 @@ MapState::MapState(const Parameters& parameters, SavedMap saved)
   for (std::size_t k = 0; k < saved.classes.size(); ++k) {
     class_numbers_[saved.classes[k]] = static_cast<std::uint32_t>(k);
   }
-  // Loop closures come first, because they have fixed ids.
+  // Loop closures come first, because their ids are stored; odometry edges get new ids.
   for (const auto& [id, edge] : saved.edges) {
     if (edge.edge.kind == EdgeKind::kOdometry) continue;
     graph_.restore(id, edge.edge, edge.weight);
@@ -162,7 +162,7 @@ void MapState::erase(TrackId id) {
   combine(identity_.objectOf(id));
 }
 
-/// The clocks of different sessions cannot be compared.
+/// Between other sessions, compares times, although their clocks may differ.
 bool MapState::isNewer(const ObjectRecord& a, const ObjectRecord& b) const {
   if (a.session != b.session && (a.session == session_ || b.session == session_)) {
     return a.session == session_;
@@ -170,8 +170,8 @@ bool MapState::isNewer(const ObjectRecord& a, const ObjectRecord& b) const {
   return a.last_seen >= b.last_seen;
 }
 
-/// The newest track decides whether the object exists, and its position. `earlier` is the newest
-/// sighting of another visit.
+/// Returns the record of an object from those of its tracks. Its newest track determines its
+/// position, and whether it exists. `earlier` is the newest sighting of another visit.
 std::optional<ObjectRecord> MapState::combined(ObjectId object) const {
   std::vector<const ObjectRecord*> records;
   bool confirmed = false;
@@ -215,7 +215,7 @@ void MapState::endFactsOf(EdgeId loop) {
   regroup(before);
 }
 
-/// All tracks of the objects of tracks a and b.
+/// Returns all tracks of the objects to which tracks a and b belong.
 MapState::Groups MapState::groupsOf(TrackId a, TrackId b) const {
   Groups groups;
   for (const TrackId track : {a, b}) {
@@ -226,7 +226,8 @@ MapState::Groups MapState::groupsOf(TrackId a, TrackId b) const {
   return groups;
 }
 
-/// Moves the records of tracks that begin or cease to share an object.
+/// Moves the records of tracks that begin or cease to share an object. `before`: their objects
+/// before the change of the facts.
 void MapState::regroup(const Groups& before) {
   std::map<ObjectId, std::size_t> sizes;
   std::set<ObjectId> objects;
@@ -289,7 +290,8 @@ Unsaved MapState::unsaved() const {
     const ObjectRecord& record = records_.at(id);
     if (record.confirmed) result.changed.records[id] = record;
   }
-  // An object that restarted under its id does not exist on the map until it is confirmed.
+  // If a new object has the id of an erased one, the stored record is removed until it is
+  // confirmed.
   for (const ObjectId id : erased_) {
     if (!result.changed.records.contains(id)) result.records_gone.insert(id);
   }

@@ -1,6 +1,6 @@
-// The state of the mapper: anchors, their graph, which tracks are one object, and the anchors from
-// which objects were detected. Records of objects with several tracks are computed from those of
-// the tracks. Records all changes since it was last saved.
+// The state of the mapper: anchors, their graph, the records of objects, and the tracks that are
+// one object. The record of an object with several tracks is computed from those of its tracks. The
+// state stores all changes since the last save.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ class MapState {
   std::uint32_t numberOf(const std::string& class_name);
 
   AnchorId nextAnchor() const { return anchors_.empty() ? 1 : anchors_.rbegin()->first + 1; }
-  /// The covariance of the anchor's increment must be scaled already.
+  /// Adds an anchor. The covariance of its increment must have been multiplied by `scale`.
   void add(const Anchor& anchor);
   const std::map<AnchorId, Anchor>& anchors() const { return anchors_; }
   /// The newest anchor of a session.
@@ -29,40 +29,41 @@ class MapState {
 
   const PoseGraph& graph() const { return graph_; }
   EdgeId addLoop(const Edge& edge) { return graph_.add(edge); }
-  /// Also ends the facts that depend on it.
+  /// Removes a loop closure and its facts.
   void removeLoop(EdgeId id);
-  /// Sets the factor of all increments of the session.
+  /// Sets the factors of the covariances of all increments of the session.
   void scaleOdometry(const DriftVariance& scale, const WorldId& session);
   void optimise() { (void)graph_.optimise(); }
   /// Moves a component as a whole: T_MA = T_MN T_NA.
   void move(const std::set<AnchorId>& anchors, const LevelPose& T_MN);
 
-  /// The view from an anchor; empty if no landmark was observed.
+  /// Returns the view from an anchor; empty if there is none.
   const View& viewFrom(AnchorId id) const;
   void putView(AnchorId id, View view);
 
   /// Records by object. If an object has several tracks, `earlier` and `sighting` may be of
-  /// different tracks; the id in `in_anchor` names the track.
+  /// different tracks; `in_anchor.id` is that of the track.
   const std::map<ObjectId, ObjectRecord>& records() const { return records_; }
   /// Returns null if the track is unknown.
   const ObjectRecord* recordOfTrack(TrackId id) const;
   void put(TrackId id, ObjectRecord record);
-  /// The object has ended, according to this track.
+  /// Marks a track as gone. Its object ends if this is its newest track.
   void end(TrackId id);
-  /// The track was merged into another one. Removes its record.
+  /// Removes the record of a track, because it was merged or was never confirmed.
   void erase(TrackId id);
-  /// Records of this session count as newer than those of any other.
+  /// Sets the present session. Its records count as newer than those of all other sessions.
   void follow(const WorldId& session) { session_ = session; }
   bool isNewer(const ObjectRecord& a, const ObjectRecord& b) const;
   const std::set<ObjectId>& unconfirmed() const { return unconfirmed_; }
-  /// Objects that were detected from an anchor, on the newest visit or on the one before.
+  /// Objects whose newest or earlier sighting belongs to the anchor.
   const std::set<ObjectId>& seenFrom(AnchorId id) const;
 
   const Identity& identity() const { return identity_; }
   void unite(const SameObject& fact);
   /// Moves the facts of a loop closure to another one.
   void replaceLoop(EdgeId loop, EdgeId by) { identity_.replaceLoop(loop, by); }
-  /// Tracks whose object has changed since markSaved(), or that have begun or ceased to share it.
+  /// Tracks whose object id has changed since markSaved(), or that began or ceased to share an
+  /// object.
   const std::set<TrackId>& regrouped() const { return regrouped_; }
 
   Unsaved unsaved() const;
@@ -88,7 +89,7 @@ class MapState {
   SavedAnchor savedAnchor(AnchorId id) const;
   bool isSaved(AnchorId id) const;
 
-  double visit_m_;  ///< distance travelled after which a new visit begins
+  double visit_m_;  ///< distance travelled without detection after which a new visit begins
   PoseGraph graph_;
   std::map<AnchorId, Anchor> anchors_;
   std::map<ObjectId, ObjectRecord> records_;

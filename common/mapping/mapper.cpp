@@ -12,7 +12,7 @@
 namespace perdure::mapping {
 namespace {
 
-constexpr double kOverlap_m = 3.0;  // overlap of the views of two anchors, along the trajectory
+constexpr double kOverlap_m = 3.0;  // distance travelled by which the views of two anchors overlap
 
 }  // namespace
 
@@ -25,8 +25,8 @@ Mapper::Mapper(const Parameters& parameters, SavedMap saved)
       tracked_ties_(parameters),
       loop_book_(parameters.loop) {}
 
-/// Records the last position. The body may have moved since then, as far as its speed and the gap
-/// allow.
+/// Stores the last position of the previous session. Its standard deviation allows for motion at
+/// the last speed during the gap. Stores nothing after a gap above one minute.
 void Mapper::rememberLastPlace(const Odometry& next) {
   constexpr double kAtRest_m = 2.0, kLeastSpeed = 1.0, kLongest_s = 60.0;
   const auto before = std::exchange(newest_odometry_, std::nullopt);
@@ -38,7 +38,8 @@ void Mapper::rememberLastPlace(const Odometry& next) {
             kAtRest_m + gap_s * std::max(kLeastSpeed, before->speed)};
 }
 
-/// The position at which the session began. The yaw of this W in M is unknown.
+/// Returns the position at which the session began, by the last one. The yaw of this W in M is
+/// unknown.
 std::optional<LastPlace> Mapper::lastPlace() const {
   constexpr double kTurns_rad = 10.0, kFarthest_m = 150.0;
   if (!ended_ || ended_->begins == 0 || builder_.way_m() > kFarthest_m) return std::nullopt;
@@ -49,7 +50,7 @@ std::optional<LastPlace> Mapper::lastPlace() const {
   return last;
 }
 
-/// A session that is already known continues from its newest anchor.
+/// Begins a session. A known session continues from its newest anchor.
 void Mapper::begin(const Odometry& odometry) {
   rememberLastPlace(odometry);
   session_ = odometry.world;
@@ -69,15 +70,16 @@ void Mapper::begin(const Odometry& odometry) {
   tracked_ties_.begin();
 }
 
-/// Tentative loop closures that replaced accepted ones remain, because object ids depend on them.
+/// Removes tentative loop closures from the graph, except those that replaced accepted ones,
+/// because object ids depend on these.
 void Mapper::dropTentativeLoops() {
   for (const EdgeId id : loop_book_.begin()) {
     if (state_.identity().factsOf(id).empty()) state_.removeLoop(id);
   }
 }
 
-/// Sets the scale of the session's odometry errors. A replay takes that of its anchors, because it
-/// must not change them; otherwise the scale is estimated from the loops.
+/// Sets the scale of the session's odometry errors: in a replay that of the anchors, which must not
+/// change, else an estimate from the loops.
 void Mapper::continueDrift(const WorldId& session) {
   const auto last = state_.newestOf(session);
   odometry_variance_ = last ? last->scale : DriftVariance();
@@ -123,7 +125,7 @@ void Mapper::onOdometry(const Odometry& odometry) {
   const auto before = builder_.last();
   auto anchor = builder_.add(odometry, state_.nextAnchor());
   if (!anchor) return;
-  if (before) {  // objects and landmarks observed from that anchor until now
+  if (before) {  // its view has the landmarks observed since that anchor
     state_.putView(before->id,
                    view_builder_.viewFrom(before->T_WA, builder_.way_m(),
                                           builder_.way_m() - before->way_m + kOverlap_m));
@@ -146,7 +148,8 @@ bool Mapper::isOld(const ObjectRecord& record) const {
          std::abs(builder_.way_m() - record.way_m) > parameters_.loop.visit_m;
 }
 
-/// The object given the pose: the part of its covariance that the pose error explains is removed.
+/// Returns the object with its covariance given the body's pose, that is without the part that the
+/// pose error explains.
 PlacedObject Mapper::placedOf(const ObjectBelief& belief, const Matrix6d& pose_error) {
   const ClassBelief& best = belief.best();
   PlacedObject o;
@@ -208,7 +211,7 @@ void Mapper::onObjects(const Objects& objects) {
         known == nullptr || belief.last_seen > known->last_seen || known->session != *session_;
     if (seen_now) see(belief, objects);
   }
-  // A body that lost its position and does not move can be located by additional objects.
+  // If the odometry was reset and the body does not move, additional objects can locate it.
   const bool more = ended_ && seen_ > searched_with_;
   if (!more && builder_.way_m() - searched_at_m_ < parameters_.loop.search_each_m) return;
   searched_at_m_ = builder_.way_m();
@@ -270,7 +273,7 @@ std::vector<Recallable> Mapper::near(const Eigen::Vector3d& centre_W, double rad
   if (!builder_.last()) return result;
   const Anchor& here = *builder_.last();
   const Eigen::Vector3d centre_M = state_.graph().pose(here.id) * (here.T_WA.inverse() * centre_W);
-  constexpr double kSeenWithin_m = 60.0;  // largest distance of an object from its anchor
+  constexpr double kSeenWithin_m = 60.0;  // largest expected distance of an object from its anchor
   for (const auto& [anchor, pose] : state_.graph().poses()) {
     if ((pose.p - centre_M).norm() > radius_m + kSeenWithin_m) continue;
     std::optional<Recallable> of_anchor;
@@ -309,7 +312,8 @@ const ObjectRecord* Mapper::recordOf(ObjectId id) const {
 
 bool Mapper::holds(ObjectId id) const { return recordOf(id) != nullptr; }
 
-/// The relative pose of anchor `a` to `here`; nothing if it is too uncertain.
+/// Returns the transform and its error for objects of anchor `a`; nothing if the pose of `a`
+/// relative to `here` is too uncertain.
 std::optional<Recallable> Mapper::relativeTo(const Anchor& here, const Anchor& a) {
   const auto T_ba = marginals().to(a.id);
   const LoopParameters& loop = parameters_.loop;

@@ -1,8 +1,9 @@
 // The map: anchors along the trajectory, their pose graph, the objects that belong to them, and
-// loop closures. Inputs are odometry and the working set. Outputs are the present positions of
-// objects of earlier visits, the tracks that are one object, and the pose of W in M.
+// loop closures. Inputs are odometry, landmarks and the working set. Outputs are the present
+// positions of objects of earlier visits, the tracks that are one object, and the pose of W in M.
 //
-// It uses no files, threads or clock. The same messages in the same order give the same map.
+// The mapper uses no files, threads or clock. The same messages in the same order give the same
+// map.
 #pragma once
 
 #include <cstddef>
@@ -42,7 +43,8 @@ struct LoopWithdrawal {
 /// Changes since the last call of takeChange.
 struct MapChange {
   std::vector<LoopClosure> loops;
-  std::vector<SameObject> facts;   ///< from these loop closures; a was known, b was detected as new
+  std::vector<SameObject> facts;   ///< from these loop closures; a: known track, b: newly detected
+                                   ///< track
   std::vector<MergeOrder> merges;  ///< objects that became one by the facts
   std::vector<LoopWithdrawal> withdrawn;
   std::vector<MergeOrder> splits;  ///< objects that were separated again
@@ -53,9 +55,9 @@ struct MapChange {
 /// A map object near the body.
 struct Recallable {
   ObjectId id = 0;
-  TrackId track = 0;  ///< its id when it was last detected
-  /// Maps the stored belief from its session's W into the present W. Nothing: the belief is in the
-  /// present W, and odometry alone relates it to the body.
+  TrackId track = 0;  ///< id of the track that was last detected
+  /// Maps the stored belief from its session's W into the present W. Nothing if the belief is in
+  /// the present W and the graph has not moved its anchor relative to the body.
   std::optional<RigidTransform> T_now;
   /// Error of T_now: [δp, δyaw] in W, with rotations about `about_W`.
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
@@ -66,40 +68,43 @@ struct Recallable {
 
 class Mapper {
  public:
-  /// `saved`: the state at the end of the last process.
+  /// `saved` is the state at the last save.
   explicit Mapper(const Parameters& parameters, SavedMap saved = {});
 
-  /// Must precede the working set of the same frame.
+  /// Processes the odometry of a frame. Must precede the working set of the same frame.
   void onOdometry(const Odometry& odometry);
   void onObjects(const Objects& objects);
-  /// Landmarks show the appearance of places. Without them, only objects locate the body.
+  /// Processes landmarks, which show the appearance of places. Without them, only objects locate
+  /// the body.
   void onLandmarks(const Landmarks& landmarks);
-  /// The filter has merged two tracks. An absorbed track that was never confirmed names no object.
+  /// Processes a merge by the filter. Stores no fact if the absorbed track was never confirmed.
   void onMerged(TrackId survivor, TrackId absorbed, bool confirmed = true);
-  /// The filter has deleted a confirmed track.
+  /// Processes the deletion of a confirmed track by the filter.
   void onGone(TrackId id);
-  /// Repeats a saved session and searches for its places on the maps of other sessions, also with
-  /// later observations. Used when maps are combined. Afterwards the mapper is at the end of the
-  /// session.
+  /// Visits the anchors of a saved session again, and searches at each for loops with other
+  /// sessions, including later ones. Map fusion uses this function. Afterwards the mapper is at the
+  /// end of the session.
   void replay(const WorldId& session);
   MapChange takeChange() { return std::exchange(change_, {}); }
 
-  /// Whether it receives the odometry of this frame of reference.
+  /// Whether the present session is `world` and has an anchor.
   bool follows(const WorldId& world) const { return session_ == world && builder_.last(); }
 
-  /// Objects within radius_m of a position in W. Only objects are returned whose position relative
-  /// to the body is certain enough to match them with detections.
+  /// Returns the objects within `radius_m` of a position in W. Leaves out objects whose pose
+  /// relative to the body is too uncertain for a recall.
   std::vector<Recallable> near(const Eigen::Vector3d& centre_W, double radius_m);
-  /// The same for one track as last detected; nothing if its position is too uncertain.
+  /// Returns the same data for one track as last detected; nothing if the track is gone or its pose
+  /// is too uncertain.
   std::optional<Recallable> placeOf(TrackId track);
 
-  /// Whether the object belongs to an anchor.
+  /// Whether the object is confirmed and belongs to an anchor.
   bool holds(ObjectId id) const;
-  /// The record of the object; null if it does not belong to an anchor.
+  /// Returns the record of the object; null if it is not confirmed or does not belong to an anchor.
   const ObjectRecord* recordOf(ObjectId id) const;
 
   const Identity& identity() const { return state_.identity(); }
-  /// Tracks whose object has changed since markSaved(), or that have begun or ceased to share it.
+  /// Tracks whose object id has changed since markSaved(), or that began or ceased to share an
+  /// object.
   const std::set<TrackId>& regrouped() const { return state_.regrouped(); }
 
   /// unsaved() returns the changes to save. Call markSaved() once they are saved.
@@ -108,18 +113,19 @@ class Mapper {
 
   /// The pose of the present W in M, near the body.
   RigidTransform T_MW() const;
-  /// Details of that transform; nothing before the first pose.
+  /// The transform T_MW with its M and covariance.
   struct Frame {
     WorldId map;  ///< M: W of the first session of the component
     RigidTransform T_MW;
     Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();  ///< covariance of the body's pose in M,
                                                            ///< [δp, δyaw]
     std::uint32_t sessions = 0;                            ///< number of sessions in the component
-    std::uint32_t loops = 0;                               ///< number of accepted loop closures on
-                                                           ///< the whole map
+    std::uint32_t loops = 0;                               ///< number of accepted loop closures and
+                                                           ///< ties on the whole map
   };
+  /// Returns nothing before the first anchor.
   std::optional<Frame> frame();
-  /// The same transform along a session, at each anchor.
+  /// T_MW near an anchor of a session, at the time of the anchor.
   struct Along {
     TimePoint time;
     RigidTransform T_MW;
@@ -132,15 +138,17 @@ class Mapper {
     Edge edge;
     double weight = 1.0;
     bool told = false;  ///< false while it is tentative; always false for a tie
-    std::vector<std::pair<ObjectId, ObjectId>> pairs = {};  ///< known, seen; empty: unknown
+    std::vector<std::pair<ObjectId, ObjectId>> pairs = {};  ///< known, seen; empty if unknown, or
+                                                            ///< if the loop is by landmarks
     std::size_t points = 0;
   };
   std::vector<Loop> loops() const;
-  /// Variances of every anchor, as in Marginals::variances; empty without anchors.
+  /// Returns the variances of every anchor as Marginals::variances() does; empty if there are no
+  /// anchors.
   std::map<AnchorId, Eigen::Vector4d> variances();
   /// Number of map objects that were last detected from an anchor.
   std::size_t objectsOf(AnchorId anchor) const;
-  /// The newest anchor of a session; if it has none, of any session.
+  /// The newest anchor of a session; of any session if this one has none.
   std::optional<AnchorId> newestAnchor(const WorldId& session) const;
 
   const PoseGraph& graph() const { return state_.graph(); }
@@ -191,8 +199,8 @@ class Mapper {
   ViewSearch view_search_;
   TrackedTies tracked_ties_;
   LoopBook loop_book_;
-  DriftVariance odometry_variance_;  ///< factor on the covariances of the session's odometry edges
-  /// The largest plausible deviation of the odometry, as a multiple of that in use.
+  DriftVariance odometry_variance_;  ///< factors of the covariances of the session's odometry edges
+  /// The largest plausible standard deviation of the odometry's error, relative to the one in use.
   double widening_ = 1.0;
   std::optional<WorldId> session_;
   std::unique_ptr<Marginals> marginals_;  ///< relative to the newest anchor
@@ -203,15 +211,16 @@ class Mapper {
     std::set<std::pair<ObjectId, ObjectId>> pairs;
   };
   std::optional<ActiveLoop> active_;
-  /// The pose of the session by one search, if one search does not suffice.
+  /// The pose of the session according to one search, until a second search agrees.
   struct Tentative {
     LevelPose T_MN;
     AnchorId component = 0;
     double way_m = 0.0;
     std::set<std::pair<ObjectId, ObjectId>> pairs;
   };
-  std::optional<Tentative> tentative_elsewhere_, tentative_widely_;  ///< of the two searches
-  /// The end of the previous session, until this session is connected with it.
+  std::optional<Tentative> tentative_elsewhere_, tentative_widely_;  ///< of searchElsewhere() and
+                                                                     ///< searchWidely()
+  /// The end of the previous session, until a loop connects this session with the map.
   struct Ended {
     AnchorId anchor = 0, begins = 0;  ///< newest anchor of the previous session, and first one of
                                       ///< this session

@@ -16,7 +16,7 @@ std::set<std::pair<ObjectId, ObjectId>> pairsOf(const PlaceMatch& match) {
 
 }  // namespace
 
-/// Adds edges from objects that were detected again under their old ids.
+/// Adds an edge if objects that were detected again under their old ids reduce the uncertainty.
 void Mapper::tie() {
   const auto tie = tracked_ties_.find(body());
   if (!tie) return;
@@ -25,7 +25,7 @@ void Mapper::tie() {
   const double chi2 = state_.graph().chi2(edge);
   state_.addLoop(edge);
   marginals_.reset();
-  constexpr double kAgrees = 4.0;  // the next optimisation includes it
+  constexpr double kAgrees = 4.0;  // χ² up to which the tie waits for the next optimisation
   if (chi2 > kAgrees) graphMoved();
 }
 
@@ -37,7 +37,8 @@ void Mapper::graphMoved() {
   ++revision_;
 }
 
-/// Reports the loop closures that the graph accepts now, and removes those that it rejects.
+/// Reports loop closures that the graph accepts now, and removes those that it has rejected for
+/// some distance.
 void Mapper::settle() {
   const LoopBook::Verdict verdict = loop_book_.judge(state_.graph(), builder_.way_m());
   for (const EdgeId id : verdict.given_up) {
@@ -59,14 +60,14 @@ void Mapper::settle() {
   }
 }
 
-/// The pairs of the loop closure are one object each.
+/// Adds a fact for each pair of the loop closure: both tracks are one object.
 void Mapper::join(const LoopClosure& loop) {
   const Identity& identity = state_.identity();
   for (const auto& [known, seen] : loop.match.pairs) {
     const ObjectRecord *of_known = state_.recordOfTrack(known),
                        *of_seen = state_.recordOfTrack(seen);
     const bool both = of_known && of_seen && !of_known->gone && !of_seen->gone;
-    if (known == seen || !both) continue;  // one may be gone since the loop was found
+    if (known == seen || !both) continue;  // a track may have ended since the search
     const auto [survivor, absorbed] =
         std::minmax({identity.objectOf(known), identity.objectOf(seen)});
     const SameObject fact{loop.id, known, seen};
@@ -92,7 +93,8 @@ void Mapper::withdraw(EdgeId loop) {
   if (active_ && active_->id == loop) active_.reset();
 }
 
-/// The present view, in the newest anchor. A replayed session uses the stored view.
+/// Returns the present view in the axes of the newest anchor; in a replay, the anchor's stored
+/// view.
 View Mapper::viewOfNow() const {
   constexpr double kBack_m = 15.0;
   const Anchor& here = *builder_.last();
@@ -100,7 +102,7 @@ View Mapper::viewOfNow() const {
   return view_builder_.viewFrom(here.T_WA, builder_.way_m(), kBack_m);
 }
 
-/// Whether the match has a pair of the newest loop closure.
+/// Whether the match and the newest loop closure have a pair in common.
 bool Mapper::restsOnActive(const PlaceMatch& match) const {
   return active_ && std::any_of(match.pairs.begin(), match.pairs.end(),
                                 [&](const auto& pair) { return active_->pairs.contains(pair); });
@@ -116,7 +118,7 @@ std::optional<LoopSearch::Found> Mapper::searchWidely(const Whereabouts& here) {
   if (widening_ < kWider || since_m < parameters_.loop.elsewhere_each_m) return std::nullopt;
   searched_widely_at_m_ = builder_.way_m();
   auto found = loop_search_.nearby(body(widening_));
-  // A match of the active loop's pairs is a less accurate measurement of it.
+  // A match with pairs of the active loop would only measure this loop again, less accurately.
   if (!found || restsOnActive(found->match) ||
       view_search_.contradicts(*found, here, viewOfNow()) ||
       !isAgreedOn(*found, tentative_widely_, kOthers)) {
@@ -125,8 +127,8 @@ std::optional<LoopSearch::Found> Mapper::searchWidely(const Whereabouts& here) {
   return found;
 }
 
-/// Searches by objects. If they give no match, searches by objects in a wider region, because the
-/// odometry may err more than is assumed, and by appearance, once for each anchor.
+/// Searches by objects. If that gives no match, searches by objects in a wider region, and then,
+/// once for each anchor, by appearance.
 std::optional<LoopSearch::Found> Mapper::searchNearby(const Whereabouts& here, bool new_view) {
   auto found = loop_search_.nearby(here);
   if (found && view_search_.contradicts(*found, here, viewOfNow())) return std::nullopt;
@@ -158,11 +160,12 @@ void Mapper::search() {
   if (!found) found = searchElsewhere(here, new_view);
   if (!found) return;
   const bool by_objects = !found->match.pairs.empty();
-  if (by_objects && active_ && active_->pairs == pairsOf(found->match)) return;  // nothing new
+  if (by_objects && active_ && active_->pairs == pairsOf(found->match)) return;  // no new pair
   close(*found);
 }
 
-/// Learns the scale of the session's odometry errors from its loops, and applies it.
+/// Estimates the scale of the session's odometry errors from its loops. Applies the scale except in
+/// a replay.
 void Mapper::learnDrift() {
   std::vector<Anchor> way;
   for (const auto& [id, anchor] : state_.anchors()) {
@@ -185,8 +188,9 @@ void Mapper::learnDrift() {
   learned_at_m_ = builder_.way_m();
 }
 
-/// In similar streets one search may find the wrong street. A second search uses more objects, in
-/// at least `other_pairs` pairs of objects that the first one did not match.
+/// Returns whether an earlier search gave the same pose, because one search may find a similar,
+/// wrong street. The two searches must be some distance apart, and at least `other_pairs` pairs
+/// must be absent from the first. Otherwise stores `found` in `before`.
 bool Mapper::isAgreedOn(const LoopSearch::Found& found, std::optional<Tentative>& before,
                         std::size_t other_pairs) const {
   constexpr double kSame_m = 3.0, kSame_rad = 0.1;
@@ -235,7 +239,7 @@ void Mapper::close(const LoopSearch::Found& found) {
   graphMoved();
 }
 
-/// Moves the younger of two components into the older one's M, as the edge determines.
+/// Moves the younger of the two components that the edge connects into the M of the older one.
 void Mapper::bringTogether(const Edge& edge) {
   const auto components = componentsOf(state_.graph());
   const bool b_is_younger = components.at(edge.b) > components.at(edge.a);
@@ -250,7 +254,7 @@ void Mapper::bringTogether(const Edge& edge) {
   state_.move(moving, b_is_younger ? T_MN : T_MN.inverse());
 }
 
-/// Converts the measured T_Mb to an edge. The error of a in M is not a part of the edge's error.
+/// Converts a measured T_Mb to an edge. The error of a in M is not part of the edge's error.
 Edge Mapper::edgeFrom(AnchorId a, AnchorId b, const LevelGaussian& T_Mb, EdgeKind kind) const {
   Edge edge{a, b, {}, kind};
   const LevelPose T_Ma = state_.graph().pose(a);

@@ -5,7 +5,8 @@
 
 namespace perdure::mapping {
 
-/// Sets the evidence of a loop closure. For one of an earlier process, its facts are the evidence.
+/// Sets the evidence of a loop closure: its pairs and number of landmarks. If it was found before
+/// the present session, the evidence is its facts.
 void Mapper::putWitnesses(EdgeId loop, std::vector<std::pair<ObjectId, ObjectId>>& pairs,
                           std::size_t& points) const {
   if (const LoopClosure* closure = loop_book_.closureOf(loop)) {

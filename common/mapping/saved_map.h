@@ -1,6 +1,6 @@
-// The part of the map that outlives the process, besides the objects: anchors, edges, and the
-// sightings of each object. `Mapper` reports the changes. The store commits them in the same
-// transaction as the objects, and returns them bit by bit at the next start.
+// The stored part of the map besides the beliefs: anchors, edges, views, facts, and the sightings
+// of each object. `Mapper` returns the changes. The store commits them in the same transaction as
+// the objects, and loads them bit for bit at the next start.
 #pragma once
 
 #include <cstdint>
@@ -26,22 +26,23 @@ struct Sighting {
   PlacedObject in_anchor;
 };
 
-/// The record of a track, or of an object from all of its tracks.
+/// The record of a track, or of an object with one or several tracks.
 struct ObjectRecord {
   WorldId session;
   double way_m = 0.0;  ///< distance travelled in the session at its last detection
   TimePoint last_seen;
-  Matrix6d pose_error = Matrix6d::Zero();  ///< the body's pose error at that time, [θ, p]
+  Matrix6d pose_error = Matrix6d::Zero();  ///< covariance of the body's pose error [θ, p] at that
+                                           ///< time
   Sighting sighting;                       ///< the newest sighting
-  std::optional<Sighting> earlier;         ///< on the visit before, if it was detected again
-  bool confirmed = false;                  ///< ever confirmed, so it is on the map; others are not
-                                           ///< saved
-  bool gone = false;  ///< the filter deleted this track; only of tracks that share an object
+  std::optional<Sighting> earlier;         ///< the sighting of the visit before, if any
+  bool confirmed = false;                  ///< confirmed at any time; only such objects are on the
+                                           ///< map and saved
+  bool gone = false;  ///< the filter deleted this track; set only for tracks that share an object
 };
 
 struct SavedAnchor {
   Anchor anchor;
-  LevelPose T_MA;          ///< by the graph
+  LevelPose T_MA;          ///< pose in M by the graph
   bool held_fast = false;  ///< whether it is the fixed anchor of its component
 };
 
@@ -50,7 +51,7 @@ struct SavedEdge {
   double weight = 1.0;  ///< at the last optimisation, (0, 1]
 };
 
-/// The whole state, or changes that replace the stored rows of the same ids.
+/// The whole state, or changes: rows that replace the stored ones of the same ids.
 struct SavedMap {
   std::vector<std::string> classes;  ///< all class names, indexed by ClassShare::name
   std::map<AnchorId, SavedAnchor> anchors;

@@ -11,8 +11,8 @@
 namespace perdure::mapping {
 namespace {
 
-/// Above this share of its variance, an object's position mostly comes from the map, not from
-/// detections.
+/// Largest share of the recalled position in an object's information. Above it, the position comes
+/// too much from the map instead of detections.
 constexpr double kMostLaid = 0.25;
 
 struct Pair {
@@ -27,8 +27,8 @@ MatchEquations equationsAt(const LevelPose& T_Mb, const std::vector<Pair>& pairs
   return equations;
 }
 
-/// Selects the pairs of the one visit that constrains the body's position best, because the edge
-/// leads to an anchor of that visit. Returns that anchor.
+/// Removes all pairs except those of the visit that constrains the body's position best. Returns an
+/// anchor of that visit, to which the edge leads.
 AnchorId keepOneVisit(std::vector<Pair>& pairs, const MapState& state, double visit_m) {
   AnchorId best = 0;
   double most = 0.0;
@@ -53,8 +53,8 @@ bool TrackedTies::isUsed(ObjectId id, double way_m) const {
   return at != used_at_m_.end() && way_m - at->second < parameters_.loop.visit_m;
 }
 
-/// The posterior of an object contains its recalled position as a prior. If r is that prior's share
-/// of the information, detections alone have the covariance P / (1 − r).
+/// The posterior covariance P of an object includes its recalled position as a prior. If the prior
+/// has the share r of the information, detections alone have the covariance P / (1 − r).
 std::optional<TrackedTies::Tie> TrackedTies::find(const Whereabouts& body) const {
   const LoopParameters& loop = parameters_.loop;
   const double way_m = body.way.way_m();

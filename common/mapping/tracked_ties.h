@@ -1,5 +1,5 @@
 // Measures drift with objects that are observed again under their old ids. The filter recalled them
-// at the poses of the graph, and detections have corrected these since. Derivation:
+// at poses from the graph; new detections have corrected these poses. Derivation:
 // tools/docs/maths/pose_graph.md.
 #pragma once
 
@@ -20,10 +20,12 @@ class TrackedTies {
     AnchorId home = 0;              ///< anchor of the earlier visit
     std::vector<ObjectId> objects;  ///< observed on both visits as the same track
   };
-  /// Returns the present tie, or nothing if the objects add no information to the graph. Each
-  /// object is used once per visit.
+  /// Returns the present tie; nothing if there are too few such objects, or if they do not reduce
+  /// the uncertainty enough. Leaves out objects of ties used on this visit.
   std::optional<Tie> find(const Whereabouts& body) const;
+  /// Records that the objects of the tie were used.
   void use(const Tie& tie, double way_m);
+  /// Call it at the start of a session.
   void begin() { used_at_m_.clear(); }
 
  private:

@@ -34,7 +34,8 @@ std::optional<Way> wayTo(AnchorId anchor, const Whereabouts& body, const View& s
   return Way{anchor, {T_Ma * match->T_AB.mean, turnedBy(T_Ma.R(), match->T_AB.covariance)}, *match};
 }
 
-/// The best candidate, with the score of the best one at another place.
+/// Returns the best candidate, with the score of the best one at another place as `next`, and sets
+/// `home` to its anchor.
 std::optional<PlaceMatch> bestOf(const std::vector<Way>& ways, AnchorId& home) {
   const auto best = std::max_element(ways.begin(), ways.end(), [](const Way& a, const Way& b) {
     return a.match.nats < b.match.nats;
@@ -72,7 +73,7 @@ std::optional<LoopSearch::Found> ViewSearch::nearby(const Whereabouts& body,
     ++asked;
     const auto way = wayTo(id, body, seen);
     if (!way) continue;
-    // The error of the candidate plus the prior of the body relative to this anchor.
+    // Covariance of the difference of the candidate from the prior pose relative to this anchor.
     const LevelGaussian prior = bodyByGraph(body, *T_ba);
     Eigen::Matrix4d S = prior.covariance + way->T_MB.covariance;
     addFloor(S, parameters_.loop.floor_m, parameters_.loop.floor_rad);

@@ -1,5 +1,5 @@
-// Place recognition by appearance, the second cue besides objects. It proposes loops if objects
-// give no evidence, and confirms or contradicts loops proposed by objects. Derivation:
+// Place recognition by appearance, in addition to that by objects. Finds loops if objects give no
+// evidence, and contradicts wrong loops that objects propose. Derivation:
 // tools/docs/maths/appearance.md.
 #pragma once
 
@@ -15,8 +15,8 @@ class ViewSearch {
  public:
   explicit ViewSearch(const Parameters& parameters) : parameters_(parameters) {}
 
-  /// `seen`: recent landmarks, in the axes of the body's newest anchor. Searches the part of the
-  /// graph that is linked to the body. Returns only results that clearly reduce the uncertainty of
+  /// Searches the part of the graph that is linked to the body. `seen` has recent landmarks, in the
+  /// axes of the body's newest anchor. Returns only results that clearly reduce the uncertainty of
   /// the body's position.
   std::optional<LoopSearch::Found> nearby(const Whereabouts& body, const View& seen) const;
   /// Searches the components of the graph that are not linked to the body's session.

@@ -23,8 +23,8 @@ constexpr double power(double base, int exponent) {
 
 }  // namespace detail
 
-/// Weights of `Order` neighbouring controls as polynomials in s: [control][power of s]. Source:
-/// Sommer et al. 2020, eq. 14 (Qin's general matrix of uniform B-splines).
+/// Returns the weights of `Order` neighbouring controls as polynomials in s: [control][power of s].
+/// Source: Sommer et al. 2020, eq. 14 (Qin's general matrix of uniform B-splines).
 template <int Order>
 constexpr std::array<std::array<double, Order>, Order> blendingMatrix() {
   std::array<std::array<double, Order>, Order> m{};
@@ -45,7 +45,8 @@ constexpr std::array<std::array<double, Order>, Order> blendingMatrix() {
   return m;
 }
 
-/// Weights that multiply differences of neighbours instead (eq. 16): sums of the rows below.
+/// Returns the weights of the differences between neighbouring controls (eq. 16): each row is the
+/// sum of the rows of blendingMatrix() from this one on.
 template <int Order>
 constexpr std::array<std::array<double, Order>, Order> cumulativeMatrix() {
   auto m = blendingMatrix<Order>();
@@ -55,7 +56,7 @@ constexpr std::array<std::array<double, Order>, Order> cumulativeMatrix() {
   return m;
 }
 
-/// A polynomial's value and first two derivatives at s; T may be a dual number.
+/// Returns the value and the first two derivatives of a polynomial at s. T may be a dual number.
 template <class T, std::size_t N>
 std::array<T, 3> evaluatePolynomial(const std::array<double, N>& coefficients, const T& s) {
   std::array<T, 3> v{T(0.0), T(0.0), T(0.0)};

@@ -7,8 +7,8 @@
 namespace perdure {
 namespace {
 
-// Regularised lower incomplete gamma P(a, x): series below a + 1, continued fraction above
-// (Abramowitz & Stegun 6.5.29 and 6.5.31).
+// Regularised lower incomplete gamma function P(a, x): a series for x below a + 1, a continued
+// fraction above (Abramowitz & Stegun 6.5.29 and 6.5.31).
 double regularisedGamma(double a, double x) {
   if (x <= 0.0) return 0.0;
   const double scale = std::exp(-x + a * std::log(x) - std::lgamma(a));

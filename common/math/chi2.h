@@ -3,9 +3,9 @@
 
 namespace perdure {
 
-/// P(X <= x) for `dof` >= 1 degrees of freedom, x >= 0.
+/// Returns P(X <= x) for x >= 0 and `dof` >= 1 degrees of freedom.
 double chi2Cdf(double x, int dof);
-/// The x with P(X <= x) = p; p in (0, 1), dof >= 1.
+/// Returns the x with P(X <= x) = p, for p in (0, 1) and dof >= 1.
 double chi2Quantile(double p, int dof);
 
 }  // namespace perdure

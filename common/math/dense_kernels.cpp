@@ -42,7 +42,7 @@ PERDURE_INLINE void reduceTile(double* S, long stride, long i, long j, const Fou
   }
 }
 
-/// As above, for one row and `width` columns.
+/// Does the same as reduceTile() below the diagonal block, for one row and `width` columns.
 PERDURE_INLINE void reduceRow(double* S, long stride, long i, long j, long width,
                               const Four& inverse) {
   for (long c = 0; c < width; ++c) {
@@ -52,7 +52,8 @@ PERDURE_INLINE void reduceRow(double* S, long stride, long i, long j, long width
   }
 }
 
-/// Subtracts earlier columns in the block and factorises `width` columns from j on.
+/// Factorises the diagonal block of `width` columns from j on, and stores the inverses of its
+/// diagonal. Returns false if the block is not positive definite.
 PERDURE_INLINE bool factoriseBlock(double* S, long stride, long j, long width, Four& inverse) {
   for (long c = j; c < j + width; ++c) {
     double* column = S + c * stride;
@@ -68,7 +69,8 @@ PERDURE_INLINE bool factoriseBlock(double* S, long stride, long j, long width, F
   return true;
 }
 
-/// Solves rows i to i + N of 4 W columns, stored row by row, from the rows before them.
+/// Solves rows i to i + N of X, whose rows before i are solved. X has 4 W columns and is stored row
+/// by row.
 template <int N, int W>
 PERDURE_INLINE void whitenRows(const double* L, long stride, long i, double* X) {
   constexpr long kWidth = kFour * W;
@@ -93,7 +95,7 @@ PERDURE_INLINE void whitenRows(const double* L, long stride, long i, double* X) 
   }
 }
 
-/// Whitens up to 4 W columns; `X`, n × 4 W, is a work space.
+/// Whitens `columns` columns of B, at most 4 W. `X` is a workspace of n × 4 W numbers.
 template <int W>
 PERDURE_INLINE void whitenPanel(const double* L, long stride, long n, double* B, long columns,
                                 double* X) {
@@ -138,7 +140,7 @@ PERDURE_INLINE void timesTransposedTile(const double* A, long rows, const double
   }
 }
 
-/// Computes all rows from i on of columns j to j + N of A Bᵀ.
+/// Computes columns j to j + N of A Bᵀ in all rows from i on.
 template <int N>
 PERDURE_INLINE void timesTransposedColumns(const double* A, long rows, const double* B,
                                            long columns, long inner, long i, long j,

@@ -1,7 +1,7 @@
-// The loops that dominate the run time of a batch with ten to a hundred dimensions. Eigen's packing
-// of blocks of this size costs more than the sums. On x86-64 the functions are also compiled for
-// AVX2, which is used if the machine supports it. Results do not depend on the machine, because
-// fused multiply-add is not used.
+// Matrix operations that dominate the run time of batch estimates with ten to a hundred dimensions.
+// For matrices of this size, Eigen's packing of blocks costs more than the arithmetic. On x86-64
+// the functions are also compiled for AVX2, which is used if the machine supports it. Results do
+// not depend on the machine, because fused multiply-add is not used.
 #pragma once
 
 namespace perdure::dense {
@@ -14,18 +14,18 @@ bool factorise(double* S, long stride, long n);
 /// B ← L⁻¹ B for an n × m matrix with column stride n.
 void whiten(const double* L, long stride, long n, double* B, long m);
 
-/// The 4 × 4 blocks on and below the diagonal of A B, with A n × 6 and B 6 × n; n is a multiple of
-/// four.
+/// Computes A B for A n × 6 and B 6 × n, in 4 × 4 blocks on and below the diagonal only; n is a
+/// multiple of four.
 void multiplySix(const double* A, const double* B, long n, double* product);
 
-/// A Bᵀ with A rows × inner and B columns × inner.
+/// Computes A Bᵀ for A rows × inner and B columns × inner.
 void timesTransposed(const double* A, long rows, const double* B, long columns, long inner,
                      double* product);
 
-/// A Aᵀ with A rows × inner; only some of the elements above the diagonal are written.
+/// Computes A Aᵀ for A rows × inner, on and below the diagonal. Elements above it are undefined.
 void lowerTimesTransposed(const double* A, long rows, long inner, double* product);
 
-/// A B with A 4 × inner and B inner × columns; the columns of B have the stride `stride`.
+/// Computes A B for A 4 × inner and B inner × columns; the columns of B have the stride `stride`.
 void fourRowsTimes(const double* A, const double* B, long stride, long inner, long columns,
                    double* product);
 

@@ -14,29 +14,29 @@ namespace perdure {
 using MatrixView = Eigen::Ref<const Eigen::MatrixXd>;
 using VectorView = Eigen::Ref<const Eigen::VectorXd>;
 
-/// log N(residual; 0, S). -infinity when S is not positive definite.
+/// Returns log N(residual; 0, S), or -infinity if S is not positive definite.
 double logGaussian(const VectorView& residual, const MatrixView& S);
 
-/// rᵀ S⁻¹ r.
+/// Returns rᵀ S⁻¹ r for the residual r.
 double squaredMahalanobis(const VectorView& residual, const MatrixView& S);
 
-/// S⁻¹ B of a symmetric S, n × n, and an n × m matrix B.
+/// Returns S⁻¹ B for a symmetric n × n matrix S and an n × m matrix B.
 Eigen::MatrixXd solveSymmetric(const MatrixView& S, const MatrixView& B);
 
 Eigen::MatrixXd inverseSymmetric(const MatrixView& S);
 
-/// B S⁻¹ of an m × n matrix B: the regression of B on the variable with covariance S. The result is
-/// zero if S is not positive definite (a pivot below 1e-18).
+/// Returns B S⁻¹ for an m × n cross-covariance B: the regression on the variable with covariance S.
+/// The result is zero if S is not positive definite (a pivot below 1e-18).
 Eigen::MatrixXd regressOn(const MatrixView& S, const MatrixView& B);
 
-/// A⁻¹ of any square A; not finite if A is singular.
+/// Returns A⁻¹ of a square matrix A. The result is not finite if A is singular.
 Eigen::MatrixXd inverse(const MatrixView& A);
 Eigen::Matrix<double, 6, 6> inverse(const Eigen::Matrix<double, 6, 6>& A);
 
-/// The nearest symmetric matrix to S whose eigenvalues are at least `least`.
+/// Returns the symmetric matrix nearest to S whose eigenvalues are at least `least`.
 Eigen::MatrixXd withLeastEigenvalue(const MatrixView& S, double least);
 
-/// Eigenvalues of a symmetric S, in increasing order.
+/// Returns the eigenvalues of a symmetric S in increasing order.
 Eigen::VectorXd eigenvalues(const MatrixView& S);
 
 /// Stores L of S = L Lᵀ in S's lower triangle; the upper one is neither read nor written. Returns

@@ -8,7 +8,7 @@
 
 namespace perdure {
 
-/// Distance of two 256-bit descriptors, [0, 256].
+/// Returns the number of different bits of two 256-bit descriptors, 0 to 256.
 inline int hammingDistance(const std::array<std::uint8_t, 32>& a,
                            const std::array<std::uint8_t, 32>& b) {
   std::array<std::uint64_t, 4> x, y;

@@ -1,11 +1,12 @@
-// Central differences, for tests of analytic Jacobians and for cheap uncritical Jacobians.
+// Numeric Jacobians, for tests of analytic Jacobians and for uses that need little accuracy.
 #pragma once
 
 #include <Eigen/Core>
 
 namespace perdure {
 
-/// d f(x) / d x at x for f: R^n -> R^m, by central differences with one step for all inputs.
+/// Returns d f(x) / d x at x for f: R^n -> R^m, by central differences with the same step for all
+/// inputs.
 template <class Function>
 Eigen::MatrixXd numericJacobian(const Function& f, const Eigen::VectorXd& x, double step = 1e-6) {
   const Eigen::VectorXd at_x = f(x);

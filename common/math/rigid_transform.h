@@ -35,9 +35,9 @@ struct RigidTransform {
   bool finite() const { return q.coeffs().allFinite() && p.allFinite(); }
 };
 
-/// T ⊞ [θ, δp].
+/// Returns T ⊞ [θ, δp], in rad and m.
 RigidTransform boxPlus(const RigidTransform& T, const Eigen::Matrix<double, 6, 1>& delta);
-/// The [θ, δp] with b ⊞ delta = a.
+/// Returns delta = [θ, δp] with b ⊞ delta = a.
 Eigen::Matrix<double, 6, 1> boxMinus(const RigidTransform& a, const RigidTransform& b);
 /// Interpolates the rotation by slerp and the position linearly; s in [0, 1].
 RigidTransform interpolate(const RigidTransform& a, const RigidTransform& b, double s);

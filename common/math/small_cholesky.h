@@ -1,5 +1,5 @@
-// S = L Lᵀ for small matrices of fixed size, which a filter factorises by the thousand. They stay
-// on the stack.
+// S = L Lᵀ for small matrices of fixed size, which a filter factorises thousands of times. No heap
+// memory is used.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,7 +26,7 @@ bool choleskyInPlace(Eigen::Matrix<double, N, N>& S) {
   return true;
 }
 
-/// B ← B L⁻ᵀ: the rows of B, M × N, whitened.
+/// B ← B L⁻ᵀ: whitens the rows of B, M × N.
 template <int N, int M>
 void whitenRows(const Eigen::Matrix<double, N, N>& L, Eigen::Matrix<double, M, N>& B) {
   for (int j = 0; j < N; ++j) {

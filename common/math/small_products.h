@@ -8,7 +8,7 @@
 
 namespace perdure {
 
-/// A Bᵀ of N × K and M × K matrices.
+/// Returns A Bᵀ for A N × K and B M × K.
 template <int N, int M, int K>
 Eigen::Matrix<double, N, M> timesTransposed(const Eigen::Matrix<double, N, K>& A,
                                             const Eigen::Matrix<double, M, K>& B) {
@@ -17,7 +17,7 @@ Eigen::Matrix<double, N, M> timesTransposed(const Eigen::Matrix<double, N, K>& A
   return product;
 }
 
-/// A Aᵀ of an N × K matrix, on and below the diagonal; elements above it are undefined.
+/// Returns A Aᵀ for A N × K, on and below the diagonal; the elements above it are undefined.
 template <int N, int K>
 Eigen::Matrix<double, N, N> lowerTimesTransposed(const Eigen::Matrix<double, N, K>& A) {
   Eigen::Matrix<double, N, N> product = Eigen::Matrix<double, N, N>::Zero();
@@ -25,7 +25,7 @@ Eigen::Matrix<double, N, N> lowerTimesTransposed(const Eigen::Matrix<double, N, 
   return product;
 }
 
-/// A Bᵀ with the first K columns of A, N × N.
+/// Returns A' Bᵀ, with A' the first K columns of A, and B M × K.
 template <int N, int M, int K>
 Eigen::Matrix<double, N, M> leftTimesTransposed(const Eigen::Matrix<double, N, N>& A,
                                                 const Eigen::Matrix<double, M, K>& B) {
@@ -34,7 +34,7 @@ Eigen::Matrix<double, N, M> leftTimesTransposed(const Eigen::Matrix<double, N, N
   return product;
 }
 
-/// A B of a 4 × K matrix and the first K rows and M columns of B.
+/// Returns A B', with A 4 × K, and B' the first K rows and M columns of B.
 template <int M, int K, int N, int P>
 Eigen::Matrix<double, 4, M> timesTop(const Eigen::Matrix<double, 4, K>& A,
                                      const Eigen::Matrix<double, N, P>& B) {

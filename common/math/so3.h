@@ -7,28 +7,29 @@
 
 namespace perdure {
 
-/// The matrix [w]x with [w]x v = w × v.
+/// Returns the matrix [w]× with [w]× v = w × v.
 Eigen::Matrix3d skew(const Eigen::Vector3d& w);
-/// Rotation by |theta| radians about theta. Any finite theta.
+/// Returns the rotation by |theta| radians about theta, for any finite theta.
 Eigen::Quaterniond expQuaternion(const Eigen::Vector3d& theta);
 Eigen::Matrix3d expSo3(const Eigen::Vector3d& theta);
-/// The rotation vector with |theta| <= pi.
+/// Returns the rotation vector theta, |theta| <= pi.
 Eigen::Vector3d logSo3(const Eigen::Quaterniond& q);
 Eigen::Vector3d logSo3(const Eigen::Matrix3d& R);
-/// J_r with Exp(theta + d) ≈ Exp(theta) Exp(J_r(theta) d).
+/// Returns J_r with Exp(theta + d) ≈ Exp(theta) Exp(J_r(theta) d).
 Eigen::Matrix3d rightJacobianSo3(const Eigen::Vector3d& theta);
-/// J_r^-1 with Log(Exp(theta) Exp(d)) ≈ theta + J_r^-1(theta) d; |theta| < 2 pi.
+/// Returns J_r^-1 with Log(Exp(theta) Exp(d)) ≈ theta + J_r^-1(theta) d, for |theta| < 2 pi.
 Eigen::Matrix3d rightJacobianInverseSo3(const Eigen::Vector3d& theta);
 
-/// Returns whether R is orthonormal to 1e-2 and right-handed. Not for NaN.
+/// Returns true if R is orthonormal within 1e-2 and right-handed. R must not contain NaN.
 bool isRotation(const Eigen::Matrix3d& R);
 
-/// An angle in radians, wrapped into (-pi, pi].
+/// Returns an angle in radians, wrapped into (-pi, pi].
 double wrapAngle(double angle);
-/// Yaw about +z of a rotation (x axis projected on the horizontal plane), in (-pi, pi].
+/// Returns the yaw of a rotation: the angle about +z of its x axis in the horizontal plane, in
+/// (-pi, pi].
 double yawOf(const Eigen::Matrix3d& R);
 Eigen::Matrix3d rotationAboutZ(double yaw);
-/// The smallest rotation that takes the unit vector `up` to +z.
+/// Returns the smallest rotation that turns `up` (not zero) to +z.
 Eigen::Quaterniond levelling(const Eigen::Vector3d& up);
 
 }  // namespace perdure

@@ -17,7 +17,8 @@ namespace {
 using StampGrade = DataFinding::Grade;
 using StampList = std::vector<TimePoint>;
 
-/// The median interval of ordered stamps in ns, without equal stamps.
+/// Returns the median interval between stamps, without zero intervals, in ns. Returns nothing if
+/// fewer than five intervals remain.
 std::optional<double> intervalOf(StampList stamps) {
   std::sort(stamps.begin(), stamps.end());
   std::vector<std::int64_t> intervals;
@@ -43,11 +44,12 @@ StampList stampsOfCamera(const Recording& recording) {
   return stamps;
 }
 
-/// `repeated` stamps were left out, because they were equal to earlier ones.
+/// Adds stamps_equal if more than half of the stamps equal earlier ones and were left out
+/// (`repeated`). Returns true if fewer than a tenth remain (`kept`).
 bool checkEqual(const char* of, std::uint64_t repeated, std::size_t kept, DataFindings& findings) {
   const auto all = repeated + kept;
   const bool unusable = 10 * kept < all;
-  // A list with each line twice has lost no data.
+  // A list that contains each line twice has lost no data.
   if (2 * repeated <= all || repeated < 3) return false;
   findings.push_back(
       {unusable ? StampGrade::kFatal : StampGrade::kWarning, "stamps_equal",
@@ -57,7 +59,7 @@ bool checkEqual(const char* of, std::uint64_t repeated, std::size_t kept, DataFi
   return unusable;
 }
 
-/// Detects the counts 0, 1, 2 … in place of times.
+/// Adds stamps_count if the stamps are consecutive numbers (0, 1, 2 …) instead of times.
 void checkCount(const char* of, const StampList& stamps, DataFindings& findings) {
   constexpr std::int64_t kHighest = 100'000'000;
   if (stamps.empty() || toNanoseconds(stamps.back()) > kHighest) return;
@@ -72,12 +74,12 @@ void checkCount(const char* of, const StampList& stamps, DataFindings& findings)
            of, first, toNanoseconds(stamps.back()))});
 }
 
-/// The range in nanoseconds, which shows the unit of the stamps.
+/// A range of stamps as text in nanoseconds, by which users recognise a wrong unit.
 std::string rangeText(TimePoint first, TimePoint last) {
   return fmt::format("{} … {} ns", toNanoseconds(first), toNanoseconds(last));
 }
 
-/// A guess at the relation of the two ranges of stamps: a different unit or a different clock.
+/// Suggests why the first stamps of images and IMU differ: another unit or another clock.
 std::string guessOfClock(TimePoint images, TimePoint imu) {
   const double ratio = static_cast<double>(toNanoseconds(images)) /
                        std::max(1.0, static_cast<double>(toNanoseconds(imu)));
@@ -99,7 +101,7 @@ std::string guessOfClock(TimePoint images, TimePoint imu) {
       apart, causeOfShift(apart));
 }
 
-/// Whether camera and IMU share one clock.
+/// Checks whether the stamps of camera and IMU can come from one clock.
 void checkShared(const Recording& recording, DataFindings& findings) {
   if (recording.imu.empty() || recording.frames.empty()) return;
   const TimePoint first = recording.frames.front().time, last = recording.frames.back().time;
@@ -116,7 +118,7 @@ void checkShared(const Recording& recording, DataFindings& findings) {
       std::count_if(recording.frames.begin(), recording.frames.end(),
                     [&](const auto& frame) { return frame.time >= from && frame.time <= to; });
   const auto all = static_cast<std::ptrdiff_t>(recording.frames.size());
-  // An offset of the stamps also leaves the ends of a short drive outside.
+  // In a short drive, a small offset of the stamps excludes many images at the ends.
   constexpr Duration kOffset = std::chrono::milliseconds(500);
   const bool short_time = std::max(between(from, first), between(last, to)) < kOffset;
   if ((short_time ? 10 : 20) * (all - covered) <= all) return;
@@ -144,8 +146,9 @@ void checkRate(const Recording& recording, DataFindings& findings) {
                    rate, said)});
 }
 
-/// The images are `apart` slower, by declared rates, than the inertial samples, and end as much
-/// later: one of the clocks runs at another rate. A camera of another rate ends when the IMU does.
+/// Adds declared_rates if one of the clocks runs at another rate: relative to the IMU and to the
+/// declared rates, the image intervals are too long by the share `apart`, and the images end later
+/// by the same share. If only the camera's declared rate is wrong, both sensors end together.
 void checkOneRate(const Recording& recording, const StampList& imu, const StampList& images,
                   double apart, DataFindings& findings) {
   constexpr double kLeast = 0.02, kStarts_s = 0.1, kAlike = 0.2, kShows_s = 0.5;
@@ -164,7 +167,8 @@ void checkOneRate(const Recording& recording, const StampList& imu, const StampL
                    ends > 0.0 ? "later" : "earlier")});
 }
 
-/// Both sensors differ from their declared rates by one factor: their common clock does.
+/// Adds declared_rates if the intervals of both sensors differ from the declared ones by the same
+/// factor, because their common clock may be wrong.
 void checkCommonRate(const Recording& recording, const StampList& imu, const StampList& images,
                      DataFindings& findings) {
   constexpr double kLeast = 0.02, kAlike = 0.003;
@@ -193,7 +197,7 @@ const char* nameOfSensor(const std::string& sensor) {
   return sensor == "stereo" ? "cam1" : sensor == "speed" ? "the speed" : "the ground truth";
 }
 
-/// The changes of a sensor of one kind, in order.
+/// Returns a sensor's clock changes of one kind, in order.
 std::vector<ClockChange*> changesOf(Recording& recording, const std::string& sensor, Kind kind) {
   std::vector<ClockChange*> some;
   for (ClockChange& change : recording.clock_changes) {
@@ -202,7 +206,7 @@ std::vector<ClockChange*> changesOf(Recording& recording, const std::string& sen
   return some;
 }
 
-/// Adds `by` to the times of a sensor from `from` on.
+/// Adds `by` to all times of a sensor that are not before `from`.
 void shift(Recording& recording, const std::string& sensor, TimePoint from, Duration by) {
   const auto move = [&](auto& items) {
     for (auto& item : items) item.time += item.time >= from ? by : Duration{0};
@@ -212,15 +216,16 @@ void shift(Recording& recording, const std::string& sensor, TimePoint from, Dura
   if (sensor == "frame") move(recording.frames), sortFrames(recording);
 }
 
-/// How long the device was off is not known.
+/// Returns whether the stamps begin again near 0 because the device was restarted. The length of
+/// the pause is then not known.
 bool isRestart(const ClockChange& change) {
   constexpr Duration kStart = std::chrono::seconds(5);
   return change.after < change.before && change.after >= TimePoint{} &&
          change.after < TimePoint{} + kStart;
 }
 
-/// Whether a sensor's clock was set when that of the IMU was, by as much. The amount is known to an
-/// interval, or to more where samples are missing.
+/// Returns whether the clocks of a sensor and of the IMU were set by the same amount. An amount is
+/// known to one interval, or less precisely if samples are missing.
 bool isAlike(const ClockChange& change, const ClockChange& imu) {
   const Duration more = between(TimePoint(imu.added), TimePoint(change.added));
   return !isRestart(imu) && multipleOf(5, more) > multipleOf(-4, change.usual) &&
@@ -246,7 +251,8 @@ void settleSet(Recording& recording) {
   }
 }
 
-/// Continues the stamps of a sensor that began after the counter of the other sensor had wrapped.
+/// Adds whole lengths of the counter to the stamps of a sensor that started after the other
+/// sensor's counter had wrapped.
 void settleCounters(Recording& recording) {
   if (recording.imu.empty() || recording.frames.empty()) return;
   const TimePoint imu = recording.imu.front().time, images = recording.frames.front().time;
@@ -266,7 +272,7 @@ std::string secondsText(Duration amount) {
 
 Duration stepOf(const ClockChange& change) { return between(change.after, change.before); }
 
-/// A pause that both sensors have.
+/// Returns whether the IMU and another sensor have this pause in common.
 bool isOfBoth(const ClockChange& pause, const std::vector<ClockChange>& all) {
   constexpr Duration kAlike = std::chrono::milliseconds(100);
   return std::any_of(all.begin(), all.end(), [&](const ClockChange& other) {
@@ -276,14 +282,14 @@ bool isOfBoth(const ClockChange& pause, const std::vector<ClockChange>& all) {
   });
 }
 
-/// Whether vio, as it is configured by default, starts again after a pause.
+/// Returns whether vio, in its default configuration, starts again after this pause.
 bool endsVio(const ClockChange& pause, const std::vector<ClockChange>& all) {
   constexpr Duration kBlackout = std::chrono::milliseconds(800), kImuGap = std::chrono::seconds(2);
   return (pause.sensor == "imu" && stepOf(pause) > kImuGap) ||
          (isOfBoth(pause, all) && stepOf(pause) > kBlackout);
 }
 
-/// The sentence about `count` changes of a kind, with the place and the amount of the first.
+/// The finding for `count` changes of a kind. Its text gives the place and the amount of the first.
 DataFinding findingOf(const ClockChange& first, std::size_t count, const std::string& places,
                       bool ends_vio) {
   using Grade = DataFinding::Grade;
@@ -323,7 +329,8 @@ bool isShort(const ClockChange& pause) {
   return stepOf(pause) <= std::max<Duration>(std::chrono::seconds(1), multipleOf(20, pause.usual));
 }
 
-/// Whether the sensor ends later than the other one by the length of its pause: its clock was set.
+/// Returns whether the pause is a clock that was set ahead, because the sensor then ends later than
+/// the other one by the length of the pause.
 bool isSetAhead(const Recording& recording, const ClockChange& pause) {
   if (recording.imu.empty() || recording.frames.empty()) return false;
   const auto ofBoth = [](const auto& a, const auto& b) {
@@ -338,7 +345,8 @@ bool isSetAhead(const Recording& recording, const ClockChange& pause) {
          std::chrono::abs(ends - starts - (stepOf(pause) - pause.usual)) < half / 2;
 }
 
-/// Lost samples make short pauses. Others are those of a clock that was set, or of all sensors.
+/// Removes short pauses, which are due to lost samples. Keeps those of a clock that was set ahead,
+/// and those that both sensors have.
 void dropShortPauses(Recording& recording) {
   const std::vector<ClockChange> all = recording.clock_changes;
   std::erase_if(recording.clock_changes, [&](const ClockChange& pause) {
@@ -437,10 +445,10 @@ DataFindings checkClocks(const Recording& recording, const DataUse& use) {
                   images = stampsOfCamera(recording);
   if (of_imu) checkEqual("IMU", recording.reasons.of("imu_not_increasing"), imu.size(), findings);
   checkEqual("images", recording.reasons.of("frame_not_increasing"), images.size(), findings);
-  // Frames without IMU may be numbered if there are no other times, as in KITTI tracking.
+  // Without an IMU, frame numbers may replace times, as in KITTI tracking.
   if (!of_imu || images.empty()) return findings;
   const auto factor = factorOfStamps(imu, images);
-  if (factor == 1) {  // also true for 1 kHz samples with stamps in whole ms
+  if (factor == 1) {  // excludes 1 kHz samples in whole ms, which increase by 1 as counts do
     checkCount("images", images, findings);
     checkCount("samples of the IMU", imu, findings);
   } else {

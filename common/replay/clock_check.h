@@ -6,27 +6,28 @@
 
 namespace perdure::replay {
 
-/// Continues the streams of a recording alike, after they were read one by one
-/// (files/stamp_order.h): a clock that was set by the same amount for IMU and images gets the
-/// IMU's amount in both, and a counter that wrapped in one of them only is continued in the
-/// other.
+/// Corrects streams together after they were read one by one (files/stamp_order.h). If the clock
+/// was set by the same amount for IMU and images, both get the IMU's amount. If a counter wrapped
+/// in only one of them, the other is continued too.
 void settleClocks(Recording& recording);
 
-/// Codes: clock_wrapped, clock_set, clock_set_alone, clock_paused, stamps_equal, stamps_count (an
-/// index instead of a time), stamps_unit, clocks_apart, imu_covers_part, imu_rate. A fatal finding
-/// about units explains later ones about rates.
+/// Checks the clocks of a recording. Codes: clock_wrapped, clock_set, clock_set_alone,
+/// clock_paused, stamps_equal, stamps_count (an index instead of a time), stamps_unit,
+/// clocks_apart, declared_rates, imu_covers_part and imu_rate. After a fatal finding, ranges and
+/// rates are not checked.
 DataFindings checkClocks(const Recording& recording, const DataUse& use);
 
-/// The findings about changes in mid-drive: clock_wrapped, clock_set, clock_set_alone,
+/// Adds only the findings about changes in mid-drive: clock_wrapped, clock_set, clock_set_alone and
 /// clock_paused.
 void checkClockChanges(const Recording& recording, const DataUse& use, DataFindings& findings);
 
-/// A known cause of a difference of two clocks in seconds, such as ", as GPS time is ahead of UTC".
-/// Otherwise "".
+/// Returns a known cause of a difference of two clocks in seconds, such as ", as GPS time is ahead
+/// of UTC by 18 s". Returns "" if there is none.
 std::string causeOfShift(double seconds);
 
-/// The factor that gives both the rates of an IMU (20 … 4000 Hz) and of a camera (1 … 200 Hz): 1000
-/// or 1000000. It is 1 if the rates are plausible already, or if no common factor makes them so.
+/// Returns the factor, 1000 or 1000000, that gives plausible rates to both an IMU (20 … 4000 Hz)
+/// and a camera (1 … 200 Hz). Returns 1 if the rates are plausible already, or if no common factor
+/// makes them so.
 std::int64_t factorOfStamps(std::vector<TimePoint> imu, std::vector<TimePoint> images);
 
 }  // namespace perdure::replay

@@ -20,7 +20,7 @@ namespace {
 
 using Grade = DataFinding::Grade;
 
-/// A range (low, high) of the median that identifies a wrong unit.
+/// A wrong unit of the accelerometer. It is recognised by a median force between `low` and `high`.
 struct Unit {
   double low, high;
   const char *code, *text;
@@ -43,7 +43,7 @@ bool isWithoutGravity(const std::vector<ImuSample>& samples) {
 }
 
 void addForceUnit(const std::vector<ImuSample>& samples, double force, DataFindings& findings) {
-  // Gravity is 9.8 m/s²; a moving sensor measures slightly different values.
+  // The ranges contain gravity in each unit, with a margin for motion.
   constexpr std::array kUnits{
       Unit{0.85, 1.25, "accel_in_g", "the unit is g; multiply the columns by 9.80665"},
       Unit{850, 1250, "accel_in_mg", "the unit is mg; multiply the columns by 0.00980665"},
@@ -73,7 +73,8 @@ void addForceUnit(const std::vector<ImuSample>& samples, double force, DataFindi
   }
 }
 
-/// Checks whether the mean specific force, which points upwards, points down in the image.
+/// Adds images_upside_down if the mean specific force, which points upwards, points down in the
+/// image.
 void checkUpright(const Recording& recording, DataFindings& findings) {
   if (recording.imu.size() < 20 || recording.calibration.cameras.empty()) return;
   const CameraCalibration& camera = recording.calibration.cameras.front();
@@ -89,9 +90,9 @@ void checkUpright(const Recording& recording, DataFindings& findings) {
                    kUpsideDown, camera.name)});
 }
 
-/// Lines that were left out are otherwise only counted.
+/// Adds lines_lost if more than one line per kFew was left out. Smaller losses are only counted.
 void checkLost(const Recording& recording, const DataUse& use, DataFindings& findings) {
-  constexpr std::uint64_t kFew = 20;  // at most one lost line per this number
+  constexpr std::uint64_t kFew = 20;  // accepts one lost line per this number of lines
   const std::uint64_t images = recording.frames.size(), samples = recording.imu.size();
   for (const auto& [kind, kept] : {std::pair("imu", use.imu ? samples : 0), {"frame", images}}) {
     std::uint64_t lost = 0;

@@ -22,7 +22,7 @@
 namespace perdure::replay {
 namespace {
 
-/// The median interval, or 0 if there are too few samples.
+/// The median interval, or 0 if there are fewer than three samples.
 Duration usualInterval(const std::vector<ImuSample>& samples) {
   if (samples.size() < 3) return Duration{0};
   std::vector<Duration> intervals;
@@ -68,7 +68,8 @@ bool hasMessages(const std::filesystem::path& path) {
   return RecordedMessages::looksLikeOne(path) || RosMessages::looksLikeOne(path);
 }
 
-/// A packed recording is unpacked only once, to detect its kind and to read it.
+/// Reads a recording. Compressed files are unpacked only once, to detect their kind and to read
+/// them.
 Recording readMessages(const DatasetOptions& options) {
   const UnpackedFiles kept = unpackedFiles(options.path, ".mcap");
   return RosMessages::looksLikeOne(options.path) ? readRosDrive(options)
@@ -107,7 +108,7 @@ std::optional<Reader> readerOf(const std::filesystem::path& folder) {
   return std::nullopt;
 }
 
-/// Refuses a dataset folder that holds a recording file too.
+/// Refuses a dataset folder that also contains a recording file.
 [[noreturn]] void refuseBoth(const std::filesystem::path& folder) {
   std::string file, part;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
@@ -155,8 +156,8 @@ void numberFrames(Recording& recording) {
   }
 }
 
-/// A part that may not be read looks as if it were missing, so permissions are checked after a
-/// failure.
+/// Reads a drive. Unreadable files look as if they were missing, so permissions are checked after a
+/// failure and named as its cause.
 Recording readReadable(const DatasetOptions& options) {
   try {
     Recording recording = readRecording(options);
@@ -267,8 +268,8 @@ std::optional<Frame> Dataset::decodeFrame(const Recording::FrameFile& file) {
   return frame;
 }
 
-/// The used bits are those of the brightest of five images over the drive. One scale for all images
-/// prevents flicker.
+/// Returns the used bits of a camera's images: those of the brightest image in a sample over the
+/// drive. One scale for all images prevents flicker.
 int Dataset::bitsOf(const Recording::FrameFile& file) {
   const auto known = bits_.find(file.camera);
   if (known != bits_.end()) return known->second;

@@ -25,10 +25,10 @@ using Message = std::variant<ImuSample, SpeedSample, Frame>;
 
 struct DatasetOptions {
   std::filesystem::path path = {};
-  std::string sequence = {};  ///< name, in KITTI tracking and in 7-Scenes
+  std::string sequence = {};  ///< name of the sequence, for KITTI tracking and 7-Scenes
   /// Width and height, for KITTI tracking without images.
   std::optional<std::pair<std::uint32_t, std::uint32_t>> image_size = {};
-  std::optional<std::size_t> frame_count = {};        ///< number, in KITTI tracking
+  std::optional<std::size_t> frame_count = {};        ///< number of frames, for KITTI tracking
   InstanceId source = 1;                              ///< source id of the messages
   std::optional<ImageEncoding> encoding = {};         ///< encoding of cam0; default: as in the
                                                       ///< files
@@ -36,7 +36,8 @@ struct DatasetOptions {
   std::filesystem::path rig = {};  ///< rig file that replaces the drive's own calibration
   std::size_t every = 1;           ///< use only each N-th frame of cam0, with its partner
   bool decode = true;              ///< false: frames have stamp and size, but no pixels
-  /// Topics of a ROS recording by cam0, cam1, imu, if types and names do not identify them.
+  /// Topics of a ROS recording by cam0, cam1 and imu. Required if types and names do not identify
+  /// them.
   std::map<std::string, std::string> topics = {};
 };
 
@@ -55,15 +56,16 @@ struct Recording {
     TimePoint time;
     std::uint64_t index = 0;  ///< frame index, from 0; shared by both cameras of a pair
     std::size_t camera = 0;   ///< index into calibration.cameras
-    std::string path;         ///< empty: a frame without pixels, or with pixels from `load`
-    std::function<Result<Frame>()> load = {};  ///< reads a frame from a recording; reasons image_…
+    std::string path;  ///< path of the image; empty if it has no pixels or if `load` reads them
+    std::function<Result<Frame>()> load =
+        {};  ///< reads the frame from a recording; its reasons begin with image_
   };
   DatasetKind kind = DatasetKind::kEuroc;
   Calibration calibration;
   std::size_t frame_count = 0;
-  std::vector<FrameFile> frames;         ///< sorted by time, cameras in order
-  /// Numbers of cam0's frames, also of those that --every leaves out, by the names of their images
-  /// without ending; else by their stamps.
+  std::vector<FrameFile> frames;  ///< sorted by time, then by camera
+  /// Numbers of all frames of cam0, including those that --every leaves out. The key is the name of
+  /// the image without its ending, or the stamp if the image has no name.
   std::map<std::string, std::uint64_t> numbers = {};
   std::vector<TimePoint> unpaired = {};  ///< frames of cam1 without a frame of cam0 nearby
   std::vector<ImuSample> imu;            ///< sorted by time
@@ -101,12 +103,12 @@ class Dataset {
   /// (image_missing, image_truncated, image_corrupt, image_size) and skipped; their index is not
   /// reused. At equal times the order is imu, speed, cam0, cam1.
   std::optional<Message> next();
-  /// Counts so far; imu_gap (more than 3.5 usual intervals) is counted with the sample after the
-  /// gap.
+  /// Returns the counts so far. An imu_gap (more than 3.5 usual intervals) is counted with the
+  /// sample after the gap.
   const ReasonCounts& reasons() const { return reasons_; }
   /// The problem counted last, as text for users.
   const std::string& lastProblem() const { return last_problem_; }
-  /// Continues at frame `index` with the samples that follow the frame before it.
+  /// Makes next() continue with the samples after the previous frame, and then frame `index`.
   void seek(std::uint64_t index);
   /// Calls seek() for the first frame of cam0 that is at least `after` later than the first one,
   /// and returns its index. Returns nothing if there is none.

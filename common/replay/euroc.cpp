@@ -95,7 +95,7 @@ void readSpeed(const fs::path& folder, Recording& recording) {
 /// The list of a camera's frames, with the paths of its images.
 class FrameList {
  public:
-  /// `look`: whether to check that the images exist.
+  /// If `look` is true, the images must exist; close() checks this.
   FrameList(const fs::path& folder, bool look)
       : folder_(folder), look_(look), images_(look ? folder / "data" : fs::path()) {}
 
@@ -110,8 +110,8 @@ class FrameList {
     return found ? found->string() : written.string();
   }
 
-  /// Throws if none of the listed images exists. Otherwise notes images that were found under other
-  /// names.
+  /// Throws StartupError if none of the listed images exists. Otherwise notes images that were
+  /// found under other names.
   void close(Recording& recording) const {
     if (!look_ || named_ == 0) return;
     const std::string images = (folder_ / "data").string();
@@ -159,7 +159,7 @@ void readFrames(const fs::path& folder, std::size_t camera, bool look, Recording
                                             "list stamp and file of each image in it");
   }
   for (const TableRow& row : table.rows()) {
-    // A skipped row retains its number; a list that was sorted is numbered again.
+    // Numbers count skipped rows too, unless the list was out of order and is numbered again.
     const std::uint64_t number = table.wasSorted() ? row.number : recording.frames.size();
     Recording::FrameFile frame{row.time, number, camera, list.pathOf(row)};
     if (camera != 0 && !pairWith(first, frame, recording)) continue;
@@ -221,8 +221,8 @@ bool isWordIn(const std::string& name, const std::string& of) {
   return false;
 }
 
-/// Kalibr's result files of the cameras ("camchain") or of the IMU ("imu"), in the folder or at
-/// their place in TUM-VI. The first is used.
+/// Returns Kalibr's result files of the cameras (`of` is "camchain") or of the IMU ("imu") in mav0,
+/// in the folder above it and in TUM-VI's folder `dso`. Callers use the first.
 std::vector<fs::path> kalibrFiles(const fs::path& mav0, const std::string& of) {
   constexpr char kChain[] = "camchain";
   std::vector<fs::path> all;
@@ -250,8 +250,8 @@ void noteChoice(const std::vector<fs::path>& files, Recording& recording) {
   if (std::find(notes.begin(), notes.end(), note) == notes.end()) recording.notes.push_back(note);
 }
 
-/// The sources of a folder's calibration, in this order: each sensor's sensor.yaml, the given rig
-/// file, files of Kalibr (camchain*.yaml, imu*.yaml).
+/// The calibration of a folder. Its sources, in order of precedence: each sensor's sensor.yaml, the
+/// given rig file, and Kalibr's files (camchain*.yaml, imu*.yaml).
 class EurocCalibration {
  public:
   EurocCalibration(const fs::path& mav0, const fs::path& rig) : mav0_(mav0) {
@@ -299,10 +299,11 @@ class EurocCalibration {
 
  private:
   fs::path mav0_;
-  std::vector<fs::path> chains_;  ///< the first file is also rig_
+  std::vector<fs::path> chains_;  ///< Kalibr's files of the cameras; the first was read into rig_
   std::optional<Calibration> rig_;
-  RigidTransform T_BI_;           ///< IMU in EuRoC's body, from which all data are transformed
-  RigidTransform T_I_reference_;  ///< Kalibr's reference IMU in the IMU, if there are several
+  RigidTransform T_BI_;  ///< pose of the IMU in EuRoC's body, the frame of all data in the files
+  RigidTransform
+      T_I_reference_;  ///< pose of Kalibr's reference IMU in this IMU, if there are several
 };
 
 }  // namespace

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 using ImageGrade = DataFinding::Grade;
 using FileList = std::vector<const Recording::FrameFile*>;
 
-/// Classification of a camera's images without reading them.
+/// A camera's image files, classified without reading them.
 struct Listed {
   std::size_t all = 0, missing = 0;
   FileList empty, whole;  ///< sorted by time; images of a recording count as whole
@@ -72,7 +72,8 @@ std::string whyUnreadable(const Recording::FrameFile& file, const std::string& d
                  : detail;
 }
 
-/// Without images of cam0 a run is impossible; without cam1 it continues with cam0.
+/// Returns the grade if a camera has no image: fatal for cam0; without cam1 a run continues with
+/// cam0.
 ImageGrade gradeOfNone(std::size_t camera) {
   return camera == 0 ? ImageGrade::kFatal : ImageGrade::kWarning;
 }
@@ -84,7 +85,7 @@ void addNone(const Recording& recording, std::size_t camera, const std::string& 
        fmt::format("no image of {} {}", recording.calibration.cameras[camera].name, what)});
 }
 
-/// Returns false if no image is left to check.
+/// Adds findings about missing and empty files. Returns false if no image is left to check.
 bool checkFiles(const Recording& recording, std::size_t camera, const Listed& listed,
                 DataFindings& findings) {
   const auto& name = recording.calibration.cameras[camera].name;
@@ -102,7 +103,8 @@ bool checkFiles(const Recording& recording, std::size_t camera, const Listed& li
             findings);
     return false;
   }
-  constexpr double kMostLost = 0.1;  // share of empty files, as for missing files
+  constexpr double kMostLost =
+      0.1;  // largest accepted share of empty files; the same as for missing files
   const auto empty = static_cast<double>(listed.empty.size());
   if (empty > kMostLost * static_cast<double>(listed.all)) {
     findings.push_back(
@@ -158,7 +160,7 @@ void checkImages(const Recording& recording, std::size_t camera, DataFindings& f
   const Listed listed = listedOf(recording, camera);
   if (listed.all == 0 || !checkFiles(recording, camera, listed, findings)) return;
   Looked looked = lookAt(someOf(listed.whole, 9), calibration);
-  // Check more images, because the first sample may be unrepresentative.
+  // Check more images, because the first ones may not be representative.
   if (looked.unreadable == looked.tried) looked = lookAt(someOf(listed.whole, 60), calibration);
   if (looked.unreadable == looked.tried) {
     return addNone(recording, camera,

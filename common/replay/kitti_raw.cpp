@@ -58,7 +58,7 @@ std::optional<TimePoint> parseStamp(const std::string& text) {
   return TimePoint(since + Duration(*fraction));
 }
 
-/// Line k contains the stamp of record k. Returns nothing for lines that are empty or not a stamp.
+/// Reads the stamps; line k has that of record k. An entry is empty if its line is no stamp.
 std::vector<std::optional<TimePoint>> readStamps(const fs::path& file) {
   std::vector<std::optional<TimePoint>> stamps;
   for (const auto& line : readLines(file, "KITTI keeps timestamps.txt in each sensor's folder")) {
@@ -81,7 +81,7 @@ fs::path calibrationFolder(const fs::path& drive) {
 }
 
 /// The OXTS unit as an IMU. Its records are instantaneous values at 10 Hz, not averages. The noise
-/// is therefore the unknown motion between two records, not that of the sensor.
+/// densities therefore stand for the unknown motion between two records.
 ImuCalibration oxtsCalibration() {
   ImuCalibration imu;
   imu.gyro_noise = 5e-3;
@@ -98,7 +98,7 @@ struct OxtsRecord {
   std::vector<double> values;
 };
 
-/// Orders records, which have the index of their line.
+/// Orders records by time. Their member `index` gives the line for messages.
 template <class Record>
 void orderByLine(std::vector<Record>& records, const char* kind, const fs::path& file,
                  Recording& recording) {
@@ -129,8 +129,8 @@ std::vector<OxtsRecord> readOxts(const fs::path& folder, Recording& recording) {
   return records;
 }
 
-/// East, north and up relative to the first record, by a Mercator projection with the scale of its
-/// latitude, as in KITTI's development kit.
+/// The pose in an east-north-up frame at the first record's position, by a Mercator projection with
+/// the scale of its latitude, as in KITTI's development kit.
 RigidTransform poseOf(const OxtsRecord& record, const OxtsRecord& first) {
   constexpr double kEarthRadius = 6378137.0, kRadians = std::numbers::pi / 180.0;
   const double* v = record.values.data();
@@ -197,7 +197,8 @@ void addCamera(const fs::path& folder, const std::vector<std::optional<TimePoint
   recording.frames.insert(recording.frames.end(), frames.begin(), frames.end());
 }
 
-/// The right images have the stamps of the left ones, so that a step of the clock counts once.
+/// Adds the right camera. Its images get the stamps of the left ones, so that a step of the clock
+/// is counted once.
 void addRightCamera(const fs::path& folder, const CameraCalibration& camera, Recording& recording) {
   recording.calibration.cameras.push_back(camera);
   for (std::size_t i = 0, left = recording.frames.size(); i < left; ++i) {

@@ -85,7 +85,7 @@ std::pair<std::uint32_t, std::uint32_t> imageSize(const DatasetOptions& options,
   return {size.width, size.height};
 }
 
-/// The pose file beside the labels; the most accurate kind is preferred.
+/// Reads the pose file beside the labels. If there are several, the most accurate one is used.
 std::optional<PoseFile> readPoses(const DatasetOptions& options) {
   for (const char* folder : {"poses", "poses_orb", "poses_oxts"}) {
     const fs::path file = options.path / folder / (options.sequence + ".txt");

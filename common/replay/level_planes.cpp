@@ -57,7 +57,7 @@ struct Mode {
   std::size_t count = 0;
 };
 
-/// The normal with the most neighbours, among those that `allowed` accepts.
+/// Returns the normal with the most neighbours, among the normals that `allowed` accepts.
 Mode densest(const std::vector<Eigen::Vector3d>& normals, const auto& allowed) {
   Mode best;
   const std::size_t step = std::max<std::size_t>(1, normals.size() / kCandidates);
@@ -69,7 +69,8 @@ Mode densest(const std::vector<Eigen::Vector3d>& normals, const auto& allowed) {
   return best;
 }
 
-/// The mean of the normals within `angle_deg`, iterated.
+/// Returns the mean of the normals within `angle_deg` of `axis`. It is repeated with the mean as
+/// the axis.
 Eigen::Vector3d settled(const std::vector<Eigen::Vector3d>& normals, Eigen::Vector3d axis,
                         double angle_deg) {
   constexpr int kRounds = 20;

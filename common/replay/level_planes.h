@@ -17,22 +17,23 @@ namespace perdure::replay {
 /// The estimated vertical, and its support.
 struct UpEstimate {
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< unit, in the frame of the poses
-  std::size_t patches = 0;                        ///< patches with normals within 5° of it
-  std::size_t all = 0;                            ///< patches of all planes
+  std::size_t patches = 0;  ///< number of patches with normals within 5° of `up`
+  std::size_t all = 0;      ///< number of all plane patches
 };
 
 class LevelPlanes {
  public:
-  /// `depth`: CV_16UC1, millimetres; 0 and values above 10 m (including 65535) are invalid. `K`:
-  /// its lens, without distortion. R_PC: camera in the frame P of the poses.
+  /// Adds an image. `depth`: CV_16UC1, millimetres; 0 and values above 10 m (including 65535) are
+  /// invalid. `K`: lens of the depth camera, without distortion. `R_PC`: rotation of the camera in
+  /// the frame P of the poses.
   void add(const cv::Mat& depth, const CameraCalibration& K, const Eigen::Matrix3d& R_PC);
-  /// `about`: approximate vertical, of any length: the mean vertical axis of the camera. Reasons:
-  /// planes_none (fewer than 100 patches agree within 50° of it), planes_ambiguous (another
-  /// direction, more than 20° off, has more than two thirds as many).
+  /// Estimates the vertical near `about`, the mean vertical axis of the camera (of any length).
+  /// Reasons: planes_none (fewer than 100 patches agree within 50° of `about`), planes_ambiguous
+  /// (another direction, more than 20° off, has more than two thirds as many).
   Result<UpEstimate> up(const Eigen::Vector3d& about) const;
 
  private:
-  std::vector<Eigen::Vector3d> normals_P_;  ///< pointing towards the camera
+  std::vector<Eigen::Vector3d> normals_P_;  ///< normals in P, pointing towards the camera
 };
 
 }  // namespace perdure::replay

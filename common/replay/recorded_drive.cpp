@@ -83,8 +83,8 @@ class DriveReader {
   }
 
  private:
-  /// Refuses messages of neither Perdure nor ROS, for example protobuf or JSON, which MCAP can
-  /// contain.
+  /// Refuses a recording whose messages are neither Perdure's nor ROS's. MCAP can contain protobuf
+  /// or JSON, for example.
   void refuseStrangers() const {
     for (const auto& [name, topic] : messages_.topics()) {
       if (topic.schema_encoding == "omgidl") continue;
@@ -151,7 +151,8 @@ class DriveReader {
         if (!seen.camera.empty()) file.load = [store, seen] { return store->at(seen); };
         const std::pair identity(seen.stamp.source, seen.stamp.sequence);
         if (wanted == 0) {
-          if (!first.emplace(identity, file).second) continue;  // received twice
+          if (!first.emplace(identity, file).second)
+            continue;  // the recorder received the image twice
           ++recording_.frame_count;
         } else {
           const auto pair = first.find(identity);

@@ -13,38 +13,42 @@
 
 namespace perdure::replay {
 
-/// Applies what files/stamp_order.h decides about a sensor's stamps: counts KIND_not_increasing,
-/// KIND_stray, KIND_unsorted, and adds the changes of the clock to the recording. Notes name
-/// `where` and `all`. `placeOf` names a stamp by its index in the file.
+/// Reports the decisions of files/stamp_order.h about a sensor's stamps: counts
+/// KIND_not_increasing, KIND_stray and KIND_unsorted, adds the changes of the clock to the
+/// recording, and writes notes. In notes, `where` is the place and `all` the number of items.
+/// `placeOf` names a stamp by its index in the file.
 void noteOrder(StampOrder& order, const std::string& kind, const std::string& where,
                const std::string& all, const std::function<std::string(std::size_t)>& placeOf,
                Recording& recording);
 
-/// Returns whether the folder has the layout of a kind. The reader then reports missing parts.
+/// The looksLike functions return whether the folder has the layout of a kind. The reader of that
+/// kind reports missing parts.
 bool looksLikeEuroc(const std::filesystem::path& folder);
 bool looksLikeKittiRaw(const std::filesystem::path& folder);
 bool looksLikeKittiTracking(const std::filesystem::path& folder);
-/// Colour images with one pose file each, or a scene of such sequences (seq-01 …).
+/// The folder has colour images with one pose file each, or is a scene of such sequences (seq-01
+/// …).
 bool looksLikeSevenScenes(const std::filesystem::path& folder);
-/// Frames are numbered from 0 in the order of their times. A recording without images has the
-/// frames of its odometry, without pixels.
+/// Reads a recording of `perdure record`. Frames are numbered from 0 in the order of their times. A
+/// recording without images has the frames of its odometry, without pixels.
 Recording readRecordedDrive(const DatasetOptions& options);
-/// The rig file gives the calibration that is missing in the recording.
+/// Reads a recording of ROS. The rig file overrides the calibration in the recording.
 Recording readRosDrive(const DatasetOptions& options);
 Recording readEuroc(const DatasetOptions& options);
 Recording readKittiRaw(const DatasetOptions& options);
 Recording readKittiTracking(const DatasetOptions& options);
 Recording readSevenScenes(const DatasetOptions& options);
 
-/// FOLDER/NAME.png, .jpg or .jpeg, whichever exists; else FOLDER/NAME.png.
+/// Returns FOLDER/NAME.png, .jpg or .jpeg, whichever exists; otherwise FOLDER/NAME.png.
 std::filesystem::path imagePath(const std::filesystem::path& folder, const std::string& name);
 /// Width and height of the first image that can be decoded. Returns nothing if there is none.
 std::optional<std::pair<std::uint32_t, std::uint32_t>> firstImageSize(
     const std::filesystem::path& folder);
-/// Orders the samples and numbers them; `where` is the file or topic.
+/// Orders the inertial samples by time and numbers them; `where` is the file or topic.
 void orderImu(Recording& recording, const std::string& where);
-/// Orders items, which have a member `time`, and may have `isSame`, by files/stamp_order.h; see
-/// noteOrder. Returns whether they were sorted.
+/// Orders items by their member `time` (files/stamp_order.h), and reports it by noteOrder(). An
+/// item may have a member isSame() that recognises repeated samples. Returns true if the items were
+/// in order.
 template <class Item>
 bool orderByTime(std::vector<Item>& items, const std::string& kind, const std::string& where,
                  const std::string& all, Recording& recording, const auto& placeOf) {
@@ -67,7 +71,7 @@ bool orderByTime(std::vector<Item>& items, const std::string& kind, const std::s
   items = std::move(ordered);
   return order.moved == 0;
 }
-/// The place is the number of the message.
+/// Names a place in messages by `where` and the number of the message.
 template <class Item>
 void orderByTime(std::vector<Item>& items, const std::string& kind, const std::string& where,
                  Recording& recording) {
@@ -77,8 +81,8 @@ void orderByTime(std::vector<Item>& items, const std::string& kind, const std::s
 /// Sorts frames by time, then camera.
 void sortFrames(Recording& recording);
 inline constexpr Duration kPairedWithin = std::chrono::milliseconds(5);
-/// Gives a frame of cam1 the index and the time of the frame of cam0 taken within kPairedWithin.
-/// Counts the frame and returns false if there is none. `first` is sorted by time.
+/// Gives a frame of cam1 the index and the time of the frame of cam0 taken within kPairedWithin. If
+/// there is none, counts the frame and returns false. `first` is sorted by time.
 bool pairWith(const std::vector<Recording::FrameFile>& first, Recording::FrameFile& frame,
               Recording& recording);
 /// Frame rate of a camera in Hz; 1 if it cannot be determined.

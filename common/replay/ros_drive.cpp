@@ -1,5 +1,5 @@
 // A ROS recording as a dataset: images, inertial samples, and calibration from camera_info and
-// tf_static. The rig file gives the missing calibration. Images are read on request.
+// tf_static. The rig file overrides this calibration. Images are read on request.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -21,7 +21,7 @@ namespace {
 
 constexpr char kTransforms[] = "/tf_static";
 
-/// A message of a sensor.
+/// The times of a sensor's message.
 struct Arrival {
   TimePoint time;  ///< stamp of the header; corrected at the end (files/stamp_order.h)
   std::uint64_t log_ns = 0, place = 0;  ///< as in RosMessage
@@ -48,8 +48,9 @@ Result<Frame> unpacked(const ros::CompressedImage& image, int bits) {
   return set ? Result<Frame>(frame) : tl::unexpected(set.error());
 }
 
-/// Restores the order in which the messages were written, since the recorder's clock may have been
-/// set, too. Most stamps are 0: all get the time of recording. Returns how many.
+/// Restores the order in which the messages were written, because the recorder's clock may have
+/// been set, too. If most stamps are 0, all messages get their time of recording. Returns the
+/// number of changed stamps.
 template <class A>
 std::size_t orderArrivals(std::vector<A>& arrivals) {
   std::sort(arrivals.begin(), arrivals.end(),
@@ -61,8 +62,8 @@ std::size_t orderArrivals(std::vector<A>& arrivals) {
   return arrivals.size();
 }
 
-/// Reads one camera's images quickly by the time of recording, even if many have the same one. Any
-/// other order requires a rewind.
+/// Reads one camera's images quickly in the order of recording, even if many have the same time of
+/// recording. Any other order requires a rewind.
 class RosImages {
  public:
   RosImages(const std::filesystem::path& path, CameraTopics topics, int bits)
@@ -100,11 +101,11 @@ class RosImages {
   std::uint64_t next_ = 0;  ///< images with this number and above are not read yet
 };
 
-/// The information about one camera in the recording.
+/// The data of one camera in the recording.
 struct RosCamera {
   CameraTopics topics;
   std::vector<RosImage> images = {};
-  std::optional<ros::CameraInfo> info = {};  ///< the first message
+  std::optional<ros::CameraInfo> info = {};  ///< from the first camera_info message
   bool info_changes = false;
   std::string frame_id = {};
   int bits = 8;  ///< used bits of 16, from the brightest image
@@ -333,7 +334,7 @@ class RosDriveReader {
            (refused.empty() ? "" : ": " + refused.begin()->second);
   }
 
-  /// Text about damage that may explain missing data.
+  /// Returns text about damage that may explain missing data, or "".
   std::string damage() const {
     const std::string problem = messages_.lastProblem();
     return problem.empty() ? "" : "; the file is cut off or damaged: " + problem;

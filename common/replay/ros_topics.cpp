@@ -83,7 +83,8 @@ class Choice {
     }
   }
 
-  /// Image topics without their compressed variants. If a camera has several, only the raw one.
+  /// Image topics; a topic and its compressed variant count as one. If a camera has several, and
+  /// one of them is image_raw, only that one is included.
   std::vector<std::string> candidates() const {
     std::map<std::string, std::vector<std::string>> by_camera;
     for (const auto& topic : ofTypes(topics_, {kImage, kCompressed})) {
@@ -157,8 +158,8 @@ class Choice {
     return alone && all.size() == 1 ? all.front() : "";
   }
 
-  /// The second topic, if a driver publishes accelerometer and gyroscope separately. RealSense's
-  /// driver uses /camera/accel/sample and /camera/gyro/sample.
+  /// Returns the topic of the other sensor if a driver publishes accelerometer and gyroscope
+  /// separately. RealSense's driver uses /camera/accel/sample and /camera/gyro/sample.
   std::string otherHalfOf(const std::string& topic) const {
     for (const auto& [half, other] : {std::pair("accel", "gyro"), std::pair("gyro", "accel")}) {
       const auto at = topic.rfind(half);

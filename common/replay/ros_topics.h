@@ -13,7 +13,7 @@ namespace perdure::replay {
 struct CameraTopics {
   std::string image, info;  ///< info: sensor_msgs/CameraInfo; empty if there is none
   bool compressed = false;  ///< sensor_msgs/CompressedImage
-  bool rectified = false;   ///< True for names with "image_rect…"
+  bool rectified = false;   ///< true for names with "image_rect…"
 };
 struct ChosenTopics {
   std::vector<CameraTopics> cameras;  ///< cam0, and cam1 of a pair
@@ -24,9 +24,9 @@ struct ChosenTopics {
 /// with the fix.
 std::map<std::string, std::string> topicsOf(const std::vector<std::string>& assignments);
 
-/// `wanted`: topics by cam0, cam1, imu. If the choice is ambiguous, or a requested topic is
-/// missing, throws StartupError. The message begins with `file` and lists the candidates and the
-/// fix.
+/// Chooses the topics; `wanted` has the requested ones by cam0, cam1 and imu. Throws StartupError
+/// if the choice is ambiguous, or if a requested topic is missing. The message begins with `file`
+/// and lists the candidates and the fix.
 ChosenTopics chooseTopics(const RosTopics& topics, const std::map<std::string, std::string>& wanted,
                           const std::string& file);
 

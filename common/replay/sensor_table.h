@@ -20,7 +20,7 @@ struct TableRow {
   TimePoint time;
   std::vector<std::string_view> fields;  ///< the first is the stamp
 
-  /// Apart from the stamp.
+  /// Returns whether two rows have the same values apart from the stamp.
   bool isSame(const TableRow& other) const {
     return std::equal(fields.begin() + 1, fields.end(), other.fields.begin() + 1,
                       other.fields.end());
@@ -34,9 +34,9 @@ class SensorTable {
 
   /// `kind` is the prefix of the reasons counted in `recording`: KIND_malformed,
   /// KIND_not_increasing (a repeated stamp), KIND_stray (a stamp far from those of its neighbours),
-  /// KIND_unsorted (rows that were moved). Repairs are noted there, a sentence each. Fields are
-  /// separated by commas, semicolons or blanks. If fewer than half of the rows can be used, throws
-  /// StartupError(kData) with the first wrong line.
+  /// KIND_unsorted (rows that were moved). Each repair adds a sentence to the notes in `recording`.
+  /// Fields are separated by commas, semicolons or blanks. Throws StartupError(kData) with the
+  /// first wrong line if fewer than half of the rows can be used.
   SensorTable(const std::filesystem::path& file, const std::string& kind, Recording& recording,
               const Judge& judge);
   SensorTable(const SensorTable&) = delete;  // not copyable, because rows refer to the text

@@ -28,8 +28,8 @@ namespace fs = std::filesystem;
 
 constexpr double kRate_hz = 30.0;
 constexpr std::uint32_t kWidth = 640, kHeight = 480;
-// The authors give 585 px and no pose, which is the lens of the depth camera. The colour images use
-// 525 px, as in DSAC* (Brachmann and Rother, PAMI 2021).
+// The authors give a focal length of 585 px, which is that of the depth camera, and no relative
+// pose of the cameras. The colour images fit 525 px, as in DSAC* (Brachmann and Rother, PAMI 2021).
 // In the red kitchen, depth points were compared with colour images 40 and 80 frames apart. The
 // agreement is best at 518 px and a baseline of 23 mm; the baseline of a Kinect is 25 mm.
 constexpr double kDepthFocal_px = 585.0, kFocal_px = 525.0, kBaseline_m = 0.025;
@@ -127,7 +127,7 @@ std::optional<SensorFile> sensorFileOf(const fs::path& folder) {
   return std::nullopt;
 }
 
-/// T_BD.
+/// T_BD, the pose of the depth camera D in the body.
 RigidTransform depthInBody() {
   Eigen::Matrix3d R_BD;
   R_BD << 0, 0, 1, -1, 0, 0, 0, -1, 0;
@@ -147,8 +147,8 @@ CameraCalibration depthCamera() {
   return camera;
 }
 
-/// Camera from the rig file, otherwise from sensor.yaml if it contains a lens, otherwise the known
-/// values of the Kinect.
+/// The camera from the rig file, otherwise from sensor.yaml if it contains a lens, otherwise with
+/// the known values of the Kinect.
 CameraCalibration cameraOf(const std::optional<SensorFile>& sensor, const DatasetOptions& options,
                            const fs::path& first_image) {
   CameraCalibration camera;
@@ -217,7 +217,7 @@ std::optional<RigidTransform> readPose(const fs::path& file, Complaints& wrong,
   return RigidTransform(R, p);
 }
 
-/// T_PC by frame. Invalid files are refused.
+/// Returns T_PC by frame. Throws StartupError if a file is invalid.
 std::map<std::size_t, RigidTransform> readPoses(const SceneFiles& files, Recording& recording) {
   std::map<std::size_t, RigidTransform> poses;
   Complaints wrong;
@@ -272,7 +272,8 @@ UpEstimate estimateUp(const fs::path& folder, const SceneFiles& files,
   return *up;
 }
 
-/// Unit vector against gravity in the frame of the poses: from sensor.yaml, otherwise from planes.
+/// Returns the unit vector against gravity in the frame of the poses: from sensor.yaml, otherwise
+/// from level planes.
 Eigen::Vector3d upOf(const fs::path& folder, const std::optional<SensorFile>& sensor,
                      const SceneFiles& files, const std::map<std::size_t, RigidTransform>& poses,
                      Recording& recording) {

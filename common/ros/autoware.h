@@ -94,10 +94,10 @@ struct TrackedObjects {
   static void fields(auto& m, auto& a) { a("header", m.header), a("objects", m.objects); }
 };
 
-/// Confirmed objects in `map`; T_MW is the pose of W in it. The last eight bytes of the UUID are
-/// the id. Classes unknown to Autoware are UNKNOWN. Pose, covariance and size are those of the most
-/// probable class. The sign of the orientation is known only for moving objects. If the σ of the
-/// yaw is above 1 rad, the orientation is marked as unavailable.
+/// Confirmed objects in the frame `map`; T_MW is the pose of W in M. The last eight bytes of the
+/// UUID are the id. Classes unknown to Autoware are UNKNOWN. Pose, covariance and size are those of
+/// the most probable class. The sign of the orientation is marked as known only for moving objects.
+/// If the σ of the yaw is above 1 rad, the orientation is marked as unavailable.
 TrackedObjects trackedObjectsOf(const Objects& objects, const RigidTransform& T_MW);
 
 }  // namespace perdure::ros::autoware

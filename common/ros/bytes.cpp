@@ -6,7 +6,7 @@ namespace perdure::ros {
 namespace {
 
 constexpr std::size_t kHead = 4;
-/// Second byte of the CDR header: lowest bit byte order, other bits encoding.
+/// Second byte of the CDR header: the lowest bit is the byte order, the others are the encoding.
 enum : std::uint8_t { kLittle = 1, kXcdr1 = 0, kXcdr2 = 6 };
 
 }  // namespace

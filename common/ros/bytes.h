@@ -23,7 +23,7 @@ template <class M>
 concept Struct = requires {
   M::kType;
 };
-/// A number, a Boolean value or a byte, aligned to its size.
+/// A number, a Boolean value or a byte. In a message it is aligned to its size.
 template <class X>
 concept Plain = std::is_arithmetic_v<X> || std::same_as<X, std::byte>;
 
@@ -72,7 +72,7 @@ enum class Encoding { kCdr, kRos1 };
 /// Reads the values of a message in order. After the first missing value it reads no further.
 class BytesReader {
  public:
-  /// `keeper` owns the memory of `bytes`; images refer to it without a copy.
+  /// `keeper` owns the memory of `bytes`. Images refer to this memory without a copy.
   BytesReader(std::span<const std::uint8_t> bytes, Encoding encoding,
               std::shared_ptr<const void> keeper);
 
@@ -128,7 +128,7 @@ std::vector<std::uint8_t> cdrOf(const Struct auto& message) {
   return bytes;
 }
 
-/// Reason "malformed": the bytes end before the message.
+/// Decodes a message. Reason: "malformed" if the bytes end before the message.
 template <Struct M>
 Result<M> messageOf(std::span<const std::uint8_t> bytes, Encoding encoding,
                     std::shared_ptr<const void> keeper) {

@@ -11,7 +11,7 @@
 namespace perdure::ros {
 namespace {
 
-/// A struct's fields with type and name, after the definitions of the structs that it contains.
+/// The name of a struct, and the text of its fields: type and name on each line.
 struct Definition {
   std::string type, message;
 };

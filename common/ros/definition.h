@@ -7,12 +7,12 @@
 
 namespace perdure::ros {
 
-/// "sensor_msgs/Image" → "sensor_msgs/msg/Image".
+/// Converts "sensor_msgs/Image" to "sensor_msgs/msg/Image".
 std::string ros2Name(const std::string& type);
-/// "sensor_msgs/msg/Image" → "sensor_msgs/Image"; names of ROS 1 are unchanged.
+/// Converts "sensor_msgs/msg/Image" to "sensor_msgs/Image"; names of ROS 1 are unchanged.
 std::string plainName(const std::string& name);
 
-/// The definition of the message and of those that it contains, as of rosbag2 (`ros2msg`).
+/// The definition of the message and of the structs in it, in the format of rosbag2 (`ros2msg`).
 template <class M>
 std::string definitionOf();
 

@@ -37,7 +37,7 @@ std::array<double, 36> numbersOf(const Matrix6& matrix) {
   return numbers;
 }
 
-/// The rotation vector is yaw · up.
+/// The rotation vector is the product of yaw and `up`.
 std::array<double, 36> poseCovarianceOf(const ClassBelief& belief, const Eigen::Vector3d& up,
                                         const Eigen::Matrix3d& R) {
   Eigen::Matrix<double, 6, 4> J = Eigen::Matrix<double, 6, 4>::Zero();

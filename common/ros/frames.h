@@ -28,13 +28,13 @@ std::array<double, 36> numbersOf(const Matrix6& matrix);
 /// Pose covariance from an object's centre and yaw about the vertical, rotated by R.
 std::array<double, 36> poseCovarianceOf(const ClassBelief& belief, const Eigen::Vector3d& up,
                                         const Eigen::Matrix3d& R = Eigen::Matrix3d::Identity());
-/// T_parent_child.
+/// `T` is T_parent_child, the pose of the child in the parent.
 TransformStamped transformOf(TimePoint time, const std::string& parent, const std::string& child,
                              const RigidTransform& T);
 
-/// map → odom and odom → base_link.
+/// The transforms map → odom and odom → base_link.
 TFMessage movingFrames(TimePoint time, const RigidTransform& T_MW, const RigidTransform& T_WB);
-/// base_link → imu_link, and for each camera base_link → link → optical.
+/// The transforms base_link → imu_link, and for each camera base_link → link → optical.
 TFMessage fixedFrames(const Calibration& calibration);
 
 }  // namespace perdure::ros

@@ -73,7 +73,7 @@ Result<cv::Mat> rowsOf(const Image& image, const PixelForm& encoding) {
                  pixels, image.step);
 }
 
-/// 16-bit values in the byte order of this machine.
+/// Converts 16-bit values to the byte order of this machine.
 cv::Mat inOrder(const cv::Mat& rows, bool bigendian) {
   if (bigendian == (std::endian::native == std::endian::big)) return rows;
   cv::Mat swapped = rows.clone();

@@ -7,12 +7,13 @@
 
 namespace perdure::ros {
 
-/// Size, encoding and pixels. Grey images stay grey; colours, Bayer patterns and YUV 4:2:2 become
-/// BGR. For 16-bit images, the upper eight of the lower `bits` are used. Pixels already in a
-/// frame's format are not copied. Reasons: image_encoding (the detail lists the supported ones),
-/// image_malformed.
+/// Converts an image to a frame with size, encoding and pixels. Grey images stay grey; colours,
+/// Bayer patterns and YUV 4:2:2 become BGR. For 16-bit images, the upper eight of the lower `bits`
+/// are used. Pixels already in a frame's format are not copied. Reasons: image_encoding (the detail
+/// lists the supported ones), image_malformed.
 Result<Frame> frameOf(const Image& image, int bits = 16);
-/// An image of mono8 or bgr8 in the frame <camera>_optical. The frame must not be compressed.
+/// Converts a frame, which must not be compressed, to an image of mono8 or bgr8 in
+/// <camera>_optical.
 Image imageOf(const Frame& frame);
 CompressedImage compressedOf(const Frame& frame);
 /// Number of used bits of a 16-bit image: the smallest of 8, 10, 12, 14, 16 that holds its

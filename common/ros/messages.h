@@ -198,7 +198,7 @@ struct PointCloud2 {
   using PointFields = std::vector<PointField>;
   Header header;
   std::uint32_t height = 1, width = 0;
-  PointFields point_fields;  ///< `fields` in ROS
+  PointFields point_fields;  ///< has the name `fields` in ROS
   bool is_bigendian = false;
   std::uint32_t point_step = 0, row_step = 0;
   SharedBytes data;

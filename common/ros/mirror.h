@@ -21,8 +21,8 @@ namespace perdure::ros {
 struct Outlet {
   std::string topic;       ///< "/perdure/objects"
   std::string type;        ///< "vision_msgs/Detection3DArray"
-  bool latched = false;    ///< TRANSIENT_LOCAL; all are RELIABLE
-  std::string definition;  ///< ros2msg
+  bool latched = false;    ///< DURABILITY is TRANSIENT_LOCAL; all topics are RELIABLE
+  std::string definition;  ///< text in the format ros2msg
 };
 
 class Mirror {
@@ -31,7 +31,7 @@ class Mirror {
   /// Returns whether a topic has readers. Messages without readers are not created, unless the
   /// topic is latched.
   using Wanted = std::function<bool(const Outlet& outlet)>;
-  /// `prefix` precedes all topics except /tf and /tf_static. Without `wanted` all messages are
+  /// `prefix` precedes all topics except /tf and /tf_static. Without `wanted`, all messages are
   /// created.
   Mirror(std::string prefix, Out out, Wanted wanted = {})
       : prefix_(std::move(prefix)), out_(std::move(out)), wanted_(std::move(wanted)) {}
@@ -39,27 +39,27 @@ class Mirror {
   /// Also publishes objects as Autoware's TrackedObjects on this topic, unless it is empty.
   void sayTrackedObjects(const std::string& topic) { tracked_objects_ = topic; }
 
-  /// All topics that may be published for a vehicle with these cameras, for advance declaration.
+  /// All topics that may be published for a vehicle with these cameras, to declare them in advance.
   std::vector<Outlet> outlets(const std::vector<std::string>& cameras) const;
 
-  void onCalibration(const Calibration& calibration);  ///< tf_static, camera_info
-  void onFrame(const Frame& frame);  ///< image_raw or image_raw/compressed, camera_info
-  void onImage(const Frame& frame);  ///< images only, without camera_info
-  std::string imageTopic(const std::string& camera) const {  ///< image_raw
+  void onCalibration(const Calibration& calibration);  ///< publishes tf_static, camera_info
+  void onFrame(const Frame& frame);  ///< publishes image_raw or image_raw/compressed, camera_info
+  void onImage(const Frame& frame);  ///< publishes images only, without camera_info
+  std::string imageTopic(const std::string& camera) const {  ///< topic image_raw
     return prefix_ + "/" + camera + "/image_raw";
   }
   void onImu(const ImuSample& sample);
-  void onOdometry(const perdure::Odometry& odometry);  ///< odometry, tf
+  void onOdometry(const perdure::Odometry& odometry);  ///< publishes odometry, tf
   void onLandmarks(const Landmarks& landmarks);
   void onModel(const ModelInfo& model);
   void onDetections(const Detections& detections);
   void onMapFrame(const MapFrame& frame) { map_frame_ = frame; }
-  void onObjects(const Objects& objects);  ///< objects, markers, Autoware's
-  /// Diagnostics, at the newest time of any message.
+  void onObjects(const Objects& objects);  ///< publishes objects, markers, Autoware's objects
+  /// Publishes diagnostics with the latest stamp of all messages so far.
   void onHealth(const Health& health);
 
  private:
-  /// `make()` creates the message; it is called only if a reader exists.
+  /// Publishes the message that `make()` creates, if the topic is latched or has readers.
   void say(const std::string& topic, auto make, bool latched = false);
   template <class M>
   Outlet outletOf(const std::string& topic, bool latched = false) const;
@@ -73,7 +73,7 @@ class Mirror {
   std::optional<Calibration> calibration_;
   std::map<std::uint64_t, ModelInfo> models_;
   std::optional<MapFrame> map_frame_;
-  std::optional<Imu> imu_;  ///< newest
+  std::optional<Imu> imu_;  ///< latest sample
   TimePoint newest_;
 };
 

@@ -11,19 +11,21 @@
 
 namespace perdure::ros {
 
-/// Confirmed objects in `odom`. Each possible class is a result: its score is existence × its
-/// probability, and its pose and covariance are those of its own Gaussian. The box is that of the
-/// most probable class.
+/// Confirmed objects in `odom`. Each possible class is a result. Its score is the product of
+/// existence and class probability; its pose and covariance are those of the class's own Gaussian.
+/// The box is that of the most probable class.
 Detection3DArray detections3dOf(const Objects& objects);
-/// Detections of a network in an image of `camera`, with the class names of its model, or class
+/// Detections of a network in an image of one camera, with the class names of its model, or class
 /// numbers if the model is not known. A score is the probability against clutter and the other
 /// classes; scores under 1 % are left out. Answers to predictions are excluded.
 Detection2DArray detections2dOf(const Detections& detections, const ModelInfo* model);
-/// The first marker deletes all earlier ones. Visible objects are solid, others have edges only;
-/// the edges of occluded objects are dashed. Namespaces are the classes.
+/// Markers of the confirmed objects. The first one deletes all earlier markers. Visible objects
+/// are solid, others have edges only; the edges of occluded objects are dashed. Namespaces are the
+/// classes.
 MarkerArray markersOf(const Objects& objects);
-/// `imu` is the latest sample, for the angular rate. Its variance is that of the gyroscope's noise;
-/// the bias adds little. The variance is huge if the noise or the sample is not known.
+/// The angular rate is that of `imu`, the latest sample. Its variance is that of the gyroscope's
+/// noise, because the bias adds little; it is kUnknownVariance if the noise or the sample is not
+/// known.
 Odometry odometryOf(const perdure::Odometry& odometry, const std::optional<Imu>& imu);
 /// x, y, z and σ of each landmark in `odom`. The field of σ has the name `intensity`, which viewers
 /// expect.

@@ -14,7 +14,7 @@ namespace {
 
 Eigen::Vector3d vectorOf(const Vector3& v) { return {v.x, v.y, v.z}; }
 
-/// Names the first non-finite number in `values`, for example "D[1] is nan", if any.
+/// Names the first non-finite number in `values`: "D[1] is nan". Returns "" if there is none.
 std::string notFinite(const char* name, std::span<const double> values) {
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!std::isfinite(values[i])) return fmt::format("{}[{}] is {}", name, i, values[i]);
@@ -142,7 +142,7 @@ void FrameTree::add(const TFMessage& message) {
   }
 }
 
-/// T_ancestor_frame for the frame itself and all its ancestors.
+/// Returns T_ancestor_frame for the frame itself and all its ancestors.
 std::map<std::string, RigidTransform> FrameTree::toRoots(std::string frame) const {
   std::map<std::string, RigidTransform> ways;
   RigidTransform T;

@@ -14,7 +14,7 @@
 namespace perdure::ros {
 
 TimePoint timeOf(const Time& time);
-/// The caller sets source and sequence.
+/// Converts an inertial sample. The caller sets source and sequence.
 ImuSample sampleOf(const Imu& imu);
 /// Size and lens of the images that the message describes: from K and D, or from P if they are
 /// `rectified`. Binning and region of interest are applied. Name, pose and rate are not set.

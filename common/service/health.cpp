@@ -45,7 +45,7 @@ Health HealthMeter::sample(Clock::time_point now) {
   return health;
 }
 
-/// The rate over the last five seconds.
+/// Returns the rate of frames, in Hz, over the last five seconds.
 double HealthMeter::rateAt(Clock::time_point now) {
   constexpr std::chrono::seconds kWindow{5};
   history_.emplace_back(now, frames_out_);

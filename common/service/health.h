@@ -21,13 +21,13 @@ class HealthMeter {
   void frameOut() { ++frames_out_; }
   void dropped(std::uint64_t n = 1) { dropped_ += n; }
   void setDropped(std::uint64_t total) { dropped_ = total; }
-  /// Sets the state with one sentence: the fault and its fix, or the cause of waiting.
+  /// Sets the state. `message`: one sentence on the fault and its fix, or on the cause of waiting.
   void state(HealthState state, const std::string& message = {});
 
   std::uint64_t framesIn() const { return frames_in_; }
   std::uint64_t framesOut() const { return frames_out_; }
 
-  /// The message of this second; the caller adds the reasons.
+  /// Returns the message for this second. The caller adds the reasons.
   Health sample(std::chrono::steady_clock::time_point now);
 
  private:
@@ -43,26 +43,27 @@ class HealthMeter {
   std::deque<std::pair<Clock::time_point, std::uint64_t>> history_;
 };
 
-/// An input that a service needs: detects that it stops. Use it in the loop's thread only.
+/// Detects that an input which a service needs has stopped. Use it in the loop's thread only.
 class Input {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// `what` names the input, "inertial samples"; `fix` ends the message: "start capture".
+  /// `what` names the input, for example "inertial samples". `fix` ends the message, for example
+  /// "start capture".
   Input(std::string what, std::string fix) : what_(std::move(what)), fix_(std::move(fix)) {}
 
   void heard() { heardAt(Clock::now()); }
   void heardAt(Clock::time_point now);
-  /// Returns true after three quarters of a second without a message, or after four periods if that
-  /// is longer. An input that has never arrived is not silent; the service then waits for it.
+  /// Returns true after 0.75 s without a message, or after four periods if these are longer. An
+  /// input that has never arrived is not silent, because the service still waits for it.
   bool silent(Clock::time_point now) const;
-  /// The message about the silence: "no inertial samples for 1.2 s; <fix>".
+  /// Returns the message about the silence, for example "no inertial samples for 1.2 s; <fix>".
   std::string sentence(Clock::time_point now) const;
 
  private:
   std::string what_, fix_;
   std::optional<Clock::time_point> last_;
-  std::optional<double> period_s_;  ///< smoothed
+  std::optional<double> period_s_;  ///< smoothed time between messages
 };
 
 }  // namespace perdure::service

@@ -17,7 +17,7 @@ class OnDemand {
 
   OnDemand(Context& context, Wanted wanted, Open open)
       : context_(context), wanted_(std::move(wanted)), open_(std::move(open)) {}
-  /// A reader of a topic, whose counts are published in Health.
+  /// Constructor for a reader of a topic; its counts are published in Health.
   template <class T>
   OnDemand(Context& context, bus::Topic<T> topic, Wanted wanted,
            std::type_identity_t<Sink<T>> handler, std::type_identity_t<Sink<T>> on_gone = {})
@@ -34,7 +34,8 @@ class OnDemand {
   OnDemand(const OnDemand&) = delete;
   OnDemand& operator=(const OnDemand&) = delete;
 
-  /// Opens or closes the reader. Must not be called from a handler of messages.
+  /// Opens the reader if it is wanted, and closes it if not. Must not be called from a handler of
+  /// messages.
   void follow() {
     if (wanted_() == (reader_ != nullptr)) return;
     if (!reader_) {

@@ -21,7 +21,8 @@ std::int64_t nowNs(clockid_t clock) {
   return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
 }
 
-/// Offset of the wall clock from the time since boot; `within_ns`: time between the readings.
+/// Returns the offset of the wall clock from the time since boot. `within_ns` receives the time
+/// that the readings took.
 std::int64_t wallOffsetNs(std::int64_t& within_ns) {
   const std::int64_t before = nowNs(CLOCK_BOOTTIME);
   const std::int64_t wall = nowNs(CLOCK_REALTIME);
@@ -53,7 +54,7 @@ void ClockSteps::look() {
   constexpr std::int64_t kStep = 100'000'000;  // ns; NTP slews at most 0.5 ms per second
   std::int64_t within = 0;
   const std::int64_t offset = wallOffsetNs(within);
-  if (within > kStep / 2) return;  // interrupted between the readings
+  if (within > kStep / 2) return;  // the thread was interrupted between the readings
   if (std::abs(offset - offset_ns_) > kStep) {
     ++count_;
     last_ = std::chrono::steady_clock::now();

@@ -1,4 +1,4 @@
-// The interface of this process to the operating system.
+// Interface to the operating system: CPU time, memory, steps of the clock, and systemd.
 #pragma once
 
 #include <chrono>
@@ -7,10 +7,10 @@
 namespace perdure::service {
 
 double processorSeconds();      ///< CPU time of all threads since the start
-std::uint64_t residentBytes();  ///< memory in use
+std::uint64_t residentBytes();  ///< resident memory
 
-/// Detects steps of the wall clock: changes relative to the time since boot that are larger than
-/// slewing causes.
+/// Detects steps of the wall clock. A step is a change relative to the time since boot that is
+/// larger than slewing can cause.
 class ClockSteps {
  public:
   ClockSteps();
@@ -29,13 +29,13 @@ class ClockSteps {
 void notifyReady();
 void notifyStopping();
 
-/// Client of systemd's watchdog, if it is enabled for this process (WATCHDOG_USEC). systemd kills a
-/// process that sends no message within the watchdog's period.
+/// Client of systemd's watchdog; has no effect unless WATCHDOG_USEC enables the watchdog. systemd
+/// kills a process that sends no message within the watchdog's period.
 class Watchdog {
  public:
   using Clock = std::chrono::steady_clock;
   Watchdog();
-  /// The interval of messages; zero without a watchdog.
+  /// Returns the interval of messages; zero without a watchdog.
   std::chrono::microseconds period() const { return period_; }
   /// Sends a keep-alive message, at most four times per watchdog period.
   void feed(Clock::time_point now);

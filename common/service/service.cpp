@@ -30,7 +30,7 @@ void describe(Common& common, config::Fields& fields) {
                 {"how much is logged to standard error"});
 }
 
-/// "semantic_filter" → "perdure-semantic-filter".
+/// Returns the name of the executable: "semantic_filter" gives "perdure-semantic-filter".
 std::string executableOf(const Program& program) {
   std::string name = "perdure-" + program.process;
   std::replace(name.begin(), name.end(), '_', '-');
@@ -58,14 +58,16 @@ void addOptions(CLI::App& app, CommandLine& line) {
   app.set_version_flag("--version", std::string(PERDURE_VERSION));
 }
 
-/// The options shared by all services of this host, from a file beside the service's own file.
+/// Returns the options shared by all services of this host, from bus.yaml beside the service's
+/// file.
 bus::Options commonBus(const CommandLine& line, std::vector<config::Problem>& problems) {
   const auto folder = std::filesystem::path(line.config_file).parent_path();
   const bool beside = !line.config_file.empty();
   return bus::commonOptions(beside ? (folder.empty() ? "." : folder.string()) : "", problems);
 }
 
-/// Reads file and assignments. Throws StartupError with all errors, including `problems`.
+/// Reads the configuration file and the assignments of the command line. Throws StartupError with
+/// all errors, including `problems`.
 void readConfiguration(config::Fields& fields, const CommandLine& line,
                        std::vector<config::Problem> problems) {
   const auto append = [&](std::vector<config::Problem> more) {
@@ -77,7 +79,7 @@ void readConfiguration(config::Fields& fields, const CommandLine& line,
   config::refuse(problems);
 }
 
-/// Everything after reading the command line; throws StartupError.
+/// Does everything that follows the reading of the command line. Throws StartupError.
 void start(const Program& program, const CommandLine& line) {
   const BlockedSignals blocked;
   Common common;
@@ -156,8 +158,8 @@ void Context::run() {
   publishHealth();
 }
 
-/// Each completed turn of the loop feeds the watchdog. A hanging handler or a stopped process does
-/// not.
+/// Each completed iteration feeds the watchdog, which therefore ends a process that hangs or is
+/// stopped.
 void Context::runLoop() {
   constexpr std::chrono::microseconds kLongest{1'000'000};
   Watchdog watchdog;
@@ -178,7 +180,7 @@ ReasonCounts Context::reasons() const {
   return counts;
 }
 
-/// Health counts refusals. The log contains the field of the first refusal of each kind.
+/// Logs the detail of the first refusal of each kind. Health only counts refusals.
 void Context::logNewRefusals() {
   for (const auto& endpoint : endpoints_) {
     for (const auto& [count, detail] : endpoint->firstDetails()) {
@@ -192,7 +194,7 @@ void Context::logNewRefusals() {
   }
 }
 
-/// Changes are logged, because RouDi may stop and start while the services run.
+/// Logs changes of shared memory, because RouDi may stop and start while the services run.
 void Context::noteSharedMemory() {
   const std::string text = domain_.sharedMemoryText();
   if (text == shared_memory_) return;
@@ -200,7 +202,8 @@ void Context::noteSharedMemory() {
   log_->log(domain_.sharedMemory().on() ? spdlog::level::info : spdlog::level::warn, "{}", text);
 }
 
-/// Cyclone disconnects a process when its identity expires; a restart uses the renewed one.
+/// Throws StartupError if the identity is no longer valid. Cyclone disconnects a process when its
+/// identity expires; after a restart it uses the renewed one.
 void Context::requireIdentity() const {
   const auto& identity = participant_.identity();
   if (!identity || identity->until > std::chrono::system_clock::now()) return;
@@ -208,7 +211,7 @@ void Context::requireIdentity() const {
                            " has ended; `perdure security renew`, and its folder here");
 }
 
-/// Text about an identity that expires soon. The result is empty for other identities.
+/// Returns a text if the identity expires soon; otherwise "".
 std::string Context::identityEnds() const {
   const auto& identity = participant_.identity();
   if (!identity || identity->until - std::chrono::system_clock::now() > bus::kRenewBefore)
@@ -226,7 +229,7 @@ void Context::noteSilence() {
   silent_inputs_ = silent;
 }
 
-/// Text about the silent inputs that prevent output. The result is empty if no input is silent.
+/// Returns a text about the silent inputs; "" if no input is silent.
 std::string Context::silence() const {
   const auto now = Input::Clock::now();
   std::string text;
@@ -257,7 +260,7 @@ void Context::publishHealth() {
   const std::string silent = silence();
   const bool well_but_silent = !silent.empty() && health.state == HealthState::kOk;
   if (!silent.empty() && health.state != HealthState::kFailed) {
-    // An earlier error may be the cause of the silence, so its message is retained.
+    // The message of an earlier error stays, because the error may be the cause of the silence.
     const bool well = health.state == HealthState::kOk || health.message.empty();
     health.message = well ? silent : health.message + "; " + silent;
     health.state = HealthState::kDegraded;

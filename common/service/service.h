@@ -1,5 +1,5 @@
-// The common part of every service's main: options, configuration, log, signals, health, watchdog.
-// README.md in this folder shows an example.
+// The common part of every service's main: options, configuration, log, signals, health and
+// watchdog. README.md in this folder shows an example.
 #pragma once
 
 #include <spdlog/logger.h>
@@ -19,16 +19,16 @@
 
 namespace perdure::service {
 
-/// A log to standard error.
+/// Returns a log that writes to standard error.
 std::shared_ptr<spdlog::logger> makeLog(const std::string& process,
                                         const std::string& level = "info");
 
-/// The time of std::chrono::steady_clock, ns.
+/// Returns the time of std::chrono::steady_clock in ns.
 inline std::int64_t monotonicNs() {
   return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-/// The context of a service's body: its endpoints, loop, health and log.
+/// The endpoints, loop, health and log of a service, for its body.
 class Context {
  public:
   Context(const std::string& process, const bus::Options& options,
@@ -49,8 +49,8 @@ class Context {
   HealthMeter& health() { return health_; }
   spdlog::logger& log() { return *log_; }
 
-  /// A reader whose messages go to `handler` in the loop's thread. Its counts are published in
-  /// Health.
+  /// Creates a reader whose messages are passed to `handler` in the loop's thread. Its counts are
+  /// published in Health.
   template <class T>
   bus::Reader<T>& on(const bus::Topic<T>& topic, std::type_identity_t<Sink<T>> handler,
                      std::type_identity_t<Sink<T>> on_gone = {}) {
@@ -67,27 +67,28 @@ class Context {
     endpoints_.push_back(writer);
     return *writer;
   }
-  /// A writer as a node's output. Messages that cannot be written are counted in Health.
+  /// Creates a writer as an output of a node. Messages that cannot be written are counted in
+  /// Health.
   template <class T>
   Sink<T> sink(const bus::Topic<T>& topic) {
     return [&to = writer(topic)](const T& value) { (void)to.write(value); };
   }
 
-  /// Additional counts for Health; `source` is called once a second in the loop's thread.
+  /// Adds counts to Health. `source` is called once a second in the loop's thread.
   void countReasons(std::function<void(ReasonCounts&)> source);
   void countReasons(std::function<const ReasonCounts&()> source);
-  /// `update` is called once a second before Health is published, to set its state.
+  /// Sets a function that is called once a second, before Health is published, to set the state.
   void onHealth(std::function<void()> update) { on_health_ = std::move(update); }
 
-  /// Declares an input that is necessary for any output. If it arrives and then stops, Health
-  /// becomes degraded at once and names it. Its handler calls heard().
+  /// Declares an input without which the service has no output. The handler of the input must call
+  /// heard(). If the input arrives and then stops, Health becomes degraded at once and names it.
   Input& needs(const std::string& what, const std::string& fix) {
     if (inputs_.empty()) every(std::chrono::milliseconds(100), [this] { noteSilence(); });
     return inputs_.emplace_back(what, fix);
   }
 
-  /// Monitors a separate thread: the watchdog is fed only while `goes_on` returns true. It is
-  /// called in the loop's thread.
+  /// Monitors a separate thread: the watchdog is fed only while `goes_on`, called in the loop's
+  /// thread, returns true.
   void watch(std::function<bool()> goes_on) { watched_.push_back(std::move(goes_on)); }
 
   void every(std::chrono::nanoseconds period, std::function<void()> tick) {
@@ -95,7 +96,7 @@ class Context {
   }
   /// Reports readiness and runs the loop until SIGTERM, SIGINT or stop().
   void run();
-  /// May be called from any thread.
+  /// Ends run(). May be called from any thread.
   void stop() { loop_.stop(); }
   bool stopping() const { return loop_.stopped(); }
 
@@ -119,7 +120,7 @@ class Context {
   std::list<std::function<void(ReasonCounts&)>> reason_sources_;
   std::list<std::shared_ptr<const bus::Endpoint>> endpoints_;
   std::set<std::string> logged_refusals_;
-  std::string shared_memory_;  ///< last text about shared memory
+  std::string shared_memory_;  ///< text about shared memory, as last logged
   bus::WaitLoop loop_;
   std::list<Input> inputs_;
   std::size_t silent_inputs_ = 0;
@@ -133,18 +134,19 @@ struct Shorthand {
 };
 
 struct Program {
-  std::string process;  ///< "capture", "vio", …: the name in Health and in the log
+  std::string process;  ///< name in Health and in the log, for example "vio"
   std::string summary;  ///< one sentence for --help
   /// Describes the service's own fields; those of bus.* and log.* are added.
   std::function<void(config::Fields&)> describe;
   /// Creates and connects the nodes, and calls context.run(). May throw StartupError before that.
   std::function<void(Context&)> body;
-  /// Checks between fields, after reading; may throw StartupError. Part of --check-config.
+  /// Checks conditions between fields after reading, also for --check-config. May throw
+  /// StartupError.
   std::function<void()> verify = {};
   std::vector<Shorthand> shorthands = {};
 };
 
-/// The complete main of a service; returns its exit status.
+/// Runs the complete main of a service, and returns the exit status.
 int runService(int argc, char** argv, const Program& program);
 
 }  // namespace perdure::service

@@ -1,6 +1,6 @@
-// SIGTERM, SIGINT and SIGHUP (the terminal was closed) end a program in order, by a normal call in
-// a normal thread. SIGXFSZ is ignored, so a write beyond the largest size of a file fails like one
-// to a full disk.
+// SIGTERM, SIGINT and SIGHUP (the terminal was closed) end a program in order: a thread receives
+// them and calls a function. SIGXFSZ is ignored, so a write beyond the file size limit fails like a
+// write to a full disk.
 #pragma once
 
 #include <functional>
@@ -8,8 +8,8 @@
 
 namespace perdure::service {
 
-/// Blocks the signals in this thread and in all threads that it starts later. Create it first.
-/// SIGHUP stays ignored if it is, as under nohup.
+/// Blocks the signals in this thread and in all threads that it starts later. Create this object
+/// before other threads. If SIGHUP is ignored, as under nohup, it stays ignored.
 class BlockedSignals {
  public:
   BlockedSignals();

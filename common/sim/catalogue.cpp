@@ -70,7 +70,7 @@ SceneObject drawObject(const std::string& class_name, Dice& dice, const std::str
   object.class_name = class_name;
   object.looks_like = class_name == "toy" ? "car" : class_name;
   object.shape = shape.name;
-  // Sizes in all directions are correlated: one common number determines half of the spread.
+  // The sizes in all directions are correlated: one common number determines half of their spread.
   const double overall = dice.unit();
   for (Eigen::Index i = 0; i < 3; ++i) {
     const double s = 0.5 * (overall + dice.unit());

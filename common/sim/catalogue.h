@@ -1,4 +1,4 @@
-// Properties of each class: its shapes and the ranges of their sizes.
+// The catalogue of classes: their shapes and the ranges of their sizes.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,8 +11,8 @@
 
 namespace perdure::sim {
 
-/// A shape of a class with the range of its sizes: length (x, forwards), width, height; metres. If
-/// the name is empty, the look's seed determines the shape.
+/// A shape of a class with the range of its sizes in metres: length (x, forwards), width, height.
+/// If the name is empty, the look's seed determines the shape.
 struct Shape {
   std::string name;
   Eigen::Vector3d smallest, largest;
@@ -23,10 +23,11 @@ struct Shape {
 const std::vector<std::string>& truthClasses();
 const std::vector<Shape>& shapesOf(const std::string& class_name);
 
-/// A new object of the class with class, shape, size and look, but without id and place.
+/// Draws an object of the class, with shape, size and look, but without id and pose.
 SceneObject drawObject(const std::string& class_name, Dice& dice, const std::string& look_set);
 
-/// The seed of a look. Its top byte is the number of the set, so that sets have no common seeds.
+/// Draws the seed of a look. Its top byte is the number of the set, so that sets have no common
+/// seeds.
 std::uint64_t lookSeed(Dice& dice, const std::string& look_set);
 
 }  // namespace perdure::sim

@@ -18,7 +18,8 @@ double normalCdf(double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); }
 
 double sizeOf(const Box& box) { return std::sqrt(std::max(0.0, box.area())); }
 
-/// KITTI's alpha in the levelled camera frame: yaw about the vertical minus the centre's bearing.
+/// KITTI's alpha in the levelled camera frame: yaw about the vertical minus the bearing of the
+/// centre.
 double alphaOf(const RigidTransform& T_WC, const Eigen::Vector3d& centre_W, double yaw) {
   const Eigen::Vector3d down = -Eigen::Vector3d::UnitZ(), optical = T_WC.R().col(2);
   const Eigen::Vector3d forward = (optical - optical.dot(down) * down).normalized();
@@ -66,7 +67,7 @@ Eigen::MatrixXd classDirections(const DetectorModel& model) {
   for (const ConfusionPair& pair : model.confusion) {
     if (!(pair.share > 0.0 && pair.share < 0.5)) refuse("confusion is not within 0 and 0.5");
     const auto i = indexOf(pair.first), j = indexOf(pair.second);
-    // Half the distance between two unit Gaussians is the quantile of their confusion probability.
+    // Half the distance of two unit Gaussians is the quantile of their confusion probability.
     const double half = std::sqrt(chi2Quantile(1.0 - 2.0 * pair.share, 1)) / model.separation;
     cosines(i, j) = cosines(j, i) = std::max(0.0, 1.0 - 2.0 * half * half);
   }
@@ -88,12 +89,12 @@ struct SimulatedDetector::Sight {
   double bearing = 0.0;  ///< direction of the camera, as seen from the object
 };
 
-/// Standard normal numbers for one observation. One part is drawn for each frame. The other part is
-/// a fixed function of object and viewpoint: waves of random phase, whose correlation decreases as
-/// the viewpoint changes.
+/// Standard normal errors of one observation. One part is drawn for each frame. The other part is a
+/// fixed function of object and viewpoint: a sum of waves with random phases. Its correlation
+/// decreases as the viewpoint changes.
 class SimulatedDetector::Errors {
  public:
-  /// `time`: in units of the time constant of sides; empty: drawn for each frame.
+  /// `time`: in time constants of the sides' errors; without it, sides are drawn for each frame.
   Errors(std::uint64_t seed, std::uint64_t frame, std::uint64_t object, double persistent,
          double bearing, double log_distance, std::optional<double> time = {})
       : fresh_(seedOf("look", {seed, frame, object})),
@@ -107,7 +108,7 @@ class SimulatedDetector::Errors {
     }
   }
   double normal() { return withPersistent(fresh_.normal()); }
-  /// A number for a side of the box: the drawn part changes with the time constant.
+  /// The error of one side of the box; its drawn part changes with the time constant.
   double side() {
     if (!time_) return normal();
     double lasting = 0.0;
@@ -165,8 +166,8 @@ double SimulatedDetector::foundProbability(double size_px, double visible) const
          logistic((visible - model_.half_visible) / model_.visible_softness);
 }
 
-/// The box of what the detector encloses, within the image. A cuboid that the camera model cannot
-/// project as a whole has the box of the outline.
+/// The box that the detector reports, within the image. If the camera model cannot project the
+/// whole cuboid, the box of the outline.
 Box SimulatedDetector::extentOf(const TruthView& view, const TruthObject& object,
                                 const TruthKey& key, const RigidTransform& T_WC) const {
   const Box outline = view.boxInside(width_, height_);
@@ -196,7 +197,7 @@ double SimulatedDetector::visibleShare(const TruthView& view) const {
   return inside > 0.0 ? std::min(1.0, view.visible_fraction / inside) : 0.0;
 }
 
-/// Gives a hidden object the visibility of the last visible frame, and moves its box on.
+/// Gives a hidden object the visibility of its last visible frame, and extrapolates its box.
 void SimulatedDetector::coast(Sight& sight, std::uint64_t frame) const {
   const std::uint64_t id = sight.view.object_id;
   const double most =
@@ -257,16 +258,16 @@ Detections SimulatedDetector::detect(std::uint64_t frame, const FrameStamp& stam
   found.model_hash = info_.hash;
   const std::vector<Sight> all = sights(frame, stamp.time, T_WB * camera_.T_BC());
   for (const Sight& sight : all) {
-    // the detector has no such class
+    // The detector has no such class.
     if (sight.looks_like == model_.classes.size()) continue;
     if (auto detection = look(sight, all, frame)) found.detections.push_back(std::move(*detection));
   }
   Dice dice(seedOf("false alarms", {model_.seed, frame}));
-  double left = std::exp(-model_.false_per_frame);  // Poisson-distributed number by Knuth's method
+  double left = std::exp(-model_.false_per_frame);  // Poisson-distributed, by Knuth's method
   for (double product = dice.unit(); product > left; product *= dice.unit()) {
     found.detections.push_back(falseAlarm(dice));
   }
-  // Sort, so that the order contains no information about identities.
+  // Sorts, so that the order contains no information about identities.
   std::ranges::sort(found.detections, [](const Detection& a, const Detection& b) {
     return std::tie(a.box.x1, a.box.y1, a.box.x2) < std::tie(b.box.x1, b.box.y1, b.box.x2);
   });
@@ -295,8 +296,8 @@ std::optional<Detection> SimulatedDetector::look(const Sight& sight, const std::
   return detection;
 }
 
-/// The visible part of the box: the nearer object with the largest overlap hides one side. If the
-/// occluder is not an object, the side is a function of the object's id.
+/// The visible part of the box: the nearer object with the largest overlap hides one side. If no
+/// object overlaps, the object's id determines the hidden side.
 Box SimulatedDetector::visiblePart(const Sight& sight, const std::vector<Sight>& all) const {
   Box box = sight.inside;
   if (sight.visible >= model_.shrink_below) return box;
@@ -345,7 +346,7 @@ std::optional<Box> SimulatedDetector::withErrors(const Box& box, Errors& errors)
   return noisy;
 }
 
-/// 1 for large and visible objects, down to least_separation for barely detectable ones.
+/// Returns 1 for large and visible objects, down to least_separation for barely detectable ones.
 double SimulatedDetector::quality(double size_px, double visible) const {
   const double ease = foundProbability(size_px, visible) / std::max(model_.found, 1e-9);
   return model_.least_separation + (1.0 - model_.least_separation) * ease;

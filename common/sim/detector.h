@@ -1,9 +1,9 @@
-// A simulated detector, drawn from the truth. It produces boxes with noise, misses by size and
-// visibility, false alarms, class confusion, and azimuths with flips. It allows tests of the filter
-// without a network.
+// Simulates a detector from the truth, for tests of the filter without a network. It produces boxes
+// with noise, misses by size and visibility, false alarms, class confusion, and azimuths with
+// flips.
 //
-// Its class evidence is correct by construction. Each box has a feature vector from a unit Gaussian
-// about the mean of its class (clutter: about the origin). The activations are the exact
+// Its class evidence is exact by construction. Each box has a feature vector from a unit Gaussian
+// around the mean of its class (clutter: around the origin). The activations are the exact
 // log-likelihood ratios of that vector. Errors from similar viewpoints are correlated.
 #pragma once
 
@@ -27,7 +27,8 @@ struct ConfusionPair {
   double share = 0.05;
 };
 
-/// Sizes are √(width · height) of the part of the outline inside the image, in pixels.
+/// Parameters of the detector. Sizes are √(width · height) in px of the outline's part in the
+/// image.
 struct DetectorModel {
   std::uint64_t seed = 1;
   std::vector<std::string> classes{"car",   "van",          "person",  "bicycle",
@@ -44,13 +45,12 @@ struct DetectorModel {
   double box_floor_px = 0.8;      ///< additional σ of a side in pixels, added in quadrature
   double side_correlation = 0.3;  ///< correlation of the errors of opposite sides
   double shrink_below = 0.6;      ///< fraction below which boxes enclose the visible part only
-  /// Share of sides whose deviation is tail_scale times larger.
+  /// Share of sides whose error is tail_scale times larger.
   double tail_share = 0.0, tail_scale = 5.0;
-  /// Time constant of the sides' errors, apart from their persistent share; 0: drawn again for each
-  /// frame.
+  /// Time constant of the sides' errors without their persistent share; 0: drawn for each frame.
   double error_time_s = 0.0;
-  /// A tracker continues the box of an object that becomes hidden for this time, at constant
-  /// velocity in the image, s.
+  /// Time in s for which a tracker continues the box of a hidden object, at constant velocity in
+  /// the image.
   double coast_s = 0.0;
   BoxExtent boxes = BoxExtent::kOutline;
   bool declare_boxes = true;  ///< false: ModelInfo states that the extent of boxes is unknown
@@ -68,24 +68,25 @@ struct DetectorModel {
   double latency_s = 0.0;         ///< delay of the detections; used by the publisher
 };
 
-/// One row of unit length per class: the direction of its mean from that of clutter in the space of
-/// features. Rows are orthogonal, except for confused pairs. Throws StartupError(kConfiguration).
+/// For each class, the unit direction of its mean from clutter's in the space of features, as a
+/// row. Rows are orthogonal, except for confused pairs. Throws StartupError(kConfiguration) for
+/// impossible confusions.
 Eigen::MatrixXd classDirections(const DetectorModel& model);
 
 class SimulatedDetector {
  public:
-  /// Throws StartupError(kConfiguration) for invalid numbers. `camera` is the camera whose views
-  /// the truth contains.
+  /// Throws StartupError(kConfiguration) for invalid parameters. `camera`: the camera of the views
+  /// in the truth.
   SimulatedDetector(DetectorModel model, Truth truth, const CameraCalibration& camera);
 
   const ModelInfo& info() const { return info_; }
   const DetectorModel& model() const { return model_; }
   const Truth& truth() const { return truth_; }
 
-  /// The detections in the frame with this index, from 0. T_WB is the true pose of the body in the
-  /// world of the truth. The result depends on the arguments and the seed only.
+  /// The detections in a frame; `frame` counts from 0. T_WB is the true pose of the body in the
+  /// world of the truth. The result depends only on the arguments and the seed.
   Detections detect(std::uint64_t frame, const FrameStamp& stamp, const RigidTransform& T_WB) const;
-  /// The detection probability of an object, from its size in the image and its visible fraction.
+  /// Detection probability of an object by its size in the image and its visible fraction.
   double foundProbability(double size_px, double visible) const;
 
  private:
@@ -101,7 +102,7 @@ class SimulatedDetector {
   void coast(Sight& sight, std::uint64_t frame) const;
   Box visiblePart(const Sight& sight, const std::vector<Sight>& all) const;
   std::optional<Box> withErrors(const Box& box, Errors& errors) const;
-  /// `truth` is the index of the class, or classes.size() for clutter.
+  /// `truth`: index of the class, or classes.size() for clutter.
   std::vector<float> activations(std::size_t truth, double quality, Errors& errors) const;
   double quality(double size_px, double visible) const;
   Detection falseAlarm(Dice& dice) const;

@@ -1,4 +1,4 @@
-// Seeded random choices that are the same on every machine and with every library.
+// Seeded random numbers that are the same on every machine and with every library.
 #pragma once
 
 #include <cmath>
@@ -17,7 +17,7 @@ constexpr std::uint64_t mixBits(std::uint64_t x) {
   return x ^ (x >> 31U);
 }
 
-/// A separate seed for a purpose and some numbers (a scene's seed, a frame, an object's id).
+/// Combines a purpose and some numbers (scene's seed, frame, object id) into a separate seed.
 constexpr std::uint64_t seedOf(std::string_view purpose,
                                std::initializer_list<std::uint64_t> numbers) {
   std::uint64_t seed = 0;

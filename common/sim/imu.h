@@ -1,6 +1,6 @@
-// Simulates an IMU in the body: point samples of the exact motion, with the errors of the
-// continuous-time model of Kalibr and EuRoC (white noise and bias random walk, given by densities).
-// Also simulates the wheel speed of a vehicle.
+// Simulates an IMU in the body frame: point samples of the exact motion, with errors of the
+// continuous-time model of Kalibr and EuRoC (densities of white noise and bias random walk). Also
+// simulates the wheel speed of a vehicle.
 #pragma once
 
 #include <vector>
@@ -15,17 +15,17 @@ inline constexpr double kGravity = 9.81;  ///< m/s²; W's z axis points against 
 
 struct ImuRecord {
   ImuSample sample;
-  /// The biases in the sample, at its time.
+  /// The true biases at the time of the sample.
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = Eigen::Vector3d::Zero();
 };
 
-/// Samples from the scene's t = 0 until `seconds`, at calibration.rate_hz. `epoch` is the sensor
-/// time of t = 0. A shorter record equals the start of a longer one.
+/// Returns samples from the scene's t = 0 until `seconds`, at calibration.rate_hz. `epoch` is the
+/// sensor time of t = 0. A shorter record equals the start of a longer one.
 std::vector<ImuRecord> simulateImu(const Trajectory& body, const ImuCalibration& calibration,
                                    const ImuErrors& errors, std::uint64_t seed, double seconds,
                                    TimePoint epoch);
 
-/// Samples from the scene's t = 0 until `seconds`; `epoch` is the sensor time of t = 0.
+/// Returns samples from the scene's t = 0 until `seconds`; `epoch` is the sensor time of t = 0.
 std::vector<SpeedSample> simulateSpeed(const Trajectory& body, const SpeedErrors& errors,
                                        std::uint64_t seed, double seconds, TimePoint epoch);
 

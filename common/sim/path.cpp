@@ -15,7 +15,7 @@ constexpr double kStep = 0.25;  ///< metres between points of a path
 
 using Points = std::vector<Eigen::Vector2d>;
 
-/// The arc of a corner, or the point itself if the path is straight there or the radius is 0.
+/// The arc at a corner; the corner itself if the path is straight there or the radius is 0.
 Points roundedCorner(const Eigen::Vector2d& before, const Corner& corner,
                      const Eigen::Vector2d& after) {
   const Eigen::Vector2d in = (corner.point - before).normalized();
@@ -69,7 +69,7 @@ Points resampled(const Points& outline, double& step) {
   return points;
 }
 
-/// The moving average, applied twice, so that the curvature changes steadily.
+/// The moving average, applied twice, so that the curvature is continuous.
 template <class Value>
 std::vector<Value> smoothed(std::vector<Value> values, int half, bool closed) {
   const int n = static_cast<int>(values.size());
@@ -118,7 +118,7 @@ GroundPath::GroundPath(const std::vector<Corner>& corners, bool closed, double s
   Points points = resampled(outlineOf(corners, closed), step_);
   if (closed) points.pop_back();  // equal to the first point
   points = smoothed(std::move(points), static_cast<int>(0.5 * smoothing_m / kStep), closed);
-  // Smoothing shortens curves, so the points are resampled at equal distances.
+  // Smoothing shortens the curve, so that it must be resampled at equal distances.
   if (closed) points.push_back(points.front());
   points = resampled(points, step_ = kStep);
   if (closed) points.pop_back();
@@ -161,7 +161,7 @@ double Drive::distanceAt(double t_s) const {
 
 namespace {
 
-/// The highest speeds within all limits, at every step from `from` on.
+/// The highest speeds within all limits, at every step of the path from `from` on.
 std::vector<double> speedProfile(const GroundPath& path, const SpeedLimits& limits, double from,
                                  double length, bool stops) {
   const auto count = static_cast<std::size_t>(std::ceil(length / kStep)) + 1;
@@ -227,7 +227,7 @@ Drive cruise(double from, double speed, double from_s, double until_s) {
 
 namespace {
 
-/// Waves of the road surface with lengths of 3 to 9 m.
+/// Unevenness of the road as waves with lengths of 3 to 9 m.
 class Roughness {
  public:
   Roughness(std::uint64_t seed, double lap_m) {
@@ -237,7 +237,7 @@ class Roughness {
       if (lap_m > 0.0) wave.length = lap_m / std::round(lap_m / wave.length);
     }
   }
-  /// Three heights between -1 and 1, for bounce, roll and pitch.
+  /// Three independent heights between -1 and 1, for bounce, roll and pitch.
   Eigen::Vector3d at(double distance) const {
     Eigen::Vector3d height = Eigen::Vector3d::Zero();
     for (std::size_t i = 0; i < waves_.size(); ++i) {

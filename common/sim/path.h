@@ -1,4 +1,4 @@
-// Paths on the ground and the speeds along them: from corner points to a trajectory's controls.
+// Computes trajectories on the ground: paths from corner points, and the speeds along them.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,8 +20,8 @@ struct PathPoint {
   double curvature = 0.0;  ///< 1/m, left turns positive
 };
 
-/// Straight lines and arcs, with gradual changes of curvature. A closed path repeats; an open path
-/// continues straight beyond its ends.
+/// A path of straight lines and arcs with gradual changes of curvature. A closed path repeats; an
+/// open path continues straight beyond its ends.
 class GroundPath {
  public:
   GroundPath(const std::vector<Corner>& corners, bool closed, double smoothing_m = 4.0);
@@ -52,11 +52,11 @@ struct Drive {
   double distanceAt(double t_s) const;
 };
 
-/// Rests for `rest_s` at distance `from`, then drives as fast as the limits allow until `until_s`,
-/// or until it stops at distance `to` (infinite: never).
+/// Rests for `rest_s` at distance `from`, then drives as fast as the limits allow, until `until_s`
+/// or until it stops at distance `to` (infinite: without a stop).
 Drive drive(const GroundPath& path, const SpeedLimits& limits, double from, double to,
             double rest_s, double until_s);
-/// Drives at constant speed from start to end, without a rest.
+/// Drives at constant speed from `from_s` to `until_s`, without a rest.
 Drive cruise(double from, double speed, double from_s, double until_s);
 
 struct Suspension {

@@ -1,5 +1,5 @@
-// A scene with exact truth, determined by name, seed and options: objects and their poses over
-// time, the motion of the body, and its sensors. W has z up; the ground is z = 0.
+// A scene with exact truth, determined by name, seed and options: objects with their motion, the
+// motion of the body, and its sensors. W has z up and the ground at z = 0.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,24 +13,23 @@
 
 namespace perdure::sim {
 
-/// An object that the map should contain (or reject, as the toy). It is part of the truth.
+/// An object of the truth, which the map should contain (or reject, if it is the toy).
 struct SceneObject {
   std::uint64_t id = 0;  ///< > 0
   std::string
       class_name;  ///< truth: car, van, person, bicycle, chair, dining table, monitor, couch, toy
-  /// The class that a detector assigns. It equals the class itself, except for the toy (car).
+  /// The class that a detector assigns: the object's own class, except for the toy (car).
   std::string looks_like;
   std::string
       shape;  ///< shape of the class (catalogue.h): hatchback, sedan, …; empty: by the look's seed
   std::uint64_t look_seed = 0;  ///< colours, textures, details
   Eigen::Vector3d size =
       Eigen::Vector3d::Ones();  ///< length (x of O), width (y), height (z); metres
-  /// Pose of the centre of its box, yaw about +z. Object frame O: x forwards, z up, origin in the
-  /// centre.
+  /// Pose of the box centre, yaw about +z. Object frame O: x forwards, z up, origin in the centre.
   Trajectory motion{RigidTransform{}};
   bool moves = false;  ///< moves at some time during its presence
-  /// It jumps between two frames, as if moved by a person. The truth has two keys and no motion
-  /// between them. `moves` is set too.
+  /// The object jumps between two frames, as if moved by a person. The truth has two keys and no
+  /// motion between them. `moves` is set too.
   bool steps = false;
   double present_from_s = -1e9, present_until_s = 1e9;
 
@@ -40,8 +39,8 @@ struct SceneObject {
 enum class PropKind { kFacade, kTree, kPole, kHedge, kWall, kKerb, kFloor, kCrate, kShelf };
 
 /// Scenery: visible and able to occlude objects, but not part of the truth. The pose is that of the
-/// centre of its box. Long props (facades, walls, hedges, kerbs, shelves) have x along their
-/// length; their front is −y.
+/// box centre. Long props (facades, walls, hedges, kerbs, shelves) extend along x; their front is
+/// −y.
 struct Prop {
   PropKind kind = PropKind::kFacade;
   std::uint64_t look_seed = 0;
@@ -74,8 +73,8 @@ struct SpeedErrors {
   bool noise = true;
 };
 
-/// The sensors. `calibration` is written to the sensor.yaml files; `true_calibration` describes the
-/// simulated sensors. The two differ only in tests of calibration.
+/// The sensors. `calibration` is written to the sensor.yaml files; `true_calibration` is that of
+/// the simulated sensors. Only tests of calibration have different values.
 struct Rig {
   Calibration calibration, true_calibration;
   std::vector<CameraErrors> cameras;
@@ -102,17 +101,17 @@ struct SceneOptions {
   bool stereo = false, mono8 = false, rolling_shutter = false, noise = true;
   std::uint32_t width = 640, height = 480;
   double rate_hz = 20.0;
-  /// Looks (colours, textures, shapes) have different seeds for training, testing and use. A
-  /// network is therefore never tested on its training data.
+  /// Looks (colours, textures, shapes) have different seeds for training, testing and use, so that
+  /// no network is tested on its training data.
   std::string look_set = "use";  ///< use, train, test
 };
 
 struct SceneName {
   std::string name, proves;
 };
-/// All scenes, and `random`: single views for training.
+/// All scenes, including `random`: single views for training.
 const std::vector<SceneName>& sceneNames();
-/// Throws StartupError(kUsage) with the known names if `name` is unknown.
+/// Builds a scene. Throws StartupError(kUsage) with the known names if `name` is unknown.
 Scene makeScene(const std::string& name, std::uint64_t seed, const SceneOptions& options);
 
 }  // namespace perdure::sim

@@ -13,7 +13,7 @@ constexpr double kTrunkHalf = 0.2;   ///< metres
 
 Eigen::Vector2d along(double yaw) { return {std::cos(yaw), std::sin(yaw)}; }
 
-/// Extent of `solid` from its centre in a direction of unit length.
+/// Extent of `solid` from its centre in `direction` (unit length).
 double reach(const Solid& solid, const Eigen::Vector2d& direction) {
   const Eigen::Vector2d x = along(solid.yaw), y(-x.y(), x.x());
   return solid.half.x() * std::abs(x.dot(direction)) + solid.half.y() * std::abs(y.dot(direction));

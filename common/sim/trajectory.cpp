@@ -14,7 +14,7 @@ constexpr int kPositionOrder = 6, kRotationOrder = 5;
 constexpr auto kPositionWeights = blendingMatrix<kPositionOrder>();
 constexpr auto kRotationWeights = cumulativeMatrix<kRotationOrder>();
 
-/// Controls near one time. Indices outside the range give the first or the last control.
+/// The controls near one time. Indices outside the range give the first or the last control.
 class Controls {
  public:
   Controls(const std::vector<RigidTransform>& all, std::int64_t first) : all_(all), first_(first) {}
@@ -77,7 +77,7 @@ MotionState Trajectory::at(double t_s) const {
   const double u =
       std::clamp((t_s - start_s_) / interval_s_, -8.0, static_cast<double>(control_.size()) + 8.0);
   const double position_segment = std::floor(u), rotation_segment = std::floor(u + 0.5);
-  // The rotation's knots lie half-way between the controls, so that neither spline has a lag.
+  // The rotation's knots are half-way between the controls, so that neither spline lags.
   evaluatePosition(Controls(control_, static_cast<std::int64_t>(position_segment) - 2),
                    u - position_segment, interval_s_, state);
   evaluateRotation(Controls(control_, static_cast<std::int64_t>(rotation_segment) - 2),

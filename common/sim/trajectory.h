@@ -22,15 +22,15 @@ struct MotionState {
 class Trajectory {
  public:
   /// Control poses every `interval_s` from `start_s`, at least one. The spline smooths them and
-  /// does not pass through them. The first and last control apply outside the range.
+  /// does not pass through them. The first and the last control apply outside the range.
   /// Derivatives are continuous up to the rate of the acceleration (C⁴ position, C³ rotation).
-  /// Adjacent controls must be less than half a turn apart. Two poses with a very short interval
-  /// form a step.
+  /// Adjacent controls must be less than half a turn apart. Two different controls at a very short
+  /// interval form a step.
   Trajectory(double start_s, double interval_s, std::vector<RigidTransform> control_poses);
   /// A body at rest.
   explicit Trajectory(const RigidTransform& T_WB) : Trajectory(0.0, 1.0, {T_WB}) {}
 
-  /// Valid for any finite t. The body is at rest until three intervals before the first control,
+  /// State at any finite time. The body is at rest until three intervals before the first control,
   /// and from three intervals after the last one.
   MotionState at(double t_s) const;
   RigidTransform poseAt(double t_s) const { return at(t_s).T_WB; }

@@ -21,7 +21,7 @@ bool samePlace(const TruthKey& a, const TruthKey& b) {
   return (a.centre_W - b.centre_W).norm() < 1e-6 && std::abs(wrapAngle(a.yaw - b.yaw)) < 1e-6;
 }
 
-/// The time between the two times at which an object with an instantaneous move left its place.
+/// The time between `before_s` and `after_s` at which an object jumps.
 double timeOfStep(const SceneObject& object, double before_s, double after_s) {
   const TruthKey start = keyAt(object, before_s, {});
   while (after_s - before_s > 1e-4) {
@@ -31,7 +31,7 @@ double timeOfStep(const SceneObject& object, double before_s, double after_s) {
   return after_s;
 }
 
-/// One key at the start of each rest that lasts at least one sample.
+/// Keys of an object that rests: one at the start of each rest that lasts at least one sample.
 std::vector<TruthKey> keysOfStanding(const SceneObject& object, double seconds, TimePoint epoch) {
   std::vector<TruthKey> keys{keyAt(object, 0.0, epoch)};
   double last_s = 0.0;

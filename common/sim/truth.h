@@ -1,5 +1,5 @@
-// The truth of a simulated folder: reads and writes objects_truth.json, visibility_truth.csv and
-// inside_truth.csv. A missing inside_truth.csv is treated as an empty file.
+// The truth of a simulated folder: reads objects_truth.json, visibility_truth.csv and
+// inside_truth.csv, and writes them. A missing inside_truth.csv counts as empty.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,8 +22,8 @@ inline constexpr char kVisibilityHeader[] = "frame,object_id,visible_fraction,x1
 inline constexpr char kInsideTruthFile[] = "inside_truth.csv";
 inline constexpr char kInsideHeader[] = "frame,object_id,x1,y1,x2,y2";
 
-/// The pose of an object at a time. The object stays there until the next key. If `moves` is set,
-/// it moves on a straight line between keys, which are then dense: ten per second.
+/// The pose of an object from a time on, until the next key. If `moves` is set, the object moves
+/// straight between keys, which are then dense: ten per second.
 struct TruthKey {
   TimePoint time;
   Eigen::Vector3d centre_W = Eigen::Vector3d::Zero();
@@ -43,17 +43,17 @@ struct TruthObject {
 
 Box clipped(const Box& box, double width, double height);
 
-/// One object in one frame of cam0. Rows exist for objects whose full outline touches the image.
+/// One object in one frame of cam0. A row exists if the object's full outline touches the image.
 struct TruthView {
   std::uint64_t object_id = 0;
-  /// Number of visible pixels divided by the pixels of the complete outline, including the part
-  /// outside the image.
+  /// Visible pixels divided by the pixels of the complete outline, including its part outside the
+  /// image.
   double visible_fraction = 0.0;
   Box box;  ///< box of the complete, unoccluded outline, not clipped to the image
-  /// Box of the part of that outline inside the image; set if the image border cuts it.
+  /// Box of the outline's part inside the image; set if the image border truncates the outline.
   std::optional<Box> inside = {};
 
-  /// The box within an image of this size: `inside`, or the intersection of box and image.
+  /// The box within an image of this size: `inside`, or else the intersection of box and image.
   Box boxInside(double width, double height) const;
 };
 
@@ -63,9 +63,9 @@ struct Truth {
 };
 
 bool hasTruth(const std::filesystem::path& folder);
-/// Throws StartupError(kUnavailable) with the file, the line and the fix.
+/// Reads a folder. Throws StartupError(kUnavailable) with file, line and fix if a file is invalid.
 Truth readTruth(const std::filesystem::path& folder);
-/// `epoch` is the sensor time of the scene's t = 0.
+/// The truth of a scene's objects; `epoch` is the sensor time of the scene's t = 0.
 std::vector<TruthObject> truthOf(const Scene& scene, TimePoint epoch);
 void writeObjectsTruth(const std::filesystem::path& folder,
                        const std::vector<TruthObject>& objects);

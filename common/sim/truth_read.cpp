@@ -40,7 +40,7 @@ bool isA(const Json& value) {
   return !std::floating_point<T> || value.is_number();
 }
 
-/// A member of a JSON object; `kind` names the required type.
+/// Reads a member of a JSON object; `kind` names the required type in the error message.
 template <class T>
 T member(const Json& parent, const char* key, const std::string& where, const char* kind) {
   const auto found = parent.find(key);
@@ -194,7 +194,7 @@ std::map<std::uint64_t, std::vector<TruthView>> readViews(const fs::path& file,
   return views;
 }
 
-/// Adds the boxes inside the image. Folders of earlier versions lack this file.
+/// Adds the boxes inside the image, unless an earlier version wrote the folder without this file.
 void readInside(const fs::path& file, std::map<std::uint64_t, std::vector<TruthView>>& views) {
   if (!fs::exists(file)) return;
   readRows<4>(file, kInsideHeader, "six", [&](const std::string& where, const Row<4>& row) {

@@ -5,7 +5,7 @@
 
 namespace perdure {
 
-/// Linear components, 0 … 1.
+/// A colour in linear components, 0 … 1.
 struct Colour {
   double r = 0, g = 0, b = 0, a = 1;
   Colour withAlpha(double alpha) const { return {r, g, b, alpha}; }

@@ -23,7 +23,7 @@ void addStrokes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, bool dashed,
   }
   const int strokes =
       std::clamp(static_cast<int>(std::round(length / (kDash + kGap))), 2, kMostDashes);
-  // The number of gaps is one less than the number of strokes, which begin and end at the corners.
+  // Strokes begin and end at the corners, so there is one gap less than strokes.
   const double unit = 1.0 / (strokes * (kDash + kGap) - kGap);
   for (int i = 0; i < strokes; ++i) {
     const double from = i * (kDash + kGap) * unit;

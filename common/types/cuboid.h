@@ -35,11 +35,11 @@ inline constexpr std::array<std::array<int, 2>, 12> kEdges{{{0, 1},
                                                             {3, 7}}};
 
 /// The ends of the strokes, two per stroke. The strokes are the edges and a line from the middle of
-/// the floor to the lower edge of the front, which shows the heading. Dashed: short strokes with
-/// gaps.
+/// the floor to the lower edge of the front, which shows the heading. If `dashed`, these lines are
+/// divided into short strokes with gaps.
 std::vector<Eigen::Vector3d> strokesOf(const Cuboid& cuboid, bool dashed);
 
-/// Returns true if something on the map occludes the object now.
+/// Returns true if an object on the map occludes the object now.
 inline bool isHidden(const ObjectBelief& object) {
   return object.visibility == Visibility::kOccluded;
 }

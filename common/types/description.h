@@ -1,7 +1,7 @@
-// How messages are described: each header of this folder has, below a struct, its fields by name
-// and kind with their limits. Encoding, decoding, JSON and Python use this description. In
-// describe(a, d, w), `a` is the archive, `d` the domain value, `w` the value on the wire (idl/).
-// The IDL has no bounds; they are checked here, where refusals can be counted.
+// Descriptions of messages. Each header of this folder lists, after its structs, their fields by
+// name and kind with their limits. Encoding, decoding, JSON and Python use these descriptions. In
+// describe(a, d, w), `a` is the archive, `d` the domain value, and `w` the value on the wire
+// (idl/). The IDL states no bounds; they are checked here, so that refusals can be counted.
 #pragma once
 
 #include <concepts>
@@ -47,7 +47,7 @@ inline constexpr std::size_t kDetections =
 inline constexpr std::size_t kLandmarks = 65536;
 inline constexpr std::size_t kObjects = 16384;
 inline constexpr std::size_t kReplyObjects = 100000;
-inline constexpr std::size_t kReplyAnchors = 65536;  ///< also the limit of loops
+inline constexpr std::size_t kReplyAnchors = 65536;  ///< also the largest number of loops
 inline constexpr std::size_t kReasons = 1024;
 inline constexpr std::size_t kEvidenceKinds = 64;
 /// Tolerance of the norm of a quaternion or a unit vector, and of the sum of a PMF.

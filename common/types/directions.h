@@ -1,6 +1,6 @@
-// From where an object was detected: the farthest distance in each of sixteen sectors of the
-// horizontal ray from the camera to the object. Sector k: its azimuth in the frame of the belief
-// lies in [k, k + 1) / 16 turns from x towards y.
+// The directions from which an object was detected. The horizontal ray from the camera to the
+// object lies in one of sixteen sectors; the farthest distance in each sector is stored. Sector k
+// has azimuths in [k, k + 1) / 16 turns, from x towards y in the frame of the belief.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,21 +11,21 @@ namespace perdure {
 
 inline constexpr int kDirections = 16;
 inline constexpr double kDirectionWidth = 2.0 * M_PI / kDirections;  // rad
-/// m; 0: not detected from this direction
+/// The farthest distance in each sector, m; 0 if the object was not detected from this direction.
 using Directions = Eigen::Matrix<float, kDirections, 1>;
 
-/// `azimuth`: finite, rad.
+/// Returns the sector of a finite azimuth, rad.
 inline int sectorOf(double azimuth) {
   const int sector =
       static_cast<int>(std::floor(std::remainder(azimuth, 2.0 * M_PI) / kDirectionWidth));
   return (sector + kDirections) % kDirections;
 }
-/// `azimuth`: finite, rad. `metres`: of the detection, finite, > 0.
+/// Adds a detection at a finite azimuth, rad, from a distance of `metres`, finite and > 0.
 inline void addDirection(Directions& directions, double azimuth, double metres) {
   float& farthest = directions[sectorOf(azimuth)];
   farthest = std::max(farthest, static_cast<float>(metres));
 }
-/// The same directions in a frame in which azimuths are larger by `yaw`, finite, rad; to the
+/// Returns the directions in a frame in which azimuths are larger by `yaw` (finite, rad), to the
 /// nearest sector.
 inline Directions turnedBy(const Directions& directions, double yaw) {
   Directions there;
@@ -33,7 +33,7 @@ inline Directions turnedBy(const Directions& directions, double yaw) {
   for (int k = 0; k < kDirections; ++k) there[(k + shift) % kDirections] = directions[k];
   return there;
 }
-/// Returns the angle from an azimuth to a sector, rad, 0 inside of it, at most π.
+/// Returns the angle from an azimuth to a sector, rad: 0 inside the sector, at most π.
 inline double angleToSector(int sector, double azimuth) {
   const double centre = (sector + 0.5) * kDirectionWidth;
   const double off = std::abs(std::remainder(azimuth - centre, 2.0 * M_PI));

@@ -32,7 +32,7 @@ inline const char* nameOf(HealthState state) {
   return nameAt(kNames, state);
 }
 
-/// Message in the Health of capture.
+/// Health::message of capture after the last frame of a drive.
 inline constexpr char kEndOfDrive[] = "end of drive";
 /// A reason in Health, set if the silence of inputs is the only cause of the degraded state.
 inline constexpr char kInputSilent[] = "input_silent";

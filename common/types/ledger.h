@@ -15,12 +15,12 @@ namespace perdure {
 /// kinds are appended.
 enum class ExistenceEvidence : std::uint8_t {
   kPrior = 0,  ///< odds of a new object before its first box
-  kHit,        ///< observations in which it was detected
+  kHit,        ///< observations in which the object was detected
   kRepeated,   ///< repeated detections from the same viewpoint, which carry little information
   kMiss,       ///< observations without a detection, computed as if nothing occluded the object
   kUnmappedOccluder,  ///< part of kMiss that is revoked: an unmapped occluder may hide the object
-  kHidden,            ///< unused observations: a mapped object occluded it (0 nats)
-  kAway,              ///< unused observations: it was outside the image (0 nats)
+  kHidden,            ///< unused observations: a mapped object occluded the object (0 nats)
+  kAway,              ///< unused observations: the object was outside the image (0 nats)
   kTime,              ///< survival: objects may leave
   kMisshapen,         ///< hypotheses whose size became impossible for their class
   kLost,              ///< hypotheses that the object drove off to an unknown place

@@ -15,7 +15,7 @@ namespace perdure {
 /// An object as the map shows it.
 struct MapObject {
   ObjectId id = 0;
-  WorldId world;  ///< M; or the W that the query names
+  WorldId world;  ///< M, or the W that the query names
   std::string class_name;
   double existence = 0.0, class_probability = 0.0;
   Vector7d mean = Vector7d::Zero();
@@ -24,8 +24,8 @@ struct MapObject {
   std::uint32_t hits = 0;
   Visibility visibility = Visibility::kOutOfView;
   Memory memory = Memory::kWorking;
-  /// The session is not yet located on the earlier map, so this may be a second row of a known
-  /// object.
+  /// True if the session is not yet located on the earlier map. This may then be a second row of a
+  /// known object.
   bool provisional = false;
 };
 
@@ -46,15 +46,15 @@ struct MapHeader {
   std::uint32_t tiles = 0, objects = 0;
 };
 
-/// The pose of W, the odometry's frame of reference, in M, the frame of the whole map. It
+/// T_MW, the pose of W (the odometry's frame of reference) in M (the frame of the whole map). It
 /// compensates the drift near the body. W never jumps; T_MW jumps at loop closures.
 struct MapFrame {
-  FrameStamp stamp;  ///< stamp of the frame at which it applies
+  FrameStamp stamp;  ///< stamp of the frame to which T_MW applies
   InstanceId instance = 0;
   WorldId world;  ///< W
   WorldId map;    ///< M; initially the W of the oldest session that is connected with this one
   RigidTransform T_MW;
-  /// Covariance of the body's position and yaw in M, [δp, δyaw], m and rad; all 0: see
+  /// Covariance of the body's position and yaw in M, [δp, δyaw], m and rad. If all are 0, see
   /// hasCovariance().
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
   std::uint64_t revision = 0;  ///< counts changes of the graph
@@ -69,7 +69,7 @@ enum class MapQueryKind : std::uint8_t {
   kByRadius,
   kByBox,
   kAll,
-  kRestore,    ///< a filter starts: requests the newest working set of another filter, on
+  kRestore,    ///< sent when a filter starts; requests the newest working set of another filter, on
                ///< `map/near`
   kGraph = 7,  ///< anchors within `radius` (0: all), nearest to `low` first, and the loop closures
                ///< between them
@@ -98,20 +98,20 @@ struct MapAnchor {
   WorldId map;                                  ///< M
   Eigen::Vector3d p = Eigen::Vector3d::Zero();  ///< position in M
   double yaw = 0.0;                             ///< rad
-  /// Standard deviations of [p, yaw] relative to the first anchor of M, m and rad. All 0 for
-  /// another anchor: not known (map_graph.h).
+  /// Standard deviations of [p, yaw] relative to the first anchor of M, m and rad. If all are 0,
+  /// they are not known, unless this is the first anchor (map_graph.h).
   Eigen::Vector4d sigma = Eigen::Vector4d::Zero();
   std::uint32_t objects = 0;  ///< number of objects last detected from here
 };
 
 enum class MapLoopKind : std::uint8_t {
   kLoop = 0,  ///< the body passed this place before
-  kTie,       ///< from objects that still had their ids
+  kTie,       ///< relative pose from tracks that were detected on both visits
 };
 enum class MapLoopState : std::uint8_t {
-  kTentative = 0,  ///< the graph does not accept it, or not yet
+  kTentative = 0,  ///< not accepted by the graph, or not yet
   kConfirmed,
-  kWithdrawn,  ///< it was accepted, but later ones contradict it; not a part of the graph any more
+  kWithdrawn,  ///< once accepted, but contradicted by later ones; not a part of the graph any more
 };
 
 /// Two objects that a loop closure identified: one of the map, and one detected at that time.
@@ -145,9 +145,9 @@ struct MapReply {
   bool truncated = false;  ///< more objects or anchors matched than `limit`
   std::vector<MapObject> objects;
   std::vector<ObjectBelief> beliefs;  ///< the objects in full, for a query by id
-  std::vector<MapAnchor> anchors;     ///< for kGraph, by id: anchors in the newest session's M
-  std::vector<MapLoop> loops;         ///< for kGraph, by id: loop closures between `anchors`
-  /// Totals in that M, including those not in this reply; 0: not known.
+  std::vector<MapAnchor> anchors;  ///< for kGraph: anchors in the newest session's M, sorted by id
+  std::vector<MapLoop> loops;      ///< for kGraph: loop closures between `anchors`, sorted by id
+  /// Total numbers in this M, including those not in this reply; 0: not known.
   std::uint32_t anchor_count = 0, loop_count = 0;
 };
 
@@ -158,7 +158,7 @@ struct Member {
   bool operator==(const Member&) const = default;
 };
 
-/// The map's knowledge of the body's surroundings, for one filter. Complete: a later message
+/// The objects of the map near the body, for one filter. The message is complete: a later one
 /// replaces it.
 struct MapNear {
   FrameStamp stamp;  ///< stamp of the newest working set in use
@@ -166,7 +166,7 @@ struct MapNear {
   InstanceId client = 0;       ///< the filter that owns the working set or sent kRestore
   WorldId world;               ///< W
   std::uint64_t revision = 0;  ///< grows by one with each message of an instance
-  /// The map has all messages of the client up to this time on disk; 0: none.
+  /// The map has stored all messages of the client up to this time on disk; 0: none.
   TimePoint kept;
   ObjectId next_id = 1;         ///< smaller ids are in use
   bool corrects_drift = false;  ///< the map's graph receives this odometry

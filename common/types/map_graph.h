@@ -7,7 +7,7 @@
 namespace perdure {
 
 /// Returns true for the first anchor of the map. The σ of other anchors are relative to it; its own
-/// are 0.
+/// are 0 and known.
 inline bool isFirstOfMap(const MapAnchor& anchor) {
   return anchor.previous == 0 && anchor.session == anchor.map;
 }

@@ -25,7 +25,7 @@ inline constexpr char kOtherClass[] = "other";
 /// One EKF of the bank: p(x | class), x = [p_WO (centre), yaw, log length, log width, log height].
 struct ClassBelief {
   std::string name;          ///< lower-case, or kOtherClass
-  double probability = 0.0;  ///< π_k; they sum to 1 over an object's classes
+  double probability = 0.0;  ///< π_k; the sum over an object's classes is 1
   Vector7d mean = Vector7d::Zero();
   Matrix7d covariance = Matrix7d::Identity();
   Eigen::Matrix<double, 7, 6> cross_pose = Eigen::Matrix<double, 7, 6>::Zero();  ///< P_xg
@@ -50,14 +50,14 @@ struct ObjectBelief {
   Visibility visibility = Visibility::kVisible;
   double visible_fraction = 0.0;           ///< v in [0, 1]
   ObjectId blocked_by = 0;                 ///< the occluding object; 0: none, or not an object
-  TimePoint first_seen, last_seen, as_of;  ///< as_of: up to when process noise was applied
+  TimePoint first_seen, last_seen, as_of;  ///< as_of: time up to which process noise was added
   std::uint32_t hits = 0, visible_misses = 0;
-  double moving = 0.0;                                 ///< probability that it moves
+  double moving = 0.0;                                 ///< probability that the object moves
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s in W, zero while static
   Memory memory = Memory::kWorking;
-  bool recalled = false;  ///< recalled from the map and not detected since
+  bool recalled = false;                      ///< recalled from the map and not detected since
   Directions seen_from = Directions::Zero();  ///< in W; 0 everywhere: not known
-  Ledger why;             ///< reasons of existence and class probabilities
+  Ledger why;                                 ///< reasons of existence and class probabilities
 
   const ClassBelief& best() const { return classes.front(); }
   TrackId trackId() const { return track != 0 ? track : id; }
@@ -71,7 +71,8 @@ struct EndedTrack {
   bool operator==(const EndedTrack&) const = default;
 };
 
-/// The working set at one frame, sufficient to restore it. Complete: a later message replaces it.
+/// The working set at one frame, sufficient to restore it. It is complete: a later message replaces
+/// it.
 struct Objects {
   FrameStamp stamp;
   InstanceId instance = 0;
@@ -83,18 +84,18 @@ struct Objects {
   /// Covariance of [θ, p] as in Odometry, to which `cross_pose` of objects detected in this frame
   /// refers. Zero: not known.
   Eigen::Matrix<double, 6, 6> pose_error = Eigen::Matrix<double, 6, 6>::Zero();
-  /// The newest `map/near` in use; 0: none.
+  /// Source and revision of the newest `map/near` in use; 0: none.
   InstanceId near_source = 0;
   std::uint64_t near_revision = 0;
-  /// The map must give objects nearer to the body than this, m; 0: none.
+  /// The map must send the objects nearer to the body than this, m; 0: none.
   double near_m = 0.0;
-  std::vector<EndedTrack> ended;  ///< after MapNear::kept; at most kMostEnded
+  std::vector<EndedTrack> ended;  ///< tracks that ended after MapNear::kept; at most kMostEnded
 };
 inline constexpr std::size_t kMostEnded = 256;
 
 /// The newest state of one object of the working set. Latched on `object_state`, keyed by the
-/// object's id. Disposed of when the object leaves the working set: gone, merged into another, or
-/// archived. An archived object remains on the map. Events state the cause.
+/// object's id. It is disposed of when the object leaves the working set: gone, merged into
+/// another, or archived. An archived object remains on the map. Events state the cause.
 struct ObjectState {
   FrameStamp stamp;
   InstanceId instance = 0;
@@ -118,7 +119,7 @@ enum class EventKind : std::uint8_t {
   kPredictedReturn,
   kModelChanged,
   kRestored,
-  kLoopClosed,     ///< from the map's graph, as are the next two
+  kLoopClosed,     ///< this event and the next two come from the map's graph
   kLoopWithdrawn,  ///< a loop closure was retracted
   kRelocalised,    ///< a session was located on an earlier map
 };
@@ -135,12 +136,12 @@ struct Event {
   std::string class_name;    ///< class of the object at that time
   double probability = 0.0;  ///< the probability concerned: r, or π of the class
   std::string detail;
-  /// For kPredictedReturn: seconds after the stamp: expected value, and the ends of a 90 %
-  /// interval.
+  /// For kPredictedReturn: the expected value and the ends of a 90 % interval, in seconds after the
+  /// stamp.
   std::array<double, 3> returns_in_s{};
 };
 
-/// Expected boxes of objects in a coming frame, for top-down detection by inference.
+/// The expected box of an object in a coming frame, for top-down detection by inference.
 struct Prediction {
   ObjectId object_id = 0;
   std::string class_name;

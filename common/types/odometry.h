@@ -25,7 +25,7 @@ enum class OdometryState : std::uint8_t {
 
 struct Odometry {
   FrameStamp stamp;
-  InstanceId instance = 0;  ///< the process that made it
+  InstanceId instance = 0;  ///< the process that published it
   WorldId world;
   OdometryState state = OdometryState::kInitialising;
   RigidTransform T_WB;
@@ -47,7 +47,7 @@ struct Landmark {
   std::uint64_t id = 0;
   Eigen::Vector3d p_W = Eigen::Vector3d::Zero();
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< m², in W, relative to the pose
-  Eigen::Matrix<double, 3, 6> cross_pose = Eigen::Matrix<double, 3, 6>::Zero();  ///< [θ, p]
+  Eigen::Matrix<double, 3, 6> cross_pose = Eigen::Matrix<double, 3, 6>::Zero();  ///< with [θ, p]
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  ///< distorted pixel in `camera`
   std::array<std::uint8_t, 32> descriptor{};        ///< 256-bit BRIEF (ORB), or zeros
 };

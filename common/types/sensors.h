@@ -32,7 +32,7 @@ struct Frame {
   std::string camera;  ///< "cam0", "cam1"
   std::uint32_t width = 0, height = 0;
   ImageEncoding encoding = ImageEncoding::kMono8;
-  SharedBytes data;  ///< a received frame refers to the memory in which it arrived
+  SharedBytes data;  ///< a received frame refers to the memory of the received message
 };
 
 struct ImuSample {
@@ -56,7 +56,7 @@ enum class DistortionModel : std::uint8_t {
   kNone = 0,
   kRadialTangential = 1,  ///< k1 k2 p1 p2 (OpenCV, EuRoC "radial-tangential")
   kEquidistant = 2,       ///< k1 k2 k3 k4 (Kannala-Brandt, OpenCV fisheye)
-  kRational = 3,  ///< k1 k2 p1 p2 k3 k4 k5 k6 (OpenCV); radial-tangential with k3: k4 … are 0
+  kRational = 3,  ///< k1 k2 p1 p2 k3 k4 k5 k6 (OpenCV); k4 … k6 are 0 for a lens with k3 only
 };
 
 constexpr std::size_t coefficientsOf(DistortionModel model) {
@@ -68,7 +68,7 @@ struct CameraCalibration {
   std::uint32_t width = 0, height = 0;
   double fx = 0, fy = 0, cx = 0, cy = 0;  ///< pixels
   DistortionModel distortion = DistortionModel::kNone;
-  std::vector<double> distortion_coefficients;  ///< their number is that of coefficientsOf()
+  std::vector<double> distortion_coefficients;  ///< coefficientsOf() gives their number
   RigidTransform T_BC;                          ///< camera in body
   double time_offset_s = 0.0;                   ///< t_imu = t_image + time_offset_s
   double readout_s = 0.0;                       ///< rolling shutter, first to last row; 0 = global

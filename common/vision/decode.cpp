@@ -10,13 +10,13 @@ namespace {
 
 using std::string_view_literals::operator""sv;
 
-/// Byte `at` as a number; 0 behind the end.
+/// Byte `at` as a number; 0 after the end.
 std::size_t byteAt(std::string_view bytes, std::size_t at) {
   return at < bytes.size() ? static_cast<unsigned char>(bytes[at]) : 0;
 }
 
-/// Walks over the segments of a JPEG to its end mark. A thumbnail's end mark lies inside a segment.
-/// Bytes after the end mark (padding, a vendor's trailer) are not read.
+/// Returns whether a JPEG has an end mark after its segments. A thumbnail's end mark lies inside a
+/// segment and does not count. Bytes after the end mark (padding, a vendor's trailer) are not read.
 bool hasJpegEnd(std::string_view bytes) {
   constexpr std::size_t kEnd = 0xD9, kFirstOfNoLength = 0xD0;
   for (std::size_t at = 2; at + 1 < bytes.size();) {
@@ -42,13 +42,13 @@ bool hasPngEnd(std::string_view bytes) {
   return false;
 }
 
-/// libjpeg fills missing data with grey and reports success. The end marks are checked instead.
+/// Checks the end marks, because libjpeg fills missing data with grey and reports success.
 bool endsAsItShould(std::string_view bytes) {
   if (bytes.starts_with("\xFF\xD8"sv)) return hasJpegEnd(bytes);
   return !bytes.starts_with("\x89PNG"sv) || hasPngEnd(bytes);
 }
 
-/// The pixels as the sensor gave them: an orientation tag (EXIF) does not turn them.
+/// Reads the pixels as the sensor gave them: an orientation tag (EXIF) does not turn them.
 constexpr int kAsSensed = cv::IMREAD_IGNORE_ORIENTATION;
 
 int readFlags(std::optional<ImageEncoding> encoding) {
@@ -143,7 +143,8 @@ Result<cv::Mat> decodeDepthFile(const std::string& path) {
 }
 
 int usedBits(const std::string& path) {
-  if (!std::filesystem::is_regular_file(path)) return 16;  // OpenCV would print an error to stderr
+  if (!std::filesystem::is_regular_file(path))
+    return 16;  // otherwise OpenCV prints an error to stderr
   if (hasEightBits(headOf(path))) return 16;
   try {
     return bitsOf(cv::imread(path, kSixteenGrey));

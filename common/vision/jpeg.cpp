@@ -61,8 +61,8 @@ Result<Frame> decompressed(const Frame& frame, ImageEncoding wanted) {
       width < 1 || height < 1) {
     return fail("jpeg_malformed", tjGetErrorStr2(turbo.get()));
   }
-  // Checked before memory is allocated: the frame's size is bounded, but the JPEG may state any
-  // size.
+  // The size is checked before memory is allocated: the frame's is bounded, but a JPEG may state
+  // any size.
   if (std::cmp_not_equal(width, frame.width) || std::cmp_not_equal(height, frame.height)) {
     return fail("jpeg_size_wrong", "the JPEG's width and height are not the frame's");
   }

@@ -7,7 +7,7 @@
 
 namespace perdure::vision {
 
-/// The compressed image; a frame that is already compressed is unchanged. Quality 1 … 100. Reasons:
+/// Compresses a frame with a quality of 1 … 100; a compressed frame is unchanged. Reasons:
 /// image_missing, image_malformed (size and bytes disagree), jpeg_failed.
 Result<Frame> compressed(const Frame& frame, int quality);
 

@@ -1,4 +1,4 @@
-// Memory for the sequences of one outgoing message, reused from message to message.
+// Memory for the sequences of one outgoing message, reused for the next message.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@ namespace perdure::wire {
 
 class Arena {
  public:
-  /// Zeroed memory for `count` elements of a C type, valid until clear().
+  /// Returns zeroed memory for `count` elements of a C type. It is valid until clear().
   template <class T>
   T* allocate(std::size_t count) {
     static_assert(std::is_trivially_copyable_v<T>);
@@ -20,7 +20,7 @@ class Arena {
   void clear() { memory_.release(); }
 
  private:
-  std::pmr::unsynchronized_pool_resource blocks_;  ///< keeps released blocks
+  std::pmr::unsynchronized_pool_resource blocks_;  ///< reuses released blocks
   std::pmr::monotonic_buffer_resource memory_{64 << 10, &blocks_};
 };
 

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kHeader = 4;
 constexpr std::uint8_t kXcdr1 = 0x00, kXcdr2 = 0x06, kDelimitedXcdr2 = 0x08;  // + 1: little-endian
-constexpr std::uint32_t kVersion1 = 1, kVersion2 = 2;                         // Cyclone's
+constexpr std::uint32_t kVersion1 = 1, kVersion2 = 2;                         // as in Cyclone
 constexpr std::uint8_t kNative = std::endian::native == std::endian::little ? 1 : 0;
 
 bool isFinal(const dds_topic_descriptor_t& type) {
@@ -24,7 +24,7 @@ bool isFinal(const dds_topic_descriptor_t& type) {
   return dds_stream_extensibility(type.m_ops, &kind) && kind == DDSI_SERTYPE_EXT_FINAL;
 }
 
-/// The XCDR version of an encapsulation for a type; 0 if it does not fit the type.
+/// Returns the XCDR version of an encapsulation; 0 if the encapsulation is not valid for the type.
 std::uint32_t versionOf(std::uint8_t encapsulation, const dds_topic_descriptor_t& type) {
   const auto form = static_cast<std::uint8_t>(encapsulation & ~1u);
   if (!isFinal(type)) return form == kDelimitedXcdr2 ? kVersion2 : 0;
@@ -33,15 +33,15 @@ std::uint32_t versionOf(std::uint8_t encapsulation, const dds_topic_descriptor_t
 
 using Op = std::uint32_t;
 
-/// Size of one number in bytes. Returns nothing for other kinds.
+/// Returns the size of a number of this kind in bytes, or nothing for kinds that are not numbers.
 std::optional<std::size_t> sizeOf(dds_stream_typecode kind) {
   if (kind == DDS_OP_VAL_BLN) return 1;
   if (kind < DDS_OP_VAL_1BY || kind > DDS_OP_VAL_8BY) return std::nullopt;
   return std::size_t{1} << (kind - DDS_OP_VAL_1BY);
 }
 
-/// Follows a message by Cyclone's operations, as Cyclone does, and reads lengths only. The
-/// functions return the next operation, or nullptr for an unknown one.
+/// Walks through a message by Cyclone's operations, as Cyclone does, but reads only the lengths.
+/// The functions return the next operation, or nullptr if an operation is unknown.
 class Walk {
  public:
   explicit Walk(std::span<const std::uint8_t> cdr) : cdr_(cdr) {}
@@ -73,7 +73,7 @@ class Walk {
   const Op* sequence(const Op* ops) {
     const auto kind = DDS_OP_SUBTYPE(*ops);
     const auto size = sizeOf(kind);
-    if (!size) number();  // size of all elements in bytes
+    if (!size) number();  // skips the size of all elements in bytes
     const std::uint32_t count = number();
     if (size) return skip(*size, count), ops + 2;
     for (std::uint32_t i = 0; i < count; ++i) {
@@ -87,7 +87,7 @@ class Walk {
     return kind == DDS_OP_VAL_STR ? ops + 2 : ops + DDS_OP_ADR_JMP(ops[3]);
   }
 
-  /// Handles a member that is missing in the message; returns nullptr if Cyclone would abort.
+  /// Skips a member that the message does not contain. Returns nullptr if Cyclone would abort.
   static const Op* absent(const Op* ops) {
     const auto kind = DDS_OP_TYPE(*ops), part = DDS_OP_SUBTYPE(*ops);
     if (kind == DDS_OP_VAL_STR || sizeOf(kind)) return ops + 2;
@@ -110,7 +110,7 @@ class Walk {
     return value;
   }
   void text() { at_ += number(); }
-  /// XCDR2 aligns to at most four bytes.
+  /// Skips `count` numbers of `size` bytes. XCDR2 aligns to at most four bytes.
   void skip(std::size_t size, std::size_t count) {
     if (count == 0) return;
     const std::size_t unit = std::min<std::size_t>(size, 4);
@@ -122,9 +122,10 @@ class Walk {
 };
 
 /// Cyclone 0.10.2 aborts if an @appendable struct ends before a member that is itself one
-/// (cyclonedds#1560, fixed in later versions). Returns whether the message contains all required
-/// structs. `cdr` is XCDR2 accepted by dds_stream_normalize_data(), without encapsulation; `ops`
-/// describe its type. Also returns false for members of kinds that Perdure's types do not use.
+/// (cyclonedds#1560, fixed in later versions). Returns whether the message contains all such
+/// members. `cdr` is XCDR2 without encapsulation that dds_stream_normalize_data() has accepted;
+/// `ops` describe its type. Also returns false if a member is of a kind that Perdure's types do not
+/// use.
 bool structsArePresent(std::span<const std::uint8_t> cdr, const std::uint32_t* ops) {
   return Walk(cdr).structure(ops);
 }
@@ -143,9 +144,9 @@ Result<CdrSample> CdrSample::read(std::span<const std::uint8_t> message,
   if (version == 0) {
     return fail("bad_encapsulation", std::string("not how ") + type.m_typename + " is encoded");
   }
-  // Cyclone checks and byte-swaps in place, and requires aligned memory. In XCDR2 it checks for
-  // four bytes per array element even if an element has eight. Byte-swapping may therefore access
-  // up to twice the size of the data.
+  // Cyclone checks and byte-swaps in place, and requires aligned memory. In XCDR2 it checks only
+  // for four bytes per array element, even if an element has eight. Byte-swapping may therefore
+  // access up to twice the size of the data.
   const auto payload = message.subspan(kHeader);
   std::vector<std::uint64_t> aligned(2 * payload.size() / sizeof(std::uint64_t) + 1);
   if (!payload.empty()) std::memcpy(aligned.data(), payload.data(), payload.size());

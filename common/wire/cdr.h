@@ -1,6 +1,7 @@
 // Messages as bytes, on the network and in recordings: four bytes of encapsulation (RTPS 2.5,
-// 10.5), then XCDR1 (final types) or delimited XCDR2 (appendable ones). Readers with more or fewer
-// known members can read XCDR2 too. This code needs no DDS participant and no network.
+// 10.5), then XCDR1 (final types) or delimited XCDR2 (appendable ones). Readers whose type has more
+// or fewer members can also read delimited XCDR2. This code needs no DDS participant and no
+// network.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +18,7 @@ namespace perdure::wire {
 /// Owns the generated C struct decoded from bytes.
 class CdrSample {
  public:
-  /// Accepts arbitrary bytes and reads nothing outside them. Reasons: bad_encapsulation,
+  /// Decodes arbitrary bytes, and reads nothing outside them. Fails with bad_encapsulation or
   /// malformed_cdr.
   static Result<CdrSample> read(std::span<const std::uint8_t> message,
                                 const dds_topic_descriptor_t& type);
@@ -32,9 +33,10 @@ class CdrSample {
   std::unique_ptr<void, Free> sample_;
 };
 
-/// A C struct as bytes, in the wire format of its type.
+/// Returns a C struct as bytes, in the wire format of its type.
 std::vector<std::uint8_t> writeCdr(const void* sample, const dds_topic_descriptor_t& type);
-/// The message of an image without its encapsulation; empty if decodeInPlace cannot read it.
+/// Returns the message of an image without its encapsulation; empty if decodeInPlace() cannot read
+/// the encapsulation.
 std::span<const std::uint8_t> payloadInPlace(std::span<const std::uint8_t> message);
 
 /// Decodes a value with all checks, or returns the reason of a failure. `keeper` owns the memory of
@@ -62,12 +64,12 @@ Result<std::vector<std::uint8_t>> encodeCdr(const T& value) {
   return writeCdr(&sample, Type<T>::descriptor());
 }
 
-/// The IDL of a type such as "perdure::msg::Objects" with all types that it needs, as one text
-/// without #include. The result is empty if the type is unknown.
+/// Returns the IDL of a type such as "perdure::msg::Objects" with all types that it needs, as one
+/// text without #include. Returns "" for unknown types.
 std::string idlOf(std::string_view type_name);
 
-/// The variant of a type such as "perdure::msg::Objects" in which every struct is final, with the
-/// same memory layout. Returns nullptr if the type itself is final, or unknown.
+/// Returns the variant of a type such as "perdure::msg::Objects" in which every struct is final;
+/// the memory layout is the same. Returns nullptr if the type itself is final, or is unknown.
 const dds_topic_descriptor_t* plainTwinOf(const std::string& type_name);
 
 }  // namespace perdure::wire

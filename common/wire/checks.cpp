@@ -15,8 +15,8 @@ bool isSymmetric(const Eigen::Ref<const Eigen::MatrixXd>& P) {
   return (P - P.transpose()).cwiseAbs().maxCoeff() <= kSymmetry * largest;
 }
 
-/// The correlation matrix of P. Rows without variance must be zero and become rows of the identity.
-/// The result is empty if P has a negative variance, or a covariance without variance.
+/// Returns the correlation matrix of P; zero rows of P become rows of the identity. Returns an
+/// empty matrix if a variance is negative, or is zero in a row that is not.
 Eigen::MatrixXd correlations(const Eigen::Ref<const Eigen::MatrixXd>& P) {
   Eigen::VectorXd scale(P.rows());
   for (Eigen::Index i = 0; i < P.rows(); ++i) {
@@ -57,7 +57,7 @@ bool isText(std::string_view text) {
 }
 
 bool isSemiDefinite(const Eigen::Ref<const Eigen::MatrixXd>& P) {
-  constexpr double kRounding = 1e-6;  // rounding errors of correlations
+  constexpr double kRounding = 1e-6;  // tolerated rounding errors of correlations
   if (P.rows() != P.cols() || !P.allFinite() || !isSymmetric(P)) return false;
   Eigen::MatrixXd C = correlations(P);
   if (C.size() == 0) return false;

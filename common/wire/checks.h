@@ -11,14 +11,14 @@ namespace perdure::wire {
 
 /// Returns true if the value is finite and within the limits.
 bool inside(double value, const Limits& limits);
-/// Returns whether `bytes` is a possible size of the frame's data: raw pixels or a JPEG of them.
+/// Returns whether `bytes` is a possible size of the frame's data, which are raw pixels or a JPEG.
 bool isSizeOf(const Frame& frame, std::size_t bytes);
 /// Returns whether `text` is valid UTF-8 without NUL.
 bool isText(std::string_view text);
-/// Returns whether P is symmetric and positive semi-definite within rounding, for any units of its
-/// rows.
+/// Returns whether P is symmetric and, within rounding errors, positive semi-definite. Rows may
+/// have different units.
 bool isSemiDefinite(const Eigen::Ref<const Eigen::MatrixXd>& P);
-/// Returns whether P is symmetric and positive definite, for any units of its rows.
+/// Returns whether P is symmetric and positive definite. Rows may have different units.
 bool isDefinite(const Eigen::Ref<const Eigen::MatrixXd>& P);
 
 }  // namespace perdure::wire

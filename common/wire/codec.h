@@ -1,7 +1,7 @@
-// Converts between domain types and wire types. Any bytes give a value or a reason; both directions
-// check one table of bounds. Reasons: not_finite, out_of_range, over_bound, bad_enum, bad_text,
-// size_mismatch, bad_rotation, bad_covariance, bad_probabilities, empty. The detail is the path of
-// the field, for example "items[3].classes[0].covariance".
+// Converts between domain types and wire types. Every input gives a value or a reason. Both
+// directions check the same table of bounds. Reasons: not_finite, out_of_range, over_bound,
+// bad_enum, bad_text, size_mismatch, bad_rotation, bad_covariance, bad_probabilities, empty. The
+// detail is the path of the field, for example "items[3].classes[0].covariance".
 #pragma once
 
 #include <memory>
@@ -13,8 +13,9 @@
 
 namespace perdure::wire {
 
-/// Fills `wire`, which refers to texts and pixels of `value` and to sequences in `arena`. It is
-/// valid as long as both exist unchanged. If a field is refused, the key's fields are still set.
+/// Fills `wire`, which then refers to texts and pixels of `value` and to sequences in `arena`.
+/// `wire` is valid while both exist unchanged. If a field is refused, the fields of the key are
+/// still set.
 template <class T>
 Result<void> encode(const T& value, typename Type<T>::Wire& wire, Arena& arena);
 
@@ -22,8 +23,8 @@ Result<void> encode(const T& value, typename Type<T>::Wire& wire, Arena& arena);
 template <class T>
 Result<T> decode(const typename Type<T>::Wire& wire);
 
-/// Decodes CDR in memory owned by `keeper` (native byte order, no header, as Cyclone delivers it).
-/// Byte sequences are not copied. Available for the types listed below.
+/// Decodes CDR in memory owned by `keeper` (native byte order, no header, as Cyclone delivers it)
+/// without copying byte sequences. Available for the types of kDecodedInPlace.
 template <class T>
 Result<T> decodeInPlace(std::span<const std::uint8_t> cdr, std::shared_ptr<const void> keeper);
 template <class T>
@@ -31,7 +32,7 @@ inline constexpr bool kDecodedInPlace = false;
 template <>
 inline constexpr bool kDecodedInPlace<Frame> = true;
 
-/// Decodes a dispose: a value in which only the key's fields are defined.
+/// Decodes a disposal. In the result only the fields of the key are defined.
 template <class T>
 T decodeKey(const typename Type<T>::Wire& wire);
 

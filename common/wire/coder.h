@@ -1,5 +1,5 @@
-// Encodes domain types into wire types, or decodes them, and checks every field. Keeps the first
-// refusal in a message, with the path of its field. Internal to common/wire.
+// Encodes domain types into wire types, or decodes them, and checks every field. Stores the first
+// refusal of a message, with the path of its field. Internal to common/wire.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,7 +26,7 @@ class Coder {
   using Memory = std::conditional_t<kEncodes, Arena&, std::shared_ptr<const void>>;
 
  public:
-  /// The arena of the encoded sequences; or the owner of the decoded message's memory, whose pixels
+  /// `memory`: the arena for encoded sequences; or the owner of the message to decode, whose pixels
   /// are then not copied.
   explicit Coder(Memory memory) : memory_(std::forward<Memory>(memory)) {}
 
@@ -68,7 +68,7 @@ class Coder {
       checkText(name, d, longest);
       w = const_cast<char*>(d.c_str());  // Cyclone's C types lack const; the text is only read
     } else {
-      if (w == nullptr) return d.clear();  // an older writer, or no text
+      if (w == nullptr) return d.clear();  // the writer is older, or the text is empty
       const std::string_view view(w, strnlen(w, longest + 1));
       checkText(name, view, longest);
       if (!failed()) d = view;
@@ -168,11 +168,12 @@ class Coder {
       }
     }
   }
-  /// `holds` is called only for values that were read.
+  /// Refuses the value with `code` unless holds(). `holds` is called only for values that were
+  /// read.
   void ensure(const char* name, const char* code, auto holds) {
     if (!failed() && !holds()) refuse(name, code);
   }
-  /// Checks a value of the wire that has no counterpart in the domain.
+  /// The same for a value on the wire without a counterpart in the domain type.
   void ensureWire(const char* name, const char* code, auto holds) {
     if constexpr (!kEncodes) ensure(name, code, holds);
   }
@@ -214,7 +215,8 @@ class Coder {
     if (w._length > 0 && w._buffer == nullptr) refuse(name, "size_mismatch");
     return w._length > 0 && w._buffer != nullptr;
   }
-  /// An external byte may be neither 0 nor 1. It must not be read as a bool.
+  /// Returns a bool from outside. Refuses bytes other than 0 and 1, which must not be read as a
+  /// bool.
   bool isTrue(const char* name, const bool& w) {
     std::uint8_t byte = 0;
     std::memcpy(&byte, &w, sizeof byte);
@@ -229,7 +231,8 @@ class Coder {
     }
     return d.has_value();
   }
-  /// Gives the target the length of the source. Returns false if the elements must not be copied.
+  /// Resizes the target to the length of the source. Returns false if the elements must not be
+  /// copied.
   bool resize(const char* name, auto& d, auto& w, std::size_t most) {
     if constexpr (kEncodes) {
       if (!checkCount(name, d.size(), most)) return false;

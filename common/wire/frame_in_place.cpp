@@ -19,7 +19,7 @@ class Cursor {
     at_ += sizeof(X);
     return true;
   }
-  /// Reads a length and that number of bytes.
+  /// Reads a length n and the next n bytes.
   bool counted(std::span<const std::uint8_t>& part) {
     std::uint32_t length = 0;
     if (!value(length) || !has(length)) return false;
@@ -35,7 +35,7 @@ class Cursor {
   std::size_t at_ = 0;
 };
 
-/// Cyclone's C types lack const, but the data are only read.
+/// Returns a mutable pointer for Cyclone's C types, which lack const. The data are only read.
 template <class X>
 X* borrowed(std::span<const std::uint8_t> bytes) {
   return reinterpret_cast<X*>(const_cast<std::uint8_t*>(bytes.data()));

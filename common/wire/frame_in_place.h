@@ -8,12 +8,12 @@
 
 namespace perdure::wire {
 
-/// Fills `wire`; its camera and pixels refer to `cdr`: native byte order, no header, XCDR1 or XCDR2
-/// (identical for this type, because its members of 8 bytes come first). Returns false if the data
-/// are truncated or the text has no terminator.
+/// Fills `wire`, whose camera and pixels then refer to `cdr`. `cdr` has native byte order and no
+/// header, in XCDR1 or XCDR2, which are identical for this type because its members of 8 bytes come
+/// first. Returns false if the data are truncated, or if the text has no terminator.
 bool frameInPlace(std::span<const std::uint8_t> cdr, perdure_msg_Frame& wire);
 
-/// Size of `wire` as CDR without its header.
+/// Returns the size in bytes of `wire` as CDR without a header.
 std::size_t sizeInPlace(const perdure_msg_Frame& wire);
 
 }  // namespace perdure::wire

@@ -16,7 +16,7 @@ const idl::File* fileOf(std::string_view struct_name) {
   return nullptr;
 }
 
-/// The file's text after that of the files that it includes (idl/README.md).
+/// Returns the text of the included files (idl/README.md), followed by that of the file.
 std::string inlined(const idl::File& file) {
   std::string before, text;
   std::istringstream lines{std::string(file.text)};

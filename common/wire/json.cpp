@@ -7,7 +7,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// JSON has neither NaN nor infinity; null replaces them.
+/// Returns null for NaN and infinity, which JSON does not have.
 Json numberJson(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Json choiceJson(EventKind kind) { return nameOf(kind); }

@@ -12,13 +12,13 @@ enum class Role : std::uint32_t {
   kInference = 1u << 2,
   kSemanticFilter = 1u << 3,
   kMapStore = 1u << 4,
-  kRecord = 1u << 5,       ///< `perdure record`: reads everything
-  kOperator = 1u << 6,     ///< the other commands: read everything, write queries
-  kPlayer = 1u << 7,       ///< `perdure play`: writes everything; made on demand only
-  kSubscriber = 1u << 8,   ///< third-party programs: read results, query the map
-  kGateway = 1u << 9,      ///< displays the bus: reads everything, writes queries
-  kRos2 = 1u << 10,        ///< the outward bridge to ROS 2: reads everything
-  kRos2Driver = 1u << 11,  ///< the bridge with inputs: also writes their topics; on demand only
+  kRecord = 1u << 5,       ///< `perdure record`: reads all topics
+  kOperator = 1u << 6,     ///< the other commands: read all topics, write queries
+  kPlayer = 1u << 7,       ///< `perdure play`: writes all topics; created on request only
+  kSubscriber = 1u << 8,   ///< third-party programs: read results, write map queries
+  kGateway = 1u << 9,      ///< gateway: reads all topics, writes queries
+  kRos2 = 1u << 10,        ///< the bridge to ROS 2 without inputs: reads all topics
+  kRos2Driver = 1u << 11,  ///< the bridge with inputs: also writes their topics; on request only
 };
 
 class Roles {

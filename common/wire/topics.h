@@ -1,5 +1,5 @@
-// Every topic of the system, one line each: message, name, quality of service, expected rate,
-// recorded or not, writers and readers. Names on the wire are perdure/<vehicle>/<name>. All code
+// Every topic of the system, one row each: message, name, quality of service, expected rate,
+// whether it is recorded, writers and readers. Names on the wire are perdure/<vehicle>/<name>. Code
 // that handles all topics or all messages expands this list.
 #pragma once
 
@@ -32,16 +32,16 @@ namespace perdure::wire {
 
 struct Qos {
   bool reliable = true;
-  int depth = 1;               ///< KEEP_LAST
+  int depth = 1;               ///< history depth (KEEP_LAST)
   bool latched = false;        ///< TRANSIENT_LOCAL: late joiners receive the last samples
-  int late = 0;                ///< number of those; 0: `depth`
+  int late = 0;                ///< number of these last samples; 0: `depth`
   bool kept = false;           ///< writers store the newest sample for ReadFrom::kKept
   bool exclusive = false;      ///< OWNERSHIP EXCLUSIVE and LIVELINESS MANUAL_BY_TOPIC
   double lease_s = 0.0;        ///< lease of the liveliness; 0: infinite
-  bool shared_memory = false;  ///< allowed for topics without key and latching only
+  bool shared_memory = false;  ///< only allowed for topics without key or latching
 };
 
-/// The shortest lease that does not expire falsely: three periods, at least 100 ms.
+/// Returns the shortest lease, in s, that does not expire falsely: three periods, at least 100 ms.
 constexpr double leaseFor(double rate_hz) {
   constexpr double kShortest = 0.1;  // shorter leases expire falsely on a busy machine (measured)
   return rate_hz > 0 ? std::max(kShortest, 3.0 / rate_hz) : kShortest;
@@ -61,7 +61,7 @@ struct TopicRow {
   Qos qos;
   double rate_hz;  ///< nominal, for a 10 Hz camera and a 100 Hz IMU; 0: on change
   bool recorded;
-  Roles writers, readers;  ///< granted by DDS-Security, without the roles that read or write all
+  Roles writers, readers;  ///< under DDS-Security, besides the roles for all topics
 };
 
 namespace table {
@@ -77,9 +77,9 @@ constexpr Qos bestEffort(int depth) { return {.reliable = false, .depth = depth}
 constexpr Qos latched(int depth, double lease_s = 0.0) {
   return {.depth = depth, .latched = true, .lease_s = lease_s};
 }
-/// A sensor whose gaps end the frame of reference. 10 s at 400 Hz are stored for a stopped reader;
-/// then DDS itself gives it up. A reader that begins receives as many samples as the start of vio
-/// needs.
+/// For a sensor whose gaps end the frame of reference. The depth stores 10 s at 400 Hz for a
+/// stopped reader, until DDS considers it dead. A new reader receives the samples that vio needs to
+/// start.
 constexpr Qos kSensor{.depth = 4096, .latched = true, .late = 512};
 constexpr Qos exclusive(int depth, double rate_hz) {
   return {.depth = depth, .exclusive = true, .lease_s = leaseFor(rate_hz)};
@@ -91,7 +91,7 @@ constexpr const dds_topic_descriptor_t* twinOf() {
   return kTwin;
 }
 
-// The two macros join the message's name with the prefixes of the generated C names.
+// The two macros build the generated C names from the message's name.
 #define PERDURE_FINAL_TOPIC(T, ...) \
   TopicRow<T, perdure_msg_##T, &perdure_msg_##T##_desc, nullptr> { __VA_ARGS__ }
 #define PERDURE_TOPIC(T, ...)                                                     \
@@ -110,8 +110,8 @@ constexpr std::tuple kRows{
     PERDURE_TOPIC(Calibration, "calibration", latched(1), kOnChange, kRecorded,
                   kCapture | kRos2Driver,
                   kVio | kInference | kSemanticFilter | kMapStore |
-                      kSubscriber),  // inference: upright images; map_store: place on Earth
-    // capture reads odometry with pace.mode; vio reads it only if another program writes it
+                      kSubscriber),  // for upright images (inference), and place on Earth
+    // capture reads odometry if pace.mode is "follow"; vio reads it if another program writes it.
     PERDURE_FINAL_TOPIC(Odometry, "odometry", reliable(64), kCameraHz, kRecorded,
                         kVio | kRos2Driver,
                         kSemanticFilter | kCapture | kMapStore | kVio | kInference | kSubscriber),
@@ -128,7 +128,7 @@ constexpr std::tuple kRows{
     PERDURE_TOPIC(ObjectState, "object_state", latched(1), kOnChange, kNotRecorded, kSemanticFilter,
                   kSubscriber),
     PERDURE_TOPIC(Event, "events", latched(256), kOnChange, kRecorded, kSemanticFilter | kMapStore,
-                  kSubscriber),  // map_store: loops of the graph
+                  kSubscriber),  // map_store, for loops of the graph
     PERDURE_TOPIC(Predictions, "predictions", bestEffort(1), kCameraHz, kRecorded, kSemanticFilter,
                   kInference | kSubscriber),
     PERDURE_TOPIC(MapTile, "map", latched(1), kOnChange, kNotRecorded, kMapStore, kSubscriber),

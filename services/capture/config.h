@@ -1,4 +1,4 @@
-// Configuration of capture.
+// Configuration of the service capture.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ namespace perdure::capture {
 struct DatasetConfig {
   std::string path;
   std::string sequence;             ///< only for KITTI tracking
-  std::vector<std::string> topics;  ///< topics of a ROS recording: "cam0=/left/image_raw"
+  std::vector<std::string> topics;  ///< topics of a ROS recording, as "cam0=/image_raw"
   std::string cameras = "stereo";
   double lead_s = 5.0, trail_s = 0.5;
 };
@@ -41,8 +41,8 @@ struct RunConfig {
 };
 
 struct CameraConfig {
-  /// libcamera's ids of cam0 and cam1, or parts of them. If `id` is empty, the first camera is
-  /// used; if `second` is empty, there is one camera.
+  /// libcamera's ids, or parts of the ids, of cam0 and cam1. An empty `id` selects the first
+  /// camera; with an empty `second` there is no cam1.
   std::string id, second;
   std::string format = "auto";  ///< libcamera's name, for example "YUYV"; auto: the best available
   double rate_hz = 20.0;
@@ -50,7 +50,7 @@ struct CameraConfig {
   std::string flip = "none";             ///< "none", "horizontal", "vertical" or "both"
   std::string focus = "as_is";           ///< as_is, auto, or manual (at lens_dioptres)
   double lens_dioptres = 0.0;            ///< 1/m; 0: infinity
-  std::vector<double> crop;              ///< x, y, width, height, pixels of the sensor; empty: all
+  std::vector<double> crop;              ///< x, y, width, height in sensor pixels; empty: all
 };
 
 struct ImuConfig {

@@ -20,7 +20,7 @@
 namespace perdure::capture {
 namespace {
 
-constexpr std::size_t kMostSizes = 12;  // listed sizes of a mode, in the text for people
+constexpr std::size_t kMostSizes = 12;  // largest number of listed sizes of a mode
 
 void addControls(const libcamera::ControlInfoMap& offered, SeenCamera& camera) {
   const auto has = [&](const auto& control) { return offered.find(control.id()) != offered.end(); };
@@ -83,7 +83,7 @@ bool hasChannels(const iio_device* device, const char* kind) {
   return true;
 }
 
-/// Attribute of the device, or of its first channel of a kind that has it.
+/// Returns an attribute of the device, or of the first of its channels that has the attribute.
 std::string attributeOf(const iio_device* device, const char* name) {
   char text[1024] = {};
   if (iio_device_attr_read(device, name, text, sizeof text) > 0) return trimmed(text);
@@ -177,7 +177,7 @@ bool hasSize(const SeenCamera& camera, const std::pair<std::uint32_t, std::uint3
   });
 }
 
-/// Largest size that both cameras have, up to a megapixel; vio needs no more.
+/// Returns the largest size that both cameras support, up to one megapixel, which suffices for vio.
 std::string sizeFor(const SeenCamera& camera, const SeenCamera& other) {
   std::pair<std::uint32_t, std::uint32_t> best{0, 0};
   for (const auto& mode : camera.modes) {
@@ -190,7 +190,8 @@ std::string sizeFor(const SeenCamera& camera, const SeenCamera& other) {
   return best.first > 0 ? fmt::format("{}x{}", best.first, best.second) : "its size";
 }
 
-/// Rate that both cameras support; the usual rate if a camera has no control for it.
+/// Returns a rate that both cameras support, or the default if a camera has no control for the
+/// rate.
 double rateFor(const SeenCamera& camera, const SeenCamera& other) {
   double rate = 20.0;
   for (const SeenCamera* of : {&camera, &other}) {

@@ -1,4 +1,5 @@
-// `perdure-capture --list`: connected cameras and inertial units, and a configuration.
+// Implements `perdure-capture --list`, which prints the connected cameras and inertial units, and a
+// configuration for them.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +16,7 @@ struct SeenCamera {
   };
   std::vector<Mode> modes;
   double slowest_hz = 0.0, fastest_hz = 0.0;  ///< 0: not reported
-  std::vector<std::string> settable;          ///< keys of the configuration
+  std::vector<std::string> settable;          ///< configuration keys that the camera supports
 };
 
 struct SeenImu {
@@ -23,22 +24,23 @@ struct SeenImu {
   bool gyro = false, accel = false;
   std::string rates;  ///< as reported by the device; empty: not reported
   double rate_hz = 0.0;
-  std::vector<std::string> triggers;  ///< triggers of the context
+  std::vector<std::string> triggers;  ///< names of the triggers in the libiio context
 };
 
 struct Seen {
   std::vector<SeenCamera> cameras;
   std::vector<SeenImu> imus;
-  std::vector<std::string> problems;  ///< why a device could not be read, with the fix
+  std::vector<std::string> problems;  ///< devices that could not be read: cause and fix
 };
 
-/// Finds devices through libcamera and through the libiio context `uri`.
+/// Finds cameras through libcamera, and inertial units through the libiio context `uri`.
 Seen lookAround(const std::string& uri);
 
-/// The devices found, or the places searched, and a configuration to copy.
+/// Returns text: the devices found (or where they were searched), and a configuration to copy.
 std::string describe(const Seen& seen, const std::string& uri);
 
-/// Runs `perdure-capture --list [URI]` and prints the result. Returns 69 if no device is found.
+/// Runs `perdure-capture --list [URI]`, prints the result, and returns the exit status: 69 if no
+/// device is found.
 int listSensors(const std::vector<std::string>& arguments);
 
 }  // namespace perdure::capture

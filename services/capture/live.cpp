@@ -15,7 +15,8 @@ bool isUsed(const CameraCalibration& camera, const Config& config) {
   return camera.name == cameraName(0) || (camera.name == cameraName(1) && camerasOf(config) > 1);
 }
 
-/// `unused` receives a sentence if the rig has a camera that is not used.
+/// Reads the calibration of the rig. `unused` receives a sentence if the rig has a camera that is
+/// not configured.
 Calibration rigOf(const Config& config, InstanceId source, std::string& unused) {
   requireSource(config);
   Calibration rig = replay::readRig(config.rig);
@@ -106,7 +107,8 @@ void Live::openImu(const ImuConfig& config) {
 /// Called on a stream's thread.
 void Live::scanned(const IioScan& scan) {
   const std::lock_guard lock(pairing_mutex_);
-  // Readings of one device have one time. With the acceleration first, the pair is complete.
+  // Both readings of a scan have the same time. The acceleration is added first, so that the
+  // gyroscope's reading completes the sample.
   if (scan.accel) {
     for (const auto& pair : pairing_.accel({scan.time_ns, *scan.accel})) offer(pair);
   }

@@ -20,14 +20,16 @@
 
 namespace perdure::capture {
 
-/// Returns the functions that open the cameras of these settings. `log` receives their log lines.
+/// Returns the functions that open the cameras of these settings. `log` receives the log lines of
+/// the cameras.
 using CameraOpeners = std::function<std::vector<OpenCamera>(
     const std::vector<CameraSettings>& cameras, std::function<void(const std::string&)> log)>;
 
 class Live {
  public:
-  /// Reads the rig and publishes it. Opens the sensors in the background, and reopens them after a
-  /// loss. Throws StartupError if the rig is not given, cannot be read, or lacks a camera.
+  /// Reads the rig file and publishes its calibration. Opens the sensors in the background, and
+  /// reopens them after a loss. Throws StartupError if the rig file is not configured, cannot be
+  /// read, or lacks a configured camera.
   Live(service::Context& context, const Config& config, const CameraOpeners& openers);
 
  private:
@@ -43,7 +45,7 @@ class Live {
   void write(std::vector<CameraImage> images);
   void publish(const InertialPair& sample);
   void publish(const SpeedReading& reading);
-  /// Publishes the calibration again, with the position of the body on Earth.
+  /// Publishes the calibration again, together with the position of the body on Earth.
   void publish(const EarthPlace& place);
   void updateHealth();
   std::string imuYield();
@@ -51,14 +53,14 @@ class Live {
 
   service::Context& context_;
   const HostClock clock_;
-  std::map<std::string, bus::Writer<Frame>*> frames_;  ///< writers by camera
+  std::map<std::string, bus::Writer<Frame>*> frames_;  ///< writers, by camera
   bus::Writer<Calibration>& calibrations_;
   Sink<ImuSample> imu_;
   Sink<SpeedSample> speed_;
   std::string unused_;  ///< cameras of the rig that the configuration does not use
   Calibration rig_;
   BoundedQueue<Message> queue_{1024, Overflow::kDropOldest};  // several seconds of IMU samples
-  /// A separate queue, so that a network sender that sends too much causes no loss of images.
+  /// A separate queue, so that too many messages from the network cause no loss of images.
   BoundedQueue<Message> from_vehicle_{256, Overflow::kDropOldest};
   std::uint64_t samples_ = 0;
   std::int64_t last_ns_ = 0;  ///< stamp of the last inertial sample
@@ -71,7 +73,7 @@ class Live {
   mutable std::mutex pairing_mutex_;
   ImuPairing pairing_;
   std::uint64_t readings_ = 0;  ///< number of gyroscope readings
-  // Their threads use all members above, so these members are destroyed first.
+  // The threads of these members use all members above, so these members are destroyed first.
   std::vector<std::unique_ptr<IioStream>> imus_;
   std::unique_ptr<LiveCameras> cameras_;
   Vehicle vehicle_;

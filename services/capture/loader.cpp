@@ -87,7 +87,8 @@ Loader::Loader(const Config& config, std::unique_ptr<replay::Dataset> drive, std
     const auto pauses = static_cast<Duration::rep>(std::max<std::uint64_t>(frame_count_, 2) - 1);
     length_ = end - begin + (end - begin) / pauses;
     until_ = begin + length_;
-    // Starts at the previous frame: samples after a lap's last frame belong to that lap.
+    // Starts at the previous frame, because samples after the last frame of a lap belong to that
+    // lap.
     first -= std::min<std::uint64_t>(first, 1);
     lap_ = first / frame_count_;
     first %= frame_count_;
@@ -116,7 +117,7 @@ void Loader::moveToLap(replay::Message& message) const {
   if (auto* frame = std::get_if<Frame>(&message)) frame->stamp.sequence += lap_ * frame_count_;
 }
 
-/// A frame that cannot be compressed is sent as it is, and counted.
+/// Compresses a frame. If this fails, the frame stays uncompressed, and the failure is counted.
 void Loader::compress(replay::Message& message) {
   auto* frame = std::get_if<Frame>(&message);
   if (!frame || !frame->data) return;

@@ -19,20 +19,22 @@ std::unique_ptr<replay::Dataset> openDrive(const Config& config, InstanceId sour
 
 class Loader {
  public:
-  /// Begins at frame `first`. `notify` is called on the loader's thread after each message. With
-  /// run.on_end "repeat" the drive repeats without end. Frame n·frameCount() + i is then its frame
-  /// i, later by n lap lengths (all frames and the interval between laps). Reading then begins one
-  /// frame early, with the samples of that frame.
+  /// Begins at frame `first`. `notify` is called on the loader's thread after each message. If
+  /// run.on_end is "repeat", the drive repeats without end: frame n·frameCount() + i is frame i of
+  /// the drive, later by n lap lengths (all frames and the interval between laps). Reading then
+  /// begins one frame early, with the samples of that frame.
   Loader(const Config& config, std::unique_ptr<replay::Dataset> drive, std::uint64_t first,
          std::function<void()> notify);
   ~Loader();
   Loader(const Loader&) = delete;
   Loader& operator=(const Loader&) = delete;
 
-  /// Next message if it is ready; ended() is true after the last one.
+  /// Returns the next message if it is ready; otherwise nothing. After the last message ended() is
+  /// true.
   std::optional<replay::Message> take();
   bool ended() const;
-  /// Counts of omitted data (image_truncated, imu_gap, …), and the last problem as text.
+  /// Return the counts of data problems (image_truncated, imu_gap, …), and the last problem as
+  /// text.
   ReasonCounts reasons() const;
   std::string lastProblem() const;
 

@@ -30,7 +30,8 @@ std::int64_t Node::dueAt(TimePoint time) const {
   return state_.start_ns + static_cast<std::int64_t>(drive_ns / config_.pace.rate);
 }
 
-/// Whether an earlier process has sent the message, or its time passed without a process.
+/// Returns whether an earlier process has sent the message, or its time passed while no process
+/// ran.
 bool Node::isPast(TimePoint time, bool image, std::uint64_t sequence, std::int64_t now_ns) {
   if (!catching_up_) return false;
   if (!image) return toNanoseconds(time) <= resumed_.last_ns;

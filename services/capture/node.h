@@ -1,4 +1,5 @@
-// Publishes a drive message by message, by its own clock or at the speed of its readers.
+// Publishes the messages of a drive one by one, at their times (clock mode) or at the speed of the
+// readers (follow mode).
 #pragma once
 
 #include <cstdint>
@@ -24,12 +25,12 @@ struct Outputs {
 class Node {
  public:
   /// `period`: usual time between frames. `resume`: state of an interrupted run, whose messages are
-  /// not sent again. In clock mode, frames due in the meantime are counted as missed_while_away,
-  /// and the inertial samples of that time are sent late.
+  /// not sent again. In clock mode, frames that were due during the interruption are counted as
+  /// missed_while_away, and its inertial samples are sent late.
   Node(const Config& config, Duration period, const std::optional<RunState>& resume,
        Outputs outputs);
 
-  /// Follow mode: answers of this name ("odometry", "detections") credit frames.
+  /// Adds an answerer ("odometry", "detections"), whose answers credit frames in follow mode.
   void expect(const std::string& answerer) { credits_.expect(answerer); }
   void onAnswer(const std::string& answerer, const FrameStamp& stamp);
 
@@ -37,8 +38,8 @@ class Node {
   void offer(replay::Message message) { pending_ = std::move(message); }
   void end() { ended_ = true; }
 
-  /// Sends the pending message if it is due. Returns the time until the next call; Duration::max():
-  /// until the next offer or answer.
+  /// Sends the pending message if it is due. Returns the time until the next call is needed;
+  /// Duration::max(): none is needed before the next offer or answer.
   Duration tick(std::int64_t now_ns);
 
   bool finished() const { return ended_ && !pending_; }

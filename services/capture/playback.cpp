@@ -143,8 +143,8 @@ void Playback::pump() {
   if (node_->finished()) finish();
 }
 
-/// Writes the file if its content would change. A sample alone does not cause a write until the
-/// next frame, because a few repeated samples do no harm.
+/// Writes the run state if it has changed. A sample alone does not cause a write, because readers
+/// tolerate a few repeated samples after a restart.
 void Playback::saveState() {
   RunState state = node_->state();
   if (config_.run.state.empty() || (state.next_sequence == saved_.next_sequence &&

@@ -16,15 +16,15 @@
 
 namespace perdure::capture {
 
-/// Waits for the readers that must receive the first frame. A process counts as present if it reads
-/// frame/cam0 (vio, inference), or any topic (others).
+/// Waits for the readers that must receive the first frame. vio and inference count as present if
+/// they read frame/cam0, other processes if they read any topic.
 class StartGate {
  public:
   using Clock = std::chrono::steady_clock;
   StartGate(const bus::Participant& participant, const StartConfig& config, Clock::time_point now);
 
-  /// Opens half a second after all readers are present, so that they discover this process too, or
-  /// after the timeout. It then stays open.
+  /// Returns whether the drive may start: half a second after all readers are present, so that they
+  /// also discover this process, or after the timeout. Once true, the result stays true.
   bool open(Clock::time_point now);
   const std::vector<std::string>& missing() const { return missing_; }
 

@@ -1,4 +1,4 @@
-// File of the run state (run.state), written atomically.
+// Reads and atomically writes the file of the run state (run.state).
 #pragma once
 
 #include <optional>
@@ -10,13 +10,14 @@
 namespace perdure::capture {
 
 std::string driveOf(const Config& config);
-/// Identity of the machine's current boot.
+/// Returns the identity of the machine's current boot.
 std::string bootId();
 
-/// State of the same run on the same boot. Empty if there is none, or if `config` names no file.
+/// Returns the stored state of the same run on the same boot. Returns nothing if there is none, or
+/// if `config` names no file.
 std::optional<RunState> readRunState(const Config& config);
 
-/// Replaces the file. False if the file cannot be written.
+/// Replaces the file. Returns false if the file cannot be written.
 bool writeRunState(const std::string& file, const RunState& state);
 
 }  // namespace perdure::capture

@@ -20,7 +20,7 @@ struct Config {
 };
 
 void describe(Config& config, config::Fields& fields);
-/// Checks conditions between fields. Throws StartupError (78).
+/// Checks conditions between fields. Throws StartupError (78) if one is violated.
 void verify(const Config& config);
 
 }  // namespace perdure::gateway

@@ -59,7 +59,8 @@ void listenAlways(service::Context& context, gateway::Node& node) {
   context.on(bus::kTopic<MapReply>, [&](const MapReply& m) { node.onMapReply(m); });
 }
 
-/// Waits briefly for the newest stored messages before it sends the state to the first viewer.
+/// Waits for stored messages, for at most 0.4 s, before the node sends its state to the first
+/// viewer.
 class Beginning {
  public:
   explicit Beginning(gateway::Node& node) : node_(node) {}
@@ -79,7 +80,8 @@ class Beginning {
     if (const auto wanted = std::exchange(awaited_, std::nullopt)) node_.setWanted(*wanted);
     for (const auto& work : std::exchange(later_, {})) work();
   }
-  /// Runs `work` at once, or after the node has received the viewers' channels.
+  /// Runs `work` at once; during the wait, runs it after the node has received the viewers'
+  /// channels.
   void afterwards(std::function<void()> work) {
     if (!awaited_) return work();
     later_.push_back(std::move(work));
@@ -134,8 +136,9 @@ class Readers {
     readers_.emplace_back(context_, topic, any(std::move(channels)), std::move(handler),
                           std::move(on_gone));
   }
-  /// Delivers the newest earlier message, which writers store (bus::Qos::kept), to new viewers. The
-  /// reader is closed after the first message. Writers without stored messages send nothing.
+  /// Reads the newest stored message (bus::Qos::kept) when one of the channels gets its first
+  /// viewer. The reader is closed after the first message. Writers without a stored message send
+  /// nothing.
   template <class T>
   void addNewestOfBefore(const bus::Topic<T>& topic, gateway::Channels channels,
                          std::type_identity_t<Sink<T>> handler) {
@@ -210,7 +213,8 @@ class Readers {
   std::list<service::OnDemand> readers_;
 };
 
-/// Services whose work another program does: the bridge to ROS 2, or a custom driver.
+/// Returns the services that another program replaces (the bridge to ROS 2, or a driver), each with
+/// a sentence.
 std::map<std::string, std::string> standIns(const bus::Participant& participant,
                                             bus::Discovery& discovery,
                                             const gateway::VitalSigns& heard) {

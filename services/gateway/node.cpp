@@ -9,7 +9,7 @@ namespace perdure::gateway {
 namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr std::chrono::seconds kLongBack{2};  // larger: restarted recording, or another drive
+constexpr std::chrono::seconds kLongBack{2};  // a larger step back: another recording or drive
 constexpr std::chrono::seconds kGap{1};       // sensor time; a longer gap interrupts the trajectory
 
 }  // namespace
@@ -51,7 +51,7 @@ void Node::sendWanted(std::initializer_list<std::uint32_t> channels) {
 
 void Node::newest(TimePoint time) {
   if (time <= time_ && time_ - time < kLongBack) return;
-  time_ = time;  // slightly earlier messages are late; much earlier ones belong to another drive
+  time_ = time;  // slightly earlier messages are late; much earlier: another drive
   if (!wanted_.empty()) outputs_.time(time);
 }
 
@@ -67,14 +67,14 @@ void Node::setWanted(const Channels& wanted) {
   lookAtGraph(looked_at_graph);
   away_ = away_ || wanted.empty();
   if (before.empty() && !wanted.empty() && time_ != TimePoint{}) outputs_.time(time_);
-  if (!wantsTiles()) map_.clear();  // the reader of tiles is closed, so stored tiles become old
+  if (!wantsTiles()) map_.clear();  // without a reader, stored tiles become outdated
   if (!before.contains(kScene)) scene_ = Scene();
   for (const std::uint32_t channel : wanted) {
     if (!before.contains(channel)) sendNow(channel);
   }
 }
 
-/// Sends the current state to the first viewer.
+/// Sends the current state of a channel to its first viewer.
 void Node::sendNow(std::uint32_t channel) {
   switch (channel) {
     case kTransforms:
@@ -87,7 +87,7 @@ void Node::sendNow(std::uint32_t channel) {
     case kMap:
     case kMapScene:
       next_map_ns_ = 0;
-      map_due_ = map_due_ || !map_.empty();  // otherwise the map is sent once tiles arrive
+      map_due_ = map_due_ || !map_.empty();  // if empty, the map is sent once tiles arrive
       return;
     case kMapGraph:
     case kMapGraphScene:
@@ -151,7 +151,7 @@ void Node::onFrame(std::size_t camera, const Frame& frame) {
        frame.stamp.time);
 }
 
-/// A stored frame is ignored if a live frame is newer.
+/// Takes a frame stored by its writer. The frame is ignored if a newer frame was sent.
 void Node::onFrameOfBefore(std::size_t camera, const Frame& frame) {
   const auto& last = image_pace_[camera].last;
   if (!last || frame.stamp.time > *last) onFrame(camera, frame);
@@ -160,7 +160,7 @@ void Node::onFrameOfBefore(std::size_t camera, const Frame& frame) {
 void Node::onOdometry(const Odometry& odometry, std::int64_t now_ns) {
   last_.odometry_ns = now_ns;
   if (odometry.state == OdometryState::kInitialising) return;
-  // With another W, other parts of the map belong to its M.
+  // If W changes, M may change too, and with it the displayed part of the map.
   map_due_ = map_due_ || (!map_.empty() && world() != odometry.world);
   beginAnew(odometry.stamp.time);
   odometry_ = odometry;
@@ -198,7 +198,8 @@ void Node::onModel(const ModelInfo& model) {
   sendWanted({kModel});
 }
 
-/// After a time without viewers, trajectory and histories begin at the next viewer.
+/// After a time without viewers, clears trajectory and histories, unless the message at `time`
+/// continues them.
 void Node::beginAnew(TimePoint time) {
   if (!std::exchange(away_, false) || (time >= time_ && time - time_ < kGap)) return;
   trajectory_.clear();
@@ -244,11 +245,12 @@ void Node::take(const Objects& objects) {
 void Node::sendObjects() {
   sendWanted({kObjects, kScene});
   for (std::size_t i = 0; i < config_.cameras.size(); ++i) sendAnnotations(i, false);
-  // otherwise the pose is sent with each odometry message
+  // If odometry is received, it determines the pose.
   if (!odometry_) sendPose(objects_->stamp.time);
 }
 
-/// The detections of a frame may arrive after the objects, so the annotations wait for them.
+/// Sends the annotations for the newest objects. Unless `now`, waits for detections of the same
+/// frame if they are likely to follow.
 void Node::sendAnnotations(std::size_t camera, bool now) {
   const bool wanted =
       wants(cameraChannel(camera, kAnnotations)) || wants(cameraChannel(camera, kLikelihood));
@@ -269,7 +271,7 @@ void Node::sendAnnotations(std::size_t camera, bool now) {
   if (wants(cameraChannel(camera, kAnnotations)))
     send(cameraChannel(camera, kAnnotations),
          imageAnnotations(*objects_, *cameras_[camera], detections), objects_->stamp.time);
-  // Without received detections, the likelihood is not known.
+  // Before the first detections, no likelihood is known.
   if (wants(cameraChannel(camera, kLikelihood)) && !frames.empty())
     send(cameraChannel(camera, kLikelihood),
          likelihoodRegions(*objects_, *cameras_[camera], detections, model_ ? &*model_ : nullptr),

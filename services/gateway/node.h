@@ -1,5 +1,5 @@
-// The gateway without bus and sockets. It converts messages of the bus to messages of channels.
-// Only channels with viewers are computed, and each message only once.
+// The gateway without bus and sockets. It converts messages of the bus to messages of channels,
+// only for channels with viewers, and once for all viewers.
 #pragma once
 
 #include <deque>
@@ -32,7 +32,7 @@ struct Outputs {
   Sink<MapQuery> query;
 };
 
-/// Times `now_ns` are on CLOCK_MONOTONIC.
+/// Converts messages. Times `now_ns` are on CLOCK_MONOTONIC.
 class Node {
  public:
   Node(const Config& config, const std::string& vehicle, InstanceId instance, Outputs outputs);
@@ -47,8 +47,8 @@ class Node {
   void onDetections(const Detections& detections);
   void onModel(const ModelInfo& model);
   void onObjects(const Objects& objects, std::int64_t now_ns);
-  /// Takes the newest message that was sent before the first viewer, for example at the end of a
-  /// drive.
+  /// Take the newest message that its writer sent before the first viewer came, for example at the
+  /// end of a drive.
   void onObjectsOfBefore(const Objects& objects);
   void onFrameOfBefore(std::size_t camera, const Frame& frame);
   void onEvent(const Event& event);
@@ -59,10 +59,11 @@ class Node {
   void onMapTile(const MapTile& tile) { map_.put(tile); }
   void onMapTileGone(const MapTile& key) { map_.erase(key); }
   void onMapReply(const MapReply& reply);
-  /// Takes the graph that map_store sent to another program; used for recordings.
+  /// Takes a graph that map_store sent to another program. Recordings contain such replies.
   void onMapGraph(const MapReply& reply);
   void onCall(const Call& call, std::int64_t now_ns);
-  /// Call it about ten times a second while clients are connected, or while waits() is true.
+  /// Does the periodic work. Call it about ten times a second while clients are connected or
+  /// waits() is true.
   void tick(std::int64_t now_ns);
   bool waits() const { return !pending_.empty(); }
 
@@ -74,7 +75,7 @@ class Node {
   std::optional<TimePoint> shownTime() const {
     return objects_ ? std::optional(objects_->stamp.time) : std::nullopt;
   }
-  /// Whether the last objects and odometry are older than `longest_ns`, or do not exist.
+  /// Returns whether the last objects and odometry arrived more than `longest_ns` ago, or never.
   bool hearsNothing(std::int64_t now_ns, std::int64_t longest_ns) const;
   const ReasonCounts& reasons() const { return reasons_; }
 
@@ -84,7 +85,7 @@ class Node {
     MapQuery query;
     std::int64_t until_ns = 0, next_ns = 0;
   };
-  /// Limits a rate, by the sensor clock.
+  /// Limits a rate by times of the sensor clock.
   struct Pace {
     double rate_hz = 0;
     std::optional<TimePoint> last = {};
@@ -92,7 +93,7 @@ class Node {
   };
 
   bool wants(std::uint32_t channel) const { return wanted_.contains(channel); }
-  /// `time`: by default, that of the newest message.
+  /// Sends a message. Without `time`, the time of the newest message is used.
   void send(std::uint32_t channel, std::string payload, std::optional<TimePoint> time = {});
   void sendScene();
   void sendWanted(std::initializer_list<std::uint32_t> channels);
@@ -121,7 +122,7 @@ class Node {
   void sendGraph(std::uint32_t channel);
   void noteReturns(const Event& event);
   void newest(TimePoint time);
-  /// Newest pose of the body, from odometry or else from objects.
+  /// The newest pose of the body: that of odometry if received, otherwise that of objects.
   struct Body {
     TimePoint time;
     WorldId world;
@@ -143,7 +144,7 @@ class Node {
   VitalSigns vital_signs_;
   Silence last_;
   TimePoint time_;
-  bool away_ = false;  ///< there were no viewers, so the stored state may be old
+  bool away_ = false;  ///< there were no viewers; the stored state may be outdated
 
   std::optional<Calibration> calibration_;
   std::vector<std::optional<CameraModel>> cameras_;

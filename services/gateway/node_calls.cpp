@@ -35,7 +35,7 @@ std::optional<Eigen::Vector3d> placeOf(const Json& request, const char* name) {
   return place.allFinite() ? std::optional(place) : std::nullopt;
 }
 
-/// Empty if the request has no valid query.
+/// Returns the query of a request, or nothing if it has no valid one.
 std::optional<MapQuery> queryOf(const Json& request) {
   MapQuery query;
   constexpr double kMost = 1000;
@@ -171,7 +171,8 @@ void Node::onMapGraph(const MapReply& reply) {
   sendWanted({kMapGraph, kMapGraphScene});
 }
 
-/// The known graph stays, because a recording has it without a map store.
+/// Takes a failure of the graph query. A graph that is already known stays, because a recording has
+/// it without a map store.
 void Node::onNoGraph(const std::string& why) {
   if (graph_ || why == why_no_graph_) return;
   why_no_graph_ = why;

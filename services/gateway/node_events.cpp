@@ -22,7 +22,7 @@ void Node::onEvent(const Event& event) {
   if (wants(kLog)) sendEvent(events_.back(), true);
 }
 
-/// The position of an event before the first pose of its W is added for later clients.
+/// Adds the positions of events that arrived before the first pose of their W, for later clients.
 void Node::placeEvents() {
   if (!unplaced_) return;
   unplaced_ = false;
@@ -33,7 +33,8 @@ void Node::placeEvents() {
   }
 }
 
-/// The position of an event: that of its object, or of the vehicle at that time if it has none.
+/// Returns the position of an event: that of its object or, for an event without object, that of
+/// the vehicle at that time.
 std::optional<Eigen::Vector3d> Node::placeOf(const Event& event) const {
   const auto now = body();
   if (!now || event.world != now->world) return std::nullopt;
@@ -55,7 +56,8 @@ void Node::sendEvent(const Happened& happened, bool as_log) {
        event.stamp.time);
 }
 
-/// A prediction is valid until the object is detected again or removed.
+/// Stores predictions of reappearance. A prediction is valid until the object is detected again or
+/// removed.
 void Node::noteReturns(const Event& event) {
   if (event.kind == EventKind::kPredictedReturn) {
     returns_[event.object_id] = event;

@@ -11,10 +11,10 @@ namespace perdure::inference {
 
 struct ModelConfig {
   std::string path;         ///< .onnx, or .cfg with its .weights
-  std::string description;  ///< "": search for it
+  std::string description;  ///< empty: see readModelFile()
   std::string backend = "auto";
   std::int64_t threads = 1;
-  double budget_ms = 0.0;  ///< per frame; 0: no budget, always the network's own input size
+  double budget_ms = 0.0;  ///< time per frame; 0: no budget, always the network's own input size
 };
 
 struct DetectionConfig {
@@ -24,7 +24,7 @@ struct DetectionConfig {
   double merge_iou = 0.5;
   std::int64_t limit = 100;
   std::vector<std::string> classes;  ///< empty: all classes of the network
-  bool prime = true;                 ///< answer predictions (core/decode/prime.h)
+  bool prime = true;                 ///< answer predicted boxes (core/decode/prime.h)
 };
 
 struct OwnershipConfig {
@@ -42,7 +42,7 @@ struct Config {
 
 void describe(Config& config, config::Fields& fields);
 
-/// Lease of `detections`: at least three periods, and at least 100 ms.
+/// Returns the lease of `detections`: three periods, but at least 100 ms.
 double leaseSeconds(const OwnershipConfig& ownership);
 
 }  // namespace perdure::inference

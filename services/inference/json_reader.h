@@ -14,7 +14,8 @@ namespace perdure::inference {
 
 using Json = nlohmann::json;
 
-/// `where`: prefix of the keys in messages. `problems` must outlive the reader.
+/// `where` is the prefix of the keys in messages. The reader adds errors to `problems`, which must
+/// outlive it.
 class JsonReader {
  public:
   JsonReader(const Json& json, std::string where, std::vector<std::string>& problems)
@@ -52,7 +53,7 @@ class JsonReader {
     if (need(key)) integer(key, target, 1, 8192);
   }
 
-  /// The target does not change if the key is absent.
+  /// Reads an integer in [low, high]. `target` does not change if the key is absent.
   void integer(const std::string& key, int& target, int low, int high) {
     const Json* value = find(key);
     if (!value) return;
@@ -117,7 +118,7 @@ class JsonReader {
   std::set<std::string> known_;
 };
 
-/// Numbers of a list; empty if the value is not a list of numbers.
+/// Returns the numbers of a list; none if the value is not a list of numbers.
 inline std::vector<double> numbersOf(const Json& json) {
   std::vector<double> numbers;
   if (!json.is_array()) return {};

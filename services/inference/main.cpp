@@ -9,7 +9,7 @@ namespace {
 using namespace perdure;
 
 void run(service::Context& context, const inference::Config& config) {
-  inference::Node node(config, context.instance());  // before loading, so that no frames queue
+  inference::Node node(config, context.instance());  // before readers exist, so no frames queue
   context.log().info("network {} with {} classes, hash {}, by {}", node.model().name,
                      node.model().classes.size(), toHex(node.model().hash), node.backend());
   const auto& ownership = config.ownership;
@@ -18,7 +18,7 @@ void run(service::Context& context, const inference::Config& config) {
                                     {inference::Worker::firstStrength(ownership), lease_s});
   auto& notices = context.writer(bus::kTopic<SwapNotice>);
   auto& models = context.writer(bus::kTopic<ModelInfo>);
-  inference::Worker* worker = nullptr;  // set before handlers use it in context.run()
+  inference::Worker* worker = nullptr;  // set below, before context.run() calls handlers
   const auto& rivals =
       context.on(bus::kTopic<Detections>, [&](const Detections& heard) { worker->heard(heard); });
   inference::Worker the_worker(node, ownership, config.model.budget_ms,

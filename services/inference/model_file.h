@@ -18,25 +18,26 @@ struct ModelFile {
 };
 
 /// Reads `path` (.onnx, or .cfg with a .weights of the same stem) and its description. If
-/// `description` is empty, it takes the first existing file of PATH.model.json, model.json beside
-/// PATH, and <stem>.json in `folders`. Throws StartupError with the fix (69: a file is missing; 78:
-/// a file is invalid).
+/// `description` is empty, the description is the first existing file of PATH.model.json,
+/// model.json beside PATH, and <stem>.json in `folders`. Throws StartupError with the fix: 69 if a
+/// file is missing, 78 if a file is invalid.
 ModelFile readModelFile(const std::string& path, const std::string& description,
                         const std::vector<std::string>& folders);
 
-/// Describes a file that is recognised as something else than a network (a pointer of Git LFS,
-/// HTML, another format), with the fix. Empty for other files.
+/// If `bytes` are recognised as something other than a network (a Git LFS pointer, HTML, another
+/// format), returns a sentence with the fix. Otherwise returns an empty string.
 std::string whyNoNetwork(std::string_view bytes);
 
-/// Description that readModelFile() uses for `path`. Throws StartupError (69).
+/// Returns the description that readModelFile() uses for `path`. Throws StartupError (69) if there
+/// is none.
 std::string findDescription(const std::string& path, const std::vector<std::string>& folders);
 
-/// config/models of the source tree or share/perdure/models of an installation, relative to the
-/// program, and config/models in the current folder.
+/// Returns config/models of the source tree or share/perdure/models of the installation, relative
+/// to the program, and config/models in the current folder.
 std::vector<std::string> standardModelFolders();
 
-/// Parses the text of a model.json. `file` names it in errors, and class files are beside it.
-/// Throws StartupError (78) that names all errors.
+/// Parses the text of a model.json. `file` is its name in messages; class files are searched for in
+/// the folder of `file`. Throws StartupError (78) that names all errors.
 ModelDescription parseModelDescription(const std::string& text, const std::string& file);
 
 }  // namespace perdure::inference

@@ -26,7 +26,7 @@ std::vector<std::string> linesOf(const ListFile& list, JsonReader& reader) {
   std::ifstream in;
   if (regular && !error) in.open(list.path);
   for (std::string line; std::getline(in, line);) {
-    // removes a byte-order mark
+    // Removes a byte-order mark.
     if (lines.empty() && line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);
     while (!line.empty() && std::isspace(static_cast<unsigned char>(line.back()))) line.pop_back();
     if (!line.empty()) lines.push_back(line);
@@ -97,7 +97,8 @@ void readOutputs(const Json& json, JsonReader& parent, ModelDescription& model) 
   reader.rejectUnknown();
 }
 
-/// Reads one prior a line: x and y of its centre, width and height, as shares of the input.
+/// Reads one prior per line: x and y of its centre, width and height, as shares of the input's
+/// sides.
 void readPriors(JsonReader& reader, const std::string& file, BoxForm& form) {
   const std::string name = reader.text("priors_file", true);
   if (name.empty()) return;

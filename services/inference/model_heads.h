@@ -1,4 +1,4 @@
-// The part of a model.json that describes the network's outputs and their numbers.
+// Reads the part of a model.json that describes the network's outputs.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace perdure::inference {
 
-/// Reads activation, levels, outputs, boxes and the keys of single families into `model`. Its
+/// Reads activation, levels, outputs, boxes and the keys of single families into `model`, whose
 /// family, input and classes must be set. File names are relative to the folder of `file`.
 void readHeads(JsonReader& reader, const std::string& file, ModelDescription& model);
 
@@ -19,11 +19,12 @@ void readHeads(JsonReader& reader, const std::string& file, ModelDescription& mo
 struct ListFile {
   std::string key;
   std::filesystem::path path;
-  std::string what;           ///< content of a line, for people
-  std::uintmax_t most_bytes;  ///< size limit; a larger file was probably named by mistake
+  std::string what;           ///< content of a line, for messages
+  std::uintmax_t most_bytes;  ///< limit; a larger file was probably named by mistake
 };
 
-/// Non-empty lines. Reports an error for `key` if there are none, or if the file is too large.
+/// Returns the non-empty lines. Reports an error for `key` if there are none, or if the file is too
+/// large.
 std::vector<std::string> linesOf(const ListFile& list, JsonReader& reader);
 
 }  // namespace perdure::inference

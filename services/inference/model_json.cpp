@@ -15,7 +15,7 @@ namespace {
 constexpr double kMostInset = 0.45;
 constexpr std::uintmax_t kMostClassBytes = 1U << 20U;
 
-/// Reads one number, or one for each channel.
+/// Reads `scale`: one number, or one for each channel.
 void readScale(JsonReader& reader, Input& input) {
   const Json* scale = reader.find("scale");
   if (!scale) return;

@@ -46,7 +46,7 @@ std::unique_ptr<Network> networkOf(const Config& config, const ModelFile& file) 
                     ".weights."));
 }
 
-/// A grey ramp, without objects and without special values.
+/// Returns a grey ramp without objects.
 Frame testImage(const Input& input) {
   Frame frame;
   frame.width = static_cast<std::uint32_t>(input.width);
@@ -68,7 +68,8 @@ Detection inImage(const Candidate& candidate, const ImageFit& fit) {
   return detection;
 }
 
-/// The part of a box inside the image; empty if below a quarter of it, or too small to detect.
+/// Returns the part of a box inside the image; nothing if it is less than a quarter of the box, or
+/// too small to detect.
 std::optional<Box> partInside(const Box& box, const ImageFit& fit) {
   constexpr double kLeastSide = 3.0, kLeastShare = 0.25;
   const double left = fit.offset_x, top = fit.offset_y;
@@ -100,7 +101,7 @@ Node::Node(const Config& config, InstanceId instance, ModelFile file)
   if (config_.model.budget_ms > 0.0) addSmallerSizes(file);
 }
 
-/// Describes the network for the present turn. Sides are those of the image before its turn.
+/// Describes the network for the present turn. Sides are named as in the image before the turn.
 void Node::describe() {
   const Input& input = description_.input;
   const bool across = quarters_ % 2 == 1;
@@ -142,10 +143,10 @@ ImageFit Node::fitTo(const Frame& frame) const {
                quarters_);
 }
 
-/// Each size has its own network, because OpenCV initialises one again when its input changes.
-/// Sizes that the network does not accept are left out.
+/// Adds smaller sizes that the network accepts. Each has its own network, because OpenCV
+/// initialises a network again if its input size changes.
 void Node::addSmallerSizes(const ModelFile& file) {
-  constexpr int kMultiple = 32;  // multiple of all strides
+  constexpr int kMultiple = 32;  // sizes are multiples of all strides
   const Input& full = description_.input;
   for (const double scale : {0.85, 0.7, 0.6, 0.5}) {
     Size size{description_, networkOf(config_, file)};
@@ -268,7 +269,8 @@ Result<Detections> Node::infer(const Frame& frame, const Predictions& expected) 
   return out;
 }
 
-/// Expectations in the order of the predictions; activation 0: the network cannot report it.
+/// Returns the expectations in the order of the predictions. An expectation has activation 0 if the
+/// network cannot report its class.
 std::vector<Expectation> Node::expectationsOf(const Predictions& expected,
                                               const Frame& frame) const {
   const ImageFit fit = fitTo(frame);
@@ -301,7 +303,7 @@ void Node::addPrimed(const Predictions& expected, const Frame& frame,
     Detection detection;
     detection.box = fit.toImage(place.box);
     detection.side_sigma = fit.toImage(place.side_sigma);
-    // The evidence is for the object, independent of its class, so all classes have the same value.
+    // The evidence is for the object's existence, so all classes have the same value.
     const double nats = primedLogRatio(description_.calibration.primed, answer);
     detection.activations.assign(info_.classes.size() + 1, static_cast<float>(nats));
     detection.activations[0] = 0.0F;

@@ -1,4 +1,4 @@
-// Computes evidence from frames with a network: the likelihood of eq. 6 and 7.
+// Computes evidence from frames with a network: the likelihood of the paper's eq. 6 and 7.
 #pragma once
 
 #include <cstddef>
@@ -22,11 +22,11 @@ namespace perdure::inference {
 
 class Node {
  public:
-  /// Loads, warms up and tests the network. Throws StartupError with the fix.
+  /// Loads, warms up and tests the network. Throws StartupError with the fix if it cannot be used.
   Node(const Config& config, InstanceId instance);
 
-  /// Description of the activations and of the reported classes. A turn of the images has a
-  /// description of its own, because boxes have other insets then.
+  /// Returns the description of the activations and of the reported classes. Each turn of the
+  /// images has its own description, because the insets of the boxes differ.
   const ModelInfo& model() const { return info_; }
 
   const ModelDescription& description() const { return description_; }
@@ -37,24 +37,25 @@ class Node {
   void onOdometry(const Odometry& odometry);
 
   /// Returns boxes in pixels of the frame, not clipped to the image. An empty list is a valid
-  /// result. `expected`: predicted objects. Each one without a matching box gets a top-down answer
-  /// (core/decode/prime.h), if the model is calibrated for it and the predictions match the frame.
-  /// Fails with "frame_malformed", "model_failed", "model_output_shape" or
+  /// result. Each object of `expected` without a matching box gets a top-down answer
+  /// (core/decode/prime.h), if the model is calibrated for answers and the predictions match the
+  /// frame. Fails with "frame_malformed", "model_failed", "model_output_shape" or
   /// "model_output_not_finite".
   Result<Detections> infer(const Frame& frame, const Predictions& expected = {});
 
-  /// Sets a steady clock in seconds, for Detections::forward_s, which stays 0 (unknown) without
-  /// one.
+  /// Sets a steady clock in seconds, which measures Detections::forward_s. Without a clock,
+  /// forward_s is 0 (unknown).
   void timeBy(std::function<double()> clock_s) { clock_s_ = std::move(clock_s); }
 
-  /// Pixels of each supported input size relative to the network's own, falling from 1.
+  /// Returns the numbers of pixels of the usable input sizes relative to the network's own size,
+  /// falling from 1.
   std::vector<double> sizeShares() const;
   void useSize(std::size_t size);
-  /// Input width relative to the network's own.
+  /// Returns the input width relative to the network's own.
   double inputScale() const;
 
-  /// All boxes whose best reported class scores `floor` or more, in pixels of the network's input,
-  /// before overlaps are merged. Fails like infer().
+  /// Returns all boxes whose best reported class has at least the score `floor`, in pixels of the
+  /// network's input, before overlaps are merged. Fails like infer().
   Result<std::vector<Candidate>> candidatesIn(const Frame& frame, double floor);
 
  private:
@@ -82,11 +83,11 @@ class Node {
   /// The network's own size first, then smaller sizes if there is a budget.
   std::vector<Size> sizes_;
   std::size_t size_ = 0;
-  int quarters_ = 0;  ///< clockwise turn of the images
+  int quarters_ = 0;  ///< clockwise quarter turns of the images
   perdure::Calibration calibration_;
-  std::optional<Eigen::Vector3d> up_B_;  ///< against gravity
+  std::optional<Eigen::Vector3d> up_B_;  ///< points against gravity, in B
   std::function<double()> clock_s_;
-  double forward_s_ = 0.0;  ///< time of the forward pass for the last frame
+  double forward_s_ = 0.0;  ///< of the last frame
   DecodeOptions options_;
   std::string identity_;  ///< identity of the network, without a turn
   ModelInfo info_;

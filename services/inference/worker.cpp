@@ -121,7 +121,8 @@ void Worker::learn(const ModelInfo& model) {
   swap_.learn(model);
 }
 
-/// A suspended process cannot assert liveliness, and DDS may not yet have reported the loss.
+/// Counts a lapse if the last sign of life is older than the lease, because DDS may not yet have
+/// reported the loss after a suspension.
 void Worker::noteLapse(Clock::time_point now) {
   if (now - last_alive_.load() > lease_) ++lapses_;
 }
@@ -158,12 +159,12 @@ void Worker::noteFailure(const Reason& reason) {
   const std::lock_guard lock(mutex_);
   reasons_.add(reason);
   last_problem_ = reason.code + ": " + reason.detail;
-  if (reason.code == "frame_malformed") return;  // the error is in capture, not in the network
+  if (reason.code == "frame_malformed") return;  // this is an error of capture, not of the network
   const auto now = Clock::now();
   if (ownership_.noteFailure(now)) {
     reasons_.add("form_lost");
     adoptStrength(now);
-    bus_.detections.release();  // the next result, which would inform readers, may be far off
+    bus_.detections.release();  // a later result would also inform readers, but may take long
   }
   swap_.ownFailure(reason);
   obey();
@@ -172,7 +173,7 @@ void Worker::noteFailure(const Reason& reason) {
 void Worker::adoptStrength(Clock::time_point now) {
   const auto strength = static_cast<std::int32_t>(ownership_.strength());
   if (strength == bus_.detections.strength()) return;
-  // A change of strength travels separately from the data, so data written with it may overtake it.
+  // DDS sends a change of strength separately from the data. Later data may arrive before it.
   if (strength < bus_.detections.strength() && bus_.rivals.matched() > 1)
     hold_until_ = now + lease_;
   bus_.detections.setStrength(strength);
@@ -227,7 +228,7 @@ void Worker::report(ReasonCounts& counts) const {
   for (const auto& [reason, n] : swap_.reasons().all()) counts.add(reason, n);
 }
 
-/// Reduction of the input by the time budget; empty without a reduction.
+/// Returns a sentence about the reduction of the input by the time budget; empty if there is none.
 std::string Worker::reducedInput() const {
   if (scale_ == 1.0) return "";
   return fmt::format(

@@ -1,5 +1,5 @@
-// Runs the network in a thread behind a queue of one frame, and decides with which strength results
-// are written.
+// Runs the network in a thread behind a queue of one frame, and chooses the strength with which
+// results are written.
 #pragma once
 
 #include <atomic>
@@ -21,7 +21,7 @@ namespace perdure::inference {
 
 struct WorkerBus {
   bus::Writer<Detections>& detections;
-  /// Reader of `detections`, matched with writers of this and of other processes.
+  /// Reader of `detections`, connected to the writers of this and of other processes.
   const bus::RawReader& rivals;
   bus::Writer<ModelInfo>& models;
   bus::Writer<SwapNotice>& notices;
@@ -29,17 +29,18 @@ struct WorkerBus {
 
 class Worker {
  public:
-  /// `end` ends the process; it may be called from any thread. `budget_ms` per frame, 0: none.
+  /// `end` ends the process and may be called from any thread. `budget_ms` is the time budget of a
+  /// frame; 0: none.
   Worker(Node& node, const OwnershipConfig& ownership, double budget_ms, WorkerBus bus,
          service::HealthMeter& health, std::function<void()> end);
-  /// Ends within the time of one frame.
+  /// Waits for the frame that the network is processing.
   ~Worker();
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
   static std::int32_t firstStrength(const OwnershipConfig& ownership);
 
-  /// Adds a frame. A frame that still waits is dropped and counted.
+  /// Adds a frame. A frame that is still waiting is dropped and counted.
   void offer(const Frame& frame);
   /// Calibration and odometry determine the turn of the following frames.
   void onCalibration(const perdure::Calibration& calibration);
@@ -47,16 +48,16 @@ class Worker {
   void expect(const Predictions& predictions);
   /// Asserts liveliness, unless the network is stuck. Call it several times in a lease.
   void assertAlive();
-  /// Whether no frame has occupied the network for longer than `longest`.
+  /// Returns true unless the network has been processing a frame for longer than `longest`.
   bool goesOn(Duration longest) const;
   void heard(const Detections& detections);
   void told(const SwapNotice& notice);
   void learn(const ModelInfo& model);
 
   void report(ReasonCounts& counts) const;
-  /// State and message for Health; the message is empty if there is nothing to report.
+  /// Returns state and message for Health. The message is empty if there is nothing to report.
   std::pair<HealthState, std::string> state() const;
-  /// Why this process failed; empty if it did not.
+  /// Returns the reason why this process failed; empty if it did not.
   std::string failure() const;
 
  private:
@@ -90,16 +91,16 @@ class Worker {
   mutable std::mutex mutex_;  ///< protects all following members and the writers
   Ownership ownership_;
   Swap swap_;
-  Clock::time_point hold_until_{};  ///< no results until then, after the strength was lowered
+  Clock::time_point hold_until_{};  ///< no result is written before, after a lower strength
   bool silent_ = false;
   std::string failure_, last_problem_;
   ReasonCounts reasons_;
   Predictions expected_;
-  /// Like `odometry_`: received, but not yet given to the node.
+  /// Received, but not yet passed to the node; the same applies to `odometry_`.
   std::optional<perdure::Calibration> calibration_;
   std::optional<Odometry> odometry_;
-  double scale_ = 1.0;   ///< width of the input relative to its own size
-  double age_ms_ = 0.0;  ///< age of the last result when it was ready
+  double scale_ = 1.0;   ///< width of the input relative to the network's own
+  double age_ms_ = 0.0;  ///< time from the receipt of the last frame to its result
   std::thread thread_;
 };
 

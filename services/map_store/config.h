@@ -15,7 +15,7 @@ struct Config {
   double commit_period_s = 0.5;
   std::int64_t max_size_mb = 0;
   bool check_at_start = true;
-  fleet::Parameters fleet;  ///< server that receives the map
+  fleet::Parameters fleet;  ///< server that receives a copy of the map
   double tile_size_m = 32.0;
   double tile_period_s = 1.0;
   std::int64_t query_limit = 1000;

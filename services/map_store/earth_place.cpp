@@ -18,7 +18,7 @@ constexpr double kFarEnough_m = 100.0;
 std::string earthAnchorOfMap(const GeoAnchor& anchor, const RigidTransform& T_MB) {
   const GeoReference onEarth(anchor, T_MB);
   const Geodetic origin = onEarth(Eigen::Vector3d::Zero());
-  // The direction of north depends on the longitude, so it is taken at the origin.
+  // The direction of east differs between places, so the yaw is computed at M's origin.
   const Eigen::Vector3d ahead = toEcef(onEarth(kFarEnough_m * Eigen::Vector3d::UnitX()));
   const Eigen::Vector3d x = enuAxes(origin).transpose() * (ahead - toEcef(origin));
   return fmt::format("{:.10f} {:.10f} {:.4f} {:.6f}", origin.latitude_deg, origin.longitude_deg,

@@ -1,4 +1,4 @@
-// The position of the map on Earth, from a satellite receiver and the body's pose.
+// Computes the position of the map on Earth from that of a satellite receiver and the body's pose.
 #pragma once
 
 #include <functional>
@@ -11,24 +11,25 @@
 
 namespace perdure::map_store {
 
-/// "LATITUDE LONGITUDE HEIGHT YAW" of M's origin: degrees of WGS 84, metres above the ellipsoid,
-/// and degrees of M's x axis from east. `perdure map export --anchor` and `store.earth_anchor` use
-/// the same format. `T_MB`: the body's pose at the anchor's time.
+/// Returns "LATITUDE LONGITUDE HEIGHT YAW" of M's origin: degrees (WGS 84), metres above the
+/// ellipsoid, and yaw of M's x axis from east in degrees, as for `perdure map export --anchor` and
+/// `store.earth_anchor`. `T_MB` is the body's pose at the anchor's time.
 std::string earthAnchorOfMap(const GeoAnchor& anchor, const RigidTransform& T_MB);
 
-/// Waits for the pose at the time of the newest anchor. Not thread-safe.
+/// Finds the body's pose at the time of the newest anchor of the calibration. Not thread-safe.
 class EarthPlace {
  public:
-  /// The pose of W in M at a time of the body, by today's graph; nothing if W is not yet located in
+  /// Returns the present T_MW near the body's place at a time; nothing if W is not yet located in
   /// the map's M.
   using FrameAt = std::function<std::optional<RigidTransform>(TimePoint)>;
 
-  /// Call it for each calibration. A new anchor restarts the wait.
+  /// Call it for each calibration. If its anchor is new, the next poses are used for it.
   void onCalibration(const Calibration& calibration);
   void onOdometry(const Odometry& odometry);
-  /// The time of the newest anchor whose pose is known.
+  /// The time of the newest anchor whose pose is known; nothing if there is none.
   std::optional<TimePoint> known() const;
-  /// earthAnchorOfMap() of that anchor if its pose is in `world`; else nothing.
+  /// Returns earthAnchorOfMap() of that anchor; nothing if its pose is not in `world`, or if `T_MW`
+  /// returns nothing.
   std::optional<std::string> ofMap(const WorldId& world, const FrameAt& T_MW) const;
 
  private:
@@ -42,7 +43,7 @@ class EarthPlace {
     Pose pose;
   };
   std::optional<GeoAnchor> awaited_;
-  std::optional<TimePoint> heard_;  ///< time of the last anchor
+  std::optional<TimePoint> heard_;  ///< time of the last received anchor
   std::optional<Pose> last_;
   std::optional<Known> known_;
 };

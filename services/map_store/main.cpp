@@ -13,7 +13,8 @@ namespace {
 
 using namespace perdure;
 
-/// The fleet's server, if `store.url` is set: receives each commit; log and Health report.
+/// Sends each commit to the fleet's server if `store.url` is set, and reports failures to log and
+/// Health.
 class FleetServer {
  public:
   explicit FleetServer(const map_store::Config& config) {
@@ -29,7 +30,8 @@ class FleetServer {
     const auto progress = replicator_->progress();
     for (const auto& [code, count] : progress.reasons.all()) counts.add(code, count);
   }
-  /// Returns the failure, or nothing. Logs the begin and the end of each kind of failure once.
+  /// Returns the failure as a sentence with the fix; empty if there is none. Logs each kind of
+  /// failure once when it begins, and when sending succeeds again.
   std::string tell(spdlog::logger& log) {
     if (!replicator_) return {};
     const auto progress = replicator_->progress();
@@ -42,7 +44,8 @@ class FleetServer {
     failing_ = progress.failing;
     return progress.trouble;
   }
-  /// Sends the last commit if the server accepts it at once; else it is sent after the next start.
+  /// Sends the last commit if the server accepts it within 0.3 s; otherwise it is sent after the
+  /// next start.
   void finish() {
     if (!replicator_) return;
     constexpr std::chrono::milliseconds kLastWords{300};

@@ -106,7 +106,8 @@ void Node::onObjects(const Objects& objects) {
   }
   Objects next = byTrack(objects);
   for (const auto& belief : next.objects) {
-    // A position from the graph without a detection since then is not a new observation.
+    // A recalled belief has not been detected since the graph placed it, so it is not a new
+    // observation.
     if (!belief.recalled) placed_.erase(belief.id);
   }
   std::erase_if(next.objects, [this](const ObjectBelief& b) { return !acceptable(b); });
@@ -114,17 +115,19 @@ void Node::onObjects(const Objects& objects) {
   leaveBehind(next);
   if (!same_filter || newest_->world != next.world) client_since_ = next.stamp.time;
   if (newest_ && !same_filter) previous_ = std::move(newest_);
-  // The filter that gave these ids has the next id. Another filter may not be restored yet.
+  // The filter that assigns the ids has the correct next_id. The next_id of a new filter may be too
+  // low, because it may not be restored yet.
   next_id_ = same_filter ? next.next_id : std::max(next_id_, next.next_id);
   newest_ = std::move(next);
   dirty_ = true;
   if (graph_) followGraph();
-  constexpr double kStep_m = 20.0 / 3.0;  // the filter's working set reaches this much farther
+  constexpr double kStep_m = 20.0 / 3.0;  // the radius of map/near includes this margin
   const bool moved = !near_from_W_ || (newest_->T_WB.p - *near_from_W_).norm() > kStep_m;
   if (moved || !same_filter) sendNear();
 }
 
-/// Tracks that this store never received count as confirmed.
+/// Returns whether the track was confirmed in the newest working set. Unknown tracks count as
+/// confirmed.
 bool Node::wasConfirmed(TrackId track) const {
   if (!newest_) return true;
   const auto at = std::find_if(newest_->objects.begin(), newest_->objects.end(),
@@ -132,7 +135,7 @@ bool Node::wasConfirmed(TrackId track) const {
   return at == newest_->objects.end() || at->confirmed;
 }
 
-/// Takes the ended tracks that were not in the previous message.
+/// Processes the ended tracks that were not in the previous message.
 void Node::takeEnded(const std::vector<EndedTrack>& ended) {
   for (const EndedTrack& each : ended) {
     if (newest_ &&
@@ -146,7 +149,8 @@ void Node::takeEnded(const std::vector<EndedTrack>& ended) {
   }
 }
 
-/// Confirmed objects that `next` does not contain: their last beliefs may not be stored.
+/// Keeps the beliefs of confirmed tracks that `next` does not contain, because their last beliefs
+/// may not be stored yet.
 void Node::leaveBehind(const Objects& next) {
   std::set<ObjectId> alive;
   for (const auto& belief : next.objects) alive.insert(belief.id);
@@ -154,7 +158,8 @@ void Node::leaveBehind(const Objects& next) {
   if (!newest_) return;
   for (auto& belief : newest_->objects) {
     if (alive.contains(belief.id)) continue;
-    const bool as_it_was = placed_.erase(belief.id) > 0;  // it left without a detection
+    const bool as_it_was = placed_.erase(belief.id) > 0;  // it left without a detection after the
+                                                          // graph placed it
     if (belief.confirmed && !as_it_was) left_[belief.id] = {newest_->world, belief};
   }
 }
@@ -179,7 +184,7 @@ void Node::flush() {
 }
 
 void Node::commit() {
-  if (!newest_) {  // only events so far: they need a working set first
+  if (!newest_) {  // ended tracks need a working set first
     dirty_ = false;
     return;
   }
@@ -192,7 +197,7 @@ void Node::commit() {
                                         mapper_.regrouped(), acknowledged_, earth.text});
   if (!written) {
     blame(written.error());
-    return;  // still marked as changed: the next tick tries again
+    return;  // dirty_ is still true, so the next tick tries again
   }
   mapper_.markSaved();
   if (written->unsound > 0) reasons_.add("graph_unsound", written->unsound);

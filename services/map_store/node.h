@@ -1,5 +1,6 @@
-// Long-term memory: stores confirmed objects of semantic_filter, publishes them as tiles and
-// answers queries. A filter that restarts gets its working set back (the paper's "semantic map").
+// Long-term memory (the paper's "semantic map"): stores confirmed objects of semantic_filter,
+// publishes them as tiles and answers queries. A filter that restarts receives its working set
+// again.
 #pragma once
 
 #include <algorithm>
@@ -25,15 +26,16 @@
 
 namespace perdure::map_store {
 
-/// Number of ids that a restored filter skips, because the last ids in use may not be stored.
+/// Number of ids that are skipped after a start of map_store, because the last ids in use may not
+/// be stored.
 inline constexpr ObjectId kIdReserve = 4096;
 
-/// Returns why the query cannot be answered; empty if it can.
+/// Returns the reason why the query cannot be answered; empty if it can be answered.
 std::string faultOf(const MapQuery& query);
 
 struct Outputs {
   Sink<MapTile> tile;
-  Sink<MapTile> emptied;  ///< only the key is valid: to be disposed of
+  Sink<MapTile> emptied;  ///< only the key is valid; the tile must be disposed of
   Sink<MapHeader> header;
   Sink<MapReply> reply;
   Sink<MapNear> near;
@@ -43,28 +45,28 @@ struct Outputs {
 
 class Node {
  public:
-  /// Opens the map. Throws StartupError.
+  /// Opens the map. Throws StartupError with the fix if it cannot be opened.
   Node(const Config& config, InstanceId instance, Outputs outputs);
   Node(const Node&) = delete;
   Node& operator=(const Node&) = delete;
 
   void onObjects(const Objects& objects);
   void onOdometry(const Odometry& odometry);
-  /// The vehicle's position on Earth in it is stored with the map.
+  /// The map stores the position on Earth that follows from the calibration's anchor.
   void onCalibration(const Calibration& calibration) { earth_.onCalibration(calibration); }
   void onLandmarks(const Landmarks& landmarks);
   void onQuery(const MapQuery& query);
-  /// Commits and publishes changes that are due. `now`: a monotonic time with any origin. Must be
-  /// called at least ten times a second.
+  /// Commits and publishes changes that are due. `now` is a monotonic time with any origin. Call it
+  /// at least ten times a second.
   void tick(Duration now);
-  /// A server has the outbox's entries up to this one; the next commit removes them.
+  /// Call it when a server has the outbox's entries up to `number`. The next commit removes them.
   void onAcknowledged(std::int64_t number) { acknowledged_ = std::max(acknowledged_, number); }
-  /// Commits the remaining changes. Must be called before the end.
+  /// Commits and publishes the remaining changes. Call it before the process ends.
   void flush();
 
   const ReasonCounts& reasons() const { return reasons_; }
   const mapping::Mapper& mapper() const { return mapper_; }
-  /// A sentence with the fix for the user, or nothing.
+  /// A sentence for the user with the fix; empty if there is no trouble.
   std::string trouble() const { return failure_.empty() ? notice_ : failure_; }
   std::uint64_t received() const { return received_; }
   std::uint64_t commits() const { return commits_; }
@@ -116,35 +118,36 @@ class Node {
   MapDatabase database_;
   mapping::Mapper mapper_;
   EarthPlace earth_;
-  bool earth_stored_ = false;  ///< written by another process; not overwritten
+  bool earth_stored_ = false;  ///< an earlier process stored the position; it is not overwritten
   std::optional<std::pair<std::uint64_t, TimePoint>>
-      told_earth_;      ///< revision of the graph and known(), at the last write
+      told_earth_;      ///< revision of the graph and earth_.known() at the last write
   bool graph_ = false;  ///< whether the graph is enabled and its stored state was read
   ReplyCache replies_;
   TileBook tiles_;
-  MapInM view_;                      ///< as of the last commit
+  MapInM view_;                      ///< objects in M as of the last commit
   std::uint64_t view_revision_ = 0;  ///< revision of the graph
   std::size_t view_anchors_ = 0;
   std::map<Square, std::vector<ObjectId>> stale_squares_;  ///< squares to publish
-  std::optional<Objects> newest_;    ///< as received or loaded, with track ids
-  std::optional<Objects> previous_;  ///< the last one of the previous filter
+  std::optional<Objects> newest_;    ///< newest working set, received or loaded, with track ids
+  std::optional<Objects> previous_;  ///< last working set of the previous filter
   TimePoint client_since_;           ///< time of this filter's first message in this W
   std::map<TrackId, PlacedBelief> left_;
   std::map<TrackId, Removal> removed_;
   struct Given {
     std::uint64_t graph = 0;  ///< revision of the graph that placed it
-    std::uint64_t near = 0;   ///< revision of the message
+    std::uint64_t near = 0;   ///< revision of the map/near message that contained it
   };
-  std::map<TrackId, Given> placed_;  ///< given to the filter and not detected since
+  std::map<TrackId, Given> placed_;  ///< tracks sent in `placed` and not detected since
   struct Join {
     TrackId seen = 0;
-    std::uint64_t near = 0;  ///< revision of the first message that gave it; 0: not given yet
+    std::uint64_t near = 0;  ///< revision of the first map/near message with the known track; 0:
+                             ///< not sent yet
   };
   /// Key: a known track. Value: a new track of the same object, which the filter must fuse with it.
   std::map<TrackId, Join> joins_;
   std::uint64_t near_revision_ = 0;
-  std::optional<MapNear> near_;                 ///< as last sent
-  std::optional<Eigen::Vector3d> near_from_W_;  ///< position of the body at that time
+  std::optional<MapNear> near_;                 ///< last message sent
+  std::optional<Eigen::Vector3d> near_from_W_;  ///< position of the body at the last sendNear()
   struct ReportedFrame {
     WorldId world;
     std::uint64_t revision = 0;
@@ -154,8 +157,8 @@ class Node {
   std::optional<ReportedFrame> reported_frame_;
   std::deque<mapping::LoopWithdrawal> withdrawn_;  ///< the newest ones, for queries about the graph
   ObjectId next_id_ = 1;
-  InstanceId kept_of_ = 0;  ///< the filter whose working set is on disk
-  TimePoint kept_;          ///< time of its newest frame on disk
+  InstanceId kept_of_ = 0;  ///< instance of the filter whose working set is on the disk
+  TimePoint kept_;          ///< time of its newest frame on the disk
   std::uint64_t revision_ = 0;
   std::int64_t acknowledged_ = 0;  ///< entries of the outbox up to this one are to be removed
   bool dirty_ = false, published_once_ = false, header_stale_ = false;

@@ -1,4 +1,4 @@
-// The graph of the map in the node: loading, updates, events and queries.
+// The node's functions for the graph: loading, updates, events and queries.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -28,7 +28,7 @@ std::string witnessesOf(const mapping::PlaceMatch& match) {
 
 void Node::loadGraph() {
   auto saved = database_.takeGraph();
-  if (!saved) {  // a new graph would overwrite it
+  if (!saved) {  // the graph stays disabled, because a new one would overwrite the stored one
     notice_ =
         "The map's graph cannot be read (" + saved.error().detail +
         "); objects are kept without it. Restart map_store once the disk of store.path is well.";
@@ -38,8 +38,8 @@ void Node::loadGraph() {
   if (saved->malformed > 0) reasons_.add("graph_malformed", saved->malformed);
   mapper_ = mapping::Mapper(config_.mapping, std::move(saved->map));
   if (!newest_) return;
-  // If the graph placed a belief before the last write, the position is in the working set only.
-  // The stored belief is in the W of its session and differs.
+  // A belief that the graph placed before the last write is only in the working set. It differs
+  // from the stored belief, which is in the W of its session.
   for (const ObjectBelief& belief : newest_->objects) {
     if (!belief.recalled) continue;
     const auto stored = database_.reader().beliefOf(belief.id);
@@ -48,7 +48,7 @@ void Node::loadGraph() {
   }
 }
 
-/// Loads object ids without a graph.
+/// Loads the facts if there is no graph, because they determine the object ids.
 void Node::loadFacts() {
   auto facts = database_.reader().facts();
   if (!facts) return blame(facts.error());
@@ -62,7 +62,7 @@ void Node::onOdometry(const Odometry& odometry) {
   if (graph_) mapper_.onOdometry(odometry);
 }
 
-/// The position of M on Earth if it has changed since the last write; else empty.
+/// Returns the position of M on Earth if it has changed since the last write; else an empty text.
 Node::NewEarth Node::newEarthAnchor() {
   const auto known = earth_.known();
   if (!known || earth_stored_ || told_earth_ == std::pair(mapper_.revision(), *known)) return {};
@@ -70,7 +70,7 @@ Node::NewEarth Node::newEarthAnchor() {
   const mapping::MapFrames frames(mapper_.graph(), mapper_.anchors());
   const auto place = earth_.ofMap(world, [&](TimePoint time) -> std::optional<RigidTransform> {
     const auto anchor = frames.anchorOf(nullptr, world, time);
-    const bool alone = mapper_.anchors().empty();  // without a graph, W is M
+    const bool alone = mapper_.anchors().empty();  // if there are no anchors, W is M
     const auto frame = frames.at(anchor, world);
     if (frame.provisional || (anchor == 0 && !alone)) return std::nullopt;
     return frame.T_MW;
@@ -89,8 +89,7 @@ void Node::followGraph() {
   for (const mapping::SameObject& fact : change.facts) joins_[fact.a] = {fact.b, 0};
   reportLoops(change);
   reportWithdrawals(change);
-  commit();  // sends the objects near the body; the row of a track that shares its object has its
-             // belief
+  commit();  // the commit also sends map/near, with the beliefs in the rows of the regrouped tracks
 }
 
 void Node::reportWithdrawals(const mapping::MapChange& change) {
@@ -135,8 +134,8 @@ void Node::reportLoops(const mapping::MapChange& change) {
   }
 }
 
-/// Reports map alignment if it may have changed: in a new session, after a change of the graph, and
-/// with each new anchor.
+/// Publishes T_MW if it may have changed: in a new session, after a change of the graph, and with
+/// each new anchor.
 void Node::reportFrame() {
   if (!newest_ || !mapper_.follows(newest_->world)) return;
   const ReportedFrame now{newest_->world, mapper_.revision(), mapper_.anchors().size()};
@@ -158,8 +157,8 @@ void Node::reportFrame() {
   outputs_.frame(frame);
 }
 
-/// Always gives the current state, even to a repeated request, so it is not stored in the reply
-/// cache.
+/// Answers with the current state, even if the request is repeated. The reply is therefore not
+/// stored in the cache.
 void Node::answerGraph(const MapQuery& query) {
   MapReply reply = emptyReply(query);
   reply.error = faultOf(query);

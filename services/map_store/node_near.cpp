@@ -1,4 +1,4 @@
-// What the map knows of the surroundings of the body, for the filter: the state on `map/near`.
+// The node's functions for `map/near`: the objects near the body, for the filter.
 #include <algorithm>
 #include <utility>
 
@@ -8,7 +8,7 @@
 namespace perdure::map_store {
 namespace {
 
-/// Clocks of sessions do not compare.
+/// Limits the times of a belief to `now`, because the clocks of two sessions cannot be compared.
 ObjectBelief notLaterThan(TimePoint now, ObjectBelief belief) {
   belief.last_seen = std::min(belief.last_seen, now);
   belief.first_seen = std::min(belief.first_seen, belief.last_seen);
@@ -25,7 +25,7 @@ std::uint64_t digestOf(const std::vector<ObjectBelief>& beliefs) {
   return digest(bytes);
 }
 
-/// But for the stamp, the revision and the next id.
+/// Compares the messages without stamp, revision and next id.
 bool sameContent(const MapNear& a, const MapNear& b) {
   return a.client == b.client && a.world == b.world && a.kept == b.kept &&
          a.corrects_drift == b.corrects_drift && a.more == b.more &&
@@ -52,7 +52,7 @@ void Node::sendNear() {
   publish(nearNow());
 }
 
-/// Gives each track its object, and sends the message unless it says what the last one said.
+/// Adds the object ids, and sends the message unless its content equals that of the last one.
 void Node::publish(MapNear near) {
   const mapping::Identity& identity = mapper_.identity();
   const auto addMember = [&](TrackId track) {
@@ -98,10 +98,10 @@ MapNear Node::nearNow() {
   return near;
 }
 
-/// Objects that are not in the working set, those there that are placed differently now, and known
-/// tracks that a loop has shown to be objects of the working set.
+/// Adds near objects that are not in the working set, recalled ones that the graph has moved since,
+/// and known tracks that a loop identified with objects of the working set.
 void Node::putNearByGraph(MapNear& near) {
-  std::map<TrackId, bool> working;  // recalled
+  std::map<TrackId, bool> working;  // value: ObjectBelief::recalled
   std::set<ObjectId> present;
   for (const ObjectBelief& belief : newest_->objects) {
     working[belief.id] = belief.recalled;
@@ -130,13 +130,13 @@ void Node::putNearByGraph(MapNear& near) {
   }
 }
 
-/// Without a graph that receives this odometry all of W is taken as it was.
+/// Adds near objects of W as stored, because there is no graph that receives this odometry.
 void Node::putNearAsStored(MapNear& near) {
   std::set<ObjectId> present;
   for (const ObjectBelief& belief : newest_->objects) {
     present.insert(mapper_.identity().objectOf(belief.id));
   }
-  // The working set may be the nearest.
+  // The nearest objects may all be in the working set, so the limit is increased.
   const auto limit = static_cast<std::uint32_t>(config_.query_limit + present.size());
   auto found =
       database_.reader().inFullNear(newest_->T_WB.p, newest_->near_m, newest_->world, limit);
@@ -171,14 +171,14 @@ void Node::give(const mapping::Recallable& there, MapNear& near) {
 }
 
 const Objects* Node::workingSetFor(const MapQuery& query) const {
-  // A filter that published before it asked wants what its predecessor knew.
+  // If the querying filter has published already, its predecessor's working set is required.
   const auto& set = newest_ && newest_->instance == query.client ? previous_ : newest_;
   if (!set || (query.world.world != 0 && query.world != set->world)) return nullptr;
   return &*set;
 }
 
-/// The whole working set of the filter before, unconfirmed and moving tracks too, relative to the
-/// body: the pose error of the new process begins at zero.
+/// Sends the whole working set of another filter, including unconfirmed and moving tracks. It is
+/// relative to the body, because the pose error of the new process begins at zero.
 void Node::restore(const MapQuery& query) {
   MapNear near = blankNear(query.client, query.world);
   if (const Objects* set = workingSetFor(query)) {
@@ -189,7 +189,7 @@ void Node::restore(const MapQuery& query) {
     }
   }
   reasons_.add("restores");
-  near_.reset();  // an answer is sent again
+  near_.reset();  // so that publish() sends the answer even if it is unchanged
   publish(std::move(near));
 }
 

@@ -1,4 +1,4 @@
-// The published map: tiles and answers, in M.
+// The node's functions for the published map: tiles and answers, in M.
 #include <algorithm>
 #include <utility>
 
@@ -18,7 +18,8 @@ bool Node::loadView() {
   return true;
 }
 
-/// Must directly follow a commit: stored rows and the graph must have the same state.
+/// Updates the view. Must directly follow a commit, because the stored rows and the graph must have
+/// the same state.
 void Node::followView(const std::vector<ObjectId>& changed) {
   const bool moved = mapper_.revision() != view_revision_;
   if (moved || mapper_.anchors().size() != view_anchors_) {
@@ -58,7 +59,7 @@ bool Node::publishSquare(const Square& square, const std::vector<ObjectId>& ids)
   return true;
 }
 
-/// A query with a W is answered in that W.
+/// Answers a query in its W if it has one, else in M.
 Result<Found> Node::find(const MapQuery& query) {
   const WorldId newest = newest_ ? newest_->world : WorldId{};
   const auto limit = std::min(query.limit, static_cast<std::uint32_t>(config_.query_limit));

@@ -19,7 +19,7 @@ struct CameraInput {
   std::int64_t bits = 0;
   bool given() const { return !image.empty(); }
   bool compressed() const;
-  std::string infoTopic() const;  ///< `info`, or the default topic beside the image
+  std::string infoTopic() const;  ///< returns `info` if set, else the usual topic beside the image
 };
 
 struct StreamInput {
@@ -60,12 +60,12 @@ struct Config {
   double apart_s = 5.0;
   bool reliable = false;
 
-  std::vector<CameraInput> cameras() const;  ///< configured cameras; cam0 first
+  std::vector<CameraInput> cameras() const;  ///< returns the configured cameras, cam0 first
   bool anyInput() const;
 };
 
 void describe(Config& config, config::Fields& fields);
-/// Checks conditions between fields. Throws StartupError (78).
+/// Checks conditions between fields. Throws StartupError (78) if one is violated.
 void verify(const Config& config);
 
 }  // namespace perdure::ros2

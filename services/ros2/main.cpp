@@ -67,7 +67,7 @@ class Outwards {
   }
 
   void followWhatIsWanted() {
-    // The angular rate is part of the odometry's twist.
+    // The IMU is also read for odometry, whose twist contains the angular rate.
     add<ImuSample>(bus::kTopic<ImuSample>, {topic("imu"), topic("odometry")},
                    [this](const ImuSample& m) { mirror_.onImu(m); });
     add<Landmarks>(bus::kTopic<Landmarks>, {topic("landmarks")},
@@ -78,7 +78,8 @@ class Outwards {
     if (!config_.tracked_objects.empty()) of_objects.push_back(config_.tracked_objects);
     add<Objects>(bus::kTopic<Objects>, std::move(of_objects), [this](const Objects& m) {
       mirror_.onObjects(m);
-      // If the bridge reads images, its rate in Health is theirs, for `perdure status`.
+      // The rate in Health is that of the images if the bridge reads any, else that of these
+      // messages.
       if (!config_.cam0.given()) context_.health().frameOut();
     });
     for (const std::string& camera : config_.shown_cameras) {
@@ -108,7 +109,7 @@ class Outwards {
   const ros2::Config& config_;
   ros2::RosSide& ros_;
   ros::Mirror mirror_;
-  std::list<service::OnDemand> followers_;  ///< open while ROS has readers of their output
+  std::list<service::OnDemand> followers_;  ///< each reader exists while ROS reads its output
   ReasonCounts reasons_;
 };
 
@@ -156,7 +157,7 @@ class Inwards {
     if (config_.imu.given()) to.imu = context_.sink(bus::kTopic<ImuSample>);
     if (config_.odometry.given()) to.odometry = context_.sink(bus::kTopic<Odometry>);
     if (config_.detections.given()) {
-      constexpr double kLease = 1.0;  // s; the rate of ROS detectors is not known
+      constexpr double kLease = 1.0;  // s; fixed, because the rate of ROS detectors is not known
       auto& detections = context_.writer(
           bus::kTopic<Detections>,
           {.strength = static_cast<std::int32_t>(config_.detections.strength), .lease_s = kLease});
@@ -233,7 +234,7 @@ class Inwards {
     }
   }
 
-  /// Reads the frames of Perdure's capture, for the poses and boxes that belong to them.
+  /// Reads the frames of Perdure's capture, because poses and boxes from ROS need their stamps.
   void listenToOwnFrames() {
     if (config_.cam0.given() || !(config_.odometry.given() || config_.detections.given())) return;
     context_.on(bus::frameTopic(config_.detections.camera), [this](const Frame& m) {

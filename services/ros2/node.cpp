@@ -89,7 +89,8 @@ std::optional<TimePoint> Node::placed(const std::string& input, const ros::Heade
   return std::nullopt;
 }
 
-/// Number of bits that the brightest image so far needs. A dark image at the start does not fix it.
+/// Returns the number of bits that the brightest image so far needs, so that a dark first image
+/// does not determine it.
 int Node::bitsOf(std::size_t camera, const ros::Image& image) {
   if (image.encoding != "mono16" && image.encoding != "16UC1") return 16;
   if (cameras_[camera].bits > 0) return static_cast<int>(cameras_[camera].bits);
@@ -182,7 +183,7 @@ void Node::tellRig() {
 
 void Node::onImu(const ros::Imu& imu, std::int64_t now_ns) {
   ImuSample sample = ros::sampleOf(imu);
-  constexpr double kMostGyro = 100.0, kMostAccel = 1000.0;  // rad/s, m/s²: beyond any IMU
+  constexpr double kMostGyro = 100.0, kMostAccel = 1000.0;  // rad/s, m/s²; no IMU exceeds them
   if (!(sample.gyro.norm() < kMostGyro) || !(sample.accel.norm() < kMostAccel)) {
     return troubles_.add("imu",
                          {"not_finite",
@@ -252,7 +253,7 @@ void Node::onOwnFrame(const Frame& frame, std::int64_t now_ns) {
 
 void Node::onDetections(const ros::Detection2DArray& detections, std::int64_t now_ns) {
   const auto& first = detections.detections;
-  // Some detectors stamp only the boxes.
+  // Some detectors set the stamp only in the boxes.
   const bool stamped = ros::timeOf(detections.header.stamp) != TimePoint() || first.empty();
   const TimePoint stamp =
       ros::timeOf(stamped ? detections.header.stamp : first.front().header.stamp);

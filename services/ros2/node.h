@@ -1,5 +1,5 @@
-// Input side of the bridge, without DDS. It converts messages of ROS to messages of Perdure, and
-// counts problems, each with its fix. Times `now_ns` are arrival times on CLOCK_MONOTONIC.
+// The input side of the bridge, without DDS. It converts messages of ROS to messages of Perdure,
+// and counts problems, each with its fix. `now_ns` are arrival times on CLOCK_MONOTONIC.
 #pragma once
 
 #include <optional>
@@ -32,7 +32,7 @@ struct Outputs {
 
 class Node {
  public:
-  /// `rig`: content of the file in.rig; empty without a file.
+  /// `rig`: calibration from the file in.rig; empty if no file is configured.
   Node(const Config& config, Calibration rig, InstanceId instance, Outputs outputs);
 
   void start();
@@ -50,7 +50,7 @@ class Node {
     troubles_.add(input, reason, now_ns);
   }
 
-  /// Takes a frame of Perdure's own capture, if the cameras are not those of ROS.
+  /// Takes a frame of Perdure's capture. Call it only if the cameras are not those of ROS.
   void onOwnFrame(const Frame& frame, std::int64_t now_ns);
 
   const Troubles& troubles() const { return troubles_; }

@@ -13,23 +13,25 @@
 
 namespace perdure::ros2 {
 
-/// "/camera/image_raw" → "rt/camera/image_raw".
+/// Returns the DDS name of a topic: "/camera/image_raw" gives "rt/camera/image_raw".
 std::string wireTopic(const std::string& topic);
-/// "sensor_msgs/Image" → "sensor_msgs::msg::dds_::Image_".
+/// Returns the DDS name of a type: "sensor_msgs/Image" gives "sensor_msgs::msg::dds_::Image_".
 std::string wireType(const std::string& type);
 
 class RosSide {
  public:
-  /// Throws StartupError: a secured bus cannot include ROS (78), or DDS fails (69).
+  /// Throws StartupError: 78 if a secured bus would include ROS, 69 if DDS fails.
   RosSide(service::Context& context, const Config& config);
 
   void advertise(const ros::Outlet& outlet);
   bool wants(const std::string& topic) const;
   void write(const ros::Outlet& outlet, std::vector<std::uint8_t> cdr);
-  /// Adds a reader. `input`: prefix of its counts. Best effort (not `reliable`) fits all drivers.
+  /// Adds a reader. `input`: prefix of its counts. Without `reliable` (best effort), it matches
+  /// every driver.
   void read(const std::string& input, const std::string& topic, const std::string& type,
             bool reliable, bool latched, int depth, bus::ForeignReader::Handler handler);
-  /// A sentence with the fix if the network changed or an input has no writer; otherwise empty.
+  /// Returns a sentence with the fix if the network has changed or an input has no writer;
+  /// otherwise empty.
   std::string trouble() const;
 
  private:

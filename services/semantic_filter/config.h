@@ -15,7 +15,7 @@ struct HistoryConfig {
 };
 
 struct RestoreConfig {
-  double timeout_s = 5.0;  ///< s; wait for the map store's answer at the start
+  double timeout_s = 5.0;  ///< s; longest wait at the start for the map store's answer
 };
 
 struct Config {

@@ -24,7 +24,7 @@ Event make(const Event& blank, EventKind kind, const ObjectBelief& object, doubl
 
 }  // namespace
 
-/// Events from before the object left are not repeated.
+/// Returns the state of an object that returns from the map, so that its events are not repeated.
 EventTracker::Known EventTracker::comeBack(const ObjectBelief& o) {
   Known known;
   known.confirmed = known.ever_confirmed = o.confirmed;
@@ -86,7 +86,7 @@ void EventTracker::merge(const MergeRecord& m, const Objects& objects, const Eve
   e.other_id = it->second.id;
   e.class_name = it->second.class_name;
   e.probability = 1.0;
-  // The survivor may have the older id of the absorbed one: its change of id is the event.
+  // If the survivor has the older id of the absorbed one, its change of id causes the event.
   if (e.object_id != e.other_id) changes.events.push_back(e);
   if (m.by_map) {
     known_.erase(it);
@@ -129,7 +129,7 @@ EventTracker::Changes EventTracker::update(const Objects& objects,
         known = comeBack(o);
         recalled_.erase(back);
       }
-    } else if (o.id < known.id) {  // the map holds it to be an older object
+    } else if (o.id < known.id) {  // the map reports it as an older object
       events.push_back(make(blank, EventKind::kMerged, o, 1.0));
       events.back().other_id = known.id;
     }

@@ -17,12 +17,13 @@ class EventTracker {
     std::vector<Event> events;      ///< ordered by track
     std::vector<EndedTrack> ended;  ///< merged, or confirmed and gone
   };
-  /// Returns the changes since the last call. `merges`: since then. `blank`: with stamp and writer.
+  /// Returns the changes since the last call. `merges`: those since the last call. `blank`: an
+  /// event with stamp and writer.
   Changes update(const Objects& objects, const std::vector<MergeRecord>& merges,
                  const Event& blank);
-  /// The track comes from the map. The next update that has the track creates the event.
+  /// Notes that the track comes from the map. The next update that has the track creates the event.
   void recalled(TrackId id, bool restored) { recalled_[id] = restored; }
-  /// The track is archived from now on. The next update creates its event.
+  /// Notes that the track is archived. The next update creates its event.
   void archived(TrackId id) { archived_.insert(id); }
   void clear() { *this = {}; }
   bool wasConfirmed(TrackId id) const;

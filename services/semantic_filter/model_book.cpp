@@ -8,7 +8,7 @@ namespace {
 constexpr std::size_t kMaxModels = 64;
 constexpr std::size_t kMaxNamed = 8;  // largest number of classes in a sentence
 
-/// Text for the classes of `model` that `other` lacks, as in "; new classes: a, b and 3 more".
+/// Returns a text of the classes of `model` that `other` lacks: "; new classes: a, b and 3 more".
 std::string beyond(const Model& model, const Model& other, const std::string& title) {
   std::string text;
   std::size_t n = 0;
@@ -20,7 +20,8 @@ std::string beyond(const Model& model, const Model& other, const std::string& ti
   return n == 0 ? "" : "; " + title + ": " + text;
 }
 
-/// Whether `now` is `before` with more classes: a file of detections lists classes as they appear.
+/// Whether `now` is `before` with more classes. The list grows if classes first appear during a
+/// file of detections.
 bool continues(const ModelInfo& now, const ModelInfo& before) {
   const auto begins = [](const auto& longer, const auto& list) {
     return list.size() <= longer.size() && std::equal(list.begin(), list.end(), longer.begin());

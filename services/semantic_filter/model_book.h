@@ -22,13 +22,14 @@ class ModelBook {
   explicit ModelBook(ClassPriors priors = {}) : priors_(std::move(priors)) {}
   const ClassPriors& priors() const { return priors_; }
 
-  /// Reason of failure: "model_contradicts_its_hash". The first model of a hash remains valid. A
-  /// model that only adds classes to the newest one of its name is of the same network.
+  /// Adds a model. Fails with "model_contradicts_its_hash" if a model of this hash has other
+  /// classes; the first one remains valid. A model that only adds classes to the newest one of its
+  /// name is of the same network.
   Result<void> add(const ModelInfo& info);
   /// Returns nullptr if no model of this hash was added, or if too many were added since.
   std::shared_ptr<const Model> find(std::uint64_t hash) const;
-  /// Detections of this known model are used in a frame at `time`. If the frame is the newest and
-  /// the model has changed, returns a sentence that describes the changes.
+  /// Notes that a frame at `time` uses detections of this model, which must be known. If the frame
+  /// is the newest and the model has changed, returns a sentence that describes the changes.
   std::optional<std::string> use(std::uint64_t hash, TimePoint time);
   /// Returns the hash of the model of the newest frame; 0 before the first.
   std::uint64_t used() const { return used_; }
@@ -45,10 +46,12 @@ class ModelBook {
   TimePoint used_at_;
 };
 
-/// Delayed detections of a new inference process that misses everything (README, roll-backs).
+/// Delayed detections of a new inference process that misses all expected objects
+/// (services/inference/README.md).
 class Probation {
  public:
-  /// Most delayed frames. The old process decides within fewer; the history can repeat more.
+  /// Largest number of delayed frames. The old process decides within fewer frames, and the history
+  /// can repeat more.
   static constexpr std::size_t kLongest = 24;
 
   void begin(InstanceId newcomer) { newcomer_ = newcomer; }

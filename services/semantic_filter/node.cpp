@@ -75,7 +75,8 @@ void Node::onOdometry(const Odometry& odometry) {
   if (frame.input.boxes || !config_.history.wait_for_detections) flush();
 }
 
-/// The pixel of a landmark in the filter's camera. vio's first camera may be another one.
+/// Returns the pixel of a landmark in the filter's camera; nothing if it is outside the image.
+/// `camera`: that of the landmarks, which may be another one.
 std::optional<Eigen::Vector2d> Node::pixelOf(const Landmark& landmark, const std::string& camera,
                                              const View& view) const {
   if (camera.empty() || camera == camera_name_) return landmark.pixel;
@@ -105,7 +106,7 @@ void Node::onLandmarks(const Landmarks& landmarks) {
   reasons_.add("landmarks_of_unknown_frame");
 }
 
-/// The reason why a message is refused, as Health counts it; nullptr if it is accepted.
+/// Returns the reason why a message is refused, as Health counts it; nullptr if it is accepted.
 const char* Node::refusalOf(const Detections& detections) const {
   if (camera_ && !detections.camera.empty() && detections.camera != camera_name_) {
     return "detections_of_other_camera";
@@ -179,7 +180,8 @@ void Node::onDetections(const Detections& detections) {
   keepEarly(detections);
 }
 
-/// Of too many, the one furthest ahead is dropped: false stamps must not displace the next ones.
+/// Stores detections that arrive before their odometry. If there are too many, drops the ones
+/// furthest ahead, because messages with false stamps must not displace the next ones.
 void Node::keepEarly(const Detections& detections) {
   for (const auto& d : early_) {
     if (d.stamp.sameFrame(detections.stamp)) return reasons_.add("detections_repeated");

@@ -36,7 +36,8 @@ class Node {
   void onLandmarks(const Landmarks& landmarks);
   void onDetections(const Detections& detections);
   void onNear(const MapNear& near);
-  /// Publishes the newest frame without its detections, at the end of the data or if they stop.
+  /// Steps and publishes the newest frame, with or without its detections, if that is still to do.
+  /// Must be called at the end of the data, or if detections stop.
   void flush();
 
   const ReasonCounts& reasons() const { return reasons_; }
@@ -84,13 +85,13 @@ class Node {
   std::optional<WorldId> world_;
   std::deque<Detections> early_;
   std::optional<MapNear> waiting_near_;  ///< arrived before the first odometry
-  InstanceId near_source_ = 0;           ///< instance of the newest message in use
+  InstanceId near_source_ = 0;           ///< writer of the newest `map/near` in use
   std::uint64_t near_revision_ = 0;
   std::map<TrackId, ObjectId> members_;    ///< as reported by the map
   std::map<TrackId, ObjectId> object_of_;  ///< as published; tracks with their own id are left out
   std::map<ObjectId, TrackId> track_of_;
   std::deque<EndedTrack> ended_;
-  std::set<TrackId> ended_confirmed_;  ///< merged tracks of `ended_` that name their object
+  std::set<TrackId> ended_confirmed_;  ///< merged tracks of `ended_` that had been confirmed
   Objects published_;                  ///< the newest message; the next one reuses its memory
   EventTracker events_;
   ReappearanceMonitor returns_;

@@ -12,7 +12,8 @@ bool isMalformed(const ObjectBelief& belief) { return belief.classes.empty() || 
 
 }  // namespace
 
-/// A track leaves all frames that may be stepped again, so late detections cannot bring it back.
+/// Removes tracks that are archived or forgotten. They leave all frames that may be stepped again,
+/// so late detections cannot bring them back.
 void Node::letGo(const Frame& frame) {
   const TimePoint now = frame.input.stamp.time, oldest = history_.oldestTime();
   const auto leaving =
@@ -28,7 +29,7 @@ void Node::letGo(const Frame& frame) {
   history_.erase(ids);
 }
 
-/// The tracks of a message. The node does not assign their ids again.
+/// Returns the tracks of a message. New tracks will not get their ids.
 Arrivals Node::arrivalsOf(const MapNear& near, ExistenceEvidence evidence) {
   Arrivals arrivals;
   arrivals.evidence = evidence;
@@ -51,7 +52,8 @@ Arrivals Node::arrivalsOf(const MapNear& near, ExistenceEvidence evidence) {
       arrivals.as_published.push_back({std::move(belief), *product});
       continue;
     }
-    // The covariance contains both errors, so the correlation with today's pose error is not known.
+    // The covariance includes an earlier pose error, whose correlation with the present one is not
+    // known.
     for (ClassBelief& c : belief.classes) c.cross_pose.setZero();
     arrivals.as_published.push_back({std::move(belief), history_.poseError().product});
   }
@@ -72,7 +74,7 @@ void Node::onNear(const MapNear& near) {
   take(near, ExistenceEvidence::kRecall);
 }
 
-/// A message that arrives before the next frame replaces it.
+/// Uses a message for the next frame. If another one arrives before that frame, it is used instead.
 void Node::take(const MapNear& near, ExistenceEvidence evidence) {
   near_source_ = near.instance;
   near_revision_ = near.revision;
@@ -86,7 +88,7 @@ void Node::take(const MapNear& near, ExistenceEvidence evidence) {
   history_.arrive(arrivals);
 }
 
-/// The survivor of a merge of confirmed tracks belongs to the older object, as in the map.
+/// Assigns the survivor of a merge of confirmed tracks to the older object, as the map does.
 void Node::noteMerge(TrackId survivor, TrackId absorbed) {
   const auto memberOf = [&](TrackId track) {
     const auto at = members_.find(track);
@@ -96,7 +98,8 @@ void Node::noteMerge(TrackId survivor, TrackId absorbed) {
   if (object != survivor) members_[survivor] = object;
 }
 
-/// Assigns object ids to tracks. Of two tracks of one object, its own or else the first has it.
+/// Assigns object ids to tracks. If an object has two tracks, the track with the same id has the
+/// object id, or else the first track.
 void Node::nameObjects() {
   object_of_.clear();
   track_of_.clear();

@@ -6,7 +6,7 @@
 namespace perdure::semantic_filter {
 namespace {
 
-/// Whether an object is likely to be detected, and no detection overlaps a likely one.
+/// Whether at least one object is likely to be detected, but no detection overlaps such an object.
 bool missesAll(const std::vector<Prediction>& expected, const Detections& detections) {
   constexpr double kLikely = 0.5, kAtAll = 0.1;  // r·π·v; intersection over union
   bool any = false;
@@ -24,7 +24,8 @@ bool missesAll(const std::vector<Prediction>& expected, const Detections& detect
 
 }  // namespace
 
-/// Detections of a new process are delayed in doubt until its probation ends.
+/// Begins and ends probations. During a probation, doubtful detections of the new process are
+/// delayed.
 void Node::onSwap(const SwapNotice& notice) {
   if (notice.step == SwapStep::kTookOver && notice.about != 0) {
     settleProbation(true);
@@ -54,7 +55,7 @@ void Node::reportModelChange(const FrameStamp& stamp, const std::string& detail)
   if (outputs_.events) outputs_.events(event);
 }
 
-/// Whether to delay detections of a new process, until it detects an expected object again.
+/// Whether detections of a new process are delayed, because they miss all expected objects.
 bool Node::isInDoubt(const Frame& frame, const Detections& detections) {
   if (!probation_.isOf(detections.instance)) return false;
   const auto model = models_.find(detections.model_hash);
@@ -74,7 +75,7 @@ bool Node::isInDoubt(const Frame& frame, const Detections& detections) {
   return false;
 }
 
-/// Applies accepted delayed detections late; otherwise these frames have none.
+/// Applies the delayed detections late if `believed`; otherwise drops them.
 void Node::settleProbation(bool believed) {
   const auto kept = probation_.take();
   if (!believed && !kept.empty()) reasons_.add("detections_rolled_back", kept.size());

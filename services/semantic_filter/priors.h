@@ -12,7 +12,8 @@ namespace perdure::semantic_filter {
 
 /// Loads the file that the configuration names. Throws StartupError as loadClassPriors does.
 ClassPriors loadPriors(const Config& config);
-/// Throws StartupError: kUnavailable without a file, kConfiguration with all file:line:col.
+/// Throws StartupError: kUnavailable if the file cannot be read, kConfiguration with file, line and
+/// column of all errors.
 ClassPriors loadClassPriors(const std::string& path);
 /// Returns, for each class, the points that span its shape, in halves of the cuboid's sides.
 std::map<std::string, std::vector<Eigen::Vector3d>> shapePoints(const ClassPriors& priors);

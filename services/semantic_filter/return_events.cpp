@@ -12,7 +12,7 @@ namespace {
 constexpr double kRemembered_s = 8.0;
 constexpr double kShortestPause_s = 0.2;  // for an object that should already be visible
 constexpr double kLongestPause_s = 0.5;   // longest interval until the time is computed again
-constexpr double kNewShare = 0.2;  // least relative change of the remaining time that is news
+constexpr double kNewShare = 0.2;  // least relative change of the remaining time that is published
 
 TimePoint later(TimePoint time, double seconds) {
   return time + std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 * seconds));
@@ -22,7 +22,8 @@ bool inSight(const Track& o) { return o.visibility.fraction > 0.0; }
 
 }  // namespace
 
-/// Whether to wait for the next detection: the time has passed, so an edge may be misjudged.
+/// Whether a confirmed object at rest is occluded, or visible again but not detected since. In the
+/// latter case an occluding edge may be misjudged.
 bool ReappearanceMonitor::waits(const Track& o, const Parameters& parameters) const {
   if (!o.life.confirmed || movingProbability(o, parameters.motion.min_speed) >= 0.5) return false;
   if (o.visibility.state == Visibility::kOccluded) return true;
@@ -37,7 +38,8 @@ void ReappearanceMonitor::addKeyframe(const FrameInput& now, const Way& way) {
   }
 }
 
-/// The largest random walk of the velocity over several lags: a swaying body drifts less.
+/// Returns the random walk of the velocity, m/s per √s: the largest over several lags, because that
+/// of a swaying body is smaller over long lags.
 double ReappearanceMonitor::speedWalk() const {
   double most = 0.0;
   for (const double lag : {0.1, 0.5, 1.0, 2.0, 4.0}) {

@@ -1,4 +1,4 @@
-// Objects that exist once the cameras are known.
+// The tracker and the filter, which need the calibration of the cameras, and helpers for frames.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -23,26 +23,31 @@ struct Cameras {
   std::vector<CameraModel> models;
 };
 
-/// Cameras whose frames are read, by the configuration: the first leads, a second needs stereo.
-/// Without any of them, the calibration's first camera.
+/// Returns the cameras whose frames are read: those of the configuration that the calibration has,
+/// two with `stereo`, otherwise one. The first one leads. If there is none, returns the
+/// calibration's first camera.
 std::vector<CameraModel> usedCameras(const Config& config, const Calibration& calibration);
-/// A sentence if a camera other than the defaults is configured and does not exist; else empty.
+/// Returns a sentence if input.cameras was changed and names a camera without calibration;
+/// otherwise an empty string.
 std::string unknownCamera(const Config& config, const Calibration& calibration);
 
-/// Camera parameters of the estimators: the mounting on the body, and the read-out time in s.
+/// Return parameters of each camera: its pose T_BC, and its read-out time in s.
 std::vector<RigidTransform> extrinsics(const std::vector<CameraModel>& all);
 std::vector<double> readouts(const std::vector<CameraModel>& all);
 
-/// Whether both calibrations have exactly the same cameras in the same order.
+/// Returns true if both calibrations have the same cameras in the same order.
 bool sameCameras(const Calibration& a, const Calibration& b);
 
-/// A sentence with both sizes if the frame's size differs from its calibration; otherwise empty.
+/// Returns a sentence if the frame's size differs from that of its calibration; otherwise an empty
+/// string.
 std::string otherSize(const Frame& frame, const CameraModel& model);
 
-/// Index in `models` of the frame's camera; empty for others. An unknown camera is counted.
+/// Returns the index in `models` of the frame's camera, or nothing if it is not among them. Counts
+/// "frame_of_unknown_camera" if the calibration does not have it either.
 std::optional<std::size_t> cameraOf(const Frame& frame, const std::vector<CameraModel>& models,
                                     const Calibration& calibration, ReasonCounts& reasons);
-/// The second image (CV_8UC1) of a pair, or empty; a missing one of a stereo rig is counted.
+/// Returns the second image (CV_8UC1) of a pair; empty if it is missing or unreadable, which is
+/// counted for a stereo rig.
 cv::Mat secondImage(const FramePair& frames, bool stereo, ReasonCounts& reasons);
 
 }  // namespace perdure::vio

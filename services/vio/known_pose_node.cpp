@@ -11,7 +11,7 @@
 namespace perdure::vio {
 namespace {
 
-constexpr std::size_t kPoses = 256;  // poses that wait for their frames
+constexpr std::size_t kPoses = 256;  // largest number of poses that wait for frames
 
 constexpr char kNoPose[] =
     "frames have no pose; start what publishes odometry, with the stamps of the frames";
@@ -94,12 +94,12 @@ std::optional<std::uint64_t> KnownPoseNode::waitsFor() const {
   return waiting_.front().first.stamp.sequence;
 }
 
-/// Whether `time` is before `newest` by more than transports reorder.
+/// Returns true if `time` is before `newest` by more than transports reorder messages.
 bool KnownPoseNode::isBefore(TimePoint time, const std::optional<TimePoint>& newest) const {
   return newest && time < *newest - std::chrono::milliseconds(300);
 }
 
-/// The clock restarted, or one stamp was far ahead. Earlier data cannot be used.
+/// Discards all data: the clock restarted, or one stamp was far ahead.
 void KnownPoseNode::clockJumpedBack() {
   reasons_.add("clock_jumped_back");
   waiting_.clear();
@@ -170,7 +170,7 @@ void KnownPoseNode::drain(bool all) {
   while (cameras_ && !waiting_.empty()) {
     const FramePair& front = waiting_.front();
     const Odometry* pose = poseOf(front.first);
-    // Poses arrive in order, so a later pose shows that this frame has none.
+    // Poses arrive in order. A later pose therefore shows that this frame has none.
     if (!pose && (poses_.empty() || poses_.back().stamp.time <= front.first.stamp.time)) return;
     if (pose && !all && cameras_->models.size() == 2 && waiting_.frontMayBePaired()) return;
     const FramePair frames = waiting_.take();

@@ -1,5 +1,5 @@
-// Node of vio with given poses (`input.odometry: given`): waits for the pose of each frame, pairs
-// stereo frames, publishes landmarks.
+// Node of vio with given poses (`input.odometry: given`). It waits for the pose of each frame,
+// pairs stereo frames and publishes landmarks.
 #pragma once
 
 #include <deque>
@@ -22,7 +22,7 @@ namespace perdure::vio {
 
 class KnownPoseNode {
  public:
-  /// landmarks: one message for each frame of the first camera that has a pose, in order.
+  /// `landmarks` receives one message for each frame of the first camera that has a pose, in order.
   KnownPoseNode(const Config& config, InstanceId instance, Sink<Landmarks> landmarks);
 
   void onCalibration(const Calibration& calibration);
@@ -33,14 +33,14 @@ class KnownPoseNode {
   /// End of data: frames that wait for a second image are processed without it.
   void flush() { drain(true); }
 
-  /// The oldest frame whose landmarks may still come.
+  /// Returns the sequence number of the oldest waiting frame; nothing if no frame waits.
   std::optional<std::uint64_t> waitsFor() const;
 
   const ReasonCounts& reasons() const;
   HealthState health() const;
-  /// One sentence: what the node waits for, or what is wrong. Empty if there is no problem.
+  /// Returns a sentence that names the missing input or the problem; empty if there is no problem.
   std::string status() const;
-  /// Status of the poses alone: a sentence if they contradict the images.
+  /// Returns a sentence if the poses contradict the images; otherwise an empty string.
   std::string statusOfPoses() const;
 
  private:
@@ -70,7 +70,7 @@ class KnownPoseNode {
   std::optional<Calibration> calibration_;
   std::unique_ptr<Cameras> cameras_;
   WaitingFrames waiting_;
-  std::deque<Odometry> poses_;    ///< oldest first, of frames that may still come
+  std::deque<Odometry> poses_;    ///< oldest first; their frames may still arrive
   std::optional<Odometry> last_;  ///< odometry of the last image that was used
   std::optional<TimePoint> last_image_;
   std::optional<TimePoint> newest_frame_;  ///< newest frame received

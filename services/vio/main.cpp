@@ -15,7 +15,7 @@ namespace {
 
 using namespace perdure;
 
-/// Delivers each frame of the configured cameras once, decoded.
+/// Decodes the frames of the configured cameras, and delivers each frame once.
 class FrameInput {
  public:
   FrameInput(service::Context& context, const vio::Config& config, ReasonCounts& reasons,
@@ -33,7 +33,7 @@ class FrameInput {
         const auto missed = gaps_[i].before(m.stamp.source, m.stamp.sequence);
         if (missed > 0) reasons_.add("frames_missed", missed);
         if (i == 0) context.health().frameIn();
-        // An image that cannot be decoded is dropped without output.
+        // An image that cannot be decoded is dropped. No output is published for it.
         if (hand(m) && i == 0) frames.heard();
       });
     }
@@ -53,7 +53,8 @@ class FrameInput {
   std::vector<bus::Gaps> gaps_;
 };
 
-/// Inputs and outputs that both nodes share. `own`: reasons of the process.
+/// Connects the inputs and outputs that both nodes have. `own` are reasons counted outside the
+/// node.
 template <class Node>
 void connect(service::Context& context, const vio::Config& config, Node& node,
              const ReasonCounts& own) {
@@ -115,7 +116,7 @@ void followGivenPoses(service::Context& context, const vio::Config& config) {
 }
 
 void serve(service::Context& context, const vio::Config& config) {
-  cv::setNumThreads(1);  // threads do not speed up images of this size
+  cv::setNumThreads(1);  // images are too small to gain from threads
   config.odometry == "given" ? followGivenPoses(context, config) : estimate(context, config);
 }
 

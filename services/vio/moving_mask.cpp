@@ -11,9 +11,10 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kNear = 0.2;    // m: edges are clipped at this depth
-constexpr float kMargin = 4.0F;  // px: patches extend beyond their point
+constexpr float kMargin = 4.0F;  // px; a point's patch extends beyond it
 
-/// Bounding box of a cuboid with its centre at p_C and the half axes `axes` (columns, in C).
+/// Returns the bounding box, in px, of a cuboid with the centre p_C and the half axes `axes`
+/// (columns, in C).
 std::optional<cv::Rect2f> boundingBox(const CameraModel& camera, const Vector3d& p_C,
                                       const Eigen::Matrix3d& axes) {
   std::vector<Vector3d> seen;
@@ -36,7 +37,7 @@ std::optional<cv::Rect2f> boundingBox(const CameraModel& camera, const Vector3d&
   const auto height = static_cast<float>(camera.calibration().height);
   float x1 = width, y1 = height, x2 = 0, y2 = 0;
   for (const Vector3d& p : seen) {
-    // Lens models are not monotonic far outside the image, unlike a pinhole.
+    // Directions are limited, because lens models are not monotonic far outside the image.
     Vector3d bounded = p / p.z();
     bounded.head<2>() = bounded.head<2>().cwiseMax(-1.5).cwiseMin(1.5);
     const auto pixel = camera.project(bounded);

@@ -1,6 +1,6 @@
-// Image regions of objects that the object filter reports as moving. Points on them give no
-// information about the motion of the camera. Off by default, so that vio does not depend on a
-// program that needs vio.
+// Image regions of objects that the object filter reports as moving. Points on these objects give
+// no information about the motion of the camera. The mask is off by default, so that vio does not
+// depend on a program that depends on vio.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -14,8 +14,8 @@ namespace perdure::vio {
 
 struct MovingMaskOptions {
   bool enabled = false;
-  double probability = 0.5;  ///< lowest probability of moving, and of existing
-  double longest_s = 1.0;    ///< largest age of the objects, s
+  double probability = 0.5;  ///< least probability of motion, and of existence
+  double longest_s = 1.0;    ///< largest age of the objects
 };
 
 class MovingMask {
@@ -23,8 +23,9 @@ class MovingMask {
   explicit MovingMask(const MovingMaskOptions& options) : options_(options) {}
 
   void onObjects(const Objects& objects);
-  /// Boxes, px and clipped to the image, of the moving objects' cuboids, propagated to `now`. T_WB:
-  /// the body in `world`. Empty for objects of another world, too old, or of a later time.
+  /// Returns the boxes of the moving objects' cuboids, propagated to `now`, in px and clipped to
+  /// the image. T_WB is the pose of the body in `world`. Returns none if the objects are of another
+  /// world, too old, or later than `now`.
   std::vector<cv::Rect2f> boxes(const CameraModel& camera, const WorldId& world,
                                 const RigidTransform& T_WB, TimePoint now) const;
 

@@ -8,7 +8,7 @@
 namespace perdure::vio {
 namespace {
 
-constexpr int kUnaidedFrames = 5;  // frames without an update from the image
+constexpr int kUnaidedFrames = 5;  // more frames without an update by the image: degraded
 
 constexpr char kLate[] =
     "frames are older than those before them; the camera's clock jumped back and the IMU's did "
@@ -115,7 +115,7 @@ std::string Node::status() const {
                               : "sees no points; it goes by inertia (and speed)";
 }
 
-/// The clock restarted. Earlier data cannot be used.
+/// Discards all data, because the clock restarted.
 void Node::clockJumpedBack() {
   if (!started()) reasons_.add("clock_jumped_back");
   imu_.clear();
@@ -129,7 +129,7 @@ void Node::clockJumpedBack() {
 }
 
 void Node::onImu(const ImuSample& sample) {
-  // Transports reorder by less than this.
+  // Transports reorder samples by less than this time.
   if (!imu_.empty() && sample.time < imu_.last() - std::chrono::milliseconds(300)) {
     clockJumpedBack();
   }
@@ -179,7 +179,7 @@ TimePoint Node::imuTime(TimePoint image_time) const {
 
 bool Node::waitsForPair() const {
   if (cameras_->models.size() < 2 || !waiting_.frontMayBePaired()) return false;
-  // After half a second of later samples, no partner is expected.
+  // Waits until samples are half a second later.
   return imu_.empty() ||
          imu_.last() < waiting_.front().first.stamp.time + std::chrono::milliseconds(500);
 }
@@ -187,9 +187,9 @@ bool Node::waitsForPair() const {
 bool Node::ready() const {
   TimePoint now = imuTime(waiting_.front().first.stamp.time);
   if (imu_.empty()) return false;
-  // The time is that of the last row, because an image arrives only after its read-out.
+  // Samples are needed until the last row has been read out.
   now += durationFromSeconds(0.5 * std::max(0.0, std::ranges::max(readouts(cameras_->models))));
-  // The last sample may be extrapolated by a quarter of a period.
+  // The last sample may be used for a further quarter of a period.
   if (const auto period = imu_.period()) now -= *period / 4;
   if (imu_.last() < now + durationFromSeconds(config_.imu_slack_s)) return false;
   if (waitsForPair()) return false;
@@ -211,7 +211,7 @@ void Node::noteGaps(TimePoint now) {
   degraded_frames_ = kDegradedFrames;
   if (!started()) return;
   if (gap > config_.longest_gap_s) return lose({"imu_gap_too_long", ""});
-  // Neither images nor samples arrived: the clock jumped, or the body moved unobserved.
+  // If neither images nor samples arrived, the clock jumped or the body moved unobserved.
   if (std::min(gap, toSeconds(now - from)) > config_.longest_blackout_s) {
     lose({"clock_jumped_or_blackout", ""});
   }
@@ -226,7 +226,7 @@ TrackedFrame Node::trackImages(const cv::Mat& first, const cv::Mat& second, Time
   }
   const Eigen::Vector3d turn = cameras_->estimator.turnOfReadout(imu_, now);
   if (!started()) {
-    // With a known rotation, a minority of points at rest is sufficient in front of traffic.
+    // If the rotation is known, the tracker can follow a minority of points at rest behind traffic.
     const auto motion = cameras_->tracker.motionSince(1, 0.8);
     constexpr std::chrono::milliseconds kEven{500};
     if (motion && *motion > config_.core.rest.disparity_px &&
@@ -328,7 +328,7 @@ void Node::publish(const FrameStamp& stamp, const FrameEstimate& e) {
   o.world = world_;
   const bool unaided = !e.at_rest && e.points_used == 0;
   unaided_frames_ = unaided ? unaided_frames_ + 1 : 0;
-  // The first points come into use some ten frames after a start.
+  // The first points are used some ten frames after a start.
   constexpr int kFirstFrames = 20;
   aided_ = aided_ || e.points_used > 0;
   const bool late = unaided_frames_ == kFirstFrames;

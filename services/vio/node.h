@@ -1,4 +1,5 @@
-// Node of vio: inertial samples, speed and frames in; odometry and landmarks out.
+// Node of vio. It receives inertial samples, speed and frames, and publishes odometry and
+// landmarks.
 #pragma once
 
 #include <memory>
@@ -30,7 +31,7 @@ struct Outputs {
   Sink<std::vector<Innovation>> innovations = {};
 };
 
-inline constexpr int kDegradedFrames = 20;  ///< degraded frames after a gap or a resumption
+inline constexpr int kDegradedFrames = 20;  ///< number of degraded frames after a gap or a restart
 
 class Node {
  public:
@@ -41,21 +42,22 @@ class Node {
   void onSpeed(const SpeedSample& sample);
   void onFrame(const Frame& frame);
   void onObjects(const Objects& objects) { moving_.onObjects(objects); }
-  /// End of data: processes the waiting frames and repeats the last inertial sample.
+  /// Processes the waiting frames at the end of the data. The last inertial sample is repeated up
+  /// to them.
   void flush() { drain(true); }
 
-  /// Sets the frame of reference; call before the first output.
+  /// Sets the frame of reference. Call it before the first output.
   void setWorld(WorldId world) { world_ = world; }
-  /// Text for restoreState() in another process; empty before a start.
+  /// Returns the text for restoreState() in another process; empty before a start.
   std::string saveState() const;
-  /// Resumes at the next frame, unless the saved state is too old. Fails with "state_malformed" or
-  /// "state_other_cameras".
+  /// Continues from the saved state at the next frame, unless the state is too old. Fails with
+  /// "state_malformed" or "state_other_cameras".
   Result<void> restoreState(const std::string& text);
 
   const ReasonCounts& reasons() const;
   bool started() const { return cameras_ && cameras_->estimator.started(); }
   HealthState health() const;
-  /// One sentence: what the node waits for, or what is wrong. Empty if there is no problem.
+  /// Returns a sentence that names the missing input or the problem; empty if there is no problem.
   std::string status() const;
 
  private:
@@ -98,7 +100,7 @@ class Node {
   std::optional<std::uint64_t> last_sequence_;  ///< sequence of the last output with a pose
   std::uint64_t frame_ = 0;
   int degraded_frames_ = 0, unaided_frames_ = 0;
-  bool aided_ = false;  ///< a point was of use since the start
+  bool aided_ = false;  ///< an update has used a point since the start
   std::string last_start_reason_;
   OdometryState last_state_ = OdometryState::kInitialising;
   mutable ReasonCounts all_reasons_;

@@ -1,4 +1,4 @@
-// Start of a node: from a saved state, at rest, with speed, or in motion.
+// Starts of the node's filter: from a saved state, at rest, with speed, or in motion.
 #include <algorithm>
 #include <cmath>
 
@@ -35,7 +35,8 @@ std::size_t Node::framesIn(double seconds) const {
   return static_cast<std::size_t>(std::max(2L, std::lround(seconds * rate) - 1));
 }
 
-/// With an IMU at rest, one camera cannot observe a speed: the background must rest long enough.
+/// If the IMU's readings are constant, one camera cannot observe a constant speed. The background
+/// must then rest long enough.
 Result<Start> Node::startWithoutSpeed(TimePoint now) {
   const Options& options = cameras_->estimator.options();
   const StartOptions& o = options.start;
@@ -64,7 +65,8 @@ void Node::begin(TimePoint now, const FrameInput& input) {
   const auto frames = std::min(framesIn(options.start.rest_window_s),
                                static_cast<std::size_t>(config_.tracker.memory));
   const std::optional<double> rest_motion = cameras_->tracker.motionSince(frames);
-  // Rest needs a whole window; motion is detected once points have moved further than rest allows.
+  // Rest needs a whole window. Motion is detected as soon as points have moved farther than rest
+  // allows.
   const auto moved = rest_motion ? rest_motion : cameras_->tracker.motionSince(framesIn(0.25));
   const bool moves = moved && *moved >= options.start.rest_disparity_px;
   const bool slow = !input.speed || std::abs(input.speed->speed) < 0.1;

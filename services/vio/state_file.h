@@ -10,9 +10,10 @@ namespace perdure::vio {
 
 class StateFile {
  public:
-  /// Creates the directory or throws StartupError. With an empty `directory` nothing is saved.
+  /// Creates the directory. Throws StartupError if it cannot be created. If `directory` is empty,
+  /// nothing is saved.
   explicit StateFile(const std::string& directory);
-  /// Returns the text of the file; empty if there is no file.
+  /// Returns the text of the file; nothing if there is no file.
   std::optional<std::string> read() const;
   /// Writes a temporary file and renames it. Fails with "state_not_written".
   Result<void> write(const std::string& text) const;

@@ -6,7 +6,7 @@
 namespace perdure::vio {
 
 constexpr std::size_t kUnpaired = 4;
-constexpr std::size_t kAlone = 10;  // frames in a row after which the second camera is absent
+constexpr std::size_t kAlone = 10;  // unpaired frames in a row: second camera absent
 constexpr std::chrono::milliseconds kReordered{300};  // largest reordering by transports
 
 Result<void> WaitingFrames::addFirst(const Frame& frame) {
@@ -48,7 +48,8 @@ Result<void> WaitingFrames::addSecond(const Frame& frame) {
   return fail("stereo_unpaired");
 }
 
-/// A late frame of a missed pair shows that the camera is back.
+/// Returns true if the frame's pair was already taken. A late frame of a missed pair also shows
+/// that the second camera works again.
 bool WaitingFrames::isLate(const Frame& second) {
   if (!taken_ || second.stamp.time > *taken_ + tolerance_) return false;
   trouble_ = "its images come too late";

@@ -1,4 +1,5 @@
-// Queue of frames in order of their stamps, each with its partner of the second camera.
+// Queue of the first camera's frames in order of their stamps, each with its partner of the second
+// camera.
 #pragma once
 
 #include <deque>
@@ -20,24 +21,26 @@ class WaitingFrames {
   explicit WaitingFrames(double pair_tolerance_s)
       : tolerance_(durationFromSeconds(pair_tolerance_s)) {}
 
-  /// Adds a frame of the first camera. Refuses it with "frame_duplicate". With "frame_reordered" it
-  /// is inserted before others. With "frame_of_earlier_run" it is inserted, and frames that are
-  /// further ahead than transports reorder are dropped.
+  /// Adds a frame of the first camera. Refuses it with "frame_duplicate". It inserts the frame, but
+  /// returns "frame_reordered" if later frames are waiting, and "frame_of_earlier_run" if it
+  /// dropped frames that were farther ahead than transports reorder.
   Result<void> addFirst(const Frame& frame);
-  /// Adds a frame of the second camera. Fails with "stereo_unpaired" if the oldest unpaired frame
-  /// was dropped, and with "frame_late" if its pair was already taken.
+  /// Adds a frame of the second camera. Fails with "stereo_unpaired" if it dropped the oldest
+  /// unpaired frame, and with "frame_late" if the partner of `frame` was already taken.
   Result<void> addSecond(const Frame& frame);
-  /// Reports an unusable frame of the second camera; why: a sentence.
+  /// Reports an unusable frame of the second camera; `why` is a sentence.
   void refuseSecond(std::string why) { trouble_ = std::move(why); }
 
   bool empty() const { return pairs_.empty(); }
   std::size_t size() const { return pairs_.size(); }
   const FramePair& front() const { return pairs_.front(); }
   FramePair take();
-  /// Whether the oldest frame has no partner and may still receive one. False if a later frame of
-  /// either camera has arrived. Also false after many frames without a partner, until one arrives.
+  /// Returns true if the oldest frame has no partner and may still receive one. Returns false if a
+  /// later pair, three later frames, or a later frame of the second camera arrived. After ten
+  /// frames without a partner it returns false until one arrives.
   bool frontMayBePaired() const;
-  /// One sentence with the fix if several frames in a row found no partner; otherwise empty.
+  /// Returns a sentence with the fix if ten frames in a row found no partner; otherwise an empty
+  /// string.
   std::string whyAlone() const;
   void clear();
 
@@ -50,7 +53,7 @@ class WaitingFrames {
   std::optional<TimePoint> taken_;  ///< stamp of the last frame taken
   int alone_ = 0;                   ///< frames taken in a row without a partner
   std::deque<TimePoint> missed_;    ///< stamps of frames without a partner, since the last pair
-  std::string trouble_;             ///< problem of the second camera's last image; empty: none
+  std::string trouble_;             ///< problem of the second camera's last image, or empty
 };
 
 }  // namespace perdure::vio

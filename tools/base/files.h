@@ -1,4 +1,4 @@
-// Files and folders of a tool.
+// Temporary folders for tools.
 #pragma once
 
 #include <cstdlib>
@@ -8,11 +8,11 @@
 
 namespace perdure::tools {
 
-/// A folder that its destructor removes with its content.
+/// A folder that the destructor removes with its content.
 class TemporaryFolder {
  public:
-  /// Creates a folder whose path starts with `start`. On failure, fail(its name) throws; errno has
-  /// the reason.
+  /// Creates a folder whose path starts with `start`. On failure, calls `fail` with the path, which
+  /// must throw; errno has the reason.
   template <class Fail>
   TemporaryFolder(const std::filesystem::path& start, Fail&& fail) {
     std::string name = start.string() + "XXXXXX";

@@ -7,14 +7,15 @@
 
 namespace perdure::tools {
 
-/// The quantile of `values`, which must not be empty; between two samples, the lower one.
+/// Returns the sample at a share in [0, 1] of the sorted `values`, rounded down to a sample.
+/// `values` must not be empty.
 inline double sampleAt(std::vector<double> values, double share) {
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * (values.size() - 1.0));
   std::nth_element(values.begin(), at, values.end());
   return *at;
 }
 
-/// Quantile of a sample by linear interpolation; q in [0, 1]; 0 for an empty sample.
+/// Returns the quantile q in [0, 1] by linear interpolation; 0 if `values` is empty.
 inline double quantile(std::vector<double> values, double q) {
   if (values.empty()) return 0.0;
   std::sort(values.begin(), values.end());

@@ -8,7 +8,7 @@
 namespace perdure::tools {
 
 void addBusOptions(CLI::App& command, bus::Options& options) {
-  // Reads the configuration before the command line is parsed, so that options override the file.
+  // Reads bus.yaml before the command line is parsed, so that options override the file.
   command.preparse_callback([&options](std::size_t) { options = listenersOptions(); });
   command.add_option("--interface", options.interface, "network interface of the topics")
       ->capture_default_str();

@@ -1,4 +1,4 @@
-// Shared by the subcommands: bus options, and a loop that ends after a time or on a signal.
+// Functions that the subcommands share: bus options, and a loop that ends after a time or a signal.
 #pragma once
 
 #include <string>
@@ -21,7 +21,7 @@ void runLoop(bus::WaitLoop& loop, double seconds);
 
 double steadySeconds();
 
-/// The five services, named as in Health and in discovery.
+/// The five services, by their names in Health and in discovery.
 inline constexpr const char* kUsualServices[] = {"capture", "vio", "inference", "semantic_filter",
                                                  "map_store"};
 

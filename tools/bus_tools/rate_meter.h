@@ -16,7 +16,7 @@ struct RateSummary {
 class RateMeter {
  public:
   explicit RateMeter(double window_s = 10.0) : window_s_(window_s) {}
-  /// Adds an arrival; `time_s` must not decrease.
+  /// Adds the arrival of a message at `time_s`, which must not decrease.
   void arrived(double time_s);
   RateSummary summary(double now_s);
 

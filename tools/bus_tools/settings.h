@@ -1,4 +1,4 @@
-// Location and content of the services' bus settings on this host.
+// Finds and reads the services' bus settings on this host.
 #pragma once
 
 #include <string>
@@ -10,9 +10,11 @@ namespace perdure::tools {
 /// /etc/perdure, or config/ in the working directory; empty if neither exists.
 std::string configurationFolder();
 
-/// The options of the services: bus.yaml, or the file of PERDURE_BUS. Throws StartupError.
+/// Reads the services' options from bus.yaml or the file in PERDURE_BUS. Throws StartupError if the
+/// file is invalid.
 bus::Options servicesOptions();
-/// Returns these options for readers: without shared memory and without the services' identity.
+/// Returns the same options for programs that only read: without shared memory and without the
+/// services' identity.
 bus::Options listenersOptions();
 
 /// The existing topic names, for the error message about an unknown topic.

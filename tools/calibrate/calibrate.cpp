@@ -13,7 +13,7 @@ namespace {
 
 DistortionModel modelOf(const CalibrateOptions& options, const CameraCalibration& prior) {
   const bool tells = prior.fx > 0.0 && prior.distortion != DistortionModel::kNone;
-  // A rational lens can be read but not estimated, so Brown's model replaces it.
+  // A rational lens can be read but not estimated, so that Brown's model replaces it.
   const bool radial = !tells || prior.distortion == DistortionModel::kRational;
   return options.lens.value_or(radial ? DistortionModel::kRadialTangential : prior.distortion);
 }

@@ -1,4 +1,4 @@
-// `perdure calibrate` as a function: from a recording to a rig, its report and pictures.
+// Implements `perdure calibrate`: estimates a rig from a recording, with a report and pictures.
 #pragma once
 
 #include <filesystem>
@@ -23,7 +23,7 @@ struct CalibratedCamera {
   Intrinsics lens;
   std::optional<CameraImu> place;
   Judgements judgements;
-  /// The lens of the last estimate, and the camera's pose on the IMU if it was estimated.
+  /// The last estimate of the lens, with the camera's pose on the IMU if it was estimated.
   CameraCalibration result() const;
 };
 
@@ -34,14 +34,14 @@ struct Calibrated {
   Judgements all() const;
 };
 
-/// Throws StartupError(kUnavailable) with the reason and the fix.
+/// Throws StartupError(kUnavailable) with the reason and the fix if the data do not suffice.
 Calibrated calibrate(const CalibrationDrive& drive, const CalibrateOptions& options);
 
 /// Writes rig.yaml, calibration.json and residuals_<camera>.png.
 void writeCalibrated(const Calibrated& calibrated, const std::filesystem::path& folder);
 std::string reportText(const Calibrated& calibrated);
 
-/// Draws the residuals over the image and over time, and the residuals of the IMU.
+/// Draws the residuals over the image and over time, and the IMU's residuals if it was used.
 void drawResiduals(const CalibratedCamera& camera, const std::filesystem::path& file);
 
 }  // namespace perdure::calibrate

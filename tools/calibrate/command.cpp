@@ -1,4 +1,4 @@
-// `perdure calibrate`: from a board, from motion, or from another program.
+// `perdure calibrate`: calibrates from a board or from motion, or imports other calibrations.
 #include <fmt/format.h>
 #include <unistd.h>
 

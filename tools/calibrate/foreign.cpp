@@ -86,7 +86,7 @@ ForeignRig ofVins(const SensorFile& file, const fs::path& path) {
     auto place = file.transform(("body_T_" + name).c_str());
     if (!place && name == "cam0") place = vinsPlace(file);
     if (place) put(camera, "T_imu_cam", *place);
-    // VINS stamps the first row; here the stamp is the middle row's.
+    // VINS stamps the first row of an image; here the stamp is that of the middle row.
     const double readout = file.number("rolling_shutter", 0, 0) > 0
                                ? file.number("rolling_shutter_tr", 0.0, 0.0)
                                : 0.0;
@@ -100,7 +100,7 @@ ForeignRig ofVins(const SensorFile& file, const fs::path& path) {
   return rig;
 }
 
-// ORB-SLAM3: flat keys with points; before version 1.0 the first camera is "Camera.".
+// ORB-SLAM3 has flat keys with points; before version 1.0 the first camera's are "Camera.".
 
 YAML::Node orbCamera(const SensorFile& file, const std::string& prefix) {
   YAML::Node camera;
@@ -123,7 +123,7 @@ YAML::Node orbCamera(const SensorFile& file, const std::string& prefix) {
   return camera;
 }
 
-/// The second camera in the first.
+/// The second camera's pose in the first camera.
 std::optional<RigidTransform> orbSecond(const SensorFile& file) {
   if (const auto place = file.transform("Stereo.T_c1_c2")) return place;
   auto rows = file.list("Tlr");  // 3x4
@@ -185,7 +185,7 @@ ForeignRig ofOrbSlam(const SensorFile& file) {
   return rig;
 }
 
-// Basalt's JSON is YAML, too.
+// Basalt's files are JSON, which is valid YAML.
 
 void basaltLens(const SensorFile& intrinsics, YAML::Node camera) {
   const std::string type = intrinsics.text("camera_type");
@@ -219,14 +219,14 @@ RigidTransform basaltPose(const SensorFile& pose) {
   return {rotation.normalized(), {p[0], p[1], p[2]}};
 }
 
-/// The largest of a noise's numbers, one for each axis; older files have one for all.
+/// The largest noise of the axes; older files have one number for all axes.
 double basaltNoise(const SensorFile& file, const char* key) {
   if (file.has(key) && file.root()[key].IsScalar()) return file.number(key, 0.0);
   const auto values = file.numbers(key, 3);
   return *std::ranges::max_element(values);
 }
 
-/// Scale and misalignment follow the three biases.
+/// Adds a note about scale and misalignment, which follow the three biases in the list.
 void noteScale(const SensorFile& file, const char* key, const std::string& path, ForeignRig& rig) {
   const auto values = file.list(key);
   double most = 0.0;

@@ -1,4 +1,4 @@
-// Calibrations of VINS, ORB-SLAM3 and Basalt as sections of a rig file.
+// Converts calibrations of VINS, ORB-SLAM3 and Basalt to sections of a rig file.
 #pragma once
 
 #include <filesystem>
@@ -17,8 +17,8 @@ struct ForeignRig {
   std::vector<std::filesystem::path> beside;  ///< other files that were read
 };
 
-/// Converts the file; returns nothing if it is of another program. A camera whose file does not
-/// contain its pose has no transform. Throws StartupError with the key and the fix.
+/// Converts the file; returns nothing if it belongs to another program. A camera has no transform
+/// if the file does not contain its pose. Throws StartupError with the key and the fix.
 std::optional<ForeignRig> sectionsOf(const replay::SensorFile& file,
                                      const std::filesystem::path& path);
 

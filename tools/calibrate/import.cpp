@@ -129,7 +129,7 @@ class Import {
   std::vector<fs::path> read_;  ///< files that were given, or that another one names
   std::size_t given_ = 0;
   std::vector<bool> in_body_;  ///< one per camera: its file gives the pose in EuRoC's body
-  /// In the IMU, which is our body: EuRoC's body, and the IMU that Kalibr's T_cam_imu is of.
+  /// Poses in the IMU I, which is our body: EuRoC's body, and the reference of Kalibr's T_cam_imu.
   RigidTransform T_I_body_, T_I_reference_;
   ImportedRig result_;
 };

@@ -1,4 +1,4 @@
-// `perdure calibrate import`: converts calibrations of Kalibr, ROS or EuRoC to a rig file.
+// `perdure calibrate import`: converts calibrations of other programs to a rig file.
 #pragma once
 
 #include <filesystem>
@@ -15,9 +15,9 @@ struct ImportedRig {
   std::vector<std::string> ignored;  ///< unknown keys
 };
 
-/// Imports Kalibr's camchain and imu files, ROS camera_info, EuRoC's sensor.yaml, VINS, ORB-SLAM3,
-/// Basalt, or a rig file. `T_BC`: poses of the cameras whose file has none, in order. Throws
-/// StartupError.
+/// Imports Kalibr's camchain and imu files, ROS camera_info, EuRoC's sensor.yaml, files of VINS,
+/// ORB-SLAM3 and Basalt, or a rig file. `T_BC`: poses of the cameras whose files have none, in
+/// their order. Throws StartupError with the cause.
 ImportedRig importRig(const std::vector<std::filesystem::path>& files,
                       const std::vector<RigidTransform>& T_BC = {});
 

@@ -1,4 +1,4 @@
-// Reads the data for a calibration: a drive in front of a board, or a folder of pictures.
+// Reads the data of a calibration: a drive in front of a board, or a folder of pictures.
 #pragma once
 
 #include <filesystem>
@@ -30,7 +30,8 @@ struct ReadOptions {
   std::size_t every = 1;  ///< uses each N-th image
 };
 
-/// Throws StartupError(kUnavailable) with the fix: nothing to read, or no board in any image.
+/// Throws StartupError(kUnavailable) with the fix if there are no images, or no image shows a
+/// board.
 CalibrationDrive readDrive(const Board& board, const ReadOptions& options,
                            const std::function<void(std::size_t, std::size_t)>& progress);
 

@@ -19,7 +19,7 @@ constexpr int kImageWidth = 720, kChartWidth = 760, kMargin = 70, kTop = 50;
 const Colour kSmall(190, 160, 60), kLarge(40, 60, 220);
 const Colour kFirst(200, 120, 30), kSecond(40, 150, 60), kThird(50, 60, 210);
 
-/// Dots whose redness grows with the residual, and the mean of each cell as an arrow.
+/// Draws residuals as dots that are redder if larger, and the mean of each cell as an arrow.
 void drawImage(cv::Mat& picture, const cv::Rect& area, const CameraCalibration& camera,
                const std::vector<CornerResidual>& residuals, double sigma) {
   const double scale = static_cast<double>(area.width) / camera.width;
@@ -31,7 +31,7 @@ void drawImage(cv::Mat& picture, const cv::Rect& area, const CameraCalibration& 
     cv::circle(picture, at, 1, tools::mixed(kSmall, kLarge, share), cv::FILLED, cv::LINE_AA);
   }
   const auto cells = cellsOf(camera, residuals);
-  constexpr double kEnlarged = 200.0;  // pixels of the picture for a residual of 1 px
+  constexpr double kEnlarged = 200.0;  // pixels of the picture per pixel of residual
   for (std::size_t i = 0; i < cells.size(); ++i) {
     if (cells[i].corners == 0) continue;
     const auto column = static_cast<double>(i % kCellColumns);

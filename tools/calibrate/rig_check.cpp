@@ -18,9 +18,9 @@ namespace perdure::calibrate {
 namespace {
 
 constexpr double kDegrees = 180.0 / M_PI;
-constexpr std::size_t kFewest = 500;  // least innovations to judge a rig by
+constexpr std::size_t kFewest = 500;  // least number of innovations for a judgement
 
-/// Runs vio over the drive, in one thread.
+/// Runs vio over the drive in one thread.
 class Watched {
  public:
   Watched(const RigCheckOptions& options, const replay::Dataset& dataset)
@@ -69,7 +69,7 @@ class Watched {
   std::size_t samples_ = 0;
 };
 
-/// Accepted innovations as corner residuals over the image.
+/// Converts accepted innovations to corner residuals over the image.
 std::vector<CornerResidual> residualsOf(const std::vector<vio::Innovation>& innovations) {
   std::vector<CornerResidual> all;
   for (const auto& i : innovations) {
@@ -78,11 +78,11 @@ std::vector<CornerResidual> residualsOf(const std::vector<vio::Innovation>& inno
   return all;
 }
 
-/// RMS in px of the residual pattern that both halves of the drive share; 0 if not significant. One
-/// half alone proves nothing, because the residuals of a track are correlated.
+/// RMS in px of the residual pattern that both halves of the drive share; 0 if not significant. A
+/// pattern in one half may come from a single track, whose residuals are correlated.
 double patternOf(const CameraCalibration& camera, const std::vector<CornerResidual>& residuals) {
-  constexpr std::size_t kEnough = 20;  // least corners in a half
-  constexpr double kSure = 3.0;        // least standard deviations
+  constexpr std::size_t kEnough = 20;  // least number of corners in each half
+  constexpr double kSure = 3.0;        // least significance in standard deviations
   const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
   const auto before = cellsOf(camera, {residuals.begin(), middle});
   const auto after = cellsOf(camera, {middle, residuals.end()});
@@ -98,17 +98,17 @@ double patternOf(const CameraCalibration& camera, const std::vector<CornerResidu
   return mean > kSure * sigma ? std::sqrt(mean) : 0.0;
 }
 
-/// Limits for a camera's pose and time offset: good up to `good`, bad above `bad`.
+/// Limits of deviations of a camera's pose and time offset: good up to `good`, bad above `bad`.
 struct Bars {
   double good, bad;
 };
 constexpr Bars kTurned{0.4 / kDegrees, 1.0 / kDegrees}, kShifted_m{0.015, 0.04},
     kLater_s{2e-3, 8e-3};
 
-/// Judges how far vio moved a quantity, compared with the standard deviation of vio.
+/// Judges a quantity by vio's deviation from the rig, compared with vio's standard deviation.
 Judgement judgeMove(const char* what, double moved, double sigma, const Bars& bars,
                     const std::string& shown, const std::string& remedy) {
-  // A move is ignored if vio is not certain of it, or if the true value may be within the good
+  // Ignores a deviation if vio is uncertain of it, or if the true value may be within the good
   // range.
   const bool sure = moved > 3.0 * sigma && moved - sigma > bars.good;
   return judged(sure ? gradeOf(moved, bars.good, bars.bad) : Grade::kGood,
@@ -117,7 +117,7 @@ Judgement judgeMove(const char* what, double moved, double sigma, const Bars& ba
 
 constexpr char kNoRemedy[] = "correct nothing before the causes above are excluded";
 
-/// Judges the camera's pose and time offset; `sole`: nothing else explains their deviation.
+/// Judges the camera's pose and time offset. `sole`: no other cause explains a deviation.
 Judgements judgePlaceOf(const RigCheck& check, bool lens_fits, bool sole) {
   Judgements all;
   const char* again =
@@ -159,8 +159,8 @@ double againstOf(const RigCheck& check) {
 
 constexpr double kFewAgainst = 0.05, kManyAgainst = 0.2;
 
-/// Reports several deviations with one common cause as one, because their separate values are
-/// meaningless.
+/// Reports several deviations as one if they have one cause, because their values have no meaning
+/// then.
 void judgeAllAtOnce(const Judgements& place, const Judgement& gravity, Judgements& all) {
   const auto isOff = [](const Judgement& one) { return one.grade != Grade::kGood; };
   const auto off = std::ranges::count_if(place, isOff) + (isOff(gravity) ? 1 : 0);
@@ -221,7 +221,7 @@ RigCheck RigWatch::check(const ReasonCounts& of_vio) const {
 }
 
 bool isSurelyGood(const RigCheck& check) {
-  constexpr double kQuarter = 0.25;  // a bad value is then at least four deviations off
+  constexpr double kQuarter = 0.25;  // a bad value then deviates by four sigma at least
   const bool sure = check.believed && check.sigma.head<3>().norm() < kQuarter * kTurned.bad &&
                     check.sigma.segment<3>(3).norm() < kQuarter * kShifted_m.bad &&
                     check.sigma[6] < kQuarter * kLater_s.bad;
@@ -243,7 +243,7 @@ replay::Recording thinned(replay::Recording recording) {
   std::optional<TimePoint> last;
   double turned = 0.0;
   auto sample = recording.imu.begin();
-  std::optional<TimePoint> next;  // of the image after this one
+  std::optional<TimePoint> next;  // stamp of the next image
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const auto& frame = frames[i];
     for (; sample != recording.imu.end() && sample->time < frame.time; ++sample) {

@@ -1,4 +1,4 @@
-// Judges a rig file by a recording of any scene, by the innovations of vio.
+// Judges a rig file by the innovations of vio over a recording of any scene.
 #pragma once
 
 #include <filesystem>
@@ -21,7 +21,7 @@ struct RigCheckOptions {
   vio::Config vio = {};
 };
 
-/// Vio's estimate of the first camera's pose relative to the rig, and the quality of the run.
+/// Vio's estimate of the first camera's extrinsics, and the quality of vio's run.
 struct RigCheck {
   CameraCalibration camera;
   std::size_t cameras = 1;
@@ -39,17 +39,17 @@ struct RigCheck {
   double gyro_bias_change = 0.0, accel_bias_change = 0.0;  ///< changes in the second half
 };
 
-/// Whether everything is good and vio is certain: standard deviations are at most a quarter of
-/// the bad limits, so that a bad value would be detected.
+/// Whether all judgements are good, and vio is so certain that it would have detected bad values:
+/// its standard deviations are at most a quarter of the limits.
 bool isSurelyGood(const RigCheck& check);
 
 class RigWatch {
  public:
-  /// Ignores data later than `seconds` after the first odometry.
+  /// Ignores data later than `seconds` after the first odometry message.
   RigWatch(const CameraCalibration& camera, double seconds);
   void onOdometry(const Odometry& odometry);
   void onInnovations(const std::vector<vio::Innovation>& innovations);
-  /// Stores the estimate after an image, because a reset of the filter discards it.
+  /// Stores vio's estimate after an image, because a reset of the filter discards it.
   void remember(const vio::Node& node);
   RigCheck check(const ReasonCounts& of_vio) const;
 
@@ -64,24 +64,25 @@ class RigWatch {
   std::vector<Eigen::Vector3d> gyro_, accel_;
 };
 
-/// The recording with fewer images: at most 110 ms or .05 rad of turning apart, if it has so many.
-/// Vio needs all images of drives shorter than 30 s; they are unchanged.
+/// Returns the recording with fewer images: consecutive images are at most 110 ms or 0.05 rad
+/// apart, if the recording allows it. Drives shorter than 30 s are unchanged, because vio needs all
+/// their images.
 replay::Recording thinned(replay::Recording recording);
 
-/// Reads the drive, from its start on, as grey images. Throws StartupError if it has no images or
-/// samples that can be read.
+/// Reads the drive's images in grey, from the start. Throws StartupError if there are no readable
+/// images or samples.
 RigCheck checkRig(replay::Dataset& drive, const RigCheckOptions& options);
 
-/// Median of the normalised innovations squared over its expected value (1 for a consistent
-/// filter).
+/// Median of the normalised innovations squared divided by its expected value; 1 for a consistent
+/// filter.
 double innovationRatio(const std::vector<vio::Innovation>& innovations);
-/// Judges the run of vio, and calls judgeBelief if the run was good enough.
+/// Judges vio's run and, if it was good enough, the estimates by judgeBelief.
 Judgements judgeRig(const RigCheck& check);
-/// Judges the estimates of lens, pose and IMU, or reports that the data are too few.
+/// Judges the estimates of lens, pose and IMU, or reports that there are too few data.
 Judgements judgeBelief(const RigCheck& check);
 
-/// Whether the two cameras contradict each other so much that a run with the first camera alone is
-/// useful. judgeSecond judges that run; it returns nothing if that run contradicts as well.
+/// Whether the two cameras contradict each other so much that vio should run with the first camera
+/// alone. judgeSecond judges that run; it returns nothing if that run contradicts the rig as well.
 bool isSecondSuspect(const RigCheck& check);
 Judgements judgeSecond(const RigCheck& both, const RigCheck& alone);
 

@@ -16,7 +16,7 @@ constexpr double kInterval = 0.04;  ///< s, interval of the motion's control poi
 
 Eigen::Vector3d normal3(sim::Dice& dice) { return {dice.normal(), dice.normal(), dice.normal()}; }
 
-/// Makes a lens and its pose differ from the data sheet.
+/// Changes a lens and its pose, so that they differ from the data sheet.
 void perturb(CameraCalibration& camera, sim::Dice& dice) {
   const double focal = 1.0 + 0.03 * dice.normal();
   camera.fx *= focal;
@@ -75,7 +75,7 @@ struct Wander3 {
   Eigen::Vector3d at(double t) const { return {x.at(t), y.at(t), z.at(t)}; }
 };
 
-/// Moves in front of the board; after a third of the time, it also shakes and rotates.
+/// The camera moves in front of the board; after a third of the time it also shakes and rotates.
 sim::Trajectory handMotion(const SimulatedCalibration& simulated, sim::Dice& dice) {
   const SimulatedOptions& options = simulated.options;
   const CameraCalibration& camera = simulated.truth();
@@ -95,7 +95,7 @@ sim::Trajectory handMotion(const SimulatedCalibration& simulated, sim::Dice& dic
     const Eigen::Vector3d p_TC(middle.x() + 1.0 * distance * p.x(),
                                middle.y() + 0.8 * distance * p.y(),
                                -distance * (1.05 + 0.35 * p.z()));
-    // The camera first looks at the middle of the board. x right, y down, z forward.
+    // The camera first faces the middle of the board: x right, y down, z forward.
     const Eigen::Vector3d z = (Eigen::Vector3d(middle.x(), middle.y(), 0.0) - p_TC).normalized();
     Eigen::Matrix3d R_TC;
     R_TC.col(0) = Eigen::Vector3d::UnitY().cross(z).normalized();

@@ -1,4 +1,5 @@
-// A calibration with exact truth: a board on a wall, and a hand with camera and IMU.
+// Simulates a calibration with exact truth: a hand moves a camera and an IMU before a board on a
+// wall.
 #pragma once
 
 #include <cstdint>
@@ -23,34 +24,35 @@ struct SimulatedOptions {
   bool shake = true;  ///< false: slow motion only, for intrinsics alone
 };
 
-/// The scene's rig holds the ground truth and, as `calibration`, the values of a data sheet. These
-/// are off by a few per cent, degrees and centimetres, and have no time offset.
+/// The scene's rig is the ground truth; `calibration` has the values of a data sheet. These are
+/// wrong by a few per cent, degrees and centimetres, and have no time offset.
 struct SimulatedCalibration {
   SimulatedOptions options;
   sim::Scene scene;
   RigidTransform T_WT;  ///< pose of the board
 
   const CameraCalibration& truth() const { return scene.rig.true_calibration.cameras[0]; }
-  /// Stamps of the images; an image shows the body at its stamp plus the time offset.
+  /// Stamps of the images; an image is exposed at its stamp plus the time offset.
   std::vector<TimePoint> stamps() const;
   RigidTransform T_CT(double t_s) const;
 };
 
 SimulatedCalibration simulateCalibration(const SimulatedOptions& options);
 
-/// Views of a detector with noise of `sigma_px`; a chessboard is found only as a whole.
+/// Simulates detected corners with noise of `sigma_px`; a chessboard is only detected as a whole.
 std::vector<View> simulateViews(const SimulatedCalibration& simulated, double sigma_px);
 std::vector<ImuSample> simulateSamples(const SimulatedCalibration& simulated);
 
-/// Renders one image in linear light.
+/// Renders the image at `t_s` in linear light.
 void drawBoard(const SimulatedCalibration& simulated, const tools::Lens& lens, double t_s,
                tools::Workers& workers, tools::Picture& picture);
 
-/// Views of the detectors in the rendered images, which have the sensor's noise.
+/// Renders images with the sensor's noise, and returns the views that the detectors find in them.
 std::vector<View> drawnViews(const SimulatedCalibration& simulated,
                              const std::function<void(std::size_t, std::size_t)>& progress = {});
 
-/// Writes the layout of EuRoC, with rig_truth.yaml and board.txt beside it. Throws StartupError.
+/// Writes a drive in the layout of EuRoC, rig_truth.yaml and board.txt. Throws StartupError if the
+/// disk reports an error.
 void writeSimulated(const SimulatedCalibration& simulated, const std::filesystem::path& folder,
                     const std::function<void(std::size_t, std::size_t)>& progress);
 

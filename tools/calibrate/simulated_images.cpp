@@ -1,4 +1,4 @@
-// Rendering part of simulated.h.
+// Renders the images of simulated.h.
 #include <array>
 #include <cmath>
 #include <opencv2/core/mat.hpp>
@@ -28,7 +28,7 @@ class Painter {
   explicit Painter(const Board& board)
       : board_(board), from_(board.printFrom()), to_(board.printTo()) {}
 
-  /// Surface that a ray hits: 0 black, 1 white, 2 the wall.
+  /// Surface at which a ray ends: 0 black, 1 white, 2 the wall.
   int ink(const Eye& eye, const Eigen::Vector3f& ray, Eigen::Vector2d& at) const {
     const Eigen::Vector3f d = eye.R_TC * ray;
     if (d.z() < 1e-3F) return 2;
@@ -50,7 +50,7 @@ class Painter {
   Eigen::Vector2d from_, to_;
 };
 
-/// Sample positions within a pixel, ordered so that the exposure times are spread over it.
+/// Sample positions within a pixel, ordered so that their exposure times are distributed evenly.
 constexpr std::array<std::size_t, kSamples> kOrder = {0, 10, 5, 15, 2, 8, 7, 13,
                                                       1, 11, 4, 14, 3, 9, 6, 12};
 

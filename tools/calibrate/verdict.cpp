@@ -43,7 +43,7 @@ Judgement coverageOf(const std::vector<Cell>& cells) {
                             fmt::join(missing, ", ")));
 }
 
-/// Judges how many views lean the board by at least 15° about each axis of the image.
+/// Judges the number of views in which the board leans by 15° or more about each image axis.
 Judgement judgeTilt(const std::vector<RigidTransform>& poses) {
   constexpr double kLean = 15.0 / kDegrees;
   std::array<std::size_t, 2> leaning{};
@@ -122,7 +122,7 @@ void judgeMotion(const CameraImu& place, Judgements& all) {
                              place.accel_rms_B[0], place.accel_rms_B[1], place.accel_rms_B[2])});
 }
 
-/// Judges the estimated standard deviations against the required accuracy: 0.1°, 3 mm, 0.3 ms.
+/// Judges the estimated standard deviations by the required accuracy: 0.1°, 3 mm, 0.3 ms.
 void judgeCertainty(const CameraImu& place, Judgements& all) {
   const auto worst = [&](int at) {
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(

@@ -1,4 +1,4 @@
-// Judgements of a calibration in words: the grade of each part, and the fix.
+// Judges a calibration in words: a grade of each part, and the fix.
 #pragma once
 
 #include <string>
@@ -17,9 +17,9 @@ struct Judgement {
 };
 using Judgements = std::vector<Judgement>;
 
-/// Good up to `good`, doubtful up to `bad`.
+/// Returns the grade of a value: good up to `good`, doubtful up to `bad`, else bad.
 Grade gradeOf(double value, double good, double bad);
-/// Appends the remedy to the text unless the grade is good.
+/// Makes a judgement; appends the remedy to the text unless the grade is good.
 Judgement judged(Grade grade, std::string text, const std::string& remedy);
 
 Grade worstOf(const Judgements& judgements);
@@ -36,7 +36,7 @@ std::vector<Cell> cellsOf(const CameraCalibration& camera,
                           const std::vector<CornerResidual>& residuals);
 
 Judgements judgeLens(const Intrinsics& lens, const CameraViews& seen);
-/// Judges which part of the image the board covered; `residuals` of all used views.
+/// Judges which part of the image the board covered. `residuals`: those of all used views.
 Judgement judgeCoverage(const CameraCalibration& camera,
                         const std::vector<CornerResidual>& residuals);
 Judgements judgePlace(const CameraImu& place, const CameraCalibration& prior);

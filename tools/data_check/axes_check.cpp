@@ -42,7 +42,8 @@ std::vector<SignedAxes> mirroredAxes() {
   return all;
 }
 
-/// Share of the image rotation about axis i that `axes` do not explain.
+/// Share of the image rotation about axis i that the gyroscope, corrected by `axes`, does not
+/// explain.
 double leftAbout(const TurnPairs& pairs, const SignedAxes& axes, Eigen::Index i) {
   const auto at = static_cast<std::size_t>(i);
   return (pairs.reference.row(i) - axes.sign[at] * pairs.given.row(axes.from[at])).squaredNorm() /
@@ -58,13 +59,13 @@ std::string textOf(const SignedAxes& axes) {
   return text;
 }
 
-/// Image rotation that a change of axes does not explain.
+/// Shares of the image rotation that the gyroscope does not explain after a change of axes.
 struct Left {
   double of_changed;  ///< mean share over the axes that change
   double of_all;      ///< share of the whole rotation
 };
 
-/// Returns nothing if an axis that changes is not explained better than before.
+/// Returns nothing unless the change clearly improves every axis that it changes.
 std::optional<Left> leftBy(const TurnPairs& pairs, const SignedAxes& axes, double least_rad) {
   constexpr double kWrong = 0.4, kRight = 0.3, kClearly = 3.0;
   const double count = std::max<double>(1.0, static_cast<double>(pairs.count()));
@@ -106,7 +107,7 @@ replay::DataFindings judgeAxes(const std::vector<Turn>& turns,
     if (left && (!least || left->of_all < least->of_all)) least = left, best = axes;
   }
   if (!least) return {};
-  // An exchange of axes is unambiguous. A single changed sign may come from a trajectory around a
+  // An exchange of axes is certain. A single changed sign may also come from a trajectory around a
   // near object.
   const bool sure = best.exchanges() && leftBy(pairs, best, kMuch_px / camera.fx);
   return {{sure ? replay::DataFinding::Grade::kFatal : replay::DataFinding::Grade::kWarning,

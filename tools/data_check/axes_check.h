@@ -1,5 +1,5 @@
-// Checks whether axes of the gyroscope are exchanged or have the wrong sign as a mirror image,
-// which no T_BS can represent.
+// Checks whether the gyroscope's axes are mirrored: exchanged or negated, so that no T_BS can
+// describe them.
 #pragma once
 
 #include <vector>
@@ -9,8 +9,8 @@
 
 namespace perdure::tools {
 
-/// Code: gyro_axes. Each axis of the body is judged separately, so that an axis with little
-/// rotation counts too. Returns nothing if the rotation is too small.
+/// Code: gyro_axes. Judges each axis of the body separately, so that an axis with little rotation
+/// counts too. Returns nothing if the rotation is too small.
 replay::DataFindings judgeAxes(const std::vector<Turn>& turns,
                                const std::vector<ImuSample>& samples,
                                const CameraCalibration& camera);

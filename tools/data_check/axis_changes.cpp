@@ -43,7 +43,7 @@ AxisChanges axisChangesOf(const std::vector<Turn>& turns, const std::vector<ImuS
   return changes;
 }
 
-/// Correlation of each axis of the images (row) with each axis of the gyroscope (column).
+/// Correlation of each axis of the images (rows) with each axis of the gyroscope (columns).
 Matrix3d correlationOf(const AxisChanges& changes) {
   Matrix3d both = Matrix3d::Zero();
   Vector3d images = Vector3d::Constant(1e-18), gyro = images;
@@ -61,7 +61,7 @@ struct Axes {
   Vector3d sign = Vector3d::Ones();
 };
 
-/// The axes with the largest sum of absolute correlations.
+/// Returns the axes with the largest sum of absolute correlations.
 Axes bestAxes(const Matrix3d& correlation) {
   Axes best, tried;
   double most = -1e9;

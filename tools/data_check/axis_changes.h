@@ -6,17 +6,18 @@
 
 namespace perdure::tools {
 
-/// Rotation rate of each axis without its mean over half a second, in standard deviations. Where it
-/// is large, each axis can be distinguished from the others.
+/// Rotation rate of each axis in standard deviations, without its mean over half a second. Large
+/// values allow a distinction of the axes.
 std::vector<ImuSample> livelinessOfAxes(const std::vector<ImuSample>& samples);
 
-/// Whether each axis of the gyroscope clearly correlates with the same axis of the images. Then
+/// Whether each axis of the gyroscope clearly correlates with the same axis of the images. If so,
 /// judgeAxisChanges cannot find a fault.
 bool axesSurelyAgree(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,
                      const CameraCalibration& camera);
 
 /// Compares changes of the rotation rate between images; the camera's translation hardly affects
-/// them. Code: gyro_axes. Returns nothing for fewer than 60 changes or unclear correlations.
+/// these changes. Code: gyro_axes. Returns nothing for fewer than 60 changes or unclear
+/// correlations.
 replay::DataFindings judgeAxisChanges(const std::vector<Turn>& turns,
                                       const std::vector<ImuSample>& samples,
                                       const CameraCalibration& camera);

@@ -13,10 +13,11 @@ namespace {
 using replay::DataFinding;
 using replay::Recording;
 
-/// Step of the shifts; a rotation of a carried camera takes much longer.
+/// Step of the tested shifts; a rotation of a carried camera takes much longer.
 constexpr double kStep_s = 0.01;
 
-/// Integral of the rates on a grid. Turns between two images are small, so that rates add up.
+/// Integral of the rates on a grid. Rotations between two images are so small that rates can be
+/// summed.
 class TurnGrid {
  public:
   explicit TurnGrid(const std::vector<ImuSample>& samples) : start_(samples.front().time) {
@@ -53,7 +54,7 @@ class TurnGrid {
   std::vector<int> holes_;
 };
 
-/// A turn of the images, in B, over cells of the grid.
+/// A rotation of the images, in B, between two cells of the grid.
 struct CellTurn {
   std::int64_t from, to;
   Eigen::Vector3d of_images;
@@ -61,7 +62,7 @@ struct CellTurn {
 
 using CellTurns = std::vector<CellTurn>;
 
-/// Returns nothing if the turns are too few, or too small to be compared.
+/// Returns nothing if there are too few turns, or if they are too small for a comparison.
 CellTurns cellsOf(const std::vector<Turn>& turns, const TurnGrid& gyro,
                   const CameraCalibration& camera) {
   constexpr std::size_t kFewest = 24;
@@ -88,8 +89,8 @@ struct ClockLine {
   }
 };
 
-/// Share of the images' turning that the gyroscope does not explain, without the means; 1 if it
-/// covers less than half of them.
+/// Share of the images' rotation that the gyroscope does not explain, without the means. 1 if the
+/// gyroscope's samples cover less than half of the turns.
 double unexplainedAt(const CellTurns& turns, const TurnGrid& gyro, const ClockLine& line) {
   Eigen::Vector3d images = Eigen::Vector3d::Zero(), off = Eigen::Vector3d::Zero();
   double images_squared = 0.0, off_squared = 0.0;
@@ -108,7 +109,7 @@ double unexplainedAt(const CellTurns& turns, const TurnGrid& gyro, const ClockLi
   return std::min(1.0, (off_squared - off.squaredNorm() / n) / std::max(1e-18, all));
 }
 
-/// Largest unexplained share of a match, and how many times that of the second best is larger.
+/// A match explains all but a share kMostLeft; the second best one leaves kTimesLeft times as much.
 constexpr double kMostLeft = 0.3, kTimesLeft = 2.0;
 
 }  // namespace
@@ -140,7 +141,7 @@ std::optional<double> rateOfTurns(const std::vector<Turn>& turns,
                                   const std::vector<ImuSample>& samples,
                                   const CameraCalibration& camera) {
   constexpr double kMostRate = 0.25;
-  constexpr std::int64_t kMost = 400, kStep = 4;  // limits of the shift at both ends, in cells
+  constexpr std::int64_t kMost = 400, kStep = 4;  // in cells; limits of the shift at both ends
   if (samples.size() < 2) return std::nullopt;
   const TurnGrid gyro(samples);
   const CellTurns cells = cellsOf(turns, gyro, camera);
@@ -171,7 +172,7 @@ replay::DataFindings rateFinding(double rate, const CameraCalibration& camera) {
 
 namespace {
 
-/// A shift of over a second; one with a name is whole seconds, the rest is the camera's own delay.
+/// A shift of over a second, rounded to whole seconds if it has a known cause such as leap seconds.
 std::optional<double> longShift(const std::vector<Turn>& along, const Recording& recording) {
   constexpr double kLeast_s = 1.0;
   const CameraCalibration& camera = recording.calibration.cameras.front();

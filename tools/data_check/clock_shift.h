@@ -1,5 +1,5 @@
-// Finds the difference of two clocks of camera and IMU of any size, and of their rates: the turning
-// of images from the whole drive is compared with that of the gyroscope at every shift.
+// Estimates the offset (of any size) and the rate between the clocks of camera and IMU. It compares
+// the rotation of images from the whole drive with that of the gyroscope at every shift.
 #pragma once
 
 #include <optional>
@@ -9,27 +9,26 @@
 
 namespace perdure::tools {
 
-/// t_imu − t_image in s, if the gyroscope explains the turning of the images at this shift, and
-/// twice as well as at any other one. `turns`: rotations from all parts of the drive.
+/// Returns t_imu − t_image in s, if the gyroscope explains the rotation of the images at this
+/// shift, and twice as well as at any other shift. `turns`: rotations from all parts of the drive.
 std::optional<double> shiftOfTurns(const std::vector<Turn>& turns,
                                    const std::vector<ImuSample>& samples,
                                    const CameraCalibration& camera);
 
-/// By how much the clock of the IMU runs faster than that of the camera, as a share, if the
-/// gyroscope explains the turning of the images then, and twice as well as with any constant
-/// shift.
+/// Returns the share by which the IMU's clock runs faster than the camera's. Returns nothing unless
+/// the gyroscope then explains the images' rotation, and twice as well as at any constant shift.
 std::optional<double> rateOfTurns(const std::vector<Turn>& turns,
                                   const std::vector<ImuSample>& samples,
                                   const CameraCalibration& camera);
 
-/// Returns the finding with code clock_rate.
+/// Returns the finding with code clock_rate; `rate`: the result of rateOfTurns.
 replay::DataFindings rateFinding(double rate, const CameraCalibration& camera);
 
-/// Reads images from places all over the drive, and returns what to add to their stamps. Returns
+/// Reads images from all parts of the drive. Returns the time in s to add to the image stamps, or
 /// nothing if no shift of over a second is certain.
 std::optional<double> shiftOfClocks(const replay::Recording& recording);
 
-/// Reads images from places all over the drive. Codes: clock_shift, clock_rate.
+/// Reads images from all parts of the drive. Codes: clock_shift, clock_rate.
 replay::DataFindings checkClockLine(const replay::Recording& recording);
 
 /// Returns the finding with code clock_shift.

@@ -22,7 +22,7 @@ using Grade = replay::DataFinding::Grade;
 
 namespace {
 
-/// Runs a check; if OpenCV throws, a warning replaces its findings.
+/// Runs a check and adds its findings; if OpenCV throws, adds a warning instead.
 template <class Check>
 void add(const char* of, replay::DataFindings& findings, Check&& check) {
   replay::DataFindings more;
@@ -35,7 +35,8 @@ void add(const char* of, replay::DataFindings& findings, Check&& check) {
   findings.insert(findings.end(), more.begin(), more.end());
 }
 
-/// Whether wrong stamps explain the changed axes as well, for example with a swinging camera.
+/// Whether wrong image stamps explain a finding of changed axes as well, for example if the camera
+/// swings.
 bool offsetExplainsAxes(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,
                         CameraCalibration camera) {
   const auto later = offsetOfTurns(turns, samples, camera);

@@ -1,4 +1,4 @@
-// Checks of a recording that pipeline, demo and doctor run first.
+// Checks of a recording that pipeline, demo and doctor run before they process it.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -8,8 +8,8 @@
 
 namespace perdure::tools {
 
-/// Runs the checks of common/replay, and compares the rotation of images and IMU if both are used.
-/// Images are only read if `use.images` is set; this takes some tenths of a second.
+/// Runs the checks of common/replay. Compares the rotations of images and IMU if `use` contains
+/// both. Images are read only if `use.images` is set; this takes some tenths of a second.
 replay::DataFindings checkDrive(const replay::Recording& recording, const replay::DataUse& use);
 
 /// Checks whether given poses rotate and accelerate as the IMU measured. Compares them with the
@@ -20,7 +20,7 @@ replay::DataFindings checkPoses(const replay::Recording& recording, const replay
 /// A list of {grade, code, text}.
 nlohmann::ordered_json toJson(const replay::DataFindings& findings);
 
-/// Prints the recording's notes and the doubtful findings on standard error, one line each.
+/// Prints the recording's notes and doubtful findings on standard error, one per line.
 void printDoubts(const replay::Recording& recording, const replay::DataFindings& findings);
 
 }  // namespace perdure::tools

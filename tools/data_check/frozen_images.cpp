@@ -33,7 +33,7 @@ bool areSame(const FrameFile& a, const FrameFile& b) {
          std::ranges::equal(*first->data, *second->data);
 }
 
-/// The farthest image from `start` in the direction of `step` that is the same.
+/// The last image that equals image `start`, searched forwards if `later`, else backwards.
 std::size_t farthestSame(const Frames& frames, std::size_t start, bool later) {
   std::size_t same = 0, other = later ? frames.size() - start : start + 1;
   while (other - same > 1) {
@@ -51,7 +51,7 @@ struct Repeated {
 
 Repeated repeatedIn(const Frames& frames) {
   constexpr Duration kEach = std::chrono::milliseconds(250);
-  constexpr std::int64_t kPlaces = 400, kPlacesInFile = 60;  // images in a file are slow to reach
+  constexpr std::int64_t kPlaces = 400, kPlacesInFile = 60;  // images in a file are slow to read
   Repeated repeated;
   if (frames.size() < 2) return repeated;
   const Duration each =
@@ -73,7 +73,7 @@ Repeated repeatedIn(const Frames& frames) {
   return repeated;
 }
 
-/// Whether the images moved up to the repeated one, or the next one is far from it.
+/// Whether the images moved before the repeated one, or jump after it.
 bool jumps(const Recording& recording, const Frames& frames, const Repeated& still) {
   constexpr double kFlows_px = 0.5, kFarther = 3.0;
   const auto flow = [&](std::size_t i) { return flowOf(recording, *frames[i], *frames[i + 1]); };

@@ -22,13 +22,13 @@ Eigen::Matrix3d crossOf(const Eigen::Vector3d& v) {
 
 constexpr double kLeastScale = 1e-5;
 
-/// A rotation, the direction of translation, and the median error of the flow that they predict.
+/// A rotation, the direction of translation, and the median error of the predicted flow.
 struct Motion {
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero(), way = Eigen::Vector3d::UnitX();
   double error = 0.0;  ///< median, rad
 };
 
-/// Solves step = ray × rotation for all points.
+/// Solves step = ray × rotation by robust least squares over all points.
 Motion withoutWay(const std::vector<Flow>& flow) {
   Motion motion;
   double scale = 1.0;  // the first round is ordinary least squares
@@ -68,7 +68,7 @@ Off offOf(const Flow& one, const Motion& motion) {
   return {normal.dot(left) / length, -normal.cross(one.ray) / length, one.ray.cross(left) / length};
 }
 
-/// Gauss-Newton with robust weights, from `start`.
+/// Estimates rotation and translation from `start` by Gauss-Newton with robust weights.
 Motion withWay(const std::vector<Flow>& flow, const Motion& start) {
   Motion motion = start;
   motion.way.normalize();

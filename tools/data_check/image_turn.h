@@ -1,6 +1,6 @@
-// Estimates the rotation of a camera between two images independent of its translation. Translation
-// moves a point along its epipolar line, so that only the flow across the line depends on the
-// rotation.
+// Estimates the rotation of a camera between two images, independently of its translation.
+// Translation moves a point along its epipolar line, so the flow across this line depends on the
+// rotation only.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,7 +16,7 @@ struct Flow {
   Eigen::Vector3d ray, step;  ///< unit ray in C, and its change
 };
 
-/// An image with the pyramid for tracking; empty without an image.
+/// An image and its pyramid for tracking; empty if there is no image.
 struct FollowedImage {
   cv::Mat image;
   std::vector<cv::Mat> pyramid;
@@ -28,17 +28,18 @@ struct FollowedImage {
 
 /// Corners of an image, well distributed.
 std::vector<cv::Point2f> cornersOf(const FollowedImage& image);
-/// Where each point of the first image is in the second; nothing if it cannot be tracked.
+/// Returns the position in the second image of each point of the first, or nothing if tracking
+/// fails.
 std::vector<std::optional<cv::Point2f>> follow(const FollowedImage& first,
                                                const FollowedImage& second,
                                                const std::vector<cv::Point2f>& from);
 
-/// Flow of the corners that can be tracked; empty if they are too few.
+/// Flow of the corners that can be tracked; empty if there are too few of them.
 std::vector<Flow> flowBetween(const CameraModel& camera, const FollowedImage& first,
                               const FollowedImage& second);
 
-/// The small rotation of the camera, rad in C. Translation is only estimated if the flow shows one.
-/// If all points are far, the flow along the lines also depends on the rotation.
+/// The small rotation of the camera, rad in C. Translation is estimated only if it clearly improves
+/// the fit; otherwise the whole flow determines the rotation.
 Eigen::Vector3d rotationOf(const std::vector<Flow>& flow);
 
 }  // namespace perdure::tools

@@ -31,8 +31,8 @@ Frames firstCamera(const Recording& recording) {
   return frames;
 }
 
-/// Difference of each pair's rotation from the previous one; 0 without samples. A constant rotation
-/// contains no information about the time offset.
+/// Change of rotation from one image pair to the next, in rad; 0 without samples. A constant
+/// rotation contains no information about the time offset.
 std::vector<double> liveliness(const Frames& frames, const std::vector<ImuSample>& samples) {
   const TurnIntegral gyro(samples);
   std::vector<double> values(frames.empty() ? 0 : frames.size() - 1, 0.0);
@@ -44,8 +44,8 @@ std::vector<double> liveliness(const Frames& frames, const std::vector<ImuSample
   return values;
 }
 
-/// Runs of consecutive pairs with the largest changes. Consecutive pairs need each image decoded
-/// only once.
+/// Returns up to three runs of consecutive pairs with the largest changes. In a run each image is
+/// decoded only once.
 using Run = std::pair<std::size_t, std::size_t>;
 std::vector<Run> liveliestRuns(const std::vector<double>& values, std::size_t most) {
   constexpr std::size_t kRuns = 3;
@@ -64,7 +64,7 @@ std::vector<Run> liveliestRuns(const std::vector<double>& values, std::size_t mo
   return chosen;
 }
 
-/// The camera of images that are smaller by a factor.
+/// The calibration of images that are reduced by `factor`.
 CameraCalibration reduced(CameraCalibration camera, int factor) {
   const auto n = static_cast<double>(factor);
   camera.width /= static_cast<std::uint32_t>(factor);
@@ -96,7 +96,7 @@ std::vector<Turn> turnsOfRun(const Frames& frames, const CameraCalibration& cali
   return turns;
 }
 
-/// Files are read in parallel; frames inside a recording file are read one after another.
+/// Reads image files in parallel, but images inside a recording file one after another.
 std::vector<Turn> turnsOfRuns(const Frames& frames, const CameraCalibration& calibration,
                               const std::vector<Run>& chosen) {
   const bool files = !frames.front()->load;
@@ -113,7 +113,7 @@ std::vector<Turn> turnsOfRuns(const Frames& frames, const CameraCalibration& cal
   return turns;
 }
 
-/// Rotations of the images (reference) and of the gyroscope, shifted by `later`.
+/// Rotations of the images (reference) and of the gyroscope, whose times are shifted by `later_s`.
 TurnPairs pairsOf(const std::vector<Turn>& turns, const TurnIntegral& gyro, double later_s) {
   const Duration later = durationFromSeconds(later_s);
   std::vector<Eigen::Vector3d> images, said;
@@ -129,9 +129,9 @@ constexpr double kEnough_px = 2.0;    ///< least rotation between two images for
 constexpr double kExplained = 0.3;    ///< largest unexplained share of good data
 constexpr double kUnexplained = 0.7;  ///< least unexplained share of faulty data
 
-/// Whether rates are the image rotation in degrees. Either they are faster than any carried sensor,
-/// or they are proportional to the image rotation and about 57 times as large. Because T_BS may be
-/// wrong too, the ratio alone suffices if the images clearly rotate.
+/// Whether the rates are in degrees. They are, if they exceed those of any carried sensor, or are
+/// proportional to the image rotation and about 57 times as large. T_BS may be wrong too; if the
+/// images clearly rotate, the ratio alone suffices.
 bool isInDegrees(const TurnPairs& pairs, double pair_s, const CameraCalibration& camera) {
   constexpr double kClearly_px = 1.0, kCommon = 0.5, kFastest = 4.0;  // px; share; rad/s, mean
   if (pairs.turningOfGiven() > kFastest * pair_s) return true;
@@ -181,8 +181,8 @@ replay::DataFindings judgeScale(const TurnPairs& pairs, double pair_s,
   return {};
 }
 
-/// The time to add to the images' stamps. Returned only if it explains the rotation, and `clearly`
-/// times as well as `camera.time_offset_s` does.
+/// Returns the time offset in s that explains the rotation, and explains it `clearly` times as well
+/// as `camera.time_offset_s` does. Returns nothing if there is no such offset.
 std::optional<double> betterOffset(const std::vector<Turn>& turns, const TurnIntegral& gyro,
                                    const CameraCalibration& camera, double most_s, double clearly) {
   const Eigen::Matrix3d R_CB = camera.T_BC.R().transpose();
@@ -192,7 +192,7 @@ std::optional<double> betterOffset(const std::vector<Turn>& turns, const TurnInt
   };
   double best = std::min(kExplained, leftAt(camera.time_offset_s) / clearly);
   std::optional<double> offset;
-  bool inside = false;  // the optimum may be outside the search range
+  bool inside = false;  // whether the optimum is inside the search range
   const int steps = static_cast<int>(std::lround(100.0 * most_s));
   for (int step = -steps; step <= steps; ++step) {
     const double later = camera.time_offset_s + 0.01 * step;
@@ -205,7 +205,7 @@ std::optional<double> betterOffset(const std::vector<Turn>& turns, const TurnInt
   return inside ? offset : std::nullopt;
 }
 
-/// Judges rates that are too large or too small by some percent, if both sides agree otherwise.
+/// Judges rates that are some percent too large or too small but agree with the images otherwise.
 replay::DataFindings judgeFactor(const TurnPairs& pairs, const CameraCalibration& camera) {
   constexpr double kLeast = 0.04, kSurely = 3.0, kAgreed = 0.05;
   const Eigen::Matrix3Xd said = camera.T_BC.R().transpose() * pairs.given;
@@ -221,7 +221,7 @@ replay::DataFindings judgeFactor(const TurnPairs& pairs, const CameraCalibration
                        1.0 / shown, camera.name, pairs.count())}};
 }
 
-/// Judges the images' stamps, in s.
+/// Limits of the judgement of the images' stamps.
 constexpr double kLongestOffset_s = 1.0, kOffsetClearly = 3.0;
 
 replay::DataFindings judgePlace(const std::vector<Turn>& turns, const TurnIntegral& gyro,
@@ -229,7 +229,7 @@ replay::DataFindings judgePlace(const std::vector<Turn>& turns, const TurnIntegr
   const Eigen::Matrix3d R_BC = camera.T_BC.R(), R_CB = R_BC.transpose();
   const double given = pairs.unexplained(R_CB);
   const double inverse = pairs.unexplained(R_BC);
-  // If another rotation, such as a column permutation, explains clearly more, T_BS is not inverted.
+  // T_BS is not inverted if another rotation, such as a column permutation, explains clearly more.
   const double least = pairs.unexplained(pairs.bestRotation());
   constexpr double kNoise = 0.05;
   if (given > kUnexplained && inverse < std::min(kExplained, 2.0 * least + kNoise)) {
@@ -240,7 +240,7 @@ replay::DataFindings judgePlace(const std::vector<Turn>& turns, const TurnIntegr
                  "inverse of Kalibr's T_cam_imu)",
                  camera.name, 100.0 * (1.0 - inverse), 100.0 * std::max(0.0, 1.0 - given))}};
   }
-  // A smaller unexplained share means a short offset, which vio estimates.
+  // A smaller unexplained share means a small time offset, which vio estimates.
   constexpr double kShown = 0.02;
   if (given < kShown) return {};
   if (const auto later = betterOffset(turns, gyro, camera, kLongestOffset_s, kOffsetClearly)) {
@@ -333,7 +333,7 @@ replay::DataFindings judgePoseTurns(const std::vector<Turn>& turns,
                                     const std::vector<ImuSample>& samples,
                                     const CameraCalibration& camera) {
   constexpr double kLongest_s = 2.0, kLeast_s = 0.1, kClearly = 3.0;
-  CameraCalibration at_images = camera;  // poses have the times of the images
+  CameraCalibration at_images = camera;  // poses have image stamps
   at_images.time_offset_s = 0.0;
   const TurnIntegral poses(samples);
   const TurnPairs pairs = pairsOf(turns, poses, 0.0);

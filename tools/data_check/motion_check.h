@@ -1,7 +1,7 @@
-// Checks whether images rotate as the gyroscope measures: its unit, the camera's rotation on the
-// IMU (inverted T_BS) and the time offset. Image rotations are robust least-squares fits to the
-// flow of corners; the effect of translation is an outlier, or the same in all pairs. Both sides
-// are compared without their means, so that a bias has no effect.
+// Checks whether images rotate as the gyroscope measures: its unit, the camera's rotation relative
+// to the IMU (inverted T_BS) and the time offset. Image rotations are robust fits to the flow of
+// corners; translation causes outliers, or the same error in all pairs. Both lists of rotations are
+// compared without their means, so that a bias has no effect.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,15 +19,15 @@ struct Turn {
   Eigen::Vector3d of_images = Eigen::Vector3d::Zero();  ///< rad, in C
 };
 
-/// Rotations of up to `most` consecutive image pairs of cam0, chosen where the rates of `samples`
-/// change most. Pairs with fewer than 15 tracked corners are omitted.
+/// Rotations of up to `most` consecutive image pairs of cam0, chosen at the largest changes of the
+/// rates of `samples`. Pairs with fewer than 15 tracked corners are omitted.
 std::vector<Turn> turnsOfImages(const replay::Recording& recording,
                                 const std::vector<ImuSample>& samples, std::size_t most = 60);
 
-/// Rotations of image pairs of cam0 from places all over the drive, whatever any sensor measured.
+/// Rotations of image pairs of cam0 at places all over the drive, independent of the IMU.
 std::vector<Turn> turnsAlong(const replay::Recording& recording);
 
-/// Whether images or gyroscope turn enough for a judgement and do not fit.
+/// Whether the images or the gyroscope rotate enough for a judgement and contradict each other.
 bool disagree(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,
               const CameraCalibration& camera);
 
@@ -37,8 +37,8 @@ replay::DataFindings judgeTurns(const std::vector<Turn>& turns,
                                 const std::vector<ImuSample>& samples,
                                 const CameraCalibration& camera);
 
-/// The camera's time offset in s with which the gyroscope explains the image rotation at least
-/// three times as well as with the given one. Returns nothing if there is no such offset.
+/// Returns the time offset in s with which the gyroscope explains the image rotation at least three
+/// times as well as with the camera's own. Returns nothing if there is no such offset.
 std::optional<double> offsetOfTurns(const std::vector<Turn>& turns,
                                     const std::vector<ImuSample>& samples,
                                     const CameraCalibration& camera);
@@ -46,7 +46,8 @@ std::optional<double> offsetOfTurns(const std::vector<Turn>& turns,
 /// Rotation rates between consecutive poses, as a gyroscope on B would measure them.
 std::vector<ImuSample> turnsOfPoses(const std::vector<replay::StampedPose>& poses);
 
-/// Code: poses_time_offset. `samples`: the result of turnsOfPoses.
+/// Compares the poses' rotations with the images'. Code: poses_time_offset. `samples`: from
+/// turnsOfPoses.
 replay::DataFindings judgePoseTurns(const std::vector<Turn>& turns,
                                     const std::vector<ImuSample>& samples,
                                     const CameraCalibration& camera);

@@ -17,7 +17,7 @@ using replay::DataFinding;
 using replay::Recording;
 using Grade = DataFinding::Grade;
 
-constexpr double kMostLost = 0.1;  // share; recordings always lose some
+constexpr double kMostLost = 0.1;  // share of files; recordings always lose some
 
 void checkFiles(const Recording& recording, std::size_t camera, replay::DataFindings& findings) {
   std::size_t all = 0, missing = 0;
@@ -38,7 +38,8 @@ void checkFiles(const Recording& recording, std::size_t camera, replay::DataFind
            100.0 * static_cast<double>(missing) / static_cast<double>(all), first)});
 }
 
-/// Typical time in s from a stamp of cam0 to that of cam1, for unpaired frames.
+/// Median time in s from a stamp of cam0 to the nearest of cam1, for the text about unpaired
+/// frames.
 double apartOf(const std::vector<TimePoint>& first, const std::vector<TimePoint>& second) {
   const bool overlap = second.front() <= first.back() && first.front() <= second.back();
   if (!overlap) return toSeconds(second.front() - first.front());

@@ -107,7 +107,7 @@ bool writeLoaded(const Recording::FrameFile& file, const fs::path& stem, std::st
   return true;
 }
 
-/// Writes the image under its stamp; returns nothing if it cannot be read.
+/// Writes the image and names it by its stamp; returns nothing if it cannot be read.
 std::optional<std::string> writeImage(const Recording::FrameFile& file, const fs::path& folder) {
   const std::string stem = std::to_string(toNanoseconds(file.time));
   std::string extension;
@@ -164,7 +164,8 @@ void writeSamples(const Recording& recording, const fs::path& mav0) {
   if (!recording.speed.empty()) write(mav0 / "speed0" / "data.csv", speed);
 }
 
-/// Refuses a target inside the source. Resolves links, because a fixed drive links its images.
+/// Refuses a target folder inside the source. Resolves links, because a fixed drive links its
+/// images.
 void refuseSource(const Recording& recording, const fs::path& copy) {
   std::set<fs::path> folders;
   for (const auto& frame : recording.frames) {

@@ -59,8 +59,8 @@ Table tableOf(const fs::path& file) {
   return table;
 }
 
-/// `text`, with or without an exponent, times 10^places as an integer number of nanoseconds. Empty
-/// if it is not a decimal number, or too large.
+/// Returns `text` (a decimal number, also with an exponent) times 10^places as an integer number of
+/// nanoseconds. Empty if it is no decimal number, or too large.
 std::optional<std::string> shifted(std::string_view text, std::size_t places) {
   text = replay::trim(text);
   std::int64_t exponent = 0;
@@ -101,8 +101,8 @@ std::size_t placesShort(const Table& table) {
   return middle >= 1e14 ? 3 : middle >= 1e11 ? 6 : 9;
 }
 
-/// For integer stamps: decimal places from the unit of IMU and camera to nanoseconds, detected from
-/// their rates.
+/// Integer stamps in another unit: decimal places to nanoseconds, detected from the rates of IMU
+/// and camera.
 struct WholeUnit {
   std::size_t places = 0;
   double least = 0.0, most = 0.0;  ///< range of stamps in that unit, with a margin
@@ -129,7 +129,7 @@ WholeUnit wholeUnitOf(const fs::path& mav0) {
           static_cast<double>(toNanoseconds(*most) + length)};
 }
 
-/// Tested for each table, because ground truth and speed may already be in nanoseconds.
+/// Tested for each table, because ground truth and speed may be in nanoseconds already.
 bool isOf(const WholeUnit& unit, const Table& table) {
   if (unit.places == 0 || table.rows.empty()) return false;
   const auto stamp = replay::parseNumber(table.rows[table.rows.size() / 2][0]);
@@ -169,7 +169,8 @@ Column columnNamed(const std::string& name) {
   return force ? Column::kForce : Column::kOther;
 }
 
-/// The axis letter that is a separate word of the name, or its last letter before a unit; else 0.
+/// Returns the axis letter if it is a separate word of the name or the last letter before a unit;
+/// else 0.
 char axisOf(const std::string& name) {
   const std::string bare = name.substr(0, name.find_first_of("[("));
   const auto letter = [&](std::size_t i) {
@@ -207,7 +208,7 @@ std::optional<Six> byHead(const Table& table, std::size_t columns) {
   return turns;
 }
 
-/// The median length of `count` columns from `first` on, and the deviation from it.
+/// Median length and its deviation, of the vectors in `count` columns from `first` on.
 struct Length {
   double median = 0, spread = 0;
 };
@@ -228,8 +229,8 @@ Length lengthOf(const Table& table, std::size_t first, std::size_t count) {
   return {median, std::max(median - lengths.front(), lengths.back() - median)};
 }
 
-/// For a table without a header. Four columns of length 1 in every row are a quaternion, and
-/// exactly one of the two other triples measures gravity.
+/// Finds the columns of a table without a header. Four columns of length 1 in every row are a
+/// quaternion, and exactly one of the other two triples measures gravity.
 std::optional<Six> byQuaternion(const Table& table, std::size_t columns) {
   if (columns != 11) return std::nullopt;
   std::optional<std::size_t> at;
@@ -291,7 +292,7 @@ void writeTable(const Table& table, const fs::path& to) {
   writeChecked(to, text);
 }
 
-/// Links everything in `from` except the names in `without`.
+/// Links all entries of `from` into `to`, except the one named `without`.
 void linkAll(const fs::path& from, const fs::path& to, const std::string& without) {
   fs::create_directories(to);
   for (const auto& entry : fs::directory_iterator(from)) {

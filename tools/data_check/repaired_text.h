@@ -1,5 +1,5 @@
-// Fixes of `perdure doctor --fix` that are needed before a drive can be read. They concern tables
-// in the layout of EuRoC with stamps that are not nanoseconds, or with an orientation beside the
+// Fixes of `perdure doctor --fix` that are needed before a drive can be read. They repair tables in
+// the layout of EuRoC whose stamps are not nanoseconds, or that have an orientation beside the
 // samples.
 #pragma once
 

@@ -60,8 +60,8 @@ void checkIntrinsics(const CameraCalibration& camera, DataFindings& findings) {
                       : "whether they are of images of another size, or of images that were cut")});
 }
 
-/// Share of the pixels that no direction in front of the camera reaches, because the distorted
-/// radius decreases again. The pixels are on a grid.
+/// Share of the pixels, sampled on a grid, that no direction in front of the camera reaches,
+/// because the distorted radius decreases again.
 double shareOfFolds(const CameraCalibration& calibration) {
   constexpr int kGrid = 24;
   const CameraModel camera(calibration);
@@ -76,7 +76,7 @@ double shareOfFolds(const CameraCalibration& calibration) {
 }
 
 void checkLens(const CameraCalibration& camera, DataFindings& findings) {
-  // A fit often folds outside the area that the corners of its board covered.
+  // A fitted lens model often folds outside the area that the board's corners covered.
   constexpr double kFew = 0.05, kMost = 0.5;
   if (camera.width == 0 || camera.height == 0) return;
   const double folds = shareOfFolds(camera);
@@ -110,7 +110,7 @@ void checkOffset(const CameraCalibration& camera, DataFindings& findings) {
 }
 
 void checkNoise(const ImuCalibration& imu, DataFindings& findings) {
-  constexpr double kGyro = 5e-3, kAccel = 0.3;  // the cheapest units have a fifth of these
+  constexpr double kGyro = 5e-3, kAccel = 0.3;  // five times those of the cheapest units
   constexpr double kRadianOfDegree = M_PI / 180.0;
   for (const auto& [value, name] :
        {std::pair(imu.gyro_noise, "gyroscope"), std::pair(imu.accel_noise, "accelerometer")}) {

@@ -1,4 +1,4 @@
-// Checks the numbers of a rig for values that are impossible for any recording.
+// Finds numbers of a rig that are impossible for any recording.
 #pragma once
 
 #include "common/replay/data_check.h"

@@ -9,7 +9,7 @@
 namespace perdure::tools {
 namespace {
 
-constexpr double kHole_s = 0.35;  // s; OXTS has 0.2 if one sample is missing
+constexpr double kHole_s = 0.35;  // OXTS has 0.2 s if one sample is missing
 
 Eigen::Matrix3Xd withoutMean(const std::vector<Eigen::Vector3d>& turns) {
   Eigen::Matrix3Xd columns(3, static_cast<Eigen::Index>(turns.size()));

@@ -1,4 +1,4 @@
-// Integrates the rates of a gyroscope, and compares two lists of rotations.
+// Integrates the rates of a gyroscope and compares two lists of rotations.
 #pragma once
 
 #include <Eigen/Core>
@@ -35,13 +35,13 @@ struct TurnPairs {
   TurnPairs(const std::vector<Eigen::Vector3d>& reference,
             const std::vector<Eigen::Vector3d>& given);
   std::size_t count() const { return static_cast<std::size_t>(reference.cols()); }
-  /// RMS in rad: of the reference, and of the given rotations.
+  /// RMS of the reference rotations in rad.
   double turning() const;
   double turningOfGiven() const;
   /// Share of the reference that the given rotations, rotated by R, do not explain; 0: all is
   /// explained.
   double unexplained(const Eigen::Matrix3d& R) const;
-  /// 0: equal; 1: uncorrelated; 2: opposite.
+  /// Disagreement of the two lists: 0 if equal, 1 if uncorrelated, 2 if opposite.
   double disagreement() const { return disagreementBy(Eigen::Matrix3d::Identity()); }
   /// Disagreement of the given rotations after rotation by R.
   double disagreementBy(const Eigen::Matrix3d& R) const;

@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Shows the rendering progress: one updated line on a terminal, otherwise one line for each tenth.
+/// Shows the rendering progress: one updated line on a terminal, else one line for each tenth.
 void showRendering(const SimulateProgress& progress) {
   const bool terminal = isatty(STDERR_FILENO) == 1;
   const std::size_t tenth = std::max<std::size_t>(1, progress.frames / 10);
@@ -33,7 +33,7 @@ void showRendering(const SimulateProgress& progress) {
             << std::flush;
 }
 
-/// Folder for the rendered drives of an installed Perdure.
+/// Folder for the rendered drives if Perdure is installed.
 fs::path userCache() {
   const char* cache = std::getenv("XDG_CACHE_HOME");
   const char* home = std::getenv("HOME");
@@ -41,7 +41,7 @@ fs::path userCache() {
   return (home != nullptr ? fs::path(home) / ".cache" : fs::temp_directory_path()) / "perdure";
 }
 
-/// Sets the missing options: folders, the demo's own drive and its network.
+/// Sets the missing options: folders, the demo's rendered drive and its network.
 void complete(DemoOptions& options, const std::atomic<bool>& interrupted) {
   if (options.programs.empty()) options.programs = programFolder().string();
   const fs::path installed = programFolder().parent_path() / "share" / "perdure";

@@ -30,7 +30,7 @@ using namespace std::chrono_literals;
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 
-/// Locks a DDS domain that no other demo of this host uses, until this process ends.
+/// Reserves a DDS domain that no other demo on this host uses, until this process ends.
 void leaseDomain() {
   const char* given = std::getenv("PERDURE_DOMAIN");
   if (given != nullptr && *given != '\0') return;
@@ -49,12 +49,12 @@ void leaseDomain() {
                      "PERDURE_DOMAIN to a free one");
 }
 
-/// The bus options of the services, from bus.yaml beside their configuration.
+/// The bus options of the services, from the bus.yaml beside their configuration.
 bus::Options busOptions(const fs::path& root) {
   std::vector<config::Problem> problems;
   bus::Options options = bus::commonOptions(root / "config", problems);
   config::refuse(problems);
-  options.shared_memory_mb = 0;  // the demo reads no images
+  options.shared_memory_mb = 0;  // the demo reads no images from the bus
   options.identity.clear();
   return options;
 }
@@ -167,7 +167,7 @@ bool Demo::over() {
   if (options_.seconds > 0 && reporter_->secondsOfDrive() >= options_.seconds) return true;
   const Health* capture = reporter_->healthOf("capture");
   if (capture == nullptr || capture->message != kEndOfDrive) return false;
-  // Detections may still arrive. The demo waits 1 s if all frames have objects, otherwise 5 s.
+  // Detections may still arrive: waits 1 s if all frames have objects, otherwise 5 s.
   const std::int64_t quiet = monotonicNs() - reporter_->lastMessageNs();
   return quiet > (reporter_->drained() ? kSecond : 5 * kSecond);
 }
@@ -208,7 +208,7 @@ void Demo::endSwappedIn() const {
   }
 }
 
-/// Sets the ground truth for the pictures. An unreadable one is reported by the scoring.
+/// Sets the ground truth of the pictures. If it cannot be read, the scoring reports the error.
 void Demo::setTruthOfPictures() {
   const auto data = dataOptions();
   auto truth = truth_ ? pictureTruthOfLabels(truth_->labels, truth_->calibration, outputs_->poses())

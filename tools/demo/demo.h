@@ -1,4 +1,4 @@
-// One run of the demo, from starting the services to the report.
+// One run of the demo, from the start of the services to the report.
 #pragma once
 
 #include <atomic>
@@ -16,19 +16,20 @@ namespace perdure::tools {
 
 class Demo {
  public:
-  /// Checks data, model and configuration, then starts everything. Throws StartupError.
+  /// Checks data, model and configuration, then starts all services. Throws StartupError.
   Demo(const DemoOptions& options, const std::atomic<bool>& interrupted);
   ~Demo() { endSwappedIn(); }
   Demo(const Demo&) = delete;
   Demo& operator=(const Demo&) = delete;
 
-  /// Runs until the drive has ended and all data are processed, --seconds are over, or the demo is
-  /// interrupted. Then it ends the services in order (unless --keep is given) and writes the
-  /// outputs. Throws StartupError if a service cannot run.
+  /// Runs until all data of the drive are processed, --seconds have passed, or the demo is
+  /// interrupted. Then ends the services in order (unless --keep is given) and writes the outputs.
+  /// Throws StartupError if a service cannot run.
   void run();
-  /// Keeps everything running after the drive if --keep is given, until interrupted; then ends it.
+  /// If --keep is given, keeps all services running after the drive until interrupted; then ends
+  /// them.
   void keep();
-  /// Doubts about the run, for the end of the last line.
+  /// Doubts about the run, which the end of the last line shows.
   const std::string& endOfLine() const { return end_of_line_; }
 
  private:

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// File that marks a run folder of the demo, which may be emptied.
+// A folder with this file is a run folder of the demo, which may be emptied.
 constexpr char kMark[] = "capture.log";
 
 [[noreturn]] void cannotUse(const fs::path& folder, const std::string& why) {
@@ -26,7 +26,7 @@ constexpr char kMark[] = "capture.log";
                      folder.string(), why);
 }
 
-/// "--set" arguments that give capture the pace of --rate.
+/// The "--set" arguments that make capture replay at the pace of --rate.
 std::vector<std::string> paceOf(const std::string& rate) {
   if (rate == "max") return {"pace.mode=follow"};
   double value = 0.0;
@@ -52,7 +52,7 @@ std::vector<std::string> settingsOf(const std::string& service, const DemoOption
   if (service == "map_store") return {"store.path=" + (folders.state / "map.sqlite").string()};
   if (service == "vio") {
     std::vector<std::string> settings = {"state.directory=" + folders.state.string()};
-    // A simulated drive with wheel speed is from a car, which does not slip sideways or jump.
+    // A simulated drive with wheel speed is that of a car, which does not slip sideways or jump.
     const bool car = isSimulated(options.data) &&
                      fs::exists(fs::path(options.data) / "mav0" / "speed0" / "data.csv");
     if (car) settings.push_back("speed.planar=true");

@@ -31,10 +31,10 @@ struct DemoOptions {
   bool keep = false;  ///< keeps everything running after the drive, until interrupted
 };
 
-/// The services in the order of their shutdown, from the source to the store.
+/// The services in the order in which they are ended, from the source to the store.
 inline constexpr const char* kServices[] = {"capture", "inference", "vio", "semantic_filter",
                                             "map_store"};
-/// A service that only displays results; omitted if its program is not installed.
+/// The service that only displays results; omitted if its program is not installed.
 inline constexpr const char kGateway[] = "gateway";
 
 struct ServicePlan {
@@ -48,20 +48,22 @@ struct DemoFolders {
   std::unique_ptr<FolderLock> lock;  ///< of OUT
 };
 
-/// Creates OUT and empties OUT/run, which belongs to this command. Throws StartupError.
+/// Creates OUT and empties OUT/run, which belongs to this command. Throws StartupError if this
+/// fails.
 DemoFolders prepareFolders(const DemoOptions& options);
 
-/// Shape points for each class, from the filter's configuration in ROOT. Throws StartupError.
+/// Shape points of each class, from the filter's configuration in ROOT. Throws StartupError if it
+/// is invalid.
 std::map<std::string, std::vector<Eigen::Vector3d>> shapesFor(const DemoOptions& options);
 
 /// Plans the services in the order of kServices. Throws StartupError if a program is missing or
 /// --rate is invalid.
 std::vector<ServicePlan> planServices(const DemoOptions& options, const DemoFolders& folders);
 
-/// perdure-gateway on this port of the loopback interface; empty if it is not installed.
+/// Plans perdure-gateway on this port of the loopback interface; empty if it is not installed.
 std::optional<ServicePlan> planGateway(const DemoOptions& options, const DemoFolders& folders,
                                        std::uint16_t port);
-/// Returns port 8765 if it is free, otherwise any free port.
+/// Returns port 8765 if it is free, else any free port.
 std::uint16_t freePort();
 
 }  // namespace perdure::tools

@@ -1,4 +1,4 @@
-// Subscribes to a running system and writes the files of `perdure pipeline`.
+// Receives the messages of a running system and writes the files of `perdure pipeline`.
 #pragma once
 
 #include <sys/types.h>
@@ -19,16 +19,17 @@
 
 namespace perdure::tools {
 
-/// Works on one host only, because ages use the CLOCK_MONOTONIC of capture. Counts each frame once.
+/// Measures latencies; counts each frame once. Valid on one host only, because ages use the
+/// CLOCK_MONOTONIC of capture.
 class LatencyMeter {
  public:
-  /// `now_ns`: time of arrival at this process.
+  /// `now_ns`: arrival of the message at this process.
   void onObjects(const Objects& objects, std::int64_t now_ns);
   void onDetections(const Detections& detections);
 
   double last_ms() const { return last_ms_; }
-  /// {"latency_ms": {"median", "p99"}, "latency_beyond_network_ms": {…}}: from capture to the
-  /// arrival of objects; the second without Detections::forward_s.
+  /// {"latency_ms": {"median", "p99"}, "latency_beyond_network_ms": {…}}: time from capture to the
+  /// arrival of objects; the second is without Detections::forward_s.
   nlohmann::ordered_json report() const;
 
  private:
@@ -40,11 +41,11 @@ class LatencyMeter {
   double last_ms_ = 0.0;
 };
 
-/// The counts of one service over all of its processes, because each process counts from 0.
+/// Sums the counts of one service over its processes, because each process counts from 0.
 class ServiceCounts {
  public:
   void add(const Health& health);
-  /// Frames of processes that run at the same time, as in a swap of the network, count once.
+  /// Frames of processes that run at the same time, as in a swap of the network, count only once.
   std::uint64_t framesIn() const { return in_; }
   std::uint64_t framesOut() const { return out_; }
   std::uint64_t dropped() const { return dropped_; }
@@ -63,8 +64,8 @@ class ServiceCounts {
 
 class Reporter {
  public:
-  /// Subscribes to the topics. `loop` must outlive the reporter, and the caller runs it. `shapes`
-  /// come from the filter's class priors, for a network whose boxes enclose outlines.
+  /// Subscribes to the topics. The caller runs `loop`, which must outlive the reporter. `shapes`
+  /// are those of the filter's class priors, for a network whose boxes enclose outlines.
   Reporter(const bus::Participant& participant, bus::WaitLoop& loop, OutputWriter& outputs,
            std::map<std::string, ShapePoints> shapes);
 
@@ -72,18 +73,18 @@ class Reporter {
   double secondsOfDrive() const { return toSeconds(newest_time_ - first_time_); }
   /// Whether the drive has ended and every frame with odometry has objects.
   bool drained() const;
-  /// Arrival of the last message about a frame, by CLOCK_MONOTONIC.
+  /// Arrival in ns of the last message about a frame, by CLOCK_MONOTONIC.
   std::int64_t lastMessageNs() const { return last_message_ns_; }
   const Health* healthOf(const std::string& process) const;
-  /// The processes that sent Health under this name.
+  /// The processes that sent Health messages under this name.
   std::vector<pid_t> pidsOf(const std::string& process) const;
 
   /// Progress text such as "frame 57/154  10.0 Hz  objects 9  latency 83 ms".
   std::string progressLine(std::size_t frames_in_all) const;
-  /// Services, latency and message counts; the caller adds the restarts.
+  /// Services, latency and message counts. The caller adds the restarts.
   nlohmann::ordered_json report() const;
   RunFacts facts(const replay::DataFindings& before) const;
-  /// Processor time for each frame by service, averaged over each second.
+  /// Processor time per frame of each service, averaged over each second.
   nlohmann::ordered_json timing() const;
 
  private:
@@ -116,7 +117,7 @@ class Reporter {
   std::map<std::string, std::vector<Span>> spans_;
 };
 
-/// CLOCK_MONOTONIC in ns, as in FrameStamp::captured_ns.
+/// The time of CLOCK_MONOTONIC in ns, as in FrameStamp::captured_ns.
 std::int64_t monotonicNs();
 
 }  // namespace perdure::tools

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::chrono::seconds kPatienceAtEnd{5};
 
-/// The last line of a service's log that is not an info line.
+/// The last line of a service's log that is not an info message.
 std::string lastWords(const std::string& log_file) {
   std::istringstream lines(textOf(log_file));
   std::string last, line;
@@ -58,7 +58,7 @@ Supervisor::~Supervisor() {
   }
 }
 
-/// The service has its own session, so that only this program receives Ctrl-C.
+/// Starts the service in its own session, so that only this program receives Ctrl-C.
 void Supervisor::start(Program& program) {
   program.process.emplace(ProgramOptions{.command = program.plan.command,
                                          .folder = folder_,

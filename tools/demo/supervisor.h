@@ -1,4 +1,4 @@
-// Keeps the services of the demo running: starts them, and starts again those that fail.
+// Keeps the services of the demo running: starts them, and restarts those that fail.
 #pragma once
 
 #include <chrono>
@@ -16,17 +16,17 @@ class Supervisor {
  public:
   /// Starts all services in `folder`. Throws StartupError if a program cannot be run.
   Supervisor(const std::vector<ServicePlan>& services, const std::filesystem::path& folder);
-  /// Ends the services that still run, with SIGTERM, or with SIGKILL after five seconds.
+  /// Ends the services that still run by SIGTERM, or by SIGKILL after five seconds.
   ~Supervisor();
   Supervisor(const Supervisor&) = delete;
   Supervisor& operator=(const Supervisor&) = delete;
 
-  /// Starts failed services again; call it often. A service that failed after its first second is
-  /// started at once, without a limit. A service that failed earlier is tried five times, with
+  /// Restarts failed services; call it often. A service that failed after its first second is
+  /// restarted at once, without a limit. A service that failed earlier is tried five times, with
   /// pauses of 1, 2, 3 and 4 seconds. Throws StartupError with the last line of its log if all
-  /// tries failed, or if its exit status says that it cannot start.
+  /// tries failed, or if its exit status means that it cannot start.
   void watch();
-  /// Requests the end with SIGTERM and returns at once; it is not started again.
+  /// Ends a service by SIGTERM, without a restart. Does not wait for the end.
   void stop(const std::string& service);
   bool runs(const std::string& service);
   int starts(const std::string& service) const;

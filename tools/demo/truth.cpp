@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-/// The tracking sequence with the same frames as a raw drive; empty if there is none.
+/// Name of the tracking sequence with the frames of a raw drive; empty if there is none.
 std::string trackingSequenceOf(const fs::path& drive) {
   return drive.filename() == "2011_09_26_drive_0005_sync" ? "0000" : "";
 }
@@ -32,7 +32,7 @@ bool complete(const TruthFiles& files) {
   return !files.sequence.empty() && fs::exists(files.labels) && fs::exists(files.calibration);
 }
 
-/// Median position in W over all labels of a static car, separately for each axis.
+/// Median position in W over all labels of a static car, computed separately for each axis.
 Eigen::Vector3d middleOf(const std::vector<replay::KittiLabel>& labels, std::int64_t track,
                          const PosesByFrame& poses, const RigidTransform& T_RI) {
   std::array<std::vector<double>, 3> values;
@@ -49,7 +49,7 @@ Eigen::Vector3d middleOf(const std::vector<replay::KittiLabel>& labels, std::int
   return middle;
 }
 
-/// Each counted track with the nearest car of FINAL, which has one position an object.
+/// Each counted track of a car, with the nearest of `rows`: final estimates, one per object.
 Json parkedCars(const std::vector<replay::KittiLabel>& labels, const std::set<std::int64_t>& tracks,
                 const PosesByFrame& poses, const RigidTransform& T_RI,
                 const std::vector<EstimateRow>& rows) {

@@ -1,4 +1,4 @@
-// Compares the map with the parked cars of the drive, if labels exist.
+// Compares the map with the labelled parked cars of a drive.
 #pragma once
 
 #include <filesystem>
@@ -15,13 +15,13 @@ struct TruthFiles {
   std::string sequence;
 };
 
-/// Takes --truth and --truth-sequence. For a KITTI drive that is also a tracking sequence, it
-/// otherwise searches a folder kitti_tracking near the data. Empty if there are no labels. Throws
-/// StartupError if --truth was given and has none.
+/// Returns the files of --truth and --truth-sequence. Without them, for a KITTI drive that is also
+/// a tracking sequence, searches a folder kitti_tracking near the data. Empty if there are no
+/// labels. Throws StartupError if --truth was given and contains no labels.
 std::optional<TruthFiles> findTruth(const DemoOptions& options);
 
-/// Copies labels and calibration to OUT/truth and compares the tables of OUT with them: recall,
-/// precision, duplicates, position error (FINAL, 1 m), and each parked car.
+/// Copies labels and calibration to OUT/truth, and scores the tables of OUT: recall, precision,
+/// duplicates, position error (final estimates, matches within 1 m), and each parked car.
 nlohmann::ordered_json scoreAgainst(const TruthFiles& truth, const std::filesystem::path& out);
 
 }  // namespace perdure::tools

@@ -15,10 +15,10 @@ void addEvaluateTrajectory(CLI::App& evaluate);
 void addEvaluateConsistency(CLI::App& evaluate);
 void addEvaluateMemory(CLI::App& evaluate);
 
-/// Judges a run by true poses and prints the result; returns false if --places is not given.
+/// Scores a run against true poses and prints the result. Returns false if --places is not given.
 using PlacesJudge =
     std::function<bool(const std::string& run, const std::string& truth, bool as_json)>;
-/// Adds --places to `memory`, and the options that need it.
+/// Adds --places, and the options that require it, to the subcommand `memory`.
 PlacesJudge addPlacesOptions(CLI::App& memory);
 
 }  // namespace perdure::tools

@@ -27,7 +27,7 @@ struct Consistency {
   std::optional<OdometryScore> odometry;
 };
 
-/// Transform from the truth's world to the run's, by yaw and position at their first common pose.
+/// Transform from the truth's world to the run's W, from yaw and position of the first common pose.
 RigidTransform alignedAtTheStart(const SimulatedTruth& truth,
                                  const std::vector<replay::StampedPose>& trajectory) {
   for (const auto& pose : trajectory) {
@@ -89,7 +89,7 @@ void print(const Consistency& consistency) {
   }
 }
 
-/// Without a sequence: the true trajectory of a dataset folder, or of a TUM file.
+/// Reads the true trajectory from a dataset folder (not one with several sequences) or a TUM file.
 replay::PoseFile truePoses(const std::string& truth) {
   if (!fs::is_directory(truth))
     return replay::PoseFile::read(truth, "--truth takes a file of poses or a dataset folder");

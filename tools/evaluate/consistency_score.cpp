@@ -41,7 +41,7 @@ MapBelief beliefOf(const nlohmann::json& json) {
   return belief;
 }
 
-/// The nearest static true object of the same class that is present when the belief was last seen.
+/// The nearest static true object of the belief's class that existed when the belief was last seen.
 std::optional<std::size_t> partnerOf(const MapBelief& belief, const sim::Truth& truth,
                                      const RigidTransform& T_WT, double within) {
   std::optional<std::size_t> best;

@@ -1,5 +1,5 @@
-// Whether covariances are consistent: mean normalised estimation error squared (ANEES) of the map's
-// objects in its χ² band (Bar-Shalom et al., 5.4).
+// Checks whether covariances are consistent: compares the average normalised estimation error
+// squared (ANEES) of the map's objects with its χ² band (Bar-Shalom et al., 5.4).
 #pragma once
 
 #include <Eigen/Core>
@@ -29,7 +29,7 @@ struct MapBelief {
 /// Throws StartupError(kUnavailable) if the file is missing or invalid.
 std::vector<MapBelief> readBeliefs(const std::filesystem::path& file);
 
-/// Normalised squared errors with `dof` degrees of freedom each; χ² if they are consistent.
+/// Normalised squared errors with `dof` degrees of freedom each. They follow χ² if consistent.
 struct Anees {
   std::string what;
   int dof = 1;
@@ -41,7 +41,7 @@ struct Anees {
   std::pair<double, double> band() const;  ///< 95 % band of mean(), independent objects
 };
 
-/// ANEES over runs of different seeds. A run is one sample: its pose errors are common.
+/// ANEES over runs of different seeds. A run is one sample, because its objects share pose errors.
 struct RunAnees {
   std::string what;
   int dof = 1;
@@ -50,7 +50,7 @@ struct RunAnees {
   void add(const Anees& run);  ///< ignores a run without objects
   double mean() const;
   double standardError() const;            ///< standard error of the mean, from the runs
-  std::pair<double, double> band() const;  ///< 95 % band of mean(), one object in each run
+  std::pair<double, double> band() const;  ///< 95 % band of mean() if each run had one object
 };
 
 struct OdometryRow {
@@ -63,28 +63,28 @@ struct OdometryRow {
 /// Throws StartupError: kUnavailable if the file is missing, kData if a row is invalid.
 std::vector<OdometryRow> readOdometry(const std::filesystem::path& file);
 
-/// Transform from the ground truth's world to the run's, by position and by the rotation about z
-/// that best aligns the two attitudes. It also works for a body whose x axis points up.
+/// Transform from the ground truth's world to the run's W. It aligns the positions, and the
+/// attitudes as well as a rotation about z can. The body's x axis may point up.
 RigidTransform placedOn(const RigidTransform& T_WB, const RigidTransform& true_T_WB);
 
-/// Scores over the rows of a run. The rows are correlated, so that no band applies to their mean.
+/// Scores over the rows of a run. No band applies to their mean, because the rows are correlated.
 struct OdometryScore {
   Anees orientation{"orientation of the body", 3, {}}, position{"position of the body", 3, {}},
       velocity{"velocity of the body", 3, {}};
 };
-/// The ground truth's W is aligned with the run's once, at the first common row of each epoch. Rows
-/// without a true pose within ±10 ms are omitted.
+/// Aligns the ground truth's W with the run's at the first common row of each epoch. Omits rows
+/// without a true pose within ±10 ms.
 OdometryScore scoreOdometry(const std::vector<OdometryRow>& rows, const replay::PoseFile& truth);
 
 struct ConsistencyScore {
   Anees position{"position", 3, {}}, yaw{"yaw", 1, {}},
       half_yaw{"yaw but for its half turns", 1, {}}, size{"size", 3, {}};
-  std::uint64_t objects = 0, left_out = 0;  ///< left_out: without a partner, or moving
+  std::uint64_t objects = 0, left_out = 0;  ///< left_out: moving, or without partner
 };
 
-/// Compares each static object with existence above one half and a class name. Its partner is the
-/// nearest true object of that class within `within` metres that is not nearer to another belief.
-/// T_WT transforms the ground truth's world to the map's.
+/// Compares each static object that has an existence above one half and a class name with its
+/// partner: the nearest true object of that class within `within` metres. A true object is the
+/// partner of its nearest belief only. T_WT transforms the ground truth's world to the map's.
 ConsistencyScore scoreConsistency(const std::vector<MapBelief>& beliefs, const sim::Truth& truth,
                                   const RigidTransform& T_WT, double within);
 

@@ -50,7 +50,7 @@ std::optional<std::uint64_t> multipleOfTenth(TimePoint time) {
   return static_cast<std::uint64_t>(ns / tenth);
 }
 
-/// The frame of row i by the ties around it, or by time.
+/// The frame of trajectory row i, from the nearest ties; without ties, from its time.
 std::optional<std::uint64_t> frameOf(std::size_t i, const std::vector<replay::StampedPose>& poses,
                                      const Ties& ties) {
   if (ties.empty()) return multipleOfTenth(poses[i].time).value_or(i);

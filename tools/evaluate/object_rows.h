@@ -24,13 +24,13 @@ struct EstimateRow {
   double length = 0, width = 0, height = 0, yaw = 0;
 };
 
-/// Throws StartupError(kData) that names each invalid line.
+/// Reads a table of estimates. Throws StartupError(kData) that names each invalid line.
 std::vector<EstimateRow> readObjectRows(const std::filesystem::path& file);
 
-/// The body's pose by frame index. A trajectory contains times only. The CSV rows tie times to
-/// frames; without rows, stamps that are multiples of 0.1 s from 0 (KITTI tracking) give the frame.
-/// Rows between two ties are consecutive frames, or are assigned by time if that is impossible.
-/// `used`: the frames of the run if it skipped some; rows are then consecutive in these.
+/// The body's pose by frame index. A trajectory contains times only; the CSV rows tie times to
+/// frames. Without CSV rows, stamps that are multiples of 0.1 s (KITTI tracking) give the frame.
+/// Poses between two ties get consecutive frames, or are assigned by time if that is impossible.
+/// `used`: the frames of a run that skipped some; poses are then consecutive in these.
 std::map<std::uint64_t, RigidTransform> posesByFrame(
     const std::vector<replay::StampedPose>& poses, const std::vector<EstimateRow>& rows,
     const std::optional<std::set<std::uint64_t>>& used = {});

@@ -21,7 +21,7 @@ bool mayBe(const Estimate& estimate, const TruthLabel& label) {
   return label.class_name.empty() || label.class_name == estimate.class_name;
 }
 
-/// Pairs within distance d and angle a, matched one-to-one, greedily by increasing distance.
+/// Matches pairs within distance d and angle a one-to-one, greedily by increasing distance.
 std::vector<Match> matchGreedily(const std::vector<TruthLabel>& truth,
                                  const std::vector<Estimate>& estimates, double d, double angle) {
   std::vector<Match> pairs;
@@ -116,7 +116,7 @@ void countCell(const std::vector<Match>& matches, std::size_t truths,
   }
 }
 
-/// The counted true object nearest to the estimate, within kNear_m; otherwise null.
+/// The counted true object nearest to the estimate; null if none is within kNear_m.
 const TruthLabel* nearestCounted(const Estimate& estimate, const TruthFrame& truth) {
   const TruthLabel* nearest = nullptr;
   double best = kNear_m;
@@ -238,7 +238,7 @@ ObjectScore scoreFrames(const std::map<std::uint64_t, ScoredFrame>& frames,
 
 std::optional<Estimate> toCamera(const EstimateRow& row, const RigidTransform& T_RW,
                                  const replay::KittiCalibration& calibration) {
-  constexpr double kClosest = 0.1;  // metres before the camera, for corners behind it
+  constexpr double kClosest = 0.1;  // least depth in m; corners behind it are moved to it
   const auto project = [&](const Eigen::Vector3d& point) -> Eigen::Vector2d {
     const Eigen::Vector3d front(point.x(), point.y(), std::max(point.z(), kClosest));
     const Eigen::Vector3d pixel = calibration.P2 * front.homogeneous();

@@ -25,7 +25,8 @@ struct Cell {
   double positionError() const;  ///< metres, mean over the matches
 };
 
-/// A false alarm (with the estimate's id) or a miss (with the true track), at 1.5 m, any angle.
+/// A false alarm (`id` is the estimate's) or a miss (`id` is the true track), within 1.5 m at any
+/// angle.
 struct Mishap {
   std::uint64_t frame = 0;
   bool miss = false;
@@ -38,16 +39,16 @@ struct Mishap {
 struct ObjectScore {
   std::array<std::array<Cell, 3>, 3> cells{};  ///< indices [distance][angle]
   // Within 1.5 m, any orientation:
-  std::uint64_t id_switches = 0;    ///< matches with another id than the object's last match
+  std::uint64_t id_switches = 0;    ///< matches whose id differs from the object's last match
   std::uint64_t duplicates = 0;     ///< unmatched estimates close to a counted true object
-  std::uint64_t interruptions = 0;  ///< counted frames without match between matched frames
+  std::uint64_t interruptions = 0;  ///< counted frames without a match, between matched ones
   std::uint64_t ids_matched = 0;    ///< distinct ids, summed over true objects
-  std::uint64_t ids_near = 0;       ///< ids near the object, with those of duplicates
+  std::uint64_t ids_near = 0;       ///< the same, with the ids of duplicates
   double minutes = 0.0;             ///< duration of counted ground truth, summed over objects
   double position_error_m = 0.0;    ///< mean over the matches
   double mean_object_recall = 0.0;
-  std::uint64_t objects = 0, objects_found = 0;  ///< true objects; those matched at least once
-  std::uint64_t neutral = 0, outside = 0;        ///< excluded estimates (1.5 m, any angle)
+  std::uint64_t objects = 0, objects_found = 0;  ///< all true objects; those matched at least once
+  std::uint64_t neutral = 0, outside = 0;        ///< estimates that do not count
   std::vector<Mishap> mishaps;
 
   /// Map objects for each true object that was found; 1 is perfect.
@@ -75,11 +76,11 @@ struct ScoredFrame {
 /// Whether an unmatched estimate belongs to an ignored label and not to a counted one.
 bool isNeutral(const Estimate& estimate, const TruthFrame& truth);
 
-/// `frames`: by frame index.
+/// Scores `frames`, which are sorted by frame index.
 ObjectScore scoreFrames(const std::map<std::uint64_t, ScoredFrame>& frames,
                         const ScoreOptions& options);
 
-/// A row in the camera; empty if its centre is behind it or outside the image.
+/// The row as an estimate in the camera frame; empty if its centre is not in the image.
 std::optional<Estimate> toCamera(const EstimateRow& row, const RigidTransform& T_RW,
                                  const replay::KittiCalibration& calibration);
 

@@ -1,4 +1,4 @@
-// `perdure evaluate objects`: the nine cells and the identities, as text or JSON.
+// `perdure evaluate objects`: prints the scores at nine pairs of thresholds and of the identities.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -30,7 +30,7 @@ struct Evaluated {
   std::uint64_t estimates = 0, poses = 0;
   std::string of;            ///< description of ground truth and class, for people
   std::size_t left_out = 0;  ///< frames with ground truth that the run skipped
-  /// Frames without a pose between frames with one, if the run does not state which frames it used.
+  /// Frames without a pose between frames with one; 0 if the run states which frames it used.
   std::size_t untold = 0;
 };
 

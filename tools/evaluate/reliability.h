@@ -1,4 +1,4 @@
-// Whether probabilities are calibrated (DeGroot and Fienberg, 1983).
+// Checks whether probabilities are calibrated (DeGroot and Fienberg, 1983).
 #pragma once
 
 #include <cstddef>
@@ -29,8 +29,8 @@ struct Reliability {
   /// the claims.
   double calibrationError(std::size_t bins = 10) const;
   double brier() const;  ///< mean of (stated probability − outcome)²
-  /// 1 − brier() divided by the score of a constant forecast of the observed share; 0 if all claims
-  /// are true or all are false.
+  /// 1 − brier() / b, with b the Brier score of a constant forecast of the observed share; 0 if all
+  /// claims are true or all are false.
   double skill() const;
 };
 
@@ -44,10 +44,10 @@ struct ClassReliability {
   std::string what;
   std::vector<ClassClaim> claims;
 
-  /// The most probable class of each claim, and whether it was correct.
+  /// Returns the claims "the most probable class is correct".
   Reliability best() const;
   double brier() const;  ///< mean of Σ_k (believed_k − is_k)², in [0, 2]
-  /// 1 − brier() divided by the score of a constant forecast of the class frequencies.
+  /// 1 − brier() / b, with b the Brier score of a constant forecast of the class frequencies.
   double skill() const;
 };
 

@@ -14,7 +14,7 @@ namespace {
 constexpr double kWhollySeen = 0.9;
 constexpr char kToy[] = "toy";
 
-/// Transforms points of W to the camera, and yaws relative to the body's heading.
+/// Transforms points from W to the camera, and yaws from W to the body's heading.
 struct Eye {
   RigidTransform T_CW;
   double heading = 0.0;
@@ -33,7 +33,8 @@ bool insideImage(const Box& box, const CameraModel& camera) {
   return box.x1 >= 0 && box.y1 >= 0 && box.x2 <= camera.width() && box.y2 <= camera.height();
 }
 
-/// Box of the corners that can be projected, clipped; without any, around the centre.
+/// Box around the corners that can be projected, clipped to the image. If none can be projected,
+/// the box is around the centre.
 Box boxOf(const EstimateRow& row, const Eye& eye, const CameraModel& camera) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   Box box{kInfinity, kInfinity, -kInfinity, -kInfinity};

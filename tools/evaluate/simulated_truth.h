@@ -1,4 +1,4 @@
-// A simulated folder as truth: exact states, and the visible share of each object.
+// Reads the truth of a simulated folder: exact states, and the visible share of each object.
 #pragma once
 
 #include <filesystem>
@@ -20,16 +20,16 @@ struct SimulatedTruth {
   CameraModel camera;
   std::vector<TimePoint> frames;  ///< times of cam0, by index
 
-  double frameInterval() const;  ///< mean in seconds; 0.1 if there are fewer than two frames
+  double frameInterval() const;  ///< mean, seconds; 0.1 if there are fewer than two frames
 };
 
 bool isSimulated(const std::filesystem::path& folder);
-/// Throws StartupError(kUnavailable) with the missing file and the fix.
+/// Throws StartupError(kUnavailable) with the missing file and the fix if the folder is incomplete.
 SimulatedTruth readSimulatedTruth(const std::filesystem::path& folder);
 
-/// Frames up to the last one of the trajectory, in the camera frame. Ground truth is transformed by
-/// the exact state, rows by the trajectory, and headings are about the vertical relative to the
-/// body.
+/// The frames up to the last pose of the trajectory, in the camera frame. The exact states
+/// transform the ground truth; the trajectory transforms the rows. Headings are about the vertical,
+/// relative to the body.
 ///
 /// Counted objects have any class except `toy` (or `class_name`, if given) and never move. They are
 /// at least nine tenths visible, completely in the image, and at least 25 px tall. Other objects
@@ -38,7 +38,7 @@ SimulatedTruth readSimulatedTruth(const std::filesystem::path& folder);
 struct SimulatedRun {
   std::map<std::uint64_t, ScoredFrame> frames;
   std::uint64_t estimates = 0;  ///< number of examined rows
-  std::uint64_t outside = 0;    ///< part of these: centre outside the image, or no pose
+  std::uint64_t outside = 0;    ///< of these: centre outside the image, or no pose
   std::uint64_t poses = 0;      ///< frames with a pose
 };
 SimulatedRun pairWithTruth(const SimulatedTruth& truth, const std::vector<EstimateRow>& rows,

@@ -1,4 +1,4 @@
-// `perdure evaluate trajectory`: a TUM file against a pose file or a dataset's truth.
+// `perdure evaluate trajectory`: compares a TUM file with a pose file or a dataset's truth.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -55,7 +55,7 @@ void readFrames(const std::string& folder, const std::string& sequence,
   }
 }
 
-/// Adds times to KITTI's lines: those of the frames, or 10 Hz from 0.
+/// Adds times to KITTI's lines: the times of `frames`, or if there are none, 10 Hz from 0.
 PoseFile withTimes(const PoseFile& file, const std::vector<TimePoint>& frames) {
   if (file.format() == PoseFormat::kTum) return file;
   std::vector<replay::StampedPose> poses = file.poses();
@@ -90,7 +90,8 @@ struct Compared {
   std::size_t untold = 0;    ///< frames between poses that lack one, for unknown reasons
 };
 
-/// Removes the times of frames that the run skipped; none if a pose has such a time.
+/// Removes the times of frames that the run skipped, and returns their number. Removes nothing if a
+/// pose has such a time.
 std::size_t leaveOutUnused(const fs::path& run, const PoseFile& poses, Truth& truth) {
   const auto used = usedFramesOf(run);
   if (!used) return 0;
@@ -147,7 +148,7 @@ Compared compare(const TrajectoryOptions& options) {
   result.left_out = left_out;
   if (!usedFramesOf(run)) result.untold = withoutPose(frames, file.poses());
   result.score = scoreTrajectory(pairs, alignmentOf(options.align));
-  // Frames that should have a pose: those of the dataset within the time span of the ground truth.
+  // A pose is expected for the dataset's frames within the time span of the ground truth.
   const auto expected = [&](TimePoint t) {
     return t >= begin && t >= poses.front().time && t <= poses.back().time;
   };

@@ -92,7 +92,7 @@ RigidTransform align(const std::vector<PosePair>& pairs, Alignment alignment) {
   }
   const Eigen::Vector3d mean_e = estimate.rowwise().mean(), mean_t = truth.rowwise().mean();
   const Eigen::Matrix3d C = (truth.colwise() - mean_t) * (estimate.colwise() - mean_e).transpose();
-  // The yaw that maximises trace(Rz' C); without motion, that of the first attitude.
+  // The yaw that maximises trace(Rz' C). If nothing moved, the yaw between the first attitudes.
   const double s = C(1, 0) - C(0, 1), c = C(0, 0) + C(1, 1);
   const bool moved = std::hypot(s, c) > 1e-4 * static_cast<double>(n);
   const double yaw = moved ? std::atan2(s, c) : first_yaw;

@@ -1,5 +1,5 @@
-// ATE after alignment, RPE (Zhang and Scaramuzza, IROS 2018), and KITTI's t_err and r_err (Geiger
-// et al., CVPR 2012).
+// Trajectory errors: ATE after alignment and RPE (Zhang and Scaramuzza, IROS 2018), and KITTI's
+// t_err and r_err (Geiger et al., CVPR 2012).
 #pragma once
 
 #include <vector>
@@ -20,8 +20,8 @@ enum class Alignment {
   kStart,  ///< position and yaw of the first pose only
 };
 
-/// T_GE with T_GE · estimate ≈ truth, by least squares of positions, or from the first pair only.
-/// Needs at least one pair.
+/// Returns T_GE with T_GE · estimate ≈ truth, by least squares of positions; for kStart, from the
+/// first pair only. Needs at least one pair.
 RigidTransform align(const std::vector<PosePair>& pairs, Alignment alignment);
 
 struct SegmentError {

@@ -14,7 +14,7 @@ struct Run {
   std::uint64_t first = 0, last = 0, step = 1;
 };
 
-/// Parses a run of frames; empty if it is invalid.
+/// Parses [first, last, step]; empty if it is invalid.
 std::optional<Run> runIn(const nlohmann::json& json) {
   if (!json.is_array() || json.size() != 3) return std::nullopt;
   for (const auto& n : json) {

@@ -1,4 +1,4 @@
-// The frames that a run used, so that skipped ones are no misses; stored in report.json.
+// The frames that a run used, from report.json. Frames that the run skipped do not count as misses.
 #pragma once
 
 #include <cstdint>
@@ -16,16 +16,16 @@ namespace perdure::tools {
 
 using UsedFrames = std::set<std::uint64_t>;
 
-/// `frames` of report.json: their number, and [first, last, step] of each run of frames.
+/// Returns `frames` of report.json: their number, and [first, last, step] of each regular series.
 nlohmann::ordered_json framesToJson(const UsedFrames& frames);
-/// Reads RUN/report.json; empty if it is missing or has no frames. Throws StartupError if the
+/// Reads RUN/report.json; empty if the file is missing or has no frames. Throws StartupError if its
 /// frames are invalid.
 std::optional<UsedFrames> usedFramesOf(const std::filesystem::path& run);
-/// Number of frames of the data from one used frame to the next; 1 if there are fewer than two.
+/// Mean step of the frame index between used frames; 1 if there are fewer than two.
 double strideOf(const UsedFrames& frames);
 
-/// Number of frames without a pose between the first pose and the last one. If the used frames are
-/// unknown, these are either misses or frames that --every skipped.
+/// Number of frames without a pose between the first pose and the last one. If it is unknown which
+/// frames the run used, these are misses or frames that --every skipped.
 std::size_t withoutPose(const std::vector<TimePoint>& frames,
                         const std::vector<replay::StampedPose>& poses);
 

@@ -1,8 +1,8 @@
 // Copies topics to and from DDS implementations without XCDR2 (Fast DDS before 3, RTI Connext
-// before 6). It publishes `objects` and `events` as perdure/ego/final/…, and reads `model` and
-// `detections` from there. Their types are those of idl/ with every struct final, in the module
-// perdure::fin.
-// Usage (strength 30 overrides perdure-inference):
+// before 6). Publishes `objects` and `events` as perdure/ego/final/…, and reads `model` and
+// `detections` under the same prefix. The types there are those of idl/ with every struct final, in
+// the module perdure::fin.
+// Usage (an ownership strength of 30 overrides perdure-inference):
 //   eval "$(perdure env)" && final_gateway [strength]
 #include <dds/dds.h>
 
@@ -17,7 +17,7 @@
 
 namespace {
 
-// Both types have the same members in the same order, so that a sample fits both.
+// Both types have the same members in the same order, so the same sample can be used for both.
 static_assert(sizeof(perdure_msg_Objects) == sizeof(perdure_fin_Objects));
 static_assert(sizeof(perdure_msg_ObjectBelief) == sizeof(perdure_fin_ObjectBelief));
 static_assert(sizeof(perdure_msg_Event) == sizeof(perdure_fin_Event));
@@ -34,7 +34,7 @@ struct Link {
   dds_entity_t reader, writer;
 };
 
-/// QoS of Perdure's topics: reliable; `latched` stores the last sample for late joiners.
+/// Returns the QoS of Perdure's reliable topics. `latched`: late joiners receive the last sample.
 dds_qos_t* reliable(int depth, bool latched) {
   dds_qos_t* qos = dds_create_qos();
   dds_qset_reliability(qos, DDS_RELIABILITY_RELIABLE, DDS_SECS(1));
@@ -92,6 +92,6 @@ int main(int argc, char** argv) {
     dds_waitset_attach(waitset, dds_create_readcondition(l.reader, DDS_ANY_STATE), 0);
   }
   while (dds_waitset_wait(waitset, nullptr, 0, DDS_INFINITY) >= 0) {
-    for (const Link& l : links) carry(l);  // a write asserts the liveliness of the writer
+    for (const Link& l : links) carry(l);  // each write asserts the writer's liveliness
   }
 }

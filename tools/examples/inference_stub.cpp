@@ -1,5 +1,6 @@
-// Example of another inference service that replaces perdure-inference: bright pixels are a lamp.
-// Needs Cyclone DDS and idl/{sensors,detections}.idl. eval "$(perdure env)" && inference_stub
+// Example of an inference service that replaces perdure-inference. It reports bright pixels as a
+// lamp. Needs Cyclone DDS and idl/{sensors,detections}.idl.
+// Usage: eval "$(perdure env)" && inference_stub
 #include <dds/dds.h>
 
 #include <algorithm>
@@ -24,7 +25,7 @@ void look(const perdure_msg_Frame& frame, dds_entity_t writer) {
                                 .camera = frame.camera,
                                 .source = kInstance,
                                 .model_hash = kHash,
-                                .items = {1, x2 > x1 ? 1U : 0U, &lamp}};  // no items: nothing found
+                                .items = {1, x2 > x1 ? 1U : 0U, &lamp}};  // none if not found
   dds_write(writer, &answer);
 }
 
@@ -37,13 +38,14 @@ int main() {
   dds_qset_reliability(qos, DDS_RELIABILITY_RELIABLE, DDS_SECS(1));
   const auto frames =
       dds_create_reader(bus, topic(perdure_msg_Frame_desc, "perdure/ego/frame/cam0"), qos, nullptr);
-  // Ownership: the strongest live writer counts. Liveliness: its lease ends if the writer stops.
+  // Readers receive the strongest live writer only. A writer that stops is dead after its lease.
   dds_qset_ownership(qos, DDS_OWNERSHIP_EXCLUSIVE);
   dds_qset_ownership_strength(qos, 30);
   dds_qset_liveliness(qos, DDS_LIVELINESS_MANUAL_BY_TOPIC, DDS_MSECS(300));
   const auto detections = dds_create_writer(
       bus, topic(perdure_msg_Detections_desc, "perdure/ego/detections"), qos, nullptr);
-  // The model names the classes of activations[1], [2], …; it is latched for late joiners.
+  // The model names the classes of activations[1], [2], …. It is latched, so late joiners receive
+  // it.
   dds_qset_durability(qos = dds_create_qos(), DDS_DURABILITY_TRANSIENT_LOCAL);
   char name[] = "stub", lamp[] = "lamp", *classes[] = {lamp};
   perdure_msg_ModelInfo model{
@@ -51,7 +53,7 @@ int main() {
   const auto models = topic(perdure_msg_ModelInfo_desc, "perdure/ego/model");
   dds_write(dds_create_writer(bus, models, qos, nullptr), &model);
   for (dds_sample_info_t info;; dds_sleepfor(DDS_MSECS(5))) {
-    dds_assert_liveliness(detections);  // needed if no frame arrives
+    dds_assert_liveliness(detections);  // keeps the ownership while no frames arrive
     for (void* sample = nullptr; dds_take(frames, &sample, &info, 1, 1) > 0; sample = nullptr) {
       if (info.valid_data) look(*static_cast<const perdure_msg_Frame*>(sample), detections);
       dds_return_loan(frames, &sample, 1);

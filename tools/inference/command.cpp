@@ -55,7 +55,7 @@ std::vector<std::string> commandOf(const SwapRequest& request) {
   return command;
 }
 
-/// Follows a swap by the messages of the processes and prints its progress.
+/// Follows a swap from the messages of the two processes, and prints its progress.
 class Report {
  public:
   enum class End { kNone, kServes, kRolledBack };
@@ -126,7 +126,7 @@ class Report {
   End end_ = End::kNone;
 };
 
-/// The last line of a log, which explains why the process ended.
+/// Returns the last line of a process's log, which explains why the process ended.
 std::string lastLineOf(const std::string& log) {
   std::ifstream file(log);
   std::string last;
@@ -183,7 +183,7 @@ void runSwap(SwapRequest request) {
   bus::Reader<Health> health(participant, bus::kTopic<Health>);
   bus::WaitLoop loop(participant);
   Subprocess newcomer({.command = commandOf(request), .log = request.log, .own_session = true});
-  newcomer.leaveAlone();  // continues after this command
+  newcomer.leaveAlone();  // the new process continues after this command
   std::printf("%-12spid %d, log %s\n", "started", newcomer.pid(), request.log.c_str());
   std::fflush(stdout);
   Report report(newcomer.pid());

@@ -82,7 +82,7 @@ void list(const Request& request) {
   std::cout << (request.json ? jsonOf(reply.objects).dump(1) + "\n" : toTable(reply.objects));
 }
 
-/// Requests one object by its id. Throws StartupError if it does not exist.
+/// Requests one object by its id. Throws StartupError if the map does not have it.
 MapReply askForOne(const Request& request) {
   MapReply reply = ask(request);
   if (reply.objects.empty()) {

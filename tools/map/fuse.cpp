@@ -79,7 +79,7 @@ FusedFile bring(WholeMap& fused, const GivenMap& given, const mapping::Parameter
   return file;
 }
 
-/// Sessions and objects for each part; objects without a position belong to none.
+/// Counts sessions and objects of each part. Objects without a position in M belong to no part.
 void countParts(const mapping::MapContents& map, FuseOutcome& outcome) {
   outcome.parts = mapping::partsOf(map);
   outcome.objects_of_part.assign(outcome.parts.size(), 0);
@@ -176,7 +176,7 @@ Json toJson(const mapping::Change& change) {
           {"by", toJson(std::vector{change.by}).front()}};
 }
 
-/// Reports omitted maps by a failure status; the written file itself is complete.
+/// Throws, for a failure status, if maps were left out. The written file is complete otherwise.
 void complainOfLeftOut(const FuseOutcome& outcome) {
   if (outcome.left_out.empty()) return;
   std::string names;

@@ -14,14 +14,14 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 constexpr double kDegrees = 180.0 / std::numbers::pi;
-constexpr std::size_t kMostNamed = 6;  // most objects named of a loop
+constexpr std::size_t kMostNamed = 6;  // largest number of objects named for one loop
 
 struct Figures {
   std::set<WorldId> sessions;
   double way_m = 0.0;
   std::size_t unknown = 0;            ///< anchors with unknown σ
   const MapAnchor* worst = nullptr;   ///< anchor with the largest σ in the plane
-  std::map<MapLoopState, int> loops;  ///< counts by state
+  std::map<MapLoopState, int> loops;  ///< numbers of loops by state
   int ties = 0;
 };
 
@@ -113,7 +113,7 @@ std::string tableOfLoops(const MapReply& graph) {
          lines;
 }
 
-/// The standard deviations; null if they are unknown.
+/// Returns the standard deviations; null if they are unknown.
 Json sigmaJson(const Eigen::Vector4d& sigma, bool known) {
   return known ? Json{sigma[0], sigma[1], sigma[2], sigma[3]} : Json();
 }

@@ -1,4 +1,4 @@
-// The graph of a map for people and programs.
+// The graph of a map as text and JSON.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -8,7 +8,8 @@
 
 namespace perdure::tools {
 
-/// Text for a reply of kind graph, over the data in the reply, which may be truncated.
+/// Returns the text for a reply of kind graph. Its figures are those of the data in the reply,
+/// which may be truncated.
 std::string toGraphText(const MapReply& graph);
 nlohmann::ordered_json toGraphJson(const MapReply& graph);
 

@@ -22,7 +22,8 @@ T read(const std::string& path, Result<T> result) {
   if constexpr (!std::is_void_v<T>) return *std::move(result);
 }
 
-/// One transaction: objects and graph are consistent even if a service writes.
+/// Opens the file and begins a transaction, so that objects and graph are consistent even if a
+/// service writes.
 map_store::Connection openAtOneState(const std::string& path) {
   auto connection = map_store::openStoreForReading(path);
   read(path, connection.execute("BEGIN"));

@@ -13,23 +13,26 @@
 
 namespace perdure::tools {
 
-/// Queries map_store over the bus. Waits until reader and writer are matched, because DDS drops
-/// earlier requests silently. Then repeats the same request until a reply arrives. After
-/// `patience_s`, fails with "no_map_store" or "no_answer".
+/// Queries map_store over the bus. Waits until reader and writer are matched, because DDS silently
+/// drops earlier requests. Then repeats the request until a reply arrives. After `patience_s`,
+/// fails with "no_map_store" if nothing matched, else with "no_answer".
 Result<MapReply> askMapStore(const bus::Participant& participant, MapQuery query,
                              double patience_s);
 
-/// Frame of the objects from a map's file: the consistent frame M, or the stored frame W.
+/// The frame of objects from a map's file: M, or W as stored.
 enum class MapFrameChoice { kM, kW };
 
-/// Reads a map's file, which a service may use at the same time. Searches positions in query.world;
-/// without one, in the M or W of the newest session.
+/// Answers a query from a map's file, which a service may use at the same time. Spatial queries
+/// search query.world; if it is 0, they search the M or W of the newest session. If it is not 0,
+/// objects are in W. Throws StartupError.
 MapReply askMapFile(const std::string& path, const MapQuery& query,
                     MapFrameChoice frame = MapFrameChoice::kM);
-/// The graph of a map's file, in the form of a running map_store. Throws StartupError.
+/// Returns the graph of a map's file as a running map_store would. Throws StartupError.
 MapReply askGraphOfFile(const std::string& path, const MapQuery& query);
-/// Geographic origin of the newest session's M, and its yaw; empty if none. Throws StartupError.
+/// Returns the position of M's origin on Earth, and the yaw of M. Returns nothing if the file has
+/// none, or if the newest session is not joined to the map. Throws StartupError.
 std::optional<GeoAnchor> earthAnchorOfMapFile(const std::string& path);
+/// Returns the standing of an object in a map's file. Throws StartupError if it is absent.
 Standing askStanding(const std::string& path, ObjectId id);
 
 }  // namespace perdure::tools

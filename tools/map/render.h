@@ -11,12 +11,13 @@
 
 namespace perdure::tools {
 
-/// One line for each object, with a header.
+/// Returns a header and one line for each object.
 std::string toTable(const std::vector<MapObject>& objects);
 std::string toText(const MapObject& object);
 nlohmann::ordered_json toJson(const MapObject& object);
-/// RFC 7946. `anchor`: geographic position of the frame's origin, and yaw of its x axis from east.
-/// Without an anchor, the output uses 0°, 0° and "georeferenced": false.
+/// Returns GeoJSON (RFC 7946). `anchor` is the position of the frame's origin on Earth, and the yaw
+/// of its x axis from east. If there is no anchor, the origin is at 0°, 0°, and "georeferenced" is
+/// false.
 nlohmann::ordered_json toGeoJson(const std::vector<MapObject>& objects,
                                  const std::optional<GeoAnchor>& anchor);
 

@@ -12,7 +12,7 @@ namespace {
 using mapping::AnchorId;
 using mapping::SavedMap;
 
-constexpr std::size_t kMostTold = 8;  // limit of listed loops and ids
+constexpr std::size_t kMostTold = 8;  // largest numbers of listed loops and of listed ids
 
 std::optional<Station> stationOf(AnchorId id, const SavedMap& map) {
   const auto at = map.anchors.find(id);

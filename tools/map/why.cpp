@@ -11,7 +11,7 @@ namespace perdure::tools {
 namespace {
 
 constexpr double kNothing = 0.005;   // nats, displayed as 0.00
-constexpr double kTolerance = 1e-6;  // relative error of a sum
+constexpr double kTolerance = 1e-6;  // largest relative error of a sum
 
 std::string aThing(const std::string& class_name) {
   if (class_name == kOtherClass) return "something of no known class";
@@ -27,7 +27,8 @@ std::string hypotheses(std::uint32_t n) {
 }
 std::string times(std::uint32_t n) { return n == 1 ? "once" : fmt::format("{} times", n); }
 
-/// Text for an object that returned; a note if it has evidence from before this ledger.
+/// Returns the text for an object that returned, with a note if it has evidence from before this
+/// ledger.
 std::string backFrom(const char* where, const LedgerEntry& entry) {
   return fmt::format(
       "back from {} {}{}", where, times(entry.count),
@@ -73,7 +74,7 @@ std::string line(double nats, const std::string& what) {
   return fmt::format("  {:>+8.2f}  {}\n", std::abs(nats) < kNothing ? 0.0 : nats, what);
 }
 
-/// Time span of the evidence; only observations have times.
+/// Returns the time span of the evidence; empty for evidence that is not an observation.
 std::string span(ExistenceEvidence kind, const LedgerEntry& entry) {
   switch (kind) {
     case ExistenceEvidence::kHit:

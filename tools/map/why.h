@@ -7,7 +7,8 @@
 
 namespace perdure::tools {
 
-/// Entries of existence and class with their sums, and whether these differ from the estimate.
+/// Returns the entries of existence and class with their sums, and a note if a sum differs from the
+/// estimate.
 std::string toWhy(const ObjectBelief& object);
 
 }  // namespace perdure::tools

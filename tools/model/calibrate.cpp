@@ -20,10 +20,9 @@ using inference::Calibration;
 using inference::Candidate;
 
 constexpr double kSame = 0.5;       // least IoU of a box and the object that it matches
-constexpr double kOnIgnored = 0.7;  // share of a box inside an ignored one
-constexpr double kApart =
-    0.3;  // a candidate box whose IoU with every true box is below this is empty
-constexpr double kClear = 0.8;  // least probability of a box whose sides are measured
+constexpr double kOnIgnored = 0.7;  // least share of a box inside an ignored one
+constexpr double kApart = 0.3;      // a place is empty if its IoU with every true box is below this
+constexpr double kClear = 0.8;      // least probability of a box whose sides are measured
 constexpr double kLarge_px = 40.0, kFull_px = 12.0;  // pixels of the input
 constexpr std::size_t kLeastInsets = 20, kLeastSides = 40;
 constexpr int kRounds = 3;
@@ -36,7 +35,7 @@ struct Target {
   std::optional<Box> hull;
 };
 
-/// The network's output for a frame: its own log-odds instead of evidence.
+/// The network's output for a frame. Activations are the network's own log-odds, not evidence.
 struct Seen {
   std::vector<Candidate> candidates;
   std::vector<Target> targets;
@@ -66,7 +65,8 @@ double covered(const Box& box, const Box& by) {
 
 constexpr int kClutter = -1, kNeutral = -2;
 
-/// For each box, by decreasing evidence: its target, or one of the values above.
+/// Returns, for each box, its target, kClutter or kNeutral. The boxes must be sorted by decreasing
+/// evidence.
 std::vector<int> match(const std::vector<Candidate>& boxes, const std::vector<Target>& targets) {
   std::vector<int> result;
   std::vector<bool> taken(targets.size(), false);
@@ -206,7 +206,7 @@ std::vector<BoxOutcome> Study::outcomes(const Calibration& calibration) const {
       if (taken[i] >= 0) {
         outcome.label = frames_[f].targets[static_cast<std::size_t>(taken[i])].k;
       } else if (!judged(static_cast<std::size_t>(best))) {
-        continue;  // may be correct, as the class has no labels
+        continue;  // may be correct, because the class has no labels
       }
       result.push_back(std::move(outcome));
     }
@@ -224,7 +224,8 @@ void Study::countTargets(const Calibration& calibration) {
   }
 }
 
-/// Throws if most objects of a map are not detected, because the map's run detected all of them.
+/// Throws StartupError if most objects of a map are not detected. The map's run detected all of
+/// them, so it used other frames.
 void Study::requireTheSameFrames() const {
   const bool by_map =
       std::ranges::any_of(frames_, [](const Seen& frame) { return !frame.sides_known; });
@@ -274,7 +275,7 @@ void Study::measureSides(const Calibration& calibration) {
   }
 }
 
-/// Adds random errors of a fraction of a side and a pixel, as in the predictions of the filter.
+/// Returns a prediction at the target, with random errors like those of the filter's predictions.
 inference::Expectation expectationAt(const Target& target, std::mt19937& random) {
   std::normal_distribution<double> normal;
   const Box& b = target.box;
@@ -285,7 +286,8 @@ inference::Expectation expectationAt(const Target& target, std::mt19937& random)
   return {moved, target.k, {x, y, x, y}};
 }
 
-/// Predictions at true objects, and at empty places (of two other frames).
+/// Returns the outcomes of predictions at true objects and at empty places. The empty places are
+/// those of objects in two other frames.
 std::vector<PrimedOutcome> Study::askAround(const Calibration& calibration) const {
   std::mt19937 random(1);
   std::vector<PrimedOutcome> places;
@@ -333,7 +335,8 @@ void Study::fitPrimedAnswers(Calibration& calibration) {
   result_.primed_nats_elsewhere = elsewhere / static_cast<double>(result_.asked_elsewhere);
 }
 
-/// A few rounds, because boxes depend slightly on the calibration (suppress.h).
+/// Fits the calibration in a few rounds, because the merged boxes depend slightly on it
+/// (suppress.h).
 void Study::fit() {
   Calibration calibration = options_.primed_only ? result_.before : plain();
   calibration.primed = {};

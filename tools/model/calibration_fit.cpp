@@ -10,11 +10,11 @@ namespace perdure::tools {
 namespace {
 
 constexpr int kFolds = 5;
-constexpr double kMostBias = 20.0;  // nats; limit of model.json
+constexpr double kMostBias = 20.0;  // nats; limit of `bias` in model.json
 constexpr std::size_t kBins = 15;
 constexpr std::size_t kLeastPlaces = 40;
 
-/// softmax(0, β x + b); element 0 is clutter. Returns the logarithm of the normaliser.
+/// Computes p = softmax(0, β x + b); element 0 is clutter. Returns the logarithm of the normaliser.
 double softMaxOf(const std::vector<double>& x, double beta, double b, std::vector<double>& p) {
   double highest = 0.0;
   p.assign(x.size() + 1, 0.0);
@@ -55,7 +55,7 @@ Cost costOf(const std::vector<BoxOutcome>& boxes, const Eigen::Vector2d& theta) 
   return cost;
 }
 
-/// Newton's method with step halving; if `with_bias` is false, b stays 0.
+/// Minimises the cost by Newton's method with step halving. If `with_bias` is false, b stays 0.
 Eigen::Vector2d minimise(const std::vector<BoxOutcome>& boxes, bool with_bias) {
   Eigen::Vector2d theta(1.0, 0.0);
   Cost cost = costOf(boxes, theta);
@@ -151,7 +151,7 @@ double clutterRateOf(const std::vector<BoxOutcome>& boxes) {
 
 std::optional<inference::PrimedCalibration> fitPrimed(const std::vector<PrimedOutcome>& places,
                                                       double floor) {
-  std::vector<BoxOutcome> found;  // logistic regression is the same fit with one class
+  std::vector<BoxOutcome> found;  // logistic regression is this fit with one class
   double there = 0, nothing_there = 0, elsewhere = 0, nothing_elsewhere = 0;
   for (const PrimedOutcome& place : places) {
     (place.there ? there : elsewhere) += 1;

@@ -1,4 +1,4 @@
-// Computes a calibration from the network's outputs for labelled boxes; pure functions.
+// Computes a calibration from the network's outputs for labelled boxes.
 #pragma once
 
 #include <cstddef>
@@ -21,23 +21,24 @@ struct Softening {
   double temperature = 1.0, bias = 0.0;
 };
 
-/// The T, and b if it is significant, that maximise the likelihood of the labels. Source: Guo et
-/// al., "On calibration of modern neural networks", ICML 2017. The cost is convex in β = 1/T and b,
-/// and is minimised by Newton's method. b is used if it improves the Bayesian information
-/// criterion. T is within [0.05, 20]. Returns no change unless there are boxes of both kinds.
+/// Returns the T, and the b if it is significant, that maximise the likelihood of the labels.
+/// Source: Guo et al., "On calibration of modern neural networks", ICML 2017. The cost is convex in
+/// β = 1/T and b, and is minimised by Newton's method. b is significant if it improves the Bayesian
+/// information criterion. T is within [0.05, 20]. Returns T = 1 and b = 0 unless there are both
+/// true boxes and clutter.
 Softening fitSoftening(const std::vector<BoxOutcome>& boxes);
 
 struct Reliability {
   struct Bin {
-    double confidence = 0.0, right = 0.0;  ///< means
+    double confidence = 0.0, right = 0.0;  ///< mean probability, and share of correct boxes
     std::size_t count = 0;
   };
-  std::vector<Bin> bins;    ///< 15 bins of equal width, over the best probability
+  std::vector<Bin> bins;    ///< 15 bins of equal width of the best probability
   double error = 0.0;       ///< expected calibration error: Σ share · |confidence − right|
   double likelihood = 0.0;  ///< mean negative log-likelihood of the labels, nats for each box
   std::size_t boxes = 0;
 };
-/// `calibrations[i]`: the calibration for box i, from its fold.
+/// Returns the reliability of the boxes; `calibrations[i]` is the calibration for box i.
 Reliability reliabilityOf(const std::vector<BoxOutcome>& boxes,
                           const std::vector<Softening>& calibrations);
 
@@ -45,21 +46,21 @@ Reliability reliabilityOf(const std::vector<BoxOutcome>& boxes,
 /// of the frames, because consecutive frames are similar.
 std::vector<Softening> crossValidated(const std::vector<BoxOutcome>& boxes, std::size_t frames);
 
-/// Share of the boxes that are clutter, limited to [0.01, 0.99].
+/// Returns the share of the boxes that are clutter, limited to [0.01, 0.99].
 double clutterRateOf(const std::vector<BoxOutcome>& boxes);
 
 /// Outcome for a predicted measurement without a box: whether the object exists, and the posterior
-/// log-odds of its class by the best candidate near it, if there is one.
+/// log-odds of its class from the best candidate near it, if any.
 struct PrimedOutcome {
   bool there = false;
   std::optional<double> odds;
 };
-/// Logistic regression of `there` on the odds. Its result without the share of true places is the
-/// log-likelihood ratio. Empty if there are fewer than 40 of either kind.
+/// Fits a logistic regression of `there` on the odds. Without the prior odds of a true place, it
+/// gives the log-likelihood ratio. Returns nothing for fewer than 40 places of either kind.
 std::optional<inference::PrimedCalibration> fitPrimed(const std::vector<PrimedOutcome>& places,
                                                       double floor);
 
-/// Standard deviation from the median of the absolute values (× 1.4826).
+/// Returns the standard deviation, computed as 1.4826 times the median of the absolute values.
 double robustSigma(std::vector<double> values);
 
 }  // namespace perdure::tools

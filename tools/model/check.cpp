@@ -34,7 +34,7 @@ StartupError notLoaded(const fs::path& network, const Reason& reason) {
                                         "or plainer network of the family"};
 }
 
-/// Largest difference; NaN counts as infinite.
+/// Returns the largest difference; NaN counts as infinite.
 double differenceOf(const inference::Tensor& tensor, const std::vector<float>& expected) {
   double largest = 1.0, difference = 0.0;
   for (std::size_t i = 0; i < expected.size(); ++i) {

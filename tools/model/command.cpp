@@ -77,14 +77,14 @@ void seal(const fs::path& network) {
   writeChecked(description, json.dump(1) + "\n");
 }
 
-/// Runs the Python part and checks its network in OpenCV.
+/// Runs the Python part and checks the network that it wrote.
 void importTo(const fs::path& out, const Staging& staging, const ImportOptions& request) {
   const TemporaryFolder reference = temporaryFolder(fs::temp_directory_path(), "perdure-model-",
                                                     "set TMPDIR to a folder that you may write");
   const fs::path made = staging.path() / out.filename();
   ImportRequest wanted{request.network, made, out,
                        request.unchecked ? fs::path() : reference.path(), request.arguments};
-  if (!request.image.empty()) {  // needed for "--input camera"
+  if (!request.image.empty()) {  // "--input camera" needs the image
     const Frame picture = readPicture(request.image);
     wanted.arguments.push_back(fmt::format("--camera={}x{}", picture.width, picture.height));
   }

@@ -59,7 +59,7 @@ const KnownUse& useNamed(const KnownNetwork& network, const std::string& name) {
                                                    network.name, fmt::join(names, ", ")));
 }
 
-/// The difference between a file and the known one; empty if they are equal.
+/// Describes the difference between a file and the known one. Returns nothing if they are equal.
 std::optional<std::string> difference(const fs::path& path, const KnownFile& file) {
   const auto bytes = fs::file_size(path);
   if (bytes != file.bytes) {
@@ -119,7 +119,7 @@ void take(const KnownFile& file, const fs::path& path) {
               static_cast<unsigned long long>(file.bytes));
 }
 
-/// The file of class names in the folder of the descriptions.
+/// Returns the file of class names in a folder of model descriptions.
 fs::path classesOf(const KnownNetwork& network) {
   std::error_code error;
   for (const std::string& folder : inference::standardModelFolders()) {
@@ -147,7 +147,7 @@ fs::path describeDarknet(const fs::path& path) {
   return to;
 }
 
-/// The reason why the calibration cannot be used; empty if it can.
+/// Returns the reason why the calibration cannot be used; an empty string if it can.
 std::string whyUncalibrated(const nlohmann::ordered_json& description, const KnownNetwork& network,
                             const KnownUse& use, bool resized) {
   if (use.calibration.is_null()) return "no calibration was measured for " + use.name;
@@ -159,7 +159,8 @@ std::string whyUncalibrated(const nlohmann::ordered_json& description, const Kno
   return fmt::format("the calibration was measured at {}, not at this size", network.input);
 }
 
-/// Adds the known keys and the calibration to the description. `resized`: --input was given.
+/// Adds the known keys and the calibration to the description. `resized` is true if --input was
+/// given.
 void calibrated(const fs::path& description, const KnownNetwork& network, const KnownUse& use,
                 bool resized) {
   std::ifstream in(description);
@@ -176,7 +177,7 @@ void calibrated(const fs::path& description, const KnownNetwork& network, const 
   std::printf("calibrated  %s (%s)\n", use.calibration.dump().c_str(), use.measured.c_str());
 }
 
-/// Arguments of the import: known properties of the network, and the user's options.
+/// Returns the arguments of the import: the network's known properties, and the user's options.
 std::vector<std::string> importArguments(const KnownNetwork& network, const std::string& input) {
   std::vector<std::string> arguments = {"--classes=" + classesOf(network).string(),
                                         "--family=" + network.family};

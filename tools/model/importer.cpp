@@ -13,10 +13,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Debian's interpreter, because only it has Debian's python3-onnx.
+// Debian's interpreter. Others do not find Debian's python3-onnx.
 constexpr const char* kPython = "/usr/bin/python3";
 
-/// The folder of perdure_model in the source tree or in an installation, relative to the program.
+/// Returns the folder of perdure_model in the source tree or in an installation, relative to the
+/// program.
 std::optional<fs::path> pythonFolder() {
   std::error_code error;
   fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path();

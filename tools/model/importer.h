@@ -1,4 +1,5 @@
-// Reads an ONNX file, repairs it for OpenCV 4.6 and writes its model.json, by perdure_model.
+// Imports an ONNX file with perdure_model, which repairs it for OpenCV 4.6 and writes its
+// model.json.
 #pragma once
 
 #include <filesystem>
@@ -10,28 +11,29 @@ namespace perdure::tools {
 struct ImportRequest {
   std::filesystem::path network;
   std::filesystem::path out;           ///< the .onnx to write; its description is OUT.model.json
-  std::filesystem::path shown;         ///< name of `out` in messages; empty: unchanged
-  std::filesystem::path reference;     ///< a folder for checkAnswers(); empty: none is written
+  std::filesystem::path shown;         ///< name of `out` in messages; empty: `out`
+  std::filesystem::path reference;     ///< folder for the data of checkAnswers(); empty: none
   std::vector<std::string> arguments;  ///< options of perdure_model: --classes, --family …
 };
 
-/// NAME.perdure.onnx in `folder`, or beside the network if that is empty.
+/// Returns NAME.perdure.onnx in `folder`, or beside the network if `folder` is empty.
 std::filesystem::path importedPath(const std::filesystem::path& network,
                                    const std::filesystem::path& folder);
 
-/// Exit status of the Python part, which reports. Throws StartupError (69) if it is missing.
+/// Returns the exit status of the Python part, which prints results and errors. Throws StartupError
+/// (69) if the Python part is missing.
 int importNetwork(const ImportRequest& request);
 
 struct ImportOptions {
-  std::filesystem::path network, out, image;  ///< out: a folder; empty: the network's
+  std::filesystem::path network, out, image;  ///< out: a folder; empty: that of the network
   double threshold = 0.25;
   bool unchecked = false;
   std::vector<std::string> arguments{};  ///< options of the Python part
 };
 
 /// The complete `perdure model import`: import, comparison, test picture, output files. Prints the
-/// results. Throws StartupError, or CLI::RuntimeError with the status of the Python part, which has
-/// reported the error; then no file is written.
+/// results. Throws StartupError, or CLI::RuntimeError with the exit status of the Python part,
+/// which then has printed the error. After an error no file is written.
 void importAndLook(const ImportOptions& options);
 
 }  // namespace perdure::tools

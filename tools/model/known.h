@@ -1,4 +1,4 @@
-// Networks that are known to work, with their download addresses and properties.
+// List of networks that are known to work, with their download addresses and properties.
 #pragma once
 
 #include <cstdint>
@@ -14,11 +14,11 @@ struct KnownFile {
   std::uint64_t bytes = 0;
 };
 
-/// The reported classes for a kind of scene, and the calibration that was measured in it.
+/// Classes to report in a kind of scene, and the calibration that was measured there.
 struct KnownUse {
   std::string name;  ///< kind of scene: street, room
   std::vector<std::string> classes;
-  nlohmann::json calibration;  ///< content for model.json; null if none was measured
+  nlohmann::json calibration;  ///< `calibration` for model.json; null: none was measured
   std::string measured;        ///< data used for the measurement
 };
 
@@ -29,11 +29,12 @@ struct KnownNetwork {
   nlohmann::json keys;  ///< additional keys of model.json
 };
 
-/// The networks of `list`, or of the program's own list if that is empty. Throws StartupError if
-/// the list is missing (69) or inconsistent (78).
+/// Returns the networks of `list`, or of the program's own list if `list` is empty. Throws
+/// StartupError: 69 if the list is missing, 78 if it is inconsistent.
 std::vector<KnownNetwork> knownNetworks(const std::filesystem::path& list);
 
-/// Lower-case hexadecimal. Throws StartupError(kUnavailable) if the file cannot be read.
+/// Returns the SHA-256 digest in lower-case hexadecimal. Throws StartupError(kUnavailable) if the
+/// file cannot be read.
 std::string sha256Of(const std::filesystem::path& file);
 
 std::string describe(const KnownNetwork& network);

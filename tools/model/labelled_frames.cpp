@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 
 constexpr double kNothingSeen = 0.05, kEnoughSeen = 0.25, kWhollySeen = 0.95;
 
-/// Box of a cuboid whose corners are all in the image.
+/// Returns the box of the object's cuboid if all its corners are in the image.
 std::optional<Box> hullOf(const sim::TruthObject& object, const sim::TruthKey& key,
                           const RigidTransform& T_CW, const CameraModel& camera) {
   const auto box = boxAround(key.centre_W, key.yaw, object.size, T_CW, camera);
@@ -24,7 +24,8 @@ std::optional<Box> hullOf(const sim::TruthObject& object, const sim::TruthKey& k
   return inside ? box : std::nullopt;
 }
 
-/// Converts a view of a simulated object to a label; empty if its visible part is too small.
+/// Converts a view of a simulated object to a label. Returns nothing if its visible part is too
+/// small.
 std::optional<TrueBox> labelOf(const sim::TruthView& view, const CameraModel& camera,
                                double least_px) {
   const Box box = view.boxInside(camera.width(), camera.height());
@@ -97,7 +98,8 @@ TrueBox labelOf(const replay::KittiLabel& label, const replay::ClassAliases& ali
 LabelledData readKitti(const LabelRequest& request, std::unique_ptr<replay::Dataset> dataset,
                        const replay::ClassAliases& aliases, double least_px) {
   LabelledData data;
-  // Excludes cyclists: networks report a person and a bicycle, KITTI labels only some.
+  // Persons and bicycles are excluded. Networks report both for a cyclist, but KITTI labels only
+  // some of them.
   data.judged = {"car", "truck", "van"};
   const auto labels = replay::readKittiLabels(labelFile(request, dataset->kind()));
   for (std::uint64_t i = 0; i < dataset->frameCount(); i += request.every) {

@@ -1,4 +1,4 @@
-// Frames with true boxes: simulated folders, KITTI, or frames with the objects of a run.
+// Frames with true boxes, from simulated folders, from KITTI, or from the objects of a run.
 #pragma once
 
 #include <filesystem>
@@ -18,9 +18,10 @@ namespace perdure::tools {
 
 struct TrueBox {
   Box box;                 ///< complete outline in pixels, clipped to the image
-  std::string class_name;  ///< canonical; empty: an unlabelled region
-  bool ignored = false;    ///< neither a miss nor a false alarm
-  /// Box of the cuboid's image; empty if the object is partly hidden or the box is unknown.
+  std::string class_name;  ///< canonical name; empty: an unlabelled region
+  bool ignored = false;    ///< counts neither as a miss nor as a false alarm
+  /// Box around the image of the object's cuboid; empty if it is unknown or the object is partly
+  /// hidden.
   std::optional<Box> hull;
 };
 
@@ -32,9 +33,9 @@ struct LabelledFrame {
 struct LabelRequest {
   std::filesystem::path data;
   std::string sequence;  ///< sequence of KITTI tracking
-  /// label_02/SEQUENCE.txt (found automatically in KITTI tracking), or OUT of a run.
+  /// label_02/SEQUENCE.txt (found automatically in KITTI tracking), or the output folder of a run.
   std::filesystem::path labels;
-  std::uint64_t every = 1;  ///< uses each N-th frame
+  std::uint64_t every = 1;  ///< use every N-th frame
 };
 
 struct LabelledData {
@@ -45,26 +46,27 @@ struct LabelledData {
   bool sides_known = true;  ///< false: the sides of a box are predictions, not measured
 };
 
-/// Box around the images of a cuboid's corners, not clipped; empty if a corner has no image.
+/// Returns the box around the images of a cuboid's corners, not clipped to the image; nothing if a
+/// corner cannot be projected.
 std::optional<Box> boxAround(const Eigen::Vector3d& centre_W, double yaw,
                              const Eigen::Vector3d& size, const RigidTransform& T_CW,
                              const CameraModel& camera);
 
-/// Ignores objects whose visible share is below a quarter, or whose longer side is below `least_px`
-/// (pixels of the image); omits those below a twentieth. For KITTI, ignores objects that are
-/// largely occluded (2, 3) or truncated, and DontCare regions. Throws StartupError (69) with the
-/// missing file and the fix.
+/// Reads frames and labels. Objects are `ignored` if their visible share is below a quarter or
+/// their longer side below `least_px` pixels of the image; they are omitted if that share is below
+/// a twentieth. In KITTI, objects that are largely occluded (2, 3) or truncated and DontCare
+/// regions are ignored. Throws StartupError (69) with the missing file and the fix.
 LabelledData readLabelled(const LabelRequest& request, const replay::ClassAliases& aliases,
                           double least_px);
 
-/// Uses the objects of a run as labels, for calibration without manual labels.
+/// Reads frames with the objects of a run as labels, for a calibration without manual labels.
 ///
-/// `request.labels` is OUT of `perdure pipeline` over the same frames. Objects of its final map
-/// (objects_final.csv) are expected in each frame in which they are not occluded.
+/// `request.labels` is the output folder of `perdure pipeline` over the same frames. Objects of its
+/// final map (objects_final.csv) are expected in each frame in which they are not occluded.
 ///
 /// Boxes of objects that are uncertain, truncated, largely occluded or small are ignored. Boxes
-/// beside an object are ignored too, because sizes of the map have errors. Only classes with at
-/// least twenty views are judged. Boxes of moving objects, and of objects missing from the map,
+/// beside an object are ignored too, because sizes in the map have errors. Only classes with at
+/// least twenty views are `judged`. Boxes of moving objects, and of objects missing from the map,
 /// count as clutter.
 ///
 /// Throws StartupError (69) with the fix if there are too few data.

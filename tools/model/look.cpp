@@ -22,7 +22,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Converts the evidence back to the network's own score, without the calibration.
+/// Returns the best class of a detection with the network's own score, which is computed back from
+/// the calibrated evidence.
 Sight sightOf(const Detection& detection, const ModelInfo& model,
               const inference::Calibration& calibration) {
   const auto& a = detection.activations;
@@ -75,7 +76,7 @@ Look lookAt(const fs::path& network, const Frame* frame, double threshold) {
   for (const Detection& detection : answer->detections) {
     look.sights.push_back(sightOf(detection, node.model(), description.calibration));
   }
-  // Duplicate detections of one object lose evidence after the threshold.
+  // Applies the threshold again, because second detections of an object have lost evidence.
   std::erase_if(look.sights, [&](const Sight& s) { return s.score < threshold; });
   std::ranges::stable_sort(look.sights, std::greater{}, &Sight::score);
   return look;

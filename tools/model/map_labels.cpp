@@ -10,9 +10,9 @@
 namespace perdure::tools {
 namespace {
 
-constexpr double kSure = 0.9;     // least score of an object that counts as true
-constexpr double kInImage = 0.9;  // least share of a box within the image if it is not truncated
-constexpr double kHidden = 0.25;  // largest occluded share of a box
+constexpr double kSure = 0.9;     // least score of an object that is used as label
+constexpr double kInImage = 0.9;  // a box with a smaller share in the image is truncated
+constexpr double kHidden = 0.25;  // largest occluded share of a box that is not ignored
 constexpr double kBeside = 0.25;  // margin for errors of the map, as a share of a box
 constexpr double kSameTime_s = 1e-3;
 constexpr std::size_t kLeastViews = 20;
@@ -32,7 +32,7 @@ Box grown(const Box& box, double share) {
   return {box.x1 - x, box.y1 - y, box.x2 + x, box.y2 + y};
 }
 
-/// The objects that are at least partly in the image.
+/// Returns the objects that are at least partly in the image.
 std::vector<View> viewsOf(const std::vector<const EstimateRow*>& rows, const RigidTransform& T_WB,
                           const CameraModel& camera) {
   const RigidTransform T_CW = (T_WB * camera.T_BC()).inverse();

@@ -1,4 +1,5 @@
-// Writes related results as one unit: beside the files of their folder, then moves all or none.
+// Writes related files as one unit: first to a temporary folder beside them, from which all are
+// moved or none.
 #pragma once
 
 #include <filesystem>
@@ -9,19 +10,20 @@
 
 namespace perdure::tools {
 
-/// A folder in `parent`. Throws StartupError: kInputOutput (disk full) or kUnavailable.
+/// Creates a temporary folder in `parent`. Throws StartupError: kInputOutput if the disk is full,
+/// otherwise kUnavailable.
 TemporaryFolder temporaryFolder(const std::filesystem::path& parent, const std::string& prefix,
                                 const std::string& fix);
 
-/// Holds files on the same disk until they are moved to a folder, which need not exist yet.
+/// Stores files on the disk of `folder` until they are moved there. The folder need not exist yet.
 class Staging {
  public:
   explicit Staging(std::filesystem::path folder);
 
   const std::filesystem::path& path() const { return waiting_.path(); }
-  /// The message with paths of the final folder.
+  /// Returns the message with the paths of the final folder in place of the temporary ones.
   std::string said(std::string message) const;
-  /// Moves all files to the folder. Throws StartupError on failure, and then restores the folder.
+  /// Moves all files to the folder. If this fails, restores the folder and throws StartupError.
   void publish();
 
  private:

@@ -7,10 +7,12 @@
 
 namespace perdure::tools {
 
-/// Ten significant digits hide the last bits, in which compilers differ.
+/// Rounds to ten significant digits, because results of different compilers differ in the last
+/// bits.
 double rounded(double value);
 
-/// Contains only the observed kinds; null for an empty ledger. Unknown kinds are named "kind_N".
+/// Returns the kinds of evidence that were observed; null for an empty ledger. Kinds without a name
+/// are called "kind_N".
 nlohmann::ordered_json toJson(const Ledger& ledger);
 
 }  // namespace perdure::tools

@@ -10,8 +10,8 @@ namespace perdure::tools {
 namespace {
 
 constexpr double kMovingAbove = 0.5;
-constexpr double kMostlySeen = 0.6;    // FINAL: visible share below which an object is occluded
-constexpr double kBelievedFrom = 0.1;  // FINAL: existence from which a track counts as detected
+constexpr double kMostlySeen = 0.6;    // objects_final.csv: an object with less is occluded
+constexpr double kBelievedFrom = 0.1;  // objects_final.csv: a track's rows begin at this existence
 
 bool isHidden(Visibility v) { return v == Visibility::kOccluded; }
 
@@ -45,7 +45,8 @@ const ShapePoints& cuboidPoints() {
   return corners;
 }
 
-/// Hull of a row's shape, or of its cuboid; empty if its centre is outside the image.
+/// Outline of a row in the image: the hull of its shape, or the box of its cuboid if `shape` is
+/// null. Empty if the row's centre is outside the image.
 std::optional<Outline> outlineOf(const ObjectRow& row, const ShapePoints* shape,
                                  const RigidTransform& T_CW, const CameraModel& camera) {
   const Eigen::Vector3d centre = T_CW * row.p_W;
@@ -73,7 +74,7 @@ bool covers(const Outline& outline, const cv::Point2f& at) {
   return cv::pointPolygonTest(outline.hull, at, false) > 0.0;
 }
 
-/// Share of an outline that no nearer one covers.
+/// The share of an outline that no nearer outline of `all` covers.
 double visibleShare(const Outline& outline, const std::vector<Outline>& all) {
   constexpr int kCells = 16;
   int open = 0, own = 0;
@@ -183,7 +184,8 @@ std::map<ObjectId, ObjectHistory::Look> ObjectHistory::looksOfSurvivors(
   return looks;
 }
 
-/// The last frame in which an object was estimated to be moving elsewhere.
+/// Returns, for each object, the last frame in which it was estimated to be moving at a place that
+/// is not its last position.
 std::map<ObjectId, std::uint64_t> ObjectHistory::lastFramesElsewhere() const {
   constexpr double kSurely = 21.1;  // χ² of three degrees of freedom, 0.9999
   std::map<ObjectId, std::uint64_t> result;

@@ -1,5 +1,5 @@
-// Estimates of each object in each frame: INST the causal ones, FINAL the last one, mapped back
-// (paper, line 337).
+// Estimates of each object in each frame: at that frame (objects_inst.csv), and the last estimate
+// transferred back to it (objects_final.csv; paper, line 337).
 #pragma once
 
 #include <cstdint>
@@ -15,10 +15,11 @@
 
 namespace perdure::tools {
 
-/// Corners of a convex solid, in half lengths, widths and heights from the centre.
+/// Corners of a convex solid about its centre, in units of its half length, half width and half
+/// height.
 using ShapePoints = std::vector<Eigen::Vector3d>;
 
-/// A row of objects_inst.csv or objects_final.csv: centre in W, metres, radians.
+/// A row of objects_inst.csv or objects_final.csv: the centre is in W; metres and radians.
 struct ObjectRow {
   std::uint64_t frame = 0;
   TimePoint time;
@@ -31,25 +32,25 @@ struct ObjectRow {
   bool visible = true;
 };
 
-/// Collects by frame; a later message about the same frame replaces the earlier one.
+/// Collects messages by frame. A later message about the same frame replaces the earlier one.
 class ObjectHistory {
  public:
-  /// Needed for FINAL, to project the last estimate into the frames.
+  /// Sets the camera that projects the last estimates into the frames for finalRows().
   void setCamera(const CameraCalibration& calibration) { camera_.emplace(calibration); }
-  /// Shapes of the classes, also for FINAL; classes without one use their cuboid.
+  /// Sets the shapes of the classes for finalRows(). Classes without a shape use their cuboid.
   void setShapes(std::map<std::string, ShapePoints> shapes) { shapes_ = std::move(shapes); }
   void add(const Objects& objects);
   void add(const Event& event);
 
-  /// Confirmed, static, present objects that are not occluded, by frame and id.
+  /// Rows of confirmed, static, present objects that are not occluded, sorted by frame and id.
   std::vector<ObjectRow> inst() const;
-  /// Rows with the surviving id after merges and the last estimate. They start at the first
-  /// detection with existence r of at least 0.1. A frame has a row if the object projects into the
-  /// image and is not occluded. Occluded means: estimated so at the time, or less than 0.6 visible
-  /// beside the last estimates of nearer objects.
+  /// Rows with the last estimate of each object and its surviving id after merges. An object's rows
+  /// start at the first frame with an existence of at least 0.1. A frame has a row if the object
+  /// projects into the image and is not occluded. An object is occluded if it was estimated so at
+  /// that frame, or if the last estimates of nearer objects leave less than 0.6 of it visible.
   ///
-  /// Objects that ended as moving or deleted have no rows. An object that moved before it stopped
-  /// at its last position has no rows until then.
+  /// Objects that were moving or deleted at the end have no rows. The rows of an object that moved
+  /// start when it has stopped at its last position.
   std::vector<ObjectRow> finalRows() const;
   /// The last belief of each confirmed object that was neither deleted nor merged, by id.
   std::vector<ObjectBelief> lastBeliefs() const;

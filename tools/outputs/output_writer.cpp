@@ -20,7 +20,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Declared default, not measured: without GNSS, the map opens in any viewer at 0°, 0°.
+// Reference without GNSS: viewers show the map at 0°, 0°.
 constexpr GeoAnchor kDefaultAnchor{};
 
 template <class Derived>
@@ -265,7 +265,7 @@ void OutputWriter::writeObjects() const {
   writeJson("objects.json", {{"objects", objects}});
 }
 
-/// T_MB at a pose within a second of the anchor's time, in the frame of the map.
+/// T_MB of the pose nearest to the time of the GNSS anchor; empty if none is within a second.
 std::optional<RigidTransform> OutputWriter::poseAtAnchor() const {
   if (!anchor_) return std::nullopt;
   constexpr Duration kNear = std::chrono::seconds(1);

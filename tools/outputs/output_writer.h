@@ -1,4 +1,4 @@
-// Writes the files of `perdure pipeline` and the demo; same messages, same bytes.
+// Writes the files of `perdure pipeline` and the demo. The same messages give the same bytes.
 #pragma once
 
 #include <filesystem>
@@ -24,7 +24,8 @@ namespace perdure::tools {
 
 class OutputWriter {
  public:
-  /// Creates the folder. Throws StartupError (kUnavailable). `sequence`: value of that column.
+  /// Creates the folder. Throws StartupError(kUnavailable) if that fails. `sequence`: the value of
+  /// the tables' column of this name.
   OutputWriter(std::filesystem::path folder, std::string sequence);
 
   void setShapes(std::map<std::string, ShapePoints> shapes) {
@@ -35,23 +36,23 @@ class OutputWriter {
   void onObjects(const Objects& objects);
   void onEvent(const Event& event);
   void onDetections(const Detections& detections) { log_.add(detections); }
-  /// Draws only points with a standard deviation of at most a metre.
+  /// Stores the points for map.png whose standard deviation is at most 1 m.
   void onLandmarks(const Landmarks& landmarks);
-  /// Ground truth for the pictures, in W; to be called before finish().
+  /// Sets the ground truth for the pictures, in W. Must be called before finish().
   void setTruth(PictureTruth truth) { truth_ = std::move(truth); }
-  /// Writes map.png and map.geojson in M, and trajectory_map.tum with the trajectory of the map's
-  /// final graph. To be called before finish().
+  /// Makes finish() write map.png and map.geojson in M, and trajectory_map.tum with the trajectory
+  /// by the map's final graph. Must be called before finish().
   void setInMap(DriveInMap in_map) { in_map_ = std::move(in_map); }
 
   /// Writes all files except events.jsonl and odometry.csv, which are written as messages arrive.
   /// Throws StartupError(kInputOutput) with the file that is incomplete.
   void finish();
-  /// Writes an additional file: timing.json, report.json.
+  /// Writes an additional file, such as timing.json or report.json.
   void writeJson(const std::string& name, const nlohmann::ordered_json& json) const;
 
   const ObjectHistory& history() const { return history_; }
   const DriveLog& log() const { return log_; }
-  /// Poses of usable odometry, by frame.
+  /// Poses of the usable odometry messages, by frame.
   const std::map<std::uint64_t, replay::StampedPose>& poses() const { return poses_; }
   std::size_t odometryFrames() const { return poses_.size(); }
   const std::filesystem::path& folder() const { return folder_; }
@@ -65,7 +66,7 @@ class OutputWriter {
   void writeGeoJson() const;
   void writePictures() const;
   MapContent mapContent() const;
-  /// The beliefs in M if the run has a map frame, otherwise unchanged in W.
+  /// The last beliefs, transformed to M if the run has a map frame; otherwise in W.
   std::vector<ObjectBelief> beliefsInMap() const;
   std::optional<RigidTransform> poseAtAnchor() const;
 

@@ -1,4 +1,4 @@
-// The folder of a run's results; results of an earlier run stay until the new ones are complete.
+// The folder of a run's results. Results of an earlier run stay until the new ones are complete.
 #pragma once
 
 #include <filesystem>
@@ -7,20 +7,22 @@
 
 namespace perdure::tools {
 
-/// A folder without a run is written directly. Otherwise files are written to a subfolder
-/// `unfinished`, and replace the earlier ones when the run has ended. If the run fails, the
-/// subfolder is removed, and so is a new folder that stayed empty. Other processes cannot write to
-/// the folder meanwhile.
+/// If the folder has no earlier run, the files are written directly. Otherwise they are written to
+/// the subfolder `unfinished`, and replace the earlier files when the run has ended. If the run
+/// fails, the destructor removes the subfolder, and also a new folder that is still empty. The
+/// folder is locked against other processes meanwhile.
 class ResultsFolder {
  public:
-  /// Throws StartupError(kUnavailable) if another process writes, or remains cannot be removed.
+  /// Locks the folder. Throws StartupError(kUnavailable) if another process writes to it, or if
+  /// files of an unfinished run cannot be removed.
   explicit ResultsFolder(std::filesystem::path out);
   ResultsFolder(const ResultsFolder&) = delete;
   ResultsFolder& operator=(const ResultsFolder&) = delete;
   ~ResultsFolder();
 
   const std::filesystem::path& folder() const { return written_; }
-  /// Replaces the earlier results; no file may be open. Throws StartupError(kInputOutput).
+  /// Replaces the earlier results. No file may be open. Throws StartupError(kInputOutput) if a file
+  /// cannot be replaced.
   void keep();
 
  private:

@@ -10,7 +10,7 @@
 namespace perdure::tools {
 namespace {
 
-/// A message that is due if more than one frame in `one_of` has the reason.
+/// A warning that is given if more than one frame in `one_of` has the reason `code`.
 struct Rule {
   const char* code;
   std::uint64_t one_of;
@@ -61,7 +61,7 @@ Doubts doubtsOfRun(const RunFacts& facts) {
                       "what came before and after is not in one frame of reference; perdure doctor "
                       "--data says why"});
   }
-  constexpr std::uint64_t kOneLost = 20;  // recordings always lose some
+  constexpr std::uint64_t kOneLost = 20;  // tolerates one lost image in 20; recordings lose some
   const std::uint64_t lost = imagesLost(facts.capture), all = facts.frames + lost;
   if (kOneLost * lost > all) {
     doubts.push_back(

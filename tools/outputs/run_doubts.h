@@ -1,4 +1,4 @@
-// Problems of a run that ended normally, as warnings and in report.json.
+// Problems of a run that ended normally. They are printed as warnings and stored in report.json.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -16,22 +16,22 @@ struct Doubt {
 using Doubts = std::vector<Doubt>;
 
 struct RunFacts {
-  /// Counts of vio, or, with given poses, of the node that computes landmarks.
+  /// Reasons counted by vio; if poses are given, by the node that computes landmarks.
   ReasonCounts vio = {};
   std::uint64_t frames = 0;  ///< frames of the first camera
   ReasonCounts capture = {};
-  std::uint64_t without_pose = 0;  ///< those without a given pose
+  std::uint64_t without_pose = 0;  ///< frames without a given pose
   std::uint64_t boxes = 0, objects = 0;
   replay::DataFindings findings = {};  ///< findings before the run
 };
 
-/// Number of images that are missing, cannot be read, or have a line that cannot be used.
+/// Number of images that are missing or unreadable, or whose line in the dataset is unusable.
 std::uint64_t imagesLost(const ReasonCounts& capture);
 
-/// Frames without a visual update, an empty map, changed clocks, contradictions.
+/// Finds problems: frames without a visual update, an empty map, changed clocks, contradictions.
 Doubts doubtsOfRun(const RunFacts& facts);
 
-/// " | WARNING: …" with each `what`; "" if there are none.
+/// Returns " | WARNING: …" with each `what`; "" if there are no doubts.
 std::string endOfLine(const Doubts& doubts);
 void printWarnings(const Doubts& doubts);
 nlohmann::ordered_json toJson(const Doubts& doubts);

@@ -1,4 +1,4 @@
-// Processor and wall time by stage, for timing.json.
+// Measures CPU and wall time by stage, for timing.json.
 #pragma once
 
 #include <map>
@@ -10,7 +10,7 @@
 
 namespace perdure::tools {
 
-/// Measures stages; the time of a nested stage does not count for the outer one.
+/// Measures stages. The time of a nested stage does not count for the outer stage.
 class StageTimer {
  public:
   /// Adds CPU time (all threads) and wall time of `work` to `stage` as one call.
@@ -19,7 +19,8 @@ class StageTimer {
     const Span span(*this, stage);
     return work();
   }
-  /// Runs `work` and adds its times to the next call of the stage: inertial samples between frames.
+  /// Runs `work` and adds its times to the next call of the stage. An example is the processing of
+  /// inertial samples between frames.
   template <class Work>
   auto timeTowardsNext(const std::string& stage, Work&& work) {
     const Span span(*this, stage, false);

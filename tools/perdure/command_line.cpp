@@ -27,7 +27,7 @@ int refuseOutput(const std::string& why) {
   return static_cast<int>(ExitCode::kInputOutput);
 }
 
-/// Checks that all output was written. A full disk or a closed file is an error.
+/// Returns `status`, or an error status if output was lost because of a full disk or a closed file.
 int checkedOutput(int status) {
   errno = 0;
   std::cout.flush();
@@ -62,7 +62,7 @@ int run(CLI::App& app, int argc, char** argv) {
   return static_cast<int>(ExitCode::kOk);
 }
 
-/// A comparison with a bound accepts "nan".
+/// Refuses numbers that are not finite, because CLI11's range checks accept "nan".
 void refuseInfinite(CLI::App& app) {
   const CLI::Validator finite(
       [](std::string& text) {
@@ -81,7 +81,7 @@ void refuseInfinite(CLI::App& app) {
 int runCommand(const char* name, void (*set_up)(CLI::App&), int argc, char** argv) {
   const auto entry = std::ranges::find(commands(), std::string(name), &CommandEntry::name);
   check(entry != commands().end(), "a subcommand has a line in tools/perdure/commands.cpp");
-  std::signal(SIGXFSZ, SIG_IGN);  // a limit of the file size is reported like a full disk
+  std::signal(SIGXFSZ, SIG_IGN);  // a write beyond the file size limit fails like on a full disk
   CLI::App app(entry->summary, std::string("perdure ") + name);
   set_up(app);
   refuseInfinite(app);

@@ -1,4 +1,5 @@
-// The subcommands of `perdure`, each an executable in libexec/perdure (perdure_command).
+// The subcommands of `perdure`. Each is an executable in libexec/perdure (perdure_command in
+// CMake).
 #pragma once
 
 #include <filesystem>
@@ -15,7 +16,7 @@ struct CommandEntry {
   const char* summary;
 };
 
-/// In the order of `perdure --help`.
+/// All subcommands in the order of `perdure --help`.
 std::span<const CommandEntry> commands();
 
 /// Each function adds the options of its subcommand, and nested subcommands.
@@ -38,10 +39,10 @@ void setUpSimulate(CLI::App& command);
 void setUpStatus(CLI::App& command);
 void setUpTopics(CLI::App& command);
 
-/// The main function of a subcommand's executable. Returns the exit status.
+/// Runs a subcommand; called by the main function of its executable. Returns the exit status.
 int runCommand(const char* name, void (*set_up)(CLI::App&), int argc, char** argv);
 
-/// The folder of `perdure` and the services, for a subcommand's executable.
+/// Returns the folder with `perdure` and the services. For use in a subcommand's executable.
 std::filesystem::path programFolder();
 
 }  // namespace perdure::tools

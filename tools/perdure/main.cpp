@@ -1,5 +1,6 @@
-// The `perdure` command. It replaces its own process with the executable of a subcommand. These are
-// in libexec/perdure beside the folder of this program, in a build folder as in an installation.
+// The `perdure` command. It replaces its own process with the executable of a subcommand. The
+// executables are in libexec/perdure beside the folder of this program, both in a build folder and
+// in an installation.
 #include <unistd.h>
 
 #include <algorithm>
@@ -63,9 +64,9 @@ int refuseUnknown(const std::string& word) {
                                       "\nRun with --help for more information.");
 }
 
-/// Returns only if the executable cannot be started.
+/// Replaces this process with a subcommand. Returns only if the executable cannot be started.
 int start(const std::string& program, const std::string& name, const Words& arguments) {
-  // `ps` shows the command line as the user typed it.
+  // argv[0] of the new process, so that `ps` shows the command line as the user typed it.
   std::string called = program + " " + name;
   std::vector<char*> words{called.data()};
   for (const std::string& word : arguments) words.push_back(const_cast<char*>(word.c_str()));

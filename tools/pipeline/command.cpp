@@ -89,7 +89,7 @@ void addOptions(CLI::App& app, PipelineOptions& options) {
   app.add_flag("--quiet", options.quiet, "No progress");
 }
 
-/// Updates one line on a terminal; otherwise prints a line every 50 frames, or every two seconds.
+/// Updates one line on a terminal; otherwise prints a line every 50 frames and every two seconds.
 void showProgress(const Pipeline& pipeline, const PipelineCounts& counts) {
   using Clock = std::chrono::steady_clock;
   static Clock::time_point shown = Clock::now();
@@ -125,8 +125,8 @@ void printReasons(const Pipeline& pipeline) {
   printWarnings(pipeline.doubts());
 }
 
-/// Writes to options.out. If there are no results, returns the error to report after the outputs
-/// are stored.
+/// Runs the pipeline and writes its outputs to options.out. If the run has no results, returns the
+/// error, which is to be reported when the outputs are stored.
 std::optional<StartupError> runInto(const PipelineOptions& options, const std::string& named) {
   if (!options.quiet) std::fprintf(stderr, "checks %s\n", options.data.c_str());
   Pipeline pipeline(options);
@@ -153,7 +153,7 @@ std::optional<StartupError> runInto(const PipelineOptions& options, const std::s
   return std::nullopt;
 }
 
-/// --rig auto: writes OUT/rig.yaml.
+/// Implements `--rig auto`: finds the rig and writes it to OUT/rig.yaml.
 void findRig(PipelineOptions& options) {
   constexpr double kFirst_s = 60.0;
   const std::string file = options.out + "/rig.yaml";

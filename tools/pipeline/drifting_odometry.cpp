@@ -13,7 +13,7 @@ double declaredScale(const DriftConfig& config) {
   return config.scale_sigma > 0.0 ? config.scale_sigma : std::abs(config.scale);
 }
 
-/// The derivative of `v` by a small rotation about the vertical.
+/// The derivative of `v` with respect to the angle of a small rotation about the vertical.
 Eigen::Vector3d turned(const Eigen::Vector3d& v) { return {-v.y(), v.x(), 0.0}; }
 
 /// Maps [yaw, p] to [θ, p] with θ in W.
@@ -31,7 +31,7 @@ Matrix6d intoBody(const RigidTransform& T_WB) {
   return D;
 }
 
-/// Covariance of roll and pitch in W, whose error is constant.
+/// Covariance of the pose with variance `value` of roll and pitch in W. Their error is constant.
 Matrix6d tilt(double value) {
   Matrix6d T = Matrix6d::Zero();
   T(0, 0) = T(1, 1) = value;
@@ -66,7 +66,7 @@ void DriftCovariance::advance(const Eigen::Vector3d& step_W, double sigma_yaw) {
   Eigen::Vector4d least = Eigen::Vector4d::Constant(kLeastStepPosition * kLeastStepPosition);
   least(0) = kLeastStepRotation * kLeastStepRotation + sigma_yaw * sigma_yaw;
 
-  // The estimate of the scale given the error so far, and its remaining variance.
+  // The scale's linear regression on u: its gain, and the variance that remains.
   const Eigen::Matrix4d P = joint_.topLeftCorner<4, 4>();
   const Eigen::Vector4d with_scale = joint_.topRightCorner<4, 1>();
   const Eigen::Vector4d gain = solveSymmetric(P, with_scale);
@@ -112,9 +112,8 @@ void DriftingOdometry::begin(const RigidTransform& true_T_WB) {
                          Eigen::Vector3d::Zero());
 }
 
-/// The true increment, in the axes of the estimated attitude and multiplied by the scale; then the
-/// yaw walks. A rotation about gravity is the same in the body and when it precedes all rotations
-/// of W.
+/// Adds the true increment, rotated by the yaw error and multiplied by 1 + scale. Then adds a
+/// random step to the yaw error.
 void DriftingOdometry::advance(const RigidTransform& true_T_WB, double seconds) {
   const Eigen::Vector3d true_step = true_T_WB.p - true_T_WB_.p;
   const double walk = config_.yaw_walk * std::sqrt(true_step.norm());

@@ -11,23 +11,24 @@
 
 namespace perdure::tools {
 
-/// The configuration of service `drifting`.
+/// The configuration of `drifting`, in which distances are too long by `scale` and yaw drifts.
 struct DriftConfig {
   double scale = 0.005;        ///< relative error of the reported distance
-  double scale_sigma = 0.0;    ///< its declared standard deviation; 0: |scale|
+  double scale_sigma = 0.0;    ///< declared standard deviation of `scale`; 0: |scale|
   double yaw_walk = 5.236e-4;  ///< rad/√m
   std::int64_t seed = 1;
   bool own_frame = false;
 };
 void describe(DriftConfig& config, config::Fields& fields);
 
-/// Growth of the errors of [yaw, p] (u) and of the scale (s) in W: u' = A u + Δ s + noise. Odometry
-/// does not contain s, so its transition is the best one for u alone: Φ = E[u' uᵀ] P⁻¹ and Q = P' −
-/// Φ P Φᵀ.
+/// Propagates the errors u of [yaw, p] in W and s of the scale: u' = A u + Δ s + noise, with Δ the
+/// step. Messages do not contain s, so their transition is the best linear one for u alone:
+/// Φ = E[u' uᵀ] P⁻¹ and Q = P' − Φ P Φᵀ, with P and P' the covariances of u and u'.
 class DriftCovariance {
  public:
   DriftCovariance(double sigma_yaw, double sigma_position, double sigma_scale);
-  /// The body moved by `step_W`, as reported; then its yaw walked with deviation `sigma_yaw`.
+  /// Propagates over the reported step `step_W` (m) and a random yaw step with deviation
+  /// `sigma_yaw`.
   void advance(const Eigen::Vector3d& step_W, double sigma_yaw);
 
   /// Covariance of [yaw, p, s].
@@ -41,8 +42,8 @@ class DriftCovariance {
   Eigen::Matrix4d transition_ = Eigen::Matrix4d::Identity(), noise_ = Eigen::Matrix4d::Zero();
 };
 
-/// Gravity remains exact: z of W is up. W is the frame of the poses. With `own_frame` it is the
-/// level frame in which the first requested pose has position and yaw 0.
+/// Odometry that drifts in position and yaw; z of W stays exactly up. W is the frame of the poses,
+/// or with `own_frame`, the level frame in which the first requested pose has position and yaw 0.
 class DriftingOdometry {
  public:
   /// `accuracy`: the declared accuracy of the poses before the drift is added.

@@ -1,5 +1,5 @@
-// Instance ids of the nodes in a pipeline run. They are fixed, so that outputs do not depend on the
-// run. Another run on the same map has other ids (Pipeline::instanceOf).
+// Instance ids of the nodes in a pipeline run. They are fixed, so that repeated runs give the same
+// outputs. Further runs on a stored map have other ids (Pipeline::instanceOf).
 #pragma once
 
 #include "common/base/ids.h"

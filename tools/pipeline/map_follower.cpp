@@ -10,8 +10,8 @@ namespace {
 
 using mapping::LevelPose;
 
-/// T_MW that transforms a belief to the object's pose in the graph: `placed` in M. Its yaw is known
-/// modulo 180°; `turn` is the approximate yaw of T_MW.
+/// Returns the T_MW that transforms a belief to `placed`, the object's pose in M by the graph. The
+/// yaw of `placed` is known modulo 180°; `turn` is the approximate yaw of T_MW.
 RigidTransform layingOf(const ObjectBelief& belief, const mapping::PlacedObject& placed,
                         double turn) {
   const Vector7d& mean = belief.best().mean;
@@ -55,8 +55,8 @@ DriveInMap MapFollower::finish(const mapping::Mapper& mapper,
         frames.at(frames.anchorOf(record, world, belief.last_seen), world).T_MW;
     drive.objects[belief.id] = T_MW;
     if (!belief.recalled || record == nullptr) continue;
-    // The graph placed it and it was not detected since, so its position does not depend on the
-    // session's W.
+    // The graph placed a recalled object, and it has not been detected since. So its position does
+    // not depend on the session's W.
     const mapping::Sighting& sighting = record->sighting;
     if (!isDrawn(frames, sighting.anchor, map)) continue;
     const auto placed =

@@ -1,4 +1,4 @@
-// The pose of a run in M: tracked during the run and evaluated at the end.
+// Records the poses of a run in M during the run, and computes the final ones at its end.
 #pragma once
 
 #include <optional>
@@ -13,10 +13,10 @@ class MapFollower {
  public:
   explicit MapFollower(const WorldId& session) : session_(session) {}
 
-  /// Call it for each frame of the session after the mapper has received the frame.
+  /// Records the body's position. Must be called for each frame after the mapper has received it.
   void follow(const Odometry& odometry, const mapping::Mapper& mapper);
 
-  /// `last`: the last belief of each object, in the session's W.
+  /// Returns the poses by the final graph. `last`: each object's last belief, in the session's W.
   DriveInMap finish(const mapping::Mapper& mapper, const std::vector<ObjectBelief>& last) const;
 
  private:

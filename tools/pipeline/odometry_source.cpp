@@ -47,8 +47,9 @@ std::optional<Odometry> PoseOdometry::at(const FrameStamp& stamp) {
   return odometry;
 }
 
-/// The error of truth is constant in W; the rotation error is in body axes, so it rotates relative
-/// to W. The error of odometry turns the step that follows it, and the step adds its own.
+/// Adds the increment's transition and covariance. A bounded error is constant in W; its rotation
+/// part is in body axes, so the transition rotates it. For other poses, the rotation error also
+/// turns the step, and the step has an error of its own.
 void PoseOdometry::addIncrement(Odometry& odometry) const {
   const RigidTransform& before = last_->T_WB;
   odometry.has_increment = true;

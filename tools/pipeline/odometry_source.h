@@ -9,24 +9,25 @@
 
 namespace perdure::tools {
 
-/// Declared accuracy of poses that have none of their own. The default is for a pose file: 2 mrad,
-/// 2 cm, 0.2 m/s.
+/// Declared accuracy of poses whose file states none; rad, m, m/s. The default is for a pose file.
 struct PoseAccuracy {
   double sigma_rotation = 2e-3, sigma_position = 0.02, sigma_velocity = 0.2;
-  /// The error neither grows nor decays from frame to frame (truth). If false, increments have the
-  /// covariances of the file's steps; without these, filter and graph assume a random walk.
+  /// True if the error neither grows nor decays from frame to frame, as for truth. If false,
+  /// increments have the covariances of the file's steps; if the file has none, filter and graph
+  /// assume a random walk.
   bool bounded = false;
-  /// W's z axis is opposite to gravity. If false, `up_W` is the mean of the body's z axis over the
-  /// poses so far, because a vehicle is upright on average.
+  /// True if W's z axis is opposite to gravity. If false, `up_W` is the mean of the body's z axis
+  /// over the poses so far, because a vehicle is upright on average.
   bool z_up = false;
 };
-/// Deviations added in each frame, so that the increments of a body at rest have a covariance. An
-/// increment without one means an exact pose.
+/// Deviations (rad, m) that are added in each frame, so that increments of a body at rest have a
+/// covariance. Receivers treat poses with zero covariance of the increment as exact.
 inline constexpr double kLeastStepRotation = 1e-7, kLeastStepPosition = 1e-6;
-/// For measured truth (EuRoC's motion capture, KITTI's OXTS): the same accuracy, but bounded.
+/// Accuracy of measured truth (EuRoC's motion capture, KITTI's OXTS): as of a pose file, but
+/// bounded.
 inline PoseAccuracy ofMeasuredTruth() { return {.bounded = true, .z_up = true}; }
-/// For the states of a simulated folder, which are exact. The values are not zero, because
-/// covariances are inverted.
+/// Accuracy of the exact states of a simulated folder. The values are not zero, because covariances
+/// are inverted.
 inline PoseAccuracy ofExactTruth() {
   return {.sigma_rotation = 1e-5,
           .sigma_position = 1e-4,
@@ -35,8 +36,8 @@ inline PoseAccuracy ofExactTruth() {
           .z_up = true};
 }
 
-/// W is the frame of the poses and is never levelled again; velocity is computed from the previous
-/// pose.
+/// Odometry from a pose file. W is the frame of the poses, whether level or not. The velocity is
+/// computed from the previous pose.
 class PoseOdometry {
  public:
   PoseOdometry(replay::PoseFile poses, InstanceId instance, const WorldId& session,

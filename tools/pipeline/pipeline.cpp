@@ -32,8 +32,8 @@ void Pipeline::hear(const ModelInfo& model) {
   filter_->onModel(model);
 }
 
-/// Records map alignment and the graph for later display. The graph is requested as a gateway does
-/// for its viewers.
+/// Records `map/frame`, and requests the graph from the map as a gateway does, so that viewers of
+/// the recording can show it.
 void Pipeline::keepMap(const MapFrame& frame) {
   if (!run_) return;
   keep("map/frame", frame, frame.stamp.time);
@@ -55,7 +55,7 @@ void Pipeline::askForGraph() {
   map_->onQuery(query);
 }
 
-/// Delivers the filter's messages to the map, and the map's answers to the filter.
+/// Lets the map process the filter's messages, and the filter the map's answers.
 void Pipeline::remember() {
   timer_.timeTowardsNext("map_store", [&] { map_->work(); });
 }
@@ -129,7 +129,8 @@ void Pipeline::handleFrame(const Frame& frame) {
   timer_.time("outputs", [] {});
 }
 
-/// A pose waits for its landmarks, and these wait for the second camera.
+/// Takes the given pose of a frame. If landmarks are computed, the pose waits for those of its
+/// frame.
 void Pipeline::givePose(const Frame& frame) {
   const auto odometry = pose_at_(frame.stamp);
   if (!odometry) return reasons_.add("frame_without_pose");
@@ -138,7 +139,7 @@ void Pipeline::givePose(const Frame& frame) {
   timer_.timeTowardsNext("vio", [&] { known_poses_->onOdometry(*odometry); });
 }
 
-/// Releases poses of frames that will get no further data.
+/// Releases the poses of frames whose landmarks are complete.
 void Pipeline::releasePoses() {
   if (!known_poses_) return;
   const auto waits_for = known_poses_->waitsFor();
@@ -149,7 +150,7 @@ void Pipeline::releasePoses() {
   held_.erase(held_.begin(), released);
 }
 
-/// The latency is the time from the decoded frame to its `objects`.
+/// Records the latency: the wall time from the decoded frame to its `objects`.
 void Pipeline::noteLatency(const FrameStamp& stamp) {
   const auto started = started_ms_.find(stamp.sequence);
   if (started == started_ms_.end()) return;
@@ -196,7 +197,7 @@ void Pipeline::offer(Detections detections) {
   waiting_[detections.stamp.sequence] = std::move(detections);
 }
 
-/// Delivers received data by frame: first odometry, then landmarks, then detections.
+/// Delivers the received data to the filter by frame: odometry, then landmarks, then detections.
 void Pipeline::deliver() {
   for (const Odometry& odometry : std::exchange(new_odometry_, {})) {
     const std::uint64_t frame = odometry.stamp.sequence;

@@ -40,7 +40,8 @@ void refuseOut(const PipelineOptions& options);
 
 class Pipeline {
  public:
-  /// Throws StartupError with the fix: data, poses, detections, model, configuration.
+  /// Throws StartupError with the fix if data, poses, detections, network or configuration are
+  /// unusable.
   explicit Pipeline(const PipelineOptions& options);
   ~Pipeline();
 
@@ -53,7 +54,7 @@ class Pipeline {
   /// Throws StartupError(kData) with the cause and the fix if there are no results: no usable
   /// frame, no pose, or no object on the map although detections were expected.
   void refuseNothing() const;
-  /// Writes overlay.mp4 and returns the result as a sentence. Must follow finish().
+  /// Writes overlay.mp4 and returns the result as a sentence. Must be called after finish().
   std::string drawOverlay(const std::function<void(std::size_t, std::size_t)>& progress) const;
 
   const PipelineCounts& counts() const { return counts_; }
@@ -65,17 +66,17 @@ class Pipeline {
   const replay::DataFindings& findings() const { return findings_; }
   /// Index of the first frame of the data in use.
   std::uint64_t firstFrame() const { return first_index_; }
-  /// Index of the first frame that --seconds left out.
+  /// Index of the first frame after the end set by --seconds; empty if the run used all frames.
   std::optional<std::uint64_t> endFrame() const { return end_index_; }
-  /// For recorded odometry and detections: the sequence numbers, in the recording, of the frames
-  /// that the filter received.
+  /// The recording's sequence numbers of the frames that the filter received; empty unless odometry
+  /// and detections are recorded ones.
   const std::optional<std::set<std::uint64_t>>& recordedFrames() const { return heard_frames_; }
   bool usesModel() const { return inference_ != nullptr; }
-  /// A sentence if the given poses contradict the images; else empty.
+  /// Returns a sentence if the given poses contradict the images; otherwise an empty string.
   std::string doubtOfPoses() const;
-  /// The problems of the run for the user, as sentences.
+  /// Returns the problems of the run as sentences for the user.
   Doubts doubts() const;
-  /// Counted reasons by service.
+  /// Returns the counted reasons by service.
   std::map<std::string, ReasonCounts> reasons() const;
 
  private:
@@ -105,7 +106,7 @@ class Pipeline {
   void checkRecorded();
   void runRecorded(const std::function<void(const PipelineCounts&)>& progress);
   void handleRecorded(const replay::RecordedMessage& message);
-  /// Writes to OUT/run.mcap if requested. Log times are the times of the sensors.
+  /// Writes a message to OUT/run.mcap if --record is given. Log times are sensor times.
   template <class T>
   void keep(const std::string& topic, const T& value, TimePoint time) {
     if (!run_) return;
@@ -136,8 +137,8 @@ class Pipeline {
   std::int64_t run_ns_ = 0;
   std::optional<TimePoint> graph_kept_;  ///< time of the last graph in run.mcap
   std::uint64_t graphs_asked_ = 0;
-  bool graph_waits_ = false;  ///< the graph has changed since
-  /// Empty: vio gives the poses.
+  bool graph_waits_ = false;  ///< run.mcap lacks the newest graph
+  /// Returns the pose of a frame; empty if vio computes the poses.
   std::function<std::optional<Odometry>(const FrameStamp&)> pose_at_;
   std::optional<replay::PoseFile> pose_file_;
   std::optional<replay::DetectionFile> detection_file_;
@@ -148,7 +149,7 @@ class Pipeline {
   std::unique_ptr<vio::KnownPoseNode> known_poses_;  ///< computes landmarks if poses are given
   std::unique_ptr<semantic_filter::Node> filter_;
   std::unique_ptr<MapMemory> map_;
-  std::optional<MapFollower> in_map_;  ///< only if the map has a graph
+  std::optional<MapFollower> in_map_;  ///< empty if the map has no graph
   bool recorded_ = false;              // odometry and detections come from the recording
   bus::Once odometry_once_;  // detects repeated messages in the recording, as the service does
   std::uint64_t model_hash_ = 0;
@@ -159,11 +160,11 @@ class Pipeline {
   double frames_seconds_ = 0.0;         // seconds since the first frame of the recording
   std::vector<Odometry> new_odometry_;  // odometry of vio that is not yet delivered
   std::vector<Odometry> held_;          // given poses that wait for their landmarks
-  // landmarks by frame, until they are given to the filter
+  // landmarks by frame that are not yet delivered to the filter
   std::map<std::uint64_t, Landmarks> landmarks_;
   std::map<std::uint64_t, Detections> waiting_;   // detections whose odometry has not arrived
   std::set<std::uint64_t> waits_for_detections_;  // frames whose odometry has arrived
-  std::map<std::uint64_t, double> started_ms_;    // wall clock, by frame
+  std::map<std::uint64_t, double> started_ms_;    // wall time of decoding, by frame
   ReasonCounts reasons_;
   Predictions expected_;  // expected boxes in the next frame
   PipelineCounts counts_;

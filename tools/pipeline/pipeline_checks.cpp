@@ -1,4 +1,4 @@
-// Checks of the data before a run, and the causes of a run without results.
+// Checks the data before a run, and finds the cause if a run has no results.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,7 +16,7 @@
 namespace perdure::tools {
 namespace {
 
-/// Returns the largest distance from the first pose in m.
+/// Returns the largest distance of a pose from the first one (m).
 double wayOf(const std::map<std::uint64_t, replay::StampedPose>& poses) {
   double farthest = 0.0;
   for (const auto& [frame, pose] : poses) {
@@ -25,7 +25,7 @@ double wayOf(const std::map<std::uint64_t, replay::StampedPose>& poses) {
   return farthest;
 }
 
-/// "image_missing 120 times, image_size 3 times".
+/// Lists reasons, for example "image_missing 120 times, image_size 3 times".
 std::string listOf(const ReasonCounts& reasons) {
   std::string list;
   for (const auto& [code, n] : reasons.all()) {
@@ -34,7 +34,7 @@ std::string listOf(const ReasonCounts& reasons) {
   return list;
 }
 
-/// The fix for vio's reason for not starting.
+/// Returns the fix for the most frequent reason why vio did not start.
 std::string fixOfStart(const ReasonCounts& reasons) {
   std::string most;
   std::uint64_t times = 0;
@@ -48,7 +48,7 @@ std::string fixOfStart(const ReasonCounts& reasons) {
   return "`perdure doctor --data` says more, and the README of vio what the reasons mean";
 }
 
-/// Reasons of the store that mean that data is missing in its file.
+/// Reasons of the map store after which data are missing in its file.
 const std::set<std::string> kUnwritable{"disk_full", "io_error", "read_only", "cannot_open",
                                         "database_error"};
 
@@ -74,7 +74,7 @@ void Pipeline::checkData() {
     return checkPoses(dataset_->recording(), file, {.images = data.decode});
   };
   auto of_poses = judge(*pose_file_);
-  for (auto& finding : of_poses) {  // the user declared the frame of the poses
+  for (auto& finding : of_poses) {  // the user's declaration outweighs the check
     if (options_.odometry_of == "body" && finding.code == "poses_of_camera")
       finding.grade = replay::DataFinding::Grade::kWarning;
   }
@@ -88,7 +88,8 @@ void Pipeline::checkData() {
   findings_.insert(findings_.end(), of_poses.begin(), of_poses.end());
 }
 
-/// Rows of other frames would be ignored without a message.
+/// Refuses a file of detections without a row for a frame of the data, because rows of other frames
+/// are ignored silently.
 void Pipeline::checkDetectionFile() {
   const auto& numbers = dataset_->recording().numbers;
   if (numbers.empty() || detection_file_->rows() == 0) return;

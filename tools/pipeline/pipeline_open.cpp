@@ -1,4 +1,4 @@
-// Start of the pipeline: opens data, odometry, detections, filter, map and recording.
+// Starts the pipeline: opens data, odometry, detections, filter, map and recording.
 #include <opencv2/core/utility.hpp>
 
 #include "common/base/errors.h"
@@ -69,7 +69,7 @@ void Pipeline::openRun() {
   const auto file = outputs_->folder() / "run.mcap";
   std::filesystem::remove(file);  // remove the file of an earlier run
   run_ = std::make_unique<replay::RecordingWriter>(file);
-  // Messages from before the first frame are logged at the time of this frame.
+  // Messages before the first frame get the log time of this frame.
   run_ns_ = toNanoseconds(dataset_->frameTime(first_index_).value_or(TimePoint()));
   if (!recorded_) keep("calibration", dataset_->calibration(), TimePoint());
 }
@@ -147,7 +147,7 @@ void Pipeline::openData() {
   first_index_ = *first;
 }
 
-/// T_WB of poses that are those of the first camera.
+/// Converts given poses of the first camera to poses of the body, if the user declared them so.
 void Pipeline::turnPosesToBody() {
   if (options_.odometry_of.empty()) return;
   if (!pose_file_) {
@@ -206,7 +206,7 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
   sinks.innovations = [this](const std::vector<vio::Innovation>& all) {
     rig_watch_->onInnovations(all);
   };
-  constexpr double kWatched_s = 60.0;  // equals the limit of perdure doctor
+  constexpr double kWatched_s = 60.0;  // checks the rig in the first 60 s, like perdure doctor
   rig_watch_.emplace(dataset_->calibration().cameras.front(), kWatched_s);
   sinks.landmarks = [this](const Landmarks& landmarks) {
     landmarks_[landmarks.stamp.sequence] = landmarks;

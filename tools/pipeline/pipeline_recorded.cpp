@@ -1,5 +1,5 @@
-// Runs the filter on recorded odometry and detections, with the same messages in the same order
-// that `perdure play` gives to the service.
+// Runs the filter on recorded odometry and detections. The filter receives the messages that
+// `perdure play` sends to the service, in the same order.
 #include "common/base/errors.h"
 #include "tools/pipeline/pipeline.h"
 
@@ -8,8 +8,8 @@ namespace {
 
 constexpr char kRecorded[] = "recorded";
 
-/// Inputs of semantic_filter. The recorded answers of the map store are not used; the present map
-/// answers instead.
+/// Whether a topic is an input of semantic_filter. The recorded answers of the map store are not
+/// used, because the run's own map answers.
 bool isFiltersInput(const std::string& topic) {
   return topic == "calibration" || topic == "model" || topic == "inference/swap" ||
          topic == "odometry" || topic == "landmarks" || topic == "detections";

@@ -7,9 +7,9 @@
 
 namespace perdure::tools {
 
-/// Counts by service, latency, and data that was left out, with reasons. If the folder has labels
-/// (KITTI tracking): recall and precision of the objects at 1 m; the labels are copied to
-/// OUT/truth.
+/// Returns counts by service, latency, and data that was left out, with reasons. If the folder has
+/// labels (KITTI tracking), adds recall and precision of the objects at 1 m, and copies the labels
+/// to OUT/truth.
 nlohmann::ordered_json makeReport(const Pipeline& pipeline, const PipelineOptions& options);
 
 }  // namespace perdure::tools

@@ -32,7 +32,8 @@ std::vector<Service> describeAll(ServiceConfigs& configs) {
   return services;
 }
 
-/// Splits `text` at the first `separator` and returns the service named before it.
+/// Returns the service that `text` names before the first `separator`. Throws StartupError(kUsage)
+/// if there is no such service.
 Service& serviceOf(std::vector<Service>& services, const std::string& text, char separator,
                    const char* option) {
   const std::string name = text.substr(0, text.find(separator));
@@ -64,7 +65,7 @@ void readFiles(std::vector<Service>& services, const PipelineOptions& options,
   }
 }
 
-/// The declared walk is the graph's. The filter's own walk stays, because it also represents errors
+/// Sets the walk of the map's graph. The filter's own walk stays, because it also represents errors
 /// that boxes share (decision 0030).
 void declareWalk(const std::string& walk, config::Fields& map_store) {
   const auto comma = walk.find(',');

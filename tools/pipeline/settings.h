@@ -21,7 +21,7 @@ struct PipelineOptions {
   std::string map;            ///< a stored map to start from; empty: start with an empty map
   std::string odometry;       ///< vio, truth, drifting, recorded, or a pose file
   std::string odometry_of;    ///< frame of a pose file: "body", "camera"; empty: body, checked
-  std::string odometry_walk;  ///< of a pose file: "m/√m,rad/√m"; empty: the map store's keys
+  std::string odometry_walk;  ///< drift of a pose file, "m/√m,rad/√m"; empty: the map store's keys
   std::string detections;     ///< "model", "simulated", "recorded", "none", or a CSV file
   std::string model, class_name;
   std::vector<std::uint32_t> image_size;
@@ -51,13 +51,14 @@ struct ServiceConfigs {
   std::uint64_t digest = 0;     ///< digest of all values
 };
 
-/// Throws StartupError: kConfiguration with all errors, kUsage for an unknown service or a walk out
-/// of range. Files: config/SERVICE.yaml of the configuration folder, if it exists, or --config. The
-/// file of the simulated detector is simulated_detector.yaml.
+/// Reads SERVICE.yaml in the configuration folder, if it exists, or the file of --config. The file
+/// of the simulated detector is simulated_detector.yaml. Throws StartupError: kConfiguration with
+/// all errors, kUsage for an unknown service or a malformed walk.
 ServiceConfigs readServiceConfigs(const PipelineOptions& options);
 
-/// The folder `config`: $PERDURE_CONFIG_DIR, or else that of the working directory, or of the
-/// source tree or installation above the program. Throws StartupError(kUnavailable) with the fix.
+/// The configuration folder: $PERDURE_CONFIG_DIR, or else `config` in the working directory, or in
+/// the source tree or installation above the program. Throws StartupError(kUnavailable) with the
+/// fix if there is none.
 std::filesystem::path configFolder();
 
 }  // namespace perdure::tools

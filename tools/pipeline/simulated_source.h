@@ -1,4 +1,4 @@
-// Detections drawn from a simulated folder's truth, in the form of inference's output.
+// Draws detections from a simulated folder's truth, as messages like those of inference.
 #pragma once
 
 #include <map>
@@ -22,8 +22,8 @@ struct DetectorConfig {
   std::vector<std::string> confusion{"car/van=0.08", "chair/couch=0.05"};
 };
 void describe(DetectorConfig& config, config::Fields& fields);
-/// The detector model with seed and pairs. Throws StartupError(kConfiguration) for a malformed
-/// pair.
+/// Returns the detector model with the seed and the confused classes of `config`. Throws
+/// StartupError(kConfiguration) for a malformed pair.
 sim::DetectorModel modelOf(const DetectorConfig& config);
 
 class SimulatedDetections {
@@ -33,10 +33,10 @@ class SimulatedDetections {
                       const replay::Dataset& dataset, InstanceId instance);
 
   ModelInfo info() const;
-  /// Creates the detections of the frame; they are due `latency_s` later. Ignores frames without a
+  /// Draws the detections of a frame, which are due `latency_s` later. Ignores frames without a
   /// true pose.
   void look(const Frame& frame);
-  /// The detections that are due at `now`, in the order of frames.
+  /// Removes and returns the detections that are due at `now`, in the order of frames.
   std::vector<Detections> due(TimePoint now);
 
  private:

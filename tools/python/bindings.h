@@ -1,4 +1,4 @@
-// The parts of the module perdure._perdure.
+// Functions that add the parts of the module perdure._perdure.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -7,9 +7,9 @@ namespace perdure::python {
 
 void bindBus(pybind11::module_& module);
 void bindSubscription(pybind11::module_& module);
-/// Reads recordings (MCAP).
+/// Adds the reader of recordings (MCAP).
 void bindRecording(pybind11::module_& module);
-/// An inference service with a network in Python, as services/inference otherwise.
+/// Adds an inference service whose network is in Python; the rest equals services/inference.
 void bindInferenceService(pybind11::module_& module);
 
 }  // namespace perdure::python

@@ -45,7 +45,7 @@ void requireSame(const bus::Options& open, const bus::Options& wanted) {
   }
 }
 
-/// Options of a subscriber: without shared memory, identity "subscriber".
+/// Options of a subscriber: no shared memory, and by default the identity "subscriber".
 bus::Options optionsOf(const BusSettings& settings) {
   bus::Options options = applied(settings, tools::listenersOptions());
   if (options.identity.empty()) options.identity = "subscriber";
@@ -105,7 +105,7 @@ namespace {
 
 class Publisher {
  public:
-  /// Raises UnknownTopic.
+  /// Raises UnknownTopic if the topic does not exist.
   Publisher(std::shared_ptr<Bus> bus, const std::string& topic, std::int32_t strength,
             double lease_s)
       : bus_(std::move(bus)) {

@@ -1,4 +1,4 @@
-// A Python process on the bus: one domain for each process, any number of participants.
+// Connects a Python process to the bus: one domain per process, any number of participants.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -11,16 +11,17 @@
 
 namespace perdure::python {
 
-/// Settings of the caller; the others come from bus.yaml and the environment, as for the commands.
+/// Settings of the caller. The others come from bus.yaml and the environment, as for the commands.
 struct BusSettings {
   std::optional<std::string> interface = {}, vehicle = {}, security = {}, identity = {};
   std::optional<std::int64_t> domain = {};
   std::optional<std::vector<std::string>> peers = {};
 };
-/// Options of a service: with shared memory, identity of its name. Throws StartupError.
+/// Options of a service: with shared memory, and by default the identity `process`. Throws
+/// StartupError for invalid settings.
 bus::Options serviceOptionsOf(const BusSettings& settings, const std::string& process);
 
-/// The domain of these options. DDS opens a domain once in each process and restricts all
+/// Opens the domain of these options. DDS opens a domain once per process and restricts all
 /// participants to the permissions of the first identity. A second call therefore returns the same
 /// domain. Throws StartupError if the open domain has other options.
 bus::Domain openDomain(const bus::Options& options);
@@ -41,7 +42,7 @@ class Bus {
   bus::Participant participant_;
 };
 
-/// Raises UnknownTopic with the existing names.
+/// Raises UnknownTopic with a list of the existing topics.
 [[noreturn]] void refuseTopic(const std::string& topic);
 
 }  // namespace perdure::python

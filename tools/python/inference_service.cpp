@@ -17,7 +17,7 @@ namespace {
 namespace py = pybind11;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::seconds kHangs{10};  // longer than any network needs for a frame
+constexpr std::chrono::seconds kHangs{10};  // no network needs longer for a frame
 
 struct ServiceOptions {
   std::string process, camera;
@@ -26,7 +26,8 @@ struct ServiceOptions {
   bool expects = false;  ///< evaluates the filter's predictions
 };
 
-/// Runs the service's loop in a thread, so that Health continues; keeps the newest frame.
+/// Runs the service's loop in a thread, so that Health is sent continuously. Stores the newest
+/// frame.
 class InferenceService {
  public:
   InferenceService(const BusSettings& settings, const ServiceOptions& options,
@@ -52,7 +53,8 @@ class InferenceService {
     if (thread_.joinable()) thread_.join();
   }
 
-  /// Returns the newest frame, or nothing after the time. Throws the error that ended the loop.
+  /// Returns the newest frame, or nothing after the time `longest`. Throws the error that ended the
+  /// loop.
   std::optional<Frame> next(std::chrono::nanoseconds longest) {
     std::unique_lock lock(mutex_);
     came_.wait_for(lock, longest, [this] { return newest_ || ended_; });
@@ -67,7 +69,7 @@ class InferenceService {
     detections.model_hash = model_.hash;
     const std::lock_guard lock(mutex_);
     busy_since_.reset();
-    if (detections_.livelinessLost() > lost_) {  // the lease expired: not the owner any more
+    if (detections_.livelinessLost() > lost_) {  // lease expired: not the owner any more
       lost_ = detections_.livelinessLost();
       if (detections_.strength() == options_.strength) {
         detections_.setStrength(options_.strength - 1);
@@ -87,7 +89,7 @@ class InferenceService {
     say(HealthState::kDegraded, why);
   }
 
-  /// The newest predictions of the filter, each only once.
+  /// Returns the newest predictions of the filter; each only once.
   std::optional<Predictions> predictions() {
     const std::lock_guard lock(mutex_);
     return std::exchange(expected_, std::nullopt);

@@ -1,4 +1,4 @@
-// perdure._map: queries to a map's file, with the results of `perdure map --db`.
+// Module perdure._map: queries to a map file, with the results of `perdure map --db`.
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 

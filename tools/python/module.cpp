@@ -1,4 +1,4 @@
-// perdure._perdure: the bus and recordings. The public interface is in perdure/*.py.
+// Module perdure._perdure: the bus and recordings. The public interface is in perdure/*.py.
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
@@ -13,7 +13,7 @@ namespace {
 namespace py = pybind11;
 using namespace perdure;
 
-/// A frame whose pixels are the rows of an image; decodes JPEG.
+/// Returns the frame with its pixels as an image; decodes JPEG.
 py::object unpacked(py::handle packed) {
   const auto frame = python::fromPython<Frame>(packed);
   Result<Frame> image = fail("");

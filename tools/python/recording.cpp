@@ -15,7 +15,8 @@ namespace py = pybind11;
 
 class Recording {
  public:
-  /// `topics`: empty means all. Raises UnknownTopic. Throws StartupError.
+  /// `topics`: if empty, all. Raises UnknownTopic for an unknown one. Throws StartupError if the
+  /// file cannot be read.
   Recording(const std::string& path, const std::vector<std::string>& topics)
       : messages_(path), wanted_(topics.begin(), topics.end()) {
     for (const std::string& topic : topics) {
@@ -30,7 +31,8 @@ class Recording {
     });
   }
 
-  /// (topic, ns of the recorder's clock, message); None at the end. Counts unreadable messages.
+  /// Returns (topic, ns of the recorder's clock, message); None at the end. Counts unreadable
+  /// messages.
   py::object next() {
     for (;;) {
       py::object read = py::none();
@@ -65,7 +67,7 @@ class Recording {
     for (const auto& [reason, n] : messages_.reasons().all()) all[reason] += n;
     return all;
   }
-  /// Empty if no message was omitted.
+  /// Describes the last problem; empty if no message was omitted.
   std::string problem() const { return problem_.empty() ? messages_.lastProblem() : problem_; }
   bool otherVersion() const { return other_version_; }
 

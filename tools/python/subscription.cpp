@@ -22,10 +22,10 @@ std::optional<Clock::time_point> endAfter(std::optional<double> seconds) {
   return Clock::now() + std::chrono::duration_cast<Clock::duration>(length);
 }
 
-/// Messages in the order of arrival, for one Python thread; waits without the GIL.
+/// Messages in the order of arrival, for one Python thread. Releases the GIL while it waits.
 class Subscription {
  public:
-  /// `gone`: also returns disposed instances. Raises UnknownTopic.
+  /// `gone`: also returns disposed instances. Raises UnknownTopic if a topic does not exist.
   Subscription(std::shared_ptr<Bus> bus, std::vector<std::string> topics, bool gone)
       : bus_(std::move(bus)), topics_(std::move(topics)), loop_(bus_->participant()) {
     for (const std::string& topic : topics_) add(topic, gone);
@@ -34,7 +34,7 @@ class Subscription {
     for (const auto& reader : readers_) loop_.off(*reader);
   }
 
-  /// (topic, message, disposed); None after the time (empty: no limit) or after close().
+  /// Returns (topic, message, disposed). Returns None after `seconds` (empty: no limit) or close().
   py::object next(std::optional<double> seconds) {
     if (waits_.exchange(true)) {
       raise(
@@ -61,13 +61,13 @@ class Subscription {
   /// Ends a wait; may be called from any thread.
   void close() { loop_.stop(); }
   bool closed() const { return loop_.stopped(); }
-  /// Number of matched writers of all its topics.
+  /// Number of matched writers of all subscribed topics.
   std::size_t matched() const {
     std::size_t n = 0;
     for (const auto& reader : readers_) n += reader->matched();
     return n;
   }
-  /// Counts of DDS and of the checks: <topic>_malformed_<reason>, _sample_lost, …
+  /// Counts of DDS and of the message checks: <topic>_malformed_<reason>, _sample_lost, …
   ReasonCounts counts() const {
     ReasonCounts counts;
     for (const auto& reader : readers_) reader->report(counts);
@@ -105,7 +105,7 @@ class Subscription {
       failure_ = std::current_exception();
     }
   }
-  /// Returns false when the time is over.
+  /// Waits for a message. Returns false if the time is over.
   bool wait(std::optional<Clock::time_point> end) {
     constexpr std::chrono::nanoseconds kSlice = std::chrono::milliseconds(50);
     std::chrono::nanoseconds longest = kSlice;
@@ -114,7 +114,7 @@ class Subscription {
     loop_.runOnce(longest);
     return !end || Clock::now() < *end;
   }
-  /// The first malformed message: the field and the reason; empty if there was none.
+  /// Field and reason of the first malformed message; empty if there was none.
   std::string firstProblem() const {
     for (const auto& reader : readers_) {
       for (const auto& [count, detail] : reader->firstDetails()) return count + ": " + detail;

@@ -10,7 +10,8 @@ BlackBox::BlackBox(double seconds, std::uint64_t most_bytes)
 void BlackBox::add(PackedChunk chunk) {
   bytes_ += chunk.chunk.bytes();
   chunks_.push_back(std::move(chunk));
-  // Drops a chunk only if the second one is old enough, so that the rest still covers the time.
+  // Drops the oldest chunk only if the second one is old enough, so that the rest still covers the
+  // required time.
   const std::int64_t newest = chunks_.back().steady_ns;
   while (chunks_.size() > 2 && newest - chunks_[1].steady_ns >= longest_ns_) dropOldest();
   while (chunks_.size() > 1 && bytes_ > most_bytes_) {

@@ -1,4 +1,4 @@
-// Detects faults, and keeps the last seconds as packed chunks, to be written after one.
+// Detects faults, and stores the last seconds as packed chunks, which are written after a fault.
 #pragma once
 
 #include <chrono>
@@ -14,7 +14,7 @@ namespace perdure::tools {
 
 class BlackBox {
  public:
-  /// Keeps at least `seconds`, limited by `most_bytes`.
+  /// Stores the last `seconds` or more, or less if they exceed `most_bytes`.
   BlackBox(double seconds, std::uint64_t most_bytes);
 
   void add(PackedChunk chunk);
@@ -40,12 +40,13 @@ class FaultWatch {
  public:
   using Time = std::chrono::steady_clock::time_point;
 
-  /// `from`: the first state that is a fault; kFailed, or kDegraded.
+  /// `from`: the mildest state that is a fault, kFailed or kDegraded.
   explicit FaultWatch(HealthState from = HealthState::kFailed) : from_(from) {}
 
-  /// A description, if this message is a process's transition to a fault.
+  /// Returns a description if the message shows a process's transition to a fault.
   std::optional<std::string> onHealth(const Health& health, Time now);
-  /// If more `health` writers missed their lease. An orderly shutdown removes the writer.
+  /// Returns a description if `silent`, the number of `health` writers that missed their lease, has
+  /// increased. An orderly shutdown removes the writer, so it does not count.
   std::optional<std::string> onSilent(std::size_t silent, Time now);
 
  private:

@@ -65,7 +65,7 @@ const dds_topic_descriptor_t* typeNamed(const std::string& name) {
   return nullptr;
 }
 
-/// Adds the message as XCDR1, with the IDL of that encoding.
+/// Adds the message, encoded as XCDR1, with the IDL for that encoding.
 Result<void> addPlain(replay::RecordingWriter& file, const replay::RecordedMessage& message) {
   const dds_topic_descriptor_t* type = typeNamed(message.type);
   if (type == nullptr) return fail("unknown_type", message.type);

@@ -12,7 +12,7 @@ namespace perdure::tools {
 namespace {
 
 using namespace std::chrono_literals;
-constexpr double kBack = 3.0;  // s of the recording that a seek reads before its target
+constexpr double kBack = 3.0;  // s; a seek reads the recording from this time before its target
 
 bool isShown(const std::string& topic) {
   return topic == "calibration" || topic == "odometry" || topic == "landmarks" ||
@@ -36,7 +36,7 @@ bool looksAtGraph(const gateway::Channels& wanted) {
   return wanted.contains(gateway::kMapGraph) || wanted.contains(gateway::kMapGraphScene);
 }
 
-/// The channel that shows each message of a topic as it arrives; empty for other topics.
+/// The channel that shows every message of a topic; empty for other topics.
 std::optional<std::uint32_t> channelOf(const std::string& topic,
                                        const std::vector<std::string>& cameras) {
   if (topic == "landmarks") return gateway::kLandmarks;
@@ -85,7 +85,8 @@ GatewayReplay::GatewayReplay(replay::RecordedMessages& recording, const gateway:
 
 GatewayReplay::~GatewayReplay() = default;
 
-/// The relation of sensor time and recorder time, linear between the ends.
+/// Finds the first and the last instant that have both sensor time and recorder time. Times between
+/// them are interpolated linearly.
 void GatewayReplay::measure() {
   begin_ns_ = recording_.startNs();
   end_ns_ = recording_.endNs();
@@ -100,7 +101,8 @@ void GatewayReplay::measure() {
                        "show; `perdure record info` tells what it has");
   }
   first_ = last_ = *first;
-  // A recording may go on long after its drive, so the search back is extended until it finds one.
+  // A recording may continue long after its drive. So the search starts earlier and earlier until
+  // it finds a message with sensor time.
   constexpr std::uint64_t kTail = 5'000'000'000, kGrows = 4;
   for (std::uint64_t tail = kTail; last_.time == first_.time; tail *= kGrows) {
     const bool all = end_ns_ - first_.log_ns <= tail;
@@ -156,7 +158,7 @@ std::unique_ptr<gateway::Node> GatewayReplay::freshNode() {
                        .query = no_store});
 }
 
-/// Restores the state at that time by reading the seconds before it.
+/// Restores the state at a log time by reading the last seconds before it.
 void GatewayReplay::seek(std::uint64_t log_ns) {
   node_ = freshNode();
   newest_.clear();
@@ -185,8 +187,8 @@ void GatewayReplay::recallRig(std::uint64_t log_ns) {
   }
 }
 
-/// Repeats messages for a client that opens a channel: the image of the shown objects, and the
-/// newest message of each other topic.
+/// Repeats messages on channels that are not in `before`: images of the same frame as the shown
+/// objects, and the newest message of each other topic.
 void GatewayReplay::repeatFrames(const gateway::Channels& before) {
   const auto shown = node_->shownTime();
   for (const auto& [topic, messages] : newest_) {
@@ -200,7 +202,7 @@ void GatewayReplay::repeatFrames(const gateway::Channels& before) {
   }
 }
 
-/// Finds the newest graph of the map before a time; extends the search until one is found.
+/// Finds the newest graph of the map before a log time; extends the search until one is found.
 void GatewayReplay::recallGraph(std::uint64_t log_ns) {
   graph_.reset();
   if (!recording_.topics().contains("map/reply")) return;
@@ -218,7 +220,7 @@ void GatewayReplay::recallGraph(std::uint64_t log_ns) {
   }
 }
 
-/// Advances to the next objects, so that a paused replay shows them.
+/// Advances to the next `objects` message, so that a paused replay shows objects.
 void GatewayReplay::showFrame() {
   fed_objects_ = false;
   const gateway::Channels wanted = std::exchange(wanted_, {});
@@ -249,13 +251,13 @@ void GatewayReplay::seekToNextEvent(const gateway::Call& call) {
   tellState(true, "");
 }
 
-/// Feeds one message; returns false at the end.
+/// Feeds one message to the gateway's node; returns false at the end of the recording.
 bool GatewayReplay::pull() {
   if (!next_) return false;
   at_ns_ = std::max(at_ns_, next_->log_ns);
   feed(*next_);
   if (channelOf(next_->topic, config_.cameras)) {
-    constexpr std::size_t kMost = 16;  // objects come some frames after their image
+    constexpr std::size_t kMost = 16;  // objects follow their image by some frames
     auto& newest = newest_[next_->topic];
     newest.push_back(std::move(*next_));
     if (newest.size() > kMost) newest.pop_front();

@@ -1,4 +1,4 @@
-// Replays a recording without a bus in the page and Foxglove, controlled by clients.
+// Replays a recording to the gateway's page and to Foxglove, without a bus. Clients control it.
 #pragma once
 
 #include <condition_variable>
@@ -19,8 +19,8 @@ namespace perdure::tools {
 class GatewayReplay {
  public:
   /// Determines the time range of the recording, and starts `start_s` after its first frame. Throws
-  /// StartupError if the recording has nothing to show, if it ends earlier, or if the port is not
-  /// available.
+  /// StartupError if the recording has nothing to show or ends before `start_s`, or if the port is
+  /// not available.
   GatewayReplay(replay::RecordedMessages& recording, const gateway::Config& config,
                 const gateway::PlaybackRequest& start, double start_s = 0.0);
   ~GatewayReplay();
@@ -32,13 +32,14 @@ class GatewayReplay {
 
  private:
   using Clock = std::chrono::steady_clock;
-  /// A message with both times: of the recorder and of the sensors.
+  /// The time of a message by the recorder's clock and by the sensors' clock.
   struct Instant {
     std::uint64_t log_ns = 0;
     TimePoint time;
   };
   struct Mail {
-    /// Every change of the wanted channels, so that returning clients are updated.
+    /// Every change of the wanted channels. All are handled, so that a client that closes and opens
+    /// a channel gets its messages again.
     std::vector<gateway::Channels> wanted;
     std::deque<gateway::Call> calls;
     std::deque<gateway::PlaybackRequest> requests;

@@ -22,7 +22,7 @@ struct Options {
   std::int64_t port = 8765;
 };
 
-/// Uses no bus; the clients control the replay.
+/// Serves the recording to browsers and Foxglove without a bus; the clients control the replay.
 void runGateway(const Options& options) {
   const service::BlockedSignals blocked;
   replay::RecordedMessages recording(options.path);

@@ -12,7 +12,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Topics with queries and answers of processes, and with the state of processes that have ended.
+/// Topics that are not played by default: they contain queries and answers of processes, or the
+/// state of processes that have ended.
 const std::set<std::string> kNotByItself{"health", "map/query", "map/near", "map/reply"};
 
 const std::map<std::string, std::set<std::string>> kInputs{
@@ -89,7 +90,7 @@ Player::Writers Player::otherWriters() {
   return others;
 }
 
-/// Plays only the events of the absent service, because two services publish events.
+/// If a service that publishes events is running, leaves out only that service's recorded events.
 void Player::settleEvents(Writers& others) {
   const auto events = others.find("events");
   if (events == others.end()) return;
@@ -101,7 +102,8 @@ void Player::settleEvents(Writers& others) {
   if (events->second.empty()) others.erase(events);
 }
 
-/// Omits the outputs of a service that reads this recording, because it publishes them again.
+/// Leaves out the outputs of running services that read this recording, because they publish these
+/// topics themselves.
 void Player::leaveToListeners(Writers& others) {
   const auto hears = [&](const std::string& process) {
     return kInputs.contains(process) && std::ranges::any_of(topics_, [&](const std::string& topic) {
@@ -167,7 +169,7 @@ void Player::waitForReaders() {
   }
 }
 
-/// Returns false if the loop was stopped meanwhile.
+/// Waits until a log time is due; returns false if the loop was stopped meanwhile.
 bool Player::waitUntil(std::uint64_t log_ns) {
   const double later = static_cast<double>(log_ns - first_ns_) / options_.rate;
   const auto due = began_ + std::chrono::nanoseconds(static_cast<std::int64_t>(later));
@@ -179,7 +181,7 @@ bool Player::waitUntil(std::uint64_t log_ns) {
   return false;
 }
 
-/// Skips the pause between two runs in one folder, or at an invalid time.
+/// Skips pauses of more than 10 s, as between two runs in one folder or after an invalid time.
 void Player::leaveOutGap(std::uint64_t log_ns) {
   constexpr std::uint64_t kLongest = 10'000'000'000;
   const std::uint64_t gap = log_ns - last_ns_;

@@ -1,4 +1,4 @@
-// Publishes a recording on the bus: the same messages, with the same time intervals.
+// Publishes a recording on the bus: the same messages at the same time intervals.
 #pragma once
 
 #include <functional>
@@ -14,9 +14,9 @@
 namespace perdure::tools {
 
 struct PlayOptions {
-  std::vector<std::string> topics;  ///< empty: all recorded topics except health and conversations
+  std::vector<std::string> topics;  ///< empty: all except health and map queries and answers
   std::string for_service;          ///< service whose inputs replace `topics`
-  double rate = 1.0;                ///< seconds of the recording in one second
+  double rate = 1.0;                ///< seconds of the recording per second
   double start_s = 0.0, seconds = 0.0;  ///< start and duration; 0: to the end
   double wait_s = 2.0;                  ///< longest wait for a reader of each topic
   bool loop = false, force = false;
@@ -24,9 +24,9 @@ struct PlayOptions {
 
 class Player {
  public:
-  /// Takes about a second to discover the bus. If no topics are named, omits the outputs of
-  /// services that read this recording. Throws StartupError for an unknown topic, a topic that is
-  /// not in the recording, or a topic that another process writes (unless `force`).
+  /// Takes about a second to discover other processes. If no topics are named, leaves out the
+  /// outputs of services that read this recording. Throws StartupError for an unknown topic, a
+  /// topic that is not in the recording, or, unless `force`, a topic that another process writes.
   Player(const bus::Participant& participant, bus::WaitLoop& loop,
          replay::RecordedMessages& recording, const PlayOptions& options);
 
@@ -35,7 +35,7 @@ class Player {
   std::uint64_t played() const { return played_; }
   const ReasonCounts& reasons() const { return reasons_; }
   const std::set<std::string>& topics() const { return topics_; }
-  /// Omitted topics with their writer, for example "map/frame (map_store)".
+  /// Topics that were left out, with their writer, for example "map/frame (map_store)".
   const std::set<std::string>& leftOut() const { return left_out_; }
 
  private:
@@ -62,9 +62,9 @@ class Player {
   replay::RecordedMessages& recording_;
   const PlayOptions options_;
   std::set<std::string> topics_, left_out_;
-  std::set<std::string> event_writers_;  ///< services that publish their own events
+  std::set<std::string> event_writers_;  ///< running services that publish events
   std::map<std::string, Voice> voices_;
-  std::uint64_t first_ns_ = 0;  ///< log time that was due at the start of playing, without gaps
+  std::uint64_t first_ns_ = 0;  ///< log time due at the start, plus the skipped gaps
   std::uint64_t last_ns_ = 0, played_ = 0;
   std::chrono::steady_clock::time_point began_;
   ReasonCounts reasons_;

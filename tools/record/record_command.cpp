@@ -25,7 +25,7 @@ struct RecordOptions {
   bool dump_at_end = false;
 };
 
-/// Receives SIGUSR1 by a flag that a timer polls, without an extra thread.
+/// Blocks SIGUSR1 and polls for it, so that no extra thread is needed.
 class DumpSignal {
  public:
   DumpSignal() {
@@ -49,7 +49,7 @@ void printSummary(const StoreReport& stored, std::uint64_t messages, const std::
   if (stored.overrun > 0) {
     text += fmt::format("; {} chunks were lost to a slow disk", stored.overrun);
   }
-  std::puts(text.c_str());  // does not throw, so that lost messages are reported in any case
+  std::puts(text.c_str());  // does not throw, so lost messages are reported even if this fails
   std::fflush(stdout);
 }
 
@@ -71,7 +71,7 @@ void runRecord(RecordOptions& options) {
   if (options.out.empty()) {
     throw StartupError(ExitCode::kUsage, "perdure record needs --out DIR, the recordings' folder");
   }
-  const DumpSignal dump;  // must exist before other threads
+  const DumpSignal dump;  // must exist before other threads, which inherit its signal mask
   const service::BlockedSignals blocked;
   options.recorder.fault =
       options.fault == "failed" ? HealthState::kFailed : HealthState::kDegraded;

@@ -21,7 +21,7 @@ std::int64_t nowOf() {
       .count();
 }
 
-/// Whether a topic describes other messages and is published once: calibration, model.
+/// Whether a topic is published once and describes other messages, like calibration and model.
 bool isLatchedAlone(const bus::TopicInfo& info) {
   return info.qos.latched && info.qos.depth == 1 && info.rate_hz == 0;
 }
@@ -49,7 +49,7 @@ Recorder::Recorder(service::Context& context, const RecorderOptions& options, St
       catalogue_(std::make_shared<mcap::Catalogue>()),
       latched_(std::make_shared<std::vector<Latched>>()),
       watch_(options.fault) {
-  // In the order of the table: simultaneous causes come before their effects.
+  // The topics keep the order of the table, so that a cause precedes a simultaneous effect.
   std::vector<std::string> topics = options.topics;
   for (const bus::TopicInfo& info : bus::topicTable()) {
     const bool wanted = options.topics.empty() && info.recorded && !info.name.ends_with('/');
@@ -121,7 +121,7 @@ void Recorder::onMessage(Source& source, const bus::CdrMessage& message) {
   if (source.draft.bytes() >= kLargestChunk) cut();
 }
 
-/// Stores the newest message of each content; a repeated one moves to the end.
+/// Stores a latched message; if it repeats an earlier one, the earlier one is removed.
 void Recorder::keepLatched(const Source& source, std::span<const std::uint8_t> bytes) {
   constexpr std::size_t kMost = 16;
   auto latched = std::make_shared<std::vector<Latched>>(*latched_);
@@ -155,7 +155,7 @@ void Recorder::updateHealth() {
   if (stored.disk_full) {
     problem += "; recording goes on as soon as there is room: free some, or lower --quota";
   }
-  constexpr std::int64_t kTold = 10'000'000'000;  // ns: duration of the report
+  constexpr std::int64_t kTold = 10'000'000'000;  // ns; Health reports a slow disk for this time
   const std::int64_t now = LogClock::steadyNs();
   if (stored.overrun > overrun_) slow_until_ns_ = now + kTold;
   overrun_ = stored.overrun;

@@ -1,4 +1,4 @@
-// Records topics as chunks; the part of `perdure record` on the bus.
+// Collects the messages of topics into chunks; the part of `perdure record` that uses the bus.
 #pragma once
 
 #include <map>
@@ -16,17 +16,18 @@ namespace perdure::tools {
 
 struct RecorderOptions {
   std::vector<std::string> topics;           ///< empty: the topics that the table records
-  bool images = false;                       ///< topics of all cameras too, unless `topics` is set
-  HealthState fault = HealthState::kFailed;  ///< the first state that is a fault
+  bool images = false;                       ///< also topics of all cameras, unless `topics` is set
+  HealthState fault = HealthState::kFailed;  ///< the mildest state that is a fault
 };
 
-/// Log times: the system clock at the start, continued by the steady clock.
+/// Log times: the system time at the start plus the time elapsed on the steady clock.
 class LogClock {
  public:
   LogClock();
   std::uint64_t nowNs() const;
   static std::int64_t steadyNs();
-  /// Change of the system clock since the start, in nanoseconds; small values are slewing.
+  /// Change of the system clock against the log time since the start, in nanoseconds. Slewing
+  /// causes small values.
   std::int64_t setByNs() const;
 
  private:
@@ -38,7 +39,7 @@ class Recorder {
   /// Throws StartupError if a topic does not exist.
   Recorder(service::Context& context, const RecorderOptions& options, Store& store);
 
-  /// Hands over the collected messages; `fault` also requests that the stored chunks be written.
+  /// Hands the collected messages to the store; `fault` also requests that it writes the black box.
   void cut(bool fault = false);
   std::uint64_t messages() const { return messages_; }
 
@@ -69,7 +70,7 @@ class Recorder {
   std::map<std::string, std::unique_ptr<Source>> sources_;
   CatalogueNow catalogue_;
   LatchedNow latched_;
-  /// Images have chunks of their own, so that readers of other topics need not unpack them.
+  /// Images have their own chunks, so that readers of other topics need not unpack images.
   replay::mcap::Draft draft_, images_;
   std::int64_t draft_began_ns_ = 0;
   FaultWatch watch_;

@@ -24,7 +24,8 @@ bool isFull(const std::error_code& error) {
   return error == std::errc::no_space_on_device || error.value() == EDQUOT;
 }
 
-/// A copy that is on the disk when this returns. A failed copy is removed.
+/// Copies a file and returns the copy's path when the copy is synchronised to the disk. A failed
+/// copy is removed.
 fs::path copyOf(const fs::path& file) {
   fs::path copy = file;
   copy += ".before-repair";

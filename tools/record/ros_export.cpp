@@ -85,7 +85,7 @@ class Export {
           file.add(outlet, cdr, now_ns_);
         }) {}
 
-  /// Writes messages that describe others first, independent of their time.
+  /// Writes the messages that describe others first, whatever their time, then all others.
   ReasonCounts run() {
     recording_.rewind([](const std::string& topic) { return topic == "model"; });
     while (const auto message = recording_.next()) take(*message);

@@ -1,4 +1,5 @@
-// A folder of recordings: names in the order of time, one recorder at a time, a quota.
+// A folder of recordings. File names sort by time; one recorder at a time writes; a quota limits
+// it.
 #pragma once
 
 #include <cstdint>
@@ -18,13 +19,14 @@ class SegmentFolder {
   /// or if another recorder uses it.
   SegmentFolder(const std::filesystem::path& folder, std::uint64_t quota, std::uint64_t keep_free);
 
-  /// "FOLDER/perdure-000124-20261122T091658Z.mcap"; `word` after the time: "-fault".
+  /// Returns a path like "FOLDER/perdure-000124-20261122T091658Z.mcap"; `word`, such as "-fault",
+  /// follows the time.
   std::filesystem::path nextFile(std::int64_t wall_ns, const std::string& word);
   void sizeIs(const std::filesystem::path& file, std::uint64_t bytes) { sizes_[file] = bytes; }
   void remove(const std::filesystem::path& file);
   /// Removes the oldest files until the quota is met, but never the newest.
   void keepQuota();
-  /// Size limit of a file, of this process (`ulimit -f`) and of FAT.
+  /// The largest possible file in bytes, by the limit of this process (`ulimit -f`) and by FAT.
   std::uint64_t largestFile() const;
   bool hasRoomFor(std::uint64_t bytes) const;
 

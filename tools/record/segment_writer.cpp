@@ -21,7 +21,7 @@ bool SegmentWriter::note(const Result<void>& written) {
   return written.has_value();
 }
 
-/// A file ends after its time, or at the size limit, or if the quota would hold too few.
+/// A file ends after its duration, at the size limit, or at an eighth of the quota.
 bool SegmentWriter::isOver(const PackedChunk& packed) const {
   constexpr std::uint64_t kFilesOfQuota = 8;
   constexpr std::uint64_t kSummary = 1u << 20;  // bytes: schemas, and 250 for each of 1000 chunks

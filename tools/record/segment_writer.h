@@ -1,4 +1,4 @@
-// Writes chunks to files that can be read alone. Continues after a full disk.
+// Writes chunks to files that can be read alone. Continues when a full disk has space again.
 #pragma once
 
 #include <memory>
@@ -39,7 +39,7 @@ class SegmentWriter {
   bool add(const PackedChunk& packed);
   void finish();
 
-  /// The problem as a sentence; empty if there is no problem.
+  /// The present problem as a sentence; empty if there is none.
   const std::string& problem() const { return problem_; }
   bool diskFull() const { return disk_full_; }
   std::uint64_t bytes() const { return bytes_; }

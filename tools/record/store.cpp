@@ -21,7 +21,7 @@ Store::Store(const StoreOptions& options, SegmentFolder& folder)
 Store::~Store() { finish(); }
 
 void Store::give(Job job) {
-  if (job.fault) fault_ = true;  // stored outside of the job, because the job may be dropped
+  if (job.fault) fault_ = true;  // not only in the job, because the job may be dropped
   (void)queue_.push(std::move(job));
 }
 

@@ -1,4 +1,4 @@
-// Thread that packs and writes chunks, or keeps them for a fault.
+// A thread packs chunks, and writes them or stores them until a fault.
 #pragma once
 
 #include <atomic>
@@ -16,20 +16,20 @@ namespace perdure::tools {
 struct StoreOptions {
   double segment_s = 60.0;
   double last_s = 0.0;                ///< length of the black box for faults; 0: no black box
-  double after_s = 10.0;              ///< seconds after the fault in its file
+  double after_s = 10.0;              ///< seconds after the fault that are also written
   std::uint64_t memory = 512u << 20;  ///< size limit of the black box, bytes
 };
 
-/// Counts of the messages since the start.
+/// Counts since the start.
 struct StoreReport {
   std::uint64_t chunks = 0;    ///< number of received chunks
-  std::uint64_t messages = 0;  ///< number in files, or stored for a fault
-  std::uint64_t lost = 0;      ///< number lost while the disk was full or failed
+  std::uint64_t messages = 0;  ///< messages in files or in the black box
+  std::uint64_t lost = 0;      ///< messages lost while the disk was full or failed
   std::uint64_t bytes = 0, files = 0, removed = 0, folder_bytes = 0, dumps = 0;
   std::uint64_t overrun = 0;    ///< chunks lost to a slow disk
   std::uint64_t cut_short = 0;  ///< chunks dropped because the black box was full
   std::string problem;          ///< problem of the recording; empty if there is none
-  bool disk_full = false;       ///< the problem is a full disk
+  bool disk_full = false;       ///< whether the problem is a full disk
   std::string lost_to;          ///< the problem that last caused lost messages
 };
 
@@ -45,9 +45,10 @@ class Store {
     CatalogueNow catalogue;
     LatchedNow latched;
     std::int64_t steady_ns = 0;
-    bool fault = false;  ///< writes the stored chunks up to this one
+    bool fault = false;  ///< the black box is to be written, including this chunk
   };
-  /// Returns at once. If the disk is too slow, drops the oldest chunks and counts them.
+  /// Queues a chunk and returns at once. If the disk is too slow, drops and counts the oldest
+  /// chunks.
   void give(Job job);
   /// Returns when all chunks are written and the last file is finished.
   void finish();

@@ -38,7 +38,7 @@ void requireName(const std::string& name) {
                          "most 48, and not \"authority\"");
 }
 
-/// Restricts the permissions to `topics`.
+/// Restricts the permissions to `topics`. Throws StartupError if a ros2_driver may not write one.
 void narrow(Permissions& permissions, bus::Role role, const std::vector<std::string>& topics) {
   if (topics.empty()) return;
   if (role != bus::Role::kRos2Driver) {
@@ -93,7 +93,7 @@ Authority Authority::create(const fs::path& folder, const std::string& vehicle, 
   writePrivate(own / kRevoked, toPem(made.revoked_.get()), kForOwner);
   writePrivate(own / kGovernance, signedDocument(made.signer(), governanceXml()), kForOwner);
   made.save();
-  // written last, because this file marks completion
+  // Written last, because this file marks a complete authority.
   writePrivate(own / kKey, toPem(made.key_.get()), kForOwner);
   return made;
 }
@@ -164,7 +164,7 @@ void Authority::write(const std::string& name, const Known& known, const Validit
   const auto put = [&](const char* file, const std::string& text) {
     writePrivate(folder / file, text, kForOwner, owner);
   };
-  // The certificate is recorded first, so that every issued certificate can be revoked.
+  // The certificate is recorded before it is used, so that every issued certificate can be revoked.
   const fs::path record = own / kIssued / (name + ".pem");
   writePrivate(record, textOf(record) + pem, kForOwner);
   put(kCa, toPem(certificate_.get()));

@@ -1,4 +1,4 @@
-// The folder of bus.security with its authority: creates, renews and revokes identities.
+// The folder of bus.security and its authority, which creates, renews and revokes identities.
 #pragma once
 
 #include <filesystem>
@@ -15,7 +15,7 @@ namespace perdure::tools {
 /// (common/bus/security/identity.h).
 class Authority {
  public:
-  /// Creates an authority. Throws StartupError if the folder has one, or cannot be written.
+  /// Creates an authority. Throws StartupError if the folder already has one or cannot be written.
   static Authority create(const std::filesystem::path& folder, const std::string& vehicle,
                           double days);
   /// Opens an authority. Throws StartupError if there is none, or its key cannot be read.
@@ -23,16 +23,17 @@ class Authority {
 
   struct Wanted {
     std::string name, role;
-    /// Topics to read instead of the default, also "frame/*"; for a ros2_driver, to write.
+    /// Topics to read instead of the role's default, or to write for a ros2_driver; also "frame/*".
     std::vector<std::string> topics = {};
     std::string owner = {};  ///< user of the files; empty: unchanged, or the current user
   };
-  /// Throws StartupError for a used or invalid name, or an unknown role, topic or user.
+  /// Adds an identity. Throws StartupError for a used or invalid name, or an unknown role, topic or
+  /// user.
   void add(const Wanted& wanted, const Validity& validity);
-  /// Issues new key, certificate and permissions. The old ones stay valid until expiry.
+  /// Issues a new key, certificate and permissions. The old ones stay valid until they expire.
   void renew(const std::string& name, const Validity& validity);
-  /// Revokes all certificates of this name. Updates the list in each folder here; other hosts need
-  /// the new list too. Running processes read it at their next start.
+  /// Revokes all certificates of this name, and updates the list in every identity folder here.
+  /// Other hosts need the new list too; running processes read it at their next start.
   void revoke(const std::string& name);
   std::vector<std::string> names() const;
   const std::string& vehicle() const { return vehicle_; }

@@ -22,7 +22,7 @@ using Signature = std::unique_ptr<PKCS7, Freed<PKCS7_free>>;
 constexpr char kOrganisation[] = "perdure";
 constexpr char kAuthorityName[] = "perdure authority";
 
-/// Throws if an OpenSSL call fails, which happens only without memory or random numbers.
+/// Throws if an OpenSSL call failed. This happens only without memory or random numbers.
 void require(bool done, const char* what) {
   if (done) return;
   char reason[256] = "";
@@ -35,7 +35,7 @@ Time timeOf(TimePoint at) {
 }
 
 Integer randomSerial() {
-  constexpr int kBits = 159;  // limits: at most 20 octets, and positive
+  constexpr int kBits = 159;  // bits of a serial number: positive, at most 20 octets
   const Number number(BN_new());
   require(number && BN_rand(number.get(), kBits, BN_RAND_TOP_ONE, BN_RAND_BOTTOM_ANY) == 1,
           "draw a serial number");
@@ -141,7 +141,7 @@ bus::RevokedList makeRevokedList(const Signer& authority, const X509_CRL* before
   X509_CRL_set_issuer_name(made, X509_get_subject_name(authority.certificate));
   const Time now = timeOf(std::chrono::system_clock::now() - std::chrono::hours(1));
   X509_CRL_set1_lastUpdate(made, now.get());
-  // The list expires together with the authority, because an outdated list must not stop a vehicle.
+  // The list is valid as long as the authority, because an outdated list must not stop a vehicle.
   X509_CRL_set1_nextUpdate(made, X509_get0_notAfter(authority.certificate));
   for (const X509* certificate : revoked) {
     X509_REVOKED* entry = X509_REVOKED_new();

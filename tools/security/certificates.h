@@ -1,4 +1,5 @@
-// X.509 and S/MIME with OpenSSL: P-256 and ECDSA with SHA-256, as DDS-Security requires.
+// Certificates and signatures (X.509, S/MIME) with OpenSSL: P-256 and ECDSA with SHA-256, as
+// DDS-Security requires.
 #pragma once
 
 #include <chrono>
@@ -14,7 +15,7 @@ using TimePoint = std::chrono::system_clock::time_point;
 struct Validity {
   TimePoint from, until;
 };
-/// Starts an hour ago, for hosts whose clock is slow.
+/// A validity that starts an hour ago, because the clock of a host may be slow.
 Validity validFor(double days);
 
 /// The subject of a certificate, in the form that the permissions of DDS use (RFC 2253).
@@ -27,17 +28,17 @@ struct Subject {
 bus::Key makeKey();
 bus::Certificate makeAuthority(EVP_PKEY* key, const Validity& validity);
 
-/// The signing authority. Its certificate and key must outlive it.
+/// The signing authority. Certificate and key must outlive the signer.
 struct Signer {
   X509* certificate;
   EVP_PKEY* key;
 };
 bus::Certificate issue(const Signer& authority, EVP_PKEY* key, const Subject& subject,
                        const Validity& validity);
-/// A list that revokes `revoked` in addition to those of `before` (may be nullptr).
+/// A list that revokes `revoked` and all certificates of `before` (may be nullptr).
 bus::RevokedList makeRevokedList(const Signer& authority, const X509_CRL* before,
                                  const std::vector<const X509*>& revoked);
-/// A document with its signature, as S/MIME.
+/// The document with its signature, as S/MIME.
 std::string signedDocument(const Signer& authority, const std::string& xml);
 
 std::string toPem(X509* certificate);

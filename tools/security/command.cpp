@@ -22,7 +22,7 @@ struct Request {
   std::vector<std::string> names;
 };
 
-/// The user of the systemd units, if root creates identities on a host that has this user.
+/// The user of the systemd units, if root creates identities on a host with this user; else empty.
 std::string serviceUser() {
   constexpr char kUser[] = "perdure";
   return geteuid() == 0 && getpwnam(kUser) != nullptr ? kUser : "";

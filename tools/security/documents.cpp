@@ -6,7 +6,7 @@
 namespace perdure::tools {
 namespace {
 
-/// All domains that the configuration allows (bus.domain).
+/// All domains that bus.domain can select.
 constexpr char kDomains[] = "<domains><id_range><min>0</min><max>230</max></id_range></domains>";
 constexpr char kHead[] =
     "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"

@@ -1,4 +1,4 @@
-// The documents of DDS-Security 1.1, 9.4: protection and rights, from the topic table.
+// The governance and permissions documents of DDS-Security 1.1, 9.4, from the topic table.
 #pragma once
 
 #include <string>
@@ -9,16 +9,17 @@
 
 namespace perdure::tools {
 
-/// Joining requires a certificate, data are encrypted, each read and write needs a permission.
+/// Governance: joining requires a certificate, all data are encrypted, and each read and write
+/// needs a permission.
 std::string governanceXml();
 
-/// Topics that a role writes and reads; "frame/*" stands for all cameras.
+/// Topics that a role may write and read; "frame/*" stands for all cameras.
 struct Permissions {
   std::vector<std::string> writes, reads;
 };
 Permissions permissionsOf(bus::Role role);
 
-/// All other topics are denied.
+/// Permissions of one subject; all other topics are denied.
 std::string permissionsXml(const Subject& subject, const std::string& vehicle,
                            const Permissions& permissions, const Validity& validity);
 

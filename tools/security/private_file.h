@@ -1,4 +1,4 @@
-// Writes files with the correct mode from their first byte.
+// Writes files that have the correct mode from their first byte on.
 #pragma once
 
 #include <sys/types.h>
@@ -13,10 +13,10 @@ struct Owner {
   uid_t user;
   gid_t group;
 };
-/// Throws StartupError if the user does not exist.
+/// Looks up a user. Throws StartupError if the user does not exist.
 Owner ownerNamed(const std::string& user);
 
-/// Replaces the file atomically, or throws StartupError.
+/// Writes or replaces the file atomically. Throws StartupError if the disk reports an error.
 void writePrivate(const std::filesystem::path& file, const std::string& text, mode_t mode,
                   const std::optional<Owner>& owner = {});
 /// Creates a folder that only its owner can access.

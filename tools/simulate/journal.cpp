@@ -26,7 +26,7 @@ std::string lineOf(const JournalEntry& entry) {
   return Json{sensors, views}.dump();
 }
 
-/// Throws Json::exception if the line is truncated.
+/// Parses a line of the journal. Throws Json::exception if the line is truncated.
 JournalEntry entryOf(const std::string& text, std::size_t cameras) {
   const Json line = Json::parse(text);
   JournalEntry entry;

@@ -1,4 +1,4 @@
-// Journal of rendered frames, a line of JSON each, from which the next run continues.
+// Journal of rendered frames, one line of JSON per frame, from which the next run continues.
 #pragma once
 
 #include <filesystem>
@@ -18,8 +18,8 @@ struct JournalEntry {
 
 class Journal {
  public:
-  /// Reads the entries of `file` up to the first one that is truncated or whose frame is incomplete
-  /// according to `is_whole`. Discards the rest, and appends there.
+  /// Reads the entries of `file` up to the first that is truncated or whose frame fails `is_whole`.
+  /// Discards the rest; new entries are appended there.
   Journal(const std::filesystem::path& file, std::size_t cameras,
           const std::function<bool(std::size_t)>& is_whole);
   const std::vector<JournalEntry>& entries() const { return entries_; }

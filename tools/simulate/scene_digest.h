@@ -1,5 +1,5 @@
-// A digest that differs between different scenes; it identifies the content of a folder beyond the
-// scene's name.
+// Computes a digest of a scene. It identifies the content of a folder, because scenes of equal name
+// may differ.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace perdure::tools {
 
-/// Covers objects, scenery, light, sensors, and the motions at each second.
+/// The digest of objects, scenery, light, sensors, and the poses at each second.
 std::uint64_t digestOf(const sim::Scene& scene);
 
 }  // namespace perdure::tools

@@ -48,7 +48,7 @@ nlohmann::json descriptionOf(const SimulateOptions& options, const sim::Scene& s
             {"encoding", options.format == ImageFormat::kPng ? "png" : "jpeg"}}}};
 }
 
-/// Refuses a folder with other content than this run.
+/// Locks the folder. Throws StartupError if it has other content than that of this run.
 FolderLock claim(const fs::path& out, const std::string& description) {
   FolderLock lock(out);
   const fs::path file = out / kSceneFile;
@@ -144,7 +144,7 @@ class Run {
     sensor.errors = scene_.rig.cameras.at(camera);
     sensor.encoding = options_.world.mono8 ? ImageEncoding::kMono8 : ImageEncoding::kBgr8;
     sensor.noise = options_.world.noise;
-    sensor.adapt = scene_.name != "random";  // views of random are independent
+    sensor.adapt = scene_.name != "random";  // views of `random` are independent
     sensor.interval_s = static_cast<double>(options_.every) /
                         scene_.rig.true_calibration.cameras.at(camera).rate_hz;
     sensor.seed = mixBits(scene_.seed, 0xca3 + camera);
@@ -205,7 +205,7 @@ bool simulate(const sim::Scene& scene, const SimulateOptions& options,
   Run run(options, scene);
   const fs::path last = options.out / sim::kVisibilityTruthFile;
   if (fs::exists(last) && run.isWhole()) return false;
-  fs::remove(last);  // images were removed since
+  fs::remove(last);  // images were removed after completion
   run.writeLists();
   Journal journal(options.out / kJournalFile, run.cameras(),
                   [&](std::size_t frame) { return run.isWhole(frame); });

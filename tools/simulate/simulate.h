@@ -1,4 +1,4 @@
-// Renders a scene to a dataset folder; resumable, deterministic.
+// Renders a scene to a dataset folder. The result is deterministic; an interrupted run continues.
 #pragma once
 
 #include <cstdint>
@@ -27,11 +27,11 @@ struct SimulateProgress {
   std::size_t resumed = 0;            ///< frames from an earlier run
 };
 
-/// Returns false if the folder was already complete. Throws StartupError for invalid options, an
+/// Returns false if the folder was complete before. Throws StartupError for invalid options, an
 /// unknown scene, or a folder with other content. `report` may be empty.
 bool simulate(const SimulateOptions& options,
               const std::function<void(const SimulateProgress&)>& report);
-/// A given scene: options.scene and options.seed are ignored.
+/// Renders `scene`; ignores options.scene and options.seed.
 bool simulate(const sim::Scene& scene, const SimulateOptions& options,
               const std::function<void(const SimulateProgress&)>& report);
 

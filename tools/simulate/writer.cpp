@@ -38,7 +38,7 @@ std::string speedCsv(const std::vector<SpeedSample>& samples) {
   return text;
 }
 
-/// The states at the times of the inertial samples.
+/// Returns the body's states at the times of the inertial samples.
 std::string statesCsv(const sim::Scene& scene, const std::vector<sim::ImuRecord>& records) {
   std::string text =
       "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],"
@@ -125,7 +125,7 @@ void writeImage(const fs::path& file, int width, int height, int channels,
   const cv::Mat image(height, width, channels == 3 ? CV_8UC3 : CV_8UC1,
                       const_cast<std::uint8_t*>(pixels.data()));
   // Empty settings make OpenCV use zlib's level 1 with run lengths after the filter SUB. This is
-  // twice as fast as level 1 alone, with smaller files.
+  // twice as fast as an explicit level 1, and the files are smaller.
   std::vector<int> settings;
   if (format == ImageFormat::kJpeg) settings = {cv::IMWRITE_JPEG_QUALITY, 95};
   std::vector<std::uint8_t> bytes;

@@ -1,5 +1,5 @@
-# Builds the page: three.js by the lockfile, the shapes, the modules. If npm cannot download
-# three.js, there is no page, and the next build tries again.
+# Builds the page from three.js (by the lockfile), the shapes and the modules. If npm cannot
+# download three.js, no page is built, and the next build tries again.
 set(fetched ${WORK}/node_modules/.perdure-lock)
 execute_process(COMMAND ${CMAKE_COMMAND} -E compare_files ${SOURCE}/package-lock.json ${fetched}
   RESULT_VARIABLE changed OUTPUT_QUIET ERROR_QUIET)

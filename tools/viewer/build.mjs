@@ -1,5 +1,5 @@
-// Copies the page to a folder: the modules of src unchanged, and three.js of node_modules beside
-// them, each also as FILE.gz for browsers that accept it.
+// Copies the page to a folder: the modules of src unchanged, and three.js from node_modules. Each
+// file is also written as FILE.gz, for browsers that accept compressed files.
 // usage: node build.mjs OUT NODE_MODULES
 import { cpSync, mkdirSync, readdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
 import { dirname, extname, join } from 'node:path';

@@ -19,7 +19,7 @@ class DisjointSets {
     const auto [low, high] = std::minmax({rootOf(a), rootOf(b)});
     parents_[high] = low;
   }
-  /// The root of each id that was named so far.
+  /// Returns the root of each id that was passed to rootOf() or join().
   const std::map<Id, Id>& roots() {
     for (auto& [id, root] : parents_) root = rootOf(id);
     return parents_;

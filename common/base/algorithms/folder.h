@@ -10,8 +10,8 @@
 
 namespace perdure {
 
-/// The paths in a folder for which `wanted` returns true, sorted. Empty if the folder is missing.
-/// Throws StartupError if it cannot be read.
+/// Returns the sorted paths in a folder for which `wanted` returns true; none if the folder is
+/// missing. Throws StartupError if the folder cannot be read.
 std::vector<std::filesystem::path> pathsIn(const std::filesystem::path& folder,
                                            const auto& wanted) {
   std::vector<std::filesystem::path> paths;

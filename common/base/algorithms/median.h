@@ -6,7 +6,8 @@
 
 namespace perdure {
 
-/// The middle value, or the upper one of the two in the middle. Returns 0 if there are no values.
+/// Returns the middle value, or the larger one of the two middle values. Returns 0 if there are no
+/// values.
 template <class Values>
 typename Values::value_type medianOf(Values values) {
   if (values.empty()) return {};

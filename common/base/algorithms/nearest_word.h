@@ -6,8 +6,9 @@
 
 namespace perdure {
 
-/// The candidate with the fewest edits (insert, delete, replace, swap of neighbours); the first of
-/// several. Empty if all need more than two edits and more than a third of the word's length.
+/// Returns the candidate with the fewest edits (insert, delete, replace, swap of neighbours); the
+/// first of several. Returns an empty string if every candidate needs more than two edits and more
+/// edits than a third of the word's length.
 std::string nearestWord(const std::string& word, const std::vector<std::string>& candidates);
 
 }  // namespace perdure

@@ -1,4 +1,5 @@
-// Stable sorting of large elements by a key: each moves once. std::stable_sort compiles slowly.
+// Stable sorting by a key that moves each element once. It replaces std::stable_sort, which takes
+// long to compile.
 #pragma once
 
 #include <cstddef>
@@ -10,11 +11,12 @@
 
 namespace perdure {
 
-/// Indices in order of increasing key. Equal keys keep their order.
+/// Returns the indices of `keys` in order of increasing key. Equal keys keep their order.
 ScratchVector<std::size_t> stableOrder(const ScratchVector<double>& keys);
 ScratchVector<std::size_t> stableOrder(const ScratchVector<std::uint64_t>& keys);
 
-/// `keyOf` returns a double or a std::uint64_t for an element.
+/// Sorts `elements` by increasing key. `keyOf` returns the key of an element, a double or a
+/// std::uint64_t.
 template <class T, class Allocator, class KeyOf>
 void stableSortBy(std::vector<T, Allocator>& elements, const KeyOf& keyOf) {
   ScratchVector<decltype(keyOf(std::as_const(elements).front()))> keys;

@@ -1,4 +1,4 @@
-// UTF-8 in texts from outside.
+// Checks UTF-8 in texts from outside the program.
 #pragma once
 
 #include <cstddef>
@@ -6,8 +6,8 @@
 
 namespace perdure {
 
-/// Length in bytes of the character at the start of `text`, which is not empty. Returns 0 if it is
-/// invalid: truncated, overlong, a surrogate, or beyond U+10FFFF.
+/// Returns the length in bytes of the first character of `text`, which must not be empty. Returns 0
+/// if the character is invalid: truncated, overlong, a surrogate, or beyond U+10FFFF.
 inline std::size_t lengthOfCharacter(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned char first = byte(0);

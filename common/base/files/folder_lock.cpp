@@ -51,7 +51,7 @@ FolderLock::FolderLock(std::filesystem::path folder) : folder_(std::move(folder)
 }
 
 bool FolderLock::holds() const {
-  if (!descriptor_.open()) return true;  // not readable, so not locked
+  if (!descriptor_.open()) return true;  // folders that cannot be read are not locked
   struct stat now {
   }, then{};
   return stat(folder_.c_str(), &now) == 0 && fstat(descriptor_.get(), &then) == 0 &&

@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The address of a file for SQLite, which takes options after a question mark.
+/// Returns the URI of a file for SQLite. `options` is empty or begins with a question mark.
 std::string addressOf(const fs::path& file, const char* options) {
   std::string address = "file://";
   for (const char c : fs::absolute(file).string()) {
@@ -30,7 +30,7 @@ int openAs(const std::string& name, sqlite3*& connection) {
   if (const int code = sqlite3_open_v2(name.c_str(), &connection, kFlags, nullptr)) return code;
   sqlite3_extended_result_codes(connection, 1);
   sqlite3_busy_timeout(connection, 1000);
-  // Opening does not touch the file; this does.
+  // SQLite reads the file only at the first statement, so errors appear here.
   return sqlite3_exec(connection, "PRAGMA schema_version", nullptr, nullptr, nullptr);
 }
 
@@ -58,7 +58,7 @@ std::string whyNot(const fs::path& file, int code, const char* of_sqlite) {
   return file.string() + ": " + of_sqlite;
 }
 
-/// SQLite keeps `-wal` beside the file that a link leads to.
+/// Returns the target of a link, because SQLite stores `-wal` beside the target.
 fs::path targetOf(const fs::path& link) {
   std::error_code missing;
   const fs::path target = fs::canonical(link, missing);

@@ -1,4 +1,5 @@
-// Opens SQLite files of others to read them. A library of its own, because few programs use SQLite.
+// Opens SQLite files of other programs for reading. This is a separate library, because few
+// programs use SQLite.
 #pragma once
 
 #include <filesystem>
@@ -14,11 +15,11 @@ struct OpenedSqlite {
   std::string why;                ///< after a failure: the cause and its fix
 };
 
-/// Opens a file to read it, and waits at most a second while another program locks it. A file in
-/// WAL mode in a folder that cannot be written is read as immutable if it has no `-wal`.
+/// Opens a file for reading, and waits for at most a second while another program locks the file.
+/// In a folder that cannot be written, a file in WAL mode is read as immutable if it has no `-wal`.
 OpenedSqlite openSqliteToRead(const std::filesystem::path& file);
 
-/// Whether a file in WAL mode has no `-wal`, so its newest data may have been left behind.
+/// Returns true if a file is in WAL mode and has no `-wal`. Its newest data may then be missing.
 bool lacksWriteAheadLog(const std::filesystem::path& file);
 
 }  // namespace perdure

@@ -11,8 +11,8 @@ namespace perdure {
 
 class HeldErrors {
  public:
-  /// `worth` decides whether a line, without its line end, is passed on. Only one object may exist
-  /// in a process.
+  /// `worth` decides whether a line, passed without its line end, is printed when this object ends.
+  /// Only one object may exist in a process at a time.
   explicit HeldErrors(std::function<bool(const std::string&)> worth);
   ~HeldErrors();
   HeldErrors(const HeldErrors&) = delete;

@@ -23,7 +23,7 @@ struct BytesMessage : ddsi_serdata {
   BytesMessage(const ddsi_sertype* of, ddsi_serdata_kind of_kind, std::vector<std::uint8_t> cdr)
       : ddsi_serdata{}, size(static_cast<std::uint32_t>(cdr.size())) {
     ddsi_serdata_init(this, of, of_kind);
-    cdr.resize((cdr.size() + 3) / 4 * 4);  // Cyclone sends whole words
+    cdr.resize((cdr.size() + 3) / 4 * 4);  // Cyclone sends multiples of four bytes
     bytes = std::make_shared<const std::vector<std::uint8_t>>(std::move(cdr));
   }
   std::uint32_t size;  // size without the padding of the last word
@@ -64,7 +64,7 @@ ddsi_serdata* fromPieces(const ddsi_sertype* type, ddsi_serdata_kind kind, ddsrt
   return made(type, kind, std::move(cdr));
 }
 
-/// Without a key all messages belong to one instance.
+/// Returns an empty key: without a key, all messages belong to one instance.
 ddsi_serdata* keyOf(const ddsi_sertype* type) { return made(type, SDK_KEY, {}); }
 
 ddsi_serdata_ops messageOps() {
@@ -122,7 +122,8 @@ ddsi_sertype_ops typeOps() {
   return ops;
 }
 
-/// A DDS type without a key in XCDR1, which matches by name. The caller owns one reference.
+/// Returns a DDS type without a key, in XCDR1, that matches other types by name. The caller owns
+/// one reference to it.
 ddsi_sertype* makeBytesType(const std::string& name) {
   static const ddsi_serdata_ops kMessages = messageOps();
   static const ddsi_sertype_ops kType = typeOps();
@@ -132,18 +133,18 @@ ddsi_sertype* makeBytesType(const std::string& name) {
   return type;
 }
 
-/// A message of such a type; the caller owns one reference.
+/// Returns a message of a type from makeBytesType(). The caller owns one reference to it.
 ddsi_serdata* messageOf(const ddsi_sertype* type, std::vector<std::uint8_t> cdr) {
   return made(type, SDK_DATA, std::move(cdr));
 }
 
-/// The bytes of a message, including the header. They stay valid as long as they have an owner.
+/// Returns the bytes of a message, including the header. They stay valid while they have an owner.
 SharedBytes bytesOf(const ddsi_serdata* message) {
   const BytesMessage& bytes = in(message);
   return {bytes.bytes, std::span(*bytes.bytes).first(bytes.size)};
 }
 
-/// The topic, and its type. If `keep` is given, the caller owns one reference to the type.
+/// Creates the topic. If `keep` is given, it receives the type, and the caller owns one reference.
 Entity foreignTopic(const Participant& participant, const ForeignTopic& topic,
                     ddsi_sertype** keep = nullptr) {
   ddsi_sertype* type = makeBytesType(topic.type);
@@ -157,7 +158,7 @@ Entity foreignTopic(const Participant& participant, const ForeignTopic& topic,
   return created(handle, "the topic " + topic.name + " (" + topic.type + ")");
 }
 
-/// Shared memory is reserved for Perdure's own images.
+/// Returns a QoS without shared memory, which only Perdure's own images use.
 QosPtr foreignQos(const ForeignTopic& topic) {
   const Qos row{.reliable = topic.reliable, .depth = topic.depth, .latched = topic.latched};
   QosPtr qos = writerQos(row, {}, {}, false);

@@ -15,18 +15,19 @@ struct ddsi_sertype;
 namespace perdure::bus {
 
 struct ForeignTopic {
-  std::string name;        ///< name on the wire: "rt/camera/image_raw"
-  std::string type;        ///< "sensor_msgs::msg::dds_::Image_"
+  std::string name;        ///< name on the wire, for example "rt/camera/image_raw"
+  std::string type;        ///< for example "sensor_msgs::msg::dds_::Image_"
   bool reliable = true;    ///< a best-effort reader matches any writer
   bool latched = false;    ///< TRANSIENT_LOCAL
   int depth = 1;           ///< KEEP_LAST
   std::string count = {};  ///< prefix of the names of its counts; empty: the topic's name
 };
 
-/// Readers and writers ignore their own participant, so that mirrored messages do not return.
+/// Reads a third-party topic. Foreign readers and writers ignore their own participant, so that a
+/// process does not receive the messages that it writes.
 class ForeignReader : public AnyReader {
  public:
-  /// `cdr` includes its header of four bytes. It stays valid as long as it has an owner.
+  /// `cdr` includes its header of four bytes, and stays valid while it has an owner.
   using Handler = std::function<void(const SharedBytes& cdr)>;
 
   ForeignReader(const Participant& participant, const ForeignTopic& topic);
@@ -41,8 +42,8 @@ class ForeignWriter : public AnyWriter {
   ForeignWriter(const Participant& participant, const ForeignTopic& topic);
   ~ForeignWriter();
 
-  /// `cdr` includes its header. Messages that cannot be written are counted, and the reason is
-  /// returned.
+  /// Writes `cdr`, which includes its header. If DDS cannot write it, counts and returns the
+  /// reason.
   Result<void> write(std::vector<std::uint8_t> cdr);
 
  private:

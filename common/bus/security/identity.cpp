@@ -57,7 +57,7 @@ std::chrono::system_clock::time_point timeOf(const ASN1_TIME* time) {
   return std::chrono::system_clock::from_time_t(timegm(&parts));
 }
 
-/// Returns X509_V_OK, or the code of the reason why the certificate is not accepted.
+/// Returns X509_V_OK if the certificate is accepted; otherwise OpenSSL's code of the reason.
 int verify(X509* certificate, X509* authority, X509_CRL* revoked) {
   const Store store(X509_STORE_new());
   X509_STORE_add_cert(store.get(), authority);
@@ -105,7 +105,7 @@ constexpr Item kItems[] = {
     {"dds.sec.access.governance", "AccessControl", "Governance", identity_files::kGovernance},
     {"dds.sec.access.permissions", "AccessControl", "Permissions", identity_files::kPermissions},
 };
-/// Cyclone's own plugins, by their default names.
+/// Cyclone's own security plugins, by their default names.
 constexpr const char* kPlugins[][3] = {{"auth", "Authentication", "authentication"},
                                        {"access", "AccessControl", "access_control"},
                                        {"crypto", "Cryptographic", "crypto"}};

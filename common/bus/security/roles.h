@@ -17,7 +17,7 @@ struct RoleName {
   std::string_view name;
 };
 std::span<const RoleName> roleNames();
-/// The identity of a process if bus.identity is not set, by the name of its participant.
+/// Returns the identity that the process uses if bus.identity is not set.
 std::string identityOf(const std::string& process);
 
 }  // namespace perdure::bus

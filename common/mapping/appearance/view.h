@@ -1,4 +1,4 @@
-// The appearance of an anchor: landmarks observed on the trajectory from it to the next anchor.
+// The appearance of an anchor: landmarks observed between this anchor and the next one.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,7 +19,7 @@ struct SeenPoint {
   bool operator==(const SeenPoint&) const = default;
 };
 
-/// At most kMostPoints points of 48 bytes each.
+/// A view has at most kMostPoints points of 48 bytes each.
 using View = std::vector<SeenPoint>;
 inline constexpr std::size_t kMostPoints = 48;
 

@@ -7,10 +7,10 @@
 namespace perdure::mapping {
 namespace {
 
-constexpr double kKept_m = 40.0;         // points are stored over this distance travelled
+constexpr double kKept_m = 40.0;         // a landmark is removed after this distance travelled
 constexpr double kRelative = 0.1;        // largest error of a point relative to its distance
 constexpr double kFarthest_m = 60;       // largest distance from the body
-constexpr std::size_t kMostKept = 2000;  // limit for a body at rest
+constexpr std::size_t kMostKept = 2000;  // largest number of landmarks, also for a body at rest
 
 }  // namespace
 

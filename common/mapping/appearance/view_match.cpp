@@ -13,9 +13,9 @@
 namespace perdure::mapping {
 namespace {
 
-constexpr int kAlike = 64;                 // bits; a quarter of the descriptor
-constexpr double kUnlikeNext = 0.8;        // ratio to the distance of the second best
-constexpr std::size_t kLeastAgreeing = 4;  // number of agreeing points
+constexpr int kAlike = 64;                 // largest distance of similar descriptors, bits
+constexpr double kUnlikeNext = 0.8;        // largest ratio to the distance of the second best
+constexpr std::size_t kLeastAgreeing = 4;  // least number of agreeing points
 constexpr double kDeviations = 3.0;        // gate, in standard deviations
 constexpr double kPointError_m = 0.15;     // error that the covariance of a point does not include
 constexpr double kBaseline_m = 1.0;        // least distance of two points that propose a yaw
@@ -44,7 +44,7 @@ Nearest nearestOf(const SeenPoint& point, const View& among) {
   return nearest;
 }
 
-/// Pairs that are mutual nearest neighbours and pass the ratio test.
+/// Returns pairs of points whose descriptors are mutual nearest neighbours and pass the ratio test.
 std::vector<Alike> alikeOnes(const View& stored, const View& seen) {
   std::vector<Alike> pairs;
   for (std::size_t k = 0; k < seen.size(); ++k) {
@@ -64,8 +64,8 @@ bool agrees(const Alike& pair, const LevelPose& T_AB) {
   return (T_AB * pair.b - pair.a).squaredNorm() < kDeviations * kDeviations * pair.variance;
 }
 
-/// T_AB that maps the middle of two points to that of two others, and aligns the lines between
-/// them.
+/// Returns the T_AB that maps the midpoint of two points in B to that of their partners in A, and
+/// aligns the two lines. Returns nothing if the points are too close for a yaw.
 std::optional<LevelPose> proposedBy(const Alike& first, const Alike& second) {
   const Eigen::Vector3d line_a = second.a - first.a, line_b = second.b - first.b;
   const double sigma = std::sqrt(first.variance + second.variance);
@@ -77,8 +77,8 @@ std::optional<LevelPose> proposedBy(const Alike& first, const Alike& second) {
   return T_AB;
 }
 
-/// Least squares over the agreeing pairs. The covariance is widened if the residuals exceed the
-/// assumed errors.
+/// Returns the least-squares pose of the agreeing pairs, starting from `T_AB`. The covariance is
+/// widened if the residuals exceed the assumed errors.
 LevelGaussian fitted(const std::vector<Alike>& pairs, LevelPose T_AB) {
   Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
   double chi2 = 0.0, count = 0.0;
@@ -153,7 +153,7 @@ std::optional<ViewMatch> matchViews(const View& stored, const View& seen) {
   match.points = static_cast<std::size_t>(std::count_if(
       pairs.begin(), pairs.end(), [&](const Alike& p) { return agrees(p, match.T_AB.mean); }));
   if (match.points < kLeastAgreeing || !isCovariance(match.T_AB.covariance)) return std::nullopt;
-  // Each proposal uses two points.
+  // Two points define the pose, so only the others are evidence.
   const auto others = static_cast<double>(match.points - 2);
   match.nats = -(logChoose(pairs.size(), 2) + logChoose(pairs.size() - 2, match.points - 2) +
                  others * std::log(chanceOf(pairs)));

@@ -1,5 +1,5 @@
-// Anchor: a place on the trajectory of the body, to which the long-term memory is linked. Objects
-// are stored relative to an anchor. When the graph moves anchors, objects move with them.
+// An anchor is a place on the trajectory of the body. Objects are stored relative to an anchor.
+// When the graph moves anchors, objects move with them.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,7 +13,8 @@ namespace perdure::mapping {
 
 using AnchorId = std::uint64_t;  ///< 0: none; ids increase with time within a session
 
-/// Factors on covariances of the odometry: of place and yaw, and of height.
+/// Factors of the odometry's covariances: `plane` for x, y and yaw, `height` for z. of() applies
+/// them to a covariance of [p, yaw]; over() divides them by other factors.
 struct DriftVariance {
   double plane = 1.0, height = 1.0;
   Eigen::Matrix4d of(const Eigen::Matrix4d& covariance) const {
@@ -33,9 +34,9 @@ struct Anchor {
   WorldId session;        ///< the odometry's frame of reference W
   FrameStamp stamp;
   RigidTransform T_WA;          ///< z against gravity; constant
-  LevelGaussian from_previous;  ///< T_previous,A by odometry
+  LevelGaussian from_previous;  ///< T_previous,A by odometry, with `scale` applied
   double way_m = 0.0;           ///< distance travelled in the session so far
-  DriftVariance scale;          ///< factors by which loops have scaled the increment's covariance
+  DriftVariance scale;          ///< factors, estimated from loops, of the increment's covariance
 };
 
 }  // namespace perdure::mapping

@@ -1,4 +1,4 @@
-// Errors of level poses and of objects: their rotation, and their lower bounds.
+// Functions for the errors of level poses and of objects: propagation, rotation, and lower bounds.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,13 +11,14 @@ namespace perdure::mapping {
 /// origin. `arm_A` is the vector from that origin to the object.
 Eigen::Matrix4d byFrame(const Eigen::Vector3d& arm_A);
 
-/// The covariance of [p, yaw] after a rotation of the axes by R.
+/// Returns the covariance of [p, yaw] after a rotation of the axes by R.
 Eigen::Matrix4d turnedBy(const Eigen::Matrix3d& R, const Eigen::Matrix4d& covariance);
 
-/// The larger standard deviation of x and y, m.
+/// The larger of the standard deviations of x and y, m.
 double planeSigma(const Eigen::Matrix4d& covariance);
 
-/// Adds the minimal standard deviations of position (m) and yaw (rad).
+/// Adds the variances of an additional error with these standard deviations of position (m) and yaw
+/// (rad).
 void addFloor(Eigen::Matrix4d& covariance, double floor_m, double floor_rad);
 
 }  // namespace perdure::mapping

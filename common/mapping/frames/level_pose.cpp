@@ -6,7 +6,7 @@
 namespace perdure::mapping {
 namespace {
 
-/// Shorter horizontal projections do not define a direction.
+/// Shorter horizontal projections of a unit vector do not define a direction.
 constexpr double kLeastHorizontal = 0.3;
 
 Eigen::Vector3d horizontal(const Eigen::Vector3d& axis, const Eigen::Vector3d& up) {

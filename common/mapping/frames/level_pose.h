@@ -1,5 +1,5 @@
-// Poses between frames whose z axes point against gravity: position and yaw. Roll and pitch of the
-// body are known from gravity at each place and do not drift.
+// Poses between frames whose z axes point against gravity. They have only position and yaw, because
+// gravity determines roll and pitch of the body without drift.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,7 +22,7 @@ struct LevelPose {
 
 /// Errors are [δp, δyaw] with p = p̂ + δp (axes of A) and yaw = ŷ + δyaw; m and rad.
 using LevelError = Eigen::Vector4d;
-/// `a` minus `b`.
+/// Returns the error of `a` relative to `b`.
 LevelError difference(const LevelPose& a, const LevelPose& b);
 
 /// T_AB with the covariance of its error.
@@ -31,23 +31,23 @@ struct LevelGaussian {
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
 };
 
-/// T_AB T_BC, with independent errors.
+/// Returns T_AB T_BC. The errors of the two factors must be independent.
 LevelGaussian compose(const LevelGaussian& T_AB, const LevelGaussian& T_BC);
 LevelGaussian inverse(const LevelGaussian& T_AB);
 
-/// Jacobian of the error of T_AB T_BC with respect to the error of T_AB; the second function: of
-/// T_BC.
+/// Jacobians of the error of T_AB T_BC: composedByFirst() with respect to the error of T_AB,
+/// composedBySecond() to that of T_BC.
 Eigen::Matrix4d composedByFirst(const LevelPose& T_AB, const LevelPose& T_BC);
 Eigen::Matrix4d composedBySecond(const LevelPose& T_AB);
 /// Jacobian of the error of T_AB⁻¹ with respect to the error of T_AB.
 Eigen::Matrix4d invertedBy(const LevelPose& T_AB);
 
-/// Position and yaw of a transform between two frames that are level, or nearly so.
+/// Returns position and yaw of a transform between two frames that are level, or nearly so.
 LevelPose levelOf(const RigidTransform& T_AB);
 
-/// The frame at the origin of B with z axis `up_A`; its x axis is the horizontal projection of B's
-/// x axis. If B's x axis is within 17° of the vertical, B's z axis is used instead, which is the
-/// viewing direction of a camera. All in A; `up_A` is a unit vector.
+/// Returns the pose in A of the frame at B's origin whose z axis is the unit vector `up_A`. Its x
+/// axis is the horizontal projection of B's x axis. If that axis is within 17° of the vertical, B's
+/// z axis, the viewing direction of a camera, is projected instead.
 RigidTransform levelled(const RigidTransform& T_AB, const Eigen::Vector3d& up_A);
 
 }  // namespace perdure::mapping

@@ -16,7 +16,7 @@ Matrix46 levelByPose(const Odometry& odometry) {
   return B;
 }
 
-/// Propagates an error of position and yaw along a rigid motion of the body.
+/// Matrix that propagates an error [δp, δyaw] along the rigid motion from `before` to `now`.
 Eigen::Matrix4d carried(const Odometry& before, const Odometry& now) {
   Eigen::Matrix4d S = Eigen::Matrix4d::Identity();
   S.topRightCorner<3, 1>() = now.up_W.cross(now.T_WB.p - before.T_WB.p);

@@ -1,5 +1,5 @@
 // The odometry error since an earlier place: the present pose error minus the error at that place,
-// propagated along the rigid motion of the body. Derivation: tools/docs/maths/pose_graph.md.
+// which the rigid motion of the body has propagated. Derivation: tools/docs/maths/pose_graph.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,7 +8,7 @@
 
 namespace perdure::mapping {
 
-/// Random walk over the distance travelled, for poses without increments.
+/// Assumed random walk of the error over the distance travelled, for poses without increments.
 struct LevelWalk {
   double position = 0.0;  ///< m/√m
   double yaw = 0.0;       ///< rad/√m
@@ -18,13 +18,13 @@ class RelativeError {
  public:
   explicit RelativeError(const LevelWalk& walk) : walk_(walk) {}
 
-  /// The earlier place is the pose of `odometry`.
+  /// Sets the earlier place to the pose of `odometry`.
   void begin(const Odometry& odometry);
-  /// Continues from the frame `before` to the frame `now`; `metres` is the distance travelled
-  /// between them.
+  /// Continues from the odometry `before` to `now`; `metres` is the distance travelled between
+  /// them.
   void add(const Odometry& before, const Odometry& now, double metres);
 
-  /// Covariance of [δp, δyaw], p in W.
+  /// The covariance of the relative error [δp, δyaw], m and rad, δp in W.
   Eigen::Matrix4d covariance() const { return joint_.topLeftCorner<4, 4>(); }
 
  private:

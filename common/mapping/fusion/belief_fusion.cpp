@@ -26,7 +26,8 @@ double probabilityOf(const ObjectBelief& belief, const std::string& name) {
   return c == nullptr ? kNotConsidered : std::max(c->probability, kLeastShare);
 }
 
-/// The weight for the most probable class of both beliefs together.
+/// Returns the host's weight in the fusion of the most probable class that both beliefs contain; .5
+/// if they have no common class.
 double weightOf(const ObjectBelief& host, const ObjectBelief& guest) {
   double weight = 0.5, likeliest = 0.0;
   for (const ClassBelief& c : host.classes) {
@@ -68,7 +69,7 @@ void poolClasses(ObjectBelief& result, const ObjectBelief& guest, double weight)
       [](const ClassBelief& a, const ClassBelief& b) { return a.probability > b.probability; });
 }
 
-/// Enters the fusion as a merge, so that the sums of the ledger equal the belief.
+/// Records the fusion in the ledger as a merge, so that the sums of the ledger equal the belief.
 void enterMerge(ObjectBelief& result) {
   Ledger& why = result.why;
   if (why.empty()) return;

@@ -23,14 +23,14 @@ Eigen::VectorXd relativeSpread(const Matrix7d& a, const Matrix7d& b) {
   return eigenvalues(both);
 }
 
-/// Derivative of log det (w A⁻¹ + (1 - w) B⁻¹), which decreases with w.
+/// Derivative of log det (w A⁻¹ + (1 - w) B⁻¹) with respect to w. It decreases with w.
 double slopeAt(double w, const Eigen::VectorXd& spread) {
   double slope = 0.0;
   for (const double s : spread) slope += (s - 1.0) / (w * s + 1.0 - w);
   return slope;
 }
 
-/// Mean and covariance of an equal mixture of both.
+/// Mean and covariance of a mixture of both estimates.
 CuboidGaussian coveringBoth(const CuboidGaussian& a, const CuboidGaussian& b, const Vector7d& d,
                             double w) {
   CuboidGaussian both;

@@ -1,6 +1,6 @@
-// Fuses two estimates of one object whose errors have an unknown correlation (Julier and Uhlmann
-// 1997), and does the same for probabilities. The fusion of an estimate with itself leaves it
-// unchanged. Derivation: tools/docs/maths/fusion.md.
+// Fuses two estimates of one object if the correlation of their errors is unknown (Julier and
+// Uhlmann 1997). Fuses probabilities likewise. An estimate fused with itself does not change.
+// Derivation: tools/docs/maths/fusion.md.
 #pragma once
 
 #include "common/types/objects.h"
@@ -12,18 +12,20 @@ struct CuboidGaussian {
   Vector7d mean = Vector7d::Zero();
   Matrix7d covariance = Matrix7d::Identity();
 };
-/// `a` minus `b`, yaw in (-90°, 90°].
+/// Returns `a` minus `b`, with yaw wrapped to (-90°, 90°].
 Vector7d cuboidDifference(const Vector7d& a, const Vector7d& b);
 
-/// Weight of the information of `a`, [0, 1]; `b` has the remaining weight. It minimises the volume
-/// of the result. It is .5 if both are equal. Both must be positive definite.
+/// Returns the weight of the information of `a`, [0, 1], that minimises the volume of the fused
+/// covariance; .5 if both are equal. Both covariances must be positive definite.
 double intersectionWeight(const Matrix7d& a, const Matrix7d& b);
 
-/// Fuses with the information w A⁻¹ + (1 - w) B⁻¹. If the two contradict each other, the result
-/// covers both, because their mean would be overconfident and wrong. Yaw stays near that of `a`.
+/// Fuses `a` and `b` with the information w A⁻¹ + (1 - w) B⁻¹. If they contradict each other, the
+/// result covers both, because their weighted mean would be wrong and overconfident. The yaw stays
+/// within 90° of that of `a`.
 CuboidGaussian intersect(const CuboidGaussian& a, const CuboidGaussian& b, double weight);
 
-/// p^w q^(1-w), normalised: the weighted mean of the log-odds.
+/// Returns the probability whose log-odds are the weighted mean of those of p and q: p^w q^(1-w),
+/// normalised.
 double pooled(double p, double q, double weight);
 
 }  // namespace perdure::mapping

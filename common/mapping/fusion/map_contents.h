@@ -1,4 +1,4 @@
-// The complete contents of a map, for fusion with other maps: the graph, objects and their history,
+// The complete contents of a map, for fusion with other maps: the graph, objects including history,
 // their origins, and the changes between drives.
 #pragma once
 
@@ -14,7 +14,7 @@
 
 namespace perdure::mapping {
 
-/// The reason why an object is history: kGone, or kMerged into another object.
+/// The end of an object that is history: kGone, or kMerged into another object.
 struct Ending {
   EventKind kind = EventKind::kGone;
   TimePoint time;
@@ -28,14 +28,14 @@ struct StoredObject {
   std::optional<Ending> ended;
 };
 
-/// The origin of an object from another map. Maps that continue one another share their first
-/// session, and have equal object ids up to the point where they diverge.
+/// The origin of an object that comes from another map. If one map continues another, both have the
+/// same first session, and equal object ids up to the point where they diverge.
 struct Origin {
   SessionIdentity map;  ///< first session of the other map
   ObjectId id = 0;      ///< id in the other map
-  ObjectId now = 0;     ///< id in this map; the object may be history since
+  ObjectId now = 0;     ///< id in this map; the object may have become history
   TimePoint first_seen;
-  TimePoint last_seen;  ///< last sighting in the belief that was copied
+  TimePoint last_seen;  ///< last sighting that the copied belief contains
   bool operator==(const Origin&) const = default;
 };
 
@@ -45,7 +45,7 @@ struct Change {
   Kind kind = Kind::kGone;
   ObjectId id = 0;
   std::string class_name;
-  WorldId map;                                    ///< M of the place
+  WorldId map;                                    ///< M in which `p_M` is given
   Eigen::Vector3d p_M = Eigen::Vector3d::Zero();  ///< earlier position
   TimePoint last_seen;                            ///< last sighting at that position
   TimePoint since;                                ///< time at which it was found gone or elsewhere
@@ -63,7 +63,7 @@ struct MapContents {
   ObjectId largestId() const;
 };
 
-/// The object that an object was merged into; itself if it has not been merged.
+/// Returns the present id of an object after all merges; `id` if it has not been merged.
 ObjectId survivorOf(const MapContents& map, ObjectId id);
 
 /// Returns whether `a`, and not `b`, is the first map of a fusion. The map with the older first

@@ -28,13 +28,13 @@ void apply(SavedMap& map, Unsaved&& unsaved) {
   for (const ObjectId id : unsaved.records_gone) map.records.erase(id);
 }
 
-/// Drives along sessions again until that finds no more loops.
+/// Replays sessions until they yield no more loops.
 class Replays {
  public:
   Replays(const SavedMap& map, const Parameters& parameters) : mapper_(parameters, map) {}
 
   void run(const std::vector<WorldId>& sessions) {
-    // What one of them joins the next time may be what lies before the place where it was joined.
+    // A session joined in one pass may yield loops before the place of joining in the next pass.
     constexpr int kMostPasses = 3;
     for (int pass = 0; pass < kMostPasses; ++pass) {
       const std::size_t before = loops_;
@@ -65,7 +65,8 @@ class Replays {
   std::size_t loops_ = 0;
 };
 
-/// What is new, and after it what had found nothing before.
+/// Returns new and continued sessions, followed by those that are not in the largest component.
+/// Returns nothing if there are no new or continued sessions.
 std::vector<WorldId> toBeReplayed(const MapContents& map, const Addition& addition) {
   std::vector<WorldId> sessions = addition.sessions;
   sessions.insert(sessions.end(), addition.grown.begin(), addition.grown.end());

@@ -1,9 +1,8 @@
-// Fuses the maps of several drives and vehicles into one. Their sessions are aligned by loops,
-// which a replay of each session along its anchors finds. Beliefs about identical objects are
-// fused.
+// Fuses the maps of several drives and vehicles into one. A replay of each session along its
+// anchors finds loops, which align the sessions. Beliefs about the same object are fused.
 //
-// There are no files, threads or clock. The same maps in the same order give the same result, and
-// adding a map a second time changes nothing. Derivation: tools/docs/maths/fusion.md.
+// The code uses no files, threads or clock. The same maps in the same order give the same result. A
+// map that is added twice has no further effect. Derivation: tools/docs/maths/fusion.md.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +16,8 @@ namespace perdure::mapping {
 /// The result of adding one map.
 struct FusionReport {
   std::vector<WorldId> added, grown;  ///< sessions, by their worlds in the fused map
-  std::vector<WorldId> parted;        ///< continued differently in two maps; one of them is used
+  std::vector<WorldId> parted;        ///< continued differently in two maps; one continuation is
+                                      ///< used
   std::size_t known = 0;              ///< sessions with nothing new
   std::size_t objects = 0;            ///< objects added, without history
   std::size_t renewed = 0;            ///< known objects with later observations
@@ -26,11 +26,11 @@ struct FusionReport {
   std::vector<Change> changes;        ///< new changes
 };
 
-/// Adds `other` to `map`; both must have at least one session. If the first map is the one that
-/// comes first (comesFirst), the result does not depend on the order of the others.
+/// Adds `other` to `map`; both must have at least one session. The order in which the others are
+/// added does not matter if the first of all is the one that comesFirst() selects.
 FusionReport fuseInto(MapContents& map, const MapContents& other, const Parameters& parameters);
 
-/// Sessions grouped by component, the component with most anchors first.
+/// Returns sessions grouped by component, in descending order of the component's number of anchors.
 std::vector<std::vector<WorldId>> partsOf(const MapContents& map);
 
 }  // namespace perdure::mapping

@@ -38,7 +38,7 @@ class Renewal {
 
   std::vector<Change> run(const Addition& addition) {
     for (const Renewed& each : addition.renewed) {
-      // A merge of theirs ends what has its survivor in the map, too.
+      // An object that the other map has merged or lost ends here too.
       if (each.now.ended) {
         endAsTheySay(each);
       } else {
@@ -49,7 +49,8 @@ class Renewal {
   }
 
  private:
-  /// What another drive has seen later than it went stays.
+  /// Ends an object that ended in the other map. An object stays if this map has other evidence of
+  /// it and observed it after that end, or if both maps merged it into the same object.
   void endAsTheySay(const Renewed& each) {
     const Ending& ending = *each.now.ended;
     const StoredObject& before = each.before;
@@ -87,7 +88,8 @@ class Renewal {
     map_.objects[each.id] = std::move(taken);
   }
 
-  /// The newest sighting is theirs; the one before may be of a drive that they do not know.
+  /// Returns the other map's record. If this map's record is of another session, its sighting
+  /// becomes `earlier`.
   std::optional<ObjectRecord> recordOf(const Renewed& each) const {
     if (!each.record_now) return each.record_before;
     ObjectRecord record = *each.record_now;
@@ -98,7 +100,8 @@ class Renewal {
     return record;
   }
 
-  /// Between two drives; within one the filter follows what moves.
+  /// Returns whether the object moved between two drives. Within one drive the filter tracks
+  /// motion.
   bool hasMoved(const Renewed& each) {
     if (!each.record_before || !each.record_now) return false;
     if (each.record_before->session == each.record_now->session) return false;
@@ -156,7 +159,8 @@ class Joining {
   }
 
  private:
-  /// That whose sighting the joined record has: its W is where the belief belongs.
+  /// Returns the object of the group that has the sighting of the common record, because the fused
+  /// belief must be in the W of that sighting.
   ObjectId hostOf(const std::vector<ObjectId>& group, const ObjectRecord& record) const {
     for (const ObjectId id : group) {
       const auto at = before_.find(id);

@@ -1,5 +1,5 @@
-// What becomes of the beliefs and rows of objects when maps are brought together: known ones that
-// were seen again, and those that a loop shows to be one.
+// Updates the beliefs and records of objects when maps are fused: known objects that were observed
+// again, and objects that a loop identifies as one.
 #pragma once
 
 #include <vector>
@@ -10,12 +10,13 @@
 
 namespace perdure::mapping {
 
-/// Takes what is newer of known objects, by the poses of the graph as it is. Where the belief rests
-/// on what other maps have seen the two are fused. Says what stands elsewhere now, or is gone.
+/// Replaces beliefs and records of known objects by newer ones. If the known belief contains
+/// evidence that the newer one lacks, the two are fused with the present poses of the graph.
+/// Returns the objects that have moved or are gone.
 std::vector<Change> renew(MapContents& map, const Addition& addition);
 
-/// Fuses the beliefs of objects that `identity` lists as the same object. `before`: the records as
-/// they were. Absorbed objects become history. Returns their number.
+/// Fuses the beliefs of objects that `identity` lists as the same object. `before` has their
+/// records before this identification. Absorbed objects become history. Returns their number.
 std::size_t mergeObjects(MapContents& map, const std::map<ObjectId, ObjectRecord>& before,
                          const Identity& identity, const PoseGraph& graph);
 

@@ -1,6 +1,6 @@
-// Finds objects that occupy the same place, which solid objects cannot do. The replay's search
-// compares positions only and leaves some of them separate. A filter that tracked one object twice
-// does so too. Derivation: tools/docs/maths/fusion.md.
+// Finds objects that occupy the same space and must therefore be one solid object. They remain
+// after the replay, which compares positions only, or if a filter tracked one object twice.
+// Derivation: tools/docs/maths/fusion.md.
 #pragma once
 
 #include <vector>
@@ -11,11 +11,10 @@
 
 namespace perdure::mapping {
 
-/// The merges to be done; the older id survives. `aligned` has the map's sightings after the
-/// alignment, `graph` its poses.
-/// Two objects are merged on four conditions. They have the same class. The centre of each lies in
-/// the cuboid of the other. Their relative position is known better than the width of the narrower
-/// one. Neither has a second such partner.
+/// Returns the merges to do; the older id survives. `aligned` has the map's sightings after the
+/// alignment, `graph` the poses. Two objects are merged if they have the same class, the centre of
+/// each lies in the cuboid of the other, their relative position is known better than the width of
+/// the narrower one, and neither has a second such partner.
 std::vector<MergeOrder> overlapping(const MapContents& map, const SavedMap& aligned,
                                     const PoseGraph& graph);
 

@@ -38,7 +38,7 @@ Origin Provenance::nameOf(ObjectId id) const {
 
 std::vector<Origin> Provenance::toldOf(ObjectId id) const { return under(by_now_, id, told_); }
 
-/// If a belief is newer than all its recorded origins, this map has observed the object since.
+/// A belief newer than all its recorded origins contains observations of this map.
 std::vector<Origin> Provenance::of(ObjectId id) const {
   const StoredObject& object = map_.objects.at(id);
   auto all = under(object.ended ? by_now_ : by_survivor_, id, told_);

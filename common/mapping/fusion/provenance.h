@@ -1,5 +1,6 @@
-// The origins of a map's objects: the objects of other maps that they contain, and the time of the
-// last observation of each. This identifies evidence that two maps share, even if ids have changed.
+// The origins of a map's objects: the objects of other maps whose evidence they contain, with the
+// time of the last observation of each. Origins identify evidence that two maps share, even if ids
+// have changed.
 #pragma once
 
 #include <map>
@@ -12,30 +13,30 @@ namespace perdure::mapping {
 
 /// Result of a search for an object by its id in another map.
 struct Known {
-  ObjectId id = 0;    ///< 0: not found; the object may be history since
-  bool told = false;  ///< found in a recorded origin, not only by an equal id
+  ObjectId id = 0;    ///< 0: not found; the object may have become history
+  bool told = false;  ///< found in a recorded origin, not by equal id and first_seen
 };
 
 class Provenance {
  public:
-  /// The map must have a session and outlive this object. Objects may be added to the map in the
-  /// meantime.
+  /// The map must have a session and outlive this object. Objects may be added to it later.
   explicit Provenance(const MapContents& map);
 
-  /// The identity of the object in other maps, from its id in this map.
+  /// Returns the origin that identifies an object of this map in other maps.
   Origin nameOf(ObjectId id) const;
-  /// All origins of the object. For an object that has not ended they include those of merged
-  /// objects.
+  /// All origins of the object, including this map if it has observed the object since. If the
+  /// object has not ended, includes the origins of objects merged into it.
   std::vector<Origin> of(ObjectId id) const;
   /// The recorded origins of the object itself, without those of merged objects.
   std::vector<Origin> toldOf(ObjectId id) const;
+  /// Whether the object contains all evidence of `origin`.
   bool covers(ObjectId id, const Origin& origin) const;
   Known find(const Origin& origin) const;
 
-  /// `origin.now` must be an object of the map. For a known origin only the time of the last
-  /// observation is updated.
+  /// Records an origin. `origin.now` must be an object of the map. If the origin is recorded
+  /// already, only the time of its last observation is updated.
   void add(const Origin& origin);
-  /// Records the object's own origin. Call it before its belief is changed.
+  /// Records this map as an origin of the object. Call it before the object's belief is changed.
   void tell(ObjectId id);
   const std::vector<Origin>& told() const { return told_; }
 

@@ -8,7 +8,7 @@
 
 namespace perdure::mapping {
 
-/// Computes one factorisation per `from` anchor. Requests with the same `from` should be
+/// Factorises the graph whenever `from` changes. Requests with the same `from` should be
 /// consecutive.
 class Relations {
  public:

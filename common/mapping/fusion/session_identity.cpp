@@ -22,7 +22,7 @@ class Bits {
   std::string text_;
 };
 
-/// Covariances are excluded, because loops rescale them according to the odometry error.
+/// Adds an anchor to the digest, without its covariances, because loops rescale them.
 void add(Bits& bits, const Anchor& anchor) {
   bits.add(anchor.stamp.source);
   bits.add(anchor.stamp.sequence);

@@ -1,5 +1,5 @@
-// Identifies a session in any map by its first anchors, bit for bit. Numbers of worlds and ids are
-// not unique across vehicles.
+// Identifies a session in any map by digests of its first anchors, because ids and numbers of
+// worlds are not unique across vehicles.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ struct SessionIdentity {
   std::uint64_t first = 0, second = 0;
   auto operator<=>(const SessionIdentity&) const = default;
 
-  /// Returns true for the same session, even if one of the maps has its first anchor only.
+  /// Returns true for the same session, even if one map has only the session's first anchor.
   bool matches(const SessionIdentity& other) const {
     return first == other.first && (second == other.second || second == 0 || other.second == 0);
   }
@@ -29,7 +29,7 @@ struct Session {
   std::vector<AnchorId> anchors;  ///< ordered, not empty
 };
 
-/// Sessions ordered by their first anchors: the oldest session of the map comes first.
+/// Returns the sessions of the map by the ids of their first anchors, so the oldest comes first.
 std::vector<Session> sessionsOf(const SavedMap& map);
 
 /// The session with this identity, or null.

@@ -8,7 +8,7 @@
 namespace perdure::mapping {
 namespace {
 
-/// Between the positions of one place in two drives.
+/// Largest distance between positions of one object in two drives.
 constexpr double kSamePlace_m = 1.5;
 
 struct Standing {
@@ -91,8 +91,9 @@ class Departures {
   }
 
  private:
-  /// Returns the object of another drive at the place of `gone`. Returns nothing if the drive
-  /// itself has another object of the class there, because `gone` was then a duplicate.
+  /// Returns the nearest object of another drive at the place of `gone`, or null. Returns null if
+  /// the drive of `gone` has another object of the class there, because `gone` was then a
+  /// duplicate.
   const Standing* leftBy(const StoredObject& gone) const {
     const auto where = places_.of(gone);
     if (!where) return nullptr;

@@ -1,6 +1,6 @@
-// Positions of objects in M, from the graph. Present objects have the position of their newest
-// sighting; history has that of the anchor of its session at that time. Also finds objects of one
-// drive that a later drive reports as gone.
+// Computes positions of objects in M from the graph: those of present objects from their newest
+// sighting, those of history from their belief and an anchor of its session. Also finds objects of
+// one drive that a later drive reports as gone.
 #pragma once
 
 #include <optional>
@@ -11,7 +11,7 @@
 
 namespace perdure::mapping {
 
-/// Components of the graph, and their names.
+/// Positions in M by the graph of a map.
 class PlacesInM {
  public:
   explicit PlacesInM(const SavedMap& map);
@@ -22,8 +22,8 @@ class PlacesInM {
     AnchorId anchor = 0;
   };
   Place of(const ObjectRecord& record) const;
-  /// The place of a belief stored in its session's W, relative to the last anchor of the session
-  /// before the last sighting. Returns nothing if the session has no anchors.
+  /// Returns the place of a belief that is stored in its session's W. The session's last anchor
+  /// before the last sighting transforms it to M. Returns nothing if the session has no anchors.
   std::optional<Place> of(const StoredObject& object) const;
 
   const MapState& state() const { return state_; }
@@ -37,8 +37,8 @@ class PlacesInM {
   std::map<WorldId, std::map<TimePoint, AnchorId>> ways_;
 };
 
-/// Ends an object if another drive later found an object of the same class gone from its place. The
-/// object becomes history. Missing observations alone are not evidence.
+/// Ends an object if a later drive reported an object of the same class gone at its place. The
+/// object becomes history. Missing observations alone do not end an object. Returns the changes.
 std::vector<Change> endWhatIsGone(MapContents& map);
 
 }  // namespace perdure::mapping

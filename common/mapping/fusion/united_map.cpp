@@ -35,15 +35,16 @@ class Uniting {
     return at == map_.graph.records.end() ? nullptr : &at->second;
   }
 
-  /// Ids assigned after two maps diverged belong to different objects, even if their origins are
-  /// equal. If the session of the last sighting is not recorded, the objects may be identical.
+  /// Returns whether an object of the other map may be the object `id`. Ids assigned after two maps
+  /// diverged belong to different objects, even if their origins are equal. If the session of a
+  /// last sighting is unknown, they may be one object.
   bool mayBeOne(ObjectId theirs, ObjectId id) const {
     const auto record = sessions_.recordOf(theirs, theirs);
     const ObjectRecord* known = recordOf(survivorOf(map_, id));
     return !record || !known || sessions_.wasSeenInBoth(*record) || sessions_.wasSeenInBoth(*known);
   }
 
-  /// The id in this map of an object of the other map; 0: new.
+  /// Returns the id in this map of an object of the other map; 0 if it is new.
   ObjectId knownAs(ObjectId theirs) const {
     const Known by_name = ours_.find(theirs_.nameOf(theirs));
     if (by_name.id != 0 && mayBeOne(theirs, by_name.id)) return by_name.id;

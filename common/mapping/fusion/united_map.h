@@ -1,5 +1,5 @@
-// Adds sessions, anchors, edges and objects of another map to a map. Colliding ids are renumbered;
-// known contents are not added again.
+// Adds sessions, anchors, edges and objects of another map to a map. Colliding ids are renumbered.
+// Contents that both maps have are not added again.
 #pragma once
 
 #include <map>
@@ -10,7 +10,8 @@
 
 namespace perdure::mapping {
 
-/// The beliefs and records of an object in two maps that both contain it, as stored.
+/// An object that both maps contain, with the stored beliefs and records: `before` of the united
+/// map, `now` of the other one.
 struct Renewed {
   ObjectId id = 0;  ///< id in the united map
   StoredObject before, now;
@@ -22,12 +23,14 @@ struct Addition {
   std::vector<WorldId> sessions;  ///< new sessions, by their worlds in the united map
   std::vector<WorldId> grown;     ///< known sessions that continue
   std::size_t known = 0;          ///< sessions with nothing new
-  std::vector<WorldId> parted;    ///< continued differently in two copies; left out
+  std::vector<WorldId> parted;    ///< sessions whose continuations differ; that of `other` is left
+                                  ///< out
   std::set<ObjectId> objects;     ///< new objects
   std::vector<Renewed> renewed;   ///< known objects that were observed again, or that ended
 };
 
-/// Renewed objects retain their belief in `map`, because its fusion requires the graph.
+/// Adds `other` to `map`. Beliefs of renewed objects do not change here, because their fusion
+/// requires the united graph.
 Addition unite(MapContents& map, const MapContents& other);
 
 }  // namespace perdure::mapping

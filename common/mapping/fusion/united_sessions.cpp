@@ -98,8 +98,8 @@ void UnitedSessions::matchAnchors(const Session& session, const Session& same) {
   }
 }
 
-/// Anchor ids of a session are consecutive. If a session continues, the ids of later anchors
-/// increase.
+/// Reserves ids for new anchors. Those of a session are consecutive, so the ids of all later
+/// anchors increase if a session continues.
 void UnitedSessions::makeRoom() {
   if (!addition_.grown.empty()) moveUp();
   AnchorId next = map_.graph.anchors.empty() ? 1 : map_.graph.anchors.rbegin()->first + 1;
@@ -169,7 +169,8 @@ void UnitedSessions::addAnchors() {
   }
 }
 
-/// The nearest known anchor of the same component; 0: none.
+/// Returns the id in the other map of the nearest known anchor of the same component; 0 if there is
+/// none.
 AnchorId UnitedSessions::reference(AnchorId id, const std::map<AnchorId, AnchorId>& known,
                                    const std::map<AnchorId, AnchorId>& components) const {
   const Eigen::Vector3d& p = other_.graph.anchors.at(id).T_MA.p;
@@ -207,8 +208,8 @@ void UnitedSessions::addAnchor(AnchorId theirs, AnchorId id, AnchorId reference,
   new_ids_.insert(id);
 }
 
-/// Adds the edges of new anchors. An edge between components that are not linked yet is left out,
-/// because the search finds it and moves the components.
+/// Adds the edges of new anchors. Leaves out an edge between components that are not linked yet,
+/// because the search finds that loop again and moves the components.
 void UnitedSessions::addEdges() {
   EdgeId next = map_.graph.edges.empty() ? 1 : map_.graph.edges.rbegin()->first + 1;
   for (const auto& [id, theirs] : other_.graph.edges) {

@@ -1,4 +1,4 @@
-// Adds the sessions, anchors and edges of another map to a map, and records their new numbers.
+// Adds the sessions, anchors and edges of another map to a map, and stores their new ids.
 #pragma once
 
 #include <map>
@@ -16,13 +16,14 @@ class UnitedSessions {
   /// Modifies the graph of `map`. Stores references to all three arguments.
   UnitedSessions(MapContents& map, const MapContents& other, Addition& addition);
 
-  /// The world in the united map for a world of the other map. A new world receives a free number.
+  /// Returns the world in the united map for a world of the other map. A new world gets a free
+  /// number.
   const WorldId& worldOf(const WorldId& world);
-  /// A record of the other map in the united map's ids. Returns nothing if it does not exist, or if
-  /// its part of the trajectory was left out.
+  /// Returns the record of `theirs` in ids of the united map; `id` becomes its object id. Returns
+  /// nothing if there is no record, or if its part of the trajectory was left out.
   std::optional<ObjectRecord> recordOf(ObjectId theirs, ObjectId id) const;
-  /// Returns whether a sighting of the record, in ids of the united map, belongs to a session that
-  /// both maps contain.
+  /// Returns whether a sighting of the record belongs to a session that both maps contain. The
+  /// record must have ids of the united map.
   bool wasSeenInBoth(const ObjectRecord& record) const;
   bool isNew(AnchorId id) const { return new_ids_.contains(id); }
 
@@ -50,7 +51,7 @@ class UnitedSessions {
   std::set<WorldId> worlds_;         ///< worlds of the map
   std::set<std::uint64_t> numbers_;  ///< numbers of these worlds
   std::map<WorldId, const Session*> known_;
-  std::map<WorldId, WorldId> world_of_;  ///< other map to this map; also the next two
+  std::map<WorldId, WorldId> world_of_;  ///< key: world of the other map; value: of this map
   std::map<std::uint64_t, std::uint64_t> number_of_;
   std::map<WorldId, std::vector<AnchorId>> new_anchors_;
   std::map<WorldId, AnchorId> first_new_;  ///< key: world in this map

@@ -14,7 +14,7 @@ namespace {
 constexpr double kLeast = 0.02, kMost = 32.0;
 constexpr int kSteps = 64;
 constexpr std::size_t kMostLoops = 12;
-const std::vector<int> kPlane = {0, 1, 3};  // of [p, yaw]
+const std::vector<int> kPlane = {0, 1, 3};  // indices of x, y and yaw in [p, yaw]
 
 }  // namespace
 
@@ -30,7 +30,7 @@ DriftScale::DriftScale(const DriftScaleParameters& parameters, const std::vector
   for (const Anchor& anchor : way) {
     const LevelPose pose = poses_.empty() ? LevelPose() : poses_.back() * anchor.from_previous.mean;
     if (!poses_.empty()) {
-      // The increment turns everything after it about its end.
+      // The yaw error of an increment turns all later poses about the end of the increment.
       Eigen::Matrix4d by_increment = byFrame(-pose.p);
       by_increment.topLeftCorner<3, 3>() = poses_.back().R();
       const Eigen::Matrix4d Q =
@@ -52,14 +52,14 @@ DriftScale::Measured DriftScale::measuredBy(const Edge& loop) const {
   return {a, b, error, turnedBy(R, loop.T_ab.covariance)};
 }
 
-/// Covariance of the odometry's errors of two relative poses, for a scale of 1.
+/// Covariance between the odometry's errors of the T_ab of two loops, for a scale of 1.
 Eigen::Matrix4d DriftScale::sharedError(const Measured& x, const Measured& y) const {
   const std::size_t from = std::max(x.a, y.a), to = std::min(x.b, y.b);
   if (from >= to) return Eigen::Matrix4d::Zero();
   return byFrame(poses_[x.b].p) * (sums_[to] - sums_[from]) * byFrame(poses_[y.b].p).transpose();
 }
 
-/// Loops as one Gaussian: their errors, the covariance of the measurements, and that of the
+/// All loops as one Gaussian: errors e, covariance Z of the measurements, and covariance C of the
 /// odometry for a scale of 1.
 struct DriftScale::Joint {
   Eigen::VectorXd e;
@@ -87,7 +87,7 @@ DriftScale::Joint DriftScale::joint(const std::vector<Measured>& loops,
   return all;
 }
 
-/// Probability density of the loops for an unknown scale, as a logarithm.
+/// Returns the logarithm of the probability density of the loops, integrated over the scale.
 double DriftScale::logEvidence(const std::vector<Measured>& loops) const {
   constexpr std::size_t kEach = 2;  // a coarse grid suffices here
   const Joint all = joint(loops, kPlane);
@@ -102,9 +102,9 @@ double DriftScale::logEvidence(const std::vector<Measured>& loops) const {
   return peak + std::log(sum);
 }
 
-/// Removes loops that are more probably wrong, given the others.
+/// Removes loops that are more probably wrong than right, given the others.
 void DriftScale::dropWrong(std::vector<Measured>& loops) const {
-  // A wrong loop errs by anything within some metres and a tenth of a radian.
+  // The error of a wrong loop is uniform over 10 m in x and y and 0.2 rad in yaw.
   const double wrong = std::log(0.05 / 0.95) + std::log(1.0 / (10.0 * 10.0 * 0.2));
   double evidence = logEvidence(loops);
   while (loops.size() > 1) {

@@ -1,6 +1,6 @@
 // Estimates from loops the ratio of the true odometry error to the reported error. For poses
-// without covariances the assumed random walk may be far too small or too large.
-// Derivation: tools/docs/maths/drift_scale.md.
+// without covariances, the assumed random walk may be far too small or too large. Derivation:
+// tools/docs/maths/drift_scale.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,25 +13,25 @@
 
 namespace perdure::mapping {
 
-/// Place and yaw share one scale. Heights have their own: odometry without gravity errs in pitch,
-/// so that its height drifts far more than its place.
+/// x, y and yaw share one scale. Height has its own, because odometry without gravity errs in
+/// pitch, and its height drifts far more than its x and y.
 class DriftScale {
  public:
-  /// `way`: anchors of one session in the order of travel. Their increments are taken without the
-  /// factors of `Anchor::scale`.
+  /// `way`: anchors of one session in the order of travel. Divides the factors of `Anchor::scale`
+  /// out of the covariances of their increments.
   DriftScale(const DriftScaleParameters& parameters, const std::vector<Anchor>& way);
 
-  /// Uses loops between anchors of the way, all at once: loops with common increments have common
-  /// errors. Among the loops that end within one stretch of `apart_m`, the most accurate one is
-  /// used, and of the stretches the newest twelve. Loops that the others contradict, and other
-  /// edges, are left out. Returns whether one was used.
+  /// Uses loops between anchors of the way jointly, because loops with common increments have
+  /// common errors. Of the loops that end in one stretch of `apart_m`, uses the most accurate one,
+  /// and of all stretches the newest twelve. Leaves out loops that the others contradict, and other
+  /// edges. Returns whether any loop was used.
   bool use(const std::vector<Edge>& loops, double apart_m);
 
-  /// The factors for covariances of the odometry at a quantile of the posterior, in (0, 1).
+  /// Returns the factors of the odometry's covariances at a quantile, in (0, 1), of the posterior.
   DriftVariance variance(double quantile) const;
 
  private:
-  /// The error of T_ab that a loop measured, in the axes of W.
+  /// The error of the odometry's T_ab as measured by a loop, in the axes of W.
   struct Measured {
     std::size_t a = 0, b = 0;  ///< indices of the way
     Eigen::Vector4d error;
@@ -48,12 +48,12 @@ class DriftScale {
   Eigen::Matrix4d sharedError(const Measured& x, const Measured& y) const;
   double varianceOf(const LogPosterior& log_posterior, double quantile) const;
 
-  std::vector<LevelPose> poses_;  ///< by odometry
+  std::vector<LevelPose> poses_;  ///< poses of the anchors by odometry
   std::vector<double> way_m_;
   std::map<AnchorId, std::size_t> at_;  ///< index of each anchor
-  /// Sums of the increments' covariances up to each anchor, as errors of position at W's origin.
+  /// Sums of the increments' covariances up to each anchor, with positions referred to W's origin.
   std::vector<Eigen::Matrix4d> sums_;
-  std::vector<double> log_scales_;  ///< grid over the scale of the standard deviation
+  std::vector<double> log_scales_;  ///< grid of the logarithm of the standard deviation's scale
   LogPosterior plane_, height_;
 };
 

@@ -12,11 +12,11 @@
 
 namespace perdure::mapping {
 
-/// The state [p, yaw].
+/// Returns the state [p, yaw] of a pose.
 Eigen::Vector4d stateOf(const LevelPose& pose);
 
-/// Whitened [R_aᵀ (p_b − p_a) − t, yaw_b − yaw_a − ψ] of a measured T_ab = (t, ψ). Parameters are
-/// the states of a and of b.
+/// Whitened [R_aᵀ (p_b − p_a) − t, yaw_b − yaw_a − ψ] of a measured T_ab = (t, ψ). The parameters
+/// are the states of a and b in M.
 class EdgeCost final : public ceres::SizedCostFunction<4, 4, 4> {
  public:
   explicit EdgeCost(const LevelGaussian& T_ab);
@@ -28,7 +28,7 @@ class EdgeCost final : public ceres::SizedCostFunction<4, 4, 4> {
   Eigen::Matrix4d whitening_;  ///< L⁻¹ of the covariance L Lᵀ
 };
 
-/// Equals χ² up to `kernel`, and stays below three times the kernel for any larger χ².
+/// Robust cost: χ² up to `kernel`, and less than three times the kernel for any larger χ².
 class ScalingLoss final : public ceres::LossFunction {
  public:
   explicit ScalingLoss(double kernel) : kernel_(kernel) {}

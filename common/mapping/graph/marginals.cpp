@@ -80,7 +80,7 @@ std::optional<LevelGaussian> Marginals::to(AnchorId anchor) const {
   if (anchor == from_) return result;
   if (!usable_) return result = std::nullopt;
   const Eigen::MatrixXd columns = columnsOf(anchor);
-  // δ(T_fa) = T_f⁻¹ rotated: position R_fᵀ (δp_a − δp_f − δyaw_f up × (p_a − p_f)), yaw δyaw_a −
+  // The error of T_fa has position R_fᵀ (δp_a − δp_f − δyaw_f up × (p_a − p_f)) and yaw δyaw_a −
   // δyaw_f.
   const Eigen::Vector3d arm = T_Ma.p - T_Mf.p;
   Eigen::Matrix4d by_from = -Eigen::Matrix4d::Identity();

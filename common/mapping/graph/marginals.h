@@ -13,8 +13,9 @@ namespace perdure::mapping {
 
 class Marginals {
  public:
-  /// Marginals of the present graph. `from`: the anchor to which all results are relative. Edges
-  /// count with their weights of the last optimise(). The graph must outlive this object.
+  /// Factorises the present graph, which must outlive this object. Results are relative to the
+  /// anchor `from`. Edges have their weights from the last optimise(); edges below kBelieved are
+  /// left out.
   Marginals(const PoseGraph& graph, AnchorId from);
 
   /// The first anchor of the component of `from`.
@@ -22,9 +23,9 @@ class Marginals {
   /// T_from,anchor with its covariance. Returns nothing if no path leads to the anchor, or if the
   /// normal equations cannot be solved.
   std::optional<LevelGaussian> to(AnchorId anchor) const;
-  /// Variances of [p, yaw] in M of every anchor, relative to the first anchor of its component; m²
-  /// and rad². Anchors whose variances cannot be computed are omitted. The cost is about that of
-  /// one factorisation. The recursion of Takahashi (Erisman and Tinney 1975) computes the inverse
+  /// Returns the variances of [p, yaw] in M of every anchor, relative to the first anchor of its
+  /// component; m² and rad². Omits anchors whose variances cannot be computed. Costs about one
+  /// factorisation, because Takahashi's recursion (Erisman and Tinney 1975) computes the inverse
   /// only at the nonzero elements of the factor.
   std::map<AnchorId, Eigen::Vector4d> variances() const;
 
@@ -32,7 +33,7 @@ class Marginals {
   using Factor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>;
 
   Eigen::VectorXd diagonalOfInverse() const;
-  /// Columns of an anchor in the inverse; zero for a fixed anchor.
+  /// The four columns of an anchor in the inverse; zero for a fixed anchor.
   Eigen::MatrixXd columnsOf(AnchorId anchor) const;
   Eigen::Matrix4d blockOf(const Eigen::MatrixXd& columns, AnchorId anchor) const;
 

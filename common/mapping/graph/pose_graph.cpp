@@ -19,7 +19,7 @@ using States = std::map<AnchorId, Eigen::Vector4d>;
 constexpr double kNoWay = std::numeric_limits<double>::infinity();
 /// Factor from one kernel to the next narrower one.
 constexpr double kNarrowing = 0.1;
-/// Relative change of cost at which the kernel is narrowed again.
+/// Relative change of cost below which the kernel is narrowed.
 constexpr double kCoarse = 0.01;
 constexpr int kCoarseIterations = 4;
 
@@ -73,12 +73,13 @@ class LeastSquares {
     }
   }
 
-  /// Returns the final cost. Returns infinity, without moving anything, if the solver finds no
-  /// usable solution.
+  /// Returns the final cost. Returns infinity, with unchanged states, if the solver finds no usable
+  /// solution.
   double descend() { return descend(options_); }
 
-  /// Descends from the present states. The kernel for new edges starts as wide as the largest χ²,
-  /// and is then narrowed. Returns infinity as soon as the cost is certain to exceed `known`.
+  /// Minimises from the present states. The kernel for new edges starts as wide as their largest
+  /// χ², and is then narrowed. Returns the final cost, or infinity as soon as it is certain to
+  /// exceed `known`.
   double descendByWideKernels(double known) {
     ceres::Solver::Options coarse = options_;
     coarse.function_tolerance = kCoarse;
@@ -87,8 +88,8 @@ class LeastSquares {
     for (bool widest = true; kernel > kernel_; kernel *= kNarrowing, widest = false) {
       new_loss_ = ScalingLoss(kernel);
       const double cost = descend(coarse);
-      // Under the widest kernel a single edge costs plain χ². The cost with this edge accepted is
-      // at least this value.
+      // The widest kernel does not reduce the χ² of a single new edge. Any solution that accepts
+      // this edge costs at least `least`.
       const double least = (converged_ ? 1.0 - kCoarse : 0.5) * cost;
       if (widest && new_edges_.size() == 1 && least > known) return kNoWay;
       coarse.max_num_iterations = std::min(coarse.max_num_iterations, kCoarseIterations);

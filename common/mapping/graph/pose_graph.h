@@ -1,5 +1,5 @@
-// The pose graph over anchors: position and yaw of each (Carlone 2014 for the parametrisation;
-// Agarwal 2013, dynamic covariance scaling, for loops that may be wrong). Derivation:
+// The pose graph of the anchors. Each anchor has position and yaw (Carlone 2014). Loops that may be
+// wrong have a robust cost (Agarwal 2013, dynamic covariance scaling). Derivation:
 // tools/docs/maths/pose_graph.md.
 #pragma once
 
@@ -17,11 +17,11 @@ using EdgeId = std::uint64_t;  ///< counts from 1
 enum class EdgeKind : std::uint8_t { kOdometry = 0, kLoop = 1, kTracking = 2 };
 
 /// A loop or tracking edge with a smaller weight is considered wrong. With the default kernel this
-/// is a χ² of 24, which one in ten thousand true edges exceeds.
+/// limit is a χ² of 24, which one in ten thousand correct edges exceeds.
 inline constexpr double kBelieved = 0.5;
 
-/// Measured T_ab with its covariance. The covariance may be singular, because the optimiser adds a
-/// millimetre and 1e-5 rad.
+/// Measured T_ab with its covariance. The covariance may be singular, because the optimiser adds
+/// standard deviations of 1 mm and 1e-5 rad.
 struct Edge {
   AnchorId a = 0, b = 0;
   LevelGaussian T_ab;
@@ -31,7 +31,7 @@ struct Edge {
 struct OptimiseReport {
   bool converged = false;
   int iterations = 0;
-  double cost = 0.0;  ///< sum of χ²; loops and tracking edges with the robust kernel
+  double cost = 0.0;  ///< sum of the costs: χ² of odometry edges, robust cost of other edges
   /// Factors of the information of loop and tracking edges, (0, 1].
   std::map<EdgeId, double> weights;
   std::map<EdgeId, double> chi2;  ///< unweighted χ² of these edges
@@ -42,24 +42,25 @@ class PoseGraph {
  public:
   explicit PoseGraph(const GraphParameters& parameters) : parameters_(parameters) {}
 
-  /// Adds the first anchor of a session at `T_MA`; it begins a new component. A component is a set
-  /// of anchors connected by accepted edges. The first anchor of each component is fixed.
+  /// Adds the first anchor of a session at `T_MA`. It begins a new component, and is fixed. A
+  /// component is a set of anchors that accepted edges connect.
   void addFirst(AnchorId id, const LevelPose& T_MA);
   /// Adds an anchor with its odometry edge, at the pose in M that follows from its increment.
   /// `previous` must be in the graph.
   void add(AnchorId id, AnchorId previous, const LevelGaussian& from_previous);
-  /// Adds an edge between two anchors of the graph. Poses do not change before optimise().
+  /// Adds an edge between two anchors of the graph. Poses change only in optimise().
   EdgeId add(const Edge& edge);
-  /// Adds a stored edge with its earlier id. New edges receive higher ids.
+  /// Adds a stored edge with its stored id and weight. Later edges get higher ids.
   void restore(EdgeId id, const Edge& edge, double weight);
   void remove(EdgeId id);
-  /// Multiplies the covariances of odometry edges by the factors of the anchors to which they lead.
+  /// Multiplies the covariance of each odometry edge by the factor of its second anchor, if
+  /// `factors` has one.
   void scaleOdometry(const std::map<AnchorId, DriftVariance>& factors);
-  /// Fixes the first anchor of each component, and no other. optimise() calls it.
+  /// Fixes the first anchor of each component, and no others. optimise() calls this function.
   void holdFirstAnchors();
 
-  /// Minimises the cost from the present poses. If the kernel would reject a new edge there, also
-  /// tries wider kernels, because after much drift a true loop resembles a wrong one.
+  /// Minimises the cost from the present poses. If the kernel rejects a new edge in the result,
+  /// also tries wider kernels, because after much drift a correct loop resembles a wrong one.
   OptimiseReport optimise();
 
   bool contains(AnchorId id) const { return poses_.contains(id); }
@@ -74,7 +75,7 @@ class PoseGraph {
   bool isNew(EdgeId id) const;
   /// χ² of an edge between anchors of the graph, at their present poses.
   double chi2(const Edge& edge) const;
-  /// Number of components when anchors were last fixed, at the last optimise().
+  /// The number of fixed anchors, which is the number of components after optimise().
   std::size_t components() const { return held_fast_.size(); }
   bool isHeldFast(AnchorId id) const { return held_fast_.contains(id); }
 

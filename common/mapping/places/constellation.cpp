@@ -15,20 +15,21 @@ namespace perdure::mapping {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kGate = 3.0;      // standard deviations of a pair's distance
+constexpr double kGate = 3.0;      // gate, in standard deviations of a pair's distance or yaw
 constexpr double kStreet_m = 6.0;  // spread of the chance density around map objects
 constexpr double kReach_m = MapIndex::kReach_m;
-// m⁻²; chance density far from the map's objects: one in a disc of 100 m radius
+// Chance density far from the map's objects, m⁻²: one object in a disc of 100 m radius.
 constexpr double kFloor = 1.0 / (kPi * 100.0 * 100.0);
 constexpr double kCell_m = 2.0, kCell_rad = 4.0 * kPi / 180.0;
 constexpr std::size_t kMostSeen = 48, kMostVotes = 250'000, kCandidates = 128;
-constexpr std::size_t kMostCells = 4096;  // candidates are chosen from these, one per place
-// beyond these limits two poses are different
+constexpr std::size_t kMostCells = 4096;  // largest number of cells from which candidates are
+                                          // chosen
+// Two poses are different if they are farther apart than one of these limits.
 constexpr double kOther_m = 1.5, kOther_rad = 8.0 * kPi / 180.0;
 constexpr double kSure = 0.9;
 constexpr double kDefaultShare = 1e-3;  // share of a class that one of the two PMFs lacks
 
-/// Log-likelihood ratio of a yaw known modulo 180° against an arbitrary yaw.
+/// Log-likelihood ratio of equal yaws, known modulo 180°, against an arbitrary yaw.
 double logSameYaw(double difference, double variance) {
   const double d = wrapHalfTurn(difference);
   double density = 0.0;
@@ -83,8 +84,8 @@ class Search {
       match.pairs.emplace_back(map_[k].id, seen_[i].id);
     }
     if (match.pairs.empty()) return std::nullopt;
-    // Uses the pairs alone. In directions with little information the mean stays near that of the
-    // prior.
+    // The covariance uses the pairs alone. In directions with little information, the mean stays
+    // near the prior.
     const Eigen::Vector4d step =
         equations.stepNear(prior_information_, difference(prior_.mean, first.x));
     match.T_MB.mean.p += step.head<3>();
@@ -146,7 +147,7 @@ class Search {
            std::abs(d[3]) < g * std::sqrt(prior_.covariance(3, 3)) + kCell_rad;
   }
 
-  /// Number of different places inside the prior, in cells of one metre and three degrees.
+  /// Number of distinguishable poses inside the prior, in cells of 1 m by 1 m by 3°.
   double cells() const {
     constexpr double kDistinct_m = 1.0, kDistinct_rad = 3.0 * kPi / 180.0;
     const double area =
@@ -172,8 +173,8 @@ class Search {
     cell.heading += votes * Eigen::Vector2d(std::cos(x.yaw), std::sin(x.yaw));
   }
 
-  /// Votes by each pair of observed objects with each similar pair of the map, nearest distances
-  /// first.
+  /// Adds votes for each pair of observed objects and each similar pair of the map. Stops at
+  /// kMostVotes.
   void votePairs(Cells& cells) const {
     struct SeenPair {
       std::size_t a, b;
@@ -218,7 +219,7 @@ class Search {
     }
   }
 
-  /// Votes by single objects, if the prior has an accurate yaw.
+  /// Adds votes by single objects, if the prior has an accurate yaw.
   void voteSingles(Cells& cells) const {
     if (prior_.covariance(3, 3) > kCell_rad * kCell_rad) return;
     for (std::size_t i = 0; i < seen_.size(); ++i) {
@@ -264,8 +265,8 @@ class Search {
     return result;
   }
 
-  /// Height of the body that best matches the heights of objects with those of their class on the
-  /// map.
+  /// Returns the z of the body at which the heights of observed objects best match those of nearby
+  /// map objects of their class.
   double height(const LevelPose& x) const {
     std::vector<double> heights;
     for (std::size_t i = 0; i < seen_.size(); ++i) {
@@ -285,14 +286,14 @@ class Search {
   }
 
   struct Likelihood {
-    double of_map = 0.0;     ///< density given that it is an object of the map
+    double of_map = 0.0;     ///< density if the object is on the map
     double by_chance = 0.0;  ///< density of an unrelated object at that place
-    std::size_t object = 0;  ///< the most probable object
+    std::size_t object = 0;  ///< index of the most probable map object
     double of_object = 0.0;
     double known = 0.0;  ///< probability that an object at that place is on the map
   };
 
-  /// Densities of the object's position, m⁻².
+  /// Densities of the position of observed object i, m⁻².
   Likelihood likelihoodOf(std::size_t i, const LevelPose& x, const Eigen::Matrix3d& R,
                           double blur) const {
     const PlacedObject& seen = seen_[i];
@@ -329,7 +330,7 @@ class Search {
     return l;
   }
 
-  /// The most probable map object for an observed one, and its probability.
+  /// Returns the most probable map object for an observed one, and its probability.
   std::pair<std::size_t, double> matchOf(std::size_t i, const LevelPose& x,
                                          const Eigen::Matrix3d& R, double blur) const {
     const Likelihood l = likelihoodOf(i, x, R, blur);
@@ -337,8 +338,9 @@ class Search {
     return {l.object, l.known * l.of_object / all};
   }
 
-  /// Map objects, each with its certain observed object. If two observed objects match one map
-  /// object, neither forms a pair, because they may be neighbours.
+  /// Returns the indices of map objects, each with that of the observed object that certainly
+  /// matches. If two observed objects match one map object, neither forms a pair, because they may
+  /// be neighbours.
   std::map<std::size_t, std::size_t> surePairs(const LevelPose& x) const {
     const Eigen::Matrix3d R = x.R();
     std::map<std::size_t, std::size_t> pairs;
@@ -361,7 +363,8 @@ class Search {
     return sum;
   }
 
-  /// The best score inside the prior if no observed object is on the map.
+  /// The score of the hypothesis that no observed object is on the map: the best of five poses
+  /// inside the prior.
   double scoreOfNone() const {
     const double reach = 2.0 * std::sqrt(prior_.covariance.topLeftCorner<2, 2>().trace());
     double best = -1e9;

@@ -1,7 +1,7 @@
 // Place recognition by constellations: estimates the pose of the body in the map from the
 // arrangement of the objects around it. Gravity is known, so only position and yaw are estimated.
-// Pairs of objects propose poses, and so do single objects if the yaw is known. The likelihood of
-// all observed objects and the prior of the odometry decide. Derivation:
+// Pairs of objects propose poses; single objects do so if the yaw is known. The likelihood of all
+// observed objects and the prior by odometry select the pose. Derivation:
 // tools/docs/maths/constellation.md.
 #pragma once
 
@@ -20,16 +20,17 @@ namespace perdure::mapping {
 struct PlaceMatch {
   LevelGaussian T_MB;  ///< estimate without the prior's information
   double score = 0.0;  ///< log-likelihood ratio against chance plus log of the prior, nats
-  double next = 0.0;   ///< score of the second best pose, or of no observed object being on the map
+  double next = 0.0;   ///< score of the second best pose, or of the hypothesis that no observed
+                       ///< object is on the map, whichever is larger
   double cells = 1.0;  ///< number of distinguishable poses inside the prior
-  /// Ids of map objects and of the observed objects certainly identical to them.
+  /// Ids of map objects, each with the id of the observed object that is certainly the same.
   std::vector<std::pair<ObjectId, ObjectId>> pairs;
   std::size_t points = 0;  ///< number of landmarks that match and agree, if landmarks were used
 };
 
-/// Returns the best pose, even if its score is low. Returns nothing if no observed object certainly
-/// matches one of the map. `seen` is in the body's level frame B. `prior` is the prior of T_MB;
-/// without prior knowledge it is as wide as the map.
+/// Returns the best pose, even if its score is low; nothing if no observed object certainly matches
+/// one of the map. `seen` is in the body's level frame B. `prior` is that of T_MB; if the body may
+/// be anywhere, it is as wide as the map.
 std::optional<PlaceMatch> bestMatch(std::vector<PlacedObject> seen, const MapIndex& map,
                                     const LevelGaussian& prior, const PlaceParameters& parameters);
 

@@ -6,7 +6,7 @@
 namespace perdure::mapping {
 namespace {
 
-/// Trajectories farther away than this many reaches have no effect.
+/// Trajectories farther away than kWays times known_within_m have no effect.
 constexpr double kWays = 4.0;
 constexpr double kAnyShare = 0.02;  ///< share of objects on the map far from all trajectories
 

@@ -1,4 +1,4 @@
-// Search index of a map's objects: by place, and pairs of them by class and distance.
+// Search index of a map's objects by place, and of pairs of objects by class and distance.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,12 +14,13 @@
 
 namespace perdure::mapping {
 
-/// Indices of points in the plane, stored by grid squares.
+/// Indices of points in the plane, stored by squares of a grid.
 class PlaceGrid {
  public:
   PlaceGrid(double width, const std::vector<Eigen::Vector2d>& places);
 
-  /// Calls `visit` for all points within one square's width of p, and for some points beyond.
+  /// Calls `visit` with the indices of all points within one square's width of p, and of some
+  /// beyond.
   template <class Visit>
   void around(const Eigen::Vector2d& p, const Visit& visit) const {
     for (std::int64_t x = cell(p.x()) - 1; x <= cell(p.x()) + 1; ++x) {
@@ -41,7 +42,7 @@ class PlaceGrid {
 
 class MapIndex {
  public:
-  /// Distance beyond which an object has no effect.
+  /// Distance beyond which a map object has no effect on a match.
   static constexpr double kReach_m = 24.0;
 
   /// `objects` in M; `driven`: positions in M from which they were observed.
@@ -49,8 +50,7 @@ class MapIndex {
            const PlaceParameters& parameters);
 
   const std::vector<PlacedObject>& objects() const { return objects_; }
-  /// Calls `visit` with the number of each object within kReach_m of a place, and of some objects
-  /// beyond.
+  /// Calls `visit` with the indices of all objects within kReach_m of p, and of some beyond.
   template <class Visit>
   void around(const Eigen::Vector2d& p, const Visit& visit) const {
     by_place_.around(p, visit);
@@ -60,17 +60,18 @@ class MapIndex {
     double distance;   ///< distance in the plane, m
     std::size_t c, d;  ///< indices of the two objects
   };
-  /// Ordered pairs of two classes, sorted by distance. Returns nothing if there are none.
+  /// Returns the pairs whose first object has class_c and whose second has class_d, sorted by
+  /// distance; null if there are none.
   const std::vector<Pair>* pairsOf(std::uint32_t class_c, std::uint32_t class_d) const;
 
-  /// Probability that an object at a place is on the map. It decreases with the distance from the
-  /// trajectories of the mapping drives.
+  /// Probability that an object at a place is on the map. It decreases with distance from the
+  /// positions `driven`.
   double knownShare(const Eigen::Vector2d& at) const;
   /// Share of a class among the objects, [0, 1].
   double commonShare(std::uint32_t class_number) const;
 
-  /// Centre of the objects; the next function returns their mean squared distance from it along
-  /// each axis.
+  /// centre() returns the mean position of the objects in the plane, spread2() their mean squared
+  /// distance from it along each axis, m².
   Eigen::Vector2d centre() const { return centre_; }
   Eigen::Vector2d spread2() const { return spread2_; }
 
@@ -86,7 +87,7 @@ class MapIndex {
   Eigen::Vector2d centre_ = Eigen::Vector2d::Zero(), spread2_ = Eigen::Vector2d::Zero();
 };
 
-/// Number of the most probable class; the PMF must not be empty.
+/// Returns the number of the most probable class. The PMF must not be empty.
 std::uint32_t mostProbable(const PlacedObject& object);
 
 }  // namespace perdure::mapping

@@ -1,5 +1,5 @@
-// A static object in a level frame, and the pose of the body from objects of known identity.
-// Derivation: tools/docs/maths/constellation.md.
+// A static object in a level frame, and the estimation of the body's pose from objects of known
+// identity. Derivation: tools/docs/maths/constellation.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,7 +17,7 @@ struct ClassShare {
   double probability = 0.0;
 };
 
-/// Wraps modulo 180° into (-90°, 90°].
+/// Wraps an angle, in radians, modulo 180° into (-90°, 90°].
 double wrapHalfTurn(double angle);
 
 /// A static object in a level frame.
@@ -28,7 +28,7 @@ struct PlacedObject {
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Identity();  ///< [p, yaw], m and rad
   std::vector<ClassShare> pmf;
 };
-/// Variance of its position in the plane, m²: the mean of x and y.
+/// Variance of the object's position in the plane, m²: the mean of the variances of x and y.
 double planeVariance(const PlacedObject& object);
 
 /// Transforms an object from frame B to frame A, without the error of the transform.
@@ -36,23 +36,23 @@ PlacedObject transformed(const LevelPose& T_AB, PlacedObject object);
 /// Transforms an object from frame B to frame A, including the error of T_AB.
 PlacedObject laid(const LevelGaussian& T_AB, const PlacedObject& object);
 
-/// Normal equations of T_MB from objects of known identity.
+/// Normal equations of the step from the linearisation point x to T_MB.
 struct MatchEquations {
   Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
   Eigen::Vector4d pull = Eigen::Vector4d::Zero();
   double chi2 = 0.0, weights = 0.0;
 
-  /// Adds the pair `seen` (in B) and `known` (in M); x: T_MB at the linearisation point. `blur` (m)
-  /// is added to the standard deviation of the position.
+  /// Adds the pair `seen` (in B) and `known` (in M). x is T_MB at the linearisation point. `blur`
+  /// (m) increases the standard deviation of the position.
   void add(const PlacedObject& seen, const PlacedObject& known, const LevelPose& x,
            double weight = 1.0, double blur = 0.0);
   Eigen::Vector4d step() const;
-  /// Solves with a prior, because some directions may be unobservable. The mean of the prior lies
-  /// `to_prior` from x. The prior has a tenth of its information, so that it has little effect in
-  /// other directions.
+  /// Returns the step with a prior, because some directions may be unobservable. `to_prior` is the
+  /// mean of the prior minus x. A tenth of the prior's information is used, so that it has little
+  /// effect in observable directions.
   Eigen::Vector4d stepNear(const Eigen::Matrix4d& prior_information,
                            const Eigen::Vector4d& to_prior) const;
-  /// The covariance, widened if the residuals exceed the assumed errors.
+  /// The covariance of T_MB, widened if the residuals exceed the assumed errors.
   Eigen::Matrix4d covariance() const;
 };
 

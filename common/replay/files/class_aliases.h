@@ -10,13 +10,13 @@ namespace perdure::replay {
 
 class ClassAliases {
  public:
-  /// Converts to lower case only.
+  /// Without aliases, names are only converted to lower case.
   ClassAliases() = default;
   /// Reads `config/class_aliases.yaml`: `canonical: [alias, …]`. Throws StartupError: kUnavailable
   /// if the file is missing, kConfiguration with file:line:col if it is invalid.
   static ClassAliases load(const std::filesystem::path& file);
 
-  /// The canonical, lower-case name. An unlisted name is only converted to lower case.
+  /// Returns the canonical, lower-case name. An unlisted name is only converted to lower case.
   std::string canonical(std::string_view name) const;
 
  private:

@@ -30,7 +30,7 @@ ImageFolder::ImageFolder(fs::path folder) : folder_(std::move(folder)) {
       if (!fs::is_directory(file, ignored)) ++other_endings_[file.extension().string()];
       continue;
     }
-    // Of two files with the same stem, the first by name is used.
+    // If several files have the same stem, the first in the order of names is used.
     const std::string stem = file.stem().string();
     const auto [form, first] = by_form_.try_emplace(withoutAccents(toLower(stem)), stem);
     if (!first && form->second != stem) form->second.clear();

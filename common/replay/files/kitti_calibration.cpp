@@ -11,7 +11,8 @@
 namespace perdure::replay {
 namespace {
 
-/// Lines `name: numbers` or `name numbers`; the official tracking files use both.
+/// The entries of a file by name. A line is `name: numbers` or `name numbers`, because the official
+/// tracking files use both.
 class Entries {
  public:
   Entries(const std::filesystem::path& file, std::string_view fix) : file_(file) {
@@ -20,13 +21,13 @@ class Entries {
       std::string name(fields[0]);
       if (name.ends_with(':')) name.pop_back();
       const auto numbers = parseNumbers({fields.begin() + 1, fields.end()});
-      if (numbers) entries_[name] = *numbers;  // dates have no numbers
+      if (numbers) entries_[name] = *numbers;  // skips dates
     }
   }
 
   bool has(const std::string& name) const { return entries_.contains(name); }
 
-  /// The entry with `count` numbers under one of the names.
+  /// Returns the entry with `count` numbers under one of the names.
   const std::vector<double>& get(const std::vector<std::string>& names, std::size_t count) const {
     for (const auto& name : names) {
       const auto found = entries_.find(name);
@@ -41,8 +42,8 @@ class Entries {
                                                    " is missing; fetch KITTI's calibration again");
   }
 
-  /// Projection matrix of a camera: K with focal lengths from 1 to 1e6 pixels, and [I | t] with t
-  /// in metres.
+  /// Returns a camera's projection matrix P = K [I | t], with t in metres. Focal lengths in K must
+  /// be 1 to 1e6 pixels.
   ProjectionMatrix projection(const std::string& name) const {
     const ProjectionMatrix P = matrix({name});
     const bool focal = P(0, 0) >= 1.0 && P(1, 1) >= 1.0 && P.cwiseAbs().maxCoeff() <= 1e6;
@@ -94,7 +95,7 @@ CameraCalibration KittiCalibration::camera(const std::string& name) const {
   camera.name = name;
   camera.width = width, camera.height = height;
   camera.fx = P(0, 0), camera.fy = P(1, 1), camera.cx = P(0, 2), camera.cy = P(1, 2);
-  // P = K [I | t] with t the origin of the rectified camera 0 in this camera.
+  // In P = K [I | t], t is the origin of the rectified camera 0 in this camera.
   const Eigen::Vector3d t = P.leftCols<3>().inverse() * P.col(3);
   const RigidTransform T_CR(Eigen::Quaterniond::Identity(), t);
   camera.T_BC = (T_CR * T_RI).inverse();

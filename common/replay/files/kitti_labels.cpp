@@ -10,7 +10,7 @@ namespace {
 constexpr double kLastFrame = 999999;  // KITTI's image names have six digits
 constexpr double kMostCount = 1e6;
 
-/// Checks frame, track, truncated and occluded, before they are converted to integers.
+/// Returns whether frame, track, truncated and occluded can be converted to integers.
 bool countsMakeSense(const std::vector<double>& v) {
   const auto within = [](double x) { return std::abs(x) <= kMostCount; };
   return v[0] >= 0 && v[0] <= kLastFrame && within(v[1]) && within(v[3]) && within(v[4]);

@@ -24,8 +24,8 @@ struct KittiLabel {
   bool dontCare() const { return type == "DontCare"; }
 };
 
-/// KITTI gives the centre of the box's bottom; `centre` is half the height above it. Throws
-/// StartupError(kData) that names each wrong line.
+/// Reads the labels. KITTI gives the centre of the box's bottom; `centre` is half the height above
+/// it. Throws StartupError(kData) that names each wrong line.
 std::vector<KittiLabel> readKittiLabels(const std::filesystem::path& file);
 
 }  // namespace perdure::replay

@@ -12,7 +12,7 @@ namespace perdure::replay {
 void refuseInside(const std::filesystem::path& out, const std::filesystem::path& data,
                   const std::string& option);
 
-/// Throws StartupError(kUsage) if the output file is the input recording.
+/// Throws StartupError(kUsage) if the output file `written` is the input recording `data`.
 void refuseOverwriting(const std::filesystem::path& written, const std::filesystem::path& data,
                        const std::string& option);
 

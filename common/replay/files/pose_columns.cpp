@@ -27,7 +27,7 @@ bool isTime(const std::string& name) {
                         "timestamp_ns", "time_ns", "t_ns", "stamp_ns"});
 }
 
-/// Index of the name among t x y z qx qy qz qw. Returns nothing for other names.
+/// Returns the index of a name in t x y z qx qy qz qw. Returns nothing for other names.
 std::optional<std::size_t> columnOf(const std::string& name) {
   if (isTime(name)) return kTime;
   constexpr std::string_view kAxes = "xyzw";
@@ -74,7 +74,7 @@ std::optional<PoseColumns> poseColumnsOf(const std::vector<std::string_view>& na
 }
 
 bool namesAngles(const std::vector<std::string_view>& names) {
-  bool angles = false, quaternion = false, time = false;  // false for comments in prose
+  bool angles = false, quaternion = false, time = false;  // all remain false for a comment in prose
   for (const auto& written : names) {
     std::string name = plainName(written);
     time = time || isTime(name) || name.ends_with("stamp");

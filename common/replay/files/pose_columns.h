@@ -10,9 +10,9 @@
 namespace perdure::replay {
 
 struct PoseColumns {
-  std::array<std::size_t, 8> of{};  ///< t x y z qx qy qz qw
+  std::array<std::size_t, 8> of{};  ///< column indices of t x y z qx qy qz qw
   std::size_t count = 0;            ///< number of all columns
-  bool nanoseconds = false;         ///< unit of the times, as in EuRoC and `rostopic echo -p`
+  bool nanoseconds = false;  ///< times are in nanoseconds, as in EuRoC and `rostopic echo -p`
 };
 
 /// Finds the columns if each of the eight quantities has exactly one name (x, tx, p_RS_R_x [m],
@@ -23,8 +23,8 @@ std::optional<PoseColumns> poseColumnsOf(const std::vector<std::string_view>& na
 /// Returns true if the names contain angles (roll, pitch, yaw) and no quaternion.
 bool namesAngles(const std::vector<std::string_view>& names);
 
-/// Returns "this is JSON …" with the fix if a line shows that the file is not a table of poses.
-/// Otherwise returns "".
+/// Returns the kind and the fix ("this is JSON …") if a line shows that the file is not a table of
+/// poses. Otherwise returns "".
 std::string otherKindOfPoses(std::string_view line, const std::vector<std::string_view>& fields);
 
 }  // namespace perdure::replay

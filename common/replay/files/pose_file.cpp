@@ -49,7 +49,8 @@ bool namesWFirst(const std::vector<std::string_view>& names) {
   return true;
 }
 
-/// A header may begin with an empty name, because pandas writes a row number before each line.
+/// Returns whether the fields are a header. Its first name may be empty, because pandas writes a
+/// row number before each line.
 bool isHeaderOfPoses(std::vector<std::string_view> fields) {
   if (fields.size() > 2 && fields.front().empty()) fields.erase(fields.begin());
   return isHeader(fields);
@@ -122,7 +123,7 @@ PoseFile PoseFile::read(const std::filesystem::path& file, std::string_view fix)
   std::optional<PoseColumns> named;
   for (const auto& line : lines) {
     const std::size_t expected = std::exchange(last_line, line.number) + 1;
-    // A line without time is the pose of the frame with its line number.
+    // In a line without a time, the line number is the frame number.
     if (columns > 8 && !named && line.number != expected && !poses.empty()) {
       wrong.add(expected,
                 "the line is empty, and poses are counted by lines; write the frame's pose");
@@ -209,8 +210,8 @@ std::optional<PoseFile::Place> PoseFile::placeAtTime(TimePoint time, Duration ma
   return Place{index - 1, s};
 }
 
-/// The error of step k displaces the body at `now` as the end of a lever from pose k. A step that
-/// is used in part counts by its share.
+/// The rotation error of step k moves the body at `now` by the lever from pose k to it. A step that
+/// lies only partly between the frames contributes its share.
 Matrix6d PoseFile::errorOfSteps(const FrameStamp& before, const FrameStamp& now) const {
   const auto a = placeOf(before.sequence, before.time), b = placeOf(now.sequence, now.time);
   check(!steps_.empty() && a && b, "both frames have a pose, and the file has steps");

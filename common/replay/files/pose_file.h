@@ -29,28 +29,29 @@ class PoseFile {
   /// quaternion whose norm is not 1 (to 1e-2), a rotation matrix that is not orthonormal (to 1e-2),
   /// and times that do not increase.
   /// Lines that begin with '#' are comments, and a first line without numbers is a header. Either
-  /// may give another column order, or eight columns of a larger number (poseColumnsOf), or columns
-  /// with the covariances of the steps (files/pose_steps.h). Names of angles are refused. The
+  /// may name the columns if they have another order, are eight of a larger number (poseColumnsOf),
+  /// or contain covariances of the steps (files/pose_steps.h). Names of angles are refused. The
   /// message ends with `fix` if the file cannot be read.
   static PoseFile read(const std::filesystem::path& file, std::string_view fix = kFix);
-  /// `steps`: for each pose, or none, the covariance of the step to it (files/pose_steps.h).
+  /// `steps` is empty, or has for each pose the covariance of the step to it (files/pose_steps.h).
   PoseFile(PoseFormat format, std::vector<StampedPose> poses, std::vector<Matrix6d> steps = {});
 
   PoseFormat format() const { return format_; }
-  /// The time of KITTI poses is 0, because they have none.
+  /// KITTI poses have no times; theirs are 0.
   const std::vector<StampedPose>& poses() const { return poses_; }
 
-  /// TUM: by time, interpolated between neighbours at most `max_gap` apart; a pose within 1 ms is
-  /// used as it is. KITTI: by the frame's index. Returns nothing outside the trajectory.
+  /// Returns the pose of a frame. TUM poses are interpolated at `time` between neighbours at most
+  /// `max_gap` apart; a pose within 1 ms is used as it is. KITTI poses are found by the frame's
+  /// index. Returns nothing outside the trajectory.
   std::optional<RigidTransform> at(std::uint64_t frame, TimePoint time,
                                    Duration max_gap = kMaxGap) const;
   bool hasSteps() const { return !steps_.empty(); }
   /// Covariance of the error [θ, p] (Odometry) that the steps between two frames add. Both frames
-  /// must have a pose, and the file steps.
+  /// must have a pose, and hasSteps() must be true.
   Matrix6d errorOfSteps(const FrameStamp& before, const FrameStamp& now) const;
 
  private:
-  /// A place on the trajectory: a pose, or a share of the step after it.
+  /// A place on the trajectory: pose `index`, plus the share of the step after it.
   struct Place {
     std::size_t index = 0;
     double share = 0.0;

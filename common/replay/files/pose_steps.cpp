@@ -11,9 +11,9 @@ namespace perdure::replay {
 namespace {
 
 constexpr std::string_view kStep = "step_";
-constexpr double kMost = 1e4;  // largest entry: a deviation of 100 m or 100 rad in a step
+constexpr double kMost = 1e4;  // largest entry: a standard deviation of 100 m or 100 rad in a step
 
-/// Row and column of "step_A_B" in the order [θ, p], the lower one first.
+/// Returns row and column of "step_A_B" in the order [θ, p], the smaller index first.
 std::optional<std::pair<int, int>> entryOf(std::string_view name) {
   if (!name.starts_with(kStep)) return std::nullopt;
   constexpr std::string_view kAxes[] = {"rx", "ry", "rz", "x", "y", "z"};
@@ -25,7 +25,7 @@ std::optional<std::pair<int, int>> entryOf(std::string_view name) {
   return std::nullopt;
 }
 
-/// Also true for a misspelt name, as STEP_X_X.
+/// Returns whether a name begins with "step_" in any case, also if it is misspelt, as STEP_X_X.
 bool namesStep(std::string_view name) {
   return name.size() >= kStep.size() &&
          std::equal(kStep.begin(), kStep.end(), name.begin(), [](char a, char b) {
@@ -33,7 +33,7 @@ bool namesStep(std::string_view name) {
          });
 }
 
-/// Whether an entry without a variance has a covariance with another one.
+/// Returns whether a quantity with zero variance has a covariance with another one.
 bool correlatesWithoutVariance(const Matrix6d& C) {
   for (int i = 0; i < 6; ++i) {
     if (C(i, i) == 0.0 && !C.row(i).isZero(0.0)) return true;
@@ -52,7 +52,7 @@ bool PoseSteps::take(const TextLine& line, bool comment, bool after_poses,
         after_poses ? "a header with step_A_B must stand before the first pose" : entriesOf(fields);
     if (error.empty()) return withoutSteps(fields);
     wrong.add(line.number, error);
-    wrong.throwIfAny();  // without the header the lines below it cannot be judged
+    wrong.throwIfAny();  // without a valid header, the lines below it cannot be checked
   } else if (comment) {
     return true;
   } else if (fields.size() != entries_.size()) {
@@ -109,7 +109,7 @@ std::string PoseSteps::addCovariance(const std::vector<std::string_view>& fields
   const Eigen::Matrix<double, 6, 1> sigma =
       C.diagonal().unaryExpr([](double v) { return v > 0.0 ? std::sqrt(v) : 1.0; });
   const Matrix6d correlations = C.cwiseQuotient(sigma * sigma.transpose());
-  constexpr double kRounding = 1e-4;  // entries with four digits
+  constexpr double kRounding = 1e-4;  // tolerance for entries with four digits
   const double variance = C.diagonal().minCoeff(), least = eigenvalues(correlations)(0);
   if (variance < 0.0 || least < -kRounding || correlatesWithoutVariance(C)) {
     return fmt::format(

@@ -10,15 +10,15 @@
 
 namespace perdure::replay {
 
-/// A step is the motion from the pose of the line before. Its error is δ in T = T̂ (Exp(r), x): x y
-/// z in metres and rx ry rz in radians, along the axes of the body at the line's pose. A and B are
-/// two of these six; entries that have no column are 0.
+/// A step is the motion from the pose of the previous line. Its error (r, x) is defined by T = T̂
+/// (Exp(r), x), along the axes of the body at the line's pose: x y z in metres, rx ry rz in
+/// radians. A and B are two of these six; entries that have no column are 0.
 class PoseSteps {
  public:
-  /// Takes the columns of a step out of a header or of a line below it. Returns false if it adds an
-  /// error to `wrong`: a name of another form, an entry that is given twice, a missing variance, a
-  /// line with another number of columns, and a matrix that is not positive semi-definite.
-  /// A header below the first pose is an error, too.
+  /// Removes the fields of the step from `fields`, which belong to a header or to a line below it.
+  /// Returns false if it adds an error to `wrong`: a misspelt name, an entry that is given twice, a
+  /// missing variance, a line with another number of columns, or a matrix that is not positive
+  /// semi-definite. A header below the first pose is an error, too.
   bool take(const TextLine& line, bool comment, bool after_poses,
             std::vector<std::string_view>& fields, Complaints& wrong);
 
@@ -26,9 +26,11 @@ class PoseSteps {
   std::vector<Matrix6d> covariances;
 
  private:
-  using Entry = std::optional<std::pair<int, int>>;  ///< row and column; empty: of the pose
+  /// Row and column; nothing for a column of the pose.
+  using Entry = std::optional<std::pair<int, int>>;
   std::string entriesOf(const std::vector<std::string_view>& names);
-  bool withoutSteps(std::vector<std::string_view>& fields) const;  ///< leaves the pose; true
+  /// Removes the step's fields; returns true.
+  bool withoutSteps(std::vector<std::string_view>& fields) const;
   std::string addCovariance(const std::vector<std::string_view>& fields);
   std::vector<Entry> entries_;  ///< entries of the covariance, in the order of the file's columns
 };

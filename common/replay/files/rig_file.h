@@ -20,12 +20,13 @@ inline constexpr char kVins[] = "of VINS", kOrbSlam[] = "of ORB-SLAM3", kBasalt[
 /// The contents of a rig file, which may have cameras only or the IMU only.
 struct RigParts {
   Calibration sensors;
-  std::map<std::string, std::string> topics;  ///< keys: cam0, cam1, imu; Kalibr's `rostopic`
+  std::map<std::string, std::string>
+      topics;  ///< topics by cam0, cam1 and imu, from Kalibr's `rostopic`
 };
 /// Throws StartupError with the key and the fix. `notes` receives a sentence for each unknown key.
 RigParts readRigParts(const std::filesystem::path& file, std::vector<std::string>* notes = nullptr);
-/// The origin of a calibration without sections of a rig file: "of ORB-SLAM3", or with kNotImported
-/// at its end; empty if it is not known.
+/// Names the origin of a calibration that is not a rig file, such as "of ORB-SLAM3". The text ends
+/// with kNotImported if the file cannot be imported, and is empty if its origin is not known.
 std::string makerOf(const SensorFile& file);
 /// Reads a rig file that must contain cam0.
 Calibration readRig(const std::filesystem::path& file, std::vector<std::string>* notes = nullptr);

@@ -126,7 +126,7 @@ void SensorFile::wrong(const std::string& key, const std::string& what) const {
 
 void SensorFile::noteUnknownKeys(std::vector<std::string>& notes,
                                  std::initializer_list<std::string_view> of_no_use) const {
-  // Keys of EuRoC, Kalibr and ROS that are not used here.
+  // Known keys of EuRoC, Kalibr and ROS that have no effect here.
   static const std::set<std::string> kOfNoUse{"sensor_type",
                                               "comment",
                                               "rostopic",

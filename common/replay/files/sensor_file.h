@@ -22,7 +22,7 @@ class SensorFile {
   /// key is repeated. The other functions throw if a value is missing or invalid.
   explicit SensorFile(const std::filesystem::path& file);
 
-  /// A map that was made from a file; `name` is for messages.
+  /// Uses a map that was read from a file; messages contain `name`.
   SensorFile(std::string name, YAML::Node root) : name_(std::move(name)), root_(std::move(root)) {
     refuseKeysThatComeTwice();
   }
@@ -31,9 +31,9 @@ class SensorFile {
   /// The section under `key`; messages contain the name of the file.
   SensorFile section(const std::string& key) const;
   std::vector<double> numbers(const char* key, std::size_t count) const;
-  /// Requires a value of at least `low`.
+  /// Returns the number under `key`. Requires a value of at least `low`.
   double number(const char* key, double low) const;
-  /// Returns `otherwise` if the key is missing.
+  /// As above, but returns `otherwise` if the key is missing.
   double number(const char* key, double low, double otherwise) const;
   std::string text(const char* key) const;
   /// Numbers of a list, of a list of rows, or of `data` below the key. Returns nothing if the key
@@ -43,11 +43,12 @@ class SensorFile {
   std::optional<RigidTransform> transform(const char* key) const;
   /// The pose of the sensor in the body; the identity if the file does not contain it.
   RigidTransform T_BS() const { return transform("T_BS").value_or(RigidTransform()); }
-  /// The frame of cameras in the IMU: T_i_b of Kalibr, the inverse of T_BS, or the identity.
+  /// The pose of the cameras' reference frame in the IMU: Kalibr's T_i_b, otherwise the inverse of
+  /// T_BS.
   RigidTransform T_IB() const;
   const YAML::Node& root() const { return root_; }
   [[noreturn]] void wrong(const std::string& key, const std::string& what) const;
-  /// Adds a sentence for each key that was not read and is not known as irrelevant.
+  /// Adds a sentence for each key that was not read and is not known to be irrelevant.
   void noteUnknownKeys(std::vector<std::string>& notes,
                        std::initializer_list<std::string_view> of_no_use = {}) const;
 
@@ -72,13 +73,14 @@ class SensorFile {
 /// lens (common/camera/wide_lens.h). Time offset, readout and rate are 0 if they are missing.
 CameraCalibration readCamera(const SensorFile& file, const std::string& name,
                              const std::optional<RigidTransform>& T_BC_given = {});
-/// The pose of the second of two cameras in Kalibr's chain. If T_cam_imu is missing, T_cn_cnm1
-/// (this camera from the previous one) gives T_BC.
+/// Returns T_BC of the second camera in Kalibr's chain from T_cn_cnm1, the transform from the
+/// previous camera into this one. Returns nothing if the file does not contain it.
 std::optional<RigidTransform> placeInChain(const SensorFile& file, const CameraCalibration& before);
-/// The rate is `rate_hz` or `update_rate`.
+/// Reads the noise and the rate (`rate_hz` or `update_rate`).
 ImuCalibration readImuCalibration(const SensorFile& file);
 
-/// The keys that the two functions above read, except T_BS: one per line, with all digits.
+/// YAML text with the keys of readCamera() or readImuCalibration() except T_BS: one key per line,
+/// with all digits.
 std::string cameraKeys(const CameraCalibration& camera);
 std::string imuKeys(const ImuCalibration& imu);
 std::string transformKey(const RigidTransform& T_BS);

@@ -40,7 +40,7 @@ void readFocalLengths(const SensorFile& file, CameraCalibration& camera) {
   camera.fx = f[0], camera.fy = f[1], camera.cx = f[2], camera.cy = f[3];
 }
 
-/// Kalibr's "pinhole-radtan" is split into pinhole and radtan.
+/// Returns the distortion model, which Kalibr may write as a part of the lens: "pinhole-radtan".
 std::string distortionName(const SensorFile& file) {
   const std::string lens = toLower(file.text("camera_model"));
   const auto dash = lens.find('-');
@@ -62,7 +62,8 @@ std::vector<double> coefficientsOf(const SensorFile& file) {
   return {};
 }
 
-/// Kalibr's unified, extended unified and double sphere lenses. Returns nothing for other lenses.
+/// Reads Kalibr's unified, extended unified or double sphere lens. Returns nothing for other
+/// lenses.
 std::optional<WideLens> wideLensOf(const SensorFile& file) {
   const std::string lens = toLower(file.text("camera_model"));
   const std::string model = lens.substr(0, lens.find('-'));
@@ -73,7 +74,7 @@ std::optional<WideLens> wideLensOf(const SensorFile& file) {
     v.insert(v.begin() + 1, 0.0);
   } else if (model == "eucm" || model == "ds" || model == "double_sphere") {
     wide.kind = model == "eucm" ? WideLens::Kind::kExtendedUnified : WideLens::Kind::kDoubleSphere;
-    v = file.numbers("intrinsics", 6);  // xi and alpha, or alpha and beta
+    v = file.numbers("intrinsics", 6);  // xi and alpha, or alpha and beta, before the same four
   } else {
     return std::nullopt;
   }
@@ -109,8 +110,8 @@ void readLens(const SensorFile& file, CameraCalibration& camera) {
   if (!set) file.wrong(set.error().code, set.error().detail);
 }
 
-/// Readout time from the first row to the last; Kalibr and TUM's rolling shutter data give it per
-/// row.
+/// Readout time from the first row to the last, s. Kalibr and TUM's rolling shutter data give it
+/// per row.
 double readoutOf(const SensorFile& file, std::uint32_t rows) {
   for (const auto& [key, unit_s] : {std::pair("line_delay", 1.0), std::pair("line-delay", 1.0),
                                     std::pair("line_delay_nanoseconds", 1e-9)}) {

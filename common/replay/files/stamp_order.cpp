@@ -19,14 +19,15 @@ using Kind = ClockChange::Kind;
 
 constexpr std::size_t kFew = 3;        ///< number of strays accepted for any number of stamps
 constexpr std::size_t kFewShare = 50;  ///< at most one stray stamp per this number of stamps
-constexpr int kFarIntervals = 32;      ///< distance from the neighbours' stamps, in intervals
+constexpr int kFarIntervals =
+    32;  ///< a stray is farther outside its neighbours' stamps than this number of intervals
 
 struct Counter {
   Duration length;
   std::string name;
 };
 
-/// Lengths after which clocks of sensors begin again.
+/// Periods after which sensor clocks start again at 0.
 std::vector<Counter> counters() {
   struct Tick {
     std::int64_t ns;
@@ -51,7 +52,8 @@ std::vector<Counter> counters() {
 
 /// Indices of a longest subsequence of stamps that do not decrease.
 std::vector<std::size_t> longestInOrder(const Times& stamps) {
-  std::vector<std::size_t> ends, before(stamps.size());  // ends[k]: end of the best k + 1
+  std::vector<std::size_t> ends,
+      before(stamps.size());  // ends[k]: last index of the best k + 1 stamps
   for (std::size_t i = 0; i < stamps.size(); ++i) {
     const auto at =
         std::upper_bound(ends.begin(), ends.end(), stamps[i],
@@ -118,7 +120,7 @@ class Line {
   Duration usual_{0};
 };
 
-/// Removes a few stamps before or after a long pause at the ends.
+/// Removes up to three stamps at either end that a long pause separates from the others.
 void cutEnds(const Times& stamps, StampOrder& order) {
   auto& kept = order.kept;
   if (kept.size() < 20) return;
@@ -156,7 +158,7 @@ Duration sum(Duration a, Duration b) {
   return between(TimePoint(a), TimePoint(-std::max(b, -Duration::max())));
 }
 
-/// Finds the changes of a clock, from stamp to stamp.
+/// Finds the changes of a clock between consecutive stamps.
 class ClockWalk {
  public:
   ClockWalk(const Times& stamps, const AreSame& same, const std::vector<ClockChange>& known)
@@ -176,12 +178,12 @@ class ClockWalk {
 
  private:
   static constexpr std::size_t kMostSet =
-      8;  ///< clocks that were set; overlapping batches are more
-  /// A list with fewer steps back than one per this number is in order.
+      8;  ///< most times that a clock is set; overlapping batches have more steps
+  /// Steps back are changes of the clock only if there is at most one per this number of stamps.
   static constexpr std::size_t kOrdered = 20;
-  static constexpr int kLost = 20;  ///< intervals in which samples may be missing
+  static constexpr int kLost = 20;  ///< longest gap of lost samples, in intervals
 
-  /// Returns false if the stamps are no clock that was set.
+  /// Returns false if there are too many steps for a clock that was set.
   bool walk() {
     Duration added{0};
     std::size_t set = 0;
@@ -218,7 +220,7 @@ class ClockWalk {
     return change;
   }
 
-  /// The change of another sensor at this place, if it explains the interval here.
+  /// Returns the change of another sensor's clock if it explains the step here.
   const ClockChange* knownAt(const ClockChange& here) const {
     const auto explains = [&](const ClockChange& set) {
       if (set.kind != Kind::kSet || set.added <= Duration{0}) return false;
@@ -232,8 +234,8 @@ class ClockWalk {
     return set == known_.end() ? nullptr : &*set;
   }
 
-  /// Whether a step back is very short, or short and over no more stamps than usual: neighbours
-  /// that changed places. Behind a clock that was set such stamps come a second time.
+  /// Returns whether a step back is due to neighbours that changed places: it is very short, or it
+  /// is short and spans no more stamps than usual. After a clock was set back, it spans them twice.
   bool isSwap(std::size_t i) const {
     const TimePoint before = stamps_[i - 1], after = stamps_[i];
     const Duration back = between(before, after);
@@ -248,7 +250,7 @@ class ClockWalk {
     return 2 * found < 3 * passed;
   }
 
-  /// Whether `count` stamps from `first` increase without a pause.
+  /// Returns whether `count` stamps from `first` increase without a pause.
   bool goesOn(std::size_t first, std::size_t count) const {
     if (first + count > stamps_.size()) return false;
     for (std::size_t i = first + 1; i < first + count; ++i) {
@@ -260,8 +262,8 @@ class ClockWalk {
     return after > before && between(after, before) <= multipleOf(kLost, usual_);
   }
 
-  /// The counter that wrapped, if the step back has its length: to about a sample between
-  /// regular stamps, or more roughly if all stamps lie inside of it.
+  /// Finds the counter that has the length of the step back. Between regular stamps it must agree
+  /// to about a sample; if all stamps lie within one period of the counter, to 1 %.
   bool findCounter(ClockChange& change, bool regular) const {
     static const std::vector<Counter> kCounters = counters();
     for (const Counter& counter : kCounters) {
@@ -277,8 +279,8 @@ class ClockWalk {
     return false;
   }
 
-  /// Whether the stamps from i on are lines at another place: they fill a gap between the times
-  /// before, or repeat them.
+  /// Returns whether the stamps from i on are lines out of order: they fill a gap between earlier
+  /// times, or repeat earlier samples.
   bool isMoved(std::size_t i) const {
     std::size_t end = i + 1;
     while (end < stamps_.size() && isNext(stamps_[end - 1], stamps_[end])) ++end;
@@ -348,7 +350,7 @@ StampOrder orderOf(const std::vector<TimePoint>& given, const AreSame& same,
   }
   dropRepeated(stamps, order);
   cutEnds(stamps, order);
-  // Lines at another place may fill a pause.
+  // Removes pauses that lines out of order fill.
   std::erase_if(order.changes, [&](const ClockChange& change) {
     const auto next =
         std::lower_bound(order.kept.begin(), order.kept.end(), change.continues,

@@ -1,6 +1,6 @@
-// Decides about the stamps of each sensor in a recording: their order, counters that wrapped,
-// and clocks that were set. Readers deliver whole streams in the order of their files (orderByTime
-// in recording.h); clock_check.h judges the result.
+// Corrects the stamps of each sensor in a recording: their order, counters that wrapped, and clocks
+// that were set. Readers deliver whole streams in the order of their files (orderByTime in
+// recording.h); clock_check.h reports the result.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@
 
 namespace perdure::replay {
 
-/// A place where the stamps of a sensor do not go on.
+/// A place where the stamps of a sensor do not continue regularly.
 struct ClockChange {
   enum class Kind {
     kCounter,  ///< a counter wrapped: `added` continues it exactly
@@ -29,34 +29,35 @@ struct ClockChange {
   std::string sensor = {};   ///< "imu", "frame", "stereo", "speed", "truth"
   std::string place = {};    ///< "FILE:LINE", or the number of the message
   TimePoint continues = {};  ///< `after` in the corrected time
-  bool common = false;       ///< kSet: all sensors changed alike
+  bool common = false;       ///< kSet: the clocks of all sensors were set by the same amount
 };
 
 /// The stamps to keep, as indices in increasing order of their corrected times.
 struct StampOrder {
   std::vector<std::size_t> kept;
-  std::vector<TimePoint> times;  ///< times of all stamps, continued over the changes
+  std::vector<TimePoint> times;  ///< times of all stamps, with corrected changes
   std::vector<ClockChange> changes;
-  std::size_t moved = 0;     ///< out of order; sorted
-  std::size_t strays = 0;    ///< removed: a few stamps far from their neighbours
-  std::size_t repeated = 0;  ///< removed: repeated stamps
+  std::size_t moved = 0;   ///< number of stamps out of order, which were sorted
+  std::size_t strays = 0;  ///< number of removed stamps that are few and far from their neighbours
+  std::size_t repeated = 0;  ///< number of removed stamps that repeat another
 };
 
-/// Whether two samples of a sensor are equal apart from their stamps.
+/// Returns whether two samples, given by index, are equal apart from their stamps.
 using AreSame = std::function<bool(std::size_t, std::size_t)>;
 
-/// Increasing stamps are all kept. A step back, or one of over a day ahead, between stamps that
-/// increase regularly on both sides is a change of the clock, unless the stamps behind it fill a
-/// gap before it (lines in another order) or repeat samples before it. A counter is recognised by
-/// its length. More than eight clocks that were set are none: batches overlap. A clock that was set
-/// back by a few intervals is recognised by `known`, the changes that the recording's other sensors
-/// show.
+/// Orders the stamps of a sensor and corrects the changes of its clock. A step back, or a step of
+/// over a day ahead, is a change of the clock if the stamps increase regularly on both sides. It is
+/// not one if the stamps after it fill a gap before it (lines in another order) or repeat samples
+/// before it. A counter that wrapped is recognised by its length. If the clock seems to be set more
+/// than eight times, the list consists of overlapping batches, and no change is assumed. `known`
+/// has the changes of the recording's other sensors; by them a clock that was set back by a few
+/// intervals is recognised.
 ///
-/// Other stamps out of order are strays if they are few, far outside their neighbours' stamps, and
-/// do not fill a gap elsewhere. Few means a fiftieth or three, if at most a fifth is out of order.
-/// With more of them the list is unsorted, and no stamp is left out. Up to three stamps at either
-/// end are strays as well, if they are separated by a pause longer than ten seconds and a thousand
-/// usual intervals.
+/// Other stamps out of order are removed as strays if they are few, far outside their neighbours'
+/// stamps, and do not fill a gap elsewhere. They are few if they are a fiftieth of all or at most
+/// three, and if at most a fifth of all is out of order. Otherwise the list is sorted, and no stamp
+/// is left out. Up to three stamps at either end are strays as well, if a pause longer than ten
+/// seconds and a thousand usual intervals separates them.
 StampOrder orderOf(
     const std::vector<TimePoint>& stamps, const AreSame& same = [](auto, auto) { return true; },
     const std::vector<ClockChange>& known = {});

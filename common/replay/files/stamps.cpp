@@ -9,7 +9,7 @@
 namespace perdure::replay {
 namespace {
 
-/// A decimal number as digits, and the position of its point from their start.
+/// A decimal number: its digits, and the number of digits before the point.
 struct Decimal {
   std::string digits;
   std::int64_t point = 0;

@@ -1,5 +1,5 @@
-// Stamps of recordings as text, in several notations. Their order:
-// common/replay/files/stamp_order.h.
+// Parses the stamps of recordings, in several notations. Their order is checked by
+// files/stamp_order.h.
 #pragma once
 
 #include <cstdint>
@@ -16,12 +16,12 @@ namespace perdure::replay {
 /// fraction remains.
 std::optional<TimePoint> parseNanoseconds(std::string_view text);
 
-/// The reason and the fix if parseNanoseconds() returns nothing. Otherwise returns "".
+/// Returns the reason and the fix if parseNanoseconds() returns nothing. Otherwise returns "".
 std::string whyNoStamp(std::string_view text);
 
 /// a − b, limited to ±292 years, because a file may contain any stamps.
 Duration between(TimePoint a, TimePoint b);
-/// n · d, with the same limit.
+/// n · d, limited to ±292 years.
 Duration multipleOf(std::int64_t n, Duration d);
 
 }  // namespace perdure::replay

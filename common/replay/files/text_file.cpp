@@ -27,7 +27,8 @@ std::optional<Number> parseWhole(std::string_view text) {
   return value;
 }
 
-/// The name beside a missing file or folder that differs from it only in case or Unicode form.
+/// Returns the existing neighbour whose name differs from the missing one only in case or Unicode
+/// form, or "" if there is none.
 std::string similarTo(const std::filesystem::path& path) {
   namespace fs = std::filesystem;
   std::error_code error;
@@ -98,7 +99,7 @@ std::string withoutAccents(std::string_view text) {
   std::string result;
   for (std::size_t i = 0; i < text.size(); ++i) {
     const auto byte = static_cast<unsigned char>(text[i]);
-    if (byte >= 0x80 && byte < 0xC0) continue;  // within a character
+    if (byte >= 0x80 && byte < 0xC0) continue;  // a further byte of a character
     if (byte < 0x80) {
       result += text[i];
       continue;

@@ -20,8 +20,8 @@ struct TextLine {
 /// StartupError(kUnavailable) if the file cannot be read; the message ends with `fix`.
 std::vector<TextLine> readLines(const std::filesystem::path& path, std::string_view fix);
 
-/// Throws StartupError(kUnavailable) if the permissions of the file or of a folder above forbid to
-/// read it.
+/// Throws StartupError(kUnavailable) if the permissions of the file or of a folder above forbid
+/// reading it.
 void refuseUnreadable(const std::filesystem::path& path);
 
 /// The text with one character in place of each one beyond ASCII, so that composed and decomposed
@@ -39,14 +39,14 @@ std::string toLower(std::string_view text);
 std::vector<std::string_view> split(std::string_view text, char separator);
 /// The separator of the fields in a line: comma if present, else semicolon, else ' '.
 char separatorOf(std::string_view line);
-/// Fields split by this separator, without empty fields at the end of the line.
+/// Fields of a line, split by separatorOf(), without empty fields at the end.
 std::vector<std::string_view> fieldsOf(std::string_view line);
 
 /// The whole text as a finite number. Returns nothing if characters remain, or for infinity and
 /// NaN.
 std::optional<double> parseNumber(std::string_view text);
 std::optional<std::int64_t> parseInteger(std::string_view text);
-/// All fields as finite numbers, or nothing.
+/// Parses all fields as finite numbers. Returns nothing if one is not.
 std::optional<std::vector<double>> parseNumbers(const std::vector<std::string_view>& fields);
 /// Returns true for column names: there are several fields, and none is infinite, NaN, or begins
 /// like a number.
@@ -56,7 +56,7 @@ bool isHeader(const std::vector<std::string_view>& fields);
 class Complaints {
  public:
   explicit Complaints(std::filesystem::path file = {}) : file_(std::move(file)) {}
-  /// Adds "file:line: what".
+  /// Adds the error "file:line: what".
   void add(std::size_t line, std::string_view what);
   void add(std::string_view sentence);
   /// Throws StartupError(kData) with the first ten errors and the number of the others, if any.

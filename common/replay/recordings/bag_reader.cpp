@@ -22,7 +22,7 @@ using HeadFields = std::map<std::string, std::string>;
 constexpr std::string_view kMagic = "#ROSBAG V2.0\n";
 constexpr std::uint64_t kMostHead = 1u << 20;
 constexpr std::uint64_t kMostChunk = 64u << 20;  // rosbag writes 768 kB
-constexpr std::uint64_t kMostHeld = 1u << 30;    // memory of chunks unpacked at one time
+constexpr std::uint64_t kMostHeld = 1u << 30;    // largest memory of chunks unpacked at one time
 
 enum class Op : std::uint8_t { kMessage = 2, kIndex = 4, kChunk = 5, kConnection = 7 };
 
@@ -34,7 +34,8 @@ X numberIn(std::string_view bytes) {
   return x;
 }
 
-/// Parses "name=value" fields, each after its length. Returns nothing if they do not fit.
+/// Parses "name=value" fields, each preceded by its length. Returns nothing if the lengths do not
+/// fit.
 std::optional<HeadFields> fieldsOf(Bytes head) {
   HeadFields fields;
   mcap::Take take(head);
@@ -118,7 +119,8 @@ class Bag : public RosSource {
   struct Pending {
     RosMessage message;
     std::uint64_t order = 0;
-    bool operator<(const Pending& other) const {  // the top of the queue is the largest
+    /// The top of the queue is the largest element, here the earliest one.
+    bool operator<(const Pending& other) const {
       return std::tie(message.log_ns, order) > std::tie(other.message.log_ns, other.order);
     }
   };
@@ -209,8 +211,8 @@ class Bag : public RosSource {
                        [this](std::uint32_t one) { return connections_.contains(one); });
   }
 
-  /// Reads connection records from the chunk that first uses each connection, if the end of the
-  /// file is missing.
+  /// Reads the connection records in a chunk. This is necessary if the end of the file, which
+  /// repeats them, is missing.
   void learnConnections(const ChunkPlace& chunk) {
     if (const auto records = unpack(chunk))
       forEachMessage(**records, [](std::uint32_t, std::uint64_t, Bytes) {});
@@ -272,8 +274,8 @@ class Bag : public RosSource {
     return known != connections_.end() && wanted_.contains(known->second.first);
   }
 
-  /// Chunks with overlapping times are unpacked together; those of rosbag overlap by fractions of a
-  /// second.
+  /// Limits the memory of unpacked chunks. Chunks whose times overlap are in memory together; those
+  /// of rosbag overlap by fractions of a second.
   void hold(const Records& records) {
     std::erase_if(held_, [](const auto& one) { return one.expired(); });
     std::uint64_t sum = records->size();

@@ -58,7 +58,7 @@ class Db3 : public RosSource {
         last_ns_ = log_ns;
         return message();
       }
-      // Text sorts after all numbers; a damaged index may give any order.
+      // Times stored as text follow all numbers; a damaged index may give any order.
       count({"stamp_malformed", path_.string() +
                                     ": a message whose time is no whole number, or goes "
                                     "back; it is left out"});
@@ -67,7 +67,7 @@ class Db3 : public RosSource {
   }
 
  private:
-  /// Returns false at the end.
+  /// Moves to the next row. Returns false at the end.
   bool step() {
     if (!rows_) return false;
     const int got = sqlite3_step(rows_.get());
@@ -99,7 +99,8 @@ class Db3 : public RosSource {
             static_cast<std::uint64_t>(sqlite3_column_int64(rows_.get(), 3)), *data, data};
   }
 
-  /// The recorder writes to FILE-wal first. Without it a file of a killed recorder is empty.
+  /// Throws StartupError if FILE-wal, to which the recorder writes first, was not copied. Without
+  /// it the file of a killed recorder is empty.
   void refuseLeftBehind() const {
     if (!lacksWriteAheadLog(path_)) return;
     throw StartupError(ExitCode::kData,
@@ -139,7 +140,7 @@ class Db3 : public RosSource {
     noteEnd(got);
   }
 
-  /// Counts row by row, because an aggregate query returns nothing if a page is damaged.
+  /// Counts messages row by row, because an aggregate query returns nothing if a page is damaged.
   void countMessages() {
     const auto rows = prepared("SELECT topic_id, timestamp FROM messages ORDER BY id");
     int got = SQLITE_ROW;
@@ -159,7 +160,7 @@ class Db3 : public RosSource {
   std::filesystem::path path_;
   std::unique_ptr<sqlite3, Close> database_;
   std::map<sqlite3_int64, std::string> names_;
-  std::string chosen_;  ///< query of the selected messages, without its order
+  std::string chosen_;  ///< query of the selected messages, without the key of their order
   Statement rows_;
   bool sorted_ = true;
   sqlite3_int64 last_ns_ = -1;

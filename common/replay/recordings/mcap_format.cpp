@@ -15,7 +15,7 @@ std::optional<Record> takeRecord(Bytes& bytes) {
   return record;
 }
 
-/// Writes the data once, because they are large.
+/// Writes the record directly into `to`, so that its large data are copied only once.
 void putMessage(std::vector<std::uint8_t>& to, const Message& message) {
   Put put(to);
   put(static_cast<std::uint8_t>(Op::kMessage));

@@ -18,10 +18,11 @@ namespace perdure::replay::mcap {
 using Bytes = std::span<const std::uint8_t>;
 
 inline constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'M', 'C', 'A', 'P', '0', '\r', '\n'};
-inline constexpr std::size_t kRecordHead = 9;              ///< opcode and length
-inline constexpr std::size_t kFooterContent = 20;          ///< bytes
-inline constexpr std::size_t kMessageHead = 22;            ///< bytes before a message's data
-inline constexpr std::uint64_t kMostRecords = 512u << 20;  ///< bytes in a chunk, unpacked
+inline constexpr std::size_t kRecordHead = 9;      ///< opcode and length
+inline constexpr std::size_t kFooterContent = 20;  ///< bytes
+inline constexpr std::size_t kMessageHead = 22;    ///< bytes before a message's data
+inline constexpr std::uint64_t kMostRecords = 512u
+                                              << 20;  ///< largest size of an unpacked chunk, bytes
 
 enum class Op : std::uint8_t {
   kHeader = 0x01,
@@ -37,7 +38,7 @@ enum class Op : std::uint8_t {
   kDataEnd = 0x0F,
 };
 
-/// Each record lists its fields once, for writing and reading.
+/// In each record, fields() lists the fields once, for writing and reading.
 struct Schema {
   static constexpr Op kOp = Op::kSchema;
   std::uint16_t id = 0;
@@ -64,7 +65,7 @@ struct Message {
   std::uint32_t sequence = 0;
   std::uint64_t log_ns = 0, publish_ns = 0;  ///< times since the epoch
   Bytes data = {};
-  /// All except the data, which are the rest of the record.
+  /// The fields before the data, which fill the rest of the record.
   static bool fields(auto& m, auto& a) {
     return a(m.channel) && a(m.sequence) && a(m.log_ns) && a(m.publish_ns);
   }
@@ -74,10 +75,11 @@ struct ChunkIndex {
   static constexpr Op kOp = Op::kChunkIndex;
   std::uint64_t start_ns = 0, end_ns = 0;  ///< log times of the first and the last message
   std::uint64_t offset = 0, length = 0;    ///< the chunk's record, including its header
-  std::map<std::uint16_t, std::uint64_t> index_offsets = {};  ///< offsets by channel
+  std::map<std::uint16_t, std::uint64_t> index_offsets =
+      {};  ///< offsets of the message indexes, by channel
   std::uint64_t index_length = 0;
   std::string compression = {};
-  std::uint64_t packed = 0, unpacked = 0;  ///< size of its records in bytes
+  std::uint64_t packed = 0, unpacked = 0;  ///< sizes of the chunk's records in bytes
   static bool fields(auto& m, auto& a) {
     return a(m.start_ns) && a(m.end_ns) && a(m.offset) && a(m.length) && a(m.index_offsets) &&
            a(m.index_length) && a(m.compression) && a(m.packed) && a(m.unpacked);
@@ -97,7 +99,7 @@ struct Statistics {
   }
 };
 
-/// Appends values.
+/// Appends values in the encoding of MCAP.
 class Put {
  public:
   explicit Put(std::vector<std::uint8_t>& to) : to_(to) {}
@@ -135,7 +137,7 @@ class Put {
   std::vector<std::uint8_t>& to_;
 };
 
-/// Reads values. Returns false and consumes nothing if the bytes end too early.
+/// Reads values. Each call returns false and consumes nothing if the bytes end too early.
 class Take {
  public:
   explicit Take(Bytes bytes) : bytes_(bytes) {}
@@ -200,7 +202,7 @@ void putRecord(std::vector<std::uint8_t>& to, const M& record) {
   M::fields(record, put);
   Put(to).record(M::kOp, content);
 }
-/// Returns nothing if the content is truncated or invalid.
+/// Decodes the content of a record. Returns nothing if it is truncated or invalid.
 template <class M>
 std::optional<M> recordFrom(Bytes content) {
   Take take(content);

@@ -7,8 +7,9 @@
 namespace perdure::replay::mcap {
 namespace {
 
-constexpr char kBare[] = "bare";  ///< no chunk: a single message record in the file
-constexpr std::uint64_t kMostContent = 64u << 20;  ///< limit of records other than chunks
+constexpr char kBare[] = "bare";  ///< marks a message record outside chunks
+constexpr std::uint64_t kMostContent = 64u
+                                       << 20;  ///< largest size of records other than chunks, bytes
 
 /// The header of a chunk, before its records.
 struct ChunkHead {
@@ -121,7 +122,8 @@ Result<Reader> Reader::open(const std::filesystem::path& path) {
   return reader;
 }
 
-/// Missing optional parts (the whole summary, statistics, indexes) are not an error.
+/// Reads the summary. If optional parts (the whole summary, statistics, indexes) are missing,
+/// returns kTooLittle, not kWrong.
 Reader::Summary Reader::readSummary() {
   constexpr std::uint64_t kEnd = kRecordHead + kFooterContent + kMagic.size();
   if (size() < kMagic.size() + kEnd) return Summary::kTooLittle;
@@ -182,7 +184,8 @@ bool Reader::describesAll() const {
          catalogue_.schemas.size() == statistics_.schemas;
 }
 
-/// Returns true if the scan reached the footer and the final magic at the end of the file.
+/// Scans the records. Returns true if it reached the footer and the final magic at the end of the
+/// file.
 bool Reader::scan() {
   catalogue_ = {};
   chunks_.clear();
@@ -213,7 +216,7 @@ bool Reader::endsAt(std::uint64_t end) {
   return next.empty();
 }
 
-/// Returns false if the rest of the file is not trustworthy.
+/// Returns false if the record is invalid, so that the rest of the file cannot be interpreted.
 bool Reader::scanRecord(Op op, std::uint64_t at, std::uint64_t length) {
   if (op == Op::kChunk) return scanChunk(at, length);
   if (op == Op::kHeader && chunks_.empty()) whole_ = at + kRecordHead + length;
@@ -257,7 +260,8 @@ bool Reader::scanChunk(std::uint64_t at, std::uint64_t length) {
   return true;
 }
 
-/// Updates the statistics and last_index_. Returns false if the data end within a record.
+/// Adds a chunk's messages to the statistics and to last_index_. Returns false if the data end
+/// within a record.
 bool Reader::countMessages(const Records& records) {
   last_index_.clear();
   const auto visit = [&](const Message& message, std::uint64_t offset) {
@@ -294,7 +298,7 @@ void Reader::scanMessageIndex(std::uint64_t at, std::uint64_t length, Bytes cont
   if (chunk.index_offsets.size() == last_index_.size()) whole_ = at + kRecordHead + length;
 }
 
-/// Adds a message outside chunks, as minimal writers produce.
+/// Adds a message record outside chunks. Minimal writers produce such records.
 void Reader::addBare(std::uint64_t at, std::uint64_t length) {
   const auto message = messageFrom(file_.read(at + kRecordHead, length));
   if (!message) return;
@@ -349,7 +353,7 @@ Result<void> Reader::finish() {
   const bool lacks_index =
       !chunks.empty() && chunks.back().index_offsets.size() != last_index_.size();
   std::optional<ChunkIndex> last;
-  std::uint64_t end = whole_ <= kMagic.size() ? 0 : whole_;  // 0: rewrite all
+  std::uint64_t end = whole_ <= kMagic.size() ? 0 : whole_;  // 0: rewrite the whole file
   if (lacks_index) {
     last = chunks.back();
     last->index_length = 0;

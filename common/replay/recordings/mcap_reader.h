@@ -21,17 +21,17 @@ using Records = std::shared_ptr<const std::vector<std::uint8_t>>;
 /// A chunk that cannot be read completely.
 struct Damage {
   std::uint64_t offset = 0;  ///< offset of its record in the file
-  Reason reason;             ///< reason of Reader::unpack, without the file
+  Reason reason;             ///< reason of Reader::unpack, without the name of the file
 };
 
 class Reader {
  public:
-  /// Reasons: "file", "not_mcap"; the detail states the fix.
+  /// Opens a recording. Reasons: "file", "not_mcap"; the detail states the fix.
   static Result<Reader> open(const std::filesystem::path& path);
 
   const std::filesystem::path& path() const { return file_.path(); }
-  /// Returns whether the file is complete: a footer, the magic, and no wrong summary. Otherwise a
-  /// scan has found all complete records.
+  /// Returns whether the file is complete: it ends with a footer and the magic, and its summary is
+  /// not wrong. Otherwise a scan has found all complete records.
   bool finished() const { return finished_; }
   /// Returns whether another recording follows in the same file, as after `cat` of two files. The
   /// second one is not read.
@@ -42,7 +42,7 @@ class Reader {
   std::uint64_t size() const { return file_.size(); }
   /// Number of bytes after the last complete chunk of an unfinished file.
   std::uint64_t cutBytes() const { return size() - whole_; }
-  /// Damage found by a scan.
+  /// The damaged chunks found by a scan or by check().
   const std::vector<Damage>& damage() const { return damage_; }
   /// Unpacks every chunk of the summary. damage() is then complete, and chunks() and statistics()
   /// describe the readable part.
@@ -58,7 +58,8 @@ class Reader {
   /// Completes an unfinished file: cuts incomplete data (cutBytes) and writes the summary. Fails
   /// with the reasons of finishable().
   Result<void> finish();
-  /// Reasons: "followed" (by another recording, which would be lost), "not_chunked".
+  /// Returns whether finish() is possible. Reasons: "followed" (by another recording, which would
+  /// be lost), "not_chunked".
   Result<void> finishable() const;
 
  private:
@@ -91,7 +92,7 @@ class Reader {
 /// …".
 std::string sentenceOfDamage(const std::filesystem::path& file, const Reader& reader);
 
-/// A sentence that another recording follows the first one in `file`, with the fix.
+/// States that another recording follows the first one in `file`, with the fix.
 std::string sentenceOfFollowed(const std::filesystem::path& file);
 
 /// Visits the messages in a chunk's records. Returns false if they are damaged; earlier messages

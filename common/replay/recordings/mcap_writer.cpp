@@ -61,7 +61,8 @@ void putIndexes(std::vector<std::uint8_t>& to, std::uint64_t at, const Draft::In
   place.index_length = to.size() - before;
 }
 
-/// Builds the summary section: group() calls `put` for each group of records, and adds its offset.
+/// Builds the summary section: group() calls `put` for each group of records, and adds the group's
+/// offset.
 class Summary {
  public:
   explicit Summary(std::uint64_t at) : at_(at) {}

@@ -51,31 +51,31 @@ struct Chunk {
 
   std::size_t bytes() const;  ///< approximate memory
 };
-/// Compresses by zstd at the fastest level.
+/// Compresses a draft with zstd at the fastest level.
 Chunk pack(const Draft& draft);
 
-/// The exit status for a reason of Writer.
+/// Returns the exit status for a reason of Writer.
 ExitCode exitCodeOf(const Reason& reason);
 
 class Writer {
  public:
-  /// Creates a file. Reasons: "file", "disk_full" (the detail is that of the system); no file
-  /// remains then.
+  /// Creates a file. Reasons: "file", "disk_full". The detail is the system's error message. No
+  /// file remains after a failure.
   static Result<Writer> create(const std::filesystem::path& path, const std::string& profile = {});
   /// Opens an existing file and truncates it at `end`. `chunks` and `counted` describe the data
-  /// before.
+  /// before `end`.
   static Result<Writer> resume(const std::filesystem::path& path, std::uint64_t end,
                                const Catalogue& catalogue, std::vector<ChunkIndex> chunks,
                                const Statistics& counted);
 
-  /// Writes the chunk, and those of its schemas and channels that are new to this file. On failure
-  /// ("disk_full", "file") the file is restored, and the call may be repeated.
+  /// Writes the chunk, after those of its schemas and channels that the file does not have yet. On
+  /// failure ("disk_full", "file") the file is restored, and the call may be repeated.
   Result<void> append(const Chunk& chunk, const Catalogue& catalogue);
   /// Writes the missing message indexes of a chunk in the file.
   Result<void> appendIndex(ChunkIndex& chunk, const Draft::Index& index);
-  /// Writes the summary; failures as in append().
+  /// Writes the summary. Fails as append() does.
   Result<void> finish();
-  /// Returns when all written data are on disk.
+  /// Returns after all written data are on disk.
   void sync() const;
 
   const std::filesystem::path& path() const { return path_; }

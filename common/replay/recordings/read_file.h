@@ -12,7 +12,7 @@ namespace perdure::replay {
 
 class ReadFile {
  public:
-  /// Reason: "file".
+  /// Opens a file. Reason: "file".
   static Result<ReadFile> open(const std::filesystem::path& path);
 
   const std::filesystem::path& path() const { return path_; }

@@ -57,7 +57,7 @@ RecordedMessages::RecordedMessages(const fs::path& path, Chunks look)
   std::vector<RecordingPart> parts;
   for (const fs::path& file : files) openFile(file, look, parts);
   notes_ = joinParts(std::move(parts));
-  // Numbers in file names sort 10 before 2.
+  // Names do not give the order of the files, because "10" sorts before "2".
   std::stable_sort(files_.begin(), files_.end(),
                    [](const auto& a, const auto& b) { return startOf(a) < startOf(b); });
   for (std::size_t i = 0; i < files_.size(); ++i) {
@@ -115,12 +115,12 @@ void RecordedMessages::openFile(const fs::path& path, Chunks look,
   start_ns_ = std::min(start_ns_, part.start_ns);
   end_ns_ = std::max(end_ns_, part.end_ns);
   parts.push_back(std::move(part));
-  reader->letGo();  // a folder may have more segments than a process may open
+  reader->letGo();  // a folder may have more segments than a process may open at once
   files_.push_back(*std::move(reader));
 }
 
-/// The compressed file, if `file` is its temporary unpacked copy. Messages for users name the
-/// compressed file.
+/// Returns the compressed file if `file` is its temporary unpacked copy, otherwise `file`. Messages
+/// for users name the compressed file.
 fs::path RecordedMessages::givenFor(const fs::path& file) const {
   const auto same = [&](const auto& unpacked) { return unpacked->path() == file; };
   const auto packed = std::find_if(unpacked_.begin(), unpacked_.end(), same);

@@ -45,7 +45,7 @@ class RecordedMessages {
     std::uint64_t messages = 0;
   };
 
-  /// kEach: every chunk is unpacked at once, so that topics() describes the readable part.
+  /// kEach unpacks every chunk at once, so that topics() describes the readable part.
   enum class Chunks { kByIndex, kEach };
   /// Opens a .mcap file, or a folder that contains such files. Compressed files (.mcap.zstd) are
   /// unpacked. Throws StartupError with the fix.
@@ -61,8 +61,8 @@ class RecordedMessages {
   /// Notes for users about unpacked files and about files that were joined.
   std::vector<std::string> notes() const;
 
-  /// Restarts with these topics only (all if `wanted` is empty), without chunks that end before
-  /// `from_ns`.
+  /// Restarts with the topics for which `wanted` is true (all if it is empty), without chunks that
+  /// end before `from_ns`.
   void rewind(std::function<bool(const std::string& topic)> wanted = {}, std::uint64_t from_ns = 0);
   /// The next message by log time. Returns nothing at the end. Messages repeated by the recorder at
   /// the start of each segment (calibration, model) are returned once.
@@ -72,12 +72,13 @@ class RecordedMessages {
   struct ChunkPlace {
     std::size_t file = 0;
     const mcap::ChunkIndex* index = nullptr;
-    std::uint64_t number = 0;  ///< number of the message in the order of the files
+    std::uint64_t number = 0;  ///< number of the chunk in the order of the files
   };
   struct Pending {
     RecordedMessage message;
     std::uint64_t order = 0;
-    bool operator<(const Pending& other) const {  // the top of the queue is the largest
+    /// The top of the queue is the largest element, here the earliest one.
+    bool operator<(const Pending& other) const {
       return std::tie(message.log_ns, order) > std::tie(other.message.log_ns, other.order);
     }
   };

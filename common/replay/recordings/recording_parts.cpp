@@ -18,7 +18,8 @@ bool shareTopic(const RecordingPart& a, const RecordingPart& b) {
                      [&](const std::string& topic) { return b.topics.contains(topic); });
 }
 
-/// The parts of one recording follow each other; only a step of the clock makes them overlap.
+/// Returns whether two parts overlap considerably. The parts of one recording follow each other;
+/// only a step of the clock makes them overlap slightly.
 bool overlap(const RecordingPart& a, const RecordingPart& b) {
   constexpr double kMost = 0.1;  // largest overlap, as a share of the shorter recording
   const double common = secondsBetween(b.start_ns, std::min(a.end_ns, b.end_ns));

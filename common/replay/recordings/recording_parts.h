@@ -15,8 +15,8 @@ struct RecordingPart {
   std::set<std::string> topics;            ///< topics with messages
 };
 
-/// Returns a sentence for each gap between two parts. Throws StartupError if two files hold the
-/// same topics at the same time: they are two recordings, which would be mixed.
+/// Returns a sentence for each gap between two parts. Throws StartupError if two files contain the
+/// same topics at the same time, because they are two recordings, which would be mixed.
 std::vector<std::string> joinParts(std::vector<RecordingPart> parts);
 
 }  // namespace perdure::replay

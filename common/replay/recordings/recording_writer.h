@@ -14,8 +14,8 @@ class RecordingWriter {
   /// Creates a file. Throws StartupError: kUnavailable, or kInputOutput if the disk is full.
   explicit RecordingWriter(const std::filesystem::path& file);
 
-  /// Log times must not decrease. `topic` is "odometry", …; reasons as for encodeCdr and
-  /// Writer::append.
+  /// Adds a message on `topic` ("odometry", …). Log times must not decrease. Reasons are those of
+  /// encodeCdr and Writer::append.
   template <class T>
   Result<void> add(const std::string& topic, const T& value, std::uint64_t log_ns) {
     const auto bytes = wire::encodeCdr(value);

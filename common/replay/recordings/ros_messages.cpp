@@ -18,8 +18,8 @@ bool isRosEncoding(const std::string& schema_encoding) {
          schema_encoding == "ros1msg";
 }
 
-/// MCAP of ROS 1 and ROS 2. The schema identifies the version, because converters write arbitrary
-/// profiles.
+/// An MCAP file of ROS 1 or ROS 2. The schema identifies the version, because converters write
+/// arbitrary profiles.
 class McapSource : public RosSource {
  public:
   explicit McapSource(const fs::path& path) : messages_(path) {
@@ -152,7 +152,8 @@ std::optional<RosMessage> RosMessages::next() {
   return message;
 }
 
-/// Zstd frames are recognised by their first bytes, which CDR never has.
+/// Unpacks a message if it is a zstd frame. It is recognised by its first bytes, which CDR never
+/// has.
 bool RosMessages::unpack(RosMessage& message) {
   static constexpr std::uint64_t kLargest = 1u << 30;
   if (topics_.at(message.topic).encoding != ros::Encoding::kCdr || !isZstd(message.data)) {

@@ -40,12 +40,12 @@ class RosSource {
   /// Counts of damaged or truncated data so far.
   const ReasonCounts& reasons() const { return reasons_; }
   const std::string& lastProblem() const { return last_problem_; }
-  /// Restarts with these topics only, without data that ended before `from_ns`.
+  /// Restarts with the topics in `wanted` only, without data that end before `from_ns`.
   virtual void rewind(const std::set<std::string>& wanted, std::uint64_t from_ns) = 0;
   virtual std::optional<RosMessage> next() = 0;
   /// Notes for users about unpacked files and about files that were joined.
   virtual std::vector<std::string> notes() const { return {}; }
-  /// Recording time of the first message; the next function returns that of the last one.
+  /// Recording time of the first message. endNs() returns that of the last one.
   std::uint64_t startNs() const { return start_ns_; }
   std::uint64_t endNs() const { return end_ns_; }
 
@@ -60,34 +60,35 @@ class RosSource {
   std::uint64_t start_ns_ = UINT64_MAX, end_ns_ = 0;
 };
 
-/// These functions throw StartupError with the fix.
+/// openBag() opens a bag of ROS 1, openDb3() a SQLite file of ROS 2. Both throw StartupError with
+/// the fix.
 std::unique_ptr<RosSource> openBag(const std::filesystem::path& file);
 std::unique_ptr<RosSource> openDb3(const std::filesystem::path& file);
 
-/// All files of a recording.
+/// The merged messages of all files of a recording.
 class RosMessages : public RosSource {
  public:
-  /// Returns whether the path is such a file, or a folder with such files. Recordings of Perdure
-  /// are excluded.
+  /// Returns whether the path is a file of these formats, or a folder with such files. Recordings
+  /// of Perdure are excluded.
   static bool looksLikeOne(const std::filesystem::path& path);
   /// Throws StartupError with the fix.
   explicit RosMessages(const std::filesystem::path& path);
 
   std::vector<std::string> notes() const override;
-  /// The counts of all files.
+  /// The sum of the counts of all files.
   ReasonCounts reasons() const;
   std::string lastProblem() const;
   void rewind(const std::set<std::string>& wanted, std::uint64_t from_ns = 0) override;
   std::optional<RosMessage> next() override;
 
-  /// Decodes a message as M. Reason: "malformed".
+  /// Decodes a message as M. Reason: "malformed" if its bytes end too early.
   template <class M>
   Result<M> valueOf(const RosMessage& message) const {
     return ros::messageOf<M>(message.data, topics_.at(message.topic).encoding, message.keeper);
   }
 
  private:
-  /// The next message of all sources, as recorded.
+  /// The earliest of the sources' next messages, as recorded.
   std::optional<RosMessage> nextRecorded();
   /// Decompresses messages of rosbag2's `compression_mode: MESSAGE`. Returns false if a message is
   /// damaged, which is counted.

@@ -17,7 +17,8 @@ class Unpacked {
  public:
   explicit Unpacked(std::uint64_t most)
       : most_(most), step_(most < kStep ? static_cast<std::size_t>(most) + 1 : kStep) {}
-  /// Allows one byte beyond the limit, so that a longer stream is detected.
+  /// Returns whether there is room for more data. One byte beyond the limit is allowed, so that a
+  /// longer stream is detected.
   bool wantsMore() const { return used_ <= most_; }
   std::uint8_t* room() {
     if (used_ == bytes_.size()) bytes_.resize(used_ + step_);
@@ -44,7 +45,7 @@ std::vector<std::uint8_t> unpackedBz2(std::span<const std::uint8_t> packed, std:
   Unpacked unpacked(most);
   bz_stream stream{};
   if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) return {};
-  // The library does not write to its input; its interface lacks const.
+  // The library does not write to its input, although its interface has no const.
   stream.next_in = reinterpret_cast<char*>(const_cast<std::uint8_t*>(packed.data()));
   stream.avail_in = static_cast<unsigned int>(packed.size());
   int state = BZ_OK;

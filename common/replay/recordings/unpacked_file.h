@@ -10,8 +10,8 @@
 
 namespace perdure::replay {
 
-/// Unpacks a file into a temporary folder in $TMPDIR (/tmp). Both are deleted with this object.
-/// They remain if the process is killed.
+/// Unpacks a file into a temporary folder in $TMPDIR (/tmp). The folder is deleted with this
+/// object, but remains if the process is killed.
 class UnpackedFile {
  public:
   /// Returns a shared object, because a recording is opened for each of its cameras. Throws
@@ -34,8 +34,8 @@ class UnpackedFile {
   std::uint64_t size_ = 0;
 };
 
-/// Returns whether a file is compressed and contains a file with this extension: "run_0.db3.zstd"
-/// or .zst.
+/// Returns whether the name is that of a compressed file with this extension: "run_0.db3.zstd" or
+/// "run_0.db3.zst".
 bool isPacked(const std::filesystem::path& file, std::string_view extension);
 /// `path` itself, or the compressed files of a folder that have no unpacked file beside them;
 /// sorted by name.

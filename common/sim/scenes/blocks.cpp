@@ -1,4 +1,4 @@
-// A town of equal blocks, and a drive that passes many of them before it returns.
+// A town of similar blocks, and a drive that passes many of them before it returns.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kBlocksSeconds = 400.0;
 constexpr double kPitchX = 52.0, kPitchY = 46.0;  ///< distance between roads
-/// Crossings at which the drive may turn. A further row of blocks surrounds them.
+/// Number of crossings at which the drive may turn. A further row of blocks surrounds them.
 constexpr int kCrossingsX = 7, kCrossingsY = 6;
 constexpr std::size_t kBlocks = (kCrossingsX + 1) * (kCrossingsY + 1);
 constexpr std::size_t kUnmistakable = 8, kWithFewChanges = 28;
@@ -24,14 +24,14 @@ constexpr double kPavementWidth = 3.25, kHouseDepth = 7.0;
 constexpr double kNoParking = 3.5;  ///< distance from the crossing road's edge
 constexpr double kShareParked = 0.68, kVanShare = 0.16, kReversedShare = 0.12;
 
-/// A block of houses and the objects around it, drawn once and placed many times, relative to its
-/// centre. Its kerbs are at ± `half`.
+/// A block of houses with the objects around it, relative to its centre. It is drawn once and
+/// placed many times. Its kerbs are at ± `half`.
 class Block {
  public:
   /// Draws houses, trees, poles, parked vehicles, bicycles and a person.
   Block(const Eigen::Vector2d& half, SceneBuilder& builder);
 
-  /// Removes or adds this number of objects (cars, bicycles or persons).
+  /// Removes or adds objects (cars, bicycles or persons); `changes` is their number.
   void alter(std::size_t changes, SceneBuilder& builder);
   void putAt(const Eigen::Vector2d& middle, SceneBuilder& builder) const;
 
@@ -65,7 +65,7 @@ struct Block::Side {
   Eigen::Vector2d outwards, along;  ///< along: the direction of the traffic on this side
   double from_middle = 0.0, half_length = 0.0;
 
-  /// `outside`: distance beyond the kerb towards the road, negative on the pavement.
+  /// `outside`: distance from the kerb towards the road; negative on the pavement.
   Place at(double forward, double outside, double yaw) const {
     return {(from_middle + outside) * outwards + forward * along,
             wrapAngle(std::atan2(along.y(), along.x()) + yaw), 0.0};
@@ -81,7 +81,7 @@ std::vector<Block::Side> Block::sidesOf(const Eigen::Vector2d& half) {
 
 Block::Block(const Eigen::Vector2d& half, SceneBuilder& builder) : half_(half) {
   for (const Side& side : sidesOf(half)) {
-    // Houses of two sides fill the corners.
+    // The houses of two sides fill the corners.
     const double corner = kPavementWidth + (side.outwards.x() == 0.0 ? 0.0 : kHouseDepth + 0.1);
     build(side, 2.0 * (side.half_length - corner), builder.dice());
   }
@@ -95,7 +95,7 @@ void Block::build(const Side& side, double length, Dice& dice) {
   while (0.5 * length - from > 4.0) {
     const double left = 0.5 * length - from;
     const double wide = dice.uniform(8.0, 17.0);
-    // A remainder that is too narrow for a separate house is added to this one.
+    // A rest that is too narrow for a further house is added to this house.
     const Eigen::Vector3d size(left - wide < 6.0 ? left : wide, kHouseDepth,
                                dice.uniform(5.5, 13.0));
     add(PropKind::kFacade, size,
@@ -160,7 +160,7 @@ bool Block::add(PropKind kind, const Eigen::Vector3d& size, const Place& place) 
   return true;
 }
 
-/// Adds an object at a free place on some side. Returns false if no place is found.
+/// Adds an object at a free place on any side. Returns false if no place is free.
 bool Block::addSomewhere(const std::string& class_name, SceneBuilder& builder) {
   constexpr int kAttempts = 40;
   Dice& dice = builder.dice();
@@ -244,7 +244,7 @@ std::vector<Eigen::Vector2d> turnsAmongBlocks(Dice& dice) {
   return points;
 }
 
-/// The number of objects in each block that differ from the template of all blocks.
+/// For each block, the number of objects that differ from the template of all blocks.
 std::vector<std::size_t> changesOf(Dice& dice) {
   std::vector<std::size_t> changes(kBlocks, 0);
   for (std::size_t i = 0; i < kBlocks; ++i) {

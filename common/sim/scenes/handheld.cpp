@@ -9,7 +9,8 @@ namespace {
 
 constexpr double kStepHz = 1.8, kWalkingSpeed = 0.8;
 
-/// Steps move the hand vertically and sideways with the speed. A resting hand trembles slightly.
+/// Hand motion: steps move it vertically and sideways in proportion to the speed; at rest it
+/// trembles.
 Eigen::Vector3d handAt(double t_s, double speed) {
   const double walking = std::min(1.0, speed / kWalkingSpeed), step = 2.0 * M_PI * kStepHz * t_s;
   return {0.004 * walking * std::sin(step + 0.7), 0.016 * walking * std::sin(0.5 * step),
@@ -43,13 +44,13 @@ Trajectory handheldMotion(const GroundPath& path, const Drive& drive, double hei
   for (std::size_t i = 0; i < drive.distance.size(); ++i) {
     const double t = drive.interval_s * static_cast<double>(i);
     const PathPoint p = path.at(drive.distance[i]);
-    // The gaze starts to wander with the walk; the camera is steady at first.
+    // The gaze begins to wander with the walk; before, the camera is steady.
     const double begun = std::clamp((t - 1.0) / 2.0, 0.0, 1.0);
     const double wanders = begun * begun * (3.0 - 2.0 * begun);
     const auto wave = [&](double period) { return wanders * std::sin(2.0 * M_PI * t / period); };
     Look look;
     look.point = p.position;
-    look.yaw = p.heading + wave(13.0) + 0.18 * wave(4.7);  // the camera turns to each side
+    look.yaw = p.heading + wave(13.0) + 0.18 * wave(4.7);  // turns to both sides
     look.pitch_down = 0.12 + 0.07 * wave(2.9);
     look.roll = 0.05 * wave(4.3);
     looks.push_back(look);

@@ -1,4 +1,4 @@
-// Rooms in which an object is hidden for a while or outside the field of view.
+// Rooms in which an object is temporarily occluded or outside the field of view.
 #include <algorithm>
 #include <cmath>
 
@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kHidingInterval = 0.05;
 
-/// A value at a time, with smooth interpolation between keys.
+/// A value at a time; values between keys are interpolated smoothly.
 struct Key {
   double t_s, value;
 };
@@ -22,7 +22,7 @@ double smoothly(const std::vector<Key>& keys, double t_s) {
   while (i + 1 < keys.size() && keys[i + 1].t_s <= t_s) ++i;
   if (i + 1 == keys.size() || t_s < keys.front().t_s) return keys[i].value;
   const double s = (t_s - keys[i].t_s) / (keys[i + 1].t_s - keys[i].t_s);
-  // Quintic: velocity and acceleration are zero at each key.
+  // Quintic interpolation: velocity and acceleration are zero at each key.
   return keys[i].value +
          s * s * s * (10.0 + s * (6.0 * s - 15.0)) * (keys[i + 1].value - keys[i].value);
 }
@@ -59,13 +59,13 @@ void putHiddenChair(SceneBuilder& builder) {
   monitor.size = {0.2, 0.68, 0.5};
   SceneObject chair = builder.draw("chair");
   chair.size = {0.5, 0.48, 0.82};
-  // All objects stand in line with the middle place of the camera; the screen faces the camera.
+  // All objects are in line with the camera's middle position; the screen faces the camera.
   builder.mustPut(table, {{kWalkX + 1.95, 0.0}, M_PI, 0.0});
   builder.mustPut(std::move(monitor), {{kWalkX + 1.9, 0.0}, M_PI, table.size.z()});
   builder.mustPut(std::move(chair), {{kWalkX + 4.2, 0.0}, builder.dice().uniform(2.7, 3.5), 0.0});
 }
 
-// ---- vanish: the camera looks at the objects, turns away, and turns back.
+// ---- vanish: the camera faces the objects, turns away, and turns back.
 
 constexpr double kVanishSeconds = 28.0, kVanishHeight = 1.5, kGoneAt = 12.0, kMovedAt = 12.4;
 

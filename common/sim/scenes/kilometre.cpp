@@ -13,7 +13,7 @@ constexpr double kKilometreSeconds = 620.0, kTopSpeed = 3.6;
 constexpr int kAcross = 5, kAlong = 4;  // roads
 constexpr double kTurnRadius = 9.0;
 
-/// Counter-clockwise around all blocks, on the right-hand lane.
+/// The path around all blocks on the right-hand lane, counter-clockwise.
 GroundPath loopOfKilometre() {
   const double l = kGridX * (kAcross - 1) + kLane, w = kGridY * (kAlong - 1) + kLane;
   return GroundPath({{{-kLane, -kLane}, kTurnRadius},
@@ -31,7 +31,7 @@ Scene makeKilometre(std::uint64_t seed, const SceneOptions& options) {
   const GroundPath loop = loopOfKilometre();
   SpeedLimits limits;
   limits.top = kTopSpeed;
-  const double from = builder.dice().uniform(30.0, 200.0);  // start on the first straight
+  const double from = builder.dice().uniform(30.0, 200.0);  // the start is on the first straight
   const Drive driven =
       drive(loop, limits, from, std::numeric_limits<double>::infinity(), 1.2, seconds + 2.0);
   putOnWheels(builder, loop, driven, seconds, options);

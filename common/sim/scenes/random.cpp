@@ -1,4 +1,4 @@
-// Streets or rooms with objects anywhere, and a camera that changes its place every second.
+// Streets or rooms with objects anywhere, and a camera that changes its pose every second.
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -34,7 +34,7 @@ class ViewFinder {
  public:
   ViewFinder(SceneBuilder& builder, const Area& area, double top_speed);
 
-  /// A view of an object. Its class is drawn uniformly from the classes in the scene.
+  /// Draws a view of an object. Its class is drawn uniformly from the classes in the scene.
   View draw();
 
  private:
@@ -73,7 +73,7 @@ View ViewFinder::draw() {
     const auto view = lookAt(builder_.scene().objects[dice.pick(indices)]);
     if (view) return *view;
   }
-  // No object was visible; choose a random view without a target.
+  // No object was visible: draws a view without a target.
   for (;;) {
     const Eigen::Vector2d point(dice.uniform(area_.low.x(), area_.high.x()),
                                 dice.uniform(area_.low.y(), area_.high.y()));
@@ -95,7 +95,7 @@ std::optional<View> ViewFinder::lookAt(const SceneObject& object) {
   if (!point) return std::nullopt;
   const Eigen::Vector3d centre = object.motion.poseAt(0.0).p;
   const Eigen::Vector2d way = centre.head<2>() - *point;
-  // Large objects stay near the centre of the image; small ones may be anywhere.
+  // Large objects are near the centre of the image; small ones may be anywhere.
   const double freedom = 1.0 - 0.75 * share;
   const double yaw = std::atan2(way.y(), way.x()) + freedom * dice.uniform(-0.62, 0.62);
   const double pitch =
@@ -120,7 +120,7 @@ std::optional<Eigen::Vector2d> ViewFinder::standAt(const SceneObject& object, do
   return std::nullopt;
 }
 
-/// Returns true if at least two of five points of the object are visible.
+/// Whether at least two of five points of the object are visible.
 bool ViewFinder::sees(const Eigen::Vector3d& eye, const SceneObject& object) const {
   const RigidTransform T_WO = object.motion.poseAt(0.0);
   int seen = 0;
@@ -151,9 +151,9 @@ View ViewFinder::viewFrom(const Eigen::Vector3d& eye, double yaw, double pitch_d
   return view;
 }
 
-/// Passes one view a second, each with its velocity; the motion between is arbitrary.
+/// Passes one view per second with the view's velocity; the motion between views is arbitrary.
 Trajectory throughViews(const std::vector<View>& views) {
-  constexpr int kControls = 10;  // number per second; the middle seven form the view
+  constexpr int kControls = 10;  // controls per second; the middle seven form the view
   std::vector<RigidTransform> controls;
   for (const View& view : views) {
     for (int i = -kControls / 2; i < kControls / 2; ++i) {
@@ -165,7 +165,7 @@ Trajectory throughViews(const std::vector<View>& views) {
   return Trajectory(-0.5, 1.0 / kControls, std::move(controls));
 }
 
-/// Two crossing streets with their usual objects, and further objects at unusual places.
+/// Builds two crossing streets with their usual objects, and adds objects at unusual places.
 Area makeOutdoors(SceneBuilder& builder) {
   Dice& dice = builder.dice();
   const double length = dice.uniform(35.0, 55.0), width = dice.uniform(8.0, 12.0);

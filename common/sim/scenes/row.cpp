@@ -32,7 +32,7 @@ Scene makeRow(std::uint64_t seed, const SceneOptions& options) {
   const double seconds = builder.seconds(kRowSeconds);
   const GroundPath way({{{0, -kLane}}, {{150, -kLane}}}, false);
   const SpeedLimits limits{4.5, 2.0, 1.2, 1.2};
-  // The drive stops behind the row for any duration of the scene.
+  // The drive stops beyond the row, whatever the duration of the scene.
   const Drive driven = drive(way, limits, 0.0, 95.0, 1.2, seconds + 2.0);
   putOnWheels(builder, way, driven, seconds, options);
   parkRow(builder);

@@ -1,4 +1,4 @@
-// One function per scene: its purpose and its construction.
+// The construction of each scene: one function per scene.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// A long street, driven at constant speed after a start from rest.
+// A drive along a long street, at constant speed after a start from rest.
 #include <algorithm>
 #include <limits>
 

@@ -14,7 +14,8 @@ constexpr double kStreetSeconds = 60.0, kStreetRest = 1.2, kSideStreet = 38.0;
 constexpr double kLapSeconds = 36.0;
 constexpr double kStreetCameraHeight = 1.6;
 
-/// Crossings of the centre lines at (0, 0), (length, 0), (length, width), (0, width).
+/// A block between the crossings (0, 0), (length, 0), (length, width) and (0, width) of centre
+/// lines.
 struct Block {
   double length = 0.0, width = 0.0;
 };
@@ -29,7 +30,7 @@ std::vector<Road> roadsOf(const Block& block, double branch) {
           {{branch, w + 0.5 * kRoadWidth}, {branch, w + s}, kRoadWidth}};
 }
 
-/// Counter-clockwise on the right-hand lane, outside the centre lines.
+/// The path around the block on the right-hand lane, counter-clockwise.
 GroundPath loopOf(const Block& block, double radius) {
   const double l = block.length + kLane, w = block.width + kLane;
   return GroundPath(
@@ -37,7 +38,8 @@ GroundPath loopOf(const Block& block, double radius) {
       true);
 }
 
-/// The slowest drive to distance `to` (infinite: without end) that has covered `far` at `by_s`.
+/// The slowest drive to distance `to` (infinite: without end) that covers the distance `far` by
+/// time `by_s`.
 Drive calmest(const GroundPath& loop, double from, double to, double far, double by_s,
               double until_s) {
   SpeedLimits limits;
@@ -58,7 +60,8 @@ Drive twoLaps(const GroundPath& loop, double from, double until_s) {
                  kStreetSeconds - 1.0, until_s);
 }
 
-/// A drive stops within one step of the path's points: scales it to the length of the lap.
+/// Drives one lap. drive() stops within one step of the end; the lap is scaled to end exactly
+/// there.
 Drive oneLap(const GroundPath& loop, double from, double until_s) {
   Drive lap = calmest(loop, from, from + loop.length(), loop.length() - 1e-6,
                       kLapSeconds - 2.0 * kStreetRest, until_s);
@@ -77,7 +80,7 @@ Scene makeBlock(SceneBuilder& builder, double seconds, DrivesAs drives, bool sam
   suspension.height = kStreetCameraHeight - kCameraAboveBody;
   suspension.seed = dice.seed();
   if (same_road) suspension.lap_m = loop.length();
-  const double from = dice.uniform(27.0, 33.0);  // start on the first straight
+  const double from = dice.uniform(27.0, 33.0);  // the start is on the first straight
   builder.setBody(
       vehicleMotion(loop, drives(loop, from, std::max(seconds, kStreetSeconds) + 2.0), suspension),
       seconds, 1.15, 2.2);

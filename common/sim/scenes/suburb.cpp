@@ -1,4 +1,5 @@
-// Streets with front gardens: hedges and walls hide cars in driveways; driven both ways.
+// Streets with front gardens, whose hedges and walls hide cars in driveways; driven in both
+// directions.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -18,7 +19,8 @@ constexpr int kSuburbColumns = 4, kSuburbRows = 4;
 constexpr double kShareMoving = 0.02;  ///< share of moving vehicles; drive 00 of KITTI: 7 of 440
 constexpr double kPassing_s = 4.0;     ///< an oncoming car is present for so long before and after
 
-/// Rows 0 and 3 twice in one direction; rows 0 and 2 and the outer columns also back.
+/// The route drives rows 0 and 3 twice in one direction, and rows 0 and 2 and the outer columns
+/// also back.
 std::vector<Eigen::Vector2d> turnsInSuburb() {
   constexpr std::array kRoute{0, 30, 32, 2, 0, 30, 33, 3, 1, 31, 30, 0, 2, 32, 33, 3};
   std::vector<Eigen::Vector2d> points;
@@ -27,7 +29,7 @@ std::vector<Eigen::Vector2d> turnsInSuburb() {
   return points;
 }
 
-/// A time around which the body drives straight on for kPassing_s; none if 50 times fail.
+/// Draws a time around which the body drives straight on for kPassing_s. Empty if 50 attempts fail.
 std::optional<double> straightWithin(double from_s, double until_s, SceneBuilder& builder) {
   const Trajectory& body = builder.scene().body;
   for (int attempt = 0; attempt < 50; ++attempt) {
@@ -41,8 +43,8 @@ std::optional<double> straightWithin(double from_s, double until_s, SceneBuilder
   return std::nullopt;
 }
 
-/// Oncoming cars, each of which passes the body on a straight. They appear where they are too far
-/// away to be detected. Each has its own part of the drive, so that they do not meet.
+/// Adds oncoming cars, each of which passes the body on a straight. They appear too far away to be
+/// detected. Each has its own part of the drive, so that they do not meet.
 void addOncoming(SceneBuilder& builder, std::size_t count, double seconds) {
   constexpr double kSpeed = 8.0, kHalfPath = 60.0;
   const double part = seconds / static_cast<double>(count);
@@ -67,7 +69,7 @@ void addOncoming(SceneBuilder& builder, std::size_t count, double seconds) {
 Furnishing furnishingOfSuburb() {
   Furnishing furnishing = furnishingOfGrid();
   furnishing.free_share = 0.5;
-  furnishing.hedge_share = 0.0;  // those of the gardens
+  furnishing.hedge_share = 0.0;  // hedges are those of the gardens
   furnishing.pavement = 1.8;
   furnishing.garden = 6.5;
   furnishing.island_share = 0.4;

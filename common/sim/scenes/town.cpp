@@ -13,7 +13,7 @@ constexpr double kTownSeconds = 520.0;
 constexpr int kColumns = 6, kRows = 5;
 constexpr std::size_t kVehicles = 500;
 
-/// Crossings where the drive turns: along the rows, then along the columns.
+/// The crossings at which the drive turns: first along the rows, then along the columns.
 std::vector<Eigen::Vector2d> turns() {
   std::vector<Eigen::Vector2i> crossings;
   const int right = kColumns - 1, top = kRows - 1;

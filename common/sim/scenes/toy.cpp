@@ -1,5 +1,5 @@
-// A nearby toy car, as large in the image as a real car at a distance. It is seen during a sideways
-// motion, or not seen from another side.
+// A near toy car that is as large in the image as a real car at a distance. A sideways motion
+// reveals its size; without motion, its size stays unknown.
 #include <cmath>
 
 #include "common/sim/scenes/parts/rigs.h"
@@ -15,7 +15,7 @@ constexpr double kScale = 14.0;        ///< the toy is a 4.2 m car, scaled to 0.
 constexpr double kToyDistance = 1.35;  ///< distance from the start of the camera
 constexpr double kToyInterval = 0.05;
 
-/// Position at this distance and bearing from the start of the camera, at the body's place.
+/// Point in the body frame at this distance and bearing from the camera's start.
 Eigen::Vector2d polar(double distance, double bearing) {
   return distance * Eigen::Vector2d(std::cos(bearing), std::sin(bearing)) +
          Eigen::Vector2d(kCameraBeforeBody, 0.0);
@@ -35,7 +35,7 @@ void putCars(SceneBuilder& builder) {
   builder.mustPut(car, {polar(kScale * kToyDistance, far_bearing), far_bearing + yaw, 0.0});
   builder.mustPut(carOf(builder, 4.2), {polar(29.0, -0.13), dice.uniform(-1.0, 1.0), 0.0});
   builder.mustPut(carOf(builder, 4.2), {polar(40.0, 0.02), dice.uniform(-1.0, 1.0), 0.0});
-  // The image is the same, because all distances between camera and toy are fourteen times smaller.
+  // Its image is the same, because size and distance are both fourteen times smaller.
   SceneObject toy = builder.draw("toy");
   toy.shape = "hatchback";
   toy.size = car.size / kScale;
@@ -46,7 +46,7 @@ void putCars(SceneBuilder& builder) {
   builder.mustPut(std::move(toy), {point, near_bearing + yaw, top});
 }
 
-/// Motion back and forth across the view, with a small part along it.
+/// Motion back and forth across the viewing direction, with a small part along it.
 Trajectory sideways(double seconds) {
   std::vector<Look> looks;
   for (double t = 0.0; t < seconds + 2.0; t += kToyInterval) {

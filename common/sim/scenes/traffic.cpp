@@ -21,7 +21,7 @@ class Traffic {
  public:
   Traffic(SceneBuilder& builder, double seconds) : builder_(builder), seconds_(seconds) {}
 
-  /// Delays the start by steps of half a second until the object meets no other one.
+  /// Adds an object; delays its start in steps of half a second until it meets no other object.
   void add(const std::string& class_name, const GroundPath& way, Drive driven) {
     SceneObject thing = builder_.draw(class_name);
     thing.moves = true;
@@ -39,7 +39,8 @@ class Traffic {
   }
 
  private:
-  /// The object is present while it is on the street; it appears and disappears beyond the ends.
+  /// The object is present while it is on the street; it appears and disappears beyond the street's
+  /// ends.
   void limitPresence(SceneObject& thing) const {
     const auto inside = [&](double t) {
       const Eigen::Vector3d p = thing.motion.poseAt(t).p;
@@ -79,8 +80,8 @@ Drive startingAt(double start_s, Drive driven) {
   return driven;
 }
 
-/// The first car leaves the left kerb into the oncoming lane, the second the right kerb, fifteen
-/// metres ahead. The third arrives on the oncoming lane and parks.
+/// The first car leaves the left kerb for the oncoming lane, the second leaves the right kerb,
+/// fifteen metres ahead of the body. The third arrives on the oncoming lane and parks.
 void addParkingManoeuvres(Traffic& traffic, double seconds) {
   const SpeedLimits limits{7.0, 1.5, 1.5, 1.5};
   const double infinity = std::numeric_limits<double>::infinity();
@@ -129,7 +130,7 @@ Scene makeTraffic(std::uint64_t seed, const SceneOptions& options) {
   const double planned = std::max(seconds, kTrafficSeconds);
   const GroundPath way({{{0, -kLane}}, {{kFarEnd, -kLane}}}, false);
   const SpeedLimits limits{6.8, 2.0, 1.4, 1.4};
-  // The drive stops before the end of the street for any duration of the scene.
+  // The drive stops before the end of the street, whatever the duration of the scene.
   const Drive driven = drive(way, limits, 0.0, 330.0, 1.2, planned + 2.0);
   putOnWheels(builder, way, driven, seconds, options);
   addTraffic(builder, planned);

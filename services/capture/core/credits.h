@@ -1,4 +1,4 @@
-// Follow mode: tracks the frames that are not answered yet, so that slow readers lose no frames.
+// Records which frames have been answered in follow mode, so that slow readers lose no frames.
 #pragma once
 
 #include <cstddef>
@@ -9,8 +9,8 @@
 
 namespace perdure::capture {
 
-/// Each configured answerer ("odometry", "detections") credits frames up to a sequence number. A
-/// frame stays open until all answerers have credited it.
+/// Each expected answerer ("odometry", "detections") credits frames up to a sequence number. A
+/// frame is open until all answerers have credited it.
 class Credits {
  public:
   explicit Credits(std::size_t window) : window_(window) {}
@@ -29,7 +29,8 @@ class Credits {
   void giveUp() {
     if (!on_the_way_.empty()) on_the_way_.pop_front();
   }
-  /// Sequence number of the first open frame, or `next` if none is open.
+  /// Returns the sequence number of the first open frame, or `next` if no frame before `next` is
+  /// open.
   std::uint64_t firstOpen(std::uint64_t next) const {
     return on_the_way_.empty() ? next : on_the_way_.front();
   }

@@ -8,8 +8,8 @@
 namespace perdure::capture {
 
 struct RunState {
-  std::string drive;                ///< digest of folder, pace and rate; other runs do not resume
-  std::string boot;                 ///< boot id, because each boot restarts CLOCK_MONOTONIC
+  std::string drive;                ///< digest of folder, pace and rate of the run
+  std::string boot;                 ///< boot id; each boot restarts CLOCK_MONOTONIC
   std::int64_t start_ns = 0;        ///< CLOCK_MONOTONIC at which `origin_ns` was due
   std::int64_t origin_ns = 0;       ///< sensor time of the first message
   std::int64_t last_ns = 0;         ///< sensor time of the last message sent
@@ -19,7 +19,7 @@ struct RunState {
 };
 
 std::string toText(const RunState& state);
-/// Empty if the text is not a run state, because it is truncated or has another format.
+/// Parses a run state. Returns nothing if the text is truncated or has another format.
 std::optional<RunState> runStateFrom(const std::string& text);
 
 }  // namespace perdure::capture

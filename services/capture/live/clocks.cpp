@@ -71,7 +71,7 @@ void ClockMap::observe(std::int64_t theirs_ns, std::int64_t ours_ns) {
   const std::int64_t lateness = ours_ns - theirs_ns;
   if (buckets_.empty()) begin(ours_ns);
   const bool early = static_cast<double>(lateness) < offset_ - kJump_ns;
-  if (settled_ && early) {  // the message arrives before its time: the remote clock was set forward
+  if (settled_ && early) {  // the message arrives too early: the remote clock was set forward
     ++jumps_;
     begin(ours_ns);
   }
@@ -86,7 +86,7 @@ void ClockMap::observe(std::int64_t theirs_ns, std::int64_t ours_ns) {
   if (!settled_) {
     offset_ = target;
     settled_ = ours_ns - first_ns_ >= kSettles_ns;
-    // the delay is larger throughout the window: the remote clock was set back
+    // The delay is larger throughout the window: the remote clock was set back.
   } else if (target - offset_ > kJump_ns) {
     ++jumps_;
     offset_ = target;

@@ -17,15 +17,15 @@ inline std::string joined(const std::string& a, const std::string& b, const char
   return a + (a.empty() || b.empty() ? "" : between) + b;
 }
 
-/// Thread-safe.
+/// The state of one device. Thread-safe.
 class DeviceState {
  public:
   explicit DeviceState(std::string problem) : problem_(std::move(problem)) {}
 
-  /// A sentence with the fix; empty while the device sends data.
+  /// Returns the problem as a sentence with the fix; empty while the device sends data.
   std::string problem() const { return locked(problem_); }
   std::string name() const { return locked(name_); }
-  /// Settings that the device does not follow; empty if it follows all.
+  /// Returns the settings that the device does not apply; empty if it applies all.
   std::string note() const { return locked(note_); }
   ReasonCounts reasons() const { return locked(reasons_); }
 

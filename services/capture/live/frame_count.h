@@ -7,12 +7,13 @@
 
 namespace perdure::capture {
 
-/// Frame numbers that continue when the camera is reopened. Number and source identify a frame.
+/// Assigns frame numbers that continue when the camera is reopened. Number and source identify a
+/// frame.
 class FrameNumbers {
  public:
-  /// The driver's numbers restart with the next frame.
+  /// Call it if the driver's numbers restart with the next frame.
   void reopened() { last_.reset(); }
-  /// Number of the frame for the driver's 32-bit number.
+  /// Returns the number of the frame that has the driver's 32-bit number `sequence`.
   std::uint64_t of(std::uint32_t sequence);
   std::uint64_t lost() const { return lost_; }
 
@@ -21,10 +22,10 @@ class FrameNumbers {
   std::uint64_t next_ = 0, lost_ = 0;
 };
 
-/// Whether number a is earlier than b; 32-bit numbers wrap around.
+/// Returns whether number a is earlier than b, although 32-bit numbers wrap around.
 bool isEarlier(std::uint32_t a, std::uint32_t b);
 
-/// Checks whether images of one opening are missing before the newest one.
+/// Detects missing images before the newest one of the same opening.
 class SequenceWatch {
  public:
   bool skips(std::uint32_t sequence) const;
@@ -34,13 +35,15 @@ class SequenceWatch {
   std::optional<std::uint32_t> last_;
 };
 
-/// Checks whether a camera delivers the requested rate: over five seconds, once after each opening.
+/// Checks, over the first five seconds of each opening, whether a camera delivers the requested
+/// rate.
 class RateWatch {
  public:
   explicit RateWatch(double asked_hz) : asked_hz_(asked_hz) {}
   void reopened();
   void frame(std::uint64_t number, std::int64_t time_ns);
-  /// A sentence if the rate differs by more than a tenth; empty before it is known.
+  /// Returns a sentence if the rate differs by more than a tenth; empty otherwise, and while the
+  /// rate is not known.
   const std::string& note() const { return note_; }
 
  private:

@@ -14,7 +14,7 @@
 namespace perdure::capture {
 namespace {
 
-constexpr double kBlock_s = 0.01;       // duration of the samples in one read
+constexpr double kBlock_s = 0.01;       // samples of this duration are read at once
 constexpr unsigned kTimeout_ms = 1000;  // without a sample for this long, the device counts as lost
 
 std::string sayError(ssize_t code) {
@@ -23,7 +23,7 @@ std::string sayError(ssize_t code) {
   return text;
 }
 
-/// First value of an attribute, from the device or its first channel of a kind.
+/// Returns a numeric attribute of a channel, or nothing if it cannot be read.
 std::optional<double> readNumber(const iio_channel* channel, const char* attribute) {
   double value = 0.0;
   if (iio_channel_attr_read_double(channel, attribute, &value) < 0) return std::nullopt;
@@ -42,7 +42,7 @@ std::string readText(const iio_channel* channel, const char* attribute) {
 }
 
 /// Requests a rate, and returns the rate that the device has set, because many devices support only
-/// a few rates. Empty if the device has no rate attribute.
+/// a few rates. Returns nothing if the device has no rate attribute.
 std::optional<double> askRate(const iio_device* device, double wanted) {
   constexpr const char* kRate = "sampling_frequency";
   if (!iio_device_find_attr(device, kRate)) return std::nullopt;
@@ -91,7 +91,8 @@ std::optional<Axes> axesOf(const iio_device* device, const std::string& kind) {
   return axes;
 }
 
-/// Selects the clock of a local device. A device in the network has its own clock.
+/// Selects the clock of a local device's stamps, and returns the clock. A device in the network has
+/// its own clock.
 StampClock clockOf(const iio_context* context, const iio_device* device) {
   if (std::strcmp(iio_context_get_name(context), "local") != 0) return StampClock::kElsewhere;
   (void)!iio_device_attr_write(device, "current_timestamp_clock", "boottime");
@@ -107,10 +108,10 @@ struct BufferDeleter {
 
 }  // namespace
 
-/// An open device. Buffers are destroyed before their context.
+/// An open device. Its members destroy the buffer before the context.
 class IioStream::Device {
  public:
-  /// Fails with "imu_absent"; the detail is a sentence with the fix.
+  /// Opens the device. Fails with "imu_absent"; the detail is a sentence with the fix.
   static Result<std::unique_ptr<Device>> open(const IioSettings& settings) {
     auto device = std::unique_ptr<Device>(new Device);
     for (const auto& step : {&Device::connect, &Device::choose, &Device::setUp, &Device::start}) {
@@ -210,7 +211,8 @@ class IioStream::Device {
                                           named, sayError(code)));
   }
 
-  /// libiio attributes a matrix shared by all channels, "in_mount_matrix", to a channel "mount".
+  /// Returns the device's mount matrix as text. libiio assigns a matrix for all channels,
+  /// "in_mount_matrix", to a channel "mount".
   std::string mountText() const {
     if (const auto text = readText(device_, "mount_matrix"); !text.empty()) return text;
     const iio_channel* shared = iio_device_find_channel(device_, "mount", false);
@@ -218,7 +220,7 @@ class IioStream::Device {
     return readText((gyro_ ? *gyro_ : *accel_)[0].channel, "mount_matrix");
   }
 
-  /// Sets the device's own rate, and that of the trigger, which determines when scans occur.
+  /// Requests the rate from the device and from its trigger, which determines when scans occur.
   void setRate(double wanted) {
     rate_hz_ = askRate(device_, wanted).value_or(wanted);
     for (const auto& axes : {gyro_, accel_}) {
@@ -261,7 +263,8 @@ class IioStream::Device {
     return stamp;
   }
 
-  /// A block becomes available with its last scan.
+  /// Observes the remote clock with the last scan of a block, because a block arrives with its last
+  /// scan.
   void observe(ssize_t scans, std::int64_t now_ns) {
     std::int64_t last = 0;
     if (stamp_) {

@@ -1,5 +1,5 @@
-// Triggered buffer of one IIO device, local or of an iiod in the network. A separate thread reads
-// it, and reopens it after a loss.
+// Reads the triggered buffer of one IIO device, local or of an iiod in the network. A separate
+// thread reads the buffer, and reopens the device after a loss.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,13 +21,13 @@ namespace perdure::capture {
 /// Removes surrounding white space; sysfs files end in a newline.
 std::string trimmed(std::string_view text);
 
-/// Clock of a device's stamps. kElsewhere: a clock that the host cannot read.
+/// The clock of a device's stamps. kElsewhere: a clock that this host cannot read.
 enum class StampClock { kBoot, kMonotonic, kRealtime, kElsewhere };
 
 StampClock stampClockNamed(std::string_view text);
 
-/// Parses a mount matrix, "1, 0, 0; 0, 1, 0; 0, 0, 1", row by row. Empty if the text is not a
-/// matrix.
+/// Parses a mount matrix, "1, 0, 0; 0, 1, 0; 0, 0, 1", row by row. Returns nothing if the text is
+/// not such a matrix.
 std::optional<Eigen::Matrix3d> parseMount(std::string text);
 
 struct IioSettings {
@@ -35,7 +35,7 @@ struct IioSettings {
   std::string device = {};   ///< name or id; empty: the first device with the required channels
   double rate_hz = 200.0;    ///< requested rate
   std::string trigger = {};  ///< name or id; empty: unchanged
-  /// Rows of R in v_B = R v_device. If empty, the device's own mount matrix is used, if it has one.
+  /// Rows of R in v_B = R v_device. If empty, the device's own mount matrix applies, if it has one.
   std::vector<double> mount = {};
   bool gyro = true, accel = true;  ///< required channels
 };
@@ -47,13 +47,14 @@ struct IioScan {
 
 class IioStream {
  public:
-  /// `give` is called on the stream's thread.
+  /// Starts the thread, on which `give` is called.
   IioStream(IioSettings settings, std::function<void(const IioScan&)> give);
   ~IioStream();
   IioStream(const IioStream&) = delete;
   IioStream& operator=(const IioStream&) = delete;
 
-  /// Counts "imu_absent" (failed openings), "imu_lost" (data stopped) and "imu_clock_jump".
+  /// Returns the state, with the counts "imu_absent" (failed openings), "imu_lost" (data stopped)
+  /// and "imu_clock_jump".
   const DeviceState& state() const { return state_; }
 
  private:

@@ -58,7 +58,7 @@ std::vector<InertialPair> ImuPairing::pairs() {
 }
 
 std::string ImuYield::look(std::uint64_t read, std::uint64_t given) {
-  // fewer samples are not judged, because one or two blocks may be in transit
+  // Fewer readings are not assessed, because one or two blocks may be in transit.
   constexpr std::uint64_t kFew = 10;
   const std::uint64_t more_read = read - std::exchange(read_, read);
   const std::uint64_t more_given = given - std::exchange(given_, given);

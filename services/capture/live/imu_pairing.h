@@ -1,4 +1,5 @@
-// Combines readings of an accelerometer and a gyroscope with different times into inertial samples.
+// Combines an accelerometer's and a gyroscope's readings, whose times differ, into inertial
+// samples.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,9 +27,9 @@ struct InertialPair {
 /// Interpolates the acceleration at each reading of the gyroscope.
 class ImuPairing {
  public:
-  /// Returns the samples that this reading completes, in order of time. Readings with decreasing
-  /// time are dropped: "imu_out_of_order". Gyroscope readings without accelerations on both sides
-  /// within a tenth of a second are dropped: "imu_unpaired".
+  /// Return the samples that this reading completes, in order of time. A reading whose time does
+  /// not increase is dropped and counted as "imu_out_of_order". A gyroscope reading that is not
+  /// between two accelerations at most 0.1 s apart is dropped and counted as "imu_unpaired".
   std::vector<InertialPair> gyro(const Triad& reading);
   std::vector<InertialPair> accel(const Triad& reading);
   const ReasonCounts& reasons() const { return reasons_; }
@@ -42,12 +43,12 @@ class ImuPairing {
   ReasonCounts reasons_;
 };
 
-/// Checks whether the readings of an IMU become samples. With wrong stamps, data arrive but give no
-/// samples.
+/// Checks whether the readings of an IMU become samples. If stamps are wrong, readings arrive but
+/// give no samples.
 class ImuYield {
  public:
-  /// Takes the totals of readings and of samples made from them. Returns a sentence if fewer than
-  /// half of the readings since the last call became samples; otherwise empty.
+  /// Takes the total numbers of readings and of samples. Returns a sentence if fewer than half of
+  /// the readings since the last call became samples; otherwise empty.
   std::string look(std::uint64_t read, std::uint64_t given);
 
  private:

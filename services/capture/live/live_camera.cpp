@@ -5,8 +5,8 @@
 namespace perdure::capture {
 namespace {
 
-/// Silence is measured in waits without an image, not in time, because the camera may have sent
-/// images while the process was suspended.
+/// One wait for an image. Silence is measured in waits, not in time, because after a suspension of
+/// the process images may be available although time has passed.
 constexpr std::chrono::milliseconds kWait{100};
 constexpr int kSilentIntervals = 10;
 
@@ -37,7 +37,7 @@ void LiveCamera::flow(CameraSession& session) {
   while (!stopping_ && !session.stepsAside() && silent < kSilentIntervals) {
     auto shot = session.next(kWait);
     silent = shot ? 0 : silent + 1;
-    if (!shot && session.gone()) break;  // all earlier images have been passed on
+    if (!shot && session.gone()) break;  // all images have been passed on
     if (!shot) continue;
     take(*std::move(shot));
     state_.flows(session.name(), joined(session.note(), rate_.note()));

@@ -13,15 +13,15 @@ namespace perdure::capture {
 
 class LiveCamera {
  public:
-  /// Both functions are called on the camera's thread. `rate_hz`: requested rate.
+  /// Starts the thread, on which both functions are called. `rate_hz`: the requested rate.
   LiveCamera(OpenCamera open, double rate_hz, std::function<void(CameraImage)> give);
   ~LiveCamera();
   LiveCamera(const LiveCamera&) = delete;
   LiveCamera& operator=(const LiveCamera&) = delete;
 
-  /// Counts "camera_absent" (failed openings), "camera_lost", "camera_silent" (images stopped),
-  /// "camera_frame_lost", "camera_frame_error", "camera_reopened" (because of another camera), and
-  /// the reasons of packed().
+  /// Returns the state, with the counts "camera_absent" (failed openings), "camera_lost",
+  /// "camera_silent" (images stopped), "camera_frame_lost", "camera_frame_error", "camera_reopened"
+  /// (because of another camera) and the reasons of packed().
   const DeviceState& state() const { return state_; }
 
  private:

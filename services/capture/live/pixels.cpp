@@ -10,10 +10,10 @@
 namespace perdure::capture {
 namespace {
 
-/// A layout with one plane, and OpenCV's conversions of it; -1: no conversion is needed.
+/// A layout with one plane, and OpenCV's codes of its conversions; -1: no conversion is needed.
 struct OnePlane {
   PixelLayout layout;
-  int bytes;  ///< bytes of a pixel
+  int bytes;  ///< bytes per pixel
   int to_grey, to_colour;
 };
 constexpr OnePlane kOnePlane[] = {
@@ -25,13 +25,14 @@ constexpr OnePlane kOnePlane[] = {
     {PixelLayout::kYuyv, 2, cv::COLOR_YUV2GRAY_YUY2, cv::COLOR_YUV2BGR_YUY2},
     {PixelLayout::kUyvy, 2, cv::COLOR_YUV2GRAY_UYVY, cv::COLOR_YUV2BGR_UYVY}};
 
-/// nullptr for the layouts with halved colours.
+/// Returns nullptr for JPEG, and for layouts with separate colour planes, which have half the size.
 const OnePlane* onePlaneOf(PixelLayout layout) {
   const auto* found = std::ranges::find(kOnePlane, layout, &OnePlane::layout);
   return found == std::end(kOnePlane) ? nullptr : found;
 }
 
-/// OpenCV's constructor takes mutable bytes, although they are only read here.
+/// Returns the plane as an OpenCV matrix without a copy. The constructor takes mutable bytes, but
+/// they are only read.
 cv::Mat view(const ImagePlane& plane, int rows, int columns, int channels) {
   return {rows, columns, CV_8UC(channels), const_cast<std::uint8_t*>(plane.bytes.data()),
           plane.stride};

@@ -12,14 +12,16 @@ namespace {
 
 constexpr std::uint32_t kExtendedFlag = 0x80000000U, kStandardMask = 0x7ffU,
                         kExtendedMask = 0x1fffffffU;
-constexpr unsigned kMostBits = 64 * 8;         // bits of a CAN FD frame
+constexpr unsigned kMostBits = 64 * 8;         // number of bits of a CAN FD frame
 constexpr std::size_t kLongestDbcLine = 1000;  // longer lines would need too much stack
-constexpr double kLargest = 1e30;              // physical value; its square is still finite
+constexpr double kLargest = 1e30;              // limit of physical values; its square is finite
 
-/// Position of bit k of a signal in DBC's numbering: byte · 8 + bit. Bit 0 is the lowest.
+/// Returns the position of bit k of a signal, in DBC's numbering byte · 8 + bit. Bit 0 is the
+/// lowest.
 unsigned positionOf(const CanSignal& s, unsigned k) {
   if (s.little_endian) return s.start + k;
-  // The start bit is the highest; bits continue down each byte, then from the next one's top.
+  // The start bit is the highest. Lower bits follow down each byte, then from the top of the next
+  // byte.
   const unsigned from_top = s.length - 1 - k;
   const unsigned sequential = s.start / 8 * 8 + (7 - s.start % 8) + from_top;
   return sequential / 8 * 8 + (7 - sequential % 8);

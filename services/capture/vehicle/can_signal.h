@@ -16,22 +16,23 @@ struct CanSignal {
   unsigned length = 1;  ///< bits, 1 to 64
   bool little_endian = true, is_signed = false;
   double factor = 1.0, offset = 0.0;  ///< physical = raw · factor + offset
-  double low = 0.0, high = 0.0;       ///< range of the physical value; if equal, unlimited
+  double low = 0.0, high = 0.0;       ///< range of the physical value; equal: unlimited
   std::string unit;                   ///< unit as written; empty: none
 };
 
 /// Parses "ID LINE". ID is decimal as in a DBC file (bit 31 set for 29 bits), or hexadecimal (29
 /// bits above 0x7ff). LINE is an SG_ line or its part after the colon: `0x1a0 7|16@0+ (0.01,0)
-/// [0|655.35] "km/h"`. Range, unit and receivers are optional. Fails with "can_signal" and a
-/// sentence on the error.
+/// [0|655.35] "km/h"`. Range, unit and receivers are optional. Fails with "can_signal"; the detail
+/// is a sentence.
 Result<CanSignal> parseCanSignal(const std::string& text);
 
-/// Raw bits, sign extended. Fails with "speed_can_short" if the frame has too few bytes.
+/// Returns the raw bits, sign extended. Fails with "speed_can_short" if the frame has too few
+/// bytes.
 Result<std::int64_t> rawValueOf(const CanSignal& signal, std::span<const std::uint8_t> data);
 
-/// Physical value. Fails with "speed_can_short", or with "speed_can_invalid" if the value is
-/// outside the signal's range. It also fails for the pattern "not available": all ones, or the
-/// least signed number, from eight bits on.
+/// Returns the physical value. Fails with "speed_can_short" if the frame has too few bytes, or with
+/// "speed_can_invalid" if the value is outside the signal's range or means "not available" (signals
+/// of eight bits or more: all ones, or the least signed number).
 Result<double> valueOf(const CanSignal& signal, std::span<const std::uint8_t> data);
 
 }  // namespace perdure::capture

@@ -9,7 +9,7 @@
 namespace perdure::capture {
 namespace {
 
-constexpr double kSlowest = 2.0;  // m/s: with 0.05 m/s of error, the course is accurate to 1.5°
+constexpr double kSlowest = 2.0;  // m/s; an error of 0.05 m/s is then 1.5° of course
 constexpr double kBend = 2.0 * std::numbers::pi / 180.0;
 constexpr std::int64_t kDrive_ns = 2'000'000'000, kGap_ns = 1'500'000'000;
 constexpr std::size_t kFewest = 3;
@@ -31,7 +31,7 @@ std::optional<EarthPlace> EarthAnchor::offer(const GnssFix& fix, bool backwards)
   if (!moves) return std::nullopt;
   drive_.push_back(fix);
   while (drive_.size() > 1 && fix.time_ns - drive_[1].time_ns >= kDrive_ns) drive_.pop_front();
-  // Repeats a position, because readers may have had no pose at the time of the last one.
+  // Returns a position again, because readers may have had no pose at the time of the previous one.
   const bool again = given_sigma_m_ && fix.time_ns - given_ns_ >= kAgain_ns &&
                      fix.sigma_m <= kAsGood * *given_sigma_m_;
   const bool better = !given_sigma_m_ || fix.sigma_m <= kBetter * *given_sigma_m_ || again;

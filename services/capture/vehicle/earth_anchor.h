@@ -1,4 +1,4 @@
-// Selects the fix of a GNSS receiver that gives the vehicle's position on Earth.
+// Selects the fixes of a GNSS receiver that give the vehicle's position and heading on Earth.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,11 +11,11 @@
 namespace perdure::capture {
 
 struct AnchorSettings {
-  double most_sigma_m = 5.0;                          ///< largest accepted sigma of a fix
+  double most_sigma_m = 5.0;                          ///< largest accepted sigma_m of a fix
   Eigen::Vector3d antenna = Eigen::Vector3d::Zero();  ///< position in the body, m
 };
 
-/// Position of the body's origin, in degrees and metres as in GnssFix, and its yaw.
+/// The position of the body's origin, in degrees and metres as in GnssFix, and the body's yaw.
 struct EarthPlace {
   std::int64_t time_ns = 0;  ///< CLOCK_BOOTTIME
   double latitude_deg = 0, longitude_deg = 0, height_m = 0;
@@ -23,16 +23,16 @@ struct EarthPlace {
   double sigma_m = 0;  ///< standard deviation of each horizontal axis
 };
 
-/// Position with a heading. The heading is the course over ground on a straight drive. This needs
-/// fixes over two seconds, faster than 2 m/s, with courses within 2°. A vehicle that drives
-/// backwards has no heading. Single-threaded.
+/// Combines fixes into a position with a heading, which is the course over ground of a straight
+/// drive: fixes over two seconds, faster than 2 m/s, with courses within 2°. While the vehicle
+/// drives backwards, there is no heading. Single-threaded.
 class EarthAnchor {
  public:
   explicit EarthAnchor(AnchorSettings settings) : settings_(settings) {}
 
-  /// Returns the first position, and later positions whose sigma is at most half the best sigma
-  /// returned. After half a minute, it also returns a position with a similar sigma. `backwards`:
-  /// from the wheels.
+  /// Takes a fix. Returns the first position, and later ones whose sigma is at most half the
+  /// smallest sigma returned before, or similar to it after half a minute. `backwards`: the wheels
+  /// report that the vehicle drives backwards.
   std::optional<EarthPlace> offer(const GnssFix& fix, bool backwards);
 
  private:

@@ -9,8 +9,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr double kSigmasOfEph = 2.4477;  // standard deviations of a 95 % circle: √(χ²₂)
-constexpr double kUnstated_m = 10.0;     // default if gpsd reports no error
+constexpr double kSigmasOfEph = 2.4477;  // √(χ²₂): radius of a 95 % circle in σ
+constexpr double kUnstated_m = 10.0;     // standard deviation if gpsd reports none
 
 std::optional<double> number(const Json& json, const char* key) {
   const auto it = json.find(key);
@@ -19,7 +19,7 @@ std::optional<double> number(const Json& json, const char* key) {
   return std::isfinite(value) ? std::optional(value) : std::nullopt;
 }
 
-/// Whether a height is plausible, including heights in the air and below the sea.
+/// Returns whether a height is plausible, including heights in the air and below sea level.
 bool isHeight(double metres) { return std::abs(metres) <= 1e5; }
 
 /// Converts degrees clockwise from north to radians counter-clockwise from east, (−π, π].
@@ -29,7 +29,7 @@ double courseOf(double degrees_from_north) {
   return (from_east - 360.0 * turns) * std::numbers::pi / 180.0;
 }
 
-/// False for gpsd's statuses of dead reckoning, of a fixed position, and of a simulator.
+/// Returns false for gpsd's statuses of dead reckoning, of a fixed position and of a simulator.
 bool isMeasured(const Json& json) {
   const double status = number(json, "status").value_or(0.0);
   return status != 5.0 && status != 7.0 && status != 8.0;

@@ -1,4 +1,4 @@
-// Reads reports of gpsd, one JSON object a line. Source: gpsd_json(5), protocol 3.
+// Reads reports of gpsd, one JSON object per line. Source: gpsd_json(5), protocol 3.
 #pragma once
 
 #include <cstdint>
@@ -17,11 +17,12 @@ struct GnssFix {
   std::optional<double> course;  ///< radians from east, counter-clockwise, (−π, π]
 };
 
-/// Request that is sent once; gpsd then sends reports without further requests.
+/// The request that starts gpsd's reports. It is sent once per connection.
 inline constexpr std::string_view kGpsdWatch = "?WATCH={\"enable\":true,\"json\":true};\n";
 
-/// Fix of a TPV report; empty for other reports. The height is altHAE, or alt before protocol 3.14.
-/// Fails with "gpsd_malformed", or with "gpsd_no_fix" if gpsd reports no three-dimensional fix.
+/// Returns the fix of a TPV report; nothing for other reports. The height is altHAE, or alt before
+/// protocol 3.14. Fails with "gpsd_malformed", or with "gpsd_no_fix" if gpsd reports no
+/// three-dimensional fix.
 Result<std::optional<GnssFix>> readGpsd(std::string_view line, std::int64_t time_ns);
 
 }  // namespace perdure::capture

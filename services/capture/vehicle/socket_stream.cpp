@@ -15,10 +15,10 @@
 namespace perdure::capture {
 namespace {
 
-constexpr int kPoll_ms = 100;  // longest delay of a stop
+constexpr int kPoll_ms = 100;  // longest delay until a stop takes effect
 constexpr std::size_t kLongestLine = 4096;
 
-/// The kernel's stamp of arrival if present; otherwise the current time.
+/// Returns the kernel's stamp of arrival if the message has one; otherwise the current time.
 std::int64_t arrivalOf(msghdr& message) {
   for (cmsghdr* c = CMSG_FIRSTHDR(&message); c; c = CMSG_NXTHDR(&message, c)) {
     if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SCM_TIMESTAMPNS) continue;
@@ -29,8 +29,8 @@ std::int64_t arrivalOf(msghdr& message) {
   return HostClock::nowNs();
 }
 
-/// Whether the socket is a stream. A stream returns zero bytes at its end, but a datagram may be
-/// empty.
+/// Returns whether the socket is a stream. Zero bytes mean the end of a stream, but a datagram may
+/// be empty.
 bool isStream(int socket) {
   int type = 0;
   socklen_t size = sizeof type;

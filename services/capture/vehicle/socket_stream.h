@@ -16,24 +16,25 @@ namespace perdure::capture {
 
 struct Packet {
   std::span<const std::uint8_t> bytes;
-  std::int64_t time_ns = 0;  ///< CLOCK_BOOTTIME; the kernel's time of arrival, if available
+  std::int64_t time_ns = 0;  ///< CLOCK_BOOTTIME; time of arrival, by the kernel if available
 };
 
 /// Opens a socket for reading. On failure, the detail is a sentence with the fix.
 using OpenSocket = std::function<Result<int>()>;
 
-/// Raw frames with these ids on a CAN interface (SocketCAN), classic and FD. A packet is the
+/// Opens a raw CAN socket (SocketCAN) for classic and FD frames with these ids. A packet is the
 /// kernel's `can_frame` or `canfd_frame`. An extended id has the kernel's flag CAN_EFF_FLAG.
 OpenSocket canSocket(std::string interface, std::vector<std::uint32_t> ids);
 OpenSocket udpSocket(std::string address);
-/// Connection to HOST:PORT; `greeting` is sent once. A packet is any piece of the received data.
+/// Connects to HOST:PORT and sends `greeting` once. A packet is any piece of the received data.
 OpenSocket tcpSocket(std::string address, std::string greeting);
 
 class SocketStream {
  public:
-  /// `kind`: prefix of the reasons, for example "speed". The reasons are "speed_absent" (failed
-  /// openings), "speed_lost" (it can no longer be read) and "speed_silent" (no data for `silence`;
-  /// a connection is then reopened). `name`: for people. `give` is called on the stream's thread.
+  /// Starts the thread, on which `give` is called. `kind`: prefix of the reasons. With "speed"
+  /// these are "speed_absent" (failed openings), "speed_lost" (reading failed) and "speed_silent"
+  /// (no data for `silence`; a connection is then reopened). `name`: name of the source in
+  /// messages.
   SocketStream(std::string kind, std::string name, std::chrono::nanoseconds silence,
                OpenSocket open, std::function<void(const Packet&)> give);
   ~SocketStream();
@@ -44,7 +45,7 @@ class SocketStream {
 
  private:
   void flow();
-  /// False at the end of the stream.
+  /// Reads one packet. Returns false at the end of the stream, or if reading fails.
   bool readOne(int socket);
   bool fails(const char* what, const std::string& why);
 
@@ -63,7 +64,7 @@ class SocketStream {
 class Lines {
  public:
   void add(const Packet& packet, const std::function<void(std::string_view, std::int64_t)>& give);
-  /// Ends the last line of a datagram, which has no line end.
+  /// Ends the last line of a datagram, which may have no line end.
   void end(std::int64_t time_ns, const std::function<void(std::string_view, std::int64_t)>& give);
 
  private:

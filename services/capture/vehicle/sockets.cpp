@@ -22,7 +22,7 @@ namespace {
 
 constexpr int kConnect_ms = 2000;
 
-/// Closes the socket that failed.
+/// Closes the socket, and returns the reason of its failure from errno.
 tl::unexpected<Reason> failed(int socket, const std::string& what) {
   const std::string why = std::strerror(errno);
   if (socket >= 0) ::close(socket);
@@ -34,7 +34,7 @@ struct AddressDeleter {
 };
 using Addresses = std::unique_ptr<addrinfo, AddressDeleter>;
 
-/// Resolves HOST:PORT, also [HOST]:PORT.
+/// Resolves HOST:PORT or [HOST]:PORT.
 Result<Addresses> resolve(const std::string& address, int type) {
   const auto colon = address.rfind(':');
   if (colon == std::string::npos || colon + 1 == address.size()) {
@@ -52,7 +52,7 @@ Result<Addresses> resolve(const std::string& address, int type) {
   return Addresses(list);
 }
 
-/// Connects within two seconds.
+/// Returns whether the socket connects within two seconds.
 bool connects(int socket, const addrinfo& to) {
   if (::connect(socket, to.ai_addr, to.ai_addrlen) == 0) return true;
   if (errno != EINPROGRESS) return false;

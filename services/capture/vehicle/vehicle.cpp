@@ -124,7 +124,7 @@ Vehicle::Vehicle(const SpeedConfig& speed, const GnssConfig& gnss, Outputs outpu
           said_.reset();
           speed_lines_.add(packet, lines);
           speed_lines_.end(packet.time_ns, lines);
-          if (said_) give(*said_);  // a datagram gives one reading
+          if (said_) give(*said_);  // a datagram gives one reading, its last
         });
   }
   if (gnss_socket) {
@@ -200,7 +200,7 @@ void Vehicle::count(Of what, const Reason& reason) {
   (what == Of::kSpeed ? speed_trouble_ : gnss_trouble_) = reason.detail;
 }
 
-/// A sentence if data arrive, but give no reading.
+/// Returns a sentence if data arrive but give no readings; otherwise empty.
 std::string Vehicle::silence() const {
   const std::int64_t now_ns = HostClock::nowNs();
   const auto flows = [](const std::unique_ptr<SocketStream>& stream) {

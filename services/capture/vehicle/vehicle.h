@@ -1,4 +1,4 @@
-// Speed of the vehicle and its position on Earth, from a CAN bus, UDP lines or gpsd.
+// Receives the vehicle's speed and position on Earth, from a CAN bus, UDP lines or gpsd.
 #pragma once
 
 #include <atomic>
@@ -26,17 +26,17 @@ void checkVehicle(const SpeedConfig& speed, const GnssConfig& gnss);
 
 class Vehicle {
  public:
-  struct Outputs {  // callbacks on threads of this class, each called by one thread at a time
+  struct Outputs {  // callbacks on threads of this class; each by one thread at a time
     std::function<void(const SpeedReading&)> speed;
     std::function<void(const EarthPlace&)> place;
   };
   /// Opens the configured sources, and reopens them after a loss. Throws StartupError.
   Vehicle(const SpeedConfig& speed, const GnssConfig& gnss, Outputs outputs);
-  /// Uses the caller's sockets instead, for tests. An empty function opens no socket.
+  /// For tests: uses these sockets instead. An empty function opens no socket.
   Vehicle(const SpeedConfig& speed, const GnssConfig& gnss, Outputs outputs,
           OpenSocket speed_socket, OpenSocket gnss_socket);
 
-  /// A sentence with the fix; empty while all configured sources send data.
+  /// Returns the problem as a sentence with the fix; empty while all configured sources send data.
   std::string problem() const;
   std::string name() const;
   void report(ReasonCounts& counts) const;
@@ -55,7 +55,7 @@ class Vehicle {
   const GnssConfig gnss_;
   const Outputs outputs_;
   Lines speed_lines_, gnss_lines_;
-  std::optional<SpeedReading> said_;  ///< last reading of a datagram's lines
+  std::optional<SpeedReading> said_;  ///< last reading from the lines of a datagram
   EarthAnchor anchor_;
   std::atomic<bool> backwards_{false};
   std::atomic<std::int64_t> speed_ns_, fix_ns_;  ///< initially the start
@@ -63,7 +63,7 @@ class Vehicle {
   std::optional<WheelSpeed> wheels_;
   ReasonCounts reasons_;
   std::string speed_trouble_, gnss_trouble_;
-  // Their threads use all members above, so these members are destroyed first.
+  // The threads of these members use all members above, so these members are destroyed first.
   std::unique_ptr<SocketStream> speed_stream_, gnss_stream_;
 };
 

@@ -19,16 +19,16 @@ struct SpeedReading {
   double sigma = 0.0;        ///< m/s, standard deviation
 };
 
-/// Factor from a unit to m/s: m/s, km/h, mph, kn and their usual other names. Fails with
-/// "speed_unit".
+/// Returns the factor from a unit to m/s, for m/s, km/h, mph, kn and their usual synonyms. Fails
+/// with "speed_unit" for other units.
 Result<double> metresPerSecond(const std::string& unit);
 
 struct WheelSettings {
   std::vector<CanSignal> wheels;     ///< at least one; the reading is their mean
   std::optional<CanSignal> reverse;  ///< indicates that the vehicle drives backwards
   double reverse_value = 1.0;        ///< physical value of `reverse` when driving backwards
-  double sigma = 0.05;               ///< m/s, standard deviation of one wheel, without its
-                                     ///< resolution
+  double sigma = 0.05;               ///< m/s, standard deviation of one wheel; its resolution
+                                     ///< is added
 };
 
 /// Parses the texts of the configuration (config.h, `speed.can`). `reverse`: "ID LINE == VALUE", or
@@ -36,20 +36,20 @@ struct WheelSettings {
 WheelSettings wheelSettings(const std::vector<std::string>& signals, const std::string& reverse,
                             double sigma);
 
-/// Single-threaded.
+/// Combines wheel signals into readings of the vehicle's speed. Single-threaded.
 class WheelSpeed {
  public:
   explicit WheelSpeed(WheelSettings settings);
 
-  /// Takes a frame of the bus. It returns a reading once each wheel has sent a value, with the mean
-  /// of their times. If one wheel sends twice before another, the reading uses only the wheels
-  /// received ("speed_can_partial"). The variance of the mean includes `sigma`, the resolution and
-  /// the differences between wheels. If `reverse` was not received for three seconds,
-  /// "speed_can_no_reverse" is counted.
+  /// Takes a frame of the bus. Returns a reading once each wheel has sent a value; its time is the
+  /// mean of the values' times. If one wheel sends twice before another has sent, the reading uses
+  /// only the wheels received, and "speed_can_partial" is counted. The variance of the mean
+  /// includes `sigma`, the resolution and the differences between wheels. If `reverse` was not
+  /// received for three seconds, "speed_can_no_reverse" is counted.
   std::optional<SpeedReading> frame(std::uint32_t id, bool extended,
                                     std::span<const std::uint8_t> data, std::int64_t time_ns);
   const ReasonCounts& reasons() const { return reasons_; }
-  /// Why the last frame of a signal gave no value; empty if it gave one.
+  /// Returns why the last frame of a signal gave no value; empty if it gave one.
   const std::string& trouble() const { return trouble_; }
 
  private:

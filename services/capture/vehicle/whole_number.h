@@ -1,4 +1,4 @@
-// Parses numbers of configurations and of lines from sockets; the whole text must be a number.
+// Parses numbers in configurations and in lines from sockets. The whole text must be one number.
 #pragma once
 
 #include <charconv>
@@ -8,7 +8,8 @@
 
 namespace perdure::capture {
 
-/// A finite number, with only blanks around it; empty for other texts.
+/// Returns the finite number in the text, which may have blanks around it. Returns nothing for
+/// other texts.
 inline std::optional<double> wholeNumber(std::string_view text) {
   const auto first = text.find_first_not_of(' '), last = text.find_last_not_of(' ');
   if (first == std::string_view::npos) return std::nullopt;

@@ -15,10 +15,11 @@ namespace perdure::gateway {
 namespace {
 
 using Point = Eigen::Vector2d;
-constexpr int kSamples = 8;  // samples along an edge, because distortion bends it
+constexpr int kSamples = 8;  // samples along an edge, which lens distortion bends
 enum PointsType { kLineLoop = 2, kLineList = 4 };
 
-/// Adds the visible strokes of the line from a to b (in C). Dashed: every other one.
+/// Adds the visible strokes of the line from a to b, points in C. If `dashed`, adds every second
+/// stroke.
 void addStrokes(const CameraModel& camera, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                 bool dashed, std::vector<Point>& strokes) {
   const int samples = dashed ? 2 * kSamples + 1 : kSamples;
@@ -89,7 +90,8 @@ std::optional<Label> putObject(JsonWriter& json, const Objects& objects, const O
   return Label{corner, nameOf(object) + hidden, colour.withAlpha(isHidden(object) ? 0.45 : 0.75)};
 }
 
-/// Probability of an object against clutter, by the most probable class, with even prior odds.
+/// Returns the probability that the box is of its most probable class rather than clutter, given
+/// even prior odds.
 double likelihood(const Detection& detection) {
   if (detection.activations.size() < 2) return 0.0;
   const float best =
@@ -106,7 +108,7 @@ void putDetection(JsonWriter& json, TimePoint time, const Detection& detection) 
            {1, 1, 1, bright}, 1);
 }
 
-/// Andrew's monotone chain.
+/// Returns the convex hull of the points by Andrew's monotone chain algorithm.
 std::vector<Point> convexHull(std::vector<Point> points) {
   std::ranges::sort(points, [](const Point& a, const Point& b) {
     return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
@@ -141,7 +143,8 @@ struct Said {
   bool asked = false;
 };
 
-/// Probability from the detections that `object` exists rather than clutter, with even prior odds.
+/// Returns the probability of the object's class against clutter, given even prior odds, for the
+/// detection in `region` or for the answer to the object's prediction; nothing if there is neither.
 std::optional<Said> saidOf(const ObjectBelief& object, const Box& region,
                            const Detections& detections, const ModelInfo& model) {
   constexpr double kLeastOverlap = 0.3;

@@ -12,7 +12,7 @@ namespace perdure::gateway {
 namespace {
 
 constexpr double kSampleEvery = 0.5;       // s
-constexpr std::size_t kMostSamples = 600;  // five minutes
+constexpr std::size_t kMostSamples = 600;  // per object: five minutes
 constexpr std::size_t kMostHistories = 4000;
 
 /// Writes centre, yaw, size and their standard deviations, with the keys of the schema.
@@ -102,7 +102,7 @@ void putClasses(JsonWriter& json, const ObjectBelief& object) {
   json.end(']');
 }
 
-/// Sentences about events, with fmt's names of sentenceOf().
+/// Sentences about events. sentenceOf() replaces the names in braces.
 constexpr std::pair<EventKind, const char*> kSentences[] = {
     {EventKind::kBorn, "{what} is seen for the first time"},
     {EventKind::kConfirmed, "{what} is confirmed ({p:.2f})"},
@@ -221,7 +221,7 @@ void History::add(const Objects& objects) {
     samples.push_back({now, object.existence, object.best().probability, object.visible_fraction});
     if (samples.size() > kMostSamples) samples.pop_front();
   }
-  // Ids increase, so the smallest is the oldest.
+  // Ids increase, so the history with the smallest id is the oldest.
   while (samples_.size() > kMostHistories) samples_.erase(samples_.begin());
 }
 

@@ -1,4 +1,4 @@
-// Perdure's own JSON: a summary of all objects for each frame, and the full state of one object.
+// Perdure's own JSON messages: objects, events, detections, and replies about the map.
 #pragma once
 
 #include <deque>
@@ -13,19 +13,22 @@
 
 namespace perdure::gateway {
 
-/// "perdure.Objects". latency_ms below 0: not known.
+/// Returns the message "perdure.Objects". A negative `latency_ms` is unknown.
 std::string objectsAtAGlance(const Objects& objects, double latency_ms);
-/// "perdure.Event", and its text as "foxglove.Log". `place`: position of the event in W.
+/// Return an event as "perdure.Event", and its text as "foxglove.Log". `place`: position of the
+/// event in W.
 std::string eventJson(const Event& event, const std::optional<Eigen::Vector3d>& place = {});
 std::string eventLog(const Event& event);
-/// "perdure.Detections"; without the model, classes have no names.
+/// Returns "perdure.Detections". If `model` is nullptr, the classes have no names.
 std::string detectionsJson(const Detections& detections, const ModelInfo* model);
 std::string modelJson(const ModelInfo& model);
 
-/// "perdure.MapReply" from the map store's answer. `map`: M; objects of other maps are "elsewhere".
+/// Returns the map store's answer as "perdure.MapReply". `map`: the displayed M. Objects of other
+/// maps are marked "elsewhere".
 std::string mapReplyJson(const MapReply& reply, const WorldId& map);
 
-/// History of the objects' existence, class and visibility, twice a second, for some minutes.
+/// Stores the existence, class probability and visibility of the objects, twice a second for the
+/// last five minutes.
 class History {
  public:
   void add(const Objects& objects);
@@ -39,11 +42,12 @@ class History {
   std::map<ObjectId, std::deque<Sample>> samples_;
 };
 
-/// "perdure.Object": its belief, the reasons, the predicted reappearance, and its history.
+/// Returns "perdure.Object": state, ledger, predicted reappearance (`returns`) and history of an
+/// object.
 std::string objectInFull(const ObjectBelief& object, const std::optional<Event>& returns,
                          const std::deque<History::Sample>* history);
 
-/// "perdure.Map", in M. `view`: all known objects; `shown`: the objects that are sent.
+/// Returns "perdure.Map", in M. `view`: all known objects; `shown`: the objects to send.
 std::string mapJson(const MapLayer::View& view, const std::vector<MapObject>& shown,
                     TimePoint time);
 

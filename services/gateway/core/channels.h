@@ -1,4 +1,4 @@
-// Channels and services of the gateway, in one table.
+// The channels and services of the gateway.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,8 @@
 
 namespace perdure::gateway {
 
-/// In addition, each camera has channels kCamera + kPerCamera · index + one of CameraPart.
+/// Ids of the channels. In addition, each camera has the channels kCamera + kPerCamera · index +
+/// part, for each CameraPart.
 enum Channel : std::uint32_t {
   kTransforms = 1,
   kScene,
@@ -31,7 +32,7 @@ enum Channel : std::uint32_t {
   kMapScene,
   kMapGraph,
   kMapGraphScene,
-  kRaw = 50,  ///< first id of the bus's topics that are passed on unchanged
+  kRaw = 50,  ///< first id of the topics that are passed on unchanged
   kCamera = 100,
 };
 enum CameraPart : std::uint32_t {
@@ -46,10 +47,10 @@ constexpr std::uint32_t cameraChannel(std::size_t camera, CameraPart part) {
   return kCamera + kPerCamera * static_cast<std::uint32_t>(camera) + part;
 }
 
-/// Which messages slow clients lose, and which ones late clients receive.
+/// Selects the messages that slow clients lose, and the messages that late clients receive.
 enum class Delivery {
   kNewest,  ///< the newest message replaces an unsent one; late clients receive it
-  kEach,    ///< drops, counts and reports the oldest messages; late clients receive the last ones
+  kEach,    ///< the oldest waiting ones are dropped and counted; late clients receive the last
 };
 
 struct ChannelInfo {
@@ -59,17 +60,18 @@ struct ChannelInfo {
   Delivery delivery = Delivery::kNewest;
 };
 
-/// JSON schema of a known name: Foxglove's well-known ones and Perdure's own.
+/// Returns the JSON schema `name`, which is one of Foxglove's or Perdure's own.
 std::string jsonSchema(std::string_view name);
 
 std::vector<ChannelInfo> channelTable(const std::vector<std::string>& cameras);
-/// A topic of the bus that is passed on unchanged, as CDR with its IDL: "/raw/imu". Only for @final
-/// types, which use XCDR1, because readers of other types may not support XCDR2's delimiters.
+/// Returns the channel, for example "/raw/imu", of a topic that is passed on unchanged, as CDR with
+/// its IDL. The type must be @final, which uses XCDR1, because clients may not support XCDR2's
+/// delimiters.
 ChannelInfo rawChannel(std::uint32_t id, const std::string& topic, const std::string& type,
                        std::string idl);
 
-/// One message of a channel, encoded once for all clients. If `payload` has changes only, `whole`
-/// is for clients that did not get the message before.
+/// One message of a channel, encoded once for all clients. If `payload` has only the changes since
+/// the previous message, `whole` is for clients that have not received that message.
 struct Encoded {
   std::uint32_t channel = 0;
   TimePoint time;
@@ -88,10 +90,10 @@ struct ServiceInfo {
   std::string name, type, request_schema, response_schema;
 };
 std::vector<ServiceInfo> serviceTable();
-/// Continues to the next event; only for recordings.
+/// Returns the service that continues playback to the next event. It exists only for recordings.
 ServiceInfo nextEventService();
 
-/// Service call of a client; `client` and `call` identify the answer.
+/// A client's call of a service. `client` and `call` identify the answer.
 struct Call {
   std::uint64_t client = 0;
   std::uint32_t service = 0, call = 0;
@@ -101,7 +103,7 @@ struct Answer {
   std::uint64_t client = 0;
   std::uint32_t service = 0, call = 0;
   bool ok = true;
-  std::string payload;  ///< JSON; a sentence if !ok
+  std::string payload;  ///< JSON if `ok`, otherwise a sentence
 };
 
 using Channels = std::set<std::uint32_t>;
@@ -111,7 +113,7 @@ struct PlaybackRequest {
   bool play = true;
   double speed = 1.0;
   std::optional<TimePoint> seek;
-  std::string id;  ///< id that is returned with the answer
+  std::string id;  ///< returned with the answer
 };
 struct PlaybackState {
   enum class Status : std::uint8_t { kPlaying = 0, kPaused = 1, kBuffering = 2, kEnded = 3 };

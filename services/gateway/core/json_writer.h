@@ -1,4 +1,5 @@
-// Writes JSON as text piece by piece. Messages that are sent twenty times a second need no tree.
+// Writes JSON text piece by piece, because building a tree for each frequent message would cost
+// more.
 #pragma once
 
 #include <charconv>
@@ -12,7 +13,7 @@
 
 namespace perdure::gateway {
 
-/// RFC 4648, with padding.
+/// Encodes bytes in base64 (RFC 4648) with padding.
 inline std::string base64(std::span<const std::uint8_t> bytes) {
   constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string text;
@@ -30,7 +31,8 @@ inline std::string base64(std::span<const std::uint8_t> bytes) {
   return text;
 }
 
-/// Inserts commas. The caller closes objects and arrays, and writes keys before values.
+/// Appends JSON and inserts commas. The caller closes objects and arrays, and writes keys before
+/// values.
 class JsonWriter {
  public:
   explicit JsonWriter(std::size_t expected = 1024) { out_.reserve(expected); }
@@ -51,7 +53,7 @@ class JsonWriter {
     out_ += "\":";
     return *this;
   }
-  /// Writes a number with `decimals` decimals; 0 if it is not finite.
+  /// Writes a number with `decimals` decimals. Writes 0 for numbers that are not finite.
   JsonWriter& number(double value, int decimals = 4) {
     comma();
     char buffer[64];
@@ -83,15 +85,15 @@ class JsonWriter {
     out_ += "null";
     return *this;
   }
-  /// Writes escaped text; bytes that are not UTF-8 become '?'.
+  /// Writes text and escapes it. Bytes that are not UTF-8 become '?'.
   JsonWriter& text(std::string_view value);
-  /// Writes a key from outside, which must be escaped.
+  /// Writes a key that may need escaping, because it comes from outside.
   JsonWriter& textKey(std::string_view name) {
     text(name);
     out_ += ':';
     return *this;
   }
-  /// Writes a member: a key and a value, which may be of a type with put(JsonWriter&, value).
+  /// Writes a member: a key and a value. The value may be of any type with put(JsonWriter&, value).
   template <class Value, class... Decimals>
   JsonWriter& with(std::string_view name, const Value& value, Decimals... decimals) {
     key(name);

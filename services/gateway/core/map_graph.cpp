@@ -18,7 +18,7 @@ constexpr std::int64_t kRefused_ns = 5'000'000'000;
 
 const char* wordOf(MapLoopKind kind) { return kind == MapLoopKind::kTie ? "tie" : "loop"; }
 
-/// The page has the same colours in words.js.
+/// Returns the colour of a loop; words.js of the page has the same colours.
 Colour colourOf(const MapLoop& loop) {
   if (loop.state == MapLoopState::kWithdrawn) return {1.0, 0.56, 0.53, 0.9};
   if (loop.state == MapLoopState::kTentative) return {0.96, 0.75, 0.25, 0.9};
@@ -30,7 +30,7 @@ std::string sessionOf(const MapAnchor& anchor) {
   return fmt::format("{}/{}", toHex(anchor.session.world), anchor.session.epoch);
 }
 
-/// Writes an empty list if sigma is not known.
+/// Writes the standard deviations; an empty list if they are not known.
 void putSigma(JsonWriter& json, const Eigen::Vector4d& sigma, bool known) {
   json.with("sigma", {sigma.data(), known ? 4U : 0U}, 4);
 }

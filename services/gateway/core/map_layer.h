@@ -16,22 +16,22 @@ class MapLayer {
   void follow(const MapFrame& frame);
   void put(const MapTile& tile);
   void erase(const MapTile& key);
-  /// Clears the tiles, because they are no longer received.
+  /// Clears the tiles. Call it when they are not received any more.
   void clear() { tiles_.clear(); }
   bool empty() const { return tiles_.empty(); }
   bool takeChanged();
 
-  /// The newest frame if it belongs to this W; otherwise nullptr.
+  /// Returns the newest `map/frame` if it belongs to this W; otherwise nullptr.
   const MapFrame* frameOf(const WorldId& world) const;
-  /// Transforms points from W to M. Identity if no frame of this W was received; map_store then
-  /// publishes objects of W unchanged.
+  /// Returns the transform of points from W to M. It is the identity if no `map/frame` of this W
+  /// was received, because map_store then publishes objects of W unchanged.
   RigidTransform T_MW(const WorldId& world) const;
   WorldId mapOf(const WorldId& world) const;
 
   struct View {
     std::vector<MapObject> here;  ///< objects in the M of this W
-    std::size_t elsewhere = 0;    ///< number of objects of maps whose transform to this M is
-                                  ///< unknown
+    std::size_t elsewhere = 0;    ///< number of objects of other maps, whose transform to
+                                  ///< this M is unknown
   };
   View viewFrom(const WorldId& world) const;
 
@@ -41,11 +41,12 @@ class MapLayer {
   bool changed_ = false;
 };
 
-/// The message "perdure.MapFrame".
+/// Returns the message "perdure.MapFrame".
 std::string mapFrameJson(const MapFrame& frame);
 
 inline constexpr std::size_t kMostOfMap = 2000;
-/// The nearest kMostOfMap of `objects`, nearest first. `p_MB`: position of the body in M.
+/// Returns the kMostOfMap objects nearest to the body, nearest first. `p_MB`: position of the body
+/// in M.
 std::vector<MapObject> nearestTo(const Eigen::Vector3d& p_MB, std::vector<MapObject> objects);
 
 }  // namespace perdure::gateway

@@ -17,7 +17,7 @@ namespace perdure::gateway {
 inline constexpr char kMapFrame[] = "map", kOdomFrame[] = "odom", kBodyFrame[] = "base_link";
 std::string opticalFrame(const std::string& camera);
 
-/// Writes {"sec", "nsec"}; times before 1970 become 0.
+/// Writes a time as {"sec", "nsec"}. Times before 1970 become 0.
 void put(JsonWriter& json, TimePoint time);
 void put(JsonWriter& json, const Eigen::Vector3d& v);
 void put(JsonWriter& json, const Eigen::Quaterniond& q);
@@ -29,16 +29,16 @@ enum class DeletionType { kMatching = 0, kAll = 1 };
 enum class LineType { kStrip = 0, kLoop = 1, kSegments = 2 };
 void putDeletion(JsonWriter& json, TimePoint time, DeletionType type, const std::string& id);
 void beginEntity(JsonWriter& json, TimePoint time, const char* frame, const std::string& id);
-/// Ends a scene entity. `without`: primitive types that it does not contain.
+/// Ends a scene entity. `without`: the primitive types that the entity does not contain.
 void endEntity(JsonWriter& json, std::initializer_list<const char*> without);
-/// Writes the list of the primitive type `name` ("cubes", "spheres") with one solid.
+/// Writes the list `name` of a primitive type ("cubes", "spheres") with one solid.
 void putSolid(JsonWriter& json, const char* name, const RigidTransform& pose,
               const Eigen::Vector3d& size, const Colour& colour);
 void putLine(JsonWriter& json, LineType type, double thickness_px,
              const std::vector<Eigen::Vector3d>& points, const Colour& colour);
 void putPair(JsonWriter& json, const char* name, const std::string& value);
 
-/// Rotation about the vertical `up`, like the objects' yaw.
+/// Returns the rotation by `yaw` about the vertical axis.
 Eigen::Quaterniond rotationOfYaw(double yaw);
 
 }  // namespace perdure::gateway

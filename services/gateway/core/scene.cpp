@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kEllipsoidSigmas = 2.0;
 
-/// An entity without the time at its beginning.
+/// Returns an entity's JSON without the time at the beginning.
 std::string_view untimed(std::string_view entity) {
   return entity.substr(std::min(entity.size(), entity.find("frame_id")));
 }

@@ -13,7 +13,8 @@
 
 namespace perdure::gateway {
 
-/// `changes` since the update before, and the `whole` scene for clients that have not got that one.
+/// `changes` since the previous update, and the `whole` scene for clients that have not received
+/// that update.
 struct SceneUpdate {
   std::string changes, whole;
 };
@@ -24,11 +25,11 @@ class Scene {
 
  private:
   std::optional<WorldId> world_;
-  std::map<ObjectId, std::string> shown_;  ///< entities
+  std::map<ObjectId, std::string> shown_;  ///< JSON of the entities shown
 };
 
-/// The durable map as foxglove.SceneUpdate in the frame `map`: pale cuboids, dashed if provisional.
-/// `objects` are in M; those in `working` are left out. Each message is complete.
+/// Returns the durable map as foxglove.SceneUpdate in the frame `map`: pale cuboids, dashed if
+/// provisional. `objects` are in M; those in `working` are omitted. Each message is complete.
 std::string mapScene(const std::vector<MapObject>& objects, const std::set<ObjectId>& working,
                      TimePoint time);
 

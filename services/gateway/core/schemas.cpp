@@ -10,9 +10,9 @@ namespace {
 
 using Schema = nlohmann::ordered_json;
 
-/// A type begins with its name at the start of a line; with "!", the schema has the name as its
-/// title. Its members follow, separated by semicolons: name, type, and after a colon the
-/// description, which ends with the line. A type must be above its first use.
+/// The schemas. A type begins with its name at the start of a line; with "!", the schema has this
+/// name as its title. The members follow, separated by semicolons: name, type, and after a colon a
+/// description that ends with the line. A type must be defined above its first use.
 constexpr std::string_view kTypes = R"(
 time!
  sec natural; nsec natural
@@ -211,7 +211,7 @@ perdure.MapReply!
 
 using Types = std::map<std::string, Schema, std::less<>>;
 
-/// Text before the separator, which is removed from `rest` with this text.
+/// Returns the text before the separator, and removes text and separator from `rest`.
 std::string_view cut(std::string_view& rest, std::string_view separator) {
   const std::size_t at = rest.find(separator);
   const std::string_view part = rest.substr(0, at);

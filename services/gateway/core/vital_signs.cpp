@@ -10,13 +10,13 @@
 namespace perdure::gateway {
 namespace {
 
-constexpr double kSilent = 2.5;  // s; Health is sent each second
+constexpr double kSilent = 2.5;  // s; services send Health once a second
 
 double secondsSince(std::int64_t then_ns, std::int64_t now_ns) {
   return then_ns == 0 ? -1.0 : 1e-9 * static_cast<double>(now_ns - then_ns);
 }
 
-/// Value of a label, escaped for Prometheus.
+/// Returns the value of a label, escaped for Prometheus.
 std::string label(const std::string& text) {
   std::string escaped;
   for (const char c : text) {

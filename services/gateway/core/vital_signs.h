@@ -1,4 +1,4 @@
-// State of the services, for the page ("perdure.Health"), for /healthz and for Prometheus.
+// The state of the services, for the page ("perdure.Health"), for /healthz and for Prometheus.
 #pragma once
 
 #include <cstdint>
@@ -12,11 +12,11 @@ namespace perdure::gateway {
 
 struct Figure {
   std::string name, help;
-  bool counts = false;  ///< a counter; otherwise a gauge
+  bool counts = false;  ///< true: a counter; false: a gauge
   double value = 0;
 };
 
-/// Last times of messages, on CLOCK_MONOTONIC in ns; 0: never.
+/// Arrival times of the newest messages, CLOCK_MONOTONIC; 0: none has arrived.
 struct Silence {
   std::int64_t objects_ns = 0, odometry_ns = 0;
 };
@@ -27,14 +27,16 @@ class VitalSigns {
 
   void onHealth(const Health& health, std::int64_t now_ns);
   bool hears(const std::string& process, std::int64_t now_ns) const;
-  /// Sets the services that do not report, each with a sentence on the program that replaces it.
+  /// Sets the services that other programs replace. `sentences`: by service, a sentence about that
+  /// program.
   void setStandIns(std::map<std::string, std::string> sentences);
 
-  /// The message "perdure.Health".
+  /// Returns the message "perdure.Health".
   std::string json(std::int64_t now_ns, const Silence& last) const;
-  /// The answer {"status": "ok" or "degraded" or "silent", …}
+  /// Returns the answer {"status": "ok", "degraded" or "silent", …} of /healthz.
   std::string healthz(std::int64_t now_ns) const;
-  /// Prometheus' text format, 0.0.4.
+  /// Returns the figures in Prometheus' text format 0.0.4. `own` and `own_reasons` are the
+  /// gateway's.
   std::string metrics(std::int64_t now_ns, const std::vector<Figure>& own,
                       const std::map<std::string, std::uint64_t>& own_reasons) const;
 
@@ -42,7 +44,7 @@ class VitalSigns {
   struct Service {
     Health health;
     std::int64_t heard_ns = 0;
-    double cpu = -1.0;  ///< share of one core between the last two messages; below 0: not known
+    double cpu = -1.0;  ///< share of one core between the last two messages; < 0: unknown
   };
   /// Returns Health for display, without the faults that follow from the end of a drive.
   Health shown(const Health& health, std::int64_t now_ns) const;

@@ -24,7 +24,7 @@ void putHeader(JsonWriter& json, TimePoint time, const std::string& frame) {
   json.begin('{').with("timestamp", time).with("frame_id", frame);
 }
 
-/// Little-endian CDR with alignment up to four bytes, which suffices for the image.
+/// Writes little-endian CDR. Alignment to at most four bytes suffices for the members of the image.
 class Cdr {
  public:
   explicit Cdr(std::size_t expected) {
@@ -128,7 +128,7 @@ std::string compressedImage(const FrameStamp& stamp, const std::string& camera,
 }
 
 void Trajectory::add(TimePoint time, const WorldId& world, const RigidTransform& T_WB) {
-  const bool again = time + kBack < time_;  // the recording has restarted
+  const bool again = time + kBack < time_;  // true: the recording has restarted
   if (world != world_ || again) {
     world_ = world;
     poses_.clear();

@@ -1,4 +1,4 @@
-// Geometry for Foxglove: frames, the pose and trajectory of the body, landmarks, the camera.
+// Geometry for Foxglove: frames, the pose and trajectory of the body, landmarks and cameras.
 #pragma once
 
 #include <string>
@@ -9,19 +9,19 @@
 
 namespace perdure::gateway {
 
-/// map → odom → base_link → <camera>_optical.
+/// Returns the transforms map → odom → base_link → <camera>_optical.
 std::string frameTransforms(TimePoint time, const RigidTransform& T_MW, const RigidTransform& T_WB,
                             const Calibration* calibration);
 std::string poseInFrame(TimePoint time, const RigidTransform& T_WB);
-/// Points with x, y, z and sigma as 32-bit floats.
+/// Returns the landmarks as points with x, y, z and sigma as 32-bit floats.
 std::string landmarksAsPoints(const Landmarks& landmarks);
 std::string cameraCalibration(const CameraCalibration& camera, TimePoint time);
 
-/// foxglove::CompressedImage as CDR (XCDR1, little-endian). `jpeg`: the image's bytes.
+/// Returns foxglove::CompressedImage as CDR (XCDR1, little-endian). `jpeg`: the bytes of the image.
 std::string compressedImage(const FrameStamp& stamp, const std::string& camera,
                             std::span<const std::uint8_t> jpeg);
 
-/// Trajectory of the body, thinned to at most a few thousand points.
+/// The trajectory of the body, thinned to at most a few thousand points.
 class Trajectory {
  public:
   void add(TimePoint time, const WorldId& world, const RigidTransform& T_WB);

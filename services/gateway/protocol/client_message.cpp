@@ -14,7 +14,7 @@ tl::unexpected<Reason> malformed(const std::string& member, const std::string& i
   return fail("member_malformed", "\"" + member + "\" has to be " + is);
 }
 
-/// A natural number of 32 bits; empty for other values.
+/// Returns a natural number of at most 32 bits, or nothing for other values.
 std::optional<std::uint32_t> naturalOf(const Json& value) {
   if (!value.is_number_integer()) return std::nullopt;
   if (!value.is_number_unsigned() && value.get<std::int64_t>() < 0) return std::nullopt;

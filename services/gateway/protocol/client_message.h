@@ -1,4 +1,5 @@
-// Messages from clients of the Foxglove WebSocket protocol: any bytes give a value or a reason.
+// Parses messages from clients of the Foxglove WebSocket protocol. Any bytes give a value or a
+// reason.
 #pragma once
 
 #include <cstdint>
@@ -35,7 +36,7 @@ struct ServiceCall {
   std::uint32_t service = 0, call = 0;
   std::string encoding, payload;
 };
-/// Valid messages without effect: connection graph, updates of parameters.
+/// Valid messages without effect: subscriptions to the connection graph and to parameters.
 struct Ignored {};
 /// Valid messages that are refused, because this gateway only displays.
 struct NotOffered {
@@ -45,9 +46,11 @@ struct NotOffered {
 using ClientMessage = std::variant<Subscribe, Unsubscribe, GetParameters, FetchAsset, ServiceCall,
                                    PlaybackRequest, Ignored, NotOffered>;
 
-/// Fails with json_malformed, op_missing, op_unknown, member_malformed or too_many_subscriptions.
+/// Parses a text message. Fails with json_malformed, op_missing, op_unknown, member_malformed or
+/// too_many_subscriptions.
 Result<ClientMessage> parseText(std::string_view text);
-/// Fails with binary_empty, binary_unknown, binary_short or playback_malformed.
+/// Parses a binary message. Fails with binary_empty, binary_unknown, binary_short or
+/// playback_malformed.
 Result<ClientMessage> parseBinary(std::span<const std::uint8_t> bytes);
 
 }  // namespace perdure::gateway::protocol

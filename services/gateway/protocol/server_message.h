@@ -1,5 +1,4 @@
-// Messages from the server of the Foxglove WebSocket protocol, as JSON or as bytes of binary
-// messages.
+// Builds the server's messages of the Foxglove WebSocket protocol, as JSON or as binary messages.
 #pragma once
 
 #include <array>
@@ -12,15 +11,16 @@
 
 namespace perdure::gateway::protocol {
 
-/// The newest first; a client that offers none of them is refused.
+/// The supported subprotocols, newest first. A client that offers none of them is refused.
 inline constexpr std::array<std::string_view, 2> kSubprotocols{"foxglove.sdk.v1",
                                                                "foxglove.websocket.v1"};
-/// Selects the subprotocol from a Sec-WebSocket-Protocol header; empty if none is supported.
+/// Selects the subprotocol from a Sec-WebSocket-Protocol header. Returns "" if none is supported.
 std::string_view chooseSubprotocol(std::string_view offered);
 
 enum class StatusLevel { kInfo = 0, kWarning = 1, kError = 2 };
 
-/// `range`: time range of a recording that clients control; empty for live data.
+/// Returns the message serverInfo. `range`: time range of a recording that clients control; empty
+/// for live data.
 std::string serverInfo(const std::string& name, const std::string& session,
                        const std::optional<TimeRange>& range = std::nullopt);
 std::string advertise(const std::vector<ChannelInfo>& channels);

@@ -1,4 +1,4 @@
-// One WebSocket client; waiting messages are written one at a time.
+// One WebSocket client. Its waiting messages are written one at a time.
 #include <array>
 
 #include "services/gateway/web/shared.h"
@@ -7,7 +7,7 @@ namespace perdure::gateway::web {
 namespace {
 
 /// Closes a connection without waiting until the client has closed its side. Beast's own teardown
-/// waits up to the timeout of a handshake, and then loses the client's error.
+/// waits for up to the timeout of a handshake, and then loses the client's error.
 class Wire : public beast::tcp_stream {
  public:
   explicit Wire(beast::tcp_stream stream) : beast::tcp_stream(std::move(stream)) {}
@@ -101,7 +101,8 @@ void Client::onRead(beast::error_code error) {
   if (!cut_) read();
 }
 
-/// The first failure of read or write removes the client from the hub; the second has no effect.
+/// Removes the client from the hub after the first failure of a read or write. Later failures have
+/// no effect.
 void Client::noteEnd(beast::error_code error) {
   if (!joined_) return;
   joined_ = false;
@@ -151,7 +152,8 @@ void Client::onWritten(beast::error_code error, std::size_t bytes) {
   flush();
 }
 
-/// Closes without a close frame, which would wait behind unread data. The client's read fails.
+/// Closes the connection without a close frame, which would wait behind unread data. The pending
+/// read then fails.
 void Client::cut(const std::string&) {
   if (cut_) return;
   cut_ = true;

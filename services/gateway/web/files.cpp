@@ -80,7 +80,7 @@ void Files::replaceIn(const std::string& path, const std::string& from, const st
 fs::path usualPageFolder() {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  // bin/perdure-gateway, or libexec/perdure/play
+  // The program is bin/perdure-gateway or libexec/perdure/play.
   fs::path page;
   for (fs::path up = program.parent_path(); up.has_relative_path(); up = up.parent_path()) {
     page = up / "share" / "perdure" / "viewer";

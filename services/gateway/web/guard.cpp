@@ -15,7 +15,7 @@ std::string lower(std::string_view text) {
   return result;
 }
 
-/// Compares in a time that depends only on the length of `a`.
+/// Returns whether a and b are equal, in a time that depends only on the length of `a`.
 bool sameSecret(std::string_view a, std::string_view b) {
   unsigned differs = a.size() == b.size() ? 0U : 1U;
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -25,7 +25,8 @@ bool sameSecret(std::string_view a, std::string_view b) {
   return differs == 0;
 }
 
-/// Value of token= in a query. Percent signs are not decoded, because tokens do not need them.
+/// Returns the value of token= in the query of `target`, or "". Percent-encoding is not decoded,
+/// because tokens do not need it.
 std::string_view tokenIn(std::string_view target) {
   constexpr std::string_view kName = "token=";
   const std::size_t question = target.find('?');
@@ -63,7 +64,7 @@ Result<void> Guard::checkHost(std::string_view host) const {
   const auto& allowed = options_.allowed_hosts;
   const bool listed =
       std::ranges::any_of(allowed, [&](const auto& one) { return lower(one) == name; });
-  // With a token the name is not checked: a foreign page lacks the token.
+  // If a token is configured, any name is accepted, because a foreign page does not have the token.
   const bool guarded = !options_.token.empty() && !name.empty();
   if (guarded || isLoopback(name) || name == options_.address || listed) return {};
   return fail("host_refused", "the Host header names \"" + name.substr(0, 64) +

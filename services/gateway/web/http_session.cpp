@@ -1,4 +1,5 @@
-// Processes the requests of one connection in order. A WebSocket upgrade ends the HTTP session.
+// Processes the largest number of requests per connection in order. A WebSocket upgrade ends the
+// HTTP session.
 #include <optional>
 
 #include "services/gateway/protocol/server_message.h"
@@ -7,7 +8,7 @@
 namespace perdure::gateway::web {
 namespace {
 
-constexpr std::chrono::seconds kPatience{10};  // time limit for a whole request, and for its answer
+constexpr std::chrono::seconds kPatience{10};  // time limit of a request, and of its answer
 constexpr std::uint32_t kLongestHeader = 8192;
 constexpr int kMostRequests = 1000;  // requests of one connection
 
@@ -61,7 +62,7 @@ std::string_view view(beast::string_view text) { return {text.data(), text.size(
 
 void HttpSession::onRead(beast::error_code error) {
   if (error == beast::error::timeout) {
-    // Browsers keep idle connections open; closing one is not counted.
+    // The timeout of an idle connection is not counted, because browsers keep connections open.
     if (parser_->got_some()) shared_->hub.reasons().add("http_too_slow");
     return;
   }
@@ -191,7 +192,8 @@ void HttpSession::send(std::shared_ptr<Response> response, std::shared_ptr<const
       http::to_status_class(response->result()) != http::status_class::client_error;
   response->keep_alive(goes_on);
   stream_.expires_after(kPatience);
-  // The serializer must outlive the write. Answers to HEAD and 304 have a length without a body.
+  // The serializer must outlive the write. Answers to HEAD, and answers 304, have a length but no
+  // body.
   using Serializer = http::response_serializer<typename Response::body_type>;
   auto serializer = std::make_shared<Serializer>(*response);
   const bool bare = parser_->get().method() == http::verb::head;

@@ -6,7 +6,7 @@
 namespace perdure::gateway::web {
 namespace {
 
-constexpr int kMostASecond = 200;        // messages of one client
+constexpr int kMostASecond = 200;        // messages from one client
 constexpr std::size_t kMostOfOne = 512;  // subscriptions of one client
 
 template <class... F>
@@ -152,7 +152,8 @@ void Hub::unsubscribe(Viewer& viewer, std::uint32_t subscription) {
   viewer.outbox_.forget(subscription);
 }
 
-/// A channel without viewers is not computed, so its stored messages are cleared.
+/// Removes a subscription. After the last one, the channel is not computed any more, so its stored
+/// messages are cleared.
 void Hub::release(std::uint32_t channel) {
   Kept& kept = channels_.at(channel);
   if (--kept.subscriptions == 0) kept.messages.clear();
@@ -206,7 +207,7 @@ void Hub::complain(Viewer& viewer, const std::string& sentence) {
 
 void Hub::publish(const Encoded& message) {
   const auto channel = channels_.find(message.channel);
-  // The last viewer has left; the message was made before this was known.
+  // If the last viewer has left, drops the message, which was made before this was known.
   if (channel == channels_.end() || channel->second.subscriptions == 0) return;
   Kept& kept = channel->second;
   ++published_;

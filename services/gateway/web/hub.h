@@ -1,4 +1,5 @@
-// Subscriptions of all clients, messages for late clients, and service calls; one thread.
+// Manages the subscriptions of all clients, messages for late clients, and service calls.
+// Single-threaded.
 #pragma once
 
 #include <chrono>
@@ -17,7 +18,7 @@
 
 namespace perdure::gateway::web {
 
-/// One client, independent of its transport.
+/// A client, independent of its transport.
 class Viewer {
  public:
   explicit Viewer(std::size_t most_events) : outbox_(most_events, kMostControl) {}
@@ -25,7 +26,7 @@ class Viewer {
   Outbox& outbox() { return outbox_; }
   std::uint64_t id() const { return id_; }
 
-  /// Called if a message waits in the outbox.
+  /// Called when the outbox has a message to write.
   virtual void flush() = 0;
   /// Closes the client; `why` is the reason as text.
   virtual void cut(const std::string& why) = 0;
@@ -38,7 +39,7 @@ class Viewer {
   bool plays_ = true;
   std::map<std::uint32_t, std::uint32_t> channel_of_;  ///< channels by subscription
   std::chrono::steady_clock::time_point second_{};
-  int said_ = 0;  ///< messages in that second
+  int said_ = 0;  ///< messages from the client in that second
 };
 
 class Hub {
@@ -50,10 +51,11 @@ class Hub {
   };
   Hub(std::string name, std::string session, std::size_t most_events, Told told);
 
-  /// `plays`: its subprotocol has the control of recordings.
+  /// Adds a client. `plays`: its subprotocol can control recordings.
   void join(Viewer& viewer, bool plays = true);
   void leave(Viewer& viewer);
-  /// Handles a message of a client; `now` limits their rate.
+  /// Handles a message from a client. A client that sends too many messages a second is
+  /// disconnected.
   void hear(Viewer& viewer, std::string_view bytes, bool text,
             std::chrono::steady_clock::time_point now);
 
@@ -67,7 +69,7 @@ class Hub {
 
   std::size_t clients() const { return viewers_.size(); }
   std::uint64_t published() const { return published_; }
-  /// Messages that slow clients lost, including clients that have left.
+  /// Returns how many messages slow clients have lost, including clients that have left.
   std::uint64_t dropped() const;
   const ReasonCounts& reasons() const { return reasons_; }
   ReasonCounts& reasons() { return reasons_; }

@@ -1,4 +1,5 @@
-// Bounded queue to one client: kNewest replaces the waiting message, kEach drops the oldest.
+// A bounded queue to one client. A message of kNewest replaces the waiting one; with kEach, the
+// oldest is dropped.
 #pragma once
 
 #include <cstdint>
@@ -24,12 +25,14 @@ struct Outgoing {
 
 class Outbox {
  public:
-  /// most_events: limit for each subscription. most_control: for messages of the protocol.
+  /// `most_events`: limit of waiting events per subscription. `most_control`: limit of messages of
+  /// the protocol itself.
   Outbox(std::size_t most_events, std::size_t most_control)
       : most_events_(most_events), most_control_(most_control) {}
 
   void put(const Encoded& message, std::uint32_t subscription, Delivery delivery);
-  /// False if too many messages wait, because the client does not read.
+  /// Adds a message of the protocol itself. Returns false if too many wait, because the client does
+  /// not read.
   bool putControl(std::string message, bool text);
   /// Adds the time of the newest message, which replaces a waiting one.
   void putTime(std::string message);
@@ -38,7 +41,7 @@ class Outbox {
   std::optional<Outgoing> take();
   std::size_t size() const { return waiting_.size(); }
   std::uint64_t dropped() const { return dropped_; }
-  /// Number of events lost since the last call.
+  /// Returns the number of events lost since the last call.
   std::uint64_t takeLostEvents();
 
  private:

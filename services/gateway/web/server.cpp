@@ -11,7 +11,7 @@ namespace perdure::gateway::web {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr int kMostPosted = 2000;  // messages that wait for the server's thread
+constexpr int kMostPosted = 2000;  // limit of messages that wait for the server's thread
 
 tcp::endpoint endpointOf(const Options& options) {
   beast::error_code error;
@@ -66,7 +66,7 @@ class Server::Impl {
 
   std::uint16_t port() const { return port_; }
 
-  /// Runs `work` in the server's thread. False if that thread is far behind.
+  /// Runs `work` in the server's thread. Returns false, without running it, if too much work waits.
   template <class Work>
   bool post(Work work) {
     if (posted_ >= kMostPosted) return false;
@@ -108,7 +108,7 @@ class Server::Impl {
     acceptor_.async_accept([this](beast::error_code error, tcp::socket socket) {
       if (!acceptor_.is_open()) return;
       if (error) {
-        // If the process has no free descriptors, other connections must end first.
+        // If the process has no free descriptors, waits until other connections have ended.
         shared_->hub.reasons().add("accept_failed");
         constexpr std::chrono::milliseconds kPause{100};
         auto pause = std::make_shared<asio::steady_timer>(io_, kPause);

@@ -1,4 +1,4 @@
-// Server of the only port: HTTP for the page, /healthz and /metrics, and the Foxglove WebSocket
+// The gateway's server. One port has HTTP (the page, /healthz, /metrics) and the Foxglove WebSocket
 // protocol. One thread serves all clients. All functions may be called from any thread.
 #pragma once
 
@@ -16,12 +16,12 @@
 namespace perdure::gateway::web {
 
 struct Content {
-  std::string name, session;  ///< arguments of serverInfo
+  std::string name, session;  ///< sent to clients in serverInfo
   std::vector<ChannelInfo> channels;
   std::vector<ServiceInfo> services;
   Files files;
-  std::optional<TimeRange> range = std::nullopt;  ///< time range of a recording that clients
-                                                  ///< control
+  std::optional<TimeRange> range = std::nullopt;  ///< time range, if clients control a
+                                                  ///< recording
 };
 
 struct Stats {
@@ -32,7 +32,8 @@ struct Stats {
 
 class Server {
  public:
-  /// `told` is called in the server's thread. Throws StartupError (69) if the port is taken.
+  /// Opens the port and starts the thread, in which `told` is called. Throws StartupError (69) if
+  /// the port is in use.
   Server(const Options& options, Content content, Hub::Told told);
   ~Server();
   Server(const Server&) = delete;
@@ -45,7 +46,7 @@ class Server {
   void tellPlayback(PlaybackState state);
   void setTexts(std::string healthz, std::string metrics);
   Stats stats() const;
-  /// False if its thread has not run for some seconds.
+  /// Returns false if the server's thread has not run for some seconds.
   bool goesOn() const;
 
  private:

@@ -1,4 +1,4 @@
-// Data that all connections of the server share; used by its one thread.
+// Data that all connections of the server share. Only the server's thread uses them.
 #pragma once
 
 #include <boost/asio/io_context.hpp>
@@ -47,7 +47,7 @@ struct Shared {
 
 /// Reads and answers requests, and passes the socket to a client after an upgrade.
 void serveHttp(tcp::socket socket, std::shared_ptr<Shared> shared);
-/// Takes over from HTTP. `protocol`: the negotiated subprotocol.
+/// Takes over a connection from HTTP after an upgrade. `protocol`: the negotiated subprotocol.
 void serveClient(beast::tcp_stream stream, Request request, std::string protocol,
                  std::shared_ptr<Shared> shared);
 

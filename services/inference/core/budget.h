@@ -1,5 +1,5 @@
-// Selects the input size of the network that keeps a frame within a time budget. It decreases at
-// once, and increases only after many frames below the budget, to avoid oscillation.
+// Selects the network's input size that keeps the time of a frame within a budget. The size
+// decreases after few slow frames, but increases only after many fast ones, to avoid oscillation.
 #pragma once
 
 #include <cstddef>
@@ -11,14 +11,15 @@ class Budget {
  public:
   static constexpr std::size_t kSlow = 5;    ///< frames whose median must exceed the budget
   static constexpr std::size_t kQuick = 30;  ///< frames whose median must be below the budget
-  static constexpr double kRoom = 0.8;       ///< share of the budget that a larger size may take
+  static constexpr double kRoom = 0.8;       ///< share of the budget that a new size may take
 
-  /// `shares`: pixels of each size relative to the first one, falling from 1. The time of a frame
-  /// is proportional to them. `budget_ms` 0: always the first size.
+  /// `shares` are the numbers of pixels of the sizes relative to the first one, falling from 1. The
+  /// time of a frame is assumed to be proportional to them. If `budget_ms` is 0, the first size is
+  /// always used.
   Budget(double budget_ms, std::vector<double> shares);
 
   std::size_t size() const { return size_; }
-  /// Adds the time of a frame at the current size. Returns whether the size has changed.
+  /// Adds the time of a frame at the current size. Returns true if the size changes.
   bool took(double ms);
 
  private:
@@ -31,7 +32,7 @@ class Budget {
   double budget_ms_;
   std::vector<double> shares_;
   std::size_t size_ = 0;
-  std::vector<double> times_;  ///< times of the last frames at this size, at most kQuick
+  std::vector<double> times_;  ///< ms, of the last frames at this size, at most kQuick
 };
 
 }  // namespace perdure::inference

@@ -6,7 +6,7 @@ namespace perdure::map_store {
 namespace {
 
 constexpr std::size_t kMostClasses = 4096;
-constexpr std::size_t kMostKinds = 4096;  // largest number of kinds of evidence
+constexpr std::size_t kMostKinds = 4096;  // largest number of kinds of evidence in a ledger
 
 constexpr auto classFields = [](auto& io, auto& belief) {
   io(belief.name, belief.probability, belief.mean, belief.covariance, belief.cross_pose);

@@ -1,4 +1,4 @@
-// Converts beliefs to bytes and back, versioned and exact: a double keeps its bits.
+// Converts beliefs to bytes with a version, and back, without loss: a double keeps its bits.
 #pragma once
 
 #include <cstdint>
@@ -10,15 +10,17 @@
 
 namespace perdure::map_store {
 
-/// The first two bytes of every blob; readers refuse unknown versions. Version 1 has no ledger;
-/// version 2 has no pose error in the header.
+/// The version, in the first two bytes of every blob. Readers refuse unknown versions. Version 1
+/// has no ledger; version 2 has no pose error in the header.
 inline constexpr std::uint16_t kBeliefFormat = 4;
 
 Bytes encodeBelief(const ObjectBelief& belief);
-/// Refuses ("belief_malformed") truncated, too long, classless or unknown-version bytes.
+/// Fails with "belief_malformed" if the bytes are truncated, too long, of an unknown version, or
+/// have no class.
 Result<ObjectBelief> decodeBelief(std::span<const std::uint8_t> bytes);
 
-/// Encodes all members of `objects` except the beliefs.
+/// Encodes all members of `objects` except the beliefs. decodeHeader() fails with
+/// "belief_malformed".
 Bytes encodeHeader(const Objects& objects);
 Result<Objects> decodeHeader(std::span<const std::uint8_t> bytes);
 

@@ -1,5 +1,5 @@
-// Converts values to bytes and back, little-endian and exact. A writer and a reader have the same
-// functions, so that one list `fields(io, value)` serves both.
+// Converts values to little-endian bytes and back, without loss. ByteWriter and ByteReader have the
+// same functions, so that one function `fields(io, value)` serves both.
 #pragma once
 
 #include <Eigen/Core>
@@ -58,7 +58,7 @@ class ByteWriter {
   Bytes bytes_;
 };
 
-/// Reads past the end return zero and make ok() false.
+/// Reads values that ByteWriter wrote. A read past the end gives zero and makes ok() false.
 class ByteReader {
  public:
   explicit ByteReader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
@@ -102,7 +102,7 @@ class ByteReader {
   void take(T& value) {
     value = taken<T>();
   }
-  /// Reads a time. Makes ok() false if a message could not carry it.
+  /// Reads a time in nanoseconds. Makes ok() false if it is not a valid time of a message.
   void take(std::int64_t& ns) {
     ns = static_cast<std::int64_t>(taken<std::uint64_t>());
     if (!isTime(ns)) ok_ = false;
@@ -136,7 +136,7 @@ class ByteReader {
   bool ok_ = true;
 };
 
-/// Returns the version and the fields of a value.
+/// Returns the version and the fields of a value as bytes.
 Bytes encode(std::uint16_t version, const auto& value, auto fields) {
   ByteWriter out;
   out(version);

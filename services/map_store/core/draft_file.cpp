@@ -44,12 +44,13 @@ void DraftFile::remove() const {
 
 void DraftFile::keep() const {
   if (!sync(path_)) cannotWriteMap(final_, {"io_error", "it cannot be synced"});
-  // SQLite would take the log of a replaced map for the log of this one.
+  // SQLite would apply the log of a replaced map to this one.
   std::error_code error;
   for (const char* suffix : kBeside) std::filesystem::remove(final_ + suffix, error);
   std::filesystem::rename(path_, final_, error);
   if (error) cannotWriteMap(final_, {"io_error", error.message()});
-  (void)sync(std::filesystem::absolute(final_).parent_path());  // not all file systems can
+  (void)sync(std::filesystem::absolute(final_).parent_path());  // ignored, because not all file
+                                                                // systems support it
 }
 
 }  // namespace perdure::map_store

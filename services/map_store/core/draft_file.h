@@ -13,7 +13,8 @@ inline constexpr const char* kBeside[] = {"-wal", "-shm", "-journal"};
 /// Throws StartupError: "The map PATH cannot be written (why); the fix."
 [[noreturn]] void cannotWriteMap(const std::string& path, const Reason& reason);
 
-/// The file `path`.part. The destructor removes it and its SQLite files unless it was renamed.
+/// The file `path`.part. The destructor removes it and the files of SQLite beside it, unless keep()
+/// renamed it.
 class DraftFile {
  public:
   explicit DraftFile(const std::string& path);
@@ -21,7 +22,7 @@ class DraftFile {
   DraftFile(const DraftFile&) = delete;
   DraftFile& operator=(const DraftFile&) = delete;
   const std::string& path() const { return path_; }
-  /// Syncs the draft and renames it to its path. Throws as cannotWriteMap() does.
+  /// Syncs the draft and renames it to `path`. Throws as cannotWriteMap() does.
   void keep() const;
 
  private:

@@ -20,9 +20,10 @@ using mapping::MapContents;
 using mapping::Origin;
 using mapping::StoredObject;
 
-// `map_first` and `map_second` are digests that identify the map of an object: of the first
-// session's first anchor, and of its first two. Changes: objects that one drive detected and
-// another one did not find again. kind 0: gone, 1: moved. The position is in M of `map_world`.
+// In `provenance`, `map_first` and `map_second` identify the map of an object. They are digests of
+// the first anchor, and of the first two anchors, of the map's first session. `changes` has objects
+// that one drive detected and a later one reported as gone (kind 0) or moved (1). Their position is
+// in the M of `map_world`.
 constexpr char kFusionSchema[] = R"sql(
 CREATE TABLE provenance(
   map_first INTEGER NOT NULL, map_second INTEGER NOT NULL, old_id INTEGER NOT NULL,
@@ -111,7 +112,7 @@ WholeMap readWhole(const Connection& connection) {
   auto graph = need(readGraph(connection));
   map.malformed += graph.malformed;
   map.contents.graph = std::move(graph.map);
-  // A united map cannot be divided again: each object becomes one track.
+  // In a fused map, merges are final, so each object becomes one track.
   map.contents.graph.tracks.clear();
   map.contents.graph.facts.clear();
   for (auto& [id, record] : map.contents.graph.records) {
@@ -122,7 +123,7 @@ WholeMap readWhole(const Connection& connection) {
   readProvenance(connection, map.contents);
   readChanges(connection, map.contents);
   readMeta(connection, map);
-  // Records of objects without a row in the map, or with a row of history only.
+  // Removes records of objects that have no row in the map, or that are history.
   std::erase_if(map.contents.graph.records, [&](const auto& each) {
     const auto object = map.contents.objects.find(each.first);
     return object == map.contents.objects.end() || object->second.ended.has_value();
@@ -144,7 +145,8 @@ Batch wholeBatch(const WholeMap& map, const Objects& working, const mapping::Uns
   return batch;
 }
 
-/// No object is visible. A service that starts with the map assigns ids above these.
+/// Returns a working set without objects. Its next_id is above the ids of the map, so that a
+/// service that starts with the map assigns new ids.
 Objects emptyWorkingSet(const WholeMap& map) {
   Objects working;
   const auto& anchors = map.contents.graph.anchors;
@@ -178,7 +180,7 @@ void writeChanges(const Connection& connection, const MapContents& map) {
   }
 }
 
-/// Adds the tables that MapDatabase does not write, and puts all data into one file.
+/// Adds the tables that MapDatabase does not write, and moves the log's data into the file.
 void completeFile(const WholeMap& map, const std::string& path) {
   const auto connection = need(Connection::open(path, Connection::Mode::kReadWriteCreate));
   auto transaction = need(Transaction::begin(connection));

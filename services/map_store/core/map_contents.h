@@ -1,4 +1,4 @@
-// A whole map file with its history: read into memory, or written as a new file.
+// Reads a whole map file, including history, into memory, and writes it as a new file.
 #pragma once
 
 #include <cstdint>
@@ -16,19 +16,19 @@ struct WholeMap {
   std::uint64_t revision = 0;
   std::int64_t schema = 0;
   std::string earth_anchor;  ///< position of M on Earth (earth_place.h); empty if not known
-  /// Number of rows and parts of the graph that were left out because they could not be read.
+  /// Number of rows, and of parts of the graph, that were left out because they were unreadable.
   std::uint64_t malformed = 0;
 };
 
-/// Reads one state of the file, even if a service writes to it. Graph or provenance are empty if an
-/// older map has none. The filter's working set is not read: its confirmed tracks are among the
-/// objects, and no object is visible.
+/// Reads one state of the file, even while a service writes to it. Graph or provenance are empty if
+/// the map has none. Does not read the filter's working set, because its confirmed tracks are among
+/// the objects. No object of the result is visible.
 Result<WholeMap> readWholeMap(const Connection& connection);
 
-/// Writes a new file, complete and synced, or nothing. `path` must not exist unless `replace` is
-/// true. Until it is renamed, the draft is `path`.part. The tables `provenance` and `changes` are
-/// added; mapping::Origin and mapping::Change describe their columns. `max_size_mb`: the largest
-/// size of the file; 0: no limit. Throws StartupError with the fix.
+/// Writes a new file, complete and synced, or nothing. Its tables `provenance` and `changes` have
+/// the members of mapping::Origin and mapping::Change. `path` must not exist unless `replace` is
+/// true. The draft is `path`.part. `max_size_mb` is the largest size of the file; 0: no limit.
+/// Throws StartupError with the fix.
 void writeWholeMap(const WholeMap& map, const std::string& path, bool replace,
                    std::int64_t max_size_mb = 0);
 

@@ -12,7 +12,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Refuses remaining files: SQLite would take the log of another database for the copy's.
+/// Throws if `to` or a file of SQLite beside it exists, because SQLite would apply the log of
+/// another database to the copy.
 void refuseWhatIsThere(const std::string& to) {
   const auto refuse = [](const std::string& file) {
     if (!fs::exists(fs::symlink_status(file))) return;
@@ -25,7 +26,7 @@ void refuseWhatIsThere(const std::string& to) {
   for (const char* suffix : kBeside) refuse(to + suffix);
 }
 
-/// Closes the draft, so that all data is in one file.
+/// Copies the map to the draft and closes it, so that all data is in one file.
 void writeDraft(const std::string& from, const std::string& to, const DraftFile& draft) {
   const Connection source = openStoreForReading(from);
   const auto target = Connection::open(draft.path(), Connection::Mode::kReadWriteCreate);

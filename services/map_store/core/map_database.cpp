@@ -26,7 +26,7 @@ std::uint64_t digestOf(std::span<const std::uint8_t> bytes, const WorldId& world
   return digest(text) ^ (world.world * 31 + world.epoch);
 }
 
-/// A statement for many rows of one commit, prepared with the first row.
+/// Runs a statement that a commit uses for many rows. The first call prepares it.
 void runAgain(const Connection& connection, std::optional<Statement>& statement,
               std::string_view sql, const auto&... parameters) {
   if (!statement) statement.emplace(need(connection.prepare(sql)));
@@ -37,10 +37,10 @@ void runAgain(const Connection& connection, std::optional<Statement>& statement,
 
 struct MapDatabase::Change {
   std::set<ObjectId> objects;    ///< objects whose rows have changed
-  std::map<TrackId, Row> rows;   ///< rows that become valid with the commit
-  std::set<TrackId> shut_out;    ///< tracks that were removed later than this frame
+  std::map<TrackId, Row> rows;   ///< rows of `committed_` after the commit
+  std::set<TrackId> shut_out;    ///< tracks that were removed at or after the time of this frame
   std::set<TrackId> alive;       ///< tracks of the working set
-  std::set<ObjectId> to_derive;  ///< objects whose rows follow from the rows of their tracks
+  std::set<ObjectId> to_derive;  ///< objects whose rows must be computed from their tracks
   std::uint64_t revision = 0;    ///< revision of this commit
   std::optional<Statement> put_object, put_place;
 };
@@ -105,7 +105,8 @@ MapDatabase::Row MapDatabase::rowOf(ObjectId id) const {
     row.stored = true;
     if (stored.integer(0) != 0) row.gone = fromNanoseconds(stored.integer(1));
     const WorldId world{stored.id(3), static_cast<std::uint32_t>(stored.integer(4))};
-    // A track that had left the working set is written again even if its belief is the same.
+    // Without a digest, a track that had left the working set is written again even if its belief
+    // is the same.
     if (stored.integer(2) == 0) row.digest = digestOf(stored.blob(5), world);
   };
   need(connection_.forRows(
@@ -184,7 +185,8 @@ void MapDatabase::regroup(const Batch& batch, Change& change) {
   }
 }
 
-/// If a track does not have its object's id, its row is history: the detections of that track.
+/// Makes the row of a track whose id is not its object's id history. The row has the last belief of
+/// this track.
 void MapDatabase::hide(const StoredTrack* track, TrackId id, ObjectId object, TimePoint time,
                        Change& change) {
   const Row row = rowOf(id);
@@ -200,8 +202,9 @@ void MapDatabase::hide(const StoredTrack* track, TrackId id, ObjectId object, Ti
   remove(id, {EventKind::kMerged, time, object}, change);
 }
 
-/// An object has the row of its newest track: one of the working set, else the one of this W that
-/// was detected last, else the one that was written last. If that track is gone, so is the object.
+/// Writes the row of an object from that of its newest track: one of the working set, else the one
+/// of this W that was detected last, else the one that was written last. The object is gone if that
+/// track is gone.
 void MapDatabase::derive(ObjectId object, const Batch& batch, Change& change) {
   std::optional<StoredTrack> newest;
   const auto rank = [&](const StoredTrack& track) {
@@ -230,12 +233,13 @@ void MapDatabase::end(TrackId id, const Removal& removal, const Batch& batch, Ch
   if (!isShared(id, batch)) return remove(id, removal, change);
   change.rows.erase(id);
   change.to_derive.insert(batch.identity->objectOf(id));
-  // The surviving track holds the information of a merged track.
+  // The surviving track contains the information of a merged one.
   if (removal.kind == EventKind::kMerged) return deleteTrack(connection_, id);
   endTrack(connection_, id, removal.time);
 }
 
-/// Adds the tracks of the last working set that are on the map but were not confirmed any more.
+/// Adds the tracks of the stored working set whose belief is not in a row of the map, because they
+/// may have a row from when they were confirmed.
 void MapDatabase::addDoubtful(std::set<ObjectId>& ids) const {
   need(connection_.forRows("SELECT id FROM working WHERE belief IS NOT NULL",
                            [&](const Statement& row) { ids.insert(row.id(0)); }));
@@ -268,7 +272,7 @@ void MapDatabase::putWorking(const Objects& working, const Change& change) {
   std::int64_t position = 0;
   for (const auto& belief : working.objects) {
     if (change.shut_out.contains(belief.id)) continue;
-    insert.bindAll(position++, belief.id);  // no belief: it is in the row of the track
+    insert.bindAll(position++, belief.id);  // the belief is NULL if the track's row has it
     if (!change.rows.contains(belief.id)) insert.bind(3, encodeBelief(belief));
     need(insert.run());
   }
@@ -278,7 +282,7 @@ Result<Written> MapDatabase::write(const Batch& batch) {
   check(batch.working != nullptr, "a batch has a working set");
   return attempt([&] {
     auto transaction = need(Transaction::begin(connection_));
-    // The sweep must precede the reuse of ids.
+    // The sweep must come before new parts reuse the ids.
     if (batch.graph != nullptr && !graph_is_whole_) sweepGraph(connection_);
     Change change;
     Written written = putAll(batch, change);

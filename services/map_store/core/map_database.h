@@ -19,7 +19,7 @@
 
 namespace perdure::map_store {
 
-/// A square of the map with sides of tile_size_m: [x, x + 1) × [y, y + 1) times the size.
+/// A square of the map: [x, x + 1) × [y, y + 1) times tile_size_m.
 struct Square {
   std::int32_t x = 0, y = 0;
   auto operator<=>(const Square&) const = default;
@@ -30,7 +30,7 @@ struct PlacedBelief {
   ObjectBelief belief;
 };
 
-/// The reason why an object left the map: kGone, or kMerged into another one.
+/// The end of an object on the map: kGone, or kMerged into another object.
 struct Removal {
   EventKind kind = EventKind::kGone;
   TimePoint time;
@@ -39,16 +39,17 @@ struct Removal {
 
 struct StoredTrack;  // core/track_rows.h
 
-/// The content of one commit, by track ids. `left`: confirmed tracks that left the working set.
+/// The content of one commit, by track ids.
 struct Batch {
-  const Objects* working = nullptr;  ///< not null
-  std::map<TrackId, PlacedBelief> left;
+  const Objects* working = nullptr;      ///< not null
+  std::map<TrackId, PlacedBelief> left;  ///< confirmed tracks that left the working set
   std::map<TrackId, Removal> removed;
-  /// Tracks that the graph placed and that were not detected since: stored rows do not change.
+  /// Tracks that the graph placed and that were not detected since. Their stored rows do not
+  /// change.
   std::set<TrackId> placed = {};
   const mapping::Unsaved* graph = nullptr;  ///< changed parts of the graph; null: no changes
-  /// Defines the tracks that are one object, the changes to this, and the affected tracks. Null:
-  /// each track is an object of its own.
+  /// `identity` defines which tracks are one object, `facts` has its changes, and `regrouped` the
+  /// affected tracks. If `identity` is null, each track is a separate object.
   const mapping::Identity* identity = nullptr;
   const mapping::Unsaved* facts = nullptr;
   std::set<TrackId> regrouped = {};
@@ -57,9 +58,10 @@ struct Batch {
 };
 
 struct Written {
-  std::vector<ObjectId> objects;  ///< objects that changed, came or left, each once
+  std::vector<ObjectId> objects;  ///< ids of objects that changed, were added or removed, each once
   std::uint64_t revision = 0;
-  std::uint64_t unsound = 0;  ///< parts of the graph that are not finite; their stored values stay
+  std::uint64_t unsound = 0;  ///< unsound parts of the graph (graph_codec.h), whose stored values
+                              ///< remain
 };
 
 struct Found {
@@ -76,11 +78,11 @@ struct StoredPlace {
   TimePoint last_seen;
 };
 
-/// The square of a belief's centre; nothing if the centre is not finite or too far away.
+/// Returns the square that contains `p`; nothing if `p` is not finite or too far away.
 std::optional<Square> squareOf(const Eigen::Vector3d& p, double tile_size_m);
 MapObject mapObjectOf(const ObjectBelief& belief, const WorldId& world);
 
-/// Answers queries about a map file. Spatial queries concern one frame of reference.
+/// Answers queries about a map file. A spatial query searches one frame of reference.
 class MapReader {
  public:
   explicit MapReader(const Connection* connection) : connection_(connection) {}
@@ -90,15 +92,16 @@ class MapReader {
   Result<Found> find(const MapQuery& query, const WorldId& newest, std::uint32_t limit) const;
   /// All objects on the map, in full, by id; rows that cannot be read are left out.
   Result<std::vector<PlacedBelief>> beliefs() const;
-  /// The objects nearer than the radius, in full, nearest first.
+  /// The objects of `world` within `radius` of `centre`, in full, nearest first; at most `limit`.
   Result<Found> inFullNear(const Eigen::Vector3d& centre, double radius, const WorldId& world,
                            std::uint32_t limit) const;
   /// The last belief of a track; nothing if it is not on the map.
   Result<std::optional<PlacedBelief>> beliefOf(TrackId track) const;
-  /// Those of the objects `ids` that are on the map, in this order; at most `limit`.
+  /// Those of the objects `ids` that are on the map, in the order of `ids`; at most `limit`.
   Result<Found> byIds(const std::vector<ObjectId>& ids, std::size_t limit) const;
+  /// The places of all objects on the map.
   Result<std::vector<StoredPlace>> places() const;
-  /// Nothing if the object is not on the map.
+  /// The place of one object; nothing if it is not on the map.
   Result<std::optional<StoredPlace>> placeOf(ObjectId id) const;
   /// The objects that were merged into an object, by id.
   Result<std::vector<ObjectId>> mergedInto(ObjectId id) const;
@@ -107,7 +110,7 @@ class MapReader {
   /// The pose graph of the last commit; empty if the map has none.
   Result<SavedGraph> graph() const { return readGraph(*connection_); }
   Result<std::set<mapping::SameObject>> facts() const { return readFacts(*connection_); }
-  /// Frames of reference of the map's objects.
+  /// The `world` numbers of the map's objects.
   Result<std::set<std::uint64_t>> worlds() const;
   /// The position of M on Earth, as earthAnchorOfMap() writes it; empty if not known.
   Result<std::string> earthAnchor() const;
@@ -122,11 +125,12 @@ class MapDatabase {
  public:
   explicit MapDatabase(const StoreOptions& options);
 
-  /// Commits everything or nothing; the data is durable on return. Beliefs that did not change, or
-  /// whose objects were removed at `working`'s time or later, are not written.
+  /// Commits everything or nothing. The data is durable on return. Does not write beliefs that did
+  /// not change, or whose objects were removed at or after the time of `working`.
   Result<Written> write(const Batch& batch);
 
-  /// The graph to continue with. The next write deletes left-out parts: their ids are reused.
+  /// Returns the graph to continue with. If parts of it were left out, the next write with a graph
+  /// deletes their rows, because their ids are reused.
   Result<SavedGraph> takeGraph();
 
   MapReader reader() const { return MapReader(&connection_); }
@@ -167,7 +171,7 @@ class MapDatabase {
   double tile_size_m_;
   /// Rows of the working set's confirmed tracks, as committed.
   std::map<TrackId, Row> committed_;
-  bool graph_is_whole_ = false;  ///< whether readGraph leaves out nothing of the file
+  bool graph_is_whole_ = false;  ///< whether readGraph() leaves out no part of the file's graph
 };
 
 }  // namespace perdure::map_store

@@ -8,7 +8,7 @@
 namespace perdure::map_store {
 namespace {
 
-constexpr double kShown_m = 0.1;  // smaller motions are not published
+constexpr double kShown_m = 0.1;  // smaller displacements are not published
 
 bool isInside(const Eigen::Vector3d& p, const MapQuery& query) {
   return (p.array() >= query.low.array()).all() && (p.array() <= query.high.array()).all();

@@ -1,4 +1,5 @@
-// The positions in M of all objects, which determine squares and answer spatial queries.
+// The positions in M of all objects. They determine the objects' squares, and answer spatial
+// queries.
 #pragma once
 
 #include <functional>
@@ -22,15 +23,17 @@ class MapPlaces {
   void put(const StoredPlace& stored, const mapping::ObjectRecord* record,
            const mapping::MapFrames& frames);
   void erase(ObjectId id);
-  /// Places all objects again, as `frames` defines after a change of the graph. A square becomes
-  /// stale if an object moved 0.1 m or more since the square was taken.
+  /// Places all objects again with `frames`, after a change of the graph. The squares of an object
+  /// become stale if it may have moved by more than 0.1 m since it was published, or if its M or
+  /// `provisional` changed.
   void lay(const mapping::MapFrames& frames);
 
-  /// The anchor of an object; 0: it has none, or is not on the map.
+  /// The anchor of an object; 0 if it has none or is not on the map.
   mapping::AnchorId anchorOf(ObjectId id) const;
   /// The objects in this M for kByRadius (nearest first) and kByBox (by id).
   std::vector<ObjectId> find(const MapQuery& query, const WorldId& map) const;
-  /// Squares that changed since they were last taken, with their ids in order; empty: no ids.
+  /// Returns the squares that changed since the last call, each with the ids of its objects in
+  /// order.
   std::map<Square, std::vector<ObjectId>> takeStale();
   std::size_t size() const { return places_.size(); }
 
@@ -40,8 +43,9 @@ class MapPlaces {
     Eigen::Vector3d p_W = Eigen::Vector3d::Zero(), p_M = Eigen::Vector3d::Zero();
     WorldId map;  ///< the M of the position
     bool provisional = false;
-    std::optional<Square> square;  ///< square in which it was published; nothing: beyond all
-    double moved_m = 0.0;          ///< upper bound of its motion since then
+    std::optional<Square> square;  ///< square in which it was published; nothing if it is too far
+                                   ///< away
+    double moved_m = 0.0;          ///< upper bound of its displacement since it was published
   };
   void show(Place& place);
 
@@ -50,24 +54,25 @@ class MapPlaces {
   std::set<Square> stale_;
 };
 
-/// A map in M: the stored objects, transformed by their anchors.
+/// The map in M: anchors transform the stored objects.
 class MapInM {
  public:
   using Records = std::function<const mapping::ObjectRecord*(ObjectId)>;
-  /// `records`: the graph's records at the time of storage.
+  /// `records` returns the graph's record of an object, as of the last commit, or null.
   MapInM(MapReader reader, double tile_size_m, Records records)
       : reader_(reader), places_(tile_size_m), records_(std::move(records)) {}
 
-  /// Must precede all queries. Loads everything or nothing.
+  /// Loads the places of all objects, or none. Must precede all queries.
   Result<void> load(mapping::MapFrames frames);
   bool isLoaded() const { return loaded_; }
-  /// Takes the changes of a commit. Rows that cannot be read now are read by the next call.
+  /// Reads the rows that a commit changed. The next call reads those that cannot be read now.
   Result<void> refresh(const std::vector<ObjectId>& changed);
-  /// The graph has grown. `moved`: earlier parts of it have moved too.
+  /// Updates the frames after the graph has grown. `moved`: earlier parts of the graph have moved
+  /// too.
   void follow(mapping::MapFrames frames, bool moved);
 
-  /// Answers queries by id, class, radius and box, and for all objects, as MapReader::find does, in
-  /// M. Spatial queries search in the M of `newest`.
+  /// Answers the queries of MapReader::find() with objects in M. Spatial queries search the M of
+  /// the session `newest`.
   Result<Found> find(const MapQuery& query, const WorldId& newest, std::uint32_t limit) const;
   Result<Found> objects(const std::vector<ObjectId>& ids) const;
   std::map<Square, std::vector<ObjectId>> takeStale() { return places_.takeStale(); }

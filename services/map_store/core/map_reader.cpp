@@ -31,7 +31,7 @@ StoredPlace placeFrom(const Statement& row) {
           fromNanoseconds(row.integer(6))};
 }
 
-/// Reads rows up to `limit`, and one more to detect that there are more.
+/// Reads at most `limit` rows. Reads one more row to set `truncated`.
 Result<Found> collect(Statement& statement, std::size_t limit, bool in_full = false) {
   Found found;
   for (;;) {
@@ -62,7 +62,8 @@ void bindBox(Statement& statement, const Eigen::Vector3d& low, const Eigen::Vect
 }
 
 Result<Statement> byBox(const Connection& connection, const MapQuery& query, const WorldId& world) {
-  // The tree has single-precision bounds that enclose the points, so the columns decide.
+  // The tree's bounds have single precision and enclose the points, so the exact columns are
+  // compared too.
   auto statement = connection.prepare(std::string(kColumns) + kInBox +
                                       "AND o.x BETWEEN ?1 AND ?2 AND o.y BETWEEN ?3 AND ?4 AND "
                                       "o.z BETWEEN ?5 AND ?6 ORDER BY o.id");
@@ -111,7 +112,7 @@ Result<Statement> statementFor(const Connection& connection, const MapQuery& que
   return fail("query_invalid", "a restore or the graph is no question about objects");
 }
 
-/// Returns the beliefs of the working set. Confirmed ones are in `tracks` or `objects`.
+/// Returns the beliefs of the working set. Those of confirmed tracks are in `tracks` or `objects`.
 std::vector<ObjectBelief> workingBeliefs(const Connection& connection) {
   const bool has_tracks = need(connection.has("tracks"));  // older maps have no such table
   std::vector<ObjectBelief> beliefs;

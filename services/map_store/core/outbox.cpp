@@ -19,14 +19,16 @@ constexpr std::array kFollowed = {Followed{OutboxTable::kClasses, "graph_classes
                                   Followed{OutboxTable::kSightings, "sightings", "id"},
                                   Followed{OutboxTable::kViews, "views", "anchor"}};
 
-/// Each row has one entry, with the number of its last change.
+/// Returns the body of a trigger that enters a changed row. Each row has one entry, with the number
+/// of its last change.
 std::string enter(OutboxTable table, const std::string& id) {
   const std::string number = std::to_string(static_cast<std::int64_t>(table));
   return "BEGIN DELETE FROM outbox WHERE tbl = " + number + " AND id = " + id +
          "; INSERT INTO outbox(tbl, id) VALUES(" + number + ", " + id + "); END;";
 }
 
-/// REPLACE fires a trigger for the row that it inserts, but not for the row that it deletes.
+/// Returns the triggers of a table. REPLACE fires one for the row that it inserts, but not for the
+/// row that it deletes.
 std::string triggersOf(const Followed& table) {
   const std::string name = table.name, key = table.key;
   std::string sql;

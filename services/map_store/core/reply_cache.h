@@ -14,8 +14,8 @@ class ReplyCache {
  public:
   explicit ReplyCache(std::size_t capacity) : capacity_(capacity) {}
 
-  /// Returns null if the request was not answered, or if its reply is no longer stored. Valid until
-  /// the next call of keep.
+  /// Returns null if the request was not answered, or if its reply is no longer stored. The pointer
+  /// is valid until the next call of keep().
   const MapReply* find(InstanceId client, std::uint64_t request) const {
     for (const auto& reply : replies_) {
       if (reply.client == client && reply.request == request) return &reply;

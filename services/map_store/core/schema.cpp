@@ -14,9 +14,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// One row for each object that was ever confirmed. `gone` is 0, or 1 + the EventKind that ended the
-// object; the row then stays as history. `belief` is encoded by core/belief_codec.h. The other
-// columns are for queries. `tile_*` follow from x, y and meta.tile_size_m.
+// `objects` has one row for each object that was ever confirmed. `gone` is 0, or 1 + the EventKind
+// that ended the object; its row then remains as history. core/belief_codec.h encodes `belief`. The
+// other columns are for queries. `tile_*` are computed from x, y and meta.tile_size_m.
 constexpr char kSchema[] = R"sql(
 CREATE TABLE meta(key TEXT PRIMARY KEY, value) WITHOUT ROWID;
 CREATE TABLE objects(
@@ -47,7 +47,8 @@ std::string fixOfUse(const Reason& reason) {
                                              ": " + reason.detail + "); " + fixOfUse(reason));
 }
 
-/// A file that begins neither like SQLite nor with zeros belongs to another program.
+/// Returns whether the file belongs to another program: it begins neither like SQLite nor with
+/// zeros.
 bool beginsLikeAnotherFile(const std::string& path) {
   static constexpr std::array<char, 16> kMagic = {'S', 'Q', 'L', 'i', 't', 'e', ' ', 'f',
                                                   'o', 'r', 'm', 'a', 't', ' ', '3', '\0'};
@@ -86,7 +87,7 @@ void refuseForeign(const std::string& path, const Identity& identity, const std:
 }
 
 void prepareForWriting(const Connection& connection, const StoreOptions& options) {
-  // FULL: a commit is on disk when it returns, even if the power fails.
+  // With FULL, a commit is on the disk when it returns, even if the power fails then.
   need(connection.execute(
       "PRAGMA busy_timeout=250; PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL;"
       "PRAGMA journal_size_limit=16777216;"));
@@ -104,7 +105,7 @@ void create(const Connection& connection) {
   need(transaction.commit());
 }
 
-/// Upgrades a file of an older version by adding tables. All or nothing.
+/// Upgrades a file of an older version by adding tables. Makes all changes or none.
 void adopt(const Connection& connection, const Identity& identity) {
   if (identity.version == kSchemaVersion) return need(connection.execute(kAddedSchema));
   auto transaction = need(Transaction::begin(connection));
@@ -116,7 +117,7 @@ void adopt(const Connection& connection, const Identity& identity) {
   need(transaction.commit());
 }
 
-/// Returns a reason if the file is damaged. Throws StartupError if it is not a map of ours.
+/// Fails with a reason if the file is damaged. Throws StartupError if it is not a map of Perdure.
 Result<Connection> tryOpen(const StoreOptions& options) {
   return attempt([&] {
     auto connection = need(Connection::open(options.path, Connection::Mode::kReadWriteCreate));

@@ -10,8 +10,8 @@ namespace perdure::map_store {
 
 /// "PERD" in the database's header distinguishes our files from those of other programs.
 inline constexpr int kApplicationId = 0x50455244;
-/// 2: beliefs with ledgers. 3: the pose graph. 4: tracks that share an object. Older maps can be
-/// read; opening them for writing upgrades them to 4.
+/// Version 2 adds ledgers to beliefs, 3 adds the pose graph, and 4 adds tracks that share an
+/// object. Older maps can be read. Opening them for writing upgrades them to 4.
 inline constexpr int kSchemaVersion = 4;
 
 struct StoreOptions {
@@ -24,7 +24,7 @@ struct StoreOptions {
 
 struct OpenedStore {
   Connection connection;
-  std::string notice;  ///< a sentence if a damaged file was renamed, else empty
+  std::string notice;  ///< a sentence for the user if a damaged file was renamed; else empty
 };
 
 struct Identity {
@@ -33,16 +33,17 @@ struct Identity {
 };
 Result<Identity> identityOf(const Connection& connection);
 
-/// Reads the whole file. Reason of failure: "corrupt" if it is damaged.
+/// Reads and checks the whole file. Fails with "corrupt" if it is damaged.
 Result<void> wholeFileIsSound(const Connection& connection);
 
-/// Opens the file for the service. Throws StartupError with the fix if the folder is not writable,
-/// the file is not a map of ours, or a newer version wrote it.
+/// Opens the file for the service. Renames a damaged file and creates a new one. Throws
+/// StartupError with the fix if the folder is not writable, the file is not a map of Perdure, or a
+/// newer version wrote it.
 OpenedStore openStore(const StoreOptions& options);
 
-/// Whether the content of a file is the cause, rather than its disk or its folder.
+/// Whether the reason is a damaged file, instead of a problem of its disk or folder.
 bool isDamage(const Reason& reason);
-/// Throws StartupError with the fix.
+/// Throws StartupError with the reason and the fix.
 [[noreturn]] void cannotReadMap(const std::string& path, const Reason& reason);
 /// Opens an existing map read-only, even while the service runs. Throws as cannotReadMap() does.
 Connection openStoreForReading(const std::string& path);

@@ -20,28 +20,28 @@ struct sqlite3_stmt;
 
 namespace perdure::map_store {
 
-/// The reason of a result code: "disk_full", "read_only", "busy", "corrupt", "not_a_database",
-/// "cannot_open", "io_error", "constraint" or "database_error".
+/// Returns the reason for a result code of SQLite: "disk_full", "read_only", "busy", "corrupt",
+/// "not_a_database", "cannot_open", "io_error", "constraint" or "database_error".
 Reason reasonOf(int code, std::string_view detail);
 
-/// The exit status of a program that ends for this reason: 74 for a failed write, else 69.
+/// Returns the exit status of a program that ends with this reason: 74 for a failed write, else 69.
 ExitCode exitCodeOf(const Reason& reason);
 
-/// A failure on its way through the functions of one module, up to attempt().
+/// An exception within a module. attempt() converts it to a result at the module's edge.
 struct Failed : std::exception {
   explicit Failed(Reason why) : reason(std::move(why)) {}
   const char* what() const noexcept override { return reason.detail.c_str(); }
   Reason reason;
 };
 
-/// Returns the value. Throws Failed if there is none.
+/// Returns the value. Throws Failed with the reason if there is none.
 template <class T>
 T need(Result<T> result) {
   if (!result) throw Failed(std::move(result).error());
   if constexpr (!std::is_void_v<T>) return *std::move(result);
 }
 
-/// Calls `run` at the module's edge. Returns what it returns, or the reason of Failed.
+/// Calls `run`. Returns its result, or the reason if it throws Failed.
 template <class Run>
 Result<std::invoke_result_t<Run>> attempt(Run run) {
   try {
@@ -56,12 +56,12 @@ Result<std::invoke_result_t<Run>> attempt(Run run) {
   }
 }
 
-/// One prepared statement, valid while its connection is. Parameters count from 1, columns from 0.
+/// A prepared statement. Its connection must outlive it. Parameters count from 1, columns from 0.
 class Statement {
  public:
   Statement() = default;
 
-  /// Integers, flags and enumerations. An unsigned value is stored as the same 64 bits.
+  /// Binds an integer, flag or enumeration. An unsigned value is stored as the same 64 bits.
   template <class T>
   requires(std::is_integral_v<T> || std::is_enum_v<T>) Statement& bind(int index, T value) {
     return bindInteger(index, static_cast<std::int64_t>(value));
@@ -77,7 +77,7 @@ class Statement {
     return *this;
   }
 
-  /// True: a row was read; false: done, and reset for the next use.
+  /// Returns true if a row was read. Returns false at the end; the statement is then reset.
   Result<bool> step();
   /// Runs the statement to its end, resets it and clears its bindings.
   Result<void> run() {
@@ -97,7 +97,7 @@ class Statement {
   std::uint64_t id(int column) const { return static_cast<std::uint64_t>(integer(column)); }
   double real(int column) const;
   std::string text(int column) const;
-  /// Valid until the next step or reset.
+  /// The bytes of a blob, valid until the next step or reset.
   std::span<const std::uint8_t> blob(int column) const;
   bool isNull(int column) const;
   bool isNumber(int column) const;
@@ -126,7 +126,7 @@ class Connection {
     return prepare(sql).and_then(
         [&](Statement rows) { return rows.bindAll(values...).forEach(take); });
   }
-  /// Returns what `read` makes of the first row, or nothing if there is no row.
+  /// Returns the result of `read` for the first row, or nothing if there is no row.
   template <class Read, class T = std::invoke_result_t<Read, const Statement&>>
   Result<std::optional<T>> first(std::string_view sql, Read read, const auto&... values) const {
     return prepare(sql).and_then([&](Statement row) -> Result<std::optional<T>> {
@@ -135,13 +135,13 @@ class Connection {
       });
     });
   }
-  /// Runs statements without results, separated by semicolons.
+  /// Runs one or several statements that have no results, separated by semicolons.
   Result<void> execute(const std::string& sql) const;
-  /// The first column of the first row. The query must have one.
+  /// Returns the first column of the first row. The query must return a row.
   Result<std::int64_t> integer(std::string_view sql) const;
   /// Whether the file has a table or trigger with this name.
   Result<bool> has(const std::string& name) const;
-  /// Copies one state to `target`, page by page, even while other processes write to this one.
+  /// Copies one state of this database to `target`, even while other processes write to this one.
   Result<void> copyInto(const Connection& target) const;
 
  private:
@@ -152,8 +152,8 @@ class Connection {
   std::unique_ptr<sqlite3, Close> connection_;
 };
 
-/// Calls `read` as attempt() does, and all its queries see one state of the file. Outside a
-/// transaction a savepoint acts as one.
+/// Calls `read` as attempt() does. All its queries read one state of the file, because they run in
+/// a savepoint.
 template <class Read>
 Result<std::invoke_result_t<Read>> inOneState(const Connection& connection, Read read) {
   if (auto begun = connection.execute("SAVEPOINT state"); !begun) {
@@ -165,7 +165,7 @@ Result<std::invoke_result_t<Read>> inOneState(const Connection& connection, Read
   return value;
 }
 
-/// Rolls back at the end of its scope unless committed.
+/// A transaction. The destructor rolls it back unless it was committed.
 class Transaction {
  public:
   static Result<Transaction> begin(const Connection& connection);

@@ -12,13 +12,14 @@ namespace perdure::map_store {
 
 struct TileChanges {
   std::vector<MapTile> tiles;    ///< new contents; each has at least one object
-  std::vector<MapTile> emptied;  ///< only keys are valid: these tiles do not exist any more
+  std::vector<MapTile> emptied;  ///< tiles that do not exist any more; only their keys are valid
 };
 
 /// Stores the number of tiles of each square, so that emptied tiles can be disposed of.
 class TileBook {
  public:
-  /// Sets the contents of `square`, ordered by id. Each tile gets the instance and the revision.
+  /// Sets the objects of `square`, ordered by id, and returns the changed tiles. Each tile gets the
+  /// instance and the revision.
   TileChanges replace(const Square& square, std::vector<MapObject> objects, InstanceId instance,
                       std::uint64_t revision);
   std::uint32_t tiles() const { return tiles_; }

@@ -1,4 +1,5 @@
-// Rows of tracks that share an object. The row of the object is computed from them.
+// Reads and writes rows of tracks that share an object. The row of the object is computed from
+// them.
 #pragma once
 
 #include <optional>
@@ -10,7 +11,7 @@ namespace perdure::map_store {
 struct StoredTrack {
   TrackId id = 0;
   PlacedBelief placed;
-  std::uint64_t written = 0;  ///< revision of the map in which its last detections were written
+  std::uint64_t written = 0;  ///< revision of the map that wrote its last detections
   std::optional<TimePoint> gone;
 };
 
@@ -18,7 +19,8 @@ struct StoredTrack {
 
 std::optional<StoredTrack> readTrack(const Connection& connection, TrackId id);
 void writeTrack(const Connection& connection, const StoredTrack& track);
-/// The track shares its object from now on: copies the object's row if it has none.
+/// Prepares the row of a track that begins to share its object. If the track has none, copies the
+/// row of its object.
 void shareTrack(const Connection& connection, TrackId id);
 void endTrack(const Connection& connection, TrackId id, TimePoint time);
 void deleteTrack(const Connection& connection, TrackId id);

@@ -15,7 +15,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr int kBinary = 1;
-/// SQLSTATE that our functions on the server raise.
+/// SQLSTATE that Perdure's functions on the server raise for "server_overtaken".
 constexpr std::string_view kOvertaken = "PE001";
 
 std::string inBigEndian(std::uint64_t value) {
@@ -41,13 +41,14 @@ std::string onlyUtf8(std::string_view text) {
   return clean;
 }
 
-/// The first line of libpq's message, without a password (server_url.h).
+/// Returns the first line of libpq's message. It contains no password, because checkUrl() refuses
+/// URLs with one.
 std::string firstLine(const char* message) {
   const std::string text = message == nullptr ? "" : message;
   return text.substr(0, text.find('\n'));
 }
 
-/// The SQLSTATE in a verbose message: "FATAL:  28P01: password …".
+/// Returns the SQLSTATE in a verbose message, for example "FATAL:  28P01: password …".
 std::string stateIn(const std::string& message) {
   for (std::size_t at = message.find(":  "); at != std::string::npos;
        at = message.find(":  ", at + 1)) {
@@ -201,7 +202,8 @@ Result<void> Link::finishConnecting() {
   return fail(code, firstLine(message.c_str()));
 }
 
-/// A commit is on the server's disk when acknowledged. A lost link ends a transaction.
+/// Configures the session: an acknowledged commit is on the server's disk, and a lost link ends a
+/// transaction.
 Result<void> Link::setUp() {
   if (PQsetnonblocking(connection_.get(), 1) != 0) return tl::unexpected<Reason>(lost());
   const std::string milliseconds = std::to_string(patience_.answer.count());
@@ -224,7 +226,7 @@ Result<void> Link::wait(short events, Clock::time_point until) const {
       poll(files.data(), files.size(), static_cast<int>(std::max<std::int64_t>(left.count(), 0)));
   if (files[1].revents != 0 && ready > 0) return fail("stopped");
   if (ready == 0) return fail("server_unreachable", "the server does not answer");
-  return {};  // interrupted: the caller repeats the call
+  return {};  // poll() was interrupted; the caller waits again
 }
 
 /// Returns the next result, or null at the end of a statement's results.
@@ -321,7 +323,7 @@ Result<void> Link::endBatch() {
   }
   if (PQexitPipelineMode(connection_.get()) == 0) return tl::unexpected<Reason>(lost());
   if (!wrong && committed) return {};
-  // An aborted pipeline leaves the transaction open.
+  // A failed statement of the pipeline leaves the transaction open.
   const auto ended = run("ROLLBACK");
   if (!ended) return ended;
   return tl::unexpected<Reason>(wrong.value_or(Reason{"server_refused", "it was not committed"}));

@@ -1,4 +1,4 @@
-// A connection to PostgreSQL with bounded waits: non-blocking libpq behind RAII.
+// A connection to PostgreSQL whose waits have time limits. It wraps non-blocking libpq (RAII).
 #pragma once
 
 #include <sys/eventfd.h>
@@ -21,7 +21,7 @@ struct pg_result;
 
 namespace perdure::map_store::fleet {
 
-/// Ends the waits of another thread.
+/// A signal that ends all waits of another thread.
 class Stop {
  public:
   Stop() : file_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
@@ -30,23 +30,24 @@ class Stop {
   ~Stop() { close(file_); }
   Stop(const Stop&) = delete;
   Stop& operator=(const Stop&) = delete;
-  /// May be called from any thread; cannot be undone.
+  /// Ends all present and future waits. May be called from any thread; cannot be undone.
   void raise() const {
     const std::uint64_t one = 1;
     (void)!write(file_, &one, sizeof one);
   }
-  int file() const { return file_; }  ///< becomes readable once raised
+  int file() const { return file_; }  ///< file descriptor that becomes readable after raise()
 
  private:
   int file_;
 };
 
-/// Time limits of waits. Name resolution uses the limits of the system's resolver.
+/// Time limits of waits. Name resolution has the limits of the system's resolver instead.
 struct Patience {
   std::chrono::milliseconds connect{10'000};
-  std::chrono::milliseconds answer{20'000};  ///< while nothing is sent or received
+  std::chrono::milliseconds answer{20'000};  ///< longest time in which nothing is sent or received
 };
 
+/// Parameters of a statement, in order.
 class Values {
  public:
   Values& put(std::int64_t value);
@@ -61,6 +62,7 @@ class Values {
   std::vector<std::optional<std::string>> bytes_;
 };
 
+/// The rows that the server returned.
 class Answer {
  public:
   explicit Answer(pg_result* result) : result_(result) {}
@@ -79,25 +81,28 @@ class Answer {
   std::unique_ptr<pg_result, Clear> result_;
 };
 
-/// Reasons: "server_unreachable" (no connection, no answer, or the connection was lost),
-/// "server_login" (name, password or database), "server_rights", "server_full", "server_busy",
-/// "server_refused" (any other), "server_overtaken" (another process has written this map
-/// meanwhile), "stopped". After "server_unreachable" and "stopped" the link cannot be used any
-/// more.
+/// A link to the server. Its functions fail with "server_unreachable" (no connection, no answer, or
+/// a lost connection), "server_login" (name, password or database), "server_rights", "server_full",
+/// "server_busy", "server_overtaken" (another process has written this map meanwhile), "stopped",
+/// or "server_refused" (all others). After "server_unreachable" or "stopped" the link cannot be
+/// used any more.
 class Link {
  public:
-  /// `stop` must outlive the link; raising it ends every wait.
+  /// Connects to the server. `stop` must outlive the link; stop.raise() ends every wait.
   static Result<Link> open(const std::string& url, const Patience& patience, const Stop& stop);
 
+  /// Runs one statement and returns its rows.
   Result<Answer> ask(const std::string& sql, const Values& values = {});
   /// Runs statements without parameters or answers in one transaction.
   Result<void> run(const std::string& sql);
   Result<void> prepare(const std::string& name, const std::string& sql);
 
-  /// Statements that are sent together: begin, queue, end; one transaction or part of it.
+  /// Begins a batch of statements: call queue() for each, then endBatch(). The batch is one
+  /// transaction; if `as_transaction` is false, it is a part of the caller's transaction.
   void beginBatch(bool as_transaction = true);
   void queue(const std::string& prepared, const Values& values);
-  /// Success means that the transaction is committed. After "server_unreachable" this is unknown.
+  /// Sends the batch and waits for its results. After success the transaction is committed; after
+  /// "server_unreachable" it may or may not be.
   Result<void> endBatch();
 
   /// Waits for a notification. Returns its payload, or nothing after the time limit.

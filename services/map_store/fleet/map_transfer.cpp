@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 constexpr int kRowsAtOnce = 2000;
-/// Replaces a file's identity for maps that were pushed; there is one for each name.
+/// Stands for the file's identity of a pushed map, so that each name has one pushed map.
 constexpr char kPushed[] = "pushed";
 
 std::string fixOf(const Reason& reason) {
@@ -99,7 +99,7 @@ Chosen choose(Link& link, const std::string& name, bool unfinished) {
   return chosen;
 }
 
-/// Copies all rows of one table, portion by portion.
+/// Copies all rows of one table in portions.
 void pullTable(Link& link, std::int64_t map, const Table& table, const Connection& to) {
   const std::string what = "The map cannot be written";
   auto insertion = orGiveUp(to.prepare(insertionOf(table)), what);
@@ -202,7 +202,7 @@ void pullMap(const std::string& url, const std::string& name, const std::string&
 std::vector<std::string> pullVehicles(const std::string& url, const std::string& folder,
                                       bool unfinished) {
   std::vector<std::string> files;
-  std::string last;  // the newest map of each name comes first
+  std::string last;  // name of the last map; the newest map of each name comes first
   for (const ServerMap& map : listMaps(url)) {
     const bool wanted = map.file != kPushed && map.vehicle != last && (map.whole || unfinished);
     if (map.file != kPushed) last = map.vehicle;

@@ -46,7 +46,7 @@ void prepareStatements(Link& link) {
   need(link.prepare("put_working", upsertOf(workingTable())));
 }
 
-/// A reading transaction: one state of the file.
+/// A read transaction: all reads see one state of the file.
 class Snapshot {
  public:
   explicit Snapshot(const Connection& connection) : connection_(connection) {
@@ -60,7 +60,7 @@ class Snapshot {
   const Connection& connection_;
 };
 
-/// The position in the map's file; empty if it has none.
+/// Returns the position on Earth in the map's file; empty if there is none.
 std::vector<double> earthAnchorOf(const Connection& connection) {
   return earthAnchorFrom(MapReader(&connection).earthAnchor().value_or(""));
 }
@@ -95,7 +95,8 @@ Result<void> Pusher::attach(Link& link) {
   });
 }
 
-/// Finds or creates the row of this map; if new or of another outbox, the map there is empty.
+/// Finds or creates the row of this map on the server. If the row is new or of another outbox, the
+/// server's map becomes empty.
 void Pusher::introduce(Link& link) {
   Values values;
   values.put(std::string_view(vehicle_)).put(std::string_view(mark_.file));
@@ -142,7 +143,8 @@ Portion Pusher::pushPortion(Link& link, std::int64_t most_rows, bool as_transact
   link.beginBatch(as_transaction);
   const auto read = attempt(
       [&] { at_.next_table < kOutboxTables ? readWhole(link, draft) : readChanges(link, draft); });
-  // If the file could not be read to the end, the server refuses the portion and stores none of it.
+  // After an error in reading the file, the empty name of the outbox makes the server refuse the
+  // whole portion.
   queueAdvance(link, draft, read.has_value() ? mark_.outbox : "");
   const auto done = link.endBatch();
   need(read);
@@ -197,7 +199,8 @@ void Pusher::queueWorking(Link& link) const {
   }));
 }
 
-/// Reads the tables row by row. Then the entries follow that the outbox received meanwhile.
+/// Queues the rows of the tables, up to the size of a portion, and the working set at the end.
+/// Entries that the outbox received meanwhile are sent afterwards as changes.
 void Pusher::readWhole(Link& link, Draft& draft) const {
   while (draft.next.next_table + 1 < kOutboxTables &&
          draft.rows < static_cast<std::uint64_t>(draft.most)) {

@@ -1,7 +1,7 @@
-// Sends the changes in a map's file to the server, in portions that are one transaction each: the
-// current rows, in the order of their last change. The server reports its last entry, so a portion
-// whose answer was lost is neither repeated nor left out. The whole map is sent if the server has
-// none or has missed changes.
+// Sends the changes in a map's file to the server in portions of one transaction each: the current
+// rows, in the order of their last change. The server returns the number of the last entry that it
+// has. A portion whose answer was lost is therefore neither repeated nor left out. The whole map is
+// sent if the server does not have it or has missed changes.
 #pragma once
 
 #include <cstdint>
@@ -24,17 +24,18 @@ struct Portion {
 
 class Pusher {
  public:
-  /// `earth_anchor`: parameters.h. The file is opened read-only.
+  /// `earth_anchor` is as in server_url.h. The file is only read.
   Pusher(std::string file, std::string vehicle, std::vector<double> earth_anchor);
 
-  /// Reads the server's last entry. Must precede the first push on each link, and the first push
-  /// after any failure.
+  /// Opens the file and asks the server for the last entry that it has. Call it before the first
+  /// push on each link, and again after any failure.
   Result<void> attach(Link& link);
-  /// Sends at most `most_rows` rows. If fewer remain, the portion is smaller, and `whole`.
+  /// Sends at most `most_rows` rows. `whole` of the result is true if none remain.
   Result<Portion> push(Link& link, std::int64_t most_rows);
-  /// For a file without outbox: copies `file` to this vehicle's map, in one transaction.
+  /// Replaces the map of this vehicle by the pusher's file, which needs no outbox, in one
+  /// transaction. `file` is the identity of the map's file on the server.
   Result<void> replaceAll(Link& link, const std::string& file);
-  /// Whether the file has entries that were not sent.
+  /// Whether rows remain to be sent.
   Result<bool> hasMore() const;
 
   std::int64_t sent() const { return at_.sent; }
@@ -44,7 +45,7 @@ class Pusher {
   struct Place {
     std::int64_t sent = 0, next_table = kOutboxTables, next_id = 0;
   };
-  struct Draft;  ///< a portion under construction
+  struct Draft;  ///< a portion that is being composed
   // These throw Failed; the public functions return its reason.
   void openFile(bool with_outbox);
   void introduce(Link& link);
@@ -58,7 +59,8 @@ class Pusher {
 
   const std::string file_, vehicle_;
   const std::vector<double> earth_anchor_;
-  std::vector<double> told_earth_;  ///< position on Earth as last sent: the given one or the file's
+  std::vector<double> told_earth_;  ///< position on Earth as last sent: the configured one or that
+                                    ///< of the file
   std::optional<Connection> connection_;
   OutboxMark mark_;
   bool has_outbox_ = true;

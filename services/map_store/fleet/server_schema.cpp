@@ -8,12 +8,12 @@
 namespace perdure::map_store::fleet {
 namespace {
 
-/// Only one process at a time creates the schema.
+/// Takes a lock, so that only one process at a time creates the schema.
 constexpr char kLock[] = "SELECT pg_advisory_xact_lock(1346720324)";
 
-// A map belongs to one file under one vehicle's name. `sent`: the server has the file's outbox
-// entries up to this one. While next_table is below 7, the whole file is being sent, and has
-// arrived up to row next_id of that table.
+// A map belongs to one file and one vehicle's name. The server has the entries of the file's outbox
+// up to `sent`. While next_table is below 8, the whole file is being sent, and row next_id of that
+// table is next.
 constexpr char kMaps[] = R"sql(
 CREATE TABLE perdure.about(version bigint NOT NULL);
 CREATE TABLE perdure.maps(
@@ -92,7 +92,7 @@ CREATE TRIGGER tell_tile AFTER INSERT OR UPDATE ON perdure.objects
   FOR EACH ROW EXECUTE FUNCTION perdure.tell_tile();
 )sql";
 
-// Without a graph, the map's newest frame of reference serves as M.
+// If the map has no graph, its newest frame of reference is used as M.
 constexpr char kPlaces[] = R"sql(
 CREATE INDEX objects_by_class ON perdure.objects(map, class);
 CREATE VIEW perdure.objects_in_map AS
@@ -109,9 +109,9 @@ CREATE VIEW perdure.objects_in_map AS
     NOT EXISTS (SELECT 1 FROM perdure.anchors a WHERE a.map = o.map)));
 )sql";
 
-// M's origin is at (latitude, longitude, height); its x axis is turned by yaw from east. Conversion
-// by ECEF as in common/earth/geodesy.cpp. EPSG:4978 is ECEF, 4979 is WGS 84 with heights. @ is the
-// schema of PostGIS.
+// M's origin is at (latitude, longitude, height); its x axis is turned by yaw from east. The
+// conversion uses ECEF, as in common/earth/geodesy.cpp. EPSG:4978 is ECEF, 4979 is WGS 84 with
+// heights. @ stands for the schema of PostGIS.
 constexpr char kOnEarth[] = R"sql(
 CREATE FUNCTION perdure.on_earth(x float8, y float8, z float8, latitude float8, longitude float8,
     above float8, yaw float8) RETURNS @geometry LANGUAGE sql IMMUTABLE PARALLEL SAFE AS $$
@@ -125,7 +125,8 @@ CREATE FUNCTION perdure.on_earth(x float8, y float8, z float8, latitude float8, 
 $$;
 )sql";
 
-// # is "local" or "wgs84", $ the SRID, POINT an expression of x, y, z and the map m.
+// # stands for "local" or "wgs84", $ for the SRID, and POINT for an expression of x, y, z and the
+// map m.
 constexpr char kGeometry[] = R"sql(
 CREATE VIEW perdure.objects_# AS
   SELECT o.*, POINT::@geometry(PointZ, $) AS place
@@ -175,7 +176,8 @@ std::string wholeSchema() {
          std::to_string(kServerSchema) + ");";
 }
 
-/// Uses the catalogue, because to_regclass may give an answer from before another process's commit.
+/// Returns whether schema perdure has `name`. Reads the catalogue, because to_regclass() may not
+/// see another process's commit yet.
 bool exists(Link& link, std::string_view name) {
   return need(link.ask("SELECT EXISTS(SELECT 1 FROM pg_catalog.pg_class c JOIN "
                        "pg_catalog.pg_namespace n ON n.oid = c.relnamespace "
@@ -184,7 +186,7 @@ bool exists(Link& link, std::string_view name) {
       .boolean(0, 0);
 }
 
-/// Runs `sql` unless schema perdure has `name`; one process at a time.
+/// Runs `sql` unless schema perdure has `name`. Only one process at a time does this.
 void makeOnce(Link& link, std::string_view name, const std::string& sql) {
   if (exists(link, name)) return;
   const auto done = attempt([&] {
@@ -197,7 +199,7 @@ void makeOnce(Link& link, std::string_view name, const std::string& sql) {
   need(done);
 }
 
-/// The schema of PostGIS; empty if it is not installed.
+/// Returns the schema of PostGIS; empty if PostGIS is not installed.
 std::string schemaOfPostgis(Link& link) {
   const auto answer =
       need(link.ask("SELECT quote_ident(n.nspname) FROM pg_extension e JOIN pg_namespace n "

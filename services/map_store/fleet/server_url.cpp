@@ -30,7 +30,7 @@ namespace {
          "written as %XX.");
 }
 
-/// If there are several hosts, commas separate their ports.
+/// Whether `c` may be part of the ports, which commas separate if there are several hosts.
 bool isOfPorts(char c) { return (c >= '0' && c <= '9') || c == ','; }
 
 void checkParts(const std::string& url, const std::string& key) {
@@ -38,7 +38,7 @@ void checkParts(const std::string& url, const std::string& key) {
     void operator()(PQconninfoOption* options) const { PQconninfoFree(options); }
     void operator()(char* text) const { PQfreemem(text); }
   };
-  char* ignored = nullptr;  // the message may repeat the URL
+  char* ignored = nullptr;  // libpq's message is not used, because it may repeat the URL
   const std::unique_ptr<PQconninfoOption, Free> options(PQconninfoParse(url.c_str(), &ignored));
   const std::unique_ptr<char, Free> freed(ignored);
   if (!options) cannotBeRead(key);

@@ -9,7 +9,8 @@
 namespace perdure::map_store::fleet {
 namespace {
 
-/// Each column is "TYPE:NAME"; the type is i (integer), r (real), t (text) or b (blob).
+/// Parses the columns of a table. Each is "TYPE:NAME" with the type i (integer), r (real), t (text)
+/// or b (blob).
 Table tableFrom(const std::string& name, const std::string& columns, bool has_nulls = false) {
   constexpr std::string_view kTypes = "irtb";  // in the order of Kind
   Table table{name, {}, has_nulls};

@@ -1,4 +1,4 @@
-// The tables that a map's file and the server share, and the bit-exact transfer of their rows.
+// Tables that both a map's file and the server have, and the bit-exact transfer of their rows.
 #pragma once
 
 #include <cstdint>
@@ -27,22 +27,25 @@ struct Table {
 };
 
 const Table& tableOf(OutboxTable table);
-/// `working`: positions, ids and beliefs that no other table has.
+/// The table `working`: positions and ids of the working set's tracks, and beliefs that no other
+/// table has.
 const Table& workingTable();
 
-/// "CREATE TABLE perdure.…" for the server.
+/// Returns "CREATE TABLE perdure.…" for the server.
 std::string creationOf(const Table& table);
-/// "INSERT … ON CONFLICT …" with the map's number as $1 and the columns from $2.
+/// Returns "INSERT … ON CONFLICT …" for the server. $1 is the map's number; the columns begin at
+/// $2.
 std::string upsertOf(const Table& table);
-/// "SELECT …" of all columns from the file.
+/// Returns "SELECT …" of all columns from the file.
 std::string selectionOf(const Table& table);
-/// "INSERT …" of all columns, into a file.
+/// Returns "INSERT …" of all columns into a file.
 std::string insertionOf(const Table& table);
 std::string columnsOf(const Table& table);
 
-/// The current row of `row`, as parameters of upsertOf.
+/// Returns the current row of the statement `row` as parameters of upsertOf().
 Values valuesOf(const Table& table, std::int64_t map, const Statement& row);
-/// The reverse: binds a row of the server to insertionOf, with columns as in `table`.
+/// Binds a row from the server, whose columns are those of `table`, to a statement of
+/// insertionOf().
 void bindRow(const Table& table, const Answer& answer, int row, Statement& to);
 
 }  // namespace perdure::map_store::fleet

@@ -1,4 +1,5 @@
-// Messages of a program without PostgreSQL's library; checkUrl throws first.
+// Stubs for a program without PostgreSQL's library. They are never called, because checkUrl()
+// throws first.
 #include "common/base/errors.h"
 #include "services/map_store/fleet/map_transfer.h"
 #include "services/map_store/fleet/replicator.h"

@@ -69,7 +69,8 @@ std::vector<float> activationsOf(const std::vector<std::pair<std::size_t, double
   for (const double one : p) sum += one;
   const auto unnamed = static_cast<double>(std::count(p.begin() + 1, p.end(), 0.0));
   if (sum >= 1.0 - kLeast) {
-    // Independent scores, or a certain class: each class is compared with its complement.
+    // The scores are independent, or one class is certain: each class is compared with its
+    // complement.
     std::vector<float> ratios(classes + 1, 0.0F);
     for (std::size_t k = 1; k <= classes; ++k) {
       const double one = std::clamp(p[k], kLeast, 1.0 - kLeast);

@@ -1,4 +1,5 @@
-// Converts Detection2DArray of ROS to detections: their frame, and scores as evidence.
+// Converts Detection2DArray of ROS to detections: finds their frame, and converts scores to
+// activations.
 #pragma once
 
 #include <deque>
@@ -14,7 +15,8 @@ namespace perdure::ros2 {
 class FrameBook {
  public:
   void add(TimePoint ros_stamp, const FrameStamp& stamp);
-  /// Frame within 1 ms of the stamp (some detectors store seconds); nullptr if there is none.
+  /// Returns the frame within 1 ms of the stamp, or nullptr. Some detectors store stamps as
+  /// floating-point seconds.
   const FrameStamp* find(TimePoint ros_stamp) const;
   bool isAfterAll(TimePoint ros_stamp) const;
 
@@ -26,9 +28,10 @@ class FrameBook {
   std::deque<Entry> frames_;
 };
 
-/// Activations of one box: log-probabilities of clutter and of `classes` classes. A soft-max gives
-/// the same scores if they sum to at most 1. `named`: class and score, 0 < score ≤ 1. Of the
-/// remaining probability, `other_share` goes to classes without a score, and the rest to clutter.
+/// Returns the activations of one box: log-likelihoods of clutter and of `classes` classes.
+/// `named`: class and score, 0 < score ≤ 1. If the scores sum to less than 1, a soft-max of the
+/// result gives the same scores; `other_share` of the remaining probability goes to classes without
+/// a score, and the rest to clutter. Otherwise the scores are independent.
 std::vector<float> activationsOf(const std::vector<std::pair<std::size_t, double>>& named,
                                  std::size_t classes, double other_share);
 
@@ -36,7 +39,7 @@ struct BoxesRead {
   std::vector<Detection> detections;
   std::vector<Reason> refused;  ///< reasons box_malformed, score_malformed, class_unknown
 };
-/// `classes`: lower-case. A class_id is one of them, or its index.
+/// Converts the boxes. `classes`: lower-case names. A class_id is one of these names, or its index.
 BoxesRead boxesOf(const ros::Detection2DArray& message, const std::vector<std::string>& classes,
                   double other_share);
 

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::size_t kSeconds = 10;
-constexpr char kElsewhere[] = "perdure";  ///< input name of frames not from the bridge
+constexpr char kElsewhere[] = "perdure";  ///< input name of frames that other processes publish
 
 std::string spanText(std::int64_t ns) {
   return fmt::format("{:.6g} s", static_cast<double>(std::llabs(ns)) * 1e-9);
@@ -120,7 +120,7 @@ Result<void> Clocks::requireCommon(const std::string& name, std::int64_t offset_
     return {};
   }
   if (common_ns_) return tl::unexpected(elsewhere(name, offset_ns, now_ns));
-  return fail("clock_unknown");  // the state is temporary, so no message explains it
+  return fail("clock_unknown");  // temporary, so without an explanation
 }
 
 Result<std::int64_t> Clocks::onCommon(const std::string& name, Input& input, std::int64_t stamp_ns,

@@ -1,4 +1,4 @@
-// Converts the stamps of several drivers to one clock, which is the clock that most of them use.
+// Converts the stamps of several drivers to one common clock: the clock that most of them use.
 #pragma once
 
 #include <cstdint>
@@ -14,11 +14,11 @@
 
 namespace perdure::ros2 {
 
-/// Smallest arrival − stamp in the last ten seconds: the clock offset.
+/// Estimates a clock's offset: the smallest difference arrival − stamp in the last ten seconds.
 class LeastDelay {
  public:
   void observe(std::int64_t stamp_ns, std::int64_t now_ns);
-  /// Empty in the first half second.
+  /// Returns the offset in ns, or nothing in the first half second.
   std::optional<std::int64_t> offset() const;
   std::uint64_t jumps() const { return jumps_; }
 
@@ -35,20 +35,21 @@ class LeastDelay {
 
 class Clocks {
  public:
-  /// `apart`: largest difference of arrival − stamp on one clock.
+  /// `apart`: stamps are on the same clock if their arrival − stamp differ by at most this time.
   explicit Clocks(Duration apart) : apart_ns_(apart.count()) {}
 
-  /// Adds an input, once and before its stamps. `shared`: its stamps are on the common clock.
+  /// Adds an input; call it once, before its first stamp. `shared`: its stamps should be on the
+  /// common clock.
   void addInput(const std::string& input, bool shared);
 
-  /// Converts a stamp to the common clock; `now_ns` is its time of arrival. Times of one input
-  /// increase. Fails with stamp_missing, stamp_malformed, stamp_elsewhere (on another clock than
-  /// the other inputs) or stamp_not_newer. It fails with clock_unknown if there is no common clock
-  /// yet, or if the offset of an own clock is not known yet.
+  /// Converts a stamp to the common clock; `now_ns` is its time of arrival. The results for one
+  /// input increase. Fails with stamp_missing, stamp_malformed, stamp_elsewhere (on another clock
+  /// than the other inputs) or stamp_not_newer. It fails with clock_unknown if there is no common
+  /// clock yet, or if the offset of an own clock is not known yet.
   ///
   /// A clock becomes the common one if two inputs agree on it, if one input keeps it for half a
   /// second, or if there is only one input. More inputs must agree on it than on the previous
-  /// clock. A single wrong stamp, first or later, therefore has no effect.
+  /// clock. Therefore a single wrong stamp has no effect, even if it is the first.
   Result<TimePoint> place(const std::string& input, const ros::Time& stamp, std::int64_t now_ns);
   /// Adds a time of the common clock from another source.
   void observeCommon(TimePoint time, std::int64_t now_ns);
@@ -57,9 +58,9 @@ class Clocks {
   struct Input {
     bool shared = true;
     LeastDelay delay;
-    std::int64_t offset_ns = 0;                 ///< arrival − stamp of the last stamp
+    std::int64_t offset_ns = 0;                 ///< arrival − stamp for the last stamp
     std::optional<std::int64_t> heard_ns = {};  ///< arrival of the last stamp
-    /// Offset that two successive stamps agree on, and the start of the agreement.
+    /// Offset on which two successive stamps agree, and the time since which stamps agree.
     std::optional<std::int64_t> kept_ns = {};
     std::int64_t kept_since_ns = 0;
     std::optional<TimePoint> last = {};  ///< last time, on the common clock
@@ -69,7 +70,8 @@ class Clocks {
   Result<void> requireCommon(const std::string& name, std::int64_t offset_ns, std::int64_t now_ns);
   void hear(Input& input, std::int64_t offset_ns, std::int64_t now_ns) const;
   bool near(std::int64_t a_ns, std::int64_t b_ns) const;
-  /// Shared inputs received in the last second that agree on this offset.
+  /// Returns the shared inputs whose stamps agree on this offset, and of which one arrived in the
+  /// last second.
   std::vector<std::string> keepersOf(std::int64_t offset_ns, std::int64_t now_ns) const;
   Reason elsewhere(const std::string& name, std::int64_t offset_ns, std::int64_t now_ns) const;
 

@@ -14,11 +14,11 @@ namespace {
 using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
 constexpr std::size_t kKnots = 1024, kFrames = 64;
 constexpr Duration kLongestGap = std::chrono::milliseconds(500);
-constexpr double kUnknownVariance = 1e6;  ///< value that ROS filters write for unknown variances
+constexpr double kUnknownVariance = 1e6;  ///< ROS filters write such values for unknown variances
 
 Eigen::Vector3d vectorOf(const ros::Vector3& v) { return {v.x, v.y, v.z}; }
 
-/// Empty if the covariance is zero, or has the value for "not known".
+/// Returns the covariance of a message; nothing if it is zero or marked as unknown.
 Result<std::optional<Matrix6>> covarianceOf(const std::array<double, 36>& numbers) {
   const Matrix6 given = Eigen::Map<const Matrix6>(numbers.data());
   if (!given.allFinite())
@@ -60,7 +60,7 @@ Result<void> PoseTrack::onOdometry(const ros::Odometry& message, TimePoint time,
   one.T_WB = T_W_child * T_child_body;
   // The velocity of the body includes its rotation about the child frame.
   one.v_WB = T_W_child.q * (v + w.cross(T_child_body.p));
-  // Transforms [p, θ in W] of the child to [θ in the body, p] of the body.
+  // Transforms errors [p, θ in W] of the child frame to errors [θ in the body, p] of the body.
   const Eigen::Matrix3d R = one.T_WB.R();
   Eigen::Matrix<double, 6, 6> J = Eigen::Matrix<double, 6, 6>::Zero();
   J.block<3, 3>(0, 3) = R.transpose();
@@ -72,7 +72,7 @@ Result<void> PoseTrack::onOdometry(const ros::Odometry& message, TimePoint time,
   if (*given) covariance = **given;
   one.covariance.topLeftCorner<6, 6>() = J * covariance * J.transpose();
   one.covariance.diagonal().array() += 1e-12;
-  constexpr double kSigmaSpeed = 0.2;  // m/s; its accuracy does not matter
+  constexpr double kSigmaSpeed = 0.2;  // m/s; the value is not critical
   one.covariance.bottomRightCorner<3, 3>().diagonal().array() += kSigmaSpeed * kSigmaSpeed;
 
   Result<void> said;

@@ -12,7 +12,7 @@
 namespace perdure::ros2 {
 
 struct PoseTrackOptions {
-  /// Used if messages have no covariance; m, rad.
+  /// Standard deviations (m, rad) for messages without a covariance.
   double sigma_position = 0.05, sigma_rotation = 0.01;
   double jump_m = 3.0;
 };
@@ -22,14 +22,15 @@ class PoseTrack {
   PoseTrack(const PoseTrackOptions& options, WorldId world) : options_(options), world_(world) {}
 
   /// Adds an odometry message. `T_child_body`: pose of the body in the message's child frame. Fails
-  /// with not_finite, no_rotation or covariance. With jumped, the message is used, in a new epoch.
-  /// Decreasing times also begin a new epoch.
+  /// with not_finite, no_rotation or covariance. Also fails with jumped after a jump of the pose,
+  /// but uses the message, in a new epoch. Decreasing times begin a new epoch too.
   Result<void> onOdometry(const ros::Odometry& message, TimePoint time,
                           const RigidTransform& T_child_body);
-  /// Adds a frame that needs a pose. Fails with "late" if too many wait; the oldest is dropped.
+  /// Adds a frame that needs a pose. If too many frames wait, drops the oldest and fails with
+  /// "late".
   Result<void> onFrame(const FrameStamp& stamp);
-  /// Poses of the frames that can be interpolated now, in order of the frames. Frames before the
-  /// first message, or in a gap of half a second, get no pose; `untold` counts them.
+  /// Returns the poses that can be interpolated now, in order of the frames. Frames before the
+  /// first message, or in a gap of half a second, receive no pose; `untold` counts them.
   std::vector<Odometry> take();
   std::uint64_t untold() const { return untold_; }
 

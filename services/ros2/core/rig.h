@@ -1,4 +1,4 @@
-// Calibration from CameraInfo and /tf_static. A rig file takes precedence.
+// Builds the calibration from CameraInfo and /tf_static. A rig file takes precedence over both.
 #pragma once
 
 #include <optional>
@@ -14,7 +14,7 @@ namespace perdure::ros2 {
 
 struct RigCamera {
   std::string name;        ///< name in Perdure
-  std::string info_topic;  ///< topic named in messages
+  std::string info_topic;  ///< topic of CameraInfo, for messages to the user
   bool rectified = false;  ///< its images are rectified
 };
 
@@ -32,12 +32,14 @@ class Rig {
   void onImuOf(const std::string& frame_id);
   void onOdometryOf(const std::string& child_frame_id);
 
-  /// The calibration once it is complete, and after each change. Its source is not set.
+  /// Returns the calibration once it is complete, and again after each change; otherwise nothing.
+  /// Its source is not set.
   std::optional<Calibration> news();
   const std::optional<Calibration>& complete() const { return told_; }
-  /// The missing inputs, with the fix; empty if none are missing.
+  /// Returns the missing inputs, with the fix; empty if none are missing.
   std::string missing() const;
-  /// The body in the odometry's child frame, if a transform between the two is known.
+  /// Returns the pose of the body in the odometry's child frame, if the transform between the two
+  /// is known.
   std::optional<RigidTransform> bodyIn(const std::string& child_frame_id) const;
 
  private:

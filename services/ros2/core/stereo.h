@@ -1,4 +1,5 @@
-// Gives the second camera's images the stamps of the first one's: a pair is one frame.
+// Gives images of the second camera the stamp of the matching image of the first: a pair is one
+// frame.
 #pragma once
 
 #include <chrono>
@@ -28,7 +29,8 @@ class Stereo {
     });
     return paired;
   }
-  /// A frame of the second camera with the stamp of its pair, if that has arrived.
+  /// Adds a frame of the second camera. Returns it with the stamp of the first camera's matching
+  /// frame if that has arrived; otherwise the frame waits.
   std::optional<Frame> onSecond(Frame frame) {
     for (const FrameStamp& first : firsts_) {
       if (std::chrono::abs(frame.stamp.time - first.time) > kTolerance) continue;

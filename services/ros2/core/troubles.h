@@ -1,4 +1,4 @@
-// Problems with the inputs, counted by input and reason, with a sentence on the fix.
+// Collects problems with the inputs: counts by input and reason, and a sentence with the fix.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ class Troubles {
   }
   const ReasonCounts& counts() const { return counts_; }
   const std::map<std::string, std::string>& sentences() const { return first_; }
-  /// The newest sentence if it is at most `longest_ns` old; otherwise empty.
+  /// Returns the newest sentence if it is at most `longest_ns` old; otherwise empty.
   std::string newest(std::int64_t now_ns, std::int64_t longest_ns) const {
     return any_ && now_ns - last_ns_ <= longest_ns ? last_ : std::string();
   }

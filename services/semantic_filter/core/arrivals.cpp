@@ -46,7 +46,7 @@ class Arrival {
     for (const auto& [track, object] : arrivals_.members) objects[object].push_back(track);
     std::vector<MergeRecord> fused;
     for (auto& [object, tracks] : objects) {
-      tracks.push_back(object);  // also a track of its own
+      tracks.push_back(object);  // the id of the object is also the id of a track
       std::erase_if(tracks, [&](TrackId track) { return find(track) == end(); });
       std::stable_sort(tracks.begin(), tracks.end(), [&](TrackId a, TrackId b) {
         return find(a)->life.recalled < find(b)->life.recalled;
@@ -70,7 +70,7 @@ class Arrival {
       belief_.fused[other] = goes_on;
       fused.push_back({.survivor = goes_on, .absorbed = other, .by_map = true});
     } else if (const auto unseen = find(other); unseen->life.recalled) {
-      find(goes_on)->life.merge(unseen->life);  // detections of one object, whatever its class
+      find(goes_on)->life.merge(unseen->life);  // both are one object, whatever its class
       belief_.tracks.erase(unseen);
       fused.push_back({.survivor = goes_on, .absorbed = other, .by_map = true});
     }

@@ -1,5 +1,5 @@
 // Arrivals: tracks that the map gives to the working set, and tracks that the map merges. They are
-// an input of a frame, so a repeated step takes them again. Derivation of their covariances:
+// an input of a frame, so a repeated step uses them again. Derivation of their covariances:
 // tools/docs/maths/pose_error.md.
 #pragma once
 
@@ -12,7 +12,8 @@
 namespace perdure::semantic_filter {
 
 struct Arrivals {
-  /// Placed relative to the body: C = A P_g follows from the pose error of the frame.
+  /// Objects that are placed relative to the body. Their C = A P_g follows from the pose error of
+  /// the frame.
   std::vector<ObjectBelief> placed;
   /// A belief as this process published it, with the product of transitions of that time.
   struct Published {
@@ -20,15 +21,16 @@ struct Arrivals {
     Matrix6d product = Matrix6d::Identity();
   };
   std::vector<Published> as_published;
-  std::map<TrackId, ObjectId> members;  ///< objects of the tracks that have another id
+  std::map<TrackId, ObjectId> members;  ///< object of each track, if its id is another
   ExistenceEvidence evidence = ExistenceEvidence::kRecall;
 
   ObjectId objectOf(TrackId track) const;
 };
 
-/// Takes arrivals into the belief before a frame. A track that was detected since stays unchanged.
-/// Two tracks of one object are fused; the track that was detected on this visit survives. If their
-/// classes exclude each other, the track that was not detected leaves. Returns the fused tracks.
+/// Adds arrivals to the belief before a frame. A track that was detected since its recall stays
+/// unchanged. Two tracks of one object are fused; the one that was detected on this visit remains.
+/// If their classes exclude each other, a track that was not detected is removed. Returns the
+/// merges.
 std::vector<MergeRecord> takeIn(const Arrivals& arrivals, Belief& belief, const FrameInput& input,
                                 const SemanticFilter& filter);
 

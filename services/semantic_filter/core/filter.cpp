@@ -91,10 +91,10 @@ struct ScoredTrack {
   std::size_t track;  ///< index in Belief::tracks
   TrackScore score;
   std::optional<std::size_t> assigned = {};  ///< the box of the frame that is assigned to the track
-  /// The track before its update, if it was confirmed, is static, and a box is near. One bad box
-  /// must not deform the track.
+  /// The track before its update, if it has been confirmed, is static, and a box is near. It
+  /// replaces the track if the box deforms it.
   std::optional<Track> before = {};
-  bool sound = true;  ///< state of its numbers after the update
+  bool sound = true;  ///< whether its numbers are valid after the update
 };
 
 struct Step {
@@ -173,8 +173,8 @@ Eigen::VectorXd Step::associateAndUpdate(ScratchVector<ScoredTrack>& scored) {
   return association.explained;
 }
 
-/// Reduces the mixture of one track after its update. If no hypothesis remains, the box counts as a
-/// miss, or the box re-initialises the state; otherwise existence becomes 0.
+/// Reduces the mixture of one track after its update. If no hypothesis remains, the frame counts as
+/// a miss, or the box re-initialises the state. If both fail, existence becomes 0.
 void Step::manage(Track& track, ScoredTrack& scored) {
   const auto pmf = classShares(track);
   reduceMixture(track, frame);
@@ -243,7 +243,7 @@ StepReport SemanticFilter::step(Belief& belief, const FrameInput& heard, IdBook&
   if (!heard.boxes) return report;
   FrameInput input = withLearnedNoise(belief, heard, parameters_.box);
   markSidesBesideNearer(*input.boxes, input.view);
-  // Both change the meaning of a box or a miss, so they precede all scores.
+  // Partial views and revised occlusion change the meaning of boxes and misses, so they come first.
   explainPartialViews(belief, visibilities, input, parameters_, priors_);
   const FrameContext frame = contextOf(belief, input, parameters_, priors_);
   reviseOcclusion(belief, visibilities, input, parameters_);
@@ -251,12 +251,12 @@ StepReport SemanticFilter::step(Belief& belief, const FrameInput& heard, IdBook&
   // All tracks are scored before the first update, because association compares their scores.
   auto scored = step.scoreAll(visibilities);
   const auto explained = step.associateAndUpdate(scored);
-  // A track that lost its shape may take its box again before this box initiates another track.
+  // A track without hypotheses is re-initialised by its box before the box can initiate a new one.
   step.manageAll(scored);
   initiateTracks(belief, visibilities, explained, input, frame, ids);
   std::erase_if(belief.tracks, [](const Track& t) { return t.hypotheses.empty(); });
   report.broken = std::erase_if(belief.tracks, [](const Track& t) {
-    return t.visibility.fraction > 0.0 && !sound(t);  // the other tracks did not change
+    return t.visibility.fraction > 0.0 && !sound(t);  // tracks out of view did not change
   });
   // Track management uses the detections of this frame and includes new tracks.
   for (Track& t : belief.tracks) {

@@ -1,4 +1,4 @@
-// One step of the filter (eq. 4, 8, 9). Late frames repeat the steps (core/history.h).
+// One step of the filter (paper, eq. 4, 8, 9). Late detections repeat steps (core/history.h).
 #pragma once
 
 #include <vector>
@@ -21,8 +21,8 @@ class SemanticFilter {
 
   /// Replaces the belief before a frame by the belief after it.
   StepReport step(Belief& belief, const FrameInput& heard, IdBook& ids) const;
-  /// Fuses two tracks of one object. The older one gives the mixture; `id` names the result.
-  /// Returns false and does nothing if their classes exclude each other. Both must exist.
+  /// Fuses two tracks of one object. The result has the mixture of the older one, and the id `id`.
+  /// Returns false and does nothing if their classes exclude each other. Both tracks must exist.
   bool join(Belief& belief, TrackId id, TrackId absorbed, const FrameInput& input) const;
 
  private:

@@ -1,4 +1,5 @@
-// The latest frames with the belief before each, so that late detections give the same posterior.
+// The latest frames with the belief before each. With them, late detections give the same posterior
+// as timely ones.
 #pragma once
 
 #include <cstddef>
@@ -28,15 +29,16 @@ struct HistoryFrame {
 
 class History {
  public:
-  /// Stores `frames` frames. Counts in `reasons`, which must outlive the history.
+  /// Stores at most `frames` frames. Counts invalid tracks in `reasons`, which must outlive this.
   History(const Parameters& parameters, const ClassPriors& priors, std::size_t frames,
           ReasonCounts& reasons);
   History(const History&) = delete;
   History& operator=(const History&) = delete;
 
-  /// Begins another frame of reference. The learned values of networks and streets remain.
+  /// Begins another frame of reference: removes tracks and frames, keeps the learned parameters.
   void beginWorld();
-  /// Adds a frame that is newer than all others and not yet stepped. Removes the oldest frame.
+  /// Adds a frame that is newer than all others and not yet stepped. Removes the oldest frame if
+  /// there are too many.
   HistoryFrame& add(const Odometry& odometry, std::shared_ptr<const CameraModel> camera);
   /// The next frame that is stepped for the first time takes the arrivals in.
   void arrive(std::shared_ptr<const Arrivals> arrivals) { arrivals_ = std::move(arrivals); }
@@ -44,7 +46,7 @@ class History {
   /// Steps frame `index` and all stepped ones after it again.
   void stepAgainFrom(std::size_t index);
 
-  /// Removes tracks and their arrivals from all beliefs.
+  /// Removes tracks from all beliefs and from the arrivals of all frames.
   void erase(const std::set<TrackId>& ids);
 
   std::deque<HistoryFrame>& frames() { return frames_; }
@@ -52,8 +54,9 @@ class History {
   HistoryFrame& newest() { return frames_.back(); }
   TimePoint oldestTime() const { return frames_.front().input.stamp.time; }
   /// Predicts the frame after `frame`, with the motion and the time step since the previous frame.
+  /// Returns nothing without a previous frame of the same world.
   std::optional<ComingFrame> comingAfter(const HistoryFrame& frame) const;
-  /// Merges of frames that were stepped again, since the last call.
+  /// Returns the merges of frames that were stepped again since the last call.
   std::vector<MergeRecord> takeLateMerges();
 
   const Belief& belief() const { return belief_; }

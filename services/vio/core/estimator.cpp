@@ -16,7 +16,8 @@
 namespace perdure::vio {
 namespace {
 
-// Limits beyond which the filter has diverged, even with a small covariance.
+// Limits in m/s, rad/s and m/s²; beyond them the filter has diverged, even if its covariance is
+// small. The scale error has no unit.
 constexpr double kMaxSpeed = 150.0, kMaxGyroBias = 1.0, kMaxAccelBias = 5.0;
 constexpr double kMaxSpeedSigma = 10.0, kMaxScaleError = 0.3;
 
@@ -48,7 +49,7 @@ Eigen::Vector3d Estimator::turnOfReadout(const ImuBuffer& imu, TimePoint time) {
   return readout_s * rowMotion(nav, imu, time, half, options_.gravity, readings_, scale).rate;
 }
 
-/// Computes the row motion of the newest clone, again after an update.
+/// Computes the row motion of the newest clone. It is repeated after the update.
 void Estimator::measureRows(const ImuBuffer& imu) {
   const double readout_s = state_->longestReadout();
   if (readout_s == 0.0) return;
@@ -79,7 +80,8 @@ Result<void> Estimator::propagateTo(const FrameInput& input, const ImuBuffer& im
   return {};
 }
 
-/// True if half of the points rest and the IMU measures no turn; a lorry may also cause this.
+/// Returns true if half of the points rest and the gyroscope measures no turn. Points on a lorry
+/// that moves along with the body may cause this too.
 bool Estimator::medianRests(const FrameInput& input) const {
   const RestOptions& o = options_.rest;
   if (!input.motion_px || *input.motion_px > o.disparity_px) return false;
@@ -94,7 +96,8 @@ bool Estimator::velocityMayBeZero() const {
   return passesGate(state_->nav.v_WB, S, 0.99);
 }
 
-/// Part of the image moves. A distant background seems at rest too, so the IMU must agree.
+/// Returns true if the body rests while part of the image moves. A distant background rests in the
+/// image of a moving body too, so the IMU must agree.
 bool Estimator::standsInTraffic(const ImuBuffer& imu, bool background_rests) {
   const bool knew = standstill_.known();
   const bool held = standstill_.holds(imu, state_->time, options_.imu);
@@ -200,7 +203,7 @@ Result<void> Estimator::admitPoints(std::uint64_t frame, bool window_full) {
     if (!added) {
       reasons_.add(added.error());
       if (added.error().code.starts_with("update_")) return added;
-      if (added.error().code == "slam_depth_unknown") continue;  // the track may be used once
+      if (added.error().code == "slam_depth_unknown") continue;  // updateMsckf() may use the track
     }
     database_.erase(track->id);
   }
@@ -226,7 +229,8 @@ Result<void> Estimator::visionUpdate(const FrameInput& input, FrameEstimate& out
   return {};
 }
 
-/// The length of a path at the scene's depth is as uncertain as that depth.
+/// Enlarges the position covariance. The length of the path is as uncertain as the scene's depth,
+/// from which it was computed.
 void Estimator::widenBySupposedDepth() {
   const Clone* const last = previous_frame_ ? state_->clone(*previous_frame_) : nullptr;
   if (!last) return;
@@ -238,7 +242,7 @@ void Estimator::widenBySupposedDepth() {
 
 void Estimator::report(const FrameInput& input, FrameEstimate& out) {
   const auto P = state_->P();
-  // The pose at the image is that of the newest clone, with the error of the time offset.
+  // The covariance is that of the newest clone, which includes the error of the time offset.
   const Clone& newest = state_->clones.back();
   out.nav = state_->nav;
   out.covariance << P.block<6, 6>(newest.at, newest.at), P.block<6, 3>(newest.at, kVelocity),
@@ -264,7 +268,8 @@ void Estimator::report(const FrameInput& input, FrameEstimate& out) {
 void Estimator::marginalise(bool at_rest) {
   const std::size_t n = state_->clones.size();
   if (at_rest && n >= 2) {
-    // The newest pose repeats the previous one, whose removal preserves the window's baseline.
+    // The newest pose equals the previous one. Removing the previous one preserves the window's
+    // baseline.
     const std::uint64_t frame = state_->clones[n - 2].frame;
     database_.removeFrame(frame);
     state_->removeClone(frame);

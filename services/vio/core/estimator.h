@@ -1,5 +1,6 @@
-// The filter over tracked points. It propagates to each image, clones, updates, marginalises and
-// returns the pose of the body (paper, eq. 3 and 5). It does not access images, threads or clocks.
+// The filter over tracked points. For each image it propagates and clones the state, updates it,
+// marginalises, and returns the pose of the body (paper, eq. 3 and 5). It does not access images,
+// threads or clocks.
 #pragma once
 
 #include <Eigen/Core>
@@ -37,7 +38,7 @@ struct FrameInput {
   std::optional<double> motion_px;  ///< median image motion over the last frames
   std::optional<SpeedReading> speed;
   std::optional<double> most_motion_px = {};  ///< 0.8 quantile of the points' image motion
-  double still_share = 0.0;  ///< share of the points that have stayed in place for a second
+  double still_share = 0.0;                   ///< share of points that have not moved for a second
 };
 
 struct FrameEstimate {
@@ -47,7 +48,7 @@ struct FrameEstimate {
   std::uint64_t increment_from = 0;
   Matrix6d transition = Matrix6d::Identity(), increment_covariance = Matrix6d::Zero();
   bool at_rest = false;
-  /// Whether the gate refused the speed; empty without a speed.
+  /// True if the gate refused the speed; empty if there was no speed.
   std::optional<bool> speed_refused;
   int points_used = 0;                  ///< points of this image used by all updates
   int points_refused = 0;               ///< points that the gate or the triangulation refused
@@ -56,36 +57,42 @@ struct FrameEstimate {
 
 class Estimator {
  public:
-  /// One or two cameras. readout_s: of each camera, 0 for a global shutter; empty: all global.
+  /// T_BC has one or two cameras. readout_s is the read-out time of each camera, 0 for a global
+  /// shutter; empty if all are global.
   Estimator(const Options& options, const std::vector<RigidTransform>& T_BC, double time_offset_s,
             const std::vector<double>& readout_s = {});
 
-  /// Begins at a start, with an empty window. A running filter is reset.
+  /// Initialises the state from `start`, with an empty window. A running filter is reset.
   void start(const Start& start);
-  /// Begins with a saved state of the same cameras.
+  /// Initialises the state from a saved state, for which fits() must succeed.
   void restore(const SavedState& saved);
-  /// Checks that a saved state has the same cameras, shutters and estimated quantities. Fails with
-  /// state_other_cameras, state_other_shutter, state_other_gyro_scale or state_other_readout.
+  /// Checks that a saved state has the cameras, shutters and estimated quantities of this filter.
+  /// Fails with state_other_cameras, state_other_shutter, state_other_gyro_scale or
+  /// state_other_readout.
   Result<void> fits(const SavedState& saved) const;
-  /// Returns the state for restore(), without world and next_track. Needs started().
+  /// Returns the state for restore(); the caller sets world and next_track. Call it only if
+  /// started().
   SavedState save() const;
   bool started() const { return state_.has_value(); }
   void stop() { state_.reset(); }
   /// After this call, estimates carry the innovations of the state's points.
   void keepInnovations() { keeps_innovations_ = true; }
 
-  /// Propagates over `imu` to the frame and updates. Fails with "frame_not_after_state" or
-  /// "imu_missing"; with "numbers_…" the estimator stops.
+  /// Propagates with the samples of `imu` to the frame and updates the state. Fails with
+  /// "frame_not_after_state", "imu_missing" or "numbers_…". In the last case the estimator is
+  /// stopped.
   Result<FrameEstimate> process(const FrameInput& input, const ImuBuffer& imu);
 
-  /// Rotation R_B1_B0 of the body from the newest frame to an IMU time, from the gyroscope.
+  /// Returns the gyroscope's rotation R_B1_B0 of the body from the state's time to the IMU time
+  /// `to`. Returns the identity without a state or samples, or if `to` is not later.
   Eigen::Matrix3d predictRotation(const ImuBuffer& imu, TimePoint to);
 
-  /// Rotation of the body, a rotation vector in B, while the first camera reads out an image taken
-  /// at an IMU time. Before a start it uses the raw rate. Zero for a global shutter.
+  /// Returns the rotation vector, in B, of the body while the first camera reads out an image of
+  /// the IMU time `time`. Before a start, the gyroscope's bias is assumed to be zero. Returns zero
+  /// for a global shutter.
   Eigen::Vector3d turnOfReadout(const ImuBuffer& imu, TimePoint time);
 
-  /// Points of the newest image whose position is known, without descriptors.
+  /// Returns the points of the newest image whose position is known, without descriptors.
   std::vector<Landmark> landmarks() const;
 
   const State& state() const { return *state_; }
@@ -123,10 +130,10 @@ class Estimator {
   TrackedFrame newest_;
   /// Readings of one interval; a member so that its memory is reused.
   std::vector<ImuReading> readings_;
-  std::vector<ImuReading> rows_;  ///< readings around one image; a member for the same reason
+  std::vector<ImuReading> rows_;  ///< readings around one image; its memory is reused too
   ReasonCounts reasons_;
   bool agreed_ = false;      ///< most points of the last image agreed with their predictions
-  double supposed_m_ = 0.0;  ///< length of the path whose points had the depth of the scene
+  double supposed_m_ = 0.0;  ///< m of path along which most points had the scene's depth
   std::optional<std::uint64_t> previous_frame_;
   Matrix6d previous_pose_covariance_ = Matrix6d::Zero();
 };

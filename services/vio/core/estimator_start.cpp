@@ -23,7 +23,7 @@ void Estimator::start(const Start& start) {
       P.diagonal().segment<3>(at + 3).setConstant(p * p);
       factor = c.second_camera_factor;
     }
-    // The second camera has the error of the first, and a small error of its own.
+    // The second camera's pose has the error of the first one's, and a small error of its own.
     if (T_BC_.size() == 2) {
       const int a = state_->extrinsicsAt(0), b = state_->extrinsicsAt(1);
       const RigidTransform T_01 = T_BC_[0].inverse() * T_BC_[1];

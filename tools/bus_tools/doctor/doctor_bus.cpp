@@ -34,13 +34,13 @@ Findings checkUsualServices(const std::vector<std::string>& participants,
 }
 
 Finding checkCount(std::size_t participants) {
-  constexpr std::size_t kMany = 50;  // DDS has 61 participant indices without multicast
+  constexpr std::size_t kMany = 50;  // warns early: without multicast, at most 61 participants fit
   const std::string text = std::to_string(participants) + " participants on the bus";
   if (participants < kMany) return {Verdict::kOk, text};
   return {Verdict::kWarn, text + "; near the limit of 61: another bus.domain parts them"};
 }
 
-/// Finds endpoints with another type name, whose samples DDS drops silently.
+/// Finds endpoints whose type name is not that of the topic. DDS drops their samples silently.
 Findings checkTypes(const std::vector<bus::RemoteEndpoint>& endpoints, const std::string& prefix) {
   Findings findings;
   for (const bus::RemoteEndpoint& endpoint : endpoints) {

@@ -52,7 +52,7 @@ void runDoctor(const DoctorOptions& given) {
     const auto network = named ? given.network : configuredNetwork(given.configuration);
     std::error_code error;
     if (named || std::filesystem::is_regular_file(network, error)) {
-      // A damaged recording may not open; in that case the fixed copy is used.
+      // Uses the fixed copy if there is one, because a damaged recording may not open.
       const Drive drive = given.copy.empty() || !std::filesystem::is_directory(given.copy, error)
                               ? given.drive
                               : Drive{.data = given.copy, .rig = given.drive.rig};

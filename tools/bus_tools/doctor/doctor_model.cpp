@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kMostWaste = 1.0 / 3.0;
 
-/// Clockwise quarter turns that make the images upright, by the mean specific force.
+/// Number of clockwise quarter turns that make the images upright, from the mean specific force.
 int quartersOf(const replay::Recording& recording) {
   Eigen::Vector3d up_B = Eigen::Vector3d::Zero();
   for (const ImuSample& sample : recording.imu) up_B += sample.accel;
@@ -29,7 +29,7 @@ std::string configuredNetwork(const std::string& folder) {
     const YAML::Node path = yaml["model"] ? yaml["model"]["path"] : YAML::Node();
     return path && path.IsScalar() ? path.Scalar() : "";
   } catch (const YAML::Exception&) {
-    return {};  // the file is missing, or the service reports its fault
+    return {};  // the file is missing, or invalid, which the service reports
   }
 }
 

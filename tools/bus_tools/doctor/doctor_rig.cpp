@@ -45,8 +45,8 @@ void checkPosesOf(const Drive& drive, const replay::Recording& recording, Findin
   }
 }
 
-/// Adds findings about the rig from the motion, which are the most exact. Returns whether they
-/// contradict the rig: vio would only show the consequences.
+/// Adds the findings about the rig from the motion, which are the most exact ones. Returns whether
+/// they contradict the rig; then vio need not be run, because it would only show the consequences.
 bool checkMotionOf(const replay::Recording& recording, replay::DataFindings& of_data,
                    Findings& findings) {
   const auto is_coarse = [](const replay::DataFinding& finding) {
@@ -63,9 +63,9 @@ bool checkMotionOf(const replay::Recording& recording, replay::DataFindings& of_
   });
 }
 
-/// Returns whether vio can judge the rig by the recording.
+/// Checks the recording. Returns whether it is usable for checking the rig with vio.
 bool checkRecording(const Drive& drive, const replay::Recording& recording, Findings& findings) {
-  // The notes of 7-Scenes state what its layout leaves open; they are not faults of the data.
+  // The warnings about 7-Scenes are about data that its layout lacks; they are no faults.
   const bool scenes = recording.kind == replay::DatasetKind::kSevenScenes;
   const bool of_layout = scenes || recording.kind == replay::DatasetKind::kKittiTracking;
   for (const auto& note : recording.notes) {

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The largest `size = …` of RouDi's configuration, in bytes; 0 if there is none.
+/// Returns the largest `size = …` in RouDi's configuration, in bytes; 0 if there is none.
 std::int64_t largestChunk(const std::string& roudi_toml) {
   static const std::regex kSize(R"(^\s*size\s*=\s*(\d{1,12}))");
   std::int64_t largest = 0;
@@ -36,7 +36,7 @@ std::int64_t configuredSharedMemory(const std::string& folder) {
     try {
       const YAML::Node value = YAML::LoadFile(entry.path())["bus"]["shared_memory_mb"];
       if (value.IsDefined()) largest = std::max(largest, value.as<std::int64_t>());
-    } catch (const YAML::Exception&) {  // --check-config of the service reports the error
+    } catch (const YAML::Exception&) {  // the service's --check-config reports the error
     }
   }
   return largest;

@@ -11,10 +11,10 @@
 namespace perdure::tools {
 namespace {
 
-constexpr double kSilentHealth = 1.5;  // s; Health is published each second
-constexpr double kJustStarted = 5.0;   // s; a recent restart is reported
-constexpr double kSlow = 0.8;          // share of the expected rate; less is degraded
-constexpr double kLate = 200.0;        // ms from capture
+constexpr double kSilentHealth = 1.5;  // s; a process is silent then, as Health comes each second
+constexpr double kJustStarted = 5.0;   // s; a process that started since then is degraded
+constexpr double kSlow = 0.8;          // share of the expected rate, below which it is degraded
+constexpr double kLate = 200.0;        // ms since capture, above which data are late
 
 Level levelOf(HealthState state) {
   if (state == HealthState::kOk) return Level::kOk;
@@ -34,7 +34,7 @@ std::string spanText(double seconds) {
   return fmt::format("{:.0f} d", seconds / kDay);
 }
 
-/// State of the data source. Topics are expected only between its start and its end.
+/// State of the data source. Topics are expected only after it has started and before it ends.
 struct Source {
   bool gives = false;
   std::string why_not;
@@ -105,7 +105,7 @@ StatusNode judgeService(const std::string& name, const ServiceSeen* seen, const 
   return node;
 }
 
-/// The process that writes the topics of a silent `service`, if any.
+/// The process that writes the topics of `service` while that is silent; empty if there is none.
 std::string standInFor(const StatusSeen& seen, const std::string& service) {
   if (isHeard(seen, service)) return {};
   for (const auto& [name, topic] : seen.topics) {
@@ -116,7 +116,8 @@ std::string standInFor(const StatusSeen& seen, const std::string& service) {
   return {};
 }
 
-/// Node of a service that another process replaces. Its data are judged under sensors and topics.
+/// Node of a service that another process replaces. The nodes "sensors" and "topics" judge the
+/// data.
 StatusNode standingIn(const StatusSeen& seen, const std::string& service,
                       const std::string& process) {
   std::string topics;
@@ -226,7 +227,8 @@ StatusNode judgeTopics(const StatusSeen& seen, const Source& source) {
   return node;
 }
 
-/// Takes the frame rate from the Health of the source, because images are too large to read here.
+/// Takes the frame rate from the Health of the source, because images are too large to be read
+/// here.
 TopicSeen framesOf(const StatusSeen& seen, const std::string& source, TopicSeen topic) {
   if (!isHeard(seen, source)) return topic;
   const auto capture = seen.services.find(source);
@@ -331,7 +333,7 @@ std::uint64_t refusals(const StatusSeen& seen) {
   return n;
 }
 
-/// Judges the identities on this host by the worst one, or by the one that expires first.
+/// Judges the identities on this host: failed if one is unusable, otherwise by the first expiry.
 StatusNode judgeSecurity(const StatusSeen& seen) {
   StatusNode node{"security"};
   const IdentitySeen* first = nullptr;

@@ -1,4 +1,4 @@
-// Judges the map and its graph by the latched topics of map_store.
+// Judges the map and its graph from the latched topics of map_store.
 #include <fmt/format.h>
 
 #include "common/types/map_graph.h"
@@ -27,7 +27,7 @@ std::string placeText(const MapFrame& frame) {
                      kDegree * sigma[3]);
 }
 
-/// A missing graph is no fault, because the graph can be disabled.
+/// Judges the graph. A missing graph is no fault, because the graph can be disabled.
 StatusNode judgeGraph(const std::optional<MapFrame>& frame) {
   StatusNode node{"graph"};
   if (!frame) {

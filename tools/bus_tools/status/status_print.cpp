@@ -7,7 +7,7 @@ namespace {
 
 constexpr std::size_t kTextColumn = 30;
 
-/// Number of terminal columns of a UTF-8 text: one for each code point.
+/// Returns the number of terminal columns of a UTF-8 text: one for each code point.
 std::size_t widthOf(const std::string& text) {
   std::size_t n = 0;
   for (const char c : text) n += (static_cast<unsigned char>(c) & 0xC0U) != 0x80U ? 1 : 0;

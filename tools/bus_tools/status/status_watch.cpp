@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kSettle = 0.5;  // s; time in which latched samples arrive
 
-/// Time from capture to now, in ms; below 0 without a stamp of this host.
+/// Time from capture until now, in ms; below 0 if the message has no stamp of this host.
 template <class T>
 double latencyOf(const T& message) {
   constexpr double kLongest = 1e4;  // ms
@@ -24,7 +24,7 @@ double latencyOf(const T& message) {
   return -1.0;
 }
 
-/// Time since the start of one of our processes on this host, from /proc.
+/// Seconds since the start of the process, from /proc; empty if no Perdure process has this pid.
 std::optional<double> upSeconds(std::uint32_t pid) {
   std::ifstream stat("/proc/" + std::to_string(pid) + "/stat"), uptime("/proc/uptime");
   std::string line;

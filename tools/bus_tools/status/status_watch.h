@@ -1,4 +1,4 @@
-// Reads a running system for `perdure status`: Health, discovery, and small topics.
+// Observes a running system for `perdure status`: Health, discovery, and small topics.
 #pragma once
 
 #include <deque>
@@ -21,7 +21,7 @@ class StatusWatch {
 
   bus::WaitLoop& loop() { return loop_; }
   void onHealth(std::function<void(const Health&)> handler) { on_health_ = std::move(handler); }
-  /// The current observations, without the host.
+  /// Returns the present observations, without those of the host.
   StatusSeen seen();
 
  private:
@@ -37,7 +37,8 @@ class StatusWatch {
     int restarts = 0;
   };
 
-  /// Whether latched samples, older than their arrival, have all arrived.
+  /// Whether all latched samples have arrived by `now`. Arrivals before that do not count for
+  /// rates.
   bool settled(double now) const;
   template <class T>
   void listen(const bus::Topic<T>& topic);

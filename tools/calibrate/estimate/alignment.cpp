@@ -31,7 +31,7 @@ std::vector<Turn> turnsOf(const std::vector<CameraPose>& poses) {
   return turns;
 }
 
-/// Mean of the gyroscope over any time interval, computed by integration.
+/// Computes the mean of the gyroscope's rates over any time interval.
 class GyroMean {
  public:
   explicit GyroMean(const std::vector<ImuReading>& readings) : readings_(readings) {
@@ -60,11 +60,11 @@ class GyroMean {
   std::vector<Eigen::Vector3d> sums_;
 };
 
-/// Pairs of angular rates: of the body and of the camera.
+/// Pairs of angular rates: the body's, and the camera's.
 using Pairs = std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>;
 
-/// Removes the tenth of the pairs with the most different magnitudes, because magnitudes do not
-/// depend on the rotation between body and camera.
+/// Removes the tenth of the pairs whose magnitudes differ most. Magnitudes do not depend on the
+/// rotation between body and camera.
 void dropUnlike(Pairs& pairs) {
   const auto unlike = [](const auto& pair) {
     return std::abs(pair.first.norm() - pair.second.norm());

@@ -1,5 +1,5 @@
-// Initial estimates in closed form of a camera's extrinsics on an IMU: rotation and time offset
-// from the angular rates of both, gravity from the mean of the rotated specific forces.
+// Initial estimates, in closed form, of a camera's extrinsics on an IMU: rotation and time offset
+// from the angular rates of both, and gravity from the mean of the rotated specific forces.
 #pragma once
 
 #include <Eigen/Core>
@@ -34,7 +34,7 @@ struct Alignment {
 Result<Alignment> alignRates(const std::vector<CameraPose>& poses,
                              const std::vector<ImuReading>& readings, double widest_s);
 
-/// Whether each pose rotated as the gyroscope did; a board detected upside down did not.
+/// For each pose, whether it rotated as the gyroscope did. A board detected upside down does not.
 std::vector<bool> agreeing(const std::vector<CameraPose>& poses,
                            const std::vector<ImuReading>& readings, const Alignment& alignment);
 

@@ -24,7 +24,7 @@ constexpr char kFix[] =
   throw StartupError(ExitCode::kUsage, "--board `" + text + "` " + what + "; " + kFix);
 }
 
-/// Black modules of each tag of the family, row by row.
+/// The black modules of each tag of the family, row by row.
 const std::vector<std::uint64_t>& tagPictures() {
   static const std::vector<std::uint64_t> pictures = [] {
     const std::unique_ptr<apriltag_family_t, decltype(&tag36h11_destroy)> family(tag36h11_create(),

@@ -1,6 +1,7 @@
 // Calibration boards: a chessboard, or a grid of AprilTags (family 36h11) with black squares
-// between the corners of the tags, as Kalibr uses. Board frame T: origin at the first corner, x
-// along columns, y along rows, z away from the viewer; metres. A camera in front of it has z < 0.
+// between the corners of the tags, as in Kalibr. Board frame T, in metres: origin at the first
+// corner, x along columns, y along rows, z away from the viewer. A camera in front of the board has
+// z < 0.
 #pragma once
 
 #include <Eigen/Core>
@@ -28,10 +29,11 @@ struct Board {
   std::string text() const;
 
   std::size_t cornerCount() const;
-  /// Chessboard: corners row by row. Grid: tag by tag from the first row. The corners of a tag are
-  /// clockwise in the viewer's sight, from the upper left.
+  /// Position of a corner in T. A chessboard's corners are numbered row by row, a grid's tag by tag
+  /// from the first row. The corners of a tag are clockwise for the viewer, from the upper left.
   Eigen::Vector3d corner(std::size_t id) const;
-  /// Upper left and lower right end of the printed area, including a white margin.
+  /// printFrom() and printTo(): upper left and lower right corner of the printed area with its
+  /// margin.
   Eigen::Vector2d printFrom() const;
   Eigen::Vector2d printTo() const;
   bool black(const Eigen::Vector2d& point) const;
@@ -40,7 +42,7 @@ struct Board {
   double pitch() const { return size_m * (1.0 + gap); }
 };
 
-/// A page to print at 100 %, with a scale bar and the text of the board.
+/// A page to print at 100 %, with a scale bar and the board's description.
 std::string boardSvg(const Board& board);
 
 struct Corner {
@@ -54,7 +56,8 @@ struct View {
   std::vector<Corner> corners;
 };
 
-/// The corners of the board in a grey image, to a few hundredths of a pixel; empty: no board.
+/// The corners of the board in a grey image, to a few hundredths of a pixel; empty if there is no
+/// board.
 std::vector<Corner> findCorners(const Board& board, const cv::Mat& grey);
 
 }  // namespace perdure::calibrate

@@ -33,7 +33,7 @@ double correlationOf(const std::vector<ImuResidual>& all, Eigen::Vector3d ImuRes
   return square > 0.0 ? product / square : 0.0;
 }
 
-/// Whether a reading is clipped: the largest value of an axis repeats three times in a row.
+/// Whether the readings are clipped: the largest value of an axis occurs three times in a row.
 bool isSaturated(const std::vector<ImuReading>& readings, Eigen::Vector3d ImuReading::*which,
                  double least) {
   for (int axis = 0; axis < 3; ++axis) {
@@ -77,7 +77,7 @@ class CameraImuRun {
   }
 
  private:
-  /// Computes the camera poses and the time interval, and selects the IMU readings in it.
+  /// Computes the camera poses and their time interval, and selects the IMU readings in it.
   Result<void> prepare() {
     if (input_.views.empty()) {
       return fail("calibrate_few_views", "no image shows the board; see --board");
@@ -181,7 +181,7 @@ class CameraImuRun {
   void placeSpline() {
     auto& x = problem_.x;
     x.spline.interval_s = chooseKnotInterval(near_);
-    // Time in s that the spline extends beyond the views, so that the time offset can change.
+    // Time in s by which the spline extends beyond the views, so that the time offset can change.
     constexpr double kPad = 0.05;
     const double from =
         std::max(near_.front().time_s, problem_.sightings.front().time_s + x.time_offset_s - kPad);
@@ -227,7 +227,8 @@ class CameraImuRun {
     return {};
   }
 
-  /// Sets the deviations from the residuals; those of the IMU are at least the declared ones.
+  /// Sets the standard deviations from the residuals; those of the IMU are at least the declared
+  /// ones.
   void weigh() {
     std::vector<double> sizes;
     for (const auto& r : problem_.cornerResiduals()) sizes.push_back(r.residual.norm());
@@ -243,7 +244,7 @@ class CameraImuRun {
         std::max(declared_.accel, rmsOf(left, &ImuResidual::accel).norm() / std::sqrt(3.0) * freed);
   }
 
-  /// Factor from the residuals to the noise, by the degrees of freedom of the spline.
+  /// Ratio of the noise to the residuals, by the degrees of freedom of the spline.
   double freedomOf(std::size_t samples) const {
     const auto n = static_cast<double>(samples);
     const auto controls = static_cast<double>(problem_.x.spline.controls.size());

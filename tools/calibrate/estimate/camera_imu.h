@@ -1,6 +1,6 @@
-// Estimates a camera's pose on an IMU, time offset, lens, biases and gravity from a board: one
-// least-squares problem over a continuous-time trajectory (Furgale, Rehder, Siegwart, IROS 2013),
-// here with the lens and biases as random walks.
+// Estimates a camera's pose on an IMU, time offset, lens, biases and gravity from a board, in one
+// least-squares problem over a continuous-time trajectory (Furgale, Rehder, Siegwart, IROS 2013).
+// Additions: the lens is estimated too, and biases are random walks.
 #pragma once
 
 #include <Eigen/Core>
@@ -33,7 +33,7 @@ struct CameraImuInput {
 inline constexpr int kRotationAt = 0, kPositionAt = 3, kOffsetAt = 6, kLensAt = 7;
 using Matrix15d = Eigen::Matrix<double, 15, 15>;
 
-/// Residuals of a sensor's samples, as a multiple of the declared white noise.
+/// RMS residual of a sensor's samples, as a multiple of the declared white noise.
 struct NoiseCheck {
   double ratio = 0.0;
   double correlation = 0.0;  ///< correlation of neighbours, -1 … 1; 0 for white noise
@@ -48,12 +48,12 @@ struct CameraImu {
   CameraCalibration camera;  ///< includes T_BC and the time offset
   Matrix15d covariance = Matrix15d::Zero();
   /// Factor by which the covariance exceeds that of independent residuals. Residuals close in time
-  /// are correlated, because the errors of neighbouring corners are.
+  /// are correlated, because the errors of neighbouring corners are correlated.
   double widened = 1.0;
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = gyro_bias;  ///< mean biases
   Eigen::Vector3d gyro_bias_sigma = gyro_bias, accel_bias_sigma = gyro_bias;
   Eigen::Vector3d gravity_T = gyro_bias;  ///< m/s², in the board's frame
-  /// Limits of the used time interval, since the first view.
+  /// Start and end of the used time interval, in s since the first view.
   double from_s = 0.0, to_s = 0.0;
   double knot_interval_s = 0.0;
   Eigen::Vector3d rate_rms_B = gyro_bias, accel_rms_B = gyro_bias;  ///< RMS motion along each axis
@@ -65,11 +65,11 @@ struct CameraImu {
   Spline spline;
 };
 
-/// Fails with the reasons of alignRates, calibrate_few_views, calibrate_imu_missing,
+/// Fails with the reasons of alignRates, or with calibrate_few_views, calibrate_imu_missing,
 /// calibrate_imu_saturated, calibrate_no_convergence or calibrate_not_observable.
 Result<CameraImu> estimateCameraImu(const CameraImuInput& input, const CameraImuOptions& options);
 
-/// The largest knot spacing, s, that fits the samples as well as the smallest.
+/// The largest knot spacing in s that fits the samples as well as the smallest one.
 double chooseKnotInterval(const std::vector<ImuReading>& readings);
 
 }  // namespace perdure::calibrate

@@ -1,4 +1,4 @@
-// Residuals for Ceres' automatic derivatives; Hamilton quaternions x y z w.
+// Residuals for Ceres' automatic derivatives. Quaternions are Hamilton's, in the order x y z w.
 #pragma once
 
 #include <ceres/manifold.h>
@@ -58,7 +58,7 @@ using Rotations = std::array<Eigen::Map<const Eigen::Quaternion<T>>, kOrder>;
 template <class T>
 using Positions = std::array<Eigen::Map<const Vector3<T>>, kOrder>;
 
-/// A bias at a time between two of its nodes, by linear interpolation.
+/// The bias at a time between two bias nodes, by linear interpolation.
 template <class T>
 Vector3<T> biasAt(const T* before, const T* after, double share) {
   const Eigen::Map<const Vector3<T>> a(before), b(after);
@@ -145,7 +145,7 @@ struct FrameCost {
   }
 };
 
-/// Random walk: the difference of neighbouring bias values.
+/// Random walk of a bias: the difference of two neighbouring nodes.
 struct WalkCost {
   double weight;
   template <class T>

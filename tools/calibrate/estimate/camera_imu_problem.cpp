@@ -18,7 +18,7 @@ constexpr double kGyroBiasPrior = 0.5, kAccelBiasPrior = 2.0;  // rad/s, m/s²
 double* turnOf(Spline& spline, std::size_t i) { return spline.controls[i].q.coeffs().data(); }
 double* placeOf(Spline& spline, std::size_t i) { return spline.controls[i].p.data(); }
 
-/// The control points of segment k: five rotations, then five positions.
+/// The control points of segment k: five rotations and, if `with_places`, five positions.
 std::vector<double*> controlsOf(Spline& spline, std::size_t k, bool with_places) {
   std::vector<double*> blocks;
   for (std::size_t i = 0; i < kOrder; ++i) blocks.push_back(turnOf(spline, k + i));
@@ -26,9 +26,9 @@ std::vector<double*> controlsOf(Spline& spline, std::size_t k, bool with_places)
   return blocks;
 }
 
-/// Factor by which the covariance grows because residuals are correlated within a cluster. It is
-/// the ratio of the sandwich estimate with clusters to the one with single rows (Liang and Zeger,
-/// 1986). `influence`: effect of each row's unit residual on the estimate.
+/// Factor by which correlated residuals within clusters enlarge the covariance. It is the ratio of
+/// the sandwich estimate with clusters to the one with single rows (Liang and Zeger, 1986).
+/// `influence`: effect of each row's unit residual on the estimate.
 double wideningOf(const Eigen::MatrixXd& influence, const std::vector<double>& residuals,
                   const std::vector<int>& clusters, const Eigen::MatrixXd& covariance) {
   const int last = *std::ranges::max_element(clusters);
@@ -49,7 +49,7 @@ Eigen::SparseMatrix<double> toEigen(const ceres::CRSMatrix& m) {
                                 m.rows.data(), m.cols.data(), m.values.data());
 }
 
-/// The Jacobian of all free parameters, with those of `last` at the end, and the residuals.
+/// The residuals, and the Jacobian of all free parameters with those of `last` at the end.
 Eigen::SparseMatrix<double> jacobianWithLast(ceres::Problem& problem,
                                              const std::vector<double*>& last,
                                              std::vector<double>& residuals) {
@@ -211,7 +211,7 @@ void CameraImuProblem::gateCorners(double limit_px) {
 
 std::vector<ImuResidual> CameraImuProblem::imuResiduals() const {
   std::vector<ImuResidual> all;
-  Spline spline = x.spline;  // Ceres needs pointers that are not const
+  Spline spline = x.spline;  // Ceres needs non-const pointers
   for (const ImuReading& reading : readings) {
     const std::size_t k = x.spline.segmentAt(reading.time_s);
     const double u = x.spline.withinOf(k, reading.time_s), dt = x.spline.interval_s;
@@ -235,7 +235,7 @@ Eigen::Vector3d CameraImuProblem::biasMean(const std::vector<Eigen::Vector3d>& b
   return sum / static_cast<double>(bias.size());
 }
 
-/// The cluster (a time of kCluster) of each row of the Jacobian, in the order of build().
+/// The cluster (an interval of kCluster) of each row of the Jacobian, in the order of build().
 std::vector<int> CameraImuProblem::clusterOfRows() const {
   std::vector<int> clusters;
   const auto add = [&](double t, std::size_t rows) {

@@ -1,4 +1,4 @@
-// The least-squares problem of camera_imu.h.
+// The least-squares problem that camera_imu.h solves.
 #pragma once
 
 #include <ceres/problem.h>
@@ -9,7 +9,8 @@
 
 namespace perdure::calibrate {
 
-/// A view, and which of its corners are inliers. Time by the images' clock, since the first view.
+/// A view, and which of its corners are inliers. Its time is that of the images' clock, since the
+/// first view.
 struct Sighting {
   View view;
   double time_s = 0.0;
@@ -42,7 +43,7 @@ class CameraImuProblem {
 
   /// Initialises the bias nodes over the duration of the spline.
   void setBiases(const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel);
-  /// Returns false if Ceres finds no solution.
+  /// Returns false if Ceres finds no usable solution.
   bool solve(int iterations);
   std::vector<CornerResidual> cornerResiduals() const;
   std::vector<ImuResidual> imuResiduals() const;
@@ -55,7 +56,7 @@ class CameraImuProblem {
     double widened = 1.0;                   ///< see CameraImu::widened
     Eigen::Vector3d gyro_bias, accel_bias;  ///< standard deviations at mid-time
   };
-  /// Fails with calibrate_not_observable.
+  /// Fails with calibrate_not_observable if the data do not determine all parameters.
   Result<Certainty> certainty();
 
  private:

@@ -22,9 +22,9 @@ double brightness(const cv::Mat& grey, const cv::Point2f& at) {
   return cv::mean(patch)[0];
 }
 
-/// OpenCV may start at either end, but the square after the first corner must be black.
+/// Whether OpenCV's order starts at the wrong end: the square after the first corner must be black.
 bool isUpsideDown(const Board& board, const cv::Mat& grey, const std::vector<cv::Point2f>& found) {
-  double difference = 0.0;  // expected black minus expected white squares
+  double difference = 0.0;  // sum of expected black minus sum of expected white squares
   for (int row = 0; row + 1 < board.rows; ++row) {
     for (int column = 0; column + 1 < board.columns; ++column) {
       const auto at = static_cast<std::size_t>(row * board.columns + column);
@@ -38,8 +38,8 @@ bool isUpsideDown(const Board& board, const cv::Mat& grey, const std::vector<cv:
   return difference > 0.0;
 }
 
-/// Pattern of black and white around a corner. Returns 1 if the quadrants a + b and -a - b are
-/// black, -1 if they are white, and 0 if opposite quadrants do not match.
+/// Tests the black and white quadrants around a corner. Returns 1 if the quadrants a + b and -a - b
+/// are black, -1 if they are white, and 0 if opposite quadrants differ.
 int crossingAt(const cv::Mat& grey, const cv::Point2f& corner, const cv::Point2f& a,
                const cv::Point2f& b) {
   const double one = brightness(grey, corner + a + b), across = brightness(grey, corner - a - b);
@@ -52,7 +52,8 @@ int crossingAt(const cv::Mat& grey, const cv::Point2f& corner, const cv::Point2f
   return darker > lighter ? 1 : -1;
 }
 
-/// Whether every corner is a crossing; a board detected one square beside has others.
+/// Whether all corners are crossings with alternating colours; a board detected one square beside
+/// has other corners too.
 bool areCrossings(const Board& board, const cv::Mat& grey, const std::vector<cv::Point2f>& found) {
   constexpr float kStep = 0.3F;  // share of a square
   const auto at = [&](int column, int row) {
@@ -75,7 +76,8 @@ std::vector<Corner> findChessboard(const Board& board, const cv::Mat& grey) {
   if (!cv::findChessboardCornersSB(grey, size, found, cv::CALIB_CB_NORMALIZE_IMAGE)) {
     return {};
   }
-  // Refines the corners by the adjacent edges, because the detector's bias is some hundredths px.
+  // Refines the corners by the adjacent edges, because the detector's bias is some hundredths of a
+  // px.
   double side = 1e9;
   for (std::size_t i = 1; i < found.size(); ++i) {
     side = std::min(side, cv::norm(found[i] - found[i - 1]));
@@ -91,7 +93,8 @@ std::vector<Corner> findChessboard(const Board& board, const cv::Mat& grey) {
   return corners;
 }
 
-/// Refines the corners of a tag as crossings of edges; false for points that are not corners.
+/// Refines the corners of a tag as crossings of edges; returns false for corners that are no
+/// crossings.
 std::vector<bool> refineCrossings(const cv::Mat& grey, double side_px,
                                   std::vector<cv::Point2f>& pixels) {
   constexpr double kFarthest = 2.0;
@@ -127,8 +130,8 @@ std::vector<Corner> findAprilGrid(const Board& board, const cv::Mat& grey) {
     apriltag_detection_t* tag = nullptr;
     zarray_get(found.get(), i, static_cast<void*>(&tag));
     if (tag->hamming > 0 || tag->id >= board.columns * board.rows) continue;
-    // The library's order: lower left, lower right, upper right, upper left. Its integer
-    // coordinates are at the corners of pixels.
+    // AprilTag's order is lower left, lower right, upper right, upper left. Its integer coordinates
+    // are at the corners of pixels.
     std::vector<cv::Point2f> pixels;
     double side = 1e9;
     for (const int which : {3, 2, 1, 0}) {

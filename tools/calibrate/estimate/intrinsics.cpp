@@ -16,7 +16,7 @@ namespace perdure::calibrate {
 namespace {
 
 constexpr std::size_t kLeastCorners = 8, kLeastViews = 5;
-constexpr double kOutlierSigma = 5.0, kLeastOutlier = 0.5;  // limits; the second in px
+constexpr double kOutlierSigma = 5.0, kLeastOutlier = 0.5;  // limits of outliers; the second in px
 
 struct CornerCost {
   DistortionModel model;
@@ -37,7 +37,7 @@ struct CornerCost {
   }
 };
 
-/// The board's four outer corners as shares of the image width, to compare views.
+/// The board's four outer corners as shares of the image width, for the comparison of views.
 std::optional<Vector8d> outlineOf(const Board& board, const View& view, double width) {
   std::vector<cv::Point2d> plane, image;
   for (const Corner& corner : view.corners) {
@@ -81,7 +81,7 @@ std::vector<const View*> mostDifferent(const Board& board, const std::vector<Vie
   return taken;
 }
 
-/// Squared reprojection error of a view for a pose, in px² for each corner.
+/// Mean squared reprojection error of a view for a pose, in px² per corner.
 double errorOf(const CameraModel& camera, const Board& board, const View& view,
                const RigidTransform& T_CT) {
   double sum = 0.0;
@@ -93,7 +93,7 @@ double errorOf(const CameraModel& camera, const Board& board, const View& view,
   return sum / static_cast<double>(view.corners.size());
 }
 
-/// The lens without distortion and with the focal length that fits the views best.
+/// A lens without distortion, with the focal length that fits the views best.
 CameraCalibration firstGuess(const Board& board, const std::vector<const View*>& views,
                              CameraCalibration camera) {
   constexpr int kSteps = 24;
@@ -155,7 +155,7 @@ class Bundle {
     return summary.IsSolutionUsable() && summary.termination_type != ceres::NO_CONVERGENCE;
   }
 
-  /// Removes corners with large residuals, relative to the median.
+  /// Removes corners whose residuals are large compared with the median.
   void dropOutliers() {
     std::vector<double> sizes;
     for (const auto& r : residuals()) sizes.push_back(r.residual.norm());
@@ -318,7 +318,7 @@ Result<Intrinsics> estimateIntrinsics(const Board& board, const std::vector<View
   CameraCalibration guess = camera;
   guess.distortion = options.model;
   guess = firstGuess(board, chosen, guess);
-  // First solves with the views whose pose an undistorted lens explains.
+  // The first solution uses only the views that an undistorted lens explains.
   Bundle rough(board, guess, options);
   rough.take(
       {chosen.begin(),

@@ -35,15 +35,15 @@ struct Intrinsics {
   std::vector<CornerResidual> residuals;
 };
 
-/// fx, fy, cx, cy and the coefficients (0 for those that the lens lacks).
+/// fx, fy, cx, cy and the four distortion coefficients (0 if the lens model has none).
 Vector8d lensOf(const CameraCalibration& camera);
 void setLens(const Vector8d& lens, CameraCalibration& camera);
 
-/// Pose of the board in the camera frame, z > 0. Empty if the corners do not determine it.
+/// Pose of the board in the camera frame, z > 0. Empty if the corners do not determine the pose.
 std::optional<RigidTransform> boardPose(const CameraModel& camera, const Board& board,
                                         const View& view);
 
-/// `camera`: name and size. Fails with calibrate_few_views or calibrate_no_convergence.
+/// `camera`: name and image size. Fails with calibrate_few_views or calibrate_no_convergence.
 Result<Intrinsics> estimateIntrinsics(const Board& board, const std::vector<View>& views,
                                       const CameraCalibration& camera,
                                       const IntrinsicsOptions& options);

@@ -1,4 +1,4 @@
-// Knot spacing of the trajectory's spline: chooseKnotInterval of camera_imu.h.
+// Implements chooseKnotInterval of camera_imu.h: the knot spacing of the trajectory's spline.
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <array>
@@ -9,14 +9,14 @@
 namespace perdure::calibrate {
 namespace {
 
-/// Spacings, s, and the largest accepted increase of noise over the smallest spacing.
+/// Spacings in s, and the largest accepted increase of noise over the smallest spacing.
 constexpr std::array kIntervals = {0.2, 0.14, 0.1, 0.07, 0.05, 0.035, 0.025};
 constexpr double kMostExcess = 1.02;
 constexpr double kLeastSamples = 4.0;  ///< least samples in an interval
 
 using Signals = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 
-/// Residual variance after a spline of order `Order`, by degrees of freedom.
+/// Residual variance per degree of freedom after a fit of a spline of order `Order`.
 template <int Order>
 double leftOver(const std::vector<double>& times, const Signals& signals, double interval) {
   constexpr auto kWeights = blendingMatrix<Order>();
@@ -60,7 +60,7 @@ double chooseKnotInterval(const std::vector<ImuReading>& readings) {
     if (interval >= kLeastSamples * usual) intervals.push_back(interval);
   }
   if (intervals.empty()) return kLeastSamples * usual;
-  // The gyroscope measures the first derivative of order 5, the accelerometer the second.
+  // The gyroscope measures the first derivative of an order-5 spline, the accelerometer the second.
   const double gyro_floor = leftOver<kOrder - 1>(times, gyro, intervals.back());
   const double accel_floor = leftOver<kOrder - 2>(times, accel, intervals.back());
   for (const double interval : intervals) {

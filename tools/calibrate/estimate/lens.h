@@ -1,4 +1,4 @@
-// Projection as a template for Ceres' dual numbers, as in common/camera.
+// Projection of common/camera as a template for Ceres' dual numbers.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,5 @@
-// Motion of the body: uniform cumulative B-splines of order 5 for rotation and position (Furgale et
-// al., ICRA 2012; Sommer et al., CVPR 2020), for Ceres' dual numbers.
+// Motion of the body as uniform cumulative B-splines of order 5 for rotation and position (Furgale
+// et al., ICRA 2012; Sommer et al., CVPR 2020), templates for Ceres' dual numbers.
 #pragma once
 
 #include <Eigen/Core>
@@ -96,7 +96,7 @@ struct Spline {
     const double at = std::floor((t - start_s) / interval_s);
     return std::min(segments() - 1, static_cast<std::size_t>(std::max(0.0, at)));
   }
-  /// Position of time t within segment `k`, in [0, 1).
+  /// Relative position of time t within segment `k`, in [0, 1).
   double withinOf(std::size_t k, double t) const {
     return (t - start_s) / interval_s - static_cast<double>(k);
   }

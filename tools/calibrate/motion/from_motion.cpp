@@ -21,7 +21,8 @@ constexpr double kFree = std::numeric_limits<double>::infinity();
 constexpr double kUnseen =
     0.7;  ///< share of a prior's deviation above which the motion shows nothing
 
-/// Real rigs: phones' readouts below 35 ms, principal points within 1 %, biases below 0.05 rad/s.
+/// Limits of real rigs: readout of phones below 35 ms, principal point within 1 %, bias below 0.05
+/// rad/s.
 JointVector widePriors(const CameraCalibration& camera) {
   JointVector sigma;
   const double centre = 0.01 * camera.width;
@@ -52,7 +53,7 @@ const char* kMotion =
     "turn the camera to and fro about all three axes for half a minute, by 30 degrees and about "
     "once in two seconds, with things to see in the image";
 
-/// Whether a gyroscope with all signs exchanged would fit, which also means one exchanged sign.
+/// Whether a gyroscope with all signs inverted would fit; this also detects one inverted sign.
 bool isMirrored(const TrackWindows& tracks, const replay::Recording& recording,
                 const FirstGuess& guess) {
   constexpr double kDoubtful = 0.1, kClearly = 3.0;
@@ -112,7 +113,7 @@ CameraCalibration startOf(const FirstGuess& guess) {
   return camera;
 }
 
-/// The parameters that every use needs and that are too uncertain; empty if there are none.
+/// The parameters that every use needs and that are too uncertain; empty if all are certain.
 std::string unsureOf(const JointEstimate& joint) {
   constexpr double kFocal_share = 0.015, kTurn_deg = 1.5, kLater_s = 0.004, kResidual_px = 3.0;
   const JointVector& s = joint.sigma;
@@ -161,7 +162,7 @@ Eigen::Vector3d turnOf(const Pair& pair, double focal, const CameraCalibration& 
   return tools::rotationOf(flow);
 }
 
-/// The gyroscope's rotations of all pairs at one offset, and which pairs it covers.
+/// The gyroscope's rotations at one time offset, and the indices of the pairs that it covers.
 struct Said {
   double offset_s = 0.0;
   std::vector<std::size_t> pairs;
@@ -264,7 +265,7 @@ std::vector<std::string> writeMotionRig(const replay::DatasetOptions& drive,
 
 FirstGuess guessFromTurns(const std::vector<TrackWindow>& windows,
                           const std::vector<ImuSample>& samples, const CameraCalibration& camera) {
-  constexpr double kLeast = 0.4, kMost = 2.5, kRatio = 1.15;  // focal lengths, in widths
+  constexpr double kLeast = 0.4, kMost = 2.5, kRatio = 1.15;  // tested focal lengths, widths
   FirstGuess best;
   best.camera = camera;
   const auto pairs = pairsOf(windows);

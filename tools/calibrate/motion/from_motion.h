@@ -1,5 +1,5 @@
-// The rig of a camera and an IMU from the motion of any recording, without a board: first from
-// rotations alone, then jointly with the structure that parallax shows (joint.h).
+// Estimates the rig of a camera and an IMU from the motion of any recording, without a board: first
+// from rotations alone, then jointly with the structure that parallax shows (joint.h).
 #pragma once
 
 #include <filesystem>
@@ -21,7 +21,8 @@ struct FirstGuess {
   std::size_t pairs = 0;
 };
 
-/// `camera`: size and name. Focal lengths of 0.4 to 2.5 widths, offsets up to half a second.
+/// Uses size and name of `camera`. Tests focal lengths of 0.4 to 2.5 widths and time offsets up to
+/// half a second.
 FirstGuess guessFromTurns(const std::vector<TrackWindow>& windows,
                           const std::vector<ImuSample>& samples, const CameraCalibration& camera);
 
@@ -33,16 +34,16 @@ struct MotionRig {
   double second_px = 0.0;  ///< RMS rotation about the second axis between two images
 };
 
-/// Estimates all quantities; the only prior knowledge is the image size. Fails with
+/// Estimates all parameters; the only prior knowledge is the image size. Fails with
 /// motion_few_images, motion_blank, motion_apart (images and gyroscope do not rotate together),
 /// motion_no_rotation or motion_unsure, with a detail for users.
 Result<MotionRig> rigFromMotion(const replay::Recording& recording, const WindowOptions& options);
 
-/// One line for each parameter: value, standard deviation, and whether the motion shows it.
+/// One line per parameter: value, standard deviation, and whether the motion determines it.
 std::vector<std::string> linesOf(const MotionRig& found);
 
-/// Writes the rig file of a drive, and returns its linesOf(). Throws StartupError (kData) with the
-/// reason if no rig is found.
+/// Writes the rig file of a drive and returns its linesOf(). Throws StartupError(kData) with the
+/// reason if no rig can be estimated.
 std::vector<std::string> writeMotionRig(const replay::DatasetOptions& drive,
                                         const WindowOptions& options,
                                         const std::filesystem::path& file);
@@ -52,7 +53,7 @@ struct MotionCheck {
   /// The motion that the comparison is based on, or why no comparison is possible.
   std::string basis;
 };
-/// Uses a few short runs of images. The rest of the calibration is taken as nearly right.
+/// Uses a few short runs of images. Assumes that the rest of the calibration is nearly right.
 MotionCheck checkMotion(const replay::Recording& recording);
 
 }  // namespace perdure::calibrate

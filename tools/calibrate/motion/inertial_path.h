@@ -1,4 +1,4 @@
-// The path of the body as the IMU measures it, except for initial velocity and gravity.
+// The trajectory of the body as the IMU measures it, without initial velocity and gravity.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,7 +9,7 @@
 
 namespace perdure::calibrate {
 
-/// The body at one time, in the frame of the body at the path's start.
+/// State of the body at one time, in the body frame at the start of the trajectory.
 struct InertialState {
   Eigen::Quaterniond q;      ///< q_SB
   Eigen::Vector3d rate;      ///< w_SB_B, rad/s
@@ -21,10 +21,10 @@ struct InertialState {
 
 class InertialPath {
  public:
-  /// The samples cover [from, to], and are sorted by time; rates are constant between them.
+  /// `samples` must be sorted by time and cover [from, to]; rates are constant between two samples.
   InertialPath(const std::vector<ImuSample>& samples, const Eigen::Vector3d& gyro_bias,
                TimePoint from, TimePoint to);
-  /// `seconds` after `from`. Outside the path the last rate is used.
+  /// The state `seconds` after `from`. Outside the interval the last rate is used.
   InertialState at(double seconds) const;
 
  private:

@@ -14,7 +14,7 @@ namespace {
 
 using namespace joint;
 
-/// Normal equations of one window after its corners, and then the window itself, are eliminated.
+/// Normal equations of one window after the elimination of its corners and of its own unknowns.
 struct Reduced {
   SharedMatrix H = SharedMatrix::Zero();
   Shared g = Shared::Zero();                         ///< gradient of half the cost
@@ -24,7 +24,7 @@ struct Reduced {
   JointVector g_joint = JointVector::Zero();
 };
 
-/// Cauchy's weight.
+/// The weight of Cauchy's loss for a squared residual.
 double weightOf(double squared, double scale) { return 1.0 / (1.0 + squared / (scale * scale)); }
 double costOf(double squared, double scale) {
   return 0.5 * scale * scale * std::log1p(squared / (scale * scale));
@@ -52,7 +52,7 @@ class Problem {
     const Duration length = window.tracks->times.back() - window.tracks->times.front();
     return InertialPath(samples_, state.gyro_bias, window.from, window.from + length + 2 * kMargin);
   }
-  /// Minus the mean force, as if the body did not accelerate.
+  /// Initial gravity: minus the mean force, as if the body did not accelerate.
   Eigen::Vector3d gravityIn(const Window& window) const;
   std::vector<double> squares(const JointState& state, const Window& window) const;
   std::vector<double> allSquares() const;
@@ -64,14 +64,14 @@ class Problem {
     return excess_ * unit() * options_.prior_sigma.cwiseAbs2().cwiseInverse();
   }
   JointVector solveJoint(const std::vector<Reduced>& all) const;
-  /// The window's own unknowns with the smallest cost for a given state, by a few steps.
+  /// Minimises the cost over the window's own unknowns for a given state, in a few steps.
   void settle(const JointState& state, Window& window) const;
   std::vector<Window> settled(const JointState& state, std::vector<Window> windows) const;
   Window advanced(const Window& window, const Reduced& reduced, const JointVector& step,
                   double length) const;
   JointVector sigmaOf(const std::vector<Reduced>& all);
 
-  /// The variance of a residual, px², which priors are weighed against.
+  /// Variance of a residual in px²; the priors are weighted relative to it.
   double unit() const { return 0.25 * scale_ * scale_; }
 
   const std::vector<ImuSample>& samples_;
@@ -80,7 +80,7 @@ class Problem {
   std::vector<Window> windows_;
   double residual_px_ = 0.0;
   double scale_ = 3.0;  ///< scale of the robust loss, px
-  /// Variance of a window's gradient, as a multiple of that of independent residuals.
+  /// Ratio of the variance of a window's gradient to that of independent residuals.
   double excess_ = 1.0;
 };
 
@@ -149,7 +149,7 @@ Reduced Problem::reduce(const JointState& state, const Window& window) const {
   const double information = unit() / (kGravitySigma * kGravitySigma);
   out.H.bottomRightCorner<3, 3>() += information * down * down.transpose();
   out.g.tail<3>() += information * (gravity.norm() - kGravity) * down;
-  // A weak pull to the present value keeps a window with few corners solvable.
+  // A weak prior at the present value keeps a window with few corners solvable.
   out.H.bottomRightCorner<kOwn, kOwn>().diagonal().array() += 1e-3 * unit();
   const Eigen::LDLT<Eigen::Matrix<double, kOwn, kOwn>> own(out.H.bottomRightCorner<kOwn, kOwn>());
   const Eigen::Matrix<double, kOwn, kParameters> cross =
@@ -221,8 +221,9 @@ std::vector<Window> Problem::settled(const JointState& state, std::vector<Window
   return windows;
 }
 
-/// The sum of the windows' outer products of gradients (sandwich) accounts for residuals that are
-/// correlated within a window. If windows are few, their mean ratio to the information is a bound.
+/// The sum of outer products of the windows' gradients (sandwich) accounts for residuals that are
+/// correlated within a window. With few windows, its mean ratio to the information is a lower
+/// bound.
 JointVector Problem::sigmaOf(const std::vector<Reduced>& all) {
   JointMatrix H = JointMatrix::Zero(), meat = H;
   for (const Reduced& one : all) {
@@ -232,14 +233,14 @@ JointVector Problem::sigmaOf(const std::vector<Reduced>& all) {
   const JointVector weight = priorWeights();
   const JointMatrix inverse =
       (H + JointMatrix(weight.asDiagonal())).ldlt().solve(JointMatrix::Identity());
-  // Residuals of a fit are smaller than errors by the degrees of freedom.
+  // Residuals of a fit are smaller than the errors; the degrees of freedom correct this.
   const double count = static_cast<double>(all.size()), taken = (inverse * H).trace();
   meat *= count / std::max(0.25 * count, count - taken);
   const double excess = (inverse * meat).trace() / taken / unit();
 
   const JointVector sandwich = (inverse * meat * inverse).diagonal();
   const JointVector bound = excess * unit() * (inverse * H * inverse).diagonal();
-  // A prior contributes with the deviation that it states.
+  // A prior has its stated standard deviation, however noisy the residuals are.
   const JointVector prior = excess_ * unit() * options_.prior_sigma.cwiseInverse();
   const JointVector of_prior =
       (inverse * JointMatrix(prior.cwiseAbs2().asDiagonal()) * inverse).diagonal();
@@ -256,11 +257,11 @@ std::vector<double> Problem::allSquares() const {
   return all;
 }
 
-/// Gauss-Newton on the shared unknowns; a step that does not reduce the cost is halved.
+/// Gauss-Newton on the shared unknowns; halves a step that does not reduce the cost.
 void Problem::descend() {
-  constexpr double kShortest = 1.0 / 64.0, kLittle = 1e-4;  // steps; share of the cost
+  constexpr double kShortest = 1.0 / 64.0, kLittle = 1e-4;  // step; share of the cost
   for (int round = 0; round < options_.most_rounds; ++round) {
-    // For two-dimensional normal residuals the median square is 2 ln 2 of the variance.
+    // For two-dimensional normal residuals the median square is 2 ln 2 times the variance.
     residual_px_ = std::sqrt(medianOf(allSquares()) / (2.0 * std::log(2.0)));
     scale_ = std::max(kLeastScale_px, 2.0 * residual_px_);
     windows_ = settled(state_, std::move(windows_));
@@ -286,7 +287,7 @@ JointEstimate Problem::solve() {
   JointEstimate out;
   if (allSquares().size() < kParameters) return out;
   descend();
-  sigmaOf(reduceAll());  // for the weight of the priors
+  sigmaOf(reduceAll());  // sets the weight of the priors
   descend();
   out.sigma = sigmaOf(reduceAll());
   out.state = state_;

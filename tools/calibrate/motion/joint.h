@@ -1,7 +1,7 @@
-// Robust least squares over lens, rotation and position of the camera on the IMU, time offset,
-// readout and gyroscope bias, from tracked corners. The body moves as the IMU measures; each window
-// has its own initial velocity and gravity, and each corner its own inverse depth. All of these are
-// eliminated (Schur complement). Corners without parallax constrain the rotation only.
+// Robust least squares over lens, pose of the camera on the IMU, time offset, readout and gyroscope
+// bias, from tracked corners. The body moves as the IMU measures. Each window has its own initial
+// velocity and gravity, and each corner its own inverse depth; all of these are eliminated (Schur
+// complement). Corners without parallax constrain the rotation only.
 #pragma once
 
 #include <Eigen/Core>
@@ -31,7 +31,7 @@ struct JointState {
   CameraCalibration camera;  ///< radial-tangential, equidistant or none
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
 };
-/// `state` changed by a small `step`.
+/// Returns `state` changed by a small `step`.
 JointState moved(const JointState& state, const JointVector& step);
 JointVector between(const JointState& from, const JointState& to);
 

@@ -1,4 +1,4 @@
-// The residuals of joint.h, for doubles and for dual numbers.
+// The residuals of joint.h, for doubles and dual numbers.
 #pragma once
 
 #include <ceres/jet.h>
@@ -17,7 +17,7 @@
 namespace perdure::calibrate::joint {
 
 inline constexpr int kOwn = 6;                      // velocity and gravity of a window
-inline constexpr int kShared = kParameters + kOwn;  // all but the inverse depth
+inline constexpr int kShared = kParameters + kOwn;  // all but inverse depths
 inline constexpr int kAll = kShared + 1;
 inline constexpr double kGravity = 9.81,
                         kGravitySigma = 0.3;  // m/s²; includes the accelerometer's bias
@@ -33,7 +33,7 @@ using Shared = Eigen::Matrix<double, kShared, 1>;
 using SharedMatrix = Eigen::Matrix<double, kShared, kShared>;
 using Own = Eigen::Matrix<double, kOwn, 1>;
 
-/// Data of one window: unknowns, and the quantities of the last linearisation.
+/// Data of one window: its unknowns, and the results of the last linearisation.
 struct Window {
   const TrackWindow* tracks;
   TimePoint from;               ///< start of its inertial path, before the first image
@@ -41,7 +41,7 @@ struct Window {
   std::vector<double> inverse;  ///< inverse depths
 };
 
-/// Unknowns as T: doubles, or dual numbers whose derivatives are those of a small step.
+/// The unknowns as T: doubles, or dual numbers with derivatives by a small step.
 template <class T>
 struct Unknowns {
   Vec3<T> turn, bias, place, velocity, gravity;
@@ -86,7 +86,7 @@ Unknowns<T> unknownsOf(const JointState& state, const Own& own) {
   return u;
 }
 
-/// R v. Casting R to dual numbers would take several times as long.
+/// Returns R v. A cast of R to dual numbers would take several times as long.
 template <class T>
 Vec3<T> rotated(const Eigen::Matrix3d& R, const Vec3<T>& v) {
   const auto row = [&](int i) { return R(i, 0) * v.x() + R(i, 1) * v.y() + R(i, 2) * v.z(); };
@@ -98,7 +98,7 @@ Vec3<T> scaled(const Eigen::Vector3d& v, const T& factor) {
   return {v.x() * factor, v.y() * factor, v.z() * factor};
 }
 
-/// Body at the exposure of a pixel. The time may change by a small offset.
+/// State of the body at the exposure of a pixel. Its time may differ by a small offset.
 template <class T>
 struct BodyAt {
   Eigen::Matrix3d R;
@@ -131,7 +131,7 @@ BodyAt<T> bodyAt(const InertialPath& path, double stamp_s, const Eigen::Vector2d
   return body;
 }
 
-/// Normalised point of a pixel, with derivatives by the lens: a last Newton step in T.
+/// Ray of a pixel, with derivatives by the lens from a last Newton step in T.
 template <class T>
 std::optional<Vec3<T>> rayOf(const CameraModel& lens, const Eigen::Vector2d& pixel,
                              const Unknowns<T>& u) {
@@ -146,7 +146,7 @@ std::optional<Vec3<T>> rayOf(const CameraModel& lens, const Eigen::Vector2d& pix
   return Vec3<T>(start.x() + step.x(), start.y() + step.y(), T(1.0));
 }
 
-/// Residuals of one track, in pixels: `each(residual)` for every image after the first.
+/// Calls `each(residual)`, in pixels, for every image of a track after the first.
 template <class T, class Each>
 void forResiduals(const Window& window, std::size_t k, const InertialPath& path,
                   const CameraModel& lens, const JointState& state, const Unknowns<T>& u,

@@ -1,4 +1,4 @@
-// Compares a recording's own calibration with what its motion shows.
+// Compares a recording's own calibration with its motion.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@ using Grade = replay::DataFinding::Grade;
 
 constexpr double kSurely = 4.0;  ///< standard deviations
 
-/// The given calibration is nearly right but for what is checked.
+/// Priors of a nearly right calibration; infinite for the parameters that are checked.
 JointVector narrowPriors(const CameraCalibration& camera) {
   const double free = std::numeric_limits<double>::infinity();
   const double turn = 2.0 * M_PI / 180.0, centre = 0.01 * camera.width;
@@ -25,7 +25,7 @@ JointVector narrowPriors(const CameraCalibration& camera) {
 }
 
 replay::DataFindings judge(const CameraCalibration& given, const JointEstimate& joint) {
-  // smallest reported errors
+  // Smallest errors that are reported.
   constexpr double kLeastShare = 0.025, kLater_s = 0.008, kReadout_s = 0.01;
   const CameraCalibration& found = joint.state.camera;
   const JointVector& s = joint.sigma;
@@ -65,7 +65,7 @@ replay::DataFindings judge(const CameraCalibration& given, const JointEstimate& 
 
 namespace {
 
-/// Whether the deviations are at most `share` of those with which the motion judges.
+/// Whether the standard deviations are at most `share` of the largest that permit a judgement.
 bool isSure(const JointEstimate& joint, double share) {
   constexpr double kSureShare = 0.01, kSure_s = 0.004, kResidual_px = 2.0, kInliers = 0.6;
   return joint.sigma[kFocal] < share * kSureShare && joint.sigma[kLater] < share * kSure_s &&
@@ -76,7 +76,7 @@ bool isSure(const JointEstimate& joint, double share) {
 
 MotionCheck checkMotion(const replay::Recording& recording) {
   constexpr std::size_t kWindows = 12, kFewest = 6;
-  constexpr double kSpacing_s = 0.06;  // closer images cost more than they tell
+  constexpr double kSpacing_s = 0.06;  // closer images take time without more information
   const CameraCalibration& given = recording.calibration.cameras.front();
   if (given.distortion == DistortionModel::kRational) {
     return {{}, "the motion is not compared with a lens of eight coefficients"};
@@ -89,8 +89,8 @@ MotionCheck checkMotion(const replay::Recording& recording) {
     if (enough) joint = estimateJointly(tracks.windows, recording.imu, options);
     return enough;
   };
-  // Half of the windows is enough if they find nothing and are twice as certain as is necessary,
-  // or if they are so uncertain that others cannot change that.
+  // Half of the windows suffices if it shows no error with half the permitted deviations. The other
+  // half is also skipped if the deviations are over twice the permitted ones.
   const bool first = estimate(), sure = first && isSure(joint, 0.5) && judge(given, joint).empty();
   if (!sure && (!first || isSure(joint, 2.0))) {
     tracks.add(trackWindows(

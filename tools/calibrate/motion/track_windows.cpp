@@ -27,7 +27,7 @@ Frames framesOf(const replay::Recording& recording, const WindowOptions& options
   return frames;
 }
 
-/// Squares of the rotations from image to image about each axis, rad².
+/// Sum of the squared rotations between consecutive images, for each axis, in rad².
 Eigen::Vector3d rotationIn(const Frames& frames, const Run& run, const tools::TurnIntegral& gyro) {
   Eigen::Vector3d squares = Eigen::Vector3d::Zero();
   for (std::size_t i = run.first; i + 1 < run.second; ++i) {
@@ -36,7 +36,7 @@ Eigen::Vector3d rotationIn(const Frames& frames, const Run& run, const tools::Tu
   return squares;
 }
 
-/// The runs with the largest rotations, each axis relative to its mean.
+/// The runs with the largest rotations; each axis counts relative to its mean.
 std::vector<Run> runsOf(const Frames& frames, const std::vector<ImuSample>& samples,
                         const WindowOptions& options) {
   const tools::TurnIntegral gyro(samples);
@@ -65,7 +65,7 @@ std::vector<Run> runsOf(const Frames& frames, const std::vector<ImuSample>& samp
   return runs;
 }
 
-/// Keeps every N-th image, so that `kMostImages` or fewer remain.
+/// Keeps every N-th image, so that at most `kMostImages` remain.
 void thin(TrackWindow& window) {
   const std::size_t each = (window.times.size() + kMostImages - 1) / kMostImages;
   const auto thinned = [&](auto& items) {
@@ -111,7 +111,7 @@ TrackWindow windowOf(const Frames& frames, const Run& run, const CameraCalibrati
     before = std::move(now);
   }
   thin(window);
-  // The longest tracks constrain most.
+  // The longest tracks constrain the estimate most.
   std::ranges::stable_sort(window.tracks,
                            [](const Track& a, const Track& b) { return a.size() > b.size(); });
   window.tracks.resize(std::min(window.tracks.size(), kMostTracks));
@@ -136,7 +136,7 @@ TrackWindows trackWindows(const replay::Recording& recording, const WindowOption
   const Frames frames = framesOf(recording, options);
   if (frames.size() < 3 || recording.imu.size() < 3) return result;
   const CameraCalibration& camera = recording.calibration.cameras.front();
-  // Files are read in parallel; frames inside a recording file are read one after another.
+  // Image files are read in parallel, but images inside a recording file one after another.
   const auto policy = frames.front()->load ? std::launch::deferred : std::launch::async;
   const auto runs = runsOf(frames, recording.imu, options);
   constexpr std::size_t kWorkers = 4;

@@ -1,4 +1,4 @@
-// Corners followed through short runs of images, where the camera turns most.
+// Tracks corners through short runs of images in which the camera rotates most.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,7 +8,7 @@
 
 namespace perdure::calibrate {
 
-/// Pixels of one corner in consecutive images from the window's first one; two or more.
+/// Pixels of one corner in two or more consecutive images, from the window's first image on.
 using Track = std::vector<Eigen::Vector2d>;
 
 struct TrackWindow {
@@ -21,8 +21,8 @@ struct WindowOptions {
   std::size_t skip = 0;    ///< windows with larger rotations that are left out
   double seconds = 0.7;    ///< length of a window, at least three images; shorter ones do not
                            ///< separate slow translation from rotation
-  double spacing_s = 0.0;  ///< least time between the images that are followed
-  double until_s = 1e9;    ///< since the first image; later images are not used
+  double spacing_s = 0.0;  ///< least time between the images that are used
+  double until_s = 1e9;    ///< s since the first image; later images are not used
 };
 
 struct TrackWindows {
@@ -33,7 +33,7 @@ struct TrackWindows {
   void add(TrackWindows more);
 };
 
-/// Windows of cam0, distributed over the rotation about all axes. Images of another size than the
+/// Windows of cam0, chosen so that they rotate about all axes. Images with another size than the
 /// calibration's are not used.
 TrackWindows trackWindows(const replay::Recording& recording, const WindowOptions& options);
 

@@ -73,7 +73,8 @@ TurnPairs pairsOf(const std::vector<Step>& steps, const Reading& reading, const 
   return {reference, given};
 }
 
-/// Pairs of poses `seconds` apart, shifted by `later_s` to the clock of the gyroscope.
+/// Pairs of poses `seconds` apart; the times of the poses plus `later_s` are those of the
+/// gyroscope.
 std::vector<Step> stepsOf(const std::vector<StampedPose>& poses, const TurnIntegral& gyro,
                           double seconds, double later_s) {
   const Duration length = durationFromSeconds(seconds), later = durationFromSeconds(later_s);
@@ -118,7 +119,8 @@ struct Wrong {
   DataFinding finding;
 };
 
-/// The pose conventions that agree with the gyroscope, if the poses as written do not.
+/// Returns the conventions under which the poses agree with the sensor, unless they agree as
+/// written.
 std::optional<Wrong> wrongReading(const std::vector<Step>& steps, const Quaternion& q_BC,
                                   const Limits& limits, const Sensor& sensor) {
   if (steps.size() < limits.fewest) return std::nullopt;
@@ -132,7 +134,7 @@ std::optional<Wrong> wrongReading(const std::vector<Step>& steps, const Quaterni
     best = std::min(best, pairsOf(steps, reading, q_BC).disagreement());
   }
   if (best >= limits.explained) return std::nullopt;
-  // If the body rotates about one axis only, different axes may look like an inverse.
+  // If the body rotates about one axis only, exchanged axes may resemble an inverse.
   constexpr double kFits = 0.005, kClearly = 3.0;
   if (best > kFits && given.disagreementBy(given.bestRotation()) < best / kClearly) {
     return std::nullopt;
@@ -153,8 +155,8 @@ std::optional<Wrong> wrongReading(const std::vector<Step>& steps, const Quaterni
            100.0 * (1.0 - best))}};
 }
 
-/// The finding with its fix. Rotations alone do not distinguish an inverse from a quaternion that
-/// is conjugated.
+/// The finding with its fix. Positions decide between an inverted pose and a conjugated quaternion,
+/// because their rotations are equal.
 DataFinding repaired(Wrong wrong, const std::vector<StampedPose>& poses,
                      const replay::Recording& recording) {
   const Reading& reading = *wrong.likely.front();
@@ -210,7 +212,7 @@ std::optional<DataFinding> otherAxes(const std::vector<Step>& steps, const Quate
           100.0 * (1.0 - left), axesText(R), sensor.else_see)};
 }
 
-/// The time to add to that of the poses, if it explains their rotations.
+/// Returns the time in s to add to the poses' times, if it explains their rotations clearly better.
 std::optional<double> betterTime(const std::vector<StampedPose>& poses, const TurnIntegral& gyro,
                                  const CameraCalibration& camera, const Limits& limits) {
   constexpr double kStep_s = 0.3, kMost_s = 2.0, kEach_s = 0.02, kShown = 0.2, kClearly = 3.0;
@@ -232,8 +234,8 @@ std::optional<double> betterTime(const std::vector<StampedPose>& poses, const Tu
   return offset;
 }
 
-/// Time offsets of the poses in their first and in their last third. Each third fits only at its
-/// own offset if the clock is too fast or too slow.
+/// Time offsets of the poses in their first and in their last third. They differ if the poses'
+/// clock is too fast or too slow.
 struct GrowingOffset {
   double first_s, last_s, per_second;
 };
@@ -274,7 +276,7 @@ std::optional<GrowingOffset> growingOffset(const std::vector<StampedPose>& poses
   return GrowingOffset{offset[0], offset[1], (offset[1] - offset[0]) / apart};
 }
 
-/// Reports poses of another drive, or rotations that no reading explains.
+/// Reports poses of another drive: no change of axes explains their rotations.
 std::optional<DataFinding> nothingInCommon(const std::vector<Step>& steps, const Quaternion& q_BC,
                                            const Limits& limits) {
   constexpr double kMuch_rad = 0.1, kAlien = 0.9, kStillAlien = 0.7, kAlike = 3.0;

@@ -1,5 +1,5 @@
-// Compares the motion of given poses with the drive: poses of the camera, and poses that stand
-// still while the body moves.
+// Compares the motion of given poses with the drive. Finds poses of the camera, and poses that are
+// constant while the body moves.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -19,8 +19,8 @@ using replay::StampedPose;
 using Grade = DataFinding::Grade;
 using Poses = std::vector<StampedPose>;
 
-/// The mean of the directions of travel, in the frame that the poses have, over steps of a metre;
-/// its length shows how constant they are. Zero for fewer steps.
+/// The mean direction of travel in the body frame of the poses, over steps of a metre. Its length
+/// is 1 for a constant direction. Zero for fewer than `fewest` steps.
 Eigen::Vector3d courseOf(const Poses& poses, double fewest) {
   constexpr double kStep_m = 1.0;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -34,7 +34,7 @@ Eigen::Vector3d courseOf(const Poses& poses, double fewest) {
   return count < fewest ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : Eigen::Vector3d(sum / count);
 }
 
-/// How constant an axis of the poses is in their world: 1 is constant.
+/// How constant the direction of a body axis is in the world: 1 is constant, 0 is random.
 double constancyOf(const Eigen::Vector3d& axis, const Poses& poses) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const StampedPose& pose : poses) sum += pose.T_WB.q * axis;
@@ -45,7 +45,7 @@ struct Still {
   std::size_t first, last;
 };
 
-/// The longest time, over .4 s, in which a pose is repeated.
+/// The longest interval, over 0.4 s, in which a pose is repeated.
 std::optional<Still> longestStill(const Poses& poses) {
   constexpr double kSame_m = 1e-4, kSame_rad = 1e-4;
   constexpr Duration kLeast = std::chrono::milliseconds(400);

@@ -1,5 +1,5 @@
-// Checks for implausible poses: without rotation or translation, with jumps, or with positions
-// along other axes than the orientations.
+// Finds implausible poses: without rotation or translation, with jumps, or with positions along
+// other axes than the orientations.
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
@@ -22,7 +22,7 @@ using replay::StampedPose;
 using Grade = DataFinding::Grade;
 using Poses = std::vector<StampedPose>;
 
-/// Poses of the first camera as those of the body.
+/// Converts poses of the first camera to poses of the body.
 Poses ofBody(Poses poses, const replay::Recording& recording) {
   const RigidTransform T_CB = recording.calibration.cameras.front().T_BC.inverse();
   for (StampedPose& pose : poses) pose.T_WB = pose.T_WB * T_CB;
@@ -95,7 +95,7 @@ std::vector<Jump> jumpsOf(const Poses& poses) {
   return jumps;
 }
 
-/// Row i: the axis of the positions that is axis i of W, with its sign.
+/// Row i: the signed axis of the positions that is axis i of W.
 using SignedAxes = Eigen::Matrix3d;
 
 std::vector<SignedAxes> allSignedAxes() {
@@ -113,14 +113,14 @@ std::vector<SignedAxes> allSignedAxes() {
   return all;
 }
 
-/// Correlation of the accelerations after the positions are rotated by `axes`; 0: no correlation.
+/// Correlation with the accelerometer after the positions are rotated by `axes`; 0: none.
 double commonOf(std::vector<Push> pushes, const SignedAxes& axes) {
   for (Push& push : pushes) push.by_poses = axes * push.by_poses;
   const auto scale = scaleOf(pushes);
   return scale ? scale->common : 0.0;
 }
 
-/// Text such as "-x, y, z", including the ambiguous axes.
+/// Text such as "-x, y, z", followed by the axes that remain ambiguous.
 std::string orderText(const std::vector<SignedAxes>& likely) {
   const SignedAxes& simplest =
       *std::max_element(likely.begin(), likely.end(),

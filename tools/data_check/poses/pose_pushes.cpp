@@ -13,8 +13,8 @@ using replay::StampedPose;
 
 constexpr std::size_t kFewestPushes = 12;
 
-/// Weighted mean of the specific force around `middle`, in B at that time. The weights decrease to
-/// 0 at both ends.
+/// Weighted mean of the specific force, in B at time `middle`. The weights decrease to 0 at `from`
+/// and `to`.
 std::optional<Eigen::Vector3d> meanForce(const std::vector<ImuSample>& samples,
                                          const TurnIntegral& gyro, TimePoint from, TimePoint middle,
                                          TimePoint to) {
@@ -38,7 +38,7 @@ std::optional<Eigen::Vector3d> meanForce(const std::vector<ImuSample>& samples,
   return sum / weights;
 }
 
-/// Removes from accelerations (three rows for each push) the parts that gravity or a bias explains.
+/// Removes the parts of accelerations (three rows per push) that gravity or a bias explains.
 void takeFree(const std::vector<Push>& pushes, Eigen::MatrixXd& columns) {
   Eigen::MatrixXd free(columns.rows(), 6);
   for (std::size_t i = 0; i < pushes.size(); ++i) {

@@ -1,4 +1,4 @@
-// Unit of length of given poses.
+// Checks the unit of length of given poses.
 #include <fmt/format.h>
 
 #include <algorithm>

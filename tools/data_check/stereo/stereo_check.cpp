@@ -28,7 +28,7 @@ constexpr double kMostMatch = 0.5;  // least share of cam0's corners that a corr
 constexpr double kFewMatch = 0.25;  // largest share that two unrelated images match
 constexpr double kDegreesOfTurn = 180.0 / M_PI;
 
-/// Unit normal of the epipolar plane of a ray of C0, in C1; empty near the baseline.
+/// Unit normal, in C1, of the epipolar plane of a ray of C0; empty for a ray near the baseline.
 std::optional<Vector3d> planeOf(const StereoMatch& match, const RigidTransform& T_C1C0) {
   constexpr double kAlongBaseline = 0.1;
   const Vector3d normal = T_C1C0.p.normalized().cross(T_C1C0.q * match.first);
@@ -36,7 +36,7 @@ std::optional<Vector3d> planeOf(const StereoMatch& match, const RigidTransform& 
   return normal.normalized();
 }
 
-/// Statistics of matches against a geometry.
+/// How well matches agree with a geometry.
 struct Fit {
   std::size_t count = 0;               ///< number of matches away from the baseline
   double off_px = 0.0;                 ///< median distance from the epipolar line
@@ -52,7 +52,7 @@ Fit fitOf(const std::vector<StereoMatch>& matches, const RigidTransform& T_C1C0,
     const auto normal = planeOf(match, T_C1C0);
     if (!normal) continue;
     off_px.push_back(fx * std::asin(std::min(1.0, std::abs(normal->dot(match.second)))));
-    // A point in front of the cameras shifts towards t, according to ray + t / depth.
+    // For a point in front of the cameras, this parallax is positive.
     const double parallax = -normal->dot((T_C1C0.q * match.first).cross(match.second));
     if (std::abs(parallax) * fx < 2.0) continue;
     ++(parallax > 0.0 ? fit.before : fit.behind);
@@ -67,10 +67,10 @@ struct Turned {
   Vector3d sigma = Vector3d::Zero();
 };
 
-/// The small rotation of cam1 that minimises the distances from the epipolar lines. Gauss-Newton
+/// The small rotation of cam1 that minimises the distances from the epipolar lines, by Gauss-Newton
 /// with Cauchy weights; the baseline stays constant.
 Turned turnOf(const std::vector<StereoMatch>& matches, const RigidTransform& T_C1C0) {
-  constexpr double kFinest = 2e-4;  // rad; accuracy of corners
+  constexpr double kFinest = 2e-4;  // rad; accuracy of corner positions
   Turned turned;
   for (int round = 0; round < 20; ++round) {
     RigidTransform T = T_C1C0;
@@ -126,7 +126,7 @@ class StereoJudge {
     const auto &name0 = first_.calibration().name, &name1 = second_.calibration().name;
     const StereoMatches by_rig = matchesOf(pairs_, first_, second_, T_C1C0_.R());
     StereoMatches best = by_rig;
-    if (by_rig.share() < kMostMatch) {  // assumes equal viewing directions
+    if (by_rig.share() < kMostMatch) {  // tries equal viewing directions
       const auto alike = matchesOf(pairs_, first_, second_, Matrix3d::Identity());
       if (alike.matches.size() > 1.5 * static_cast<double>(best.matches.size())) best = alike;
     }
@@ -143,7 +143,7 @@ class StereoJudge {
   }
 
  private:
-  /// Judges pairs whose pictures do not match.
+  /// Judges pairs whose images do not match.
   DataFindings judgeUnlike(const StereoMatches& by_rig, const StereoMatches& best) const {
     if (by_rig.tried < kFewestMatches) return {};
     if (auto late = judgeStamps(); !late.empty()) return late;
@@ -192,7 +192,7 @@ class StereoJudge {
     const RigidTransform turn(expQuaternion(turned.by), Vector3d::Zero());
     const Fit repaired = fitOf(matches, turn * T_C1C0_, fx);
     const bool wrong = given.off_px > kFarOff_px || given.isBehind();
-    // Rotation about the vertical axis between the images looks like parallax of both signs.
+    // Rotation about the vertical axis between the images resembles parallax of both signs.
     const bool mixed = given.behind > kFewestMatches && 3 * given.behind > given.before;
     if (!wrong && !mixed && !isTurned(turned, given, repaired)) return {};
     if (auto late = judgeStamps(); !late.empty()) return late;
@@ -213,8 +213,8 @@ class StereoJudge {
                                of, name0));
   }
 
-  /// Whether a rotation of cam1 explains the misfit with certainty and places the points in front
-  /// of the cameras.
+  /// Whether a rotation of cam1 certainly explains the misfit and places the points in front of the
+  /// cameras.
   static bool isTurned(const Turned& turned, const Fit& given, const Fit& repaired) {
     constexpr double kLeast_rad = 1.0 / kDegreesOfTurn, kSurely = 6.0, kFits_px = 2.0;
     const double angle = turned.by.norm();
@@ -247,7 +247,7 @@ class StereoJudge {
 DataFindings checkStereo(const Recording& recording) {
   const auto& cameras = recording.calibration.cameras;
   if (cameras.size() < 2) return {};
-  // this fault has its own finding
+  // T_BS in millimetres has its own finding.
   if (hasPlaceInMm(cameras[0]) || hasPlaceInMm(cameras[1])) return {};
   const auto pairs = someStereoImages(recording);
   if (pairs.empty()) return {};

@@ -34,8 +34,8 @@ cv::Mat resized(const cv::Mat& image, const CameraModel& to) {
   return small;
 }
 
-/// Pixel in the second image for each pixel of the first, for points at infinity; −1e4 if
-/// invisible.
+/// For each pixel of the first image, the pixel in the second of a point at infinity; −1e4 if it is
+/// not visible there.
 cv::Mat whereFar(const CameraModel& first, const CameraModel& second, const Eigen::Matrix3d& R) {
   const cv::Size size = sizeOf(first);
   cv::Mat where(size, CV_32FC2, cv::Scalar(-1e4, -1e4));
@@ -52,7 +52,7 @@ cv::Mat whereFar(const CameraModel& first, const CameraModel& second, const Eige
   return where;
 }
 
-/// Mask for corner detection: the area that both cameras see, without its border.
+/// Mask for corner detection: the area that both cameras cover, without its border.
 cv::Mat seenByBoth(const cv::Mat& where) {
   constexpr int kBorder_px = 12;
   cv::Mat across, seen, inner;
@@ -64,7 +64,7 @@ cv::Mat seenByBoth(const cv::Mat& where) {
   return inner;
 }
 
-/// Normalises by the local mean and contrast, so that exposure and gamma have no effect.
+/// Normalises the image by the local mean and contrast, so that exposure and gamma have no effect.
 cv::Mat evened(const cv::Mat& image) {
   constexpr double kNoise = 2.0, kContrast = 40.0;
   const cv::Size about(31, 31);
@@ -85,7 +85,7 @@ void flipImage(cv::Mat& image, Flip flip) {
   image = flipped;
 }
 
-/// Adds the corners of the first image that are tracked to the second and back to their origin.
+/// Adds the corners of the first image that can be tracked to the second and back to their origin.
 void addMatches(const CameraModel& camera, const Eigen::Matrix3d& R, const cv::Mat& first,
                 const cv::Mat& second, const cv::Mat& seen, StereoMatches& all) {
   std::vector<cv::Point2f> from, to, back;

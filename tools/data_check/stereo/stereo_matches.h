@@ -1,6 +1,6 @@
 // Matches points between two cameras. The second image is warped to the view of the first camera by
-// the calibrated rotation. Cameras of any size, lens and direction can be compared so, and only
-// parallax remains.
+// the calibrated rotation, so that only parallax remains. This works for cameras of any size, lens
+// and direction.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,7 +21,7 @@ struct StereoImages {
 std::vector<StereoImages> someStereoImages(const replay::Recording& recording,
                                            std::size_t most = 8);
 
-/// Whether nearly all pairs contain the same picture twice.
+/// Whether the two images of nearly all pairs are the same.
 bool areSameImages(const std::vector<StereoImages>& pairs);
 
 struct StereoMatch {
@@ -39,7 +39,7 @@ struct StereoMatches {
 /// Mirroring of the second image before the comparison.
 enum class Flip { kNone, kSideways, kUpright, kBoth };
 
-/// R rotates a ray of C0 into C1.
+/// Tracks corners from the first images to the second; R_C1C0 rotates a ray of C0 into C1.
 StereoMatches matchesOf(const std::vector<StereoImages>& pairs, const CameraModel& first,
                         const CameraModel& second, const Eigen::Matrix3d& R_C1C0,
                         Flip flip = Flip::kNone);

@@ -40,7 +40,7 @@ std::vector<Turn> turnsIn(const Recording& part) {
   return turns;
 }
 
-/// Rotation between two times from consecutive rotations; empty if they have a gap.
+/// Rotation between two times, composed of consecutive rotations; empty if they have a gap.
 std::optional<Vector3d> turnedBetween(const std::vector<Turn>& turns, TimePoint from,
                                       TimePoint to) {
   Vector3d sum = Vector3d::Zero();
@@ -55,7 +55,7 @@ std::optional<Vector3d> turnedBetween(const std::vector<Turn>& turns, TimePoint 
   return sum;
 }
 
-/// Share of the second camera's rotation that the first one's, shifted by `later`, does not
+/// Share of the second camera's rotation that the first camera's, shifted by `later`, does not
 /// explain.
 double leftOver(const std::vector<Turn>& first, const std::vector<Turn>& second, double later) {
   std::vector<std::pair<Vector3d, Vector3d>> both;
@@ -85,8 +85,8 @@ double changeOf(const std::vector<Turn>& turns) {
   return std::sqrt(sum / std::max<double>(1.0, static_cast<double>(turns.size())));
 }
 
-/// Start of the seconds with the largest change of the IMU's rotation, or of the middle without
-/// samples.
+/// Start of the interval in which the IMU's rates vary most; without samples, of the middle
+/// interval.
 TimePoint liveliest(const Recording& recording, TimePoint first, TimePoint last) {
   const Duration length = durationFromSeconds(kLooked_s);
   TimePoint best = first + std::max(Duration(0), (last - first - length) / 2);

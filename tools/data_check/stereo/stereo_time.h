@@ -1,5 +1,5 @@
-// Checks whether the stamps of two cameras have the same clock. Both rotate at the same time, and
-// translation affects both image rotations nearly equally.
+// Checks whether the stamps of two cameras have the same clock. Both cameras rotate at the same
+// time, and translation affects both image rotations nearly equally.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-// `perdure evaluate memory`: whether objects that are seen again keep their ids.
+// `perdure evaluate memory`: checks whether objects that are seen again keep their ids.
 #include "tools/evaluate/command.h"
 
 #include <fmt/format.h>

@@ -60,7 +60,7 @@ double alignedError(const std::map<AnchorId, std::vector<PosePair>>& parts) {
   return count == 0 ? 0.0 : std::sqrt(squares / static_cast<double>(count));
 }
 
-/// For each frame, the visible objects that were visible on an earlier visit.
+/// Returns, by frame, the visible objects that were also visible on an earlier visit.
 std::map<std::size_t, std::set<std::uint64_t>> seenAgain(const std::vector<MemoryFrame>& frames,
                                                          const MemoryOptions& options) {
   std::map<std::size_t, std::set<std::uint64_t>> again;

@@ -46,7 +46,7 @@ struct ObjectAtPlace {
   double along = 0.0, across = 0.0;
 };
 
-/// The object nearest to the middle of the limits, in units of these.
+/// The object nearest to the middle of the limits, in units of their half widths.
 std::optional<ObjectAtPlace> objectAt(const Eigen::Vector2d& place_W, const PlaceFrame& frame,
                                       const PlaceOptions& options) {
   const Eigen::Vector2d ray = (place_W - frame.T_WB.p.head<2>()).normalized();
@@ -107,7 +107,8 @@ Places readPlaces(const std::filesystem::path& file) {
   return places;
 }
 
-/// Merges can form a cycle: two ids were merged, split, and merged in the other direction.
+/// Follows the merges of `id`. Stops at a cycle, which arises if two ids are merged, split, and
+/// merged in the other direction.
 std::uint64_t RunEvents::finalId(std::uint64_t id) const {
   std::set<std::uint64_t> seen;
   for (auto at = merged.find(id); at != merged.end() && seen.insert(id).second;

@@ -1,4 +1,4 @@
-// `perdure evaluate memory --places`: the table of memory on a user's own data.
+// `perdure evaluate memory --places`: scores the memory of a run on a user's own data.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -26,13 +26,13 @@ struct PlacesCommand {
   PlaceOptions options;
 };
 
-/// The frames with a true pose, and the place of the camera (or the body) that has the true poses.
+/// The frames with a true pose, and the mounting of the camera (or body) to which the poses belong.
 struct PlacesTruth {
   std::map<TimePoint, std::pair<std::uint64_t, RigidTransform>> frames;  ///< number, T_PC
   RigidTransform T_BC;
 };
 
-/// The frames and the camera are those of the run's data, which its report names.
+/// Reads the true poses; frames and camera come from the run's data, which report.json names.
 PlacesTruth readTruth(const fs::path& run, const std::string& poses_file,
                       const PlacesCommand& command) {
   if (!fs::is_directory(run)) {
@@ -75,7 +75,7 @@ PlacesTruth readTruth(const fs::path& run, const std::string& poses_file,
   return truth;
 }
 
-/// Horizontal ATE of the camera after alignment in yaw and position; null without a trajectory.
+/// Horizontal ATE of the camera after alignment in yaw and position; null if `file` is missing.
 Json ateOf(const fs::path& file, const PlacesTruth& truth) {
   if (!fs::exists(file)) return nullptr;
   const auto trajectory = replay::PoseFile::read(file);

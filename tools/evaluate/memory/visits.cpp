@@ -86,7 +86,7 @@ std::vector<Sighting> matched(const std::vector<SeenObject>& visible,
   return sightings;
 }
 
-/// Converts a point from the ground truth's W to the run's W by the poses of a frame.
+/// Transforms a point from the ground truth's W to the run's W by the two poses of a frame.
 Eigen::Vector3d inFrameOf(const MemoryFrame& frame, const Eigen::Vector3d& point_W) {
   return frame.T_WB * (frame.true_T_WB.inverse() * point_W);
 }
@@ -130,7 +130,7 @@ std::map<std::uint64_t, std::uint64_t> lastIds(
   return ids;
 }
 
-/// The object that matched each id in most frames.
+/// Returns, for each id, the object that it matched in most frames.
 std::map<std::uint64_t, std::uint64_t> ownersOf(const std::vector<MemoryFrame>& frames) {
   std::map<std::uint64_t, Counts> times;
   for (const auto& frame : frames) {
@@ -149,7 +149,7 @@ std::set<std::uint64_t> idsOf(const std::vector<MemoryFrame>& frames) {
   return ids;
 }
 
-/// The first frame with an id of `known`, or the end.
+/// Index of the first frame that reports an id of `known`; the number of frames if there is none.
 std::size_t firstWith(const std::set<std::uint64_t>& known,
                       const std::vector<MemoryFrame>& frames) {
   const auto found = std::ranges::find_if(frames, [&](const MemoryFrame& frame) {

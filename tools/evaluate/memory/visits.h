@@ -1,5 +1,5 @@
-// Whether an object that is seen again keeps its id. Reports are matched to truth relative to the
-// body, so that drift has no effect.
+// Checks whether an object that is seen again keeps its id. Reports are matched to truth relative
+// to the body, so that drift has no effect.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ namespace perdure::tools {
 struct MemoryOptions {
   double reach_m = 25.0;    ///< largest distance of an object from the body
   double near_m = 1.5;      ///< largest distance of a report from its object
-  double least_seen = 0.5;  ///< least visible share of a visible object
+  double least_seen = 0.5;  ///< least visible share of an object that counts as visible
   double apart_s = 60.0;    ///< least time between two visits
 };
 
@@ -30,23 +30,23 @@ struct MemoryFrame {
   double way_m = 0.0;  ///< true distance travelled since the first frame
   RigidTransform T_WB, true_T_WB;
   std::vector<Sighting> sightings;
-  std::set<std::uint64_t> reported;  ///< ids, matched or not
+  std::set<std::uint64_t> reported;  ///< ids of all reports, matched or not
 };
 
-/// Frames of the run with a pose, in order. Objects count if they never move, are not toys, are
-/// within reach and sufficiently visible. A report matches an object of its class; pairs are
-/// matched one-to-one, greedily by distance in the body frame.
+/// Returns the frames of the run with a pose, in order. Objects count if they never move, are not
+/// toys, are within reach and sufficiently visible. A report matches an object of its class; pairs
+/// are matched one-to-one, greedily by distance in the body frame.
 std::vector<MemoryFrame> besideTheBody(const SimulatedTruth& truth,
                                        const std::vector<EstimateRow>& rows,
                                        const std::vector<replay::StampedPose>& trajectory,
                                        const MemoryOptions& options);
 
-/// Frames in which an object is visible, with gaps shorter than `apart_s`.
+/// A series of frames in which an object is visible, with gaps shorter than `apart_s`.
 struct Visit {
   std::vector<std::size_t> frames;           ///< indices of frames of the run
   std::map<std::uint64_t, std::size_t> ids;  ///< number of frames in which each id matched
 
-  /// The id of most frames; the smallest one on a tie. Empty if no report matched.
+  /// The id that matched in most frames; the smallest one on a tie. Empty if no report matched.
   std::optional<std::uint64_t> id() const;
 };
 std::map<std::uint64_t, std::vector<Visit>> visitsOf(const std::vector<MemoryFrame>& frames,
@@ -54,12 +54,13 @@ std::map<std::uint64_t, std::vector<Visit>> visitsOf(const std::vector<MemoryFra
 
 struct MemoryScore {
   std::uint64_t frames = 0, sightings = 0, matched = 0;
-  std::uint64_t late_sightings = 0, late_matched = 0;  ///< counts in the second half of frames
+  std::uint64_t late_sightings = 0, late_matched = 0;  ///< counts of the second half of the frames
   std::uint64_t objects = 0, seen_twice = 0;
-  /// Objects reported on two visits; of these, those with the same id on first and last.
+  /// reported_twice: objects reported on two visits; kept: those with the same id on the first and
+  /// the last of these.
   std::uint64_t reported_twice = 0, kept = 0;
   std::uint64_t objects_matched = 0, ids = 0, with_more_ids = 0;  ///< ids: summed over objects
-  /// Median displacement in W of objects seen twice, from the first visit to the last.
+  /// Median displacement in W (m) of objects seen on two visits, from the first visit to the last.
   double drift_m = 0.0;
 
   double keptShare() const;  ///< 1 if nothing was reported twice
@@ -73,7 +74,7 @@ MemoryScore scoreMemory(const SimulatedTruth& truth, const std::vector<MemoryFra
 struct ReturnScore {
   std::uint64_t ids = 0;    ///< ids that the earlier run reported
   std::uint64_t known = 0;  ///< objects that the earlier run reported and this run sees
-  /// Counts of these objects, visible and reported, after the first report of a known id.
+  /// Sightings of known objects from the first report of a known id on: visible, and reported.
   std::uint64_t seen = 0, reported = 0;
   std::uint64_t kept = 0;   ///< objects with the id of the last earlier visit
   std::uint64_t wrong = 0;  ///< objects with an id of another object

@@ -75,10 +75,11 @@ def check_names(path, found, request, graph):
 
 
 def cut(path, graph, found, request):
-    """Cuts the graph at the heads. Returns the remaining operators that OpenCV lacks."""
+    """Cuts the graph at the heads. Returns the operators in the remaining graph that OpenCV
+    lacks."""
     was = {n.kind for n in graph.nodes}
     graph.keep(found.cuts)
-    for old, new in found.cuts.items():  # renames others first, because the names may be used
+    for old, new in found.cuts.items():  # first renames other tensors with these names
         graph.rename(old, f"perdure_cut_{new}")
     for new in found.cuts.values():
         graph.rename(new, f"perdure_was_{new}")
@@ -95,7 +96,8 @@ def cut(path, graph, found, request):
 
 
 def other_size(args, graph, found, size, request):
-    """The input size by --input; for a camera, its aspect ratio with about as many pixels."""
+    """Returns the input size that --input requests. For "camera" it has the camera's aspect ratio
+    and about as many pixels as `size`."""
     if not request.new_size:
         return size
     steps = [level["stride"] for level in found.keys.get("levels", [])] or [32]
@@ -122,8 +124,7 @@ def description(args, found, names, size, request):
 
 
 def write_reference(args, graph, size, given, found, inside):
-    """Writes the network's outputs for a noise image, with which the service's outputs are
-    compared."""
+    """Writes a noise image and the network's outputs for it, for the comparison with OpenCV."""
     folder, outputs = args.reference, list(found.cuts.values())
     pixels = np.random.default_rng(11).uniform(0, 255, (1, 3, size[1], size[0]))
     mean, scale = (np.broadcast_to(given[k], 3).reshape(3, 1, 1) for k in ("mean", "scale"))
@@ -153,7 +154,7 @@ def write(args, graph, described, priors):
 
 
 def imported(args, request, graph):
-    """Imports and writes; returns the finding, the input size, and the repairs."""
+    """Imports and writes the network. Returns the finding, the input size, and the repairs."""
     eight_bits = quantised.to_float(graph)
     size = graph.fix_input(args.network, request.size)
     graph.fold()
@@ -165,7 +166,7 @@ def imported(args, request, graph):
     size = other_size(args, graph, found, size, request)
     outputs = list(found.cuts.values())
     given = input_of(found, request)
-    if args.reference:  # uses the original graph, to detect wrong repairs too
+    if args.reference:  # by the original graph, which shows wrong repairs too
         why = write_reference(args, graph, size, given, found, inside)
         found.notes += [why] if why else []
     repaired = {} if inside else Repair(graph).run()  # repairs for OpenCV deviate from the standard
@@ -200,13 +201,13 @@ def run(args):
         done = imported(args, request, graph)
     except Fault:
         raise
-    except Exception as e:  # an inconsistent graph can fail anywhere
+    except Exception as e:  # an inconsistent graph may fail anywhere
         raise Fault(f"{args.network} is not a graph that makes sense here ({type(e).__name__}: {e}); export it again, "
                     "with opset 12")
     try:
         tell(graph, request, *done)
     except OSError as e:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # avoids a second error at the end
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # avoids a second error when Python flushes at exit
         raise Fault(f"standard output cannot be written whole ({e.strerror}); free space, or send it elsewhere",
                     INPUT_OUTPUT)
 

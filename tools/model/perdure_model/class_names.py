@@ -8,13 +8,13 @@ from pathlib import Path
 
 from .faults import DATA, UNAVAILABLE, USAGE, Fault
 
-UNUSED = ("n/a", "???")  # COCO's list of 91 uses them for unused numbers
+UNUSED = ("n/a", "???")  # unused numbers in COCO's list of 91
 SAVE = "save the file as UTF-8"
 
 
 def names_of(text):
-    """Names from a file with one name a line, or from a list with commas."""
-    if os.path.isfile(text):  # False for lists longer than any path
+    """Returns names from a file with one name per line, or from a list with commas."""
+    if os.path.isfile(text):  # also False for a list that is too long for a path
         return distinct(names_of_lines(text, decoded(text)))
     if not ("," in text or not ("/" in text or text.endswith((".txt", ".names")))):
         raise Fault(f"the file of class names {text} is missing; give a file with a name a line, or names with commas "
@@ -70,13 +70,13 @@ def refuse_repeated(where, what, named, status):
 
 
 def distinct(names):
-    """Appends a number to repeated names: n/a-12 and so on."""
+    """Appends its index to each repeated name: n/a-12 and so on."""
     lower = [name.lower() for name in names]
     return [n if lower.count(n) == 1 else f"{n}-{i}" for i, n in enumerate(lower)]
 
 
 def names_in(graph):
-    """Class names that Ultralytics stores in the file."""
+    """Returns the class names that Ultralytics stores in the file."""
     try:
         names = ast.literal_eval(graph.metadata["names"])
         return distinct([str(names[i]) for i in sorted(names)] if isinstance(names, dict) else [str(n) for n in names])

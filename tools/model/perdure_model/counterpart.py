@@ -9,8 +9,8 @@ from onnx import TensorProto, helper
 
 
 def answers(path, graph, image, found, outputs, inside):
-    """({tensor: values}, the reason if there are none). Uses numpy, or ONNX Runtime on the original
-    file if numpy lacks operators (`inside`)."""
+    """Returns ({tensor: values}, the reason if there are none). Uses numpy, or ONNX Runtime on the
+    original file if operators that OpenCV lacks remain (`inside`)."""
     if inside:
         return by_onnx_runtime(path, graph, image, found)
     values, stuck = graph.evaluate({graph.image: image}, outputs)
@@ -20,21 +20,21 @@ def answers(path, graph, image, found, outputs, inside):
 
 
 def sources_of(graph, found):
-    """{tensor of the description: its name in the file}; the input of an activation that was
-    removed."""
+    """Returns {tensor of the description: its name in the file}. The name is that of the input if
+    the tensor was the output of an activation that was removed."""
     producers = graph.producers()
     return {new: producers[new].inputs[0] if producers[new].kind == "Identity" else old
             for old, new in found.cuts.items()}
 
 
 def zeros_for(given, types):
-    """Zeros for an input other than the image, which does not affect the tensors."""
+    """Returns zeros for an input other than the image. Such inputs do not affect the tensors."""
     return np.zeros([d if isinstance(d, int) else 1 for d in given.shape], types[given.type])
 
 
 def quietly_imported():
-    """onnxruntime, or None if it is not installed. Suppresses its messages: Debian's package shares
-    a library with onnx and registers its operators a second time."""
+    """Returns onnxruntime, or None if it is not installed. Its messages are suppressed, because
+    Debian's package shares a library with onnx and registers operators a second time."""
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     sys.stderr.flush()
     os.dup2(nowhere, 2)

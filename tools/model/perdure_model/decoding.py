@@ -1,5 +1,5 @@
-"""The decoding rules of services/inference in numpy, for the comparison with a file's own
-decoding."""
+"""The decode rules of services/inference in numpy, for the comparison with the decoding in a
+file."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ YOLO_FASTESTV2_ANCHORS = [[[12.64, 19.39], [37.88, 51.48], [55.71, 138.31]],
 
 
 def planes(head):
-    """(1, C, H, W) to (cells, C)."""
+    """Converts (1, C, H, W) to (cells, C)."""
     return head.reshape(head.shape[1], -1).T
 
 
@@ -26,7 +26,8 @@ def centred(low, high):
 
 
 def yolov5(heads, strides, anchors):
-    """Rows of centre, size, objectness, classes; anchors first, then cells."""
+    """Returns rows of centre, size, objectness and classes, in order of levels, anchors and
+    cells."""
     rows = []
     for head, stride, level in zip(heads, strides, anchors):
         for part, anchor in zip(np.split(planes(head), len(level), 1), level):
@@ -44,7 +45,7 @@ def distances(head, bins, exponents=False):
 
 
 def yolov8(heads, strides, bins, offset=0.5, exponents=False):
-    """`heads`: (box, classes) of each level. Rows of centre, size, classes."""
+    """Returns rows of centre, size and classes. `heads` are (box, classes) of each level."""
     rows = []
     for (box, classes), stride in zip(heads, strides):
         d, at = distances(box, bins, exponents), cells(box) + offset
@@ -54,7 +55,8 @@ def yolov8(heads, strides, bins, offset=0.5, exponents=False):
 
 
 def yolox(heads, strides, decoded):
-    """`heads`: (box, objectness, classes) of each level."""
+    """Returns rows of box, objectness and classes. `heads` are (box, objectness, classes) of each
+    level."""
     rows = []
     for (box, objectness, classes), stride in zip(heads, strides):
         b = planes(box)
@@ -70,8 +72,8 @@ def fastestdet(heads):
 
 
 def yolo_fastestv2(heads):
-    """The decoding inside its files: sigmoids of boxes and objectness, the soft-max, a row for each
-    cell."""
+    """Returns a row for each cell, as the decoding in such files: sigmoids of boxes and objectness,
+    and the soft-max of the classes."""
     box, objectness, classes = (planes(h) for h in heads[0])
     return np.concatenate([sigmoid(box), sigmoid(objectness), softmax(classes, 1)], 1)
 
@@ -82,8 +84,8 @@ def nanodet(heads, classes):
 
 
 def as_rows(value, columns):
-    """A tensor of shape (1,N,C), (1,C,N), (1,C,H,W) or (1,A,H,W,C) as (N, C); None for other
-    shapes."""
+    """Returns a tensor of shape (1,N,C), (1,C,N), (1,C,H,W) or (1,A,H,W,C) as (N, C); None for
+    other shapes."""
     value = np.asarray(value)
     if value.dtype.kind != "f" or value.ndim < 2 or value.shape[0] != 1:
         return None
@@ -98,8 +100,9 @@ def corners(rows):
 
 
 def disagreement(mine, values, more=0):
-    """The smallest maximum difference to a tensor of the same size, relative to 1 + its value. None
-    if no tensor has that size. Boxes may be given by corners there, and `more` columns follow."""
+    """Returns the least, over all tensors of the same size, of the largest difference relative to 1
+    + the value; None if no tensor has that size. The tensor's boxes may be corners, and it has
+    `more` further columns."""
     best = None
     for value in values:
         rows = as_rows(value, mine.shape[1] + more)

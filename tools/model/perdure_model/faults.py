@@ -1,5 +1,5 @@
-"""Error that ends an import: a sentence with the fix, and the exit status (64 usage, 65 unusable
-data, 69 missing, 74 not written, 78 wrong)."""
+"""Error that ends an import: a sentence with the fix, and the exit status (64 wrong usage, 65
+unusable data, 69 missing file, 74 not written, 78 wrong content)."""
 
 import errno
 
@@ -13,7 +13,8 @@ class Fault(Exception):
 
 
 def unwritten(name, error):
-    """Fault for an OSError; one without a number comes from numpy after an incomplete write."""
+    """Returns the Fault for an OSError. An error without a number comes from numpy after an
+    incomplete write."""
     why = error.strerror or "not all of it could be written"
     if error.errno in (None, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
         return Fault(f"{name} cannot be written whole ({why}); free space, or give a folder on another disk",

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-# Input of each family as in the authors' own code.
+# Input of each family, as in the code of its authors.
 INPUTS = {
     "yolov5": {"fit": "letterbox_centre", "pad": 114, "colour": "rgb", "scale": 1 / 255, "mean": [0, 0, 0]},
     "yolox": {"fit": "letterbox_top_left", "pad": 114, "colour": "bgr", "scale": 1.0, "mean": [0, 0, 0]},
@@ -25,9 +25,9 @@ INPUTS["yolov7"] = INPUTS["yolov8"] = INPUTS["yolov5"]
 class Finding:
     family: str
     classes: int
-    cuts: dict = field(default_factory=dict)     # tensor of the graph: its name in model.json
+    cuts: dict = field(default_factory=dict)     # {tensor of the graph: its name in model.json}
     keys: dict = field(default_factory=dict)     # content of model.json: activation, levels …
     notes: list = field(default_factory=list)    # sentences for people
-    compared: str = ""                           # result of the comparison with its own decoding
+    compared: str = ""                           # result of the comparison with the file's decoding
     disagreement: float = None
     input: dict = field(default_factory=dict)    # differences from the family's usual input

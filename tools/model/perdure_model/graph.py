@@ -14,7 +14,7 @@ KEEPS_SHAPE = ("HardSwish", "Mish")
 
 
 class Node:
-    """A node. Inputs and outputs are names ("" for an omitted input); attributes are plain
+    """A node. Inputs and outputs are names ("" for an omitted input); attributes are Python
     values."""
 
     def __init__(self, kind, inputs, outputs, attributes=None, domain="", name=""):
@@ -38,7 +38,7 @@ class Node:
 class Graph:
     def __init__(self, nodes, constants, inputs, outputs, opset, metadata):
         self.nodes, self.constants, self.outputs = nodes, constants, outputs
-        self.inputs = inputs  # name: (element type, dimensions; None if unknown)
+        self.inputs = inputs  # {name: (element type, dimensions)}; unknown: None
         self.opset, self.metadata = opset, metadata
         self.shapes, self.types = {}, {}
         self.image = ""
@@ -54,7 +54,7 @@ class Graph:
         except FileNotFoundError as e:
             raise Fault(f"{e.filename or path} is missing; give an .onnx file (weights kept in a second file must lie "
                         "beside it)", UNAVAILABLE)
-        except Exception as e:  # protobuf's own errors, and others for a truncated file
+        except Exception as e:  # errors of protobuf, or others if the file is truncated
             raise Fault(f"{path} is not a whole ONNX file ({str(e).splitlines()[0] if str(e) and not isinstance(e, SystemError) else 'cut or damaged'}); "
                         "export or copy it again", DATA)
         graph = model.graph
@@ -67,13 +67,13 @@ class Graph:
                 tensor = i.type.tensor_type
                 inputs[i.name] = (tensor.elem_type, [d.dim_value or None for d in tensor.shape.dim])
         read = {i for n in graph.node for i in n.input}
-        # Some simplifiers leave unused inputs behind; an input without a reader is removed.
+        # Removes inputs without a reader, which some simplifiers leave behind.
         inputs = {name: what for name, what in inputs.items() if name in read} or inputs
         opset = max([o.version for o in model.opset_import if o.domain in ("", "ai.onnx")] or [1])
         metadata = {p.key: p.value for p in model.metadata_props}
         nodes = [Node.of(n) for n in graph.node]
         loaded = cls(nodes, constants, inputs, [o.name for o in graph.output], opset, metadata)
-        for info in [*graph.value_info, *graph.output]:  # needed by operators without inference
+        for info in [*graph.value_info, *graph.output]:  # for operators without shape inference
             tensor = info.type.tensor_type
             loaded.types[info.name] = tensor.elem_type
             if tensor.HasField("shape") and all(d.dim_value for d in tensor.shape.dim):
@@ -81,7 +81,7 @@ class Graph:
         return loaded
 
     def fix_input(self, path, size):
-        """Selects the image among the inputs and sets its size; `size`: (width, height)."""
+        """Selects the image among the inputs and sets its size, (width, height)."""
         images = [n for n, (_, d) in self.inputs.items() if len(d) == 4]
         if len(images) != 1:
             raise Fault(f"{path} has {len(images)} inputs that could be an image ({', '.join(self.inputs) or 'none'}); "
@@ -109,7 +109,7 @@ class Graph:
         return width, height
 
     def to_float32(self):
-        """Converts networks, or parts of them, from half or double precision to float32."""
+        """Converts all values of half or double precision to float32."""
         other, kinds = (np.float16, np.float64), (TensorProto.FLOAT16, TensorProto.DOUBLE)
         self.types = {k: TensorProto.FLOAT if t in kinds else t for k, t in self.types.items()}
         self.constants = {k: v.astype(np.float32) if v.dtype in other else v for k, v in self.constants.items()}
@@ -136,13 +136,14 @@ class Graph:
         return self.constants.get(name)
 
     def origin(self, name):
-        """The exporter's names of a convolution: of its output and of its weights."""
+        """Returns the exporter's names of a convolution: of its output, its weights and its
+        bias."""
         node = next((n for n in self.nodes if name in n.outputs), None)
         return " ".join([name, *(node.inputs[1:] if node else [])])
 
     def ancestors(self, names, stops=()):
-        """The nodes that the tensors depend on, in the graph's order, without those behind the
-        tensors `stops`."""
+        """Returns the nodes on which the tensors `names` depend, in the graph's order. Nodes on
+        which only the tensors `stops` depend are left out."""
         producers, wanted, todo = self.producers(), set(), list(names)
         while todo:
             name = todo.pop()
@@ -157,7 +158,7 @@ class Graph:
     def infer_shapes(self):
         try:
             model = self.to_model()
-            for node in model.graph.node:  # operators of an undeclared opset stop the inference
+            for node in model.graph.node:  # an undeclared opset would stop the inference
                 if node.op_type in KEEPS_SHAPE:
                     node.op_type = "Relu"
                     del node.attribute[:]
@@ -175,7 +176,7 @@ class Graph:
             self.shapes[name], self.types[name] = dims, kind
 
     def shape(self, name):
-        """The shape; None if it, or one of its dimensions, is unknown."""
+        """Returns the shape of a tensor; None if the shape or one of its dimensions is unknown."""
         if name in self.constants:
             return list(self.constants[name].shape)
         shape = self.shapes.get(name)
@@ -208,7 +209,8 @@ class Graph:
         return len(kept) < before
 
     def value_of(self, node):
-        """The outputs of a node that depends only on constants and known shapes."""
+        """Returns the outputs of a node that depends only on constants and known shapes; None for
+        others."""
         if node.domain or any(o in self.outputs for o in node.outputs):
             return None
         if node.kind == "Shape" and self.shape(node.inputs[0]) is not None:
@@ -224,13 +226,13 @@ class Graph:
 
     def fold(self):
         self.infer_shapes()
-        for _ in range(8):  # each round may determine more shapes
+        for _ in range(8):  # each round may give more shapes
             if not self.fold_once():
                 break
             self.infer_shapes()
 
     def keep(self, outputs):
-        """Removes all nodes that these tensors do not need."""
+        """Makes these tensors the outputs, and removes the nodes that they do not need."""
         self.outputs = list(outputs)
         self.nodes = self.ancestors(outputs)
         used = {i for n in self.nodes for i in n.inputs} | set(outputs)
@@ -238,7 +240,7 @@ class Graph:
         self.inputs = {k: v for k, v in self.inputs.items() if k in used or k == self.image}
 
     def rename(self, old, new):
-        """Renames a tensor of any origin; does nothing if the name does not exist."""
+        """Renames a tensor wherever it occurs. Does nothing if the name does not exist."""
         for node in self.nodes:
             node.inputs = [new if i == old else i for i in node.inputs]
             node.outputs = [new if o == old else o for o in node.outputs]
@@ -251,10 +253,10 @@ class Graph:
     # -- evaluating ---------------------------------------------------------------------------
 
     def evaluate(self, known, until=None):
-        """Values of all tensors that follow from `known` and the constants: (values, the operators
-        without an implementation). Stops when all of `until` are computed."""
+        """Computes all tensors that depend only on `known` and the constants. Returns (values, the
+        operators without an implementation). Stops when all of `until` are computed."""
         values, stuck = dict(known), []
-        left = {}  # number of nodes that still need a tensor, to free memory early
+        left = {}  # {tensor: number of nodes that still need it}, to free memory early
         if until is not None:
             for node in self.nodes:
                 for name in node.inputs:

@@ -1,5 +1,5 @@
-"""Finds the heads of a graph: the convolutions before its outputs, with only decoding operators
-between."""
+"""Finds the heads of a graph: convolutions that only decoding operators separate from the
+outputs."""
 
 from dataclasses import dataclass
 
@@ -29,7 +29,7 @@ class Head:
 
 
 def is_mean_of_bins(graph, node):
-    """YOLOv8's last convolution: one output, with the weights 0, 1, 2 …"""
+    """Returns true for YOLOv8's last convolution: one output, with the weights 0, 1, 2 …"""
     weight = graph.constant(node.inputs[1]) if node.kind == "Conv" and len(node.inputs) > 1 else None
     return weight is not None and weight.shape[0] == 1 and weight.size > 1 and \
         np.array_equal(weight.ravel(), np.arange(weight.size))
@@ -40,8 +40,8 @@ def is_decoding(graph, node):
 
 
 def advanced(graph, name, consumers):
-    """A convolution's output after factors or summands for each channel (YOLOv7's implicit
-    knowledge)."""
+    """Returns the tensor after the factors and summands for each channel that follow a convolution
+    (YOLOv7's implicit knowledge)."""
     channels = graph.shape(name)
     while channels and name not in graph.outputs and len(consumers.get(name, [])) == 1:
         node = consumers[name][0]
@@ -56,8 +56,8 @@ def advanced(graph, name, consumers):
 
 
 def find_heads(graph):
-    """([Head] in the order of concatenation in the outputs, the names of other tensors at which
-    decoding starts)."""
+    """Returns ([Head] in the order of their concatenation in the outputs, the names of other
+    tensors at which decoding starts)."""
     producers, consumers = graph.producers(), graph.consumers()
     heads, others, seen = [], [], set()
     todo = list(reversed(graph.outputs))
@@ -85,8 +85,8 @@ def is_unknown(node):
 
 
 def hides_heads(graph, others):
-    """The first operator that prevents the detection of heads, because its output shape or its
-    function is unknown. None if `others` (of find_heads) are not heads."""
+    """Returns the first operator that hides a head, because its output shape or its function is
+    unknown. Returns None if `others`, from find_heads(), hide no heads."""
     producers = graph.producers()
     behind = [producers[name] for name in others if name in producers]
     for node in graph.ancestors([n.outputs[0] for n in behind if n.kind == "Conv" and graph.shape(n.outputs[0]) is None]):
@@ -97,7 +97,7 @@ def hides_heads(graph, others):
 
 
 def levels_of(heads):
-    """Groups heads by resolution, in the order of the first head of each group."""
+    """Groups heads by resolution. The groups are in the order of their first heads."""
     levels = {}
     for head in heads:
         levels.setdefault((head.rows, head.columns), []).append(head)
@@ -109,5 +109,5 @@ def choosing_operators(graph):
 
 
 def decoding_nodes(graph, heads):
-    """The nodes between the heads and the outputs."""
+    """Returns the nodes between the heads and the outputs."""
     return graph.ancestors(graph.outputs, {h.name for h in heads})

@@ -1,5 +1,5 @@
 """Families identified by their heads: YOLOv5, v7, v8 to v12 and 26, YOLOX, RTMDet, NanoDet,
-PicoDet, FastestDet, YOLO-FastestV2."""
+PicoDet, FastestDet and YOLO-FastestV2."""
 
 import numpy as np
 
@@ -9,11 +9,11 @@ from .finding import Finding
 from .heads import decoding_nodes
 
 AS_THE_FILE = "decodes random heads as the file itself does (within {:.0e})"
-AGREES = 2e-3  # relative to 1 + the value, in float32 with random heads
+AGREES = 2e-3  # largest difference, relative to 1 + the value, in float32
 
 
 class Levels:
-    """The heads of a graph by level, and the results of the file's own decoding for random
+    """The heads of a graph by level, and the results of the decoding in the file for given
     values."""
 
     def __init__(self, graph, levels, size, request):
@@ -23,7 +23,9 @@ class Levels:
         self.kinds = {n.kind for n in self.nodes}
 
     def with_values(self, value):
-        """Sets `value(shape)` in each head: (heads by level, all float tensors that follow)."""
+        """Sets each head to `value(shape)` and evaluates the decoding in the file. Returns the
+        heads by level, the float tensors that follow, and the operators without an
+        implementation."""
         heads = [[value((1, h.channels, h.rows, h.columns)).astype(np.float32) for h in level] for level in self.levels]
         known = {h.name: v for level, values in zip(self.levels, heads) for h, v in zip(level, values)}
         found, stuck = self.graph.evaluate(known)
@@ -43,8 +45,8 @@ class Levels:
         return found.pop() if len(found) == 1 else None
 
     def cuts(self, roles):
-        """{tensor: name in model.json} and the keys of the levels; `roles` are in the order of the
-        heads."""
+        """Returns {tensor: name in model.json} and the keys of the levels. `roles` are in the order
+        of the heads."""
         names, keys = {}, []
         for level, stride in zip(self.levels, self.strides):
             key = {"stride": stride}
@@ -55,14 +57,15 @@ class Levels:
         return names, keys
 
     def finish(self, finding, mine, random):
-        """Compares our decoding with the file's own."""
+        """Compares our decoding, `mine`, with that in the file, and writes the result to
+        `finding`."""
         _, values, stuck = random
         if not self.nodes:
             finding.compared = "the file has no decoding of its own to compare with"
             return finding
         finding.disagreement = min((e for m in mine for e in [decoding.disagreement(m, values)] if e is not None),
                                    default=None)
-        if finding.disagreement is None:  # boxes without scores count if they agree
+        if finding.disagreement is None:  # boxes without scores suffice if they agree
             boxes = [e for m in mine if m.shape[1] > 4 for e in [decoding.disagreement(m[:, :4], values)]]
             finding.disagreement = min((e for e in boxes if e is not None and e < AGREES), default=None)
         if finding.disagreement is None:
@@ -76,7 +79,7 @@ class Levels:
 
 
 def yolox(levels):
-    """Separate boxes, objectness and classes, in this order or with objectness first
+    """Finds heads for boxes, objectness and classes, in this order or with objectness first
     (FastestDet)."""
     if not levels.count(3):
         return None
@@ -97,8 +100,8 @@ def yolox(levels):
 
 
 def box_and_classes(levels):
-    """(index of the box head, index of the class head, channels of both) of levels with two heads;
-    otherwise None."""
+    """Returns (index of the box head, index of the class head, channels of each) for levels with
+    two heads; otherwise None."""
     first, second = (levels.same_channels(i) for i in (0, 1)) if levels.count(2) else (None, None)
     wanted = len(levels.request.names or [])
     if first is None or second is None:
@@ -110,8 +113,8 @@ def box_and_classes(levels):
 
 
 def two_heads(levels, found, alternatives):
-    """Separate boxes and classes. `alternatives`: {keys of model.json: our decoding}. The first one
-    is used if the file has no decoding of its own."""
+    """Describes heads for boxes and classes. Of `alternatives`, {keys of model.json: our decoding},
+    takes the one that agrees with the file, or the first one if the file has no decoding."""
     box, classes, _, _ = box_and_classes(levels)
     found.cuts, keys = levels.cuts(["box", "classes"] if box == 0 else ["classes", "box"])
     random = levels.random()
@@ -128,7 +131,8 @@ def two_heads(levels, found, alternatives):
 
 
 def yolov8(levels):
-    """Bins of four distances, or (YOLO26) the distances themselves, and classes."""
+    """Finds heads for bins of four distances, or (YOLO26) for the distances themselves, and for
+    classes."""
     heads = box_and_classes(levels)
     if heads is None:
         return None
@@ -143,7 +147,8 @@ def yolov8(levels):
 
 
 def rtmdet(levels):
-    """Four distances from the corner of the cell, or their logarithms, and classes."""
+    """Finds heads for four distances from the corner of the cell, or their logarithms, and for
+    classes."""
     heads = box_and_classes(levels)
     if heads is None or heads[2] != 4:
         return None
@@ -160,7 +165,7 @@ def rtmdet(levels):
 
 
 def nanodet(levels):
-    """Classes and bins of four distances in one head."""
+    """Finds one head with the classes and the bins of four distances."""
     channels = levels.same_channels(0) if levels.count(1) else None
     wanted = len(levels.request.names or [])
     bins = levels.request.bins or 8
@@ -196,7 +201,8 @@ def set_anchors(found, keys, anchors):
 
 
 def yolo_fastestv2(levels):
-    """Boxes of all anchors, their objectness, and one soft-max of classes for all of them."""
+    """Finds heads for the boxes of all anchors, for their objectness, and for one soft-max of
+    classes that all anchors share."""
     request = levels.request
     given = request.anchors
     count = len(given[0]) if given else 3
@@ -211,8 +217,8 @@ def yolo_fastestv2(levels):
 
 
 def anchors_of(levels, count, classes):
-    """Anchors from the file's own decoding of zeros, for which each box equals its anchor;
-    otherwise []."""
+    """Returns the anchors from the decoding of zeros in the file, in which each box equals its
+    anchor; [] if there is none."""
     _, values, _ = levels.with_values(np.zeros)
     total = count * sum(level[0].rows * level[0].columns for level in levels.levels)
     for value in values:
@@ -229,7 +235,7 @@ def anchors_of(levels, count, classes):
 
 
 def yolov5(levels):
-    """A head with (box, objectness, classes) for each anchor."""
+    """Finds one head with (box, objectness, classes) for each anchor."""
     channels = levels.same_channels(0) if levels.count(1) else None
     request = levels.request
     given = request.anchors
@@ -251,7 +257,8 @@ def yolov5(levels):
 
 
 def yolov8_with_more(levels):
-    """Heads with masks or key points beside boxes and classes; these are omitted."""
+    """Finds heads for boxes and classes beside heads for masks or key points, which are left
+    out."""
     wanted = len(levels.request.names or [])
     picks = [(next((i for i, h in enumerate(level) if h.channels == 64), None),
               next((i for i, h in enumerate(level) if h.channels == wanted), None)) for level in levels.levels]
@@ -274,12 +281,12 @@ def yolov8_with_more(levels):
 
 RULES = {"yolox": yolox, "fastestdet": yolox, "yolov8": yolov8, "yolov5": yolov5, "yolov7": yolov5, "nanodet": nanodet,
          "picodet": nanodet, "rtmdet": rtmdet, "yolo-fastestv2": yolo_fastestv2}
-ONE_TO_ONE = "one2one"  # part of the names in a branch trained for one detection of each object
+ONE_TO_ONE = "one2one"  # in names of the branch trained for one detection of each object
 
 
 def dense(levels):
-    """Levels without the one-to-one branch if the file has both (YOLOv10, YOLO26), because the
-    dense branch gives the likelihood."""
+    """Returns the levels and a note. Leaves out the one-to-one branch if the file has both
+    (YOLOv10, YOLO26), because the dense branch gives the likelihood."""
     kept = [[h for h in level if ONE_TO_ONE not in levels.graph.origin(h.name)] for level in levels.levels]
     if all(len(level) == 2 for level in kept) and levels.count(4):
         return Levels(levels.graph, kept, levels.size, levels.request), "of its two branches the dense one is taken"
@@ -288,7 +295,8 @@ def dense(levels):
 
 
 def candidates(levels, family):
-    """Findings of all rules that fit; those that decode like the file come first."""
+    """Returns the findings of all rules that fit. Those that agree with the decoding in the file
+    come first."""
     if family and family not in RULES:
         return []
     levels, note = dense(levels)

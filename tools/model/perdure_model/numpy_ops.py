@@ -1,4 +1,4 @@
-"""ONNX operators in numpy. They fold constants, evaluate a file's own decoding, and provide
+"""ONNX operators in numpy. They fold constants, evaluate the decoding in a file, and give the
 reference outputs for OpenCV. OPS[kind] takes the inputs (None if omitted), the attributes and the
 opset, and returns a list of outputs."""
 
@@ -13,8 +13,9 @@ OPS = {}
 
 
 def register(name, function):
-    """The parameters of our functions have the names of ONNX, so that attributes that became inputs
-    in newer opsets need no rule. Attributes without a parameter are ignored."""
+    """Registers a function under an operator's name. Its parameters have the names of ONNX, so
+    attributes that became inputs in newer opsets need no rule. Attributes without a parameter are
+    ignored."""
     own = getattr(function, "__module__", "") == __name__
     spec = inspect.getfullargspec(function if own else lambda: None)
 
@@ -188,7 +189,7 @@ def layer_norm(x, scale, bias=None, *, axis=-1, epsilon=1e-5):
 
 
 def spatial_pads(sizes, kernel, strides, dilations, auto_pad, pads):
-    """[(before, after)] of each spatial axis."""
+    """Returns the padding [(before, after)] of each spatial axis."""
     if auto_pad in ("NOTSET", "VALID"):
         n = len(sizes)
         return [(pads[i], pads[i + n]) if auto_pad == "NOTSET" else (0, 0) for i in range(n)]
@@ -201,7 +202,7 @@ def spatial_pads(sizes, kernel, strides, dilations, auto_pad, pads):
 
 
 def windows(x, kernel, strides, dilations, pads, fill, ceil=False):
-    """(N, C, rows, columns, kh, kw) views of a padded image."""
+    """Returns the windows of a padded image as a view (N, C, rows, columns, kh, kw)."""
     (top, bottom), (left, right) = pads
     if ceil:  # windows may extend beyond the last pad by less than a stride
         bottom, right = bottom + strides[0] - 1, right + strides[1] - 1
@@ -267,8 +268,8 @@ def depth_to_space(x, *, blocksize, mode="DCR"):
 
 @op("Resize", "Upsample")
 def resize(x, *more, mode="nearest", coordinate_transformation_mode=None, nearest_mode=None):
-    """Nearest and linear resizing of the last two axes, in the three usual conventions. `more`: the
-    scales, or a region that is not used, the scales and the sizes."""
+    """Resizes the last two axes, nearest or linear, in the three usual conventions. `more` are the
+    scales, or a region (not used), the scales and the sizes."""
     older, data = len(more) == 1, x
     scales, sizes = (more[0], None) if older else (*more, None, None, None)[1:3]
     out = [int(i) for i in sizes] if sizes is not None else \

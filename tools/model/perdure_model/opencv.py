@@ -1,6 +1,6 @@
-"""Repairs a graph for OpenCV 4.6: replaces operators that it cannot load, or computes wrongly
-without an error. Each rule was found by a comparison of single operators with numpy;
-tests/tools/model has the cases."""
+"""Repairs a graph for OpenCV 4.6: replaces operators that OpenCV cannot load, or computes wrongly
+without an error. Each rule was found by a comparison of single operators with numpy; the cases are
+in tests/tools/model."""
 
 import numpy as np
 
@@ -39,7 +39,7 @@ class Repair:
         return f"repair_{self.count}"
 
     def emit(self, kind, inputs, outputs=None, **attributes):
-        """Adds a node. `inputs`: names, or arrays that become constants. Returns the output's
+        """Adds a node. `inputs` are names, or arrays that become constants. Returns the output's
         name."""
         names = []
         for value in inputs:
@@ -130,7 +130,7 @@ class Repair:
         return self.bound(node, "max")
 
     def bound(self, node, key):
-        """Max and Min with a scalar."""
+        """Replaces Max or Min with a scalar."""
         if len(node.inputs) != 2:
             return False
         variable = [i for i in node.inputs if self.constant(i) is None]
@@ -162,8 +162,8 @@ class Repair:
         return self.note("MatMul with a constant")
 
     def product(self, name, fixed, outputs=None):
-        """A variable times a constant of at least two dimensions, with a leading dimension above
-        1."""
+        """Multiplies a variable by a constant of at least two dimensions, also if the constant is a
+        stack of matrices."""
         parts = np.ascontiguousarray(fixed.reshape(-1, *fixed.shape[-2:]))
         if len(parts) == 1:
             return self.emit("MatMul", [name, parts[0]], outputs)
@@ -172,8 +172,8 @@ class Repair:
         return self.emit("Concat", products, outputs, axis=axis)
 
     def on_layernormalization(self, node):
-        """Normalisation over the last axis. A mean is a product with ones, in the shape of its
-        input."""
+        """Replaces a normalisation over the last axis. Means are products with ones, so that they
+        have the shape of the input."""
         shape = self.shape(node.inputs[0])
         if shape is None or len(shape) < 3 or node.attributes.get("axis", -1) not in (-1, len(shape) - 1):
             return False
@@ -212,7 +212,7 @@ class Repair:
                 return False
             else:
                 b = self.power(b)
-                if self.constant(a) is not None:  # OpenCV merges a scalar with the power wrongly
+                if self.constant(a) is not None:  # OpenCV merges a scalar and a power wrongly
                     a = self.as_constant(np.broadcast_to(self.constant(a), shape))
             kind = "Mul"
             self.note("Div")
@@ -242,7 +242,8 @@ class Repair:
         return result
 
     def is_fine(self, a, b, shape):
-        """Whether OpenCV is correct: a scalar, one value for each channel, or equal shapes."""
+        """Returns true if OpenCV is correct: for a scalar, one value for each channel, or equal
+        shapes."""
         value = self.constant(b)
         if value is not None:
             return value.size == 1 or self.is_channels(value.shape, shape)
@@ -279,7 +280,7 @@ class Repair:
         self.emit(kind, [a, b], outputs)
 
     def widen(self, name, given, shape):
-        """Expands a variable to a larger shape by products with ones, one axis at a time."""
+        """Expands a variable to a larger shape by products with ones, one for each axis."""
         given = [1] * (len(shape) - len(given)) + list(given)
         if given != list(self.shape(name) or given):
             name = self.emit("Reshape", [name, np.array(given, np.int64)])

@@ -1,4 +1,4 @@
-"""The command line."""
+"""Parses the command line."""
 
 import argparse
 import math
@@ -15,7 +15,7 @@ LARGEST_SIDE = 8192
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser with the error format of this program."""
+    """A parser that prints errors in the format of this program."""
 
     def error(self, message):
         raise Fault(f"{message}; perdure model import --help tells the options", USAGE)
@@ -65,7 +65,7 @@ def refuse(option, text, why):
 
 
 def size_of(option, text):
-    """Parses 640x480; None without a text."""
+    """Parses a size such as 640x480. Returns None if `text` is empty."""
     if not text:
         return None
     sides = re.fullmatch("([0-9]{1,5})x([0-9]{1,5})", text)
@@ -84,7 +84,8 @@ def count_of(option, text):
 
 
 def numbers_of(option, text, whole=None):
-    """`whole`: the user's complete text, of which `text` is a part."""
+    """Parses numbers that commas separate. `whole` is the complete value of the option, of which
+    `text` is a part."""
     values = []
     for part in text.split(","):
         try:
@@ -111,7 +112,7 @@ def anchors_of(text):
 
 
 def input_of(args):
-    """The user's options of the network's input, as in model.json."""
+    """Returns the user's options for the network's input, as in model.json."""
     said = {"colour": args.colour, "fit": args.fit, "pad": number_of("--pad", args.pad)}
     said["scale"] = numbers_of("--scale", args.scale) if args.scale else None
     said["mean"] = numbers_of("--mean", args.mean) if args.mean else None

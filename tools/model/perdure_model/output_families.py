@@ -7,23 +7,23 @@ from .finding import Finding
 from .graph import Node
 from .heads import CHOOSING, decoding_nodes, find_heads
 
-# Operators that do not change the scores, so that a preceding activation may be removed.
+# Operators that do not change scores. An activation before them may be removed.
 PASSING = {"Reshape", "Transpose", "Concat", "Slice", "Squeeze", "Unsqueeze", "Flatten", "Identity", "Split", "Cast",
            "Gather"}
-MANY_QUERIES = 1000  # more rows come from cells or priors, not from queries
+MANY_QUERIES = 1000  # above, the rows are of cells or priors, not of queries
 
 
 class Outputs:
     def __init__(self, graph, size, request):
         self.graph, self.size, self.request = graph, size, request
         self.shapes = {o: graph.shape(o) for o in graph.outputs}
-        self.known = None  # (boxes, scores), if found before the outputs
+        self.known = None  # (boxes, scores), if they were found before the outputs
 
     def of_rank(self, rank):
         return {o: s for o, s in self.shapes.items() if s is not None and len(s) == rank and s[0] == 1}
 
     def pair(self):
-        """(boxes, scores) if one output is (1,N,4) and another (1,N,C)."""
+        """Returns (boxes, scores) if one output is (1,N,4) and another (1,N,C)."""
         if self.known:
             return self.known
         found = self.of_rank(3)
@@ -49,8 +49,8 @@ class Outputs:
 
     def strip(self, name, boxes=0):
         """Removes the sigmoid or soft-max before `name` if only shape operators follow it. Returns
-        "sigmoid", "softmax" or "" if there is none. Of concatenated columns, the first `boxes` are
-        not scores."""
+        "sigmoid", "softmax", or "" if there is none. The first `boxes` columns of a concatenation
+        are not scores."""
         producers = self.graph.producers()
         found, todo = [], [name]
         while todo:
@@ -79,7 +79,7 @@ class Outputs:
 
 
 def parts_of(graph, name, shape):
-    """Adds Slices of the first four columns and of the others; returns their names."""
+    """Adds Slices of the first four columns and of the others. Returns their names."""
     found = []
     for part, begin, end in (("boxes", 0, 4), ("scores", 4, shape[2])):
         inputs = [name]
@@ -95,7 +95,7 @@ def parts_of(graph, name, shape):
 
 
 def single(outputs):
-    """One tensor: YOLOv5 (1,N,5+K), YOLOv8 (1,4+K,N), RT-DETR (1,Q,4+K)."""
+    """Finds one tensor: YOLOv5 (1,N,5+K), YOLOv8 (1,4+K,N), RT-DETR (1,Q,4+K)."""
     graph, request = outputs.graph, outputs.request
     wanted, family = len(request.names or []), request.family
     for name, (_, rows, columns) in outputs.of_rank(3).items():
@@ -123,8 +123,8 @@ def single(outputs):
 
 
 def box_form(outputs, name, family, found):
-    """`boxes` of model.json: offsets if priors are given. Otherwise the form follows from the
-    decoding of zeros, for which each box equals its prior."""
+    """Returns `boxes` of model.json: offsets if priors are given. Otherwise the form is found by
+    decoding zeros, for which each box equals its prior."""
     graph, request = outputs.graph, outputs.request
     form = {"y_first": True} if request.y_first else {}
     if request.priors is not None:
@@ -154,7 +154,7 @@ def box_form(outputs, name, family, found):
 
 
 def two(outputs):
-    """Separate boxes and scores: SSD and DETR."""
+    """Finds separate boxes and scores: SSD and DETR."""
     names = outputs.pair()
     if names is None:
         return None
@@ -184,8 +184,8 @@ def two(outputs):
 
 
 def chosen(graph, name):
-    """Whether the rows of a tensor were selected from others, and are not direct outputs of a
-    decoder."""
+    """Returns true if the rows of a tensor were selected from others, and are not direct outputs of
+    a decoder."""
     producers, todo = graph.producers(), [name]
     while todo:
         node = producers.get(todo.pop())
@@ -199,8 +199,9 @@ def chosen(graph, name):
 
 
 def before_choice(outputs):
-    """(boxes, scores) of a decoder before the selection that its exporter added: the sigmoids that
-    TopK reads, and the boxes (1,Q,4) with centres that are converted to corners."""
+    """Returns (boxes, scores) of a decoder before the selection that its exporter added: the
+    sigmoids that TopK reads, and the boxes (1,Q,4) by centres that are then converted to
+    corners."""
     graph = outputs.graph
     producers = graph.producers()
     ends = graph.ancestors([o for o in graph.outputs])
@@ -220,8 +221,8 @@ def before_choice(outputs):
 
 
 def queried(outputs):
-    """RT-DETR, D-FINE and similar: a decoder with outputs for queries that were selected before
-    it."""
+    """Finds RT-DETR, D-FINE and similar networks: a decoder with outputs for queries that were
+    selected before it."""
     graph, pair = outputs.graph, outputs.pair()
     if pair is None or any(chosen(graph, name) for name in pair):
         pair = before_choice(outputs)

@@ -1,6 +1,6 @@
-"""Converts 8-bit networks to float: QuantizeLinear and DequantizeLinear around each operator (QDQ),
-quantisation at run time (DynamicQuantizeLinear with ConvInteger, MatMulInteger), QLinearConv and
-QLinearMatMul."""
+"""Converts 8-bit networks to float: networks with QuantizeLinear and DequantizeLinear around each
+operator (QDQ), with quantisation at run time (DynamicQuantizeLinear with ConvInteger and
+MatMulInteger), and with QLinearConv and QLinearMatMul."""
 
 import numpy as np
 from onnx import TensorProto
@@ -8,12 +8,13 @@ from onnx import TensorProto
 from .faults import Fault
 from .graph import Node
 
-# After these, a quantisation with zero as lower limit replaces a Relu that the quantiser removed.
+# A quantiser removes the Relu after these; a quantisation with zero as lower limit replaces it.
 LINEAR = ("Conv", "ConvTranspose", "Gemm", "MatMul", "Add", "BatchNormalization")
 
 
 def dequantised(value, scale, zero, axis):
-    """(value - zero)·scale, by channels along `axis` if there are several."""
+    """Returns (value - zero)·scale. If there are several scales, they are for the channels along
+    `axis`."""
     value = np.asarray(value).astype(np.float32)
     scale = np.asarray(scale, np.float32)
     zero = np.zeros_like(scale) if zero is None else np.asarray(zero).astype(np.float32)
@@ -35,7 +36,7 @@ def dequantised(value, scale, zero, axis):
 class Floats:
     def __init__(self, graph):
         self.graph, self.constants = graph, graph.constants
-        self.same = {}   # tensor of integers, or derived from them: the original float tensor
+        self.same = {}   # {tensor of integers, or derived from them: the original float tensor}
         self.nodes, self.kinds, self.sums = [], {}, set()
         self.count = 0
 
@@ -53,7 +54,7 @@ class Floats:
         return name
 
     def fixed(self, node, index):
-        """A constant input; None if it is omitted."""
+        """Returns a constant input; None if it is omitted."""
         if len(node.inputs) <= index or node.inputs[index] == "":
             return None
         value = self.constants.get(node.inputs[index])
@@ -69,8 +70,8 @@ class Floats:
             self.same[output] = source
 
     def limited(self, output, source, scale, zero):
-        """Effect of a quantisation without rounding: it clips values below zero if its range starts
-        there."""
+        """Adds the effect of a quantisation without rounding: values below zero are clipped if the
+        range starts at zero."""
         zero = np.zeros((), np.uint8) if zero is None else np.asarray(zero)
         begins = zero.size == 1 and int(zero.ravel()[0]) == np.iinfo(zero.dtype).min
         if not begins or self.kinds.get(source) not in LINEAR:
@@ -84,7 +85,8 @@ class Floats:
             self.emit("Clip", [source], output, {"min": 0.0, "max": float(high)})
 
     def weight(self, node, index, zero, axis, scale=None):
-        """A quantised constant of `node` as float; a computed tensor is unchanged."""
+        """Returns a quantised constant of `node` as float, or the float tensor if it is
+        computed."""
         name = node.inputs[index]
         if name not in self.constants:
             return self.real(name)
@@ -92,7 +94,7 @@ class Floats:
         return self.constant(value, f"{name}_float{self.count}")
 
     def integer(self, node, kind):
-        """ConvInteger and MatMulInteger: their scales are factors after them."""
+        """Converts ConvInteger or MatMulInteger. The scales are factors behind them."""
         zero = self.constants.get(node.inputs[3]) if len(node.inputs) > 3 and node.inputs[3] else None
         weight = self.weight(node, 1, zero, 0 if kind == "Conv" else -1)
         if kind == "Conv" and weight not in self.constants:
@@ -103,8 +105,8 @@ class Floats:
         self.sums.add(node.outputs[0])
 
     def linear(self, node, kind):
-        """QLinearConv and QLinearMatMul. Inputs: x, its scale and zero, w, its scale and zero,
-        scale and zero of the output, bias."""
+        """Converts QLinearConv or QLinearMatMul. Inputs: x, its scale and zero, w, its scale and
+        zero, scale and zero of the output, and bias."""
         x_scale, w_scale, w_zero = self.fixed(node, 1), self.fixed(node, 4), self.fixed(node, 5)
         axis = 0 if kind == "Conv" else -1
         inputs = [self.weight(node, 0, self.fixed(node, 2), 0, x_scale), self.weight(node, 3, w_zero, axis, w_scale)]
@@ -118,7 +120,7 @@ class Floats:
         self.limited(node.outputs[0], out, self.fixed(node, 6), self.fixed(node, 7))
 
     def take(self, node):
-        """Returns True if `node` used integers and was converted to float."""
+        """Converts `node` to float. Returns True if it used integers."""
         if node.domain:
             return False
         if node.kind == "DequantizeLinear":
@@ -165,7 +167,7 @@ def to_float(graph):
             for output in node.outputs:
                 floats.kinds[output] = node.kind
     graph.nodes = floats.nodes
-    for kept in (graph.types, graph.shapes):  # deletes entries of removed tensors
+    for kept in (graph.types, graph.shapes):  # removes entries of removed tensors
         for name in floats.same:
             kept.pop(name, None)
     return f"its eight-bit operators ({', '.join(found)}) were taken apart to float: it is as fast as the float network"

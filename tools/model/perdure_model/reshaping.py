@@ -1,4 +1,4 @@
-"""Changes the input size of a convolutional network: scales the sizes that are stored in the
+"""Changes the input size of a convolutional network, by scaling the sizes that are stored in the
 file."""
 
 import math
@@ -9,7 +9,8 @@ from .faults import USAGE, Fault
 
 
 def of_camera(size, camera, step):
-    """About as many pixels as `size`, with the camera's aspect ratio, in multiples of `step`."""
+    """Returns a size with about as many pixels as `size` and the camera's aspect ratio, in
+    multiples of `step`."""
     height = math.sqrt(size[0] * size[1] * camera[1] / camera[0])
     return [max(step, round(n / step) * step) for n in (height * camera[0] / camera[1], height)]
 
@@ -19,7 +20,8 @@ class Reshaping:
         self.graph, self.old, self.new = graph, old, new
 
     def pair(self, rows, columns):
-        """A grid of cells of some stride, at the new size; None if it is not such a grid."""
+        """Returns a grid of cells at the new input size; None if `rows` and `columns` are not the
+        old size divided by a stride."""
         if rows < 1 or columns < 1 or rows * self.old[0] != columns * self.old[1] or self.old[1] % rows:
             return None
         stride = self.old[1] // rows
@@ -28,7 +30,8 @@ class Reshaping:
         return [self.new[1] // stride, self.new[0] // stride]
 
     def count(self, cells):
-        """The number of cells of some stride, at the new size; None if it is not such a number."""
+        """Returns a number of cells at the new input size; None if `cells` is not the number of
+        cells of a stride."""
         stride = math.isqrt(self.old[0] * self.old[1] // cells) if cells > 0 else 0
         if stride == 0 or self.old[0] % stride or self.old[1] % stride:
             return None
@@ -36,7 +39,8 @@ class Reshaping:
         return grid[0] * grid[1] if grid and cells * stride * stride == self.old[0] * self.old[1] else None
 
     def target(self, target, given):
-        """The target of a Reshape. `given`: its input shape at the old size."""
+        """Returns the target of a Reshape at the new size. `given` is the shape of its input at the
+        old size."""
         shape = [given[i] if n == 0 else int(n) for i, n in enumerate(target)]
         if -1 in shape:
             shape[shape.index(-1)] = -int(np.prod(given)) // int(np.prod(shape))
@@ -75,7 +79,7 @@ class Reshaping:
             self.constant_of(node, 3, np.array([*sizes[:-2], *grid], np.int64))
 
     def pool(self, node):
-        """A pool over its whole tensor becomes global, so that it fits every size."""
+        """Converts a pool over its whole tensor to a global one, which fits every size."""
         given = self.graph.shape(node.inputs[0])
         kernel, strides = node.attributes.get("kernel_shape"), node.attributes.get("strides", [1, 1])
         if given and list(given[2:]) == list(kernel) and not any(node.attributes.get("pads", [0])) and \
@@ -94,7 +98,7 @@ class Reshaping:
 
 
 def first_at_odds(graph, outputs):
-    """The first operator that cannot be computed at the new size; "" if all can."""
+    """Returns the first operator that cannot be computed at the new size; "" if all can."""
     _, _, height, width = graph.inputs[graph.image][1]
     image = np.zeros((1, 3, height, width), np.float32)
     values, stuck = graph.evaluate({graph.image: image}, outputs)
@@ -102,8 +106,8 @@ def first_at_odds(graph, outputs):
 
 
 def reshape(path, graph, found, old, new):
-    """`found`: the finding, already cut at its heads. Throws if the network is not
-    convolutional."""
+    """Changes the input size of the graph from `old` to `new`. `found` is the finding, already cut
+    at its heads. Raises Fault if the network is not convolutional."""
     levels = found.keys.get("levels")
     if found.family == "fastestdet":
         raise Fault(f"{path} is a fastestdet, which says sizes in shares of the input that it was trained with; "

@@ -42,7 +42,7 @@ def refuse_choosing(path, operators, family):
 
 
 def refuse_hidden(path, node, found, family):
-    """Refuses a network with an undetected head; it would be imported with fewer levels."""
+    """Refuses a network with an undetected head, because it would be imported with fewer levels."""
     what = f"{node.domain}.{node.kind}" if node.domain else node.kind
     where = f"node {node.name}" if node.name else f"the node that gives {node.outputs[0]}"
     levels = f"; only {found} of its levels were found" if found else ""
@@ -51,7 +51,7 @@ def refuse_hidden(path, node, found, family):
 
 
 def refuse_own(path, graph):
-    """Refuses the project's own family, whose calibration is not in the graph."""
+    """Refuses networks of the project's own family, because the graph lacks their calibration."""
     if {"logits8", "box8"} <= set(graph.outputs):
         raise Fault(f"{path} is of the project's own family perdure: use it as it is, with the model.json that "
                     "tools/train wrote beside it")
@@ -65,8 +65,8 @@ def refuse_rotated(path, graph):
 
 
 def inside(path, graph, family, onnx_runtime):
-    """The remaining operators that OpenCV 4.6 lacks. Refuses them without ONNX Runtime, and refuses
-    operators of other runtimes or with subgraphs."""
+    """Returns the remaining operators that OpenCV 4.6 lacks. Refuses the network if there are such
+    operators and no ONNX Runtime, or if operators belong to other runtimes or have subgraphs."""
     found = sorted({n.kind for n in graph.nodes if n.kind in INSIDE or n.domain})
     own = any(n.domain or any(isinstance(a, GraphProto) for a in n.attributes.values()) for n in graph.nodes)
     if not found or (onnx_runtime and not own):

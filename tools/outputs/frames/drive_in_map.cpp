@@ -16,7 +16,7 @@ Along::const_iterator firstAfter(const Along& along, TimePoint time) {
 RigidTransform DriveInMap::T_MB(const replay::StampedPose& pose) const {
   const auto next = firstAfter(along, pose.time);
   if (next == along.begin() || next == along.end()) return T_MW(pose.time) * pose.T_WB;
-  // Interpolates the corrections at the pose, because their origin may be far away.
+  // Interpolates the corrected poses and not T_MW, because the origin of W may be far away.
   const auto& [t0, from] = *std::prev(next);
   const auto& [t1, to] = *next;
   const double s = toSeconds(pose.time - t0) / toSeconds(t1 - t0);

@@ -1,4 +1,4 @@
-// Poses and edges of a run in M, the frame of its map, for the pictures and map.geojson.
+// Poses and edges of a run in M, the frame of its map. The pictures and map.geojson use them.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,19 +20,19 @@ struct LoopLine {
 };
 
 struct DriveInMap {
-  /// T_MW at each anchor of the session, from the final graph. Empty: M is W.
+  /// T_MW at each anchor of the session, from the final graph. Empty if M is W.
   std::vector<std::pair<TimePoint, RigidTransform>> along;
   /// T_MW for the last belief of each object; objects without an entry use `along`.
   std::map<ObjectId, RigidTransform> objects;
   std::vector<Eigen::Vector3d> anchors_M;
   std::vector<LoopLine> loops;
-  /// Position of the body by frame as the map estimated it at that time, in the axes of the
+  /// The body's position at each frame as the map estimated it at that time, in the axes of the
   /// session's start.
   std::map<std::uint64_t, Eigen::Vector3d> then;
 
   /// Pose of the body in M; T_MW is interpolated between anchors.
   RigidTransform T_MB(const replay::StampedPose& pose) const;
-  /// T_MW at the last anchor before a time, or at the first one.
+  /// T_MW at the last anchor until `time`, or at the first anchor if there is none until then.
   RigidTransform T_MW(TimePoint time) const;
   RigidTransform T_MW_begin() const;
 };

@@ -8,9 +8,9 @@
 
 namespace perdure::tools {
 
-/// Round numbers, at most `most` of them, that cover [low, high].
+/// Returns at most `most` round numbers that cover [low, high].
 std::vector<double> ticksOf(double low, double high, int most);
-/// 1, 2 or 5 times a power of ten: the largest one up to `value` > 0.
+/// Returns the largest 1, 2 or 5 times a power of ten that does not exceed `value` > 0.
 double roundBelow(double value);
 /// Formats a number with as few digits as necessary; never "-0".
 std::string numberText(double value);
@@ -25,7 +25,7 @@ class Chart {
 
   void shade(double from, double to, const Colour& colour, double opacity);
   void drawGrid(bool with_x_numbers);
-  /// Points (x, y); values outside the range are drawn at its edge.
+  /// Draws a curve through points (x, y). Values outside the range are drawn at its edge.
   void drawCurve(const std::vector<cv::Point2d>& points, Stroke stroke);
   cv::Point2d at(double x, double y) const;
 

@@ -14,7 +14,7 @@ namespace perdure::tools {
 namespace {
 
 constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX;
-constexpr int kShift = 4;  // cv::line supports sixteenths of pixels
+constexpr int kShift = 4;  // fractional bits: coordinates of cv::line are in 1/16 px
 
 Colour rgb(int r, int g, int b) { return {double(b), double(g), double(r)}; }
 
@@ -23,7 +23,8 @@ cv::Point fine(const cv::Point2d& p) {
   return {static_cast<int>(std::lround(p.x * unit)), static_cast<int>(std::lround(p.y * unit))};
 }
 
-/// The image with a margin of its own size, because coordinates of cv::line must stay small.
+/// The image's area with a margin of its own size. Lines are clipped to it, because coordinates of
+/// cv::line must stay small.
 cv::Rect2d around(const cv::Mat& image) {
   return {-1.0 * image.cols, -1.0 * image.rows, 3.0 * image.cols, 3.0 * image.rows};
 }
@@ -72,7 +73,7 @@ Colour mixed(const Colour& from, const Colour& to, double share) {
 }
 
 bool clip(const cv::Rect2d& area, cv::Point2d& a, cv::Point2d& b) {
-  // Liang and Barsky: the range of the line's parameter inside each of the four sides.
+  // Liang and Barsky: each of the four sides limits the range of the line's parameter.
   const cv::Point2d way = b - a;
   double from = 0.0, to = 1.0;
   for (const auto& [step, room] : {std::pair{-way.x, a.x - area.x},
@@ -155,7 +156,7 @@ cv::Rect placeFor(const cv::Size& size, const cv::Point& at, const cv::Rect& are
   };
   const cv::Rect wanted = inside(at.x, at.y - size.height);
   constexpr int kTries = 12;
-  for (int step = 0; step < kTries; ++step) {  // tries the place, above, below, farther above …
+  for (int step = 0; step < kTries; ++step) {  // tries `at`, then above, below, farther above, …
     const int away = (step + 1) / 2 * (step % 2 == 1 ? -1 : 1) * (size.height + 1);
     const cv::Rect place = inside(at.x, at.y - size.height + away);
     if (isFree(place)) return place;

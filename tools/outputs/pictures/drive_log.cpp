@@ -9,7 +9,7 @@
 namespace perdure::tools {
 namespace {
 
-/// Soft-max of the best class; 0 without activations.
+/// The largest soft-max of a class; 0 without activations.
 double bestProbability(const std::vector<float>& activations) {
   if (activations.size() < 2) return 0.0;
   const double top = *std::ranges::max_element(activations);
@@ -66,7 +66,7 @@ void DriveLog::add(const Detections& message) {
   FrameGlance& frame = frameOf(message.stamp);
   frame.detections.clear();
   for (const Detection& one : message.detections) {
-    if (one.primed) continue;  // a top-down likelihood without its own box
+    if (one.primed) continue;  // an answer to a prediction; the network reported no box
     frame.detections.push_back({one.box, bestProbability(one.activations)});
   }
 }

@@ -1,4 +1,4 @@
-// Short records of each frame, sufficient to draw the frame after the drive.
+// Short records of all frames, from which the pictures are drawn after the drive.
 #pragma once
 
 #include <array>
@@ -31,7 +31,7 @@ ObjectGlance glanceAt(const ObjectBelief& object);
 
 struct DetectionGlance {
   Box box;
-  double probability = 0.0;  ///< probability of the best class against clutter and others
+  double probability = 0.0;  ///< probability of the best class against clutter and other classes
 };
 
 struct FrameGlance {
@@ -42,10 +42,11 @@ struct FrameGlance {
   std::vector<DetectionGlance> detections;
 };
 
-/// Corners of an object's box in W. Bits: front or rear, left or right, top or bottom.
+/// Corners of an object's cuboid in W. The bits of the index select front or rear, left or right,
+/// and top or bottom.
 std::array<Eigen::Vector3d, 8> cornersOf(const ObjectGlance& object);
 
-/// Collects by frame; a later message about the same frame replaces the earlier one.
+/// Collects messages by frame. A later message about the same frame replaces the earlier one.
 class DriveLog {
  public:
   void add(const Objects& objects);

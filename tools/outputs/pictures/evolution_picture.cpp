@@ -14,7 +14,7 @@
 namespace perdure::tools {
 namespace {
 
-constexpr double kSameThing = 3.0;  // largest distance in m of an object from its true one
+constexpr double kSameThing = 3.0;  // largest distance between object and truth, m
 constexpr int kWidth = 1500, kRow = 190, kTop = 66, kBottom = 56;
 constexpr int kLeft = 84, kBetween = 90, kRight = 24;
 constexpr int kBodyRow = 300;
@@ -26,7 +26,7 @@ struct Seen {
 };
 struct Candidate {
   Evolution evolution;
-  std::vector<Seen> seen;  ///< frames in which it is visible
+  std::vector<Seen> seen;  ///< frames in which the object is visible
   bool confirmed = false;
 };
 
@@ -64,7 +64,8 @@ std::vector<const Candidate*> chosen(const std::map<ObjectId, Candidate>& all, s
   return firsts;
 }
 
-/// Empty if the track was absent in at least half of the frames in which the object was visible.
+/// Median distance between object and true track (m). Empty if the true track was absent in more
+/// than half of the frames in which the object was visible.
 std::optional<double> medianDistance(const Candidate& one, const TruthTrack& track) {
   std::vector<double> distances;
   for (const Seen& seen : one.seen) {
@@ -75,7 +76,7 @@ std::optional<double> medianDistance(const Candidate& one, const TruthTrack& tra
   return medianOf(std::move(distances));
 }
 
-/// Pairs with the smallest distance first; each object and each track is in at most one pair.
+/// Pairs objects and true tracks, the smallest distance first. Each is in at most one pair.
 std::map<ObjectId, const TruthTrack*> pairs(const std::map<ObjectId, Candidate>& all,
                                             const PictureTruth* truth) {
   struct Pair {
@@ -126,7 +127,7 @@ void shadePhases(Chart& chart, const Evolution& evolution) {
   }
 }
 
-/// Draws f(point) if it has a value; frames without a value, and gaps, interrupt the curve.
+/// Draws the curve of f(point). Frames without a value, and gaps, interrupt the curve.
 template <class Value>
 void drawSeries(Chart& chart, const Evolution& evolution, const Stroke& stroke, Value&& value) {
   constexpr std::uint64_t kGap = 5;
@@ -145,7 +146,7 @@ void drawSeries(Chart& chart, const Evolution& evolution, const Stroke& stroke, 
   end();
 }
 
-/// Upper end of the error axis, without extreme values at the start.
+/// Upper end of the error axis (m); ignores the largest twentieth of the values.
 double topOf(const Evolution& evolution) {
   std::vector<double> values;
   for (const auto& point : evolution.points) {

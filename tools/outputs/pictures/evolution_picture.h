@@ -1,5 +1,5 @@
-// evolution.png: position error, deviation and existence of selected objects over the frames; if
-// loops closed, a row with the body's error.
+// evolution.png: position error, standard deviation and existence of selected objects over the
+// frames. If there were loops, a further row shows the body's error.
 #pragma once
 
 #include <filesystem>
@@ -27,16 +27,17 @@ struct Evolution {
   std::vector<EvolutionPoint> points;
 };
 
-/// Selects at most `most` confirmed objects: the one visible longest in each class except *other*,
-/// then the others visible longest. Ground truth is the nearest track by the median over the frames
-/// in which the object was visible, within 3 m. Pairs are one-to-one, with the smallest distances
-/// first.
+/// Selects at most `most` confirmed objects: first, from each class except *other*, the object that
+/// was visible longest, then the others by duration. An object's ground truth is the true track
+/// with the smallest median distance while the object was visible, at most 3 m. Pairs are
+/// one-to-one, the smallest distance first.
 std::vector<Evolution> chooseEvolutions(const DriveLog& log, const PictureTruth* truth,
                                         std::size_t most);
 
-/// `body` is a separate row above the objects, if it has points.
+/// Draws a row for each object, and above them a row for `body` if it has points.
 cv::Mat drawEvolutions(const std::vector<Evolution>& evolutions, const BodyErrors& body = {});
-/// Returns false if there is nothing to draw, or if the file cannot be written.
+/// Draws and writes the picture; returns false if there is nothing to draw. Throws
+/// StartupError(kInputOutput) if the file cannot be written.
 bool writeEvolution(const DriveLog& log, const PictureTruth* truth, const BodyErrors& body,
                     const std::filesystem::path& file);
 

@@ -39,7 +39,7 @@ void drawSeries(Chart& chart, const BodyErrors& errors, const Stroke& stroke, Va
   chart.drawCurve(points, stroke);
 }
 
-/// A pale line over the whole height, and a tip on the border above.
+/// Draws a pale line over the whole height, and a tip on the upper border.
 void drawMark(cv::Mat& picture, const cv::Rect& area, const Chart& chart,
               const BodyErrors::Mark& mark, double top) {
   const cv::Point2d at = chart.at(static_cast<double>(mark.frame), top);

@@ -1,4 +1,4 @@
-// The first row of evolution.png: the body's error in W, and on the map around each loop.
+// The first row of evolution.png: the body's error in W and on the map, with marks at the loops.
 #pragma once
 
 #include <cstdint>
@@ -25,18 +25,18 @@ struct BodyErrors {
     std::uint64_t frame = 0;
     EventKind kind = EventKind::kLoopClosed;
   };
-  bool against_truth = false;  ///< false: `then` is the map's correction of the body in W
+  bool against_truth = false;  ///< false: `then` is the correction by the map
   std::vector<Point> points;
   std::vector<Mark> marks;
 };
 
-/// `poses`: in W, by frame. Ground truth and all errors are in W, with ground truth aligned at the
-/// start of the run. Returns no points if there was no loop.
+/// Computes the body's errors (m). `poses` (by frame) and ground truth are in W; ground truth is
+/// aligned at the start of the run. Returns no points if there was no loop.
 BodyErrors bodyErrors(const std::map<std::uint64_t, replay::StampedPose>& poses,
                       const DriveInMap& in_map, std::vector<BodyErrors::Mark> marks,
                       const PictureTruth* truth);
 
-/// Draws into an area of the picture; `frames` is the range of the axis below.
+/// Draws the errors into an area of the picture; `frames` is the range of the horizontal axis.
 void drawBodyErrors(cv::Mat& picture, const cv::Rect& area, const BodyErrors& errors,
                     const Chart::Range& frames);
 

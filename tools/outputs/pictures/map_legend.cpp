@@ -25,13 +25,13 @@ std::ptrdiff_t loopsOf(const MapContent& content, bool believed) {
   return std::ranges::count(content.loops, believed, &LoopLine::believed);
 }
 
-/// Draws entries in a column; sizes are in units of view.text.
+/// Draws the entries of the legend in a column. Sizes are in units of view.text.
 class Legend {
  public:
   Legend(cv::Mat& picture, const MapView& view)
       : picture_(picture), unit_(view.text), x_(view.area.br().x + 20 * unit_), y_(view.area.y) {}
 
-  /// Area of the symbol: 34 × 14 units.
+  /// Adds an entry and returns the area of its symbol, 34 × 14 units.
   cv::Rect2d entry(const std::string& text) {
     const cv::Rect2d sign(x_, y_ + 5 * unit_, 34 * unit_, 14 * unit_);
     drawText(picture_, text, cv::Point2d(x_ + 44 * unit_, y_ + 17 * unit_), kInk, style());
@@ -87,7 +87,7 @@ class Legend {
   double unit_, x_, y_;
 };
 
-/// Draws the axes, and north if it is known.
+/// Draws the axes, and the direction of north if it is known.
 void drawCompass(cv::Mat& picture, Legend& legend, const MapContent& content) {
   const double unit = legend.unit();
   const cv::Point2d from = legend.corner() + cv::Point2d(56 * unit, 78 * unit);

@@ -29,7 +29,8 @@ double distanceToWay(const std::vector<Eigen::Vector3d>& path, const Eigen::Vect
   return least;
 }
 
-/// Three times the distance that includes four fifths of the objects.
+/// Three times the distance from the trajectory (m) that includes four fifths of the objects,
+/// within limits.
 double usualDistance(const MapContent& content) {
   std::vector<double> distances;
   for (const auto& object : content.objects) {
@@ -57,7 +58,7 @@ void drawEllipse(cv::Mat& picture, const MapView& view, const ObjectGlance& obje
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(
       Eigen::Matrix2d(object.p_covariance.topLeftCorner<2, 2>()));
   const Eigen::Vector2d axes = 2.0 * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt();
-  // Omits ellipses over half of the map, of objects out of sight.
+  // Omits ellipses with a half axis above half of the map, which objects out of view can have.
   if (!axes.allFinite() || axes.maxCoeff() > 0.5 * (view.high - view.low).minCoeff()) return;
   Polyline line;
   constexpr int kSteps = 48;
@@ -236,7 +237,7 @@ MapView viewOf(const MapContent& content) {
 cv::Mat drawMap(const MapContent& content, const MapView& view) {
   cv::Mat picture(pictureSize(content, view), CV_8UC3, kPaper);
   drawGrid(picture, view);
-  cv::Mat map = picture.clone();  // clips drawings to the map's area
+  cv::Mat map = picture.clone();  // a copy, of which only the map's area is used
   drawLandmarks(map, view, content.landmarks);
   drawWay(map, view, content.path, {kInk, thick(view, 2)});
   drawAnchors(map, view, content.anchors);

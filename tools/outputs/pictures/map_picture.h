@@ -1,5 +1,5 @@
-// map.png, as figures 1 and 4 of the paper: trajectory, sparse points, objects with uncertainty,
-// ground truth.
+// map.png, like figures 1 and 4 of the paper: trajectory, sparse points, objects with uncertainty,
+// and ground truth.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,7 +14,7 @@
 
 namespace perdure::tools {
 
-/// All content is in one frame, M or W.
+/// The content of the map. All of it is in one frame, M or W.
 struct MapContent {
   bool in_M = false;                  ///< false: the content is in W
   std::vector<Eigen::Vector3d> path;  ///< trajectory of the body
@@ -23,7 +23,7 @@ struct MapContent {
   std::vector<Eigen::Vector3d> anchors;
   std::vector<LoopLine> loops;
   std::optional<PictureTruth> truth;
-  TimePoint end;                       ///< selects ground truth of objects that move or disappear
+  TimePoint end;                       ///< time for ground truth of objects that move or disappear
   std::optional<double> yaw_of_north;  ///< radians from x
 };
 
@@ -31,7 +31,7 @@ struct MapContent {
 struct MapView {
   Eigen::Vector2d low = Eigen::Vector2d::Zero(), high = Eigen::Vector2d::Ones();  ///< metres
   double scale = 1.0;  ///< pixels for each metre
-  double text = 1.0;   ///< size of letters and lines, in proportion to the picture
+  double text = 1.0;   ///< factor for the sizes of letters and lines
   cv::Rect area;       ///< area of the map in the picture
   double bar_m = 1.0;  ///< length of the scale bar
   cv::Point bar;       ///< left end of the scale bar
@@ -41,10 +41,12 @@ struct MapView {
   }
 };
 
-/// A view of the trajectory and its surroundings (60 m, less in rooms; half of that for truth).
+/// Returns a view of the trajectory and all objects up to 60 m from it (less in rooms). Ground
+/// truth is included up to half of that distance.
 MapView viewOf(const MapContent& content);
 cv::Mat drawMap(const MapContent& content, const MapView& view);
-/// Returns false if there is neither a trajectory nor an object, or if the file cannot be written.
+/// Draws and writes the map. Returns false if there is neither a trajectory nor an object. Throws
+/// StartupError(kInputOutput) if the file cannot be written.
 bool writeMap(const MapContent& content, const std::filesystem::path& file);
 
 }  // namespace perdure::tools

@@ -15,9 +15,9 @@ namespace perdure::tools {
 namespace {
 
 constexpr int kHeader = 30;
-constexpr double kDimmed = 0.88;            // dims the image, so that lines are visible
+constexpr double kDimmed = 0.88;            // factor that dims the image, to make lines visible
 constexpr double kLeastProbability = 0.15;  // less probable boxes are not drawn
-constexpr int kSamples = 16;                // samples of an edge, which lenses may bend
+constexpr int kSamples = 16;                // points of an edge, because lenses bend edges
 const Colour kWhite(255, 255, 255), kGrey(165, 165, 165), kNight(38, 34, 30);
 
 int even(double value) { return static_cast<int>(value) / 2 * 2; }
@@ -26,7 +26,7 @@ Colour brightColour(const ObjectGlance& object) {
   return mixed(classColour(object.class_name), kWhite, 0.35);
 }
 
-/// Keeps only the end points of a straight line.
+/// Removes the inner points of `line` if it is straight.
 void straighten(Polyline& line) {
   if (line.size() < 3) return;
   const cv::Point2d way = line.back() - line.front();
@@ -37,7 +37,7 @@ void straighten(Polyline& line) {
   if (straight) line = {line.front(), line.back()};
 }
 
-/// The line from a to b (in C) on the image, split into pieces at invisible parts.
+/// Projects the line from a to b (in C) into the image; invisible parts divide it into pieces.
 std::vector<Polyline> projected(const CameraModel& camera, const Eigen::Vector3d& a,
                                 const Eigen::Vector3d& b, double scale) {
   std::vector<Polyline> pieces(1);
@@ -53,7 +53,7 @@ std::vector<Polyline> projected(const CameraModel& camera, const Eigen::Vector3d
   return pieces;
 }
 
-/// Draws an object's box; returns the area that it covers, empty if it is outside the image.
+/// Draws an object's cuboid. Returns the area that it covers, empty if it is outside the image.
 cv::Rect drawBox(cv::Mat& image, const ObjectGlance& object, const RigidTransform& T_CW,
                  const CameraModel& camera, double scale) {
   const auto corners_W = cornersOf(object);
@@ -75,7 +75,7 @@ cv::Rect drawBox(cv::Mat& image, const ObjectGlance& object, const RigidTransfor
     }
   };
   for (const auto& [a, b] : kEdges) draw(corners[a], corners[b]);
-  // Direction of the object: from the centre of its floor to the centre of the front's lower edge.
+  // The object's direction: from the centre of its underside to the middle of the lower front edge.
   draw((corners[0] + corners[3]) / 2.0, (corners[1] + corners[3]) / 2.0);
   return covered.empty() ? cv::Rect() : cv::boundingRect(covered) & all;
 }
@@ -133,7 +133,7 @@ void drawHeader(cv::Mat& header, const FrameGlance& frame, TimePoint start) {
   if (right.x > sizeOf(text, style).width + 30) drawText(header, key, right, kGrey, {0.42});
 }
 
-// Transforms metres ahead and to the left of the body to pixels of the plan.
+// Transforms metres ahead and to the left of the body to pixels of the top view.
 struct PlanView {
   cv::Point2d body;
   double scale;

@@ -1,4 +1,4 @@
-// One frame of overlay.mp4: the image with 3D boxes (dashed: occluded), and a plan.
+// One frame of overlay.mp4: the image with cuboids (dashed if occluded), and a top view.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,7 +11,7 @@
 namespace perdure::tools {
 
 struct OverlaySettings {
-  double reach_m = 30.0;  ///< distance from the body to the upper edge of the plan
+  double reach_m = 30.0;  ///< distance from the body to the upper edge of the top view
   int max_width = 1280;   ///< larger images are scaled down to this width
 };
 
@@ -19,11 +19,11 @@ class OverlayPicture {
  public:
   OverlayPicture(const CameraCalibration& camera, const OverlaySettings& settings);
 
-  /// Size of each picture: the scaled image, the plan and the header; even numbers.
+  /// Size of each picture, with the scaled image, the top view and the header; even numbers.
   cv::Size size() const;
   cv::Rect imageArea() const;
-  /// `image`: CV_8UC1 or CV_8UC3 in the size of the calibration, not undistorted. `path`: positions
-  /// of the body up to this frame. `start`: the time that is displayed as 0.
+  /// Draws a picture. `image`: CV_8UC1 or CV_8UC3 in the size of the calibration, not undistorted.
+  /// `path`: positions of the body up to this frame. `start`: the time that is displayed as 0.
   cv::Mat draw(const cv::Mat& image, const FrameGlance& frame,
                const std::vector<Eigen::Vector3d>& path, TimePoint start) const;
 
@@ -38,8 +38,8 @@ class OverlayPicture {
   double scale_;  ///< scale of the image in the picture
 };
 
-/// Range of the plan: the distance in m from the body that includes nine tenths of the visible
-/// confirmed objects. 30 if there were none; at least 4, at most 60.
+/// Range of the top view in m: 1.15 times the distance from the body that includes nine tenths of
+/// the confirmed objects in sight; at least 4, at most 60. Returns 30 if there were no objects.
 double usualReach(const DriveLog& log);
 
 }  // namespace perdure::tools

@@ -1,4 +1,4 @@
-// overlay.mp4: the frames of the first camera with the estimates at each frame.
+// Writes overlay.mp4: the frames of the first camera with the estimates at each frame.
 #pragma once
 
 #include <cstddef>
@@ -21,11 +21,11 @@ class OverlayWriter {
   OverlayWriter(std::filesystem::path file, const CameraCalibration& camera, double rate_hz,
                 const OverlaySettings& settings);
 
-  /// Adds a frame; frames must be sorted by time. Opens the file at the first one. Reasons:
-  /// image_missing, image_malformed (viewOf), image_size (differs from the calibration), and those
-  /// of VideoFile (then nothing is written).
+  /// Adds a frame; frames must be sorted by time. The first call opens the file. Fails with
+  /// image_missing, image_malformed (see viewOf), image_size if the size differs from the
+  /// calibration, or a reason of VideoFile if the film cannot be written.
   Result<void> add(const Frame& frame, const FrameGlance& glance);
-  /// Finishes the film. Reason video_not_written.
+  /// Finishes the film. Fails with video_not_written.
   Result<void> finish() { return video_ ? video_->finish() : Result<void>(); }
   std::size_t frames() const { return video_ ? video_->frames() : 0; }
   /// "H.264" or "MPEG-4"; empty before the first frame.
@@ -42,9 +42,9 @@ class OverlayWriter {
   TimePoint start_;
 };
 
-/// Draws each frame of the log whose image is still in the folder. Returns a sentence about the
-/// result or the reason of a failure; missing images or codecs do not throw. Calls `progress` with
-/// the frames completed and the total.
+/// Draws each frame of the log whose image is still in the folder. Returns a sentence with the
+/// result, or with the reason if images or codecs are missing. Throws StartupError(kInputOutput) if
+/// the film is incomplete. Calls `progress` with the number of completed frames and the total.
 std::string writeOverlay(const DriveLog& log, const replay::DatasetOptions& data,
                          const std::filesystem::path& file,
                          const std::function<void(std::size_t, std::size_t)>& progress);

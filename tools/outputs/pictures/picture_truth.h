@@ -26,8 +26,9 @@ struct TruthTrack {
   std::vector<Key> keys;  ///< never empty; sorted by time
   TimePoint present_from = TimePoint::min(), present_until = TimePoint::max();
 
-  /// State at a time. Static objects: the last key until then, or the first one. Moving objects:
-  /// linear interpolation between keys, nothing outside. Empty while the object is absent.
+  /// State at `time`. For static objects, the last key until then, or the first key if there is
+  /// none. For moving objects, interpolated linearly between keys. Empty while the object is
+  /// absent, and outside the keys of moving objects.
   std::optional<Key> at(TimePoint time) const;
 };
 
@@ -36,7 +37,7 @@ struct PictureTruth {
   std::vector<TruthTrack> objects;
 };
 
-/// Transforms from frame B to frame A; both are gravity-levelled.
+/// Transforms ground truth from frame B to frame A; both are gravity-levelled.
 PictureTruth turned(const RigidTransform& T_AB, PictureTruth truth);
 
 }  // namespace perdure::tools

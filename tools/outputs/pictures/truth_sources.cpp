@@ -35,7 +35,7 @@ std::string classOf(const std::string& type) {
   return name;
 }
 
-/// One key at the median of all, separately for each axis; yaw from the mean direction.
+/// Returns one key: the median of all positions, separately for each axis, with the mean yaw.
 TruthTrack::Key middleOf(const std::vector<TruthTrack::Key>& keys) {
   TruthTrack::Key result = keys.front();
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
@@ -76,7 +76,7 @@ PictureTruth truthOfLabels(const std::vector<replay::KittiLabel>& labels,
     const auto pose = poses.find(label.frame);
     if (label.dontCare() || pose == poses.end()) continue;
     const RigidTransform T_WR = pose->second.T_WB * T_RI.inverse();
-    // KITTI's rotation_y is the angle about y from the camera's x axis to the front.
+    // KITTI's rotation_y is the angle about y from the camera's x axis to the object's front.
     const Eigen::Vector3d ahead_W =
         T_WR.q * Eigen::Vector3d(std::cos(label.rotation_y), 0.0, -std::sin(label.rotation_y));
     TruthTrack& track = tracks[label.track];

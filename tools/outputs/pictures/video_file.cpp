@@ -28,7 +28,7 @@ struct Closer {
 template <class T>
 using Held = std::unique_ptr<T, Closer>;
 
-/// A codec ready to encode; null if this machine does not support it.
+/// Returns an encoder that is ready to use; null if this machine does not support the codec.
 Held<AVCodecContext> openCodec(const AVCodec* codec, const cv::Size& size, double rate_hz,
                                bool wants_header) {
   Held<AVCodecContext> context(codec == nullptr ? nullptr : avcodec_alloc_context3(codec));
@@ -39,9 +39,9 @@ Held<AVCodecContext> openCodec(const AVCodec* codec, const cv::Size& size, doubl
   context->framerate = av_d2q(rate_hz, 60000);
   context->time_base = av_inv_q(context->framerate);
   context->gop_size = 50;
-  context->colorspace = AVCOL_SPC_SMPTE170M;  // same as in OpenCV's conversion
+  context->colorspace = AVCOL_SPC_SMPTE170M;  // the colour space of OpenCV's conversion
   context->color_range = AVCOL_RANGE_MPEG;
-  context->thread_count = 1;  // gives the same bytes on every machine
+  context->thread_count = 1;  // makes the bytes the same on every machine
   if (codec->id == AV_CODEC_ID_H264) {
     av_opt_set(context->priv_data, "preset", "superfast", 0);
     av_opt_set(context->priv_data, "crf", "24", 0);
@@ -67,7 +67,7 @@ struct VideoFile::Film {
 
   ~Film() { (void)end(); }
 
-  /// Writes the remaining data once; false if the file is incomplete.
+  /// Writes the remaining data; further calls do nothing. Returns false if the file is incomplete.
   bool end() {
     if (!std::exchange(begun, false)) return true;
     avcodec_send_frame(codec.get(), nullptr);

@@ -14,16 +14,16 @@ namespace perdure::tools {
 
 class VideoFile {
  public:
-  /// Needs even sides and rate > 0. Reasons: video_no_codec, video_not_written (the file cannot be
-  /// created).
+  /// Needs even sides and rate > 0. Fails with video_no_codec if no encoder is available, and with
+  /// video_not_written if the file cannot be created.
   static Result<VideoFile> open(const std::filesystem::path& file, const cv::Size& size,
                                 double rate_hz);
   VideoFile(VideoFile&&) noexcept;
   VideoFile& operator=(VideoFile&&) noexcept;
   ~VideoFile();  ///< finishes the film
 
-  /// Appends a picture: CV_8UC3 (blue, green, red) of the film's size. Fails with video_not_written
-  /// if the disk is full.
+  /// Appends a picture of type CV_8UC3 (blue, green, red) in the film's size. Fails with
+  /// video_not_written if the disk is full.
   Result<void> write(const cv::Mat& picture);
   Result<void> finish();
   std::size_t frames() const;

@@ -29,7 +29,7 @@ for o in objects:
     axes.add_patch(Polygon(centre + corners @ turn.T, color=colours[o.class_name], alpha=0.6))
     variances, axes_of = np.linalg.eigh(o.covariance[:2, :2])
     angle = np.degrees(np.arctan2(axes_of[1, 1], axes_of[0, 1]))
-    across, along = 4 * np.sqrt(variances)  # axes of 2 sigma on both sides
+    across, along = 4 * np.sqrt(variances)  # ellipse diameters for 2 sigma
     axes.add_patch(Ellipse(centre, along, across, angle=angle, fill=False, linewidth=0.8))
     axes.annotate(str(o.id), centre, ha="center", va="center", fontsize=7)
 for name in names:

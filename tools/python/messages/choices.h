@@ -1,4 +1,4 @@
-// Words for values of enumerations in Python; an enumeration without words is an int.
+// Words that represent values of enumerations in Python; an enumeration without words is an int.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// Converts between messages and Python instances by the description of common/wire. Needs the GIL.
+// Converts messages to and from Python instances as described in common/types. Needs the GIL.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -8,11 +8,11 @@
 
 namespace perdure::python {
 
-/// Matrices become separate numpy arrays; pixels are not copied.
+/// Converts a message to Python. Matrices become separate numpy arrays; pixels are not copied.
 pybind11::object toPython(std::type_index type, const void* message);
 void fromPython(std::type_index type, pybind11::handle from, void* message);
 
-/// T: the type of a topic, or a type that a topic's type contains.
+/// T: the type of a topic, or a type in the description of a topic's type.
 template <class T>
 pybind11::object toPython(const T& message) {
   return toPython(typeid(T), &message);
@@ -25,17 +25,17 @@ T fromPython(pybind11::handle from) {
   return message;
 }
 
-/// Sets the default values of a struct in an instance of the class with its name.
+/// Sets the default values of the struct `name` in an instance of its Python class.
 void setDefaults(const std::string& name, pybind11::handle instance);
 
 /// {"Objects": [(name, kind, shape or None, unit, item or None), …], …}: every struct of every
 /// topic, after the structs that it contains. Kinds: int, bool, float, str, choice, array, pose,
 /// message, optional_message, optional_float, list, names, counts, bytes, pixels. Item: the
-/// struct's name, or the words of a choice. The classes, their docstrings and their type hints are
-/// generated from it.
+/// struct's name, or the words of a choice. The classes with their docstrings and type hints are
+/// generated from this.
 pybind11::dict schema();
 
-/// {"objects": "Objects", "frame/": "Frame", …}
+/// The type of each topic: {"objects": "Objects", "frame/": "Frame", …}
 pybind11::dict topicTypes();
 
 }  // namespace perdure::python

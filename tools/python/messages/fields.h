@@ -1,4 +1,4 @@
-// Visits the description of messages in common/wire, for the conversions and for the schema.
+// Visits the message descriptions in common/types, for the conversions and for the schema.
 #pragma once
 
 #include <set>
@@ -9,8 +9,8 @@
 
 namespace perdure::python {
 
-/// Calls Self::field(name, value, unit) for fields whose kind follows from the type; Self has
-/// object, optional, list, choice and pixels for others.
+/// Calls Self::field(name, value, unit) for fields whose kind follows from their type. For other
+/// fields, Self has object, optional, list, choice and pixels.
 template <class Self>
 class EachField {
  public:
@@ -50,7 +50,7 @@ class EachField {
   void pass(const char* name, auto& d) { pass(name, d, ""); }
 };
 
-/// Calls visit.operator()<D, W>() for the structs of messages, each after those that it contains.
+/// Calls visit.operator()<D, W>() for each message struct, after the structs that it contains.
 template <class Visit>
 class EachStruct : public EachField<EachStruct<Visit>> {
  public:
@@ -85,7 +85,7 @@ class EachStruct : public EachField<EachStruct<Visit>> {
   std::set<std::type_index> seen_;
 };
 
-/// The structs of all topics.
+/// Calls visit for the structs of all topics.
 template <class Visit>
 void forEachStruct(Visit visit) {
   EachStruct<Visit> structs(std::move(visit));

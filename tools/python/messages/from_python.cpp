@@ -20,7 +20,7 @@ std::string shapeText(const py::array& array) {
   return py::str(array.attr("shape")).cast<std::string>();
 }
 
-/// Keeps an array alive for readers, which may end in any thread.
+/// Keeps an array alive for readers; the last reader may end in any thread.
 std::shared_ptr<const void> keeperOf(py::array array) {
   PyObject* const kept = array.release().ptr();
   return {kept, [](const void* object) {

@@ -12,7 +12,7 @@ py::object MessageClass::make() const {
   if (type == nullptr) raise("Error", "import perdure before " + name + " is used");
   static PyObject* const kNothing = PyTuple_New(0);
   return py::reinterpret_steal<py::object>(
-      type->tp_new(type, kNothing, nullptr));  // does not call __init__
+      type->tp_new(type, kNothing, nullptr));  // without a call of __init__
 }
 
 bool MessageClass::isOne(py::handle object) const {
@@ -20,7 +20,7 @@ bool MessageClass::isOne(py::handle object) const {
 }
 
 MessageClass& messageClass(const std::string& name) {
-  static auto& classes = *new std::map<std::string, MessageClass>;  // outlives the interpreter
+  static auto& classes = *new std::map<std::string, MessageClass>;  // never deleted
   MessageClass& it = classes[name];
   it.name = name;
   return it;

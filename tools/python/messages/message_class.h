@@ -1,4 +1,4 @@
-// The Python classes of messages, which perdure/messages.py creates. Needs the GIL.
+// The Python classes of messages, which perdure/messages.py registers. Needs the GIL.
 #pragma once
 
 #include <cxxabi.h>
@@ -17,17 +17,17 @@ struct MessageClass {
   PyTypeObject* type = nullptr;   ///< never released
   std::vector<PyObject*> fields;  ///< interned, in the order of the description
 
-  /// An instance without values. Raises if the class is not registered.
+  /// Creates an instance without values. Raises an error if the class is not registered.
   pybind11::object make() const;
   bool isOne(pybind11::handle object) const;
 };
 
-/// The class in this module; created on first use.
+/// Returns the class of this name, which is created on the first call.
 MessageClass& messageClass(const std::string& name);
 void registerClass(const std::string& name, pybind11::type type,
                    const std::vector<std::string>& fields);
 
-/// perdure::ObjectBelief → "ObjectBelief".
+/// Name of a type without its namespace: perdure::ObjectBelief → "ObjectBelief".
 template <class D>
 const std::string& nameOfType() {
   static const std::string name = [] {

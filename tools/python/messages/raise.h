@@ -1,4 +1,4 @@
-// Raises Python's exceptions of perdure.errors from C++. All functions need the GIL.
+// Raises the Python exceptions of perdure.errors from C++. All functions need the GIL.
 #pragma once
 
 #include <string>
@@ -7,10 +7,10 @@
 
 namespace perdure::python {
 
-/// Raises perdure.errors.`name` with a sentence that contains the fix.
+/// Raises perdure.errors.`name`; `sentence` states the cause and the fix.
 [[noreturn]] void raise(const char* name, const std::string& sentence);
 
-/// Converts a StartupError to the exception for its exit status. Call it once in each module.
+/// Makes StartupError raise the Python exception of its exit status. Call this once per module.
 void translateStartupErrors();
 
 }  // namespace perdure::python

@@ -37,7 +37,7 @@ py::object objectOf(const std::array<std::uint8_t, N>& bytes) {
   return py::array_t<std::uint8_t>(static_cast<py::ssize_t>(N), bytes.data());
 }
 
-/// A read-only array over the existing bytes, which live as long as the array.
+/// A read-only array over the frame's pixels, which live as long as the array.
 py::object pixelsOf(const Frame& frame) {
   if (!frame.data) return py::none();
   const auto bytes = *frame.data;

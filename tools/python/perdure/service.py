@@ -102,7 +102,7 @@ def _detections_of(found, k: int) -> List["messages.Detection"]:
 
 _HORIZON_S = 0.5  # seconds after their frame in which predictions are valid
 _MET = 0.6  # least overlap (IoU) of a reported box and a prediction
-_MOST_NATS = 5.0  # limit of one top-down likelihood
+_MOST_NATS = 5.0  # limit of one top-down log-likelihood
 
 
 def _overlaps(a, b) -> np.ndarray:

@@ -1,5 +1,5 @@
-// Random numbers that depend only on a counter. A pixel of a frame has the same numbers in any
-// drawing order and thread. Mixing by SplitMix64 (Steele, Lea, Flood, OOPSLA 2014).
+// Random numbers that depend only on a counter, so that a pixel of a frame has the same numbers in
+// any drawing order and thread. The bits are mixed by SplitMix64 (Steele, Lea, Flood, OOPSLA 2014).
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ constexpr std::uint64_t mixBits(std::uint64_t a, std::uint64_t b) {
 constexpr float uniformOf(std::uint64_t bits) {
   return static_cast<float>(bits >> 40) * (1.0F / 16777216.0F);
 }
-/// Mean 0, standard deviation 1, within ±3.5: the sum of four uniform numbers.
+/// Returns the scaled sum of four uniform numbers: mean 0, standard deviation 1, within ±3.5.
 constexpr float normalOf(std::uint64_t bits) {
   const auto sum = static_cast<float>((bits & 0xffff) + (bits >> 16 & 0xffff) +
                                       (bits >> 32 & 0xffff) + (bits >> 48));

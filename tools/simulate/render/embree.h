@@ -1,4 +1,4 @@
-// Embree 3 (Debian 12) or 4 (Debian 13), which differ in the options of a query.
+// Hides the different query options of Embree 3 (Debian 12) and 4 (Debian 13).
 #pragma once
 
 #if __has_include(<embree4/rtcore.h>)
@@ -11,7 +11,7 @@ namespace perdure::tools {
 
 #if RTC_VERSION_MAJOR >= 4
 
-/// The rays of a packet must have similar origins and directions.
+/// Finds nearest hits. The rays of a packet must have similar origins and directions.
 inline void intersectCoherent(const int* valid, RTCScene scene, RTCRayHit8& rays) {
   RTCIntersectArguments options;
   rtcInitIntersectArguments(&options);
@@ -33,7 +33,7 @@ inline RTCIntersectContext coherentRays() {
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   return context;
 }
-/// The rays of a packet must have similar origins and directions.
+/// Finds nearest hits. The rays of a packet must have similar origins and directions.
 inline void intersectCoherent(const int* valid, RTCScene scene, RTCRayHit8& rays) {
   RTCIntersectContext context = coherentRays();
   rtcIntersect8(valid, scene, &context, &rays);

@@ -5,7 +5,7 @@
 namespace perdure::tools {
 namespace {
 
-/// The largest normalised radius that the model can project, at most 20.
+/// The largest normalised radius that the distortion model can project, at most 20.
 double maxRadiusOf(const CameraModel& model) {
   double low = 0.0, high = 20.0;
   if (model.project({high, 0.0, 1.0})) return high;

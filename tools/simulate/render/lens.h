@@ -1,4 +1,4 @@
-// The ray of each pixel of a distorted camera, and a projection that extends beyond its image.
+// The ray of each pixel of a distorted camera, and a projection beyond the image border.
 #pragma once
 
 #include <Eigen/Core>
@@ -25,8 +25,8 @@ class Lens {
   Eigen::Vector3f direction(int column, int row, float dx, float dy) const;
   /// Angle between neighbouring pixels at the image centre, radians.
   float pixelAngle() const { return pixel_angle_; }
-  /// Pixel of any point with z > 0. Outside the range of the distortion, the outermost valid pixel
-  /// in that direction is extended radially with the focal length.
+  /// Pixel of any point with z > 0. If the distortion is not valid for the point, the outermost
+  /// valid pixel in its direction is extended radially by the focal length.
   Eigen::Vector2d projectBeyond(const Eigen::Vector3d& point_C) const;
 
  private:

@@ -68,7 +68,7 @@ void Lighting::setTime(const World& world) {
   }
 }
 
-/// Share of the sky light that reaches level ground beside and under objects.
+/// Share of the sky's light that nearby objects leave on level ground; 1 on steep surfaces.
 float Lighting::contact(const Hit& hit) const {
   if (hit.normal.z() < 0.7F) return 1.0F;
   float left = 1.0F;
@@ -95,7 +95,7 @@ Eigen::Vector3f Lighting::ambient(const Hit& hit) const {
   return (sky_colour_ * up + bounce_colour_ * (1.0F - up)) * open;
 }
 
-/// Reflection of the sky and the sun in a glossy surface (Schlick's approximation).
+/// Reflection of sky and sun in a glossy surface (Schlick's approximation).
 Eigen::Vector3f Lighting::gloss(const Eigen::Vector3f& ray, const Hit& hit, bool in_sun) const {
   const float cosine = std::clamp(-ray.dot(hit.normal), 0.0F, 1.0F);
   const Eigen::Vector3f mirrored = ray + 2.0F * cosine * hit.normal;

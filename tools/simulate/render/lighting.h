@@ -1,4 +1,4 @@
-// Light on surfaces: sun, sky, ground, contact shadows, gloss, haze. Lambert's law.
+// Light on surfaces by Lambert's law: sun, sky, ground, contact shadows, gloss and haze.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,7 +26,8 @@ class Lighting {
   void setTime(const World& world);
 
   const Eigen::Vector3f& sun() const { return sun_W_; }
-  /// Linear RGB radiance towards the eye. `ray`: unit direction; `pixel_angle`: of a pixel.
+  /// Linear RGB radiance from the hit towards `origin`. `ray`: unit direction; `pixel_angle`:
+  /// radians.
   Eigen::Vector3f shade(const Eigen::Vector3f& origin, const Eigen::Vector3f& ray, const Hit& hit,
                         bool in_sun, float pixel_angle) const;
   const Sky& sky() const { return sky_; }

@@ -9,13 +9,13 @@ namespace perdure::tools {
 namespace {
 
 constexpr double kNearPlane = 0.05;  ///< clipping plane of triangles, metres before the camera
-/// Cells along the longer side of an outline's raster: four for each pixel, within these limits.
+/// Limits of the cells along the longer side of an outline's raster, which has four per pixel.
 constexpr double kMinCells = 24.0, kMaxCells = 112.0;
 
 using Polygon = std::vector<Eigen::Vector3d>;
 using Triangle = std::array<const Eigen::Vector2d*, 3>;
 
-/// Clips a triangle at the near plane: nothing, three or four corners remain.
+/// Clips a triangle at the near plane; zero, three or four corners remain.
 void cutNear(const std::array<Eigen::Vector3d, 3>& triangle, Polygon& out) {
   out.clear();
   for (std::size_t i = 0; i < 3; ++i) {
@@ -27,7 +27,7 @@ void cutNear(const std::array<Eigen::Vector3d, 3>& triangle, Polygon& out) {
   }
 }
 
-/// Cells whose centre is in one of the triangles drawn so far.
+/// Marks the cells whose centre is in a drawn triangle.
 class Raster {
  public:
   Raster(const Box& box, double cell)
@@ -165,7 +165,7 @@ double widestAngle(const Lens& lens) {
   return widest + 0.05;
 }
 
-/// Fast conservative test: true only if no part of a ball about `centre_C` is in the image.
+/// Fast conservative test: true only if no part of the ball around `centre_C` is in the image.
 bool isOutside(const Eigen::Vector3d& centre_C, double radius, double widest) {
   const double distance = centre_C.norm();
   if (distance <= radius) return false;

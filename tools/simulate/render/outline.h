@@ -1,6 +1,6 @@
-// Computes the visible share of an object: its pixels in the rendered image divided by the pixels
-// of its complete outline. The outline is drawn alone on an image plane that extends the image by
-// its own size on each side.
+// Computes the visible share of an object: its visible pixels in the image divided by the pixels of
+// its complete outline. The outline is drawn without other objects, on an image plane that extends
+// the image by its own size on each side.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,11 +21,12 @@ struct Outline {
   /// Box of the part within the image; set if the border truncates the object.
   std::optional<Box> inside;
 };
-/// The area is 0 if the object is behind the camera or outside the enlarged plane.
+/// Draws the outline; its area is 0 if the object is behind the camera or outside the enlarged
+/// plane.
 Outline outlineOf(const Surface& surface, const RigidTransform& T_CO, const Lens& lens);
 
-/// One row for each present object whose outline box touches the image, by id. `seen` is the result
-/// of render() or identify() for the same shot. `step` is that of identify(), or 1.
+/// Returns a row, by id, for each present object whose outline box touches the image. `seen`:
+/// result of render() or identify() for the same shot; `step`: that of identify(), 1 for render().
 std::vector<sim::TruthView> viewsOf(const World& world, const Lens& lens, const Shot& shot,
                                     const Picture& seen, int step, Workers& workers);
 

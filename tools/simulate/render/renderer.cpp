@@ -10,7 +10,7 @@ namespace {
 
 constexpr float kRayStart = 0.02F, kSunOffset = 2e-3F;
 
-/// -1 for active lanes; aligned as Embree requires.
+/// Mask of a packet: -1 for active lanes; aligned as Embree requires.
 struct alignas(32) Lanes {
   std::array<int, kPacket> valid{};
 };
@@ -41,8 +41,8 @@ void readHit(const World& world, const RTCRayHit8& rays, unsigned i, const Eigen
   hit.position = origin + hit.distance * direction;
   hit.normal = (instance.R * point.normal).normalized();
   if (hit.normal.dot(direction) > 0.0F) {
-    // The normal points away for a back face, or for the shading normal of a rounded edge. Only the
-    // back face is flipped.
+    // The normal may point away for a back face, or for the shading normal of a rounded edge. Only
+    // back faces are flipped.
     Eigen::Vector3f flat(rays.hit.Ng_x[i], rays.hit.Ng_y[i], rays.hit.Ng_z[i]);
     if (World::movesAlone(rays, i)) flat = instance.R * flat;
     if (flat.dot(hit.normal) * flat.dot(direction) > 0.0F) hit.normal = -hit.normal;

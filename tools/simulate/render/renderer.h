@@ -1,5 +1,6 @@
-// Renders the image of one camera: rays through each pixel of the distorted image, shading, four
-// additional rays at edges, and motion blur. The result does not depend on the number of threads.
+// Renders the image of one camera: one ray through each pixel of the distorted image, shading, up
+// to four additional rays at edges, and motion blur. The result is independent of the number of
+// threads.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,8 +19,8 @@ namespace perdure::tools {
 inline constexpr int kTile = 32;  ///< pixels; side of the square that a task draws
 
 /// Poses of a camera during one exposure. With a rolling shutter, the middle row is exposed at
-/// `time_s`, and the first and last row half the readout before and after it. Objects have their
-/// poses at `time_s`.
+/// `time_s`; the first and the last row half the readout before and after it. Objects have their
+/// poses of `time_s`.
 struct Shot {
   double time_s = 0.0;  ///< scene time at the middle of the exposure
   sim::MotionState body;
@@ -68,7 +69,7 @@ class Renderer {
     std::array<Place, kPacket> places;
     std::array<float, kPacket> shares{};
   };
-  /// Properties of a pixel besides its radiance.
+  /// Data of a pixel besides its radiance.
   struct Detail {
     std::uint32_t key = 0;  ///< instance, material and whether the sun is visible
     float inverse_distance = 0.0F;
@@ -81,7 +82,7 @@ class Renderer {
   void findSun(Packet& packet) const;
   void drawTile(int left, int top, Picture& picture);
   void drawBlock(Packet& packet, const Place* places, Picture& picture);
-  /// Bits of the neighbours across an edge that needs antialiasing.
+  /// One bit for each of the four neighbours beyond an edge that needs antialiasing.
   unsigned edgesOf(const Picture& picture, int column, int row) const;
   void smoothTile(int left, int top, Picture& picture);
   void addSamples(Samples& samples, Picture& picture) const;

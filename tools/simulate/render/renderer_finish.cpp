@@ -1,4 +1,4 @@
-// Second part of Renderer: antialiasing and motion blur.
+// Implements antialiasing and motion blur of Renderer.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -23,9 +23,9 @@ struct Pattern {
   std::array<Ray, 4> rays;
 };
 
-/// Chooses the rays by the neighbours that differ. One neighbour, or two at a corner: two rays in
-/// that half of the pixel. Three neighbours (foliage without clear edges): two rays. Two opposite
-/// neighbours (thin objects): four rays.
+/// Chooses the additional rays by the neighbours that differ. One neighbour, or two at a corner:
+/// two rays in that half of the pixel. Three or more (foliage without clear edges): two rays. Two
+/// opposite neighbours (thin objects): four rays.
 Pattern makePattern(unsigned edges) {
   constexpr float kNear = 0.2F, kFar = 0.22F, kCentre = 1.0F - kNear - kFar;
   const float x = static_cast<float>((edges >> 1 & 1U)) - static_cast<float>(edges & 1U);
@@ -66,7 +66,7 @@ const Eigen::Vector4f& nearest(const Picture& picture, float x, float y) {
   return picture.radiance[picture.index(column, row)];
 }
 
-/// Bilinear interpolation; constant outside the border.
+/// Bilinear interpolation at (x, y); constant beyond the border.
 Eigen::Vector4f between(const Picture& picture, float x, float y) {
   x = std::clamp(x, 0.0F, static_cast<float>(picture.width - 1));
   y = std::clamp(y, 0.0F, static_cast<float>(picture.height - 1));
@@ -137,7 +137,7 @@ void Renderer::addSamples(Samples& samples, Picture& picture) const {
   packet.count = 0;
 }
 
-/// Motion of the pixel's content in the image during the exposure, in pixels.
+/// Motion of a pixel's content during the exposure, in pixels.
 Eigen::Vector2f Renderer::smear(const Picture& picture, int column, int row) const {
   const Eigen::Vector3f& d = lens_->direction(column, row);
   const std::size_t at = picture.index(column, row);

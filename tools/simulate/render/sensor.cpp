@@ -15,8 +15,8 @@ constexpr int kGammaSteps = 4096;
 constexpr int kMeterStep = 8;
 const Eigen::Vector3f kLuminance(0.2126F, 0.7152F, 0.0722F);
 
-/// Gamma table over the square root of the linear value, for a high resolution at the steep part of
-/// the curve. Light above 0.7 is compressed, as in cameras, so that skies keep contrast.
+/// Gamma table, indexed by the square root of the linear value for high resolution in the steep
+/// part of the curve. Light above 0.7 is compressed as in cameras, so that skies keep contrast.
 std::vector<std::uint8_t> gammaTable() {
   std::vector<std::uint8_t> table;
   for (int i = 0; i < kGammaSteps; ++i) {
@@ -28,7 +28,7 @@ std::vector<std::uint8_t> gammaTable() {
   return table;
 }
 
-/// Logarithm of the mean luminance; dark and bright pixels are limited.
+/// Mean logarithm of the luminance; very dark and bright pixels are clamped.
 double metered(const Picture& picture) {
   double sum = 0.0;
   std::size_t count = 0;
@@ -58,7 +58,7 @@ Sensor::Sensor(const SensorOptions& options, const Lens& lens)
 
 void Sensor::expose(const Picture& picture, std::uint64_t index) {
   const double wanted = std::log(kMiddleGrey) - metered(picture);
-  // Each image sets the exposure of the next one; the first one is metered in advance.
+  // Each image determines the exposure of the next one; the first uses its own metering.
   if (state_.frames == 0 || !options_.adapt) state_.log_exposure = wanted;
   scale_ = static_cast<float>(std::exp(state_.log_exposure + state_.log_gain));
   const double share = 1.0 - std::exp(-options_.interval_s / kAdaptation_s);

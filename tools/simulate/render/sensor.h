@@ -1,5 +1,5 @@
-// A camera's sensor, which converts radiance to eight bits: automatic exposure, vignetting, shot
-// and read noise, random-walk gain, gamma and quantisation.
+// Simulates a camera's sensor, which converts radiance to eight bits: automatic exposure,
+// vignetting, shot and read noise, random-walk gain, gamma and quantisation.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +31,7 @@ class Sensor {
  public:
   Sensor(const SensorOptions& options, const Lens& lens);
 
-  /// The image as packed rows. `index` is the frame index; noise depends on seed, index and pixel.
+  /// The image as packed rows. `index`: frame index; the noise depends on seed, index and pixel.
   std::vector<std::uint8_t> develop(const Picture& picture, std::uint64_t index, Workers& workers);
   const SensorState& state() const { return state_; }
   void setState(const SensorState& state) { state_ = state; }

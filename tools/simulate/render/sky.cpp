@@ -19,7 +19,7 @@ float lattice(std::uint64_t seed, int x, int y) {
 
 float smooth(float t) { return t * t * (3.0F - 2.0F * t); }
 
-/// Value noise in [0, 1].
+/// Smooth value noise in [0, 1].
 float noiseAt(std::uint64_t seed, float x, float y) {
   const float fx = std::floor(x), fy = std::floor(y);
   const int ix = static_cast<int>(fx), iy = static_cast<int>(fy);
@@ -60,7 +60,7 @@ void Sky::paintOutdoors(std::uint64_t seed) {
       const float y = (static_cast<float>(row) + 0.5F) * 2.0F / kSize - 1.0F;
       const float r2 = std::min(x * x + y * y, 1.0F);
       const Eigen::Vector3f d =
-          Eigen::Vector3f(2.0F * x, 2.0F * y, 1.0F - r2).normalized();  // corners show the horizon
+          Eigen::Vector3f(2.0F * x, 2.0F * y, 1.0F - r2).normalized();  // corners: the horizon
       const Eigen::Vector3f clear = horizon_ + (zenith - horizon_) * std::sqrt(d.z());
       const float share = 0.85F * cloudsAt(seed, d);
       const float glow = std::pow(std::max(0.0F, d.dot(sun_W_)), 60.0F);
@@ -76,7 +76,7 @@ Eigen::Vector3f Sky::radiance(const Eigen::Vector3f& origin_W, const Eigen::Vect
 }
 
 Eigen::Vector3f Sky::outdoors(const Eigen::Vector3f& d) const {
-  // Below the horizon, uses the horizon in that direction.
+  // Directions below the horizon get the colour of the horizon.
   const float scale = 1.0F / (d.z() > 0.0F ? 1.0F + d.z() : d.head<2>().norm() + 1e-6F);
   const auto place = [&](float t) {
     return std::clamp((t * scale + 1.0F) * (0.5F * kSize) - 0.5F, 0.0F, kSize - 1.001F);
@@ -101,7 +101,7 @@ Eigen::Vector3f Sky::ceiling(const Eigen::Vector3f& origin, const Eigen::Vector3
   const float edge = std::min(std::min(x - std::floor(x), std::ceil(x) - x),
                               std::min(y - std::floor(y), std::ceil(y) - y));
   const float tone = 0.92F + 0.08F * lattice(0x7117, column, row);
-  // Averages lines that are narrower than a pixel at this distance.
+  // Blurs lines that are narrower than a pixel at this distance.
   const float blur = 0.0025F * (at - origin).norm() / (d.z() * kCeilingTile) + 1e-3F;
   const float line =
       std::clamp((0.03F + 0.5F * blur - edge) / blur, 0.0F, 1.0F) * std::min(1.0F, 0.06F / blur);

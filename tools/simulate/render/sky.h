@@ -1,4 +1,4 @@
-// Background of rays without a hit: a sky with clouds outdoors, a ceiling with lamps indoors.
+// Background for rays without a hit: a sky with clouds outdoors, a ceiling with lamps indoors.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,7 +12,7 @@ namespace perdure::tools {
 class Sky {
  public:
   explicit Sky(const sim::Scene& scene);
-  /// Linear RGB radiance from unit direction `d_W`, seen from `origin_W`.
+  /// Linear RGB radiance in unit direction `d_W` from `origin_W`.
   Eigen::Vector3f radiance(const Eigen::Vector3f& origin_W, const Eigen::Vector3f& d_W) const;
   bool indoors() const { return indoors_; }
   /// Colour of distant haze.

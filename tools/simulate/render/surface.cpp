@@ -18,7 +18,7 @@ void require(const Mesh& mesh) {
   if (!fits) throw std::invalid_argument("a mesh has lists that do not fit together");
 }
 
-/// Square root of the texture's area divided by the triangle's.
+/// Texture repeats per metre: square root of the texture's area divided by the triangle's.
 float repeatsPerMetre(const Mesh& mesh, const std::array<std::uint32_t, 3>& t) {
   const auto& p = mesh.positions;
   const auto& uv = mesh.uvs;

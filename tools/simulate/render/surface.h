@@ -1,4 +1,4 @@
-// Shading data of a hit triangle, in addition to Embree's copy of its corners.
+// Shading data of surfaces, in addition to Embree's copy of their corners.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,7 +11,7 @@
 
 namespace perdure::tools {
 
-/// Shading data of a triangle, contiguous because rays hit triangles in random order.
+/// Shading data of a triangle, in one block because rays hit triangles in random order.
 struct Facet {
   std::array<Eigen::Vector3f, 3> normals;
   std::array<Eigen::Vector2f, 3> uvs;
@@ -25,8 +25,7 @@ struct Surface {
   std::vector<Facet> facets;  ///< data of each triangle
   std::vector<Material> materials;
 
-  /// Adds `mesh`, placed by T_SM. Throws std::invalid_argument if its lists have inconsistent
-  /// lengths.
+  /// Adds `mesh`, placed by T_SM. Throws std::invalid_argument if its lists differ in length.
   void add(const Mesh& mesh, const RigidTransform& T_SM = {});
 };
 

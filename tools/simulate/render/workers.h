@@ -15,12 +15,12 @@ namespace perdure::tools {
 
 class Workers {
  public:
-  /// `threads` >= 1, including the caller of run().
+  /// `threads` >= 1; includes the thread that calls run().
   explicit Workers(int threads) : threads_(threads) {
     check(threads >= 1, "there is at least one thread");
   }
 
-  /// Calls task(0) … task(count - 1) and returns when all are done. Rethrows an exception.
+  /// Calls task(0) … task(count - 1), and returns after all calls. Rethrows an exception of a task.
   void run(std::size_t count, const auto& task) const {
     std::atomic<std::size_t> next = 0;
     const auto work = [&] {
@@ -31,8 +31,8 @@ class Workers {
     work();
     for (auto& other : others) other.get();
   }
-  /// Runs `job` in parallel to the following code; waits while two jobs are running, and rethrows
-  /// the exception of the one for which it waited. With one thread, runs it at once.
+  /// Runs `job` in parallel to the following code. If two jobs are running, waits for the older one
+  /// first and rethrows its exception. With one thread, runs `job` at once.
   void post(std::function<void()> job) {
     if (threads_ == 1) return job();
     if (jobs_.size() == 2) finishFirst();

@@ -19,7 +19,7 @@ void* bufferOf(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::
   return buffer;
 }
 
-/// Objects with the same look share one surface.
+/// Objects of equal class, shape, look and size share one surface.
 using Look = std::tuple<std::string, std::string, std::uint64_t, std::array<double, 3>>;
 
 Look lookOf(const sim::SceneObject& object) {
@@ -52,8 +52,8 @@ bool staysForGood(const sim::SceneObject& object) {
 
 World::World(const sim::Scene& scene, int threads)
     : scene_(scene), instances_(scene.objects.size() + 1), geometries_(scene.objects.size() + 1) {
-  // One thread, because scheduling must not affect the order of triangles. This order decides which
-  // of two touching triangles a ray hits.
+  // One thread, because scheduling must not affect the order of the triangles. The order determines
+  // which of two touching triangles a ray hits.
   device_ = rtcNewDevice("threads=1");
   if (!device_) throw std::runtime_error("Embree cannot start");
   makeSurfaces(threads);

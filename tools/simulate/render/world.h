@@ -1,6 +1,5 @@
-// A scene in Embree. All static parts are in one tree of triangles. Each object that moves, appears
-// or disappears is an instance, of which only the transform changes. Embree (Wald et al., SIGGRAPH
-// 2014).
+// A scene in Embree (Wald et al., SIGGRAPH 2014). All static parts form one tree of triangles. Each
+// object that moves, appears or disappears is an instance, of which only the transform changes.
 #pragma once
 
 #include <Eigen/Core>
@@ -39,12 +38,12 @@ class World {
   /// Moves objects to their poses at scene time `t_s`. Returns false if none has moved.
   bool setTime(double t_s);
   const sim::Scene& scene() const { return scene_; }
-  /// [0] is the scenery, [i + 1] is scene().objects[i].
+  /// Element 0 is the scenery, element i + 1 is scene().objects[i].
   const std::vector<Instance>& instances() const { return instances_; }
 
-  /// Finds the nearest hits; see instanceOf.
+  /// Finds the nearest hits of the lanes in `valid`; instanceOf returns what they hit.
   void intersect(const int* valid, RTCRayHit8& rays) const;
-  /// Sets tfar to -infinity if a surface is between tnear and tfar.
+  /// Sets tfar of a ray to -infinity if a surface is between its tnear and tfar.
   void occluded(const int* valid, RTCRay8& rays) const;
 
   /// Index of the instance that lane `i` hit, or kNothing.
@@ -52,7 +51,7 @@ class World {
     if (rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) return kNothing;
     return movesAlone(rays, i) ? rays.hit.instID[0][i] : rays.hit.geomID[i];
   }
-  /// Whether the hit's Ng is in the instance's own frame and not in W.
+  /// Whether the hit's normal Ng is in the instance's own frame instead of W.
   static bool movesAlone(const RTCRayHit8& rays, unsigned i) {
     return rays.hit.instID[0][i] != RTC_INVALID_GEOMETRY_ID && rays.hit.instID[0][i] != 0;
   }

@@ -1,4 +1,4 @@
-// Seeded random choices for looks: the same seed gives the same shape on every machine.
+// Seeded random choices of appearance: the same seed gives the same shape on every machine.
 #pragma once
 
 #include <cstddef>

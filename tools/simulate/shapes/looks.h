@@ -6,8 +6,8 @@
 
 namespace perdure::tools::shapes {
 
-/// A texture with one of a few seeds, so that hundreds of objects share tens of textures. The top
-/// byte of the look's seed selects the look set, and separates the sets.
+/// Returns a texture with one of a few seeds, so that hundreds of objects share tens of textures.
+/// The top byte of `look_seed` selects the look set; sets share no texture.
 std::shared_ptr<const Texture> sharedTexture(TextureKind kind, std::uint64_t look_seed, Dice& dice,
                                              int size = 256);
 

@@ -1,4 +1,4 @@
-// Triangles with normals, texture coordinates and materials; metres, counter-clockwise.
+// Triangles with normals, texture coordinates and materials; in metres, corners counter-clockwise.
 #pragma once
 
 #include <Eigen/Core>
@@ -28,10 +28,11 @@ struct Mesh {
   std::vector<Material> materials;
 };
 
-/// Mesh in O with a centred box of exactly `object.size`. Throws std::invalid_argument.
+/// Mesh in O with a centred box of exactly `object.size`. Throws std::invalid_argument for an
+/// unknown shape.
 Mesh makeObjectMesh(const sim::SceneObject& object);
 Mesh makePropMesh(const sim::Prop& prop);
-/// The ground of the scene in W, with roads, pavements and markings, or the floor of a room.
+/// Mesh of the ground in W, with roads, pavements and markings, or of a room's floor.
 Mesh makeGroundMesh(const sim::Scene& scene);
 
 }  // namespace perdure::tools

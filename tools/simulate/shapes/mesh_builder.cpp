@@ -6,7 +6,7 @@
 namespace perdure::tools::shapes {
 namespace {
 
-constexpr float kLeastArea = 1e-9F;  // m²; smaller triangles have no defined normal
+constexpr float kLeastArea = 1e-9F;  // m²; smaller triangles are omitted
 
 Vec3 across(const Vec3& axis) {
   const Vec3 other = std::abs(axis.z()) < 0.9F ? Vec3::UnitZ() : Vec3::UnitX();

@@ -1,4 +1,4 @@
-// Builds a mesh part by part, with smooth normals up to a crease, fitted to a size.
+// Builds a mesh part by part, with smooth normals up to a crease angle, and fits it to a size.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,14 +19,15 @@ inline constexpr float kPi = std::numbers::pi_v<float>;
 
 class MeshBuilder {
  public:
-  /// `repeat_m` is the width of one texture repeat for faces without texture coordinates. These use
-  /// the two coordinates across the face's main direction.
+  /// Faces without texture coordinates repeat the texture every `repeat_m`; they use the two
+  /// coordinates across the face's main direction.
   int material(const Material& material, float repeat_m = 1.0F);
 
-  /// Starts a new part. Faces of different parts share no smooth normals. Faces that meet at more
-  /// than `crease_deg` keep an edge. Inverted meshes are not detected: see `closed`.
+  /// Starts a new part. Faces of different parts have no common smooth normals. Faces that meet at
+  /// over `crease_deg` form an edge. A part that is inside out is not detected; closed() corrects
+  /// it.
   void begin(float crease_deg = 40.0F);
-  /// Orients the last part so that its volume is positive; for closed parts.
+  /// Orients the last part so that its volume is positive. The part must be closed.
   void closed();
 
   /// Adds a triangle, counter-clockwise seen from outside. Omits faces without area.
@@ -36,31 +37,31 @@ class MeshBuilder {
   void picture(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d, int material,
                const Vec2& repeats = Vec2::Ones());
 
-  /// Closed parts, each of which calls begin.
+  /// Adds a closed part; box, tube, pipe, ellipsoid and torus call begin.
   void box(const Vec3& low, const Vec3& high, int material);
-  /// A tube from a to b, with radius_a at a and radius_b at b.
+  /// Adds a tube from a to b, with radius_a at a and radius_b at b.
   void tube(const Vec3& a, const Vec3& b, float radius_a, float radius_b, int sides, int material);
-  /// A tube through the points, with round cross-sections of the given radii (one for each point).
+  /// Adds a tube through the points, with round cross-sections of the given radii, one per point.
   void pipe(const std::vector<Vec3>& points, const std::vector<float>& radii, int sides,
             int material);
   void ellipsoid(const Vec3& centre, const Vec3& radii, int sides, int stacks, int material);
-  /// A ring with round cross-section about an axis of unit length.
+  /// Adds a ring with a round cross-section about an axis of unit length.
   void torus(const Vec3& centre, const Vec3& axis, float radius, float thickness, int sides,
              int section, int material);
 
   using MaterialOf = std::function<int(std::size_t interval, std::size_t segment)>;
-  /// Faces over closed rings of equal length, in the last part.
+  /// Adds faces between consecutive closed rings of equal length to the last part.
   void skin(const std::vector<Ring>& rings, const MaterialOf& material_of);
-  /// A closed part: a skin with fans at its ends (open without a material for them).
+  /// Adds a part: a skin with a fan at each end that has a material; other ends stay open.
   void loft(const std::vector<Ring>& rings, const MaterialOf& material_of,
             std::optional<int> first_cap, std::optional<int> last_cap, float crease_deg = 40.0F);
-  /// Adds such a surface of one material, with both ends.
+  /// Adds a loft of one material with both ends.
   void loft(const std::vector<Ring>& rings, int material, float crease_deg);
 
-  /// Transform of all faces that are added while it is set. A mirror reverses the order of corners.
+  /// Transform of all faces that are added from now on. A mirror reverses the order of corners.
   Eigen::Affine3f placing = Eigen::Affine3f::Identity();
 
-  /// Scales the bounding box to exactly `size`, centred; without a size, nothing is moved.
+  /// Returns the mesh, centred and scaled to a box of exactly `size`; unchanged without a size.
   Mesh finish(const std::optional<Eigen::Vector3d>& size) const;
 
  private:
@@ -75,7 +76,7 @@ class MeshBuilder {
   std::size_t part_start_ = 0;
 };
 
-/// A circle about the axis at centre, counter-clockwise seen from the tip of the axis.
+/// A circle about the axis at `centre`, counter-clockwise seen from the tip of the axis.
 Ring circle(const Vec3& centre, const Vec3& axis, float radius, int sides, float phase = 0.0F);
 
 }  // namespace perdure::tools::shapes

@@ -1,4 +1,4 @@
-// Loose faces to a mesh: exact size, smooth normals up to a crease, merged corners.
+// Turns loose faces into a mesh: exact size, smooth normals up to a crease angle, merged corners.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,9 +19,9 @@ struct LooseFace {
   float repeat_m = 1.0F, crease_deg = 40.0F;
 };
 
-/// Scales each axis so that the bounding box is exactly `size` (in float), centred.
+/// Scales each axis and centres the faces, so that their box is exactly `size` (in float).
 void fitTo(const Eigen::Vector3d& size, std::vector<LooseFace>& faces);
-/// Normals are weighted by angle. Faces without texture coordinates take them from positions.
+/// Joins faces; normals are weighted by angle. Positions give missing texture coordinates.
 Mesh joinFaces(const std::vector<LooseFace>& faces, const std::vector<Material>& materials);
 
 }  // namespace perdure::tools::shapes

@@ -9,7 +9,7 @@
 namespace perdure::tools::shapes {
 namespace {
 
-constexpr float kStature = 1.75F;  // metres; body height for the proportions below
+constexpr float kStature = 1.75F;  // metres; the dimensions below belong to this body height
 
 struct Clothes {
   int skin, hair, shirt, trousers, shoes;
@@ -115,7 +115,7 @@ Clothes dress(MeshBuilder& b, const Order& order, Dice& dice) {
   return c;
 }
 
-/// The pose that needs the least stretching to fill the size.
+/// The pose of which the proportions are nearest to those of the size.
 Pose poseFor(const Order& order, const std::string& shape, Dice& dice) {
   const auto tall = static_cast<float>(order.size.z());
   const float length = static_cast<float>(order.size.x()) / tall * kStature;

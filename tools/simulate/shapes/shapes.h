@@ -1,4 +1,4 @@
-// The generators of object classes and scenery, behind `mesh.h`.
+// The generators of object classes and scenery, which mesh.h calls.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,8 +10,8 @@
 
 namespace perdure::tools::shapes {
 
-/// Arguments of a generator: the exact size, the name of the shape (empty: chosen by the look) and
-/// the seed of the look. Each generator throws std::invalid_argument for an unknown shape.
+/// Arguments of a generator: exact size, name of the shape (if empty, the look's seed chooses one)
+/// and seed of the look. Each generator throws std::invalid_argument for an unknown shape.
 struct Order {
   Eigen::Vector3d size = Eigen::Vector3d::Ones();
   std::string shape;
@@ -37,7 +37,8 @@ Mesh makeFloor(const Order& order);
 Mesh makeCrate(const Order& order);
 Mesh makeShelf(const Order& order);
 
-/// The shape of the order, or one chosen by the look if it is empty; it must be one of `known`.
+/// Returns the order's shape or, if it is empty, one of `known` chosen by the look. Throws
+/// std::invalid_argument for a shape that is not in `known`.
 std::string chosenShape(const Order& order, const std::string& class_name,
                         const std::vector<std::string>& known);
 

@@ -17,7 +17,7 @@ namespace {
 using Eigen::Vector3f;
 
 constexpr float kWidest = 1e6F;  // texels; wider footprints also give the mean
-constexpr float kBlend = 1e-3F;  // distance to a level at which only that level is read
+constexpr float kBlend = 1e-3F;  // distance to a level below which only that level is read
 
 /// The patterns in the order of TextureKind.
 constexpr std::array kPatterns{
@@ -30,7 +30,7 @@ constexpr std::array kPatterns{
     &shapes::timberPattern,  &shapes::paintingPattern, &shapes::signPattern,
 };
 
-/// Texels row by row, size × size, that tile.
+/// Texels of a tileable square of size × size, row by row.
 std::vector<Vector3f> paintPattern(TextureKind kind, std::uint64_t seed, int size) {
   shapes::Dice dice(seed ^ (static_cast<std::uint64_t>(kind) << 40U));
   const shapes::Pattern pattern = kPatterns.at(static_cast<std::size_t>(kind))(dice);
@@ -59,13 +59,13 @@ const std::array<float, 256>& decoding() {
   return table;
 }
 
-/// Wraps to [0, 1); |x| must be below 2³¹ repeats.
+/// Wraps x to [0, 1); |x| must be below 2³¹.
 float wrapped(float x) {
   const float part = x - static_cast<float>(static_cast<int>(x));
   return part < 0.0F ? part + 1.0F : part;
 }
 
-/// Level and weight of the next one: log2 of the footprint, linear between powers of two.
+/// The level log2(footprint), and the weight of the next one, linear between powers of two.
 std::pair<std::size_t, float> levelOf(float texels, std::size_t last) {
   const auto bits = std::bit_cast<std::uint32_t>(texels);
   const std::size_t level = (bits >> 23U) - 127U;
@@ -115,7 +115,7 @@ Texture::Texture(TextureKind kind, std::uint64_t seed, int size) {
 Vector3f Texture::bilinear(const Level& level, float u, float v) {
   const float scale = static_cast<float>(level.size);
   const float x = u * scale - 0.5F, y = v * scale - 0.5F;
-  // Both are at least −1, so that truncation after adding one equals floor, and is much faster.
+  // x and y are at least −1: truncation after adding one equals floor, and is much faster.
   const int ix = static_cast<int>(x + 1.0F) - 1, iy = static_cast<int>(y + 1.0F) - 1;
   const float ax = x - static_cast<float>(ix), ay = y - static_cast<float>(iy);
   const int mask = level.size - 1;

@@ -1,4 +1,4 @@
-// Procedural textures from a seed, with mip maps against flicker at a distance.
+// Procedural textures from a seed, with mip maps that prevent flicker at a distance.
 #pragma once
 
 #include <Eigen/Core>
@@ -37,10 +37,10 @@ enum class TextureKind {
 
 class Texture {
  public:
-  /// size × size texels, tileable; size is a power of two from 1 to 4096, otherwise throws
-  /// std::invalid_argument.
+  /// Paints size × size tileable texels. Throws std::invalid_argument unless size is a power of two
+  /// from 1 to 4096.
   Texture(TextureKind kind, std::uint64_t seed, int size = 256);
-  /// Linear RGB, trilinear; `footprint`: width of the pixel in repeats. uv wraps.
+  /// Trilinear sample, linear RGB. `footprint`: width of the pixel in repeats; uv wraps.
   Eigen::Vector3f sample(const Eigen::Vector2f& uv, float footprint) const;
 
  private:
@@ -53,7 +53,7 @@ class Texture {
   std::vector<Level> levels_;
 };
 
-/// Returns a shared texture if kind, seed and size are equal.
+/// Returns the texture; calls with equal kind, seed and size share one.
 std::shared_ptr<const Texture> makeTexture(TextureKind kind, std::uint64_t seed, int size = 256);
 
 }  // namespace perdure::tools

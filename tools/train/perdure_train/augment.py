@@ -9,7 +9,7 @@ MIN_SIDE = 10.0  # longer side in pixels; smaller objects are ignored
 
 
 def crop(image, truth, rng):
-    """Scales a window of the picture to full size; the area outside the picture is grey."""
+    """Scales a window of the picture to full size. The area outside the picture becomes grey."""
     zoom = np.exp(rng.uniform(np.log(0.7), np.log(1.6)))
     width, height = WIDTH / zoom, HEIGHT / zoom
     x = rng.uniform(min(0, WIDTH - width), max(0, WIDTH - width))
@@ -30,7 +30,7 @@ def crop(image, truth, rng):
 
 
 def moved(truth, x, y, zoom):
-    """Boxes clipped to the new border; boxes with a small remainder become ignored."""
+    """Clips boxes to the new border. Boxes of which little remains are marked as ignored."""
     boxes = (truth["boxes"] - np.array([x, y, x, y], np.float32)) * zoom
     area = np.prod(boxes[:, 2:] - boxes[:, :2], axis=1)
     boxes = np.clip(boxes, 0, [WIDTH, HEIGHT, WIDTH, HEIGHT]).astype(np.float32)
@@ -64,8 +64,8 @@ def blurred(image, rng):
 
 
 def augmented(image, truth, rng, crops=0.75):
-    """A randomly changed uint8 image (240, 320, 3) and its ground truth. A share `crops` of the
-    pictures is cropped and scaled. The result depends only on the state of `rng`."""
+    """Returns a randomly changed uint8 image (240, 320, 3) and its ground truth. A share `crops` of
+    the pictures is cropped and scaled. The result depends only on the arguments and `rng`."""
     if rng.random() < crops:
         image, truth = crop(image, truth, rng)
     if rng.random() < 0.5:

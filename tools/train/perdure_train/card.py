@@ -1,4 +1,4 @@
-"""The figures of the model card and its table."""
+"""Computes the figures of the model card, and writes its table."""
 
 import math
 

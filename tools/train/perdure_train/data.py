@@ -1,4 +1,4 @@
-"""Pictures with ground truth in a cache folder, read through memory maps, and their batches."""
+"""Reads pictures with ground truth from a cache folder through memory maps, and forms batches."""
 
 import json
 from pathlib import Path
@@ -34,8 +34,8 @@ def chunk_folders(folder):
 
 
 class Pictures(Dataset):
-    """The pictures of all chunks. With `augment`, each look has a different augmentation. Pictures
-    with the class `favour` (an index) count twice. `crops` is the share that is cropped and scaled.
+    """The pictures of all chunks. With `augment`, a picture is changed differently each time.
+    Pictures with the class `favour` (an index) count twice. `crops`: the share that is cropped.
     """
 
     def __init__(self, folders, augment, seed=0, favour=None, crops=0.75):
@@ -48,7 +48,7 @@ class Pictures(Dataset):
         return len(self.index)
 
     def __getitem__(self, key):
-        """`key`: (look, picture); the look number selects the augmentation."""
+        """`key` is (n, picture). The running number n selects the augmentation."""
         look, picture = key
         chunk, i = self.index[picture]
         image, truth = np.array(self.chunks[chunk].images[i]), self.chunks[chunk].truth[i]
@@ -60,7 +60,7 @@ class Pictures(Dataset):
 
 
 class Looks(torch.utils.data.Sampler):
-    """Batches of (look, picture) from look `first` on: shuffled rounds over all pictures."""
+    """Batches of (n, picture) with n from `first` on. All pictures are shuffled in each round."""
 
     def __init__(self, count, batch, first, seed):
         self.count, self.batch, self.first, self.seed = count, batch, first, seed
@@ -79,7 +79,7 @@ class Looks(torch.utils.data.Sampler):
 
 
 def batch_of(samples):
-    """Images (N, 3, 240, 320) uint8, channels last, and ground truth padded to the most objects."""
+    """Images (N, 3, 240, 320) uint8, channels last in memory, and ground truth, padded."""
     images = torch.from_numpy(np.stack([image for image, _ in samples])).permute(0, 3, 1, 2)
     most = max(1, max(len(truth["classes"]) for _, truth in samples))
     padded = {"mask": np.zeros((len(samples), most), bool)}

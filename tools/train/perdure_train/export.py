@@ -13,7 +13,7 @@ from .settings import HEIGHT, WIDTH
 
 
 class _Affine(nn.Module):
-    """A batch norm that cannot be folded, because several strides share its convolution."""
+    """A batch norm that is not folded, because several strides share its convolution."""
 
     def __init__(self, norm):
         super().__init__()
@@ -68,8 +68,8 @@ def _without_identities(model):
 
 
 def write_onnx(network, path, background_shift=0.0, size=(WIDTH, HEIGHT)):
-    """For images of `size`, width first; the weights are independent of it. `background_shift` is
-    added to the background's logit as a calibration without a separate key."""
+    """Writes the ONNX file for images of `size`, width first; the weights do not depend on it.
+    `background_shift` is added to the background's logit, so model.json needs no key for it."""
     network = folded(network)
     with torch.no_grad():
         network.logits.bias[0] += background_shift

@@ -18,8 +18,8 @@ WEIGHTS = {"class": 1.0, "box": 5.0, "side": 1.0, "bin": 1.0, "residual": 1.0, "
 
 
 def inside(centres, boxes, margin):
-    """(N, G, A): whether a cell's centre is in a box that is enlarged by `margin` (A,) on each
-    side."""
+    """Whether a cell's centre is in a box (N, G, A). Each side is first moved outwards by `margin`
+    (A,)."""
     x, y = centres[:, 0], centres[:, 1]
     b = boxes[..., None]
     return (
@@ -39,7 +39,7 @@ def assign(probabilities, boxes, centres, strides, truth):
     fit = (score.sqrt() * overlap.pow(6) + 1e-12) * candidate
     best = fit.topk(TOP, dim=2)
     chosen = torch.zeros_like(fit).scatter_(2, best.indices, 1.0) * (fit > 0)
-    owner = (overlap * chosen).argmax(1)  # a cell chosen twice belongs to the best box
+    owner = (overlap * chosen).argmax(1)  # if chosen twice: the box of largest overlap
     fit = fit * chosen
     scale = (overlap * chosen).amax(2, keepdim=True) / fit.amax(2, keepdim=True).clamp_min(1e-12)
     quality = (fit * scale).gather(1, owner[:, None]).squeeze(1)
@@ -76,7 +76,7 @@ def spread_loss(raw, boxes, target, strides, weight):
 
 
 def azimuth_loss(raw, angle, weight):
-    """The two neighbouring bins share the target by their distance; each has its own residual."""
+    """The two bins nearest to the target share it by distance. Each bin has its own residual."""
     bins, residuals = raw.split(BINS, -1)
     position = torch.remainder(angle / (2 * HALF_BIN), BINS)
     lower = position.floor().long() % BINS
@@ -95,7 +95,7 @@ def azimuth_loss(raw, angle, weight):
 
 
 def losses(parts, truth, centres, strides):
-    """The terms by name, each per unit of assigned quality."""
+    """Returns the terms of the loss by name, divided by the sum of the assigned qualities."""
     logits, raw_boxes, raw_azimuth, raw_spread = parts
     boxes = boxes_of(raw_boxes, centres, strides)
     quality, owner = assign(logits.detach().softmax(-1), boxes.detach(), centres, strides, truth)

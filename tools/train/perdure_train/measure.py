@@ -1,4 +1,4 @@
-"""Detections of the deployed service on simulated folders, beside their ground truth."""
+"""Runs the deployed service on simulated folders, and pairs detections with ground truth."""
 
 import re
 import shutil
@@ -36,17 +36,17 @@ def _detect(program, data, model, threshold, clutter_rate, work):
 
 
 def _folder_of(program, cache, kind, seed, threads):
-    """The simulated folder in the cache, for `perdure detect`."""
+    """Returns the simulated folder in the cache, which `perdure detect` reads."""
     folder = Path(cache) / f"{kind}-folders" / str(seed)
     prepare.simulate(program, kind, seed, folder, threads)  # returns at once if complete
     return folder
 
 
 def frames_of(program, cache, kind, scenes, model, clutter_rate, threshold=0.05, threads=2):
-    """[(detections, truth)] of all frames in the first scenes of a set, and the median CPU time in
-    ms for each frame.
+    """Returns [(detections, truth)] of all frames in the first scenes of a set, and the median CPU
+    time per frame in ms.
 
-    detections: boxes, odds, azimuths and p, the calibrated probabilities.
+    Detections have boxes, odds, azimuths and p, the calibrated probabilities.
     """
     result, times = [], []
     first = prepare.SETS[kind][1]

@@ -69,7 +69,7 @@ class Trunk(nn.Module):
 
 
 def upsampled(small, rows):
-    """Doubles the size, and removes the surplus row if the input's height is not a multiple."""
+    """Doubles the size, then cuts the height to `rows`, which can be one less."""
     large = nn.functional.interpolate(small, scale_factor=2.0, mode="nearest")
     return large if large.shape[2] == rows else large[:, :, :rows]
 

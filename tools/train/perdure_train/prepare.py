@@ -19,7 +19,7 @@ SETS = {  # appearance set and first seed; the sets are disjoint
 
 
 def find_program(given):
-    """The `perdure` command: as given, in the newest build of the tree, or on the PATH."""
+    """Returns the `perdure` command: the given one, or from the newest build, or from the PATH."""
     if given:
         return str(given)
     root = Path(__file__).resolve().parents[3]
@@ -57,7 +57,7 @@ def make_chunk(program, kind, seed, folder, threads):
 
 
 def prepare(program, cache, kind, count, threads=2):
-    """Ensures at least `count` pictures of a set; existing ones stay."""
+    """Simulates scenes until a set has at least `count` pictures. Existing pictures are used."""
     folder, first = Path(cache) / kind, SETS[kind][1]
     folder.mkdir(parents=True, exist_ok=True)
     scenes = -(-count // VIEWS)

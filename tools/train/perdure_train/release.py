@@ -1,4 +1,4 @@
-"""Export and calibration: the ONNX file and the model.json that describes it."""
+"""Exports and calibrates a network: writes the ONNX file and the model.json that describes it."""
 
 import json
 import math
@@ -14,7 +14,7 @@ from .settings import AZIMUTH_CLASSES, BINS, CLASSES, HEIGHT, REACH, STRIDES, WI
 from .training import settle_statistics
 
 NAME = f"perdure_{WIDTH}x{HEIGHT}"
-DEMO_SIZE = (480, 360)  # same weights; the demo has small people
+DEMO_SIZE = (480, 360)  # larger, with the same weights, because people in the demo are small
 SCENES = 12  # scenes of the calibration set
 THRESHOLD = 0.05
 
@@ -81,7 +81,7 @@ def robust_sigma(values, floor, ceiling):
 
 
 def azimuth_sigma_of(frames):
-    """Standard deviation of the azimuth; excludes errors of 180°."""
+    """Robust standard deviation of the azimuth. Errors near 180° are excluded."""
     errors = np.concatenate(
         [scores.azimuth_errors(frames, CLASSES.index(name))[0] for name in AZIMUTH_CLASSES]
     )

@@ -82,7 +82,7 @@ def match(boxes, scores, truth, wanted, minimum=0.5):
 
 
 def covered(box, others):
-    """The largest share of `box` that one of `others` covers."""
+    """The largest share of `box` that a single one of `others` covers."""
     low, high = np.maximum(box[:2], others[:, :2]), np.minimum(box[2:], others[:, 2:])
     return (np.clip(high - low, 0, None).prod(1) / max((box[2:] - box[:2]).prod(), 1e-9)).max()
 
@@ -101,7 +101,7 @@ def average_precision(scores, hits, count):
 
 
 def class_average_precision(frames, k, sizes=(0, 1e9)):
-    """AP50 of class k; true objects of another size, or with the ignored flag, do not count."""
+    """AP50 of class k. True objects of another size, or with the flag "ignored", do not count."""
     scores, hits, count = [], [], 0
     for detections, truth in frames:
         chosen = truth["classes"] == k
@@ -121,7 +121,8 @@ def class_average_precision(frames, k, sizes=(0, 1e9)):
 
 
 def recall(frames, k, minimum, largest=1e9):
-    """Found and counted true objects of class k in the size range, by any box with IoU 0.5."""
+    """Counts the true objects of class k in the size range: those that any box finds with IoU 0.5,
+    and all."""
     found = count = 0
     for detections, truth in frames:
         size = sizes_of(truth["boxes"])
@@ -153,8 +154,8 @@ def azimuth_errors(frames, k):
 def outcomes(frames):
     """Log-odds (n, K) and true class of each emitted box; 0 is clutter, k + 1 is class k.
 
-    A box has an object's class if their IoU is at least 0.5 and no box with a higher score has the
-    object. Boxes on ignored objects are omitted.
+    A box has an object's class if their IoU is at least 0.5 and no box with a higher score matched
+    the object. Boxes on ignored objects are omitted.
     """
     odds, labels = [], []
     for detections, truth in frames:
@@ -183,9 +184,9 @@ def calibration_error(p, labels, bins=15):
     return float(error)
 
 
-CLEAR = 0.8  # least probability of the best class; half-hidden objects have other errors
-LARGE = 40.0  # pixels of the input; below it, pixel quantisation dominates
-FULL = 12.0  # pixels; the median suppresses their quantisation
+CLEAR = 0.8  # least probability of the best class; half-hidden objects have different errors
+LARGE = 40.0  # pixels of the input; in smaller boxes, pixel quantisation dominates
+FULL = 12.0  # least size in pixels; the median suppresses quantisation
 
 
 def matches(frames, at_least=0.0):
@@ -200,7 +201,7 @@ def matches(frames, at_least=0.0):
 
 
 def side_errors(frames):
-    """Errors of the sides of clear best matches, relative to the size of large boxes."""
+    """Errors of the sides of large boxes, relative to their size, for clear best matches."""
     errors = []
     for detections, truth, i, j in matches(frames, CLEAR):
         box = truth["boxes"][j]

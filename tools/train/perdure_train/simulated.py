@@ -1,4 +1,4 @@
-"""Reads a folder of `perdure simulate` as pictures with boxes, classes and azimuths."""
+"""Reads pictures with boxes, classes and azimuths from a folder of `perdure simulate`."""
 
 import csv
 import json
@@ -30,7 +30,7 @@ def rotation(w, x, y, z):
 
 
 def listed(text, key):
-    """The numbers of `key: [..]` in a sensor.yaml."""
+    """Returns the numbers of `key: [..]` in a sensor.yaml."""
     numbers = text[text.index(key) :]
     return [float(x) for x in numbers[numbers.index("[") + 1 : numbers.index("]")].split(",")]
 
@@ -77,7 +77,7 @@ class Poses:
         self.lens = Lens(text)
 
     def at(self, time_ns):
-        """R_WC and p_WC of the state nearest to the time."""
+        """R_WC and p_WC of the state that is nearest in time."""
         row = self.rows[np.abs(self.times - time_ns).argmin()]
         R_WB = rotation(*row[3:7])
         return R_WB @ self.T_BC[:3, :3], R_WB @ self.T_BC[:3, 3] + row[:3]
@@ -95,7 +95,7 @@ def azimuth(R_WC, p_WC, centre, yaw):
 
 
 def key_at(thing, time_ns):
-    """Centre and yaw; linearly interpolated between dense keys for moving objects."""
+    """Centre and yaw at a time, interpolated linearly between the dense keys of a moving object."""
     keys = thing["keys"]
     after = next((i for i, key in enumerate(keys) if key["time_ns"] > time_ns), len(keys))
     before = keys[max(after - 1, 0)]
@@ -107,7 +107,7 @@ def key_at(thing, time_ns):
 
 
 def judged(row, scale):
-    """Box in pixels of the input, clipped to the image, and whether it is ignored; or None."""
+    """Box in pixels of the input, clipped to the image, and whether to ignore it; or None."""
     full = np.array([float(x) for x in row[3:7]]) * scale
     box = np.clip(full, 0, [WIDTH, HEIGHT, WIDTH, HEIGHT])
     sides, whole = box[2:] - box[:2], full[2:] - full[:2]

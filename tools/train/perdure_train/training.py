@@ -44,7 +44,7 @@ def settle_statistics(network, pictures, batches=100, batch=32, seed=1):
     momenta = [m.momentum for m in norms]
     for m in norms:
         m.reset_running_stats()
-        m.momentum = None  # means the average of all batches
+        m.momentum = None  # average over all batches
     network.train()
     rng = np.random.default_rng(seed)
     for _ in range(batches):
@@ -89,7 +89,7 @@ class Trainer:
         part.replace(self.checkpoint)  # replaces the file atomically
 
     def rate(self):
-        """Learning rate: warm-up, then a cosine over the completed share of the training."""
+        """Factor of the learning rate: a warm-up, then a cosine of the completed share."""
         warm = min(1.0, (self.step + 1) / 150)
         return self.options.rate * warm * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * self.share)))
 
@@ -115,7 +115,7 @@ class Trainer:
         return {name: float(value.detach()) for name, value in terms.items()}
 
     def run(self):
-        """Trains to the end of the steps, or for the given minutes."""
+        """Trains until all steps are done or the given minutes have passed."""
         options, smooth = self.options, {}
         progress = Progress("training")
         started, before, saved = time.time(), self.share, time.time()

@@ -17,7 +17,7 @@ using Json = nlohmann::ordered_json;
 
 struct Shape {
   const char *file, *class_name;
-  Eigen::Vector3d size;  ///< m, a typical size, for the proportions of the parts
+  Eigen::Vector3d size;  ///< typical size in m, which gives the proportions of the parts
   std::uint64_t look;
 };
 
@@ -26,7 +26,7 @@ float brightness(const tools::Material& material) {
          0.0722F * material.colour.z();
 }
 
-/// Shade of each material, relative to the one with the largest area.
+/// Returns the brightness of each material, relative to the material with the largest area.
 std::vector<float> shades(const tools::Mesh& mesh) {
   std::vector<float> area(mesh.materials.size(), 0.0F);
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
@@ -45,7 +45,7 @@ std::vector<float> shades(const tools::Mesh& mesh) {
   return result;
 }
 
-/// Rounds to five decimals, a tenth of a millimetre of a large object.
+/// Rounds to five decimals, a tenth of a millimetre for a large object.
 Json vectors(const std::vector<float>& values) {
   Json array = Json::array();
   for (const float value : values) array.push_back(std::round(1e5 * double{value}) / 1e5);
@@ -68,7 +68,7 @@ Json geometryOf(const tools::Mesh& mesh) {
       indices.push_back(at->second);
       if (!is_new) continue;
       const Eigen::Vector3f p = (mesh.positions[corner] - middle).cwiseQuotient(size);
-      // The page scales the mesh back; a normal needs the inverse scale.
+      // The page scales the mesh to the object's size. Normals need the inverse scale.
       const Eigen::Vector3f n = mesh.normals[corner].cwiseProduct(size).normalized();
       positions.insert(positions.end(), {p.x(), p.y(), p.z()});
       normals.insert(normals.end(), {n.x(), n.y(), n.z()});

@@ -1,7 +1,7 @@
-// The camera image with annotations of the same frame, matched by their time.
+// Shows the camera image with the annotations of the same frame, which are matched by time.
 import { readImage, seconds } from './connection.js';
 
-const KEPT = 12; // limit of images without annotations
+const KEPT = 12; // limit of images that wait for annotations
 const PATIENCE_MS = 250;
 
 const css = (c) => `rgba(${Math.round(255 * c.r)},${Math.round(255 * c.g)},${Math.round(255 * c.b)},${c.a})`;
@@ -33,11 +33,11 @@ export class CameraView {
 
   showLikelihood(on) {
     this.likelihood = on;
-    this.annotations = null; // channel of the other kind
+    this.annotations = null; // they are of the other kind
     if (this.shown) this.draw(this.shown, null);
   }
 
-  /** Also draws the shown image again, if its annotations arrive later than it. */
+  /** Draws the image that matches the annotations; this may be the image already shown. */
   drawMatching() {
     const fits = (i) => i && this.annotations && Math.abs(i.time - this.annotations.time) < 1e-4;
     const found = this.images.findIndex(fits);
@@ -47,7 +47,7 @@ export class CameraView {
     } else if (fits(this.shown)) this.draw(this.shown, this.annotations.message);
   }
 
-  /** Shows an image without annotations if none arrive. */
+  /** Draws an image without annotations if none have arrived in time. */
   drawLate() {
     const late = this.images.findIndex((i) => performance.now() - i.at > PATIENCE_MS);
     if (late < 0 || (this.annotations && performance.now() - this.annotations.at < 2 * PATIENCE_MS)) return;
@@ -77,7 +77,7 @@ export class CameraView {
 
   drawAnnotations(message) {
     const { pen, canvas } = this;
-    // Lines and letters keep their size on the screen, independent of the image scale.
+    // Lines and text have a constant size on the screen, independent of the image scale.
     const scale = Math.max(1, (0.85 * canvas.width) / Math.max(1, canvas.clientWidth));
     for (const p of message.points) {
       pen.strokeStyle = css(p.outline_color);

@@ -1,12 +1,12 @@
-// The gateway by Foxglove's WebSocket protocol: channels by topic, services by name. Reconnects
-// automatically and reports why there is no connection.
+// Connection to the gateway by Foxglove's WebSocket protocol: channels by topic, services by name.
+// Reconnects automatically, and reports why there is no connection.
 
 const PROTOCOLS = ['foxglove.sdk.v1', 'foxglove.websocket.v1'];
 const MESSAGE = 1, TIME = 2, SERVICE_RESPONSE = 3, PLAYBACK = 5, SERVICE_REQUEST = 2, PLAYBACK_CONTROL = 3;
 const text = new TextDecoder();
 
 export class Connection {
-  /** `told(state, sentence)`: state is "connecting", "open" or "lost". */
+  /** Calls `told(state, sentence)` on changes; state: "connecting", "open" or "lost". */
   constructor(address, told) {
     this.address = address;
     this.told = told;
@@ -43,7 +43,7 @@ export class Connection {
     setTimeout(() => this.open(), pause);
   }
 
-  /** Finds out by plain HTTP if the gateway is running, because browsers hide why a WebSocket
+  /** Asks the gateway by HTTP why the connection failed, because browsers hide why a WebSocket
       was refused. */
   async whyLost(event) {
     const host = new URL(this.address).host;
@@ -59,7 +59,7 @@ export class Connection {
     }
   }
 
-  /** `handler` receives each message of the topic: parsed JSON, or a DataView for other
+  /** Passes each message of the topic to `handler`: parsed JSON, or a DataView for other
       encodings. */
   on(topic, handler) {
     this.handlers.set(topic, handler);
@@ -174,7 +174,7 @@ export class Connection {
   }
 }
 
-/** foxglove::CompressedImage in CDR: {time in s, bytes}. */
+/** Reads foxglove::CompressedImage in CDR. Returns {time (s), bytes (JPEG)}. */
 export function readImage(view) {
   let at = 4;
   const natural = () => {

@@ -1,10 +1,10 @@
-// The graph of the map in three dimensions, in M: anchors, trajectory, loops.
+// Draws the graph of the map in three dimensions, in M: anchors, trajectory and loops.
 import * as THREE from './vendor/three.module.js';
 import { LOOPS, lookOfLoop } from './words.js';
 
 const ANCHOR = '#8fb8de', UNKNOWN = '#8c8c8c', WAY = '#7094b8', NEAR_PX = 8, STEPS = 8;
 
-/** An arch from a to b, because both may be on the trajectory. */
+/** Returns an arch from a to b, because a straight line could lie on the trajectory. */
 function arch(a, b) {
   const height = 1 + 0.15 * a.distanceTo(b), points = [];
   for (let i = 0; i <= STEPS; ++i) {
@@ -17,7 +17,7 @@ function arch(a, b) {
 
 const segmentsOf = (points) => points.slice(1).flatMap((p, i) => [points[i], p]);
 
-/** Distance in pixels from a point to a line between two others. */
+/** Returns the distance in pixels from point `at` to the line between a and b. */
 function pixelsFrom(at, a, b) {
   const dx = b.x - a.x, dy = b.y - a.y;
   const t = Math.min(1, Math.max(0, ((at.x - a.x) * dx + (at.y - a.y) * dy) / Math.max(1e-9, dx * dx + dy * dy)));
@@ -25,7 +25,7 @@ function pixelsFrom(at, a, b) {
 }
 
 export class Graph {
-  /** `map`: the group with the pose of M. */
+  /** `map`: the three.js group that has the pose of M. */
   constructor(map) {
     this.group = new THREE.Group();
     map.add(this.group);
@@ -98,8 +98,8 @@ export class Graph {
     this.group.add(this.balls);
   }
 
-  /** Selects {kind: "anchor" | "loop", id}, or nothing. Draws the 2σ circle of an anchor with
-      the larger of x and y; grey if it is unknown. */
+  /** Selects {kind: "anchor" | "loop", id}, or nothing. An anchor has a circle whose radius is
+      2σ, the larger of x and y; grey if σ is unknown. */
   choose(part) {
     const anchor = part?.kind === 'anchor' ? this.anchors.get(part.id) : undefined;
     const loop = part?.kind === 'loop' ? this.loops.get(part.id) : undefined;
@@ -119,8 +119,8 @@ export class Graph {
     return local && this.group.localToWorld(local.clone());
   }
 
-  /** The part within a few pixels of a screen position, with its distance from the camera.
-      Anchors have priority over loops. */
+  /** Returns the part within a few pixels of the screen position `at`, and its distance from the
+      camera. Anchors have priority over loops. */
   pick(at, camera, width, height) {
     const inverse = new THREE.Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse).multiply(this.group.matrixWorld);
     const shown = (p) => {

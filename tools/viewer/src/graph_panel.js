@@ -1,4 +1,4 @@
-// Describes an anchor or a loop of the map's graph in words.
+// Describes an anchor or a loop of the map's graph in HTML.
 import { LOOPS, escaped, lookOfLoop } from './words.js';
 
 const metres = (x) => `${Math.abs(x) < 0.0005 ? '0' : x.toFixed(Math.abs(x) < 1 ? 3 : 2)} m`;
@@ -39,7 +39,7 @@ function loopWords(l) {
     <p class="dim">in axes of anchor ${l.a}; ${known ? '± standard deviation of the measurement' : 'how well it was measured is not known'}</p>`;
 }
 
-/** HTML of a part {kind, id}; "" if the graph does not contain it any more. */
+/** Returns HTML about a part {kind, id}; "" if it is not in the graph any more. */
 export function wordsOfPart(part, graph) {
   const found = (part.kind === 'anchor' ? graph?.anchors : graph?.loops)?.find((x) => x.id === part.id);
   if (!found) return '';

@@ -22,7 +22,7 @@ export class ObjectList {
     return at ? Math.hypot(at[0] - b[0], at[1] - b[1]) : Infinity;
   }
 
-  /** Whether every word occurs in the description of an object. */
+  /** Returns whether every word occurs in the description of object `o`. */
   matches(o, words, onlyMap) {
     if (this.model.answer?.objects) return this.model.answer.objects.has(o.id);
     const text = `${o.class} ${o.id} ${onlyMap ? 'remembered map' : visibilityWords(o)} ${this.model.isProvisional(o.id) ? 'provisional' : ''} ${o.elsewhere ? 'elsewhere' : ''} ${o.confirmed ? 'confirmed' : 'unconfirmed'} ${(o.moving ?? 0) >= 0.5 ? 'moving' : ''}`.toLowerCase();
@@ -87,7 +87,7 @@ export class ObjectList {
     return row;
   }
 
-  /** The id `step` rows after the selected one. */
+  /** Returns the id of the object `step` rows after the selected one. */
   next(step) {
     if (!this.order?.length) return 0;
     const at = this.order.indexOf(this.model.chosen);
@@ -128,8 +128,8 @@ export class EventLog {
     for (const button of this.filter.children) this.list.classList.toggle(`without-${button.dataset.group}`, button.getAttribute('aria-pressed') !== 'true');
   }
 
-  /** Removes what the event replaces: an earlier prediction, and a short change of visibility. Returns whether the
-      event itself is then nothing new. */
+  /** Removes the line that the event replaces: an earlier prediction, or a short change of visibility. Returns
+      whether the event only ends such a change, and needs no line itself. */
   replaces(event, group, time) {
     const before = this.newest.get(`${group} ${event.object_id}`);
     if (!before) return false;
@@ -149,7 +149,7 @@ export class EventLog {
     if (event.at) line.dataset.at = event.at.join();
     let words = escaped(event.words) + (event.detail ? ` <span class="dim">${escaped(event.detail)}</span>` : '');
     for (const id of new Set([event.object_id, event.other_id])) {
-      // Skips digits inside a number, such as 0.1 s.
+      // Does not link an id's digits inside a number, such as 0.1 s.
       if (id) words = words.replace(new RegExp(`(?<![\\d.])${id}(?!\\.?\\d)`), `<a data-object="${id}">${id}</a>`);
     }
     line.innerHTML = `<time>${wordsOfTime(time, this.model.origin)}</time><span>${words}</span>`;
@@ -157,7 +157,7 @@ export class EventLog {
     this.prepend(line);
   }
 
-  /** A sentence of the gateway, such as that events were lost. */
+  /** Adds a sentence of the gateway, for example that events were lost. */
   say(sentence) {
     const line = document.createElement('li');
     line.className = 'said';

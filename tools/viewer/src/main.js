@@ -1,4 +1,4 @@
-// Assembles the page: messages update the model, which updates map, lists and panels.
+// Assembles the page. Messages update the model, and the model updates map, lists and panels.
 import { CameraView } from './camera.js';
 import { Connection } from './connection.js';
 import { EventLog, ObjectList, renderServices } from './lists.js';
@@ -244,7 +244,7 @@ function figures(now) {
   return items.map(([k, v, c]) => `<div class="${c}"><dt>${k}</dt><dd>${v}</dd></div>`).join('');
 }
 
-/** Caption under the image, or text instead of it. */
+/** Returns the caption of the image, or the text shown instead of an image. */
 function captionOf(state) {
   if (camera.figure.classList.contains('has-image')) {
     return wordsOfImage(state, model.time - camera.shownTime);
@@ -293,6 +293,6 @@ function now4(rate) {
   return true;
 }
 
-// State of the page, for tests.
+// The state of the page, which tests read.
 window.perdure = { model, world, camera, connection, choose, choosePart, opened: performance.now() };
 refresh();

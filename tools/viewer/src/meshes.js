@@ -1,12 +1,12 @@
-// Shapes of the classes, generated from the simulator's meshes (meshes/*.json): in a box of 1 × 1 ×
-// 1 about the origin, x forward, z up. The colour is the brightness of a part relative to the body.
+// Shapes of the classes, generated from the simulator's meshes (meshes/*.json). A shape fills a box of
+// 1 × 1 × 1 about the origin, x forward, z up. Its colours are the brightness relative to the body.
 import * as THREE from './vendor/three.module.js';
 
 const NAMES = { car: 'car', van: 'van', truck: 'van', bus: 'van', toy: 'car', person: 'person', bicycle: 'bicycle',
   cyclist: 'bicycle', motorcycle: 'bicycle', chair: 'chair', 'dining table': 'table', monitor: 'monitor', couch: 'couch' };
 const loaded = new Map(); // name → geometry, or a promise of it
 
-/** Calls `ready(geometry)` at once or after loading; never if the class has no shape. */
+/** Calls `ready(geometry)` at once or after loading. Does not call it for classes without shape. */
 export function shapeOf(className, ready) {
   const name = NAMES[className];
   if (!name) return;

@@ -1,4 +1,4 @@
-// State of the page: the newest data, and the history of the objects since the page was opened.
+// The state of the page: the newest data, and the objects' history since the page was opened.
 
 const RATE_MS = 5000;
 
@@ -22,13 +22,13 @@ export class Model {
     const time = frame.timestamp.sec + 1e-9 * frame.timestamp.nsec;
     const world = `${frame.world}/${frame.epoch}`;
     if (this.world !== undefined && this.world !== world) this.history.clear();
-    const another = this.frame && time < this.time - 2; // whether a recording starts again
+    const another = this.frame && time < this.time - 2; // whether a recording has restarted
     if (another) this.history.clear();
     this.world = world;
     this.time = time;
     this.frame = frame;
     this.objects = new Map(objects.map((o) => [o.id, o]));
-    if (this.heardAt > 0) this.live = true; // ignores the first one, which may be old
+    if (this.heardAt > 0) this.live = true; // not for the first message, which may be old
     this.heardAt = now;
     this.arrivals.push(now);
     while (this.arrivals[0] < now - RATE_MS) this.arrivals.shift();
@@ -44,7 +44,7 @@ export class Model {
     if (samples.length > 1500) samples.shift();
   }
 
-  /** Clears the data of another time after a jump to another position of a recording. */
+  /** Clears the data after a jump to another position of a recording. */
   jumped() {
     this.history.clear();
   }
@@ -54,20 +54,20 @@ export class Model {
     this.elsewhere = message.elsewhere;
   }
 
-  /** The map's answer to a query: the list shows its objects, until the search changes. */
+  /** Stores the map's answer to a query. The list shows its objects until the search changes. */
   takeAnswer(objects, note) {
     this.answer = { objects: objects && new Map(objects.map((o) => [o.id, o])), note };
     if (!objects) return; // the map did not answer
     for (const [id, o] of this.answer.objects) this.remembered.set(id, o);
   }
 
-  /** T_MW as [x y z qx qy qz qw] if it belongs to the displayed W; otherwise W is M. */
+  /** T_MW as [x y z qx qy qz qw] if it belongs to the displayed W; otherwise the identity. */
   T_MW() {
     const f = this.mapFrame;
     return f && this.world === `${f.world}/${f.epoch}` ? f.T_MW : [0, 0, 0, 0, 0, 0, 1];
   }
 
-  /** Position of an object's centre in W; objects only on the map are in M. Null: unknown. */
+  /** Returns an object's centre in W, converted from M for objects only on the map; null: unknown. */
   placeInW(o) {
     if (o.elsewhere) return null;
     if (o.memory === undefined) return o.c; // an object of the working set
@@ -81,8 +81,8 @@ export class Model {
     return [p[0] + x, p[1] + y, p[2] + z];
   }
 
-  /** Whether the session is not localised in the earlier map yet: the object may be one of that
-      map. */
+  /** Returns whether the object may be one of the earlier map, because the session is not yet
+      localised in that map. */
   isProvisional(id) {
     return this.remembered.get(id)?.provisional ?? false;
   }
@@ -91,14 +91,14 @@ export class Model {
     return this.objects.get(id) ?? this.remembered.get(id);
   }
 
-  /** Rate of object messages a second, averaged over seconds, because a busy page receives
-      several at once. */
+  /** Returns the rate of object messages in Hz, averaged over seconds, because a busy page
+      receives several at once. */
   rate(now) {
     if (this.arrivals.length < 3 || now - this.heardAt > 2000) return 0;
     return (1000 * (this.arrivals.length - 1)) / Math.max(1, this.arrivals.at(-1) - this.arrivals[0]);
   }
 
-  /** Whether the page itself was busy, so that messages are still waiting. */
+  /** Call it after the page itself was busy: limits the silence to 1 s, as messages may wait. */
   stoodStill(now) {
     if (this.heardAt > 0) this.heardAt = Math.max(this.heardAt, now - 1000);
   }
@@ -114,7 +114,7 @@ function turned([a, b, c, w], [x, y, z]) {
   return [x + w * u + b * t - c * v, y + w * v + c * u - a * t, z + w * t + a * v - b * u];
 }
 
-/** The current fault as a sentence with the fix, and its severity; "" if there is none. */
+/** Returns the state to display, and the current fault as a sentence; "" if there is none. */
 export function troubleOf(model, connection, now) {
   if (connection.state === 'lost') return ['lost', connection.sentence];
   if (connection.state !== 'open') return ['connecting', ''];
@@ -127,7 +127,7 @@ export function troubleOf(model, connection, now) {
   if (heard.length === 0 && silent > 2) {
     return ['stale', 'No service is heard: do they run, with the same bus.domain, bus.interface and bus.vehicle as the gateway? (perdure status)'];
   }
-  // A new client receives the last objects once.
+  // A new client receives the last `objects` once, even if they are old.
   const last = silent > 2 || !model.live;
   if (last && capture?.message === 'end of drive') return ['stale', 'The drive has ended: this is the last state.'];
   if (silent > 2) {

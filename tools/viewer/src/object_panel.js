@@ -1,4 +1,4 @@
-// All data of one object, requested from the gateway twice a second while the panel is open.
+// Shows all data of one object. While open, requests them from the gateway twice a second.
 import { classWords, colourOf, escaped, existenceWords, isHidden, isInSight, percent, visibilityWords } from './words.js';
 
 const EVERY_MS = 500;
@@ -24,7 +24,7 @@ export class ObjectPanel {
     this.element.innerHTML = '<p class="empty">Click on an object in the map or in the list.</p>';
   }
 
-  /** Shows a part of the map's graph in the same place: `words` returns HTML at each render. */
+  /** Shows a part of the map's graph instead of an object. `words` returns its HTML. */
   showPart(words) {
     this.clear();
     this.part = words;
@@ -102,8 +102,8 @@ export class ObjectPanel {
     return b && at ? `${Math.hypot(at[0] - b[0], at[1] - b[1], at[2] - b[2]).toFixed(1)} m` : '–';
   }
 
-  /** Position in W; null: unknown. Replies of the store, and objects only on the map, are in
-      M. */
+  /** Returns the position in W, or null if unknown. Replies of the store, and objects only on the
+      map, are converted from M. */
   here(o) {
     return this.model.objects.has(o.id) ? o.c : this.model.placeInW({ memory: 'long_term', ...o, elsewhere: this.model.find(o.id)?.elsewhere });
   }
@@ -170,7 +170,7 @@ export class ObjectPanel {
       <tr><td></td><td class="n"><b>${signed(sum)}</b></td><td><b>log-odds: ${percent(1 / (1 + Math.exp(-sum)))}</b></td></tr></table>`;
   }
 
-  /** Explains why the most probable class leads the next one. */
+  /** Explains why the most probable class is more probable than the next one. */
   margins() {
     const [first, second] = this.full?.classes ?? [];
     const ledger = this.full?.ledger ?? {}, ousted = this.full?.ousted;
@@ -204,8 +204,8 @@ export class ObjectPanel {
     return `<h3>Where it is in ${frame}, and how large</h3><p class="dim">± one standard deviation</p><table>${rows.map(([k, v]) => `<tr><td class="dim">${k}</td><td>${v}</td></tr>`).join('')}</table>`;
   }
 
-  /** For the most probable class: correlations as colours, and the covariance of the pair under
-      the pointer. */
+  /** Shows, for the most probable class, the correlations as colours, and the covariance of the
+      pair under the pointer. */
   covariance() {
     const P = this.full?.classes?.[0]?.covariance;
     if (!P) return '';

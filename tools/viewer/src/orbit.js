@@ -1,4 +1,4 @@
-// Rotates, moves and zooms the view about a point, z up: mouse, touch and keys.
+// Rotates, moves and zooms the view about a point, with z up, by mouse, touch and keys.
 import * as THREE from './vendor/three.module.js';
 
 export class Orbit {

@@ -1,4 +1,4 @@
-// The controls of a recording; visible if the gateway plays one.
+// The playback controls, which are visible if the gateway plays a recording.
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 8];
 
@@ -30,7 +30,7 @@ export class PlaybackBar {
     this.control(this.plays, first + share * (last - first));
   }
 
-  /** Adds a speed to the list if it is missing, such as that of `play --rate 20`. */
+  /** Selects a speed. Adds it to the list if it is missing, such as that of `play --rate 20`. */
   showSpeed(speed) {
     const rounded = Number(speed.toPrecision(3)), options = [...this.speed.options];
     if (!options.some((o) => Number(o.value) === rounded)) {
@@ -40,7 +40,7 @@ export class PlaybackBar {
     if (this.speed.value !== String(rounded)) this.speed.value = String(rounded);
   }
 
-  /** Seeks a few times a second while the handle is dragged. */
+  /** Seeks while the handle is dragged, but only a few times a second. */
   seekSoon() {
     this.timer ??= setTimeout(() => {
       this.timer = undefined;

@@ -1,4 +1,4 @@
-// One object in the 3D map: its shape or box, its outline, its ellipsoid.
+// Draws one object in the 3D map: its shape or box, its outline and its ellipsoid.
 import * as THREE from './vendor/three.module.js';
 import { shapeOf } from './meshes.js';
 import { colourOf, isHidden, isInSight } from './words.js';
@@ -8,7 +8,7 @@ BOX.setAttribute('color', new THREE.BufferAttribute(new Float32Array(3 * BOX.att
 const SPHERE = new THREE.SphereGeometry(1, 20, 12);
 const UP = new THREE.Vector3(0, 0, 1), PALE = new THREE.Color('#c4d0dc');
 
-/** Dashes of about 0.3 m, so that their number is proportional to the length of an edge. */
+/** Returns the edges of a box. Dashes are about 0.3 m long, whatever the length of the edge. */
 function outline(size, dashed) {
   const [l, w, h] = size.map((s) => s / 2);
   const corner = (i) => new THREE.Vector3(i & 1 ? l : -l, i & 2 ? w : -w, i & 4 ? h : -h);
@@ -26,7 +26,7 @@ function outline(size, dashed) {
   return new THREE.BufferGeometry().setFromPoints(points);
 }
 
-/** Axes (a rotation) and variances of a symmetric 3 × 3 matrix [xx xy xz yy yz zz], by
+/** Returns axes (a rotation) and variances of a symmetric matrix [xx xy xz yy yz zz], by
     Jacobi. */
 export function eigenOf([xx, xy, xz, yy, yz, zz]) {
   const a = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], v = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];

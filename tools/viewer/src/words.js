@@ -16,7 +16,7 @@ export function colourOf(name) {
 
 export const isHidden = (o) => o.visibility === 'occluded';
 export const isInSight = (o) => o.visibility === 'visible' || o.visibility === 'partial';
-/** A class for the style sheet. */
+/** Returns the object's class for the style sheet. */
 export const looksLike = (o) => (isHidden(o) ? 'hidden' : isInSight(o) ? 'seen' : 'away');
 
 export const percent = (p) => (p > 0.9995 ? '100 %' : p >= 0.0995 ? `${(100 * p).toFixed(1)} %` : p >= 0.001 ? `${(100 * p).toFixed(2)} %` : p > 0 ? '< 0.1 %' : '0 %');
@@ -24,7 +24,7 @@ const observations = (n) => (n === 1 ? '1 observation' : `${n} observations`);
 const hypotheses = (n) => (n === 1 ? '1 hypothesis' : `${n} hypotheses`);
 const times = (n) => (n === 1 ? 'once' : `${n} times`);
 
-/** A sentence for each kind of evidence for existence. */
+/** Returns a sentence about a kind of evidence for existence. */
 export function existenceWords(kind, n) {
   const words = {
     prior: 'before its first box: few boxes are new objects',
@@ -69,12 +69,12 @@ export function visibilityWords(o) {
   return o.visibility ?? 'not known';
 }
 
-/** Groups of events for the filter; others are of objects. */
+/** Groups of events for the filter. Other events are in the group of objects. */
 export const KINDS = {
   occluded: 'sight', reappeared: 'sight', left_view: 'sight', predicted_return: 'return', loop_closed: 'map', loop_withdrawn: 'map', relocalised: 'map',
 };
 
-/** Events of the whole map, which are marked in it. */
+/** Events of the whole map, with the colours of their marks. */
 export const MARKS = { loop_closed: '#c58cff', relocalised: '#9fe5bf', loop_withdrawn: '#ff8f88' };
 
 /** Styles of the map's loops; the gateway uses the same colours. */
@@ -89,14 +89,15 @@ export const lookOfLoop = (loop) => (loop.state !== 'confirmed' ? loop.state : l
 /** Escapes a text for HTML. */
 export const escaped = (text) => String(text).replace(/[&<>"']/g, (c) => `&#${c.codePointAt(0)};`);
 
-/** Caption of an image that is `older` seconds older than the objects. */
+/** Returns the caption of an image that is `older` seconds older than the objects. */
 export function wordsOfImage(state, older) {
   const old = older > 0.5 ? `${older.toFixed(1)} s before the objects that are shown` : '';
   if (state === 'lost' || state === 'stale') return old ? `the last image, ${old}` : 'the last image';
   return old ? `the image is of ${old}` : '';
 }
 
-/** Text in place of an image. `recorded`: "" for live, "without" images, or "empty" so far. */
+/** Returns the text in place of an image. `recorded`: falsy for live data; "without": a recording
+    without images; "empty": no image so far. */
 export function wordsOfNoImage(state, { recorded, openFor, heard }) {
   if (recorded === 'without') return 'the recording has no images: perdure record --images keeps them';
   if (recorded || state === 'lost' || state === 'connecting' || openFor < 3) return 'no image yet';
@@ -105,15 +106,15 @@ export function wordsOfNoImage(state, { recorded, openFor, heard }) {
   return state === 'stale' ? `${none}: the camera has stopped.` : `${none}: is the camera in image.cameras of the gateway?`;
 }
 
-/** Standard deviations [x, y, z, yaw] of the body in the map; empty: unknown. */
+/** Returns the standard deviations [x, y, z, yaw] of the body in the map; empty: unknown. */
 export function wordsOfPlace(sigma) {
   return sigma.length > 0 ? `${Math.max(sigma[0], sigma[1]).toFixed(2)} m` : 'not known';
 }
 
-/** Time of the sensor clock; `origin`: start of a recording, otherwise 0. */
+/** Returns a time of the sensor clock as text. `origin`: start of a recording, otherwise 0. */
 export function wordsOfTime(seconds, origin) {
   const kDay = 86400;
   if (origin || seconds < 1000 * kDay) return `${(seconds - origin).toFixed(1)} s`;
-  const day = new Date(1000 * seconds); // the clock has the time of day
+  const day = new Date(1000 * seconds); // the sensor clock has the time of day
   return `${day.toTimeString().slice(0, 8)}.${Math.floor(day.getMilliseconds() / 100)}`;
 }

@@ -1,4 +1,4 @@
-// The map in three dimensions: ground, trajectory, vehicle, points and objects, with their names.
+// Draws the map in three dimensions: ground, trajectory, vehicle, points, and objects with names.
 import * as THREE from './vendor/three.module.js';
 import { Graph } from './graph.js';
 import { Orbit } from './orbit.js';
@@ -8,7 +8,7 @@ import { colourOf, looksLike } from './words.js';
 const MOST_LABELS = 40, MOST_MARKS = 100, SLOW_MS = 120, ANSWERED_MS = 150;
 
 export class World {
-  /** `onPick(id)` of an object, 0: nothing; `onPart({kind, id})` of the graph. */
+  /** Calls `onPick(id)` on selection of an object (0: none), `onPart({kind, id})` of the graph. */
   constructor(canvas, labels, onPick, onPart) {
     this.canvas = canvas;
     this.labels = labels;
@@ -34,7 +34,7 @@ export class World {
     this.addGround();
     this.addVehicle();
     this.addLines();
-    this.map = new THREE.Group(); // M in W
+    this.map = new THREE.Group(); // has the pose of M in W
     this.graph = new Graph(this.map);
     this.marks = new THREE.Group();
     this.scene.add(this.map, this.marks);
@@ -55,7 +55,8 @@ export class World {
   }
 
   addGround() {
-    // In short pieces, because some browsers draw lines that pass behind the camera incorrectly.
+    // Lines are in short pieces, because some browsers draw lines incorrectly that pass behind the
+    // camera.
     const half = 150, step = 5, points = [];
     for (let a = -half; a <= half; a += step) {
       for (let b = -half; b < half; b += step) points.push(a, b, 0, a, b + step, 0, b, a, 0, b + step, a, 0);
@@ -154,7 +155,7 @@ export class World {
     this.setMapFrame(model.T_MW());
   }
 
-  /** Places M relative to W: the working set stays, and the map moves when a loop is closed. */
+  /** Sets the pose of M in W. When a loop is closed, the map moves and the working set stays. */
   setMapFrame([x, y, z, ...q]) {
     this.map.quaternion.fromArray(q).invert();
     this.map.position.set(-x, -y, -z).applyQuaternion(this.map.quaternion);
@@ -162,7 +163,7 @@ export class World {
     this.dirty = true;
   }
 
-  /** A pole at a place where a loop was closed or retracted, or the session was localised.
+  /** Adds a pole where a loop was closed or retracted, or the session was localised.
       `world` is the W of `at`, because events may arrive before the first objects of their W. */
   addMark(at, colour, world) {
     const pole = new THREE.Mesh(new THREE.CylinderGeometry(0.05, 0.05, 3, 8).rotateX(Math.PI / 2), new THREE.MeshBasicMaterial({ color: colour }));
@@ -256,7 +257,7 @@ export class World {
     const positions = new Float32Array(3 * n), colours = new Float32Array(3 * n), colour = new THREE.Color();
     for (let i = 0; i < n; ++i) {
       positions.set(values.subarray(4 * i, 4 * i + 3), 3 * i);
-      // Brightness increases with the accuracy of the point.
+      // More accurate points are brighter.
       const known = 1 / (1 + 2 * values[4 * i + 3]);
       colour.setHSL(0.42, 0.55, 0.18 + 0.5 * known).toArray(colours, 3 * i);
     }
@@ -281,7 +282,7 @@ export class World {
     if (this.took >= SLOW_MS) this.restsUntil = Math.max(this.restsUntil, performance.now() + ANSWERED_MS);
   }
 
-  /** A line from the selected object to its occluder. */
+  /** Shows a line from the selected object to its occluder. */
   showBlocker() {
     const thing = this.things.get(this.chosen), by = thing && this.things.get(thing.object.blocked_by);
     this.blocker.visible = Boolean(by);
@@ -300,7 +301,7 @@ export class World {
     this.dirty = true;
   }
 
-  /** Selects by boxes, including those of occluded objects, because touch is inexact. */
+  /** Selects an object by its box, even if occluded, because touch is inexact. */
   pick(e) {
     if (this.orbit.travelled > 6) return;
     const box = this.canvas.getBoundingClientRect();
@@ -325,7 +326,7 @@ export class World {
     else this.onPick(best.id);
   }
 
-  /** Draws if something has changed; to be called for each animation frame. */
+  /** Draws if something has changed. Must be called for each animation frame. */
   draw() {
     const now = performance.now();
     this.keepPace(now);
@@ -338,8 +339,7 @@ export class World {
     ++this.drawn;
   }
 
-  /** If drawing is slow, leaves half of the time to lists and clicks, and uses larger
-      pixels. */
+  /** If drawing is slow, uses larger pixels, and leaves half of the time to lists and clicks. */
   keepPace(now) {
     if (this.drewAt === undefined) return;
     const took = now - this.drewAt; // time until the next frame

@@ -88,7 +88,7 @@ class CocoReader {
     return number ? static_cast<std::uint64_t>(*number) : frameOf(image, "id");
   }
 
-  /// Subtracts 1 from all frames if they surely count from 1.
+  /// Subtracts 1 from all frames if they certainly count from 1. Adds a note if they may do so.
   void countFromZero() {
     std::set<std::uint64_t> frames = result_.frames.value_or(std::set<std::uint64_t>());
     for (const CocoBox& box : result_.boxes) frames.insert(box.frame);
@@ -162,7 +162,7 @@ class CocoReader {
   const std::string& class_name_;
   /// Frame numbers of the drive, by image name.
   const std::map<std::string, std::uint64_t>& numbers_;
-  bool named_ = false;                           ///< the images are named as the drive's
+  bool named_ = false;  ///< at least one image has the name of an image of the drive
   std::map<std::string, std::string> names_;     ///< category id to class name
   std::map<std::string, std::uint64_t> frames_;  ///< image id to frame
   std::set<std::string> unnamed_;                ///< categories without a name

@@ -77,7 +77,7 @@ Columns headerlessColumns(const TextLine& line) {
   return columns;
 }
 
-/// Refuses lines of numbers from 0 to 1 behind one or two whole ones.
+/// Refuses lines in which all numbers after the first one or two lie between 0 and 1.
 void refuseShareLines(const std::filesystem::path& file, const std::vector<TextLine>& lines) {
   if (lines.empty()) return;
   const char separator = separatorOf(lines.front().text);
@@ -99,8 +99,9 @@ void refuseShareLines(const std::filesystem::path& file, const std::vector<TextL
       file.c_str());
 }
 
-/// Refuses lines whose corners stand where MOT has the width and the height, or from the second
-/// column on. Boxes near the image's upper left corner may be both: as MOT's they all lie inside.
+/// Refuses lines with corners instead of MOT's width and height, or with corners from the second
+/// column on. Small coordinates fit both formats; they are accepted as MOT's if all boxes then lie
+/// inside the image.
 void refuseCorners(const DetectionFileOptions& options, const std::vector<TextLine>& lines,
                    char separator) {
   constexpr std::size_t kLeast = 3;
@@ -127,7 +128,7 @@ void refuseCorners(const DetectionFileOptions& options, const std::vector<TextLi
       options.file.c_str(), second ? "2 to 5 with a score behind them" : "3 to 6");
 }
 
-/// Returns an empty string, or the error in the numbers of the row.
+/// Writes the numbers into `row`. Returns the error in them, or an empty string.
 std::string fillBox(const Box& box, double score, const DetectionFileOptions& options,
                     DetectionFile::Row& row) {
   if (box.x2 <= box.x1 || box.y2 <= box.y1) {
@@ -302,7 +303,7 @@ void DetectionFile::takeLines(const std::vector<TextLine>& lines, const ClassAli
 
 /// Refuses boxes whose sides are shares of the image.
 void DetectionFile::refuseShares() const {
-  constexpr double kMost = 1.5;  // a share may lie a little outside of the image
+  constexpr double kMost = 1.5;  // shares above 1 belong to boxes that extend beyond the image
   double most = 0.0;
   for (const auto& [frame, rows] : rows_) {
     for (const Row& row : rows) most = std::max({most, row.detection.box.x2, row.detection.box.y2});
@@ -337,7 +338,7 @@ std::string DetectionFile::whyOutside() const {
 
 bool DetectionFile::hasSizes() const {
   constexpr std::size_t kLeast = 20;
-  constexpr double kBorder = 2.0;  // px: boxes end there that the border cuts off
+  constexpr double kBorder = 2.0;  // px; boxes that the border cuts off end this close to it
   std::map<std::pair<double, double>, std::set<double>> lefts;
   std::map<std::pair<double, double>, std::size_t> times;
   for (const auto& [frame, rows] : rows_) {

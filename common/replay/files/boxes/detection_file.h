@@ -1,9 +1,8 @@
 // Reads detections from a file as evidence: a CSV with the header `frame,class,x1,y1,x2,y2,score`.
 // Optional columns are an azimuth (its name begins with alpha or azimuth) and `logit:<class>`.
 // Without a header, lines are RRC's `frame,x1,y1,x2,y2,score` or MOT's `frame,id,x,y,width,height,
-// score,…`, whose frames count from 1; the caller then gives the class. More columns behind corners
-// are refused, because their meaning is not known. COCO's JSON is read too
-// (coco_file.h).
+// score,…`, whose frames count from 1; the caller then gives the class. Further columns after the
+// corners are refused, because their meaning is not known. COCO's JSON is read too (coco_file.h).
 #pragma once
 
 #include <cstdint>
@@ -32,43 +31,44 @@ struct DetectionFileOptions {
   double score_floor = 0.01;
   double azimuth_sigma = 0.35;  ///< radians
   BoxExtent boxes = BoxExtent::kUnknown;
-  double width = 0.0, height = 0.0;  ///< of the images; 0: not known
-  /// Recording::numbers of the drive.
+  double width = 0.0, height = 0.0;  ///< size of the images in pixels; 0: not known
+  /// Frame numbers of the drive by image name (Recording::numbers).
   std::map<std::string, std::uint64_t> numbers = {};
 };
 
-/// Activations of a row: clutter is 0. Other classes have the values of the `logit:` columns, if
-/// present. Otherwise the row's class has logit(score), and the others have the floor's logit.
-/// Frames without rows have an empty list, which is evidence too. If FILE.frames (same stem, one
-/// frame number per line) exists, only the frames listed in it have a message.
+/// The detections in a file. Activations of a row: clutter is 0. Other classes have the values of
+/// the `logit:` columns, if present. Otherwise the row's class has logit(score), and the others
+/// have the logit of the floor. Frames without rows have an empty list, which is evidence too. If
+/// FILE.frames (same stem, one frame number per line) exists, only the frames listed in it have a
+/// message.
 class DetectionFile {
  public:
   /// Throws StartupError(kData) that names each wrong line and the fix.
   static DetectionFile read(const DetectionFileOptions& options, const ClassAliases& aliases);
 
   /// Classes known at a frame: those of the `logit:` columns, otherwise those of rows up to that
-  /// frame. A truncated file therefore gives the same result. The list grows with the frame, and
-  /// the hash changes with it.
+  /// frame. Later rows therefore never change the result. The list grows with the frame, and the
+  /// hash changes with it.
   ModelInfo modelAt(std::uint64_t frame) const;
   /// The detections of a frame. Returns nothing if the file contains no information about the
   /// frame.
   std::optional<std::vector<Detection>> at(std::uint64_t frame) const;
   std::uint64_t firstFrame() const { return rows_.empty() ? 0 : rows_.begin()->first; }
   std::uint64_t lastFrame() const { return rows_.empty() ? 0 : rows_.rbegin()->first; }
-  /// The number of detections in the file, and of those of frames beyond `last`.
+  /// rows() counts all detections in the file; rowsBeyond() counts those of frames after `last`.
   std::size_t rows() const;
   std::size_t rowsBeyond(std::uint64_t last) const;
-  /// A sentence if it is not certain or not as usual from where the file counts the frames.
+  /// A sentence if the file's frames count from 1, or if this is not certain. Otherwise "".
   const std::string& note() const { return note_; }
-  /// Whether x2 and y2 are probably a width and a height: nearly all boxes have the same, away from
-  /// the image's border, and their left sides move.
+  /// Returns whether x2 and y2 are probably a width and a height: nearly all boxes share one pair
+  /// of them, away from the image's border, although their left sides differ.
   bool hasSizes() const;
-  /// A sentence if many boxes lie outside of the images.
+  /// A sentence if many boxes lie outside the images. Otherwise "".
   std::string whyOutside() const;
 
   struct Row {
-    Detection detection;     ///< activations are empty until known, if the file has no logits
-    std::string class_name;  ///< canonical
+    Detection detection;     ///< empty until at() sets the activations, if the file has no logits
+    std::string class_name;  ///< canonical name
     double logit = 0.0;
   };
 
@@ -82,7 +82,8 @@ class DetectionFile {
   DetectionFileOptions options_;
   std::vector<std::string> logit_classes_;
   std::string note_;
-  std::vector<std::pair<std::uint64_t, std::string>> first_seen_;  ///< classes in file order
+  std::vector<std::pair<std::uint64_t, std::string>>
+      first_seen_;  ///< classes, each with its first frame
   std::map<std::uint64_t, std::vector<Row>> rows_;
   std::optional<std::set<std::uint64_t>> listed_frames_;
 };

@@ -56,7 +56,7 @@ bool SceneBuilder::inBodysWay(const Solid& solid) const {
 
 bool SceneBuilder::isFree(const Solid& solid, double margin) const {
   const auto meets = [&](const Solid& other) {
-    // An object on a support touches it, so the margin applies horizontally only.
+    // An object on a support touches the support, so that the margin applies horizontally only.
     const bool apart_in_height = std::max(other.low - solid.high, solid.low - other.high) > -1e-6;
     return !apart_in_height && meet(solid, other, margin);
   };

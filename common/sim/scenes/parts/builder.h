@@ -39,13 +39,14 @@ class SceneBuilder {
   }
   std::uint64_t look() { return lookSeed(dice_, options_.look_set); }
 
-  /// Returns false, without an effect, if the gap to any other object would be less than `margin`.
+  /// Adds an object. Returns false, without an effect, if its gap to any other is less than
+  /// `margin`.
   bool put(SceneObject object, const Place& place, double margin = 0.05);
   bool put(PropKind kind, const Eigen::Vector3d& size, const Place& place, double margin = 0.02);
-  /// Places an object as put() does, but aborts on failure. Returns a reference to the new object.
+  /// Places an object as put() does, but aborts on failure. Returns the new object.
   SceneObject& mustPut(SceneObject object, const Place& place);
   void mustPut(PropKind kind, const Eigen::Vector3d& size, const Place& place);
-  /// Adds an object with its own motion, which the caller has checked (see reserveWay).
+  /// Adds an object with its own motion. The caller checks that it is free (see reserveWay).
   SceneObject& putMoving(SceneObject object, Trajectory motion);
 
   bool isFree(const Solid& solid, double margin) const;

@@ -31,7 +31,7 @@ CameraCalibration makeCamera(const std::string& name, const SceneOptions& option
   return camera;
 }
 
-/// Noise densities of the MEMS unit in EuRoC's vehicle (ADIS16448).
+/// Noise densities of the IMU (ADIS16448) in EuRoC's vehicle.
 ImuCalibration makeImu() { return {1.7e-4, 2e-5, 2e-3, 3e-3, 200.0}; }
 
 Eigen::Vector3d drawBias(Dice& dice, double sigma) {

@@ -29,7 +29,7 @@ Room::Room(SceneBuilder& builder, double length, double width)
   const double x = 0.5 * (length + kWall), y = 0.5 * (width + kWall);
   const Eigen::Vector3d along_x(length, kWall, kWallHeight);
   const Eigen::Vector3d along_y(width + 2.0 * kWall, kWall, kWallHeight);
-  // The front (−y) of each wall faces the inside.
+  // The front (−y) of each wall faces the inside of the room.
   builder.mustPut(PropKind::kWall, along_x, {{0, y}, 0.0, 0.0});
   builder.mustPut(PropKind::kWall, along_x, {{0, -y}, M_PI, 0.0});
   builder.mustPut(PropKind::kWall, along_y, {{x, 0}, -M_PI_2, 0.0});
@@ -54,7 +54,7 @@ bool Room::putTable(const Eigen::Vector2d& point, double yaw, int chairs, int mo
     const double left = monitors == 1 ? dice.uniform(-0.1, 0.1) : (i - 0.5) * 0.5 * table.size.y();
     putMonitor(table, place, dice.uniform(-0.12, 0.12), left, dice.uniform(-0.3, 0.3));
   }
-  // Two chairs at each long side, then one at each end; a chair faces its table.
+  // Two chairs at each long side, then one at each end; all chairs face the table.
   struct Seat {
     double side, end;
   };
@@ -123,7 +123,7 @@ bool Room::putAtWall(const Eigen::Vector2d& at_wall, double inwards, double& tak
 void Room::furnishWalls() {
   Dice& dice = builder_.dice();
   for (int wall = 0; wall < 4; ++wall) {
-    const double inwards = wrapAngle(wall * M_PI_2 + M_PI);  // for walls at +x, +y, −x, −y
+    const double inwards = wrapAngle(wall * M_PI_2 + M_PI);  // the wall is at +x, +y, −x or −y
     const double run = wall % 2 == 0 ? width_ : length_;
     const double away = 0.5 * (wall % 2 == 0 ? length_ : width_);
     for (double along = 1.1; along < run - 1.1;) {

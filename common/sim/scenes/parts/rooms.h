@@ -1,4 +1,5 @@
-// Rooms with walls, tables, chairs, monitors, couches and shelves; and handheld motion in them.
+// Furnished rooms (walls, tables, chairs, monitors, couches and shelves), and handheld motion in
+// them.
 #pragma once
 
 #include "common/sim/path.h"
@@ -8,15 +9,15 @@ namespace perdure::sim {
 
 inline constexpr double kWallHeight = 2.8;
 
-/// A room around the origin of W. Objects along its walls face the inside.
+/// A room around the origin of W. Objects along its walls face the inside of the room.
 class Room {
  public:
   Room(SceneBuilder& builder, double length, double width);
 
-  /// A table with `chairs` of 0 to 6 around it and `monitors` of 0 to 2 on it. Returns false if
-  /// there is no space for the table; chairs without space are left out.
+  /// Adds a table with 0 to 6 `chairs` around it and 0 to 2 `monitors` on it. Returns false if
+  /// there is no space for the table; chairs without space are omitted.
   bool putTable(const Eigen::Vector2d& point, double yaw, int chairs, int monitors);
-  /// A table at the wall with a monitor on it and a chair in front.
+  /// Adds a table at the wall, with a monitor on it and a chair in front.
   bool putDesk(const Eigen::Vector2d& at_wall, double inwards);
   /// Places desks, couches, shelves, crates and people along all four walls.
   void furnishWalls();
@@ -37,7 +38,7 @@ class Room {
 
 /// A camera in the hand of a walking person: steps, sway, and a gaze that oscillates.
 Trajectory handheldMotion(const GroundPath& path, const Drive& drive, double height);
-/// One pose per interval, for a person whose path and gaze are given.
+/// The position and gaze of a walking person at one time.
 struct Look {
   Eigen::Vector2d point = Eigen::Vector2d::Zero();
   double yaw = 0.0, pitch_down = 0.0, roll = 0.0;

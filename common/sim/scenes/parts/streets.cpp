@@ -50,7 +50,8 @@ Streets::Streets(SceneBuilder& builder, std::vector<Road> roads, const Furnishin
   builder_.scene().roads = roads_;
 }
 
-/// `across`: distance from the centre line to that side. `yaw`: relative to its traffic.
+/// `across`: distance from the centre line towards that side. `yaw`: relative to that side's
+/// traffic.
 Place Streets::placeAt(const Road& road, int side, double along, double across, double yaw) const {
   const Eigen::Vector2d way = (road.to - road.from).normalized(), left(-way.y(), way.x());
   const double heading = std::atan2(way.y(), way.x()) + (side > 0 ? M_PI : 0.0);
@@ -70,7 +71,7 @@ void Streets::put(const Road& road, PropKind kind, const Eigen::Vector3d& size,
 }
 
 void Streets::furnish() {
-  // Houses first, because they are the largest; other objects use the remaining space.
+  // Houses come first, because they are the largest; other objects use the remaining space.
   for (const Road& road : roads_) {
     for (const int side : {-1, 1}) furnishing_.garden > 0.0 ? plots(road, side) : build(road, side);
     if (furnishing_.ends) closeEnds(road);
@@ -93,7 +94,7 @@ void Streets::build(const Road& road, int side) {
     bool built = false;
     for (double length = size.x(); length >= 4.0 && !built; length *= 0.6) {
       const Eigen::Vector3d shorter(length, size.y(), size.z());
-      // The front (−y) of the house faces the road, on the side away from the traffic's yaw.
+      // The front (−y) of the house faces the road.
       const Place place = placeAt(road, side, along + 0.5 * length,
                                   0.5 * road.width_m + set_back + 0.5 * size.y(), M_PI);
       const Solid solid = solidAt(place, shorter);
@@ -110,14 +111,14 @@ void Streets::plots(const Road& road, int side) {
     const double length = builder_.dice().uniform(13.0, 19.0);
     if (plot(road, side, along, length)) {
       along += length;
-    } else {  // beside the last plot of a crossing road
+    } else {  // beside the last plot before a crossing road
       fence(road, placeAt(road, side, along + 1.0, 0.5 * road.width_m + 1.5, M_PI), 1.98);
       along += 2.0;
     }
   }
 }
 
-/// A hedge or a wall along the x of `place`.
+/// Adds a hedge or a wall along the x axis of `place`.
 void Streets::fence(const Road& road, const Place& place, double length) {
   Dice& dice = builder_.dice();
   const bool hedge = dice.chance(0.6);
@@ -125,7 +126,7 @@ void Streets::fence(const Road& road, const Place& place, double length) {
       {length, hedge ? 0.6 : 0.2, dice.uniform(1.0, 1.8)}, place);
 }
 
-/// The driveway is at one end of the plot. A hedge or a wall may follow the pavement, and another
+/// Adds a plot with a driveway at one end. A hedge or a wall may follow the pavement, and another
 /// may separate the driveway from the neighbour.
 bool Streets::plot(const Road& road, int side, double from, double length) {
   constexpr double kDriveway = 3.2, kHouseDepth = 7.0, kParkingStrip = 2.2;
@@ -141,7 +142,7 @@ bool Streets::plot(const Road& road, int side, double from, double length) {
       !builder_.put(PropKind::kFacade, house, at)) {
     return false;
   }
-  const double enclosed = dice.unit();  // decides which of the two fences exist
+  const double enclosed = dice.unit();  // selects which of the two fences exist
   if (enclosed < 0.6) fence(road, placeAt(road, side, middle, line + 0.3, M_PI), rest - 0.2);
   const double border = drive_first ? from + 0.2 : from + length - 0.2;
   if (enclosed > 0.4 && enclosed < 0.9) {

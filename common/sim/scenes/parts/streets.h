@@ -26,21 +26,21 @@ inline constexpr double kRoadWidth = 10.0;  ///< two lanes and two rows of parke
 inline constexpr double kLane = 1.4;        ///< road's centre line to the centre of a lane
 
 inline constexpr double kGridX = 82.0, kGridY = 66.0;  ///< distance between roads
-/// Roads in rows (along x) and columns. The first crossing is at the origin.
+/// Roads in rows (along x) and columns (along y). The first crossing is at the origin.
 std::vector<Road> gridOfRoads(int columns, int rows);
-/// A third of the slots are free; trees and people are few.
+/// Furnishing with a third of the parking slots free, and few trees and people.
 Furnishing furnishingOfGrid();
 
 /// Straight roads that may cross, with objects on both sides.
 class Streets {
  public:
   Streets(SceneBuilder& builder, std::vector<Road> roads, const Furnishing& furnishing);
-  /// Requires that the body's motion is already set, because nothing is placed on its path.
+  /// The body's motion must already be set, because nothing is placed on its path.
   void furnish();
-  /// Places vehicles only, on one side (+1 left of the road's direction, -1 right) of one road.
+  /// Parks vehicles only, on one side (+1 left of the road's direction, -1 right) of one road.
   void park(const Road& road, int side);
   void build(const Road& road, int side);
-  /// Plots with a house, a front garden and a driveway, instead of build().
+  /// Adds plots with a house, a front garden and a driveway, instead of build().
   void plots(const Road& road, int side);
   void plant(const Road& road, int side);
   void people(const Road& road, int side);
@@ -58,11 +58,11 @@ class Streets {
   Furnishing furnishing_;
 };
 
-/// A path on the right-hand lane that turns at these crossings. The first and the last point are
-/// its ends. Right turns are tighter than left turns.
+/// A path on the right-hand lane that turns at these crossings and ends at the first and the last
+/// point. Right turns are tighter than left turns.
 GroundPath laneThrough(const std::vector<Eigen::Vector2d>& points);
 void drawDaylight(SceneBuilder& builder);
-/// Sets the body as a car with this drive for `seconds`, with a car's sensors, in daylight.
+/// Makes the body a car with this drive for `seconds`, with a car's sensors, in daylight.
 void putOnWheels(SceneBuilder& builder, const GroundPath& way, const Drive& driven, double seconds,
                  const SceneOptions& options);
 

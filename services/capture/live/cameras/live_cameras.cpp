@@ -41,7 +41,7 @@ std::string LiveCameras::problem() const {
   for (const auto& camera : cameras_) {
     text = joined(text, named(i++, camera.state().problem(), ": "));
   }
-  // While a camera is missing, pairs are not judged.
+  // While a camera has a problem, problems of the pairs are not reported.
   return text.empty() && pairing_ ? pairing_->problem() : text;
 }
 

@@ -14,25 +14,25 @@
 
 namespace perdure::capture {
 
-/// Each camera has its own thread. All members are called from one other thread, which passes on
-/// the cameras' images.
+/// Each camera has its own thread. One other thread receives the cameras' images and calls all
+/// members of this class.
 class LiveCameras {
  public:
-  /// One or two cameras: cam0, cam1. `give` is called on their threads, with the camera's name in
-  /// the frame.
+  /// Opens one camera (cam0) or two (cam0, cam1). `give` is called on their threads; the frame has
+  /// the camera's name.
   LiveCameras(const std::vector<OpenCamera>& cameras, double rate_hz,
               const std::function<void(CameraImage)>& give);
 
-  /// Takes an image and returns the images to publish. `now_ns`: CLOCK_BOOTTIME.
+  /// Takes an image, and returns the images that can now be published. `now_ns`: CLOCK_BOOTTIME.
   std::vector<CameraImage> pair(CameraImage image, std::int64_t now_ns);
-  /// Returns images whose wait for a partner has ended.
+  /// Returns the images that have waited too long for a partner, for publication.
   std::vector<CameraImage> due(std::int64_t now_ns);
 
-  /// As in DeviceState; with two cameras, each text begins with the camera's name.
+  /// Return the texts of DeviceState. With two cameras, each text begins with the camera's name.
   std::string problem() const;
   std::string name() const;
   std::string note() const;
-  /// With two cameras, the names of counts end in the camera's name.
+  /// Adds the counts. With two cameras, the names of the counts end in the camera's name.
   void report(ReasonCounts& counts) const;
 
  private:

@@ -12,9 +12,9 @@ namespace {
 
 constexpr double kMostTolerance_ns = 10e6;  // equal to vio's stereo.pair_tolerance
 constexpr double kLeastInterval_ns = 2e6;
-constexpr double kSilence = 4.0;  // intervals without an image: a silent camera
+constexpr double kSilence = 4.0;  // after this many intervals without image a camera is silent
 constexpr std::size_t kMostSeconds = 8;
-constexpr std::size_t kJudged = 64;  // images of cam0 per judgement
+constexpr std::size_t kJudged = 64;  // the pairing is assessed after this many images of cam0
 constexpr double kTold_ms = 2.0;
 
 }  // namespace
@@ -40,7 +40,8 @@ bool CameraTimeline::flows(std::int64_t now_ns, double longest_ns) const {
 
 StereoPairing::StereoPairing(double rate_hz) : asked_ns_(1e9 / rate_hz) {}
 
-/// The shorter interval, so that two images of a fast camera cannot match one of the other.
+/// Returns the shorter interval of the two cameras, so that two images of a fast camera cannot
+/// match the same image of the other.
 double StereoPairing::intervalNs() const {
   double interval = asked_ns_;
   for (const double period : {first_.period_ns(), second_.period_ns()}) {
@@ -123,7 +124,7 @@ void StereoPairing::dropSeconds(std::size_t n) {
   seconds_.erase(seconds_.begin(), seconds_.begin() + static_cast<std::ptrdiff_t>(n));
 }
 
-/// Drops images that are older than all images of cam0 still to come.
+/// Drops images of cam1 that are too old for any later image of cam0.
 void StereoPairing::dropPassed() {
   const auto oldest = firsts_.empty() ? first_.last_ns() : firsts_.front().image.time_ns;
   std::size_t passed = 0;
@@ -156,8 +157,8 @@ void StereoPairing::judge() {
   alone_ = late_ = 0;
 }
 
-/// Reports the difference again if it has changed much, because the phases of free-running cameras
-/// drift.
+/// Reports the time difference of the pairs, and again after a large change, because the phases of
+/// free-running cameras drift.
 void StereoPairing::judgeDifference() {
   if (apart_ms_.empty()) return note_.clear();
   const auto middle = apart_ms_.begin() + static_cast<std::ptrdiff_t>(apart_ms_.size() / 2);

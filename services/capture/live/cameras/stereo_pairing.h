@@ -14,11 +14,13 @@ namespace perdure::capture {
 
 class CameraTimeline {
  public:
-  /// False if the stamp decreases, or is ahead of `now_ns` by more than `interval_ns`.
+  /// Returns whether the image is in order. Its stamp must increase, and must not be ahead of
+  /// `now_ns` by more than `interval_ns`.
   bool takes(const CameraImage& image, std::int64_t now_ns, double interval_ns);
-  /// Stamp of the last image, including one out of order; empty before the first image.
+  /// Returns the stamp of the last image, even if that image was out of order; nothing before the
+  /// first image.
   std::optional<std::int64_t> last_ns() const { return last_ns_; }
-  /// Smoothed time between images; 0: not known.
+  /// Returns the smoothed time between images; 0: not known.
   double period_ns() const { return period_ns_; }
   bool flows(std::int64_t now_ns, double longest_ns) const;
 
@@ -29,8 +31,8 @@ class CameraTimeline {
 };
 
 /// Pairs images by the nearest stamp. An image of cam0 waits for its partner no longer than the
-/// tolerance, and is then passed on alone. If cam1 sends no images, it does not wait. Images of
-/// cam1 wait until later images of cam0 arrive, and are then dropped.
+/// tolerance, and is then passed on alone. If cam1 sends no images, images of cam0 do not wait.
+/// Images of cam1 wait until later images of cam0 arrive, and are then dropped.
 class StereoPairing {
  public:
   explicit StereoPairing(double rate_hz);
@@ -41,13 +43,16 @@ class StereoPairing {
   std::vector<CameraImage> second(CameraImage image, std::int64_t now_ns);
   std::vector<CameraImage> due(std::int64_t now_ns);
 
-  /// A third of the time between two images, at most vio's own pairing tolerance of 10 ms.
+  /// Returns the tolerance: a third of the time between two images, at most 10 ms, which is vio's
+  /// own.
   std::int64_t toleranceNs() const;
-  /// A sentence with the fix if most images of cam0 have no partner although cam1 sends images.
+  /// Returns a sentence with the fix if most images of cam0 have no partner although cam1 sends
+  /// images; otherwise empty.
   const std::string& problem() const { return problem_; }
-  /// A sentence if the images of a pair typically differ by more than 2 ms.
+  /// Returns a sentence if the stamps of a pair typically differ by more than 2 ms; otherwise
+  /// empty.
   const std::string& note() const { return note_; }
-  /// Counts "stereo_unpaired_cam0" and "…_cam1", "camera_out_of_order_cam0" and "…_cam1".
+  /// Returns the counts "stereo_unpaired_cam0", "…_cam1", "camera_out_of_order_cam0" and "…_cam1".
   const ReasonCounts& reasons() const { return reasons_; }
 
  private:
@@ -73,7 +78,7 @@ class StereoPairing {
   std::deque<Waiting> firsts_;
   Seconds seconds_;
   std::optional<std::int64_t> alone_ns_;  ///< stamp of cam0's last image without a partner
-  // Statistics since the last judgement, while both cameras send images:
+  // Statistics since the last assessment, while both cameras send images:
   std::vector<double> apart_ms_;
   std::size_t alone_ = 0, late_ = 0;
   double told_ms_ = 0.0;

@@ -1,4 +1,4 @@
-// Memory of a libcamera frame buffer, as planes of an image.
+// Access to the memory of a libcamera frame buffer, as planes of an image.
 #pragma once
 
 #include <libcamera/libcamera.h>
@@ -21,8 +21,8 @@ class MappedBuffer {
   MappedBuffer& operator=(const MappedBuffer&) = delete;
 
   const std::vector<std::span<const std::uint8_t>>& planes() const { return planes_; }
-  /// Makes the device's writes visible; call it before and after reading. Memory other than DMA
-  /// buffers does not need it and returns an error, which is ignored.
+  /// Begins or ends reading, so that the device's writes are visible. For memory other than DMA
+  /// buffers the call fails, which has no effect.
   void sync(bool begin) const;
 
  private:
@@ -34,7 +34,7 @@ class MappedBuffer {
   std::vector<std::span<const std::uint8_t>> planes_;
 };
 
-/// Planes as packed() needs them, even if a driver returns all of them as one.
+/// Returns the planes that packed() needs, even if the driver returns all planes as one.
 std::vector<ImagePlane> imagePlanes(const libcamera::StreamConfiguration& stream,
                                     PixelLayout layout, const MappedBuffer& memory,
                                     const libcamera::FrameMetadata& metadata);

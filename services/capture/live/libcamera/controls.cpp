@@ -17,8 +17,8 @@ namespace {
 namespace controls = libcamera::controls;
 namespace formats = libcamera::formats;
 
-/// The best format first, with the least conversion and full colour. libcamera names the bytes of a
-/// pixel from the last one in memory to the first.
+/// Formats in order of preference: least conversion and full colour first. libcamera names the
+/// bytes of a pixel from the last one in memory to the first.
 const std::array<KnownFormat, 11> kFormats = {{
     {formats::RGB888, PixelLayout::kBgr},
     {formats::BGR888, PixelLayout::kRgb},
@@ -41,7 +41,8 @@ class Asking {
   bool offers(const libcamera::Control<T>& control) const {
     return offered_.find(control.id()) != offered_.end();
   }
-  /// `key`: setting of the configuration that has no effect without the control.
+  /// Requests a control. If the camera lacks it, `key`, the setting that then has no effect, is
+  /// reported.
   template <class T, class V>
   void set(const libcamera::Control<T>& control, const V& value, const char* key) {
     if (offers(control)) return list_.set(control, value);
@@ -87,7 +88,8 @@ void askManualExposure(Asking& asking) {
 void askManualGain(Asking&) {}
 #endif
 
-/// Without focus control, the focus could differ from the rig's calibration unnoticed.
+/// Requests the focus. A camera without focus control is refused, because its focus could differ
+/// from the rig's calibration unnoticed.
 void askFocus(const CameraSettings& settings, Asking& asking) {
   const bool manual = settings.focus == "manual";
   if (settings.focus == "as_is") return;
@@ -114,8 +116,8 @@ libcamera::Transform transformOf(const std::string& flip) {
   return flip == "both" ? libcamera::Transform::HVFlip : libcamera::Transform::Identity;
 }
 
-// Before libcamera 0.2 the configuration has a transform of the upright image; since then it has
-// the resulting orientation.
+// Before libcamera 0.2, the configuration has the transform of the upright image; since then, it
+// has the resulting orientation.
 #if __has_include(<libcamera/orientation.h>)
 libcamera::Orientation orientationOf(const std::string& flip) {
   return libcamera::Orientation::Rotate0 * transformOf(flip);

@@ -1,4 +1,4 @@
-// Controls that are requested from a libcamera camera.
+// Selects a libcamera camera, and the controls that are requested from it.
 #pragma once
 
 #include <libcamera/camera.h>
@@ -17,30 +17,32 @@
 
 namespace perdure::capture {
 
-/// Index in `ids` of the id equal to `wanted`, else of the first id that contains it. With `alone`,
-/// only one id may contain it, so that left and right are not exchanged. Fails with "camera_absent"
-/// and the fix.
+/// Returns the index in `ids` of the id equal to `wanted`, else of the first id that contains
+/// `wanted`. Fails with "camera_absent" and the fix if there is none. If `alone`, also fails if
+/// several ids contain `wanted`, so that left and right are not exchanged.
 Result<std::size_t> chooseCamera(const std::vector<std::string>& ids, const std::string& wanted,
                                  bool alone);
 
 struct AskedControls {
   libcamera::ControlList list;
-  std::string missing;  ///< settings that the camera does not offer; empty if it offers all
-  std::string refused;  ///< why the camera must not be used, with the fix; empty if it may be used
+  std::string missing;  ///< settings that the camera does not support; empty if none
+  std::string refused;  ///< why the camera must not be used, with the fix; or empty
 };
 
-/// The rate is requested if the camera has a control for it. The frames show the actual rate.
+/// Returns the controls for these settings, given the controls that the camera offers. A rate is
+/// requested only if the camera has a control for it; the frames show the actual rate.
 AskedControls controlsFor(const CameraSettings& settings, const libcamera::ControlInfoMap& offered);
 
 using KnownFormat = std::pair<libcamera::PixelFormat, PixelLayout>;
 std::span<const KnownFormat> knownFormats();
 
-/// Requests `camera.flip`; validate() removes it if the camera does not support it.
+/// Requests the flip in the configuration. libcamera's validate() removes it if the camera does not
+/// support it.
 void askFlip(libcamera::CameraConfiguration& configuration, const std::string& flip);
 bool flips(const libcamera::CameraConfiguration& configuration, const std::string& flip);
-/// Why images do not follow `camera.flip`, with the fix; empty if they do. With "none", images are
-/// left as delivered. Those of a camera mounted at 90° stay rotated, and are calibrated in this
-/// orientation.
+/// Returns why images do not have the requested flip, with the fix; empty if they have it. With
+/// "none", images stay as delivered: those of a camera mounted at 90° stay rotated, and are
+/// calibrated in this orientation.
 std::string flipRefused(const libcamera::CameraConfiguration& configuration,
                         const std::string& flip);
 

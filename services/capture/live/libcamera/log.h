@@ -10,8 +10,9 @@
 
 namespace perdure::capture {
 
-/// Returns a libcamera line "[time] [thread] LEVEL Category file:line words" from its level on, if
-/// the level is warning or more severe. libcamera 0.0.3 cannot set this level for all categories.
+/// For a line "[time] [thread] LEVEL Category file:line words" of libcamera, returns the text from
+/// LEVEL on if the level is warning or more severe; otherwise nothing. libcamera 0.0.3 cannot set
+/// this level for all categories.
 std::optional<std::string> worthLogging(std::string_view line);
 
 /// Receives libcamera's log during the lifetime of this object. `log` may be called on any thread.
@@ -23,7 +24,8 @@ class LibcameraLog {
   LibcameraLog& operator=(const LibcameraLog&) = delete;
 
  private:
-  /// libcamera writes whole lines from several threads, so nothing is stored between writes.
+  /// Receives libcamera's lines. libcamera writes whole lines from several threads, so nothing is
+  /// stored between writes.
   class Lines : public std::streambuf {
    public:
     explicit Lines(std::function<void(const std::string&)> log) : log_(std::move(log)) {}

@@ -9,7 +9,7 @@
 namespace perdure::capture {
 namespace {
 
-constexpr std::size_t kMisses = 4;  // two seconds of attempts
+constexpr std::size_t kMisses = 4;  // two seconds of failed attempts
 constexpr std::size_t kMostUnplugged = 5;
 
 }  // namespace

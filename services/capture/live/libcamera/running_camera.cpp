@@ -27,12 +27,12 @@ RunningCamera::RunningCamera(std::shared_ptr<libcamera::CameraManager> manager,
 
 bool RunningCamera::over() { return lastOfAll(*this, &RunningCamera::leave, &RunningCamera::end); }
 
-/// If only the kernel has noticed the removal, stopping the camera would abort the process because
-/// of unreturned requests.
+/// Returns false if the kernel has removed the camera but udev has not reported this. Stopping the
+/// camera would then abort the process, because requests were not returned.
 bool RunningCamera::end() {
   const bool told = gone_ || !running_;  // no signal if the camera vanished before it ran
   if (!told && openVideoNodeVanished()) return false;
-  if (running_) camera_->stop();  // otherwise another program may be running it
+  if (running_) camera_->stop();  // if not running, another program may use it
   camera_->requestCompleted.disconnect(this);
   camera_->disconnected.disconnect(this);
   requests_.clear();
@@ -87,7 +87,8 @@ void RunningCamera::queue(Request* request) {
   if (!gone_ && !ending_) camera_->queueRequest(request);
 }
 
-/// Runs on libcamera's thread. A request cancelled early: the camera is gone, or refuses controls.
+/// Receives a completed request on libcamera's thread. If a request is cancelled early, the camera
+/// is gone or refuses the controls.
 void RunningCamera::completed(Request* request) {
   const bool asked = request == asking_;
   if (asked) asking_ = nullptr;
@@ -99,9 +100,9 @@ void RunningCamera::completed(Request* request) {
   }
 }
 
-/// udev reports a node, not a camera. If its report is late, another camera may already have that
-/// node. The camera that libcamera then treats as gone still sends images, and the next one would
-/// abort the process.
+/// udev reports a node, not a camera. If the report is late, another camera may already have this
+/// node. libcamera then treats that camera as gone, although it still sends images, and the next
+/// image would abort the process.
 void RunningCamera::disconnected() {
   gone_ = true;
   done_.close();
@@ -125,10 +126,10 @@ void RunningCamera::giveBack(Request* request) {
   invokeMethod(&RunningCamera::queue, libcamera::ConnectionTypeQueued, request);
 }
 
-/// libcamera completes requests in the order in which they were queued. The UVC driver reuses the
-/// buffer of a broken image after the other buffers. Their images are delayed until that buffer has
-/// an image, which is the newest but completes first. They then complete together on libcamera's
-/// thread.
+/// libcamera completes requests in the order in which they were queued. After a broken image the
+/// UVC driver fills the other buffers before that of the broken image. The other images are delayed
+/// until that buffer has an image, which is the newest but completes first. All then complete
+/// together on libcamera's thread.
 void RunningCamera::takeTheRest() {
   invokeMethod(&RunningCamera::settle, libcamera::ConnectionTypeBlocking);
   while (const auto more = done_.tryPop()) in_hand_.push_back(*more);

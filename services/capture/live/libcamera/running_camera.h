@@ -17,9 +17,10 @@
 
 namespace perdure::capture {
 
-/// Calls `leave` and then `end` on the object's thread, and returns the result of `end`. Earlier
-/// messages of that thread, and those that they post (queueRequest()), are processed first, because
-/// libcamera would process them later, with raw pointers. After `leave`, the object must not post.
+/// Calls `leave` and then `end` on the object's thread, and returns the result of `end`. Messages
+/// that wait on that thread, and those that they post (queueRequest()), are processed before `end`,
+/// because libcamera would otherwise process them later with raw pointers. After `leave`, the
+/// object must not post.
 template <class T, class Answer>
 Answer lastOfAll(T& object, void (T::*leave)(), Answer (T::*end)()) {
   object.invokeMethod(leave, libcamera::ConnectionTypeBlocking);
@@ -27,8 +28,8 @@ Answer lastOfAll(T& object, void (T::*leave)(), Answer (T::*end)()) {
 }
 
 /// libcamera's thread calls slots and reads requests through raw pointers. Therefore all access to
-/// requests and signals is on that thread. No camera can be unplugged in between, and after over()
-/// that thread has no pointers to them.
+/// requests and signals is on that thread: no camera can be unplugged during an access, and after
+/// over() the thread has no pointers to this object.
 class RunningCamera final : public Unended, public libcamera::Object {
  public:
   static constexpr std::size_t kBuffers = 4;
@@ -39,25 +40,29 @@ class RunningCamera final : public Unended, public libcamera::Object {
   RunningCamera& operator=(const RunningCamera&) = delete;
 
   libcamera::Camera& camera() { return *camera_; }
-  /// False if another program, or libcamera for this process, still uses the camera.
+  /// Acquires the camera. Returns false if another program, or libcamera in this process, still
+  /// uses it.
   bool acquire();
   /// Allocates a request for each buffer of a configured stream. Fails with "camera_absent".
   Result<void> allocate(libcamera::Stream* stream);
   const std::vector<std::unique_ptr<libcamera::FrameBuffer>>& buffers(libcamera::Stream* s) const {
     return allocator_->buffers(s);
   }
-  /// Some pipelines take controls at the start; the UVC pipeline takes them only from requests.
+  /// Starts the camera with these controls. Some pipelines apply controls at the start, but the UVC
+  /// pipeline only with a request. Returns false on failure.
   bool start(const libcamera::ControlList& asked);
 
-  /// Whether udev has reported to libcamera that the camera is unplugged.
+  /// Returns whether udev has reported to libcamera that the camera is unplugged.
   bool gone() const { return gone_; }
-  /// Whether the camera refuses the controls given at its start.
+  /// Returns whether the camera refuses the controls given at its start.
   bool refused() const { return refused_; }
-  /// Next request in the driver's order. Its image is valid until giveBack().
+  /// Returns the next request in the driver's order, or nullptr if none completes within `longest`.
+  /// Its image is valid until giveBack().
   libcamera::Request* next(std::chrono::milliseconds longest);
   void giveBack(libcamera::Request* request);
 
-  /// False if the kernel has removed the camera, but udev has not yet reported this to libcamera.
+  /// Returns false if the kernel has removed the camera but udev has not yet reported this to
+  /// libcamera.
   bool over() override;
 
  private:
@@ -79,7 +84,7 @@ class RunningCamera final : public Unended, public libcamera::Object {
   std::vector<std::unique_ptr<libcamera::Request>> requests_;
   std::vector<int> nodes_;  ///< descriptors of the camera's video nodes, which libcamera opened
   libcamera::ControlList asked_;
-  /// Request with the controls, until it is completed.
+  /// The request that contains the controls, until it is completed.
   const libcamera::Request* asking_ = nullptr;
   BoundedQueue<libcamera::Request*> done_{2 * kBuffers, Overflow::kDropOldest};  // never full
   std::deque<libcamera::Request*> in_hand_;  ///< taken from done_, in the driver's order

@@ -193,8 +193,8 @@ Result<Frame> Session::frameOf(const FrameBuffer& buffer) {
   return vision::compressed(*frame, settings_.jpeg_quality);
 }
 
-/// Time of the image. Without the sensor's own time, it is derived from the driver's time, which is
-/// later than the exposure.
+/// Returns the time of the image. Without the sensor's own time stamp, the driver's stamp is used,
+/// which is later than the exposure.
 std::int64_t Session::timeOf(Request& request, const libcamera::FrameMetadata& metadata) const {
   const auto exposure_us = request.metadata().get(controls::ExposureTime).value_or(0);
   const auto start = request.metadata().get(controls::SensorTimestamp);

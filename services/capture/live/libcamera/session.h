@@ -1,4 +1,4 @@
-// Sessions of libcamera's cameras.
+// Camera sessions through libcamera.
 #pragma once
 
 #include <functional>

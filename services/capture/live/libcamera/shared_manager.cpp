@@ -9,7 +9,7 @@
 
 namespace perdure::capture {
 
-/// Cameras that have not ended within kLongest are leaked: libcamera references them.
+/// Leaks the cameras that have not ended within kLongest, because libcamera still references them.
 SharedManager::~SharedManager() {
   constexpr std::chrono::milliseconds kLongest{2000}, kPause{50};
   for (auto left = kLongest; keeps() && left.count() > 0; left -= kPause) {

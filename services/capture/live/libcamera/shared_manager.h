@@ -1,4 +1,4 @@
-// libcamera's manager for all cameras of the process, which may have only one at a time.
+// The libcamera manager of all cameras. A process may have only one manager at a time.
 #pragma once
 
 #include <libcamera/camera_manager.h>
@@ -34,21 +34,23 @@ class SharedManager {
   SharedManager(const SharedManager&) = delete;
   SharedManager& operator=(const SharedManager&) = delete;
 
-  /// Cameras are opened one after the other. Hold this lock while calling manager() or missing().
+  /// Returns a lock with which cameras are opened one after the other. Hold it while calling
+  /// manager() or missing().
   std::unique_lock<std::mutex> opening() { return std::unique_lock(mutex_); }
-  /// Returns the manager, which exists as long as one of its cameras is used.
+  /// Returns the manager, which exists while one of its cameras is used. Fails if libcamera cannot
+  /// start.
   Result<std::shared_ptr<libcamera::CameraManager>> manager();
   /// Reports that the manager lacks a required camera. A new manager replaces it once no camera is
   /// used. The caller must hold one reference to the manager.
   void missing();
-  /// Reports that a camera was unplugged, with the same effect. Otherwise libcamera 0.0.3
-  /// enumerates the cameras 2^n times at the nth device that is plugged in.
+  /// Reports that a camera was unplugged. A new manager replaces this one, as with missing().
+  /// Otherwise libcamera 0.0.3 enumerates the cameras 2^n times when the nth device is plugged in.
   void unplugged();
-  /// Keeps a camera whose removal udev has not reported yet. A later manager() destroys it once
-  /// over() is true. The destructor waits for it for two seconds, and otherwise leaks it.
+  /// Keeps a camera whose removal udev has not reported yet. manager() destroys it later, once
+  /// over() returns true. The destructor waits for it for at most two seconds, and then leaks it.
   void keepUntilOver(std::unique_ptr<Unended> camera);
   bool keeps() const;
-  /// Increases if the open cameras must be closed briefly.
+  /// Returns a number that increases when the open cameras must be closed briefly.
   unsigned restarts() const { return restarts_; }
 
  private:

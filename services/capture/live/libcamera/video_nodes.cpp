@@ -17,7 +17,7 @@
 namespace perdure::capture {
 namespace {
 
-/// Descriptors, and the targets of their links.
+/// Returns the descriptors of open video nodes, and the targets of their links.
 std::vector<std::pair<int, std::string>> openVideoNodes(const std::filesystem::path& descriptors) {
   std::vector<std::pair<int, std::string>> nodes;
   std::error_code none;

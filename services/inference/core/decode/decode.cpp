@@ -9,8 +9,8 @@
 namespace perdure::inference {
 namespace {
 
-/// YOLOX: centre (gx + x)·s, size exp(w)·s. FastestDet: centre (gx + tanh x)·s, size σ(w)·input.
-/// YOLO-FastestV2: as YOLOv5, with anchor `a`.
+/// Decodes the box of cell (gx, gy) with stride s. YOLOX: centre (gx + x)·s, size exp(w)·s.
+/// FastestDet: centre (gx + tanh x)·s, size σ(w)·input. YOLO-FastestV2: as YOLOv5, with anchor `a`.
 Box boxOf(const ModelDescription& model, const Level& level, std::size_t a, int gx, int gy,
           const float* raw, std::size_t step) {
   if (model.family == Family::kYoloFastestV2) return anchoredBox(level, a, gx, gy, raw, step);
@@ -23,7 +23,8 @@ Box boxOf(const ModelDescription& model, const Level& level, std::size_t a, int 
                  sigmoid(h) * model.input.height);
 }
 
-/// YOLOX, FastestDet, YOLO-FastestV2: planes box (4·A), objectness (A), classes (K), H×W cells.
+/// Decodes YOLOX, FastestDet and YOLO-FastestV2: planes of H×W cells for box (4·A), objectness (A)
+/// and classes (K).
 void decodePlanes(const ModelDescription& model, const DecodeOptions& options, const Level& level,
                   const Tensor* tensors, std::vector<Candidate>& out) {
   const int columns = model.input.width / level.stride, rows = model.input.height / level.stride;
@@ -42,8 +43,8 @@ void decodePlanes(const ModelDescription& model, const DecodeOptions& options, c
   }
 }
 
-/// YOLO-Fastest (YOLOv3 heads): rows of A·(x, y, w, h, objectness, K classes) for each cell. Centre
-/// (gx + σ(x))·s, size anchor·exp(w).
+/// Decodes YOLO-Fastest (YOLOv3 heads): each cell has a row of A·(x, y, w, h, objectness, K
+/// classes). Centre (gx + σ(x))·s, size anchor·exp(w).
 void decodeAnchors(const ModelDescription& model, const DecodeOptions& options, const Level& level,
                    const Tensor& tensor, std::vector<Candidate>& out) {
   const int columns = model.input.width / level.stride, rows = model.input.height / level.stride;

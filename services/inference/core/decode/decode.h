@@ -1,4 +1,5 @@
-// Decodes raw head tensors to boxes with evidence, by one rule for each family (eq. 6, 7).
+// Decodes the raw tensors of the heads to boxes with evidence. Each family has one rule (paper, eq.
+// 6, 7).
 #pragma once
 
 #include <array>
@@ -23,11 +24,12 @@ struct Candidate {
 };
 
 struct DecodeOptions {
-  double score_threshold = 0.05;    ///< least score of a box's best wanted class
+  double score_threshold = 0.05;    ///< least score of a box in its best wanted class
   std::vector<std::size_t> wanted;  ///< indices of the model's classes to report, in order
 };
 
-/// Fails with "model_output_shape" or "model_output_not_finite".
+/// Returns the boxes whose score reaches the threshold. Fails with "model_output_shape" or
+/// "model_output_not_finite".
 Result<std::vector<Candidate>> decode(const ModelDescription& model, const DecodeOptions& options,
                                       const std::vector<Tensor>& tensors);
 

@@ -7,7 +7,7 @@
 namespace perdure::inference {
 namespace {
 
-/// Column c of row i is at [c * column + i * row].
+/// Rows of a tensor. Column c of row i is at data[c * column + i * row].
 struct Rows {
   const float* data;
   std::size_t column, row;

@@ -17,7 +17,8 @@ std::size_t cellCount(const ModelDescription& model, const Level& level) {
   return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
 }
 
-/// View of sides and classes in one tensor. YOLOv8 has the sides first, NanoDet the classes.
+/// Returns the view of sides and classes in one tensor. YOLOv8 has the sides first, NanoDet the
+/// classes.
 LevelView together(const ModelDescription& model, const float* data, std::size_t channel_step,
                    std::size_t cell_step) {
   const std::size_t sides = 4 * static_cast<std::size_t>(model.bins);
@@ -47,7 +48,7 @@ std::vector<LevelView> levelViewsOf(const ModelDescription& model,
   return views;
 }
 
-/// Mean distance, in cells.
+/// Returns the mean of a distance's bins, in cells.
 double meanDistance(const float* bins, std::size_t step, int count) {
   const auto p = softMax(bins, step, static_cast<std::size_t>(count));
   double mean = 0;
@@ -85,7 +86,7 @@ void decodeDistances(const ModelDescription& model, const DecodeOptions& options
       candidate.box = boxOf(model, x, y, s, view, i);
       const Box& box = candidate.box;
       if (model.bins == 1 && (box.x2 <= box.x1 || box.y2 <= box.y1))
-        continue;  // the box has negative distances
+        continue;  // negative distances give no box
       out.push_back(std::move(candidate));
     }
   }

@@ -9,7 +9,7 @@
 namespace perdure::inference {
 namespace {
 
-constexpr double kMostNats = 5.0;  // limit for one top-down answer
+constexpr double kMostNats = 5.0;  // ± limit of one top-down answer
 
 struct Overlap {
   double iou = 0.0;
@@ -26,7 +26,7 @@ Overlap mostOverlapping(const Box& box, const Boxes& others) {
   return most;
 }
 
-/// The expectations and the reported boxes that have a match.
+/// Whether each expectation (`met`) and each reported box (`used`) has a match.
 struct Meetings {
   std::vector<bool> met, used;
 };
@@ -48,7 +48,7 @@ Meetings meet(const std::vector<Expectation>& expected, const std::vector<Candid
   return result;
 }
 
-/// Variances of a network's box sides near an expectation.
+/// Returns the variances, in pixels², assumed for the sides of a network's box near an expectation.
 std::array<double, 4> ownVariances(const Box& expected) {
   constexpr double kRelative = 0.07, kPixels = 1.0;
   const double x = kPixels + kRelative * expected.width();
@@ -58,7 +58,7 @@ std::array<double, 4> ownVariances(const Box& expected) {
 
 std::array<double, 4> sidesOf(const Box& b) { return {b.x1, b.y1, b.x2, b.y2}; }
 
-/// Squared distance of the sides, relative to the variances of prediction and box together.
+/// Returns the squared distance of the sides, relative to the sum of both boxes' variances.
 double distance2(const Box& box, const Expectation& expectation) {
   const auto own = ownVariances(expectation.box), a = sidesOf(box), b = sidesOf(expectation.box);
   double sum = 0.0;
@@ -108,7 +108,7 @@ Candidate fused(const Expectation& expectation, const Candidate& candidate) {
   Candidate result = candidate;
   for (std::size_t i = 0; i < 4; ++i) {
     const double variance = expectation.side_sigma[i] * expectation.side_sigma[i];
-    // The weight of the prediction.
+    // Weight of the prediction.
     const double share = variance > 0.0 ? own[i] / (own[i] + variance) : 0.0;
     sides[i] = share * predicted[i] + (1.0 - share) * box[i];
     result.side_sigma[i] = std::sqrt((1.0 - share) * own[i]);

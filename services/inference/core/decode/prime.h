@@ -18,7 +18,7 @@
 
 namespace perdure::inference {
 
-/// Predicted box: a Gaussian in its four sides.
+/// Predicted box, a Gaussian in its four sides.
 struct Expectation {
   Box box;                             ///< pixels of the network's input
   std::size_t activation = 1;          ///< index of its class in Candidate::activations
@@ -33,33 +33,34 @@ struct PrimedAnswer {
   double odds = 0.0;  ///< log-odds of the class, minus ½ of the candidate's squared distance
 };
 
-/// Smallest IoU at which a reported box matches an expectation, or a candidate is near it.
+/// Least IoU at which a reported box matches an expectation, and at which a candidate is near it.
 inline constexpr double kMet = 0.6, kNear = 0.4;
 
-/// Matches reported boxes and expectations one to one, by falling overlap. The boxes of several
-/// objects in a row are often merged into one, but their candidates are separate. A candidate
-/// therefore belongs to the expectation that it overlaps most, independent of merging. If it
-/// overlaps an unmatched reported box more, it belongs to that box.
+/// Matches reported boxes and expectations one to one, by falling overlap, and answers the other
+/// expectations. The boxes of several objects in a row are often merged into one, but their
+/// candidates are separate. A candidate therefore belongs to the expectation that it overlaps most,
+/// even if it was merged. If it overlaps an unmatched reported box more, it belongs to that box.
 ///
-/// Each expectation takes its best candidate by activation and position: the highest log-odds of
-/// the class − ½ Σ d² / σ², with σ of the prediction and of the box together. The result is in the
-/// order of the expectations.
+/// The best candidate of an expectation has the highest log-odds of the class − ½ Σ d² / σ², where
+/// σ² is the sum of the variances of prediction and box. The result has one answer for each
+/// unmatched expectation, in their order.
 std::vector<PrimedAnswer> prime(const Calibration& calibration,
                                 const std::vector<Expectation>& expected,
                                 const std::vector<Candidate>& reported,
                                 const std::vector<Candidate>& candidates);
 
-/// Combines prediction and box; each side is weighted by its variance.
+/// Returns the candidate with the weighted mean of its box and the prediction. Sides are weighted
+/// by their inverse variances.
 Candidate fused(const Expectation& expectation, const Candidate& candidate);
 
-/// log P(answer | object present, unreported) / P(answer | no object), nats.
+/// Returns log P(answer | object present, unreported) / P(answer | no object), in nats within ±5.
 double primedLogRatio(const PrimedCalibration& primed, const PrimedAnswer& answer);
 
-/// Time for which predictions are valid after their frame.
+/// Time after their frame for which predictions are valid.
 inline constexpr double kPrimedHorizon_s = 0.5;
 
-/// Whether the predictions match the frame's camera and source. Their frame must not be later than
-/// this frame, and at most kPrimedHorizon_s older.
+/// Returns true if the predictions have the frame's camera and source, and if their frame is at
+/// most kPrimedHorizon_s older than this frame and not later.
 bool fitsFrame(const Predictions& predictions, const Frame& frame);
 
 Box movedOn(const Prediction& prediction, double after);

@@ -21,7 +21,8 @@ struct Vote {
     for (std::size_t i = 0; i < 4; ++i) sigma_sum[i] += w * candidate.side_sigma[i];
     weight += w;
   }
-  /// The votes come from the same pixels, so their mean has the same uncertainty as each of them.
+  /// Replaces the candidate's box by the mean. Its uncertainty is that of a single box, because all
+  /// boxes come from the same pixels.
   void decide(Candidate& candidate) const {
     if (weight <= 0.0) return;
     candidate.box = {sum.x1 / weight, sum.y1 / weight, sum.x2 / weight, sum.y2 / weight};
@@ -29,13 +30,14 @@ struct Vote {
   }
 };
 
-/// He et al., "Bounding box regression with uncertainty" (CVPR 2019), eq. 7, with score for 1/σ².
+/// Returns the weight of a merged box: He et al., "Bounding box regression with uncertainty" (CVPR
+/// 2019), eq. 7, with the score in place of 1/σ².
 double voteOf(const Candidate& candidate, double overlap) {
   constexpr double kWidth = 0.025;
   return candidate.score * std::exp(-(1.0 - overlap) * (1.0 - overlap) / kWidth);
 }
 
-/// Share of `box` that `by` covers.
+/// Returns the share of `box` that `by` covers.
 double covered(const Box& box, const Box& by) {
   const double width = std::min(box.x2, by.x2) - std::max(box.x1, by.x1);
   const double height = std::min(box.y2, by.y2) - std::max(box.y1, by.y1);
@@ -43,7 +45,7 @@ double covered(const Box& box, const Box& by) {
   return width > 0.0 && height > 0.0 && area > 0.0 ? width * height / area : 0.0;
 }
 
-/// Subtracts evidence from `weaker` for the area where it covers `better`; see suppress.h.
+/// Subtracts evidence from `weaker` for the share of `better` that it covers (suppress.h).
 void discount(const Candidate& better, Candidate& weaker) {
   const double share = covered(better.box, weaker.box);
   if (share <= 0.0) return;

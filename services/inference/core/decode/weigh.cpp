@@ -58,17 +58,18 @@ float evidence(const Calibration& calibration, double log_odds) {
   return evidenceOf(calibration, std::clamp(log_odds, -kMaxLogit, kMaxLogit));
 }
 
-/// Whether the score is σ(o)·σ(c_k), as in most networks.
+/// Returns true if the score is σ(o)·σ(c_k), as in most networks.
 bool isPlainProduct(const ModelDescription& model) {
   return !model.class_softmax && model.objectness_exponent == 1.0 && model.class_exponent == 1.0;
 }
 
-/// logit(σ(o) σ(c)) = −log(u + e^−c (1 + u)) with u = e^−o: one logarithm a class, exact.
+/// Returns logit(σ(o) σ(c)) = −log(u + e^−c (1 + u)) with u = e^−o, which is exact and needs one
+/// logarithm per class.
 double logitOfProduct(double u, double c) {
   return u == 0.0 ? c : -std::log(u + std::exp(-c) * (1.0 + u));
 }
 
-/// Score from objectness and classes, or from classes alone.
+/// Computes score and activations from objectness and classes, or from classes alone.
 std::optional<std::size_t> weighAlone(const ModelDescription& model, const DecodeOptions& options,
                                       const RawScores& raw, Candidate& candidate) {
   const double log_threshold = std::log(options.score_threshold);
@@ -102,7 +103,7 @@ std::optional<std::size_t> weighAlone(const ModelDescription& model, const Decod
   return best;
 }
 
-/// Score from a soft-max over classes and background.
+/// Computes score and activations from a soft-max over classes and background.
 std::optional<std::size_t> weighAgainstBackground(const ModelDescription& model,
                                                   const DecodeOptions& options,
                                                   const RawScores& raw, Candidate& candidate) {

@@ -18,12 +18,12 @@ Result<cv::Mat> viewOf(const Frame& frame) {
     return fail("frame_malformed", "the image's size and its data do not agree");
   }
   const int type = frame.encoding == ImageEncoding::kBgr8 ? CV_8UC3 : CV_8UC1;
-  // OpenCV has no view of constant data; this code does not write to it.
+  // cv::Mat cannot refer to constant data. The callers do not write to the image.
   auto* data = const_cast<std::uint8_t*>(frame.data->data());
   return cv::Mat(static_cast<int>(frame.height), static_cast<int>(frame.width), type, data);
 }
 
-/// Interleaved 8-bit BGR to float planes in the network's colour order.
+/// Converts interleaved 8-bit BGR to float planes in the network's colour order.
 cv::Mat toPlanes(const Input& input, const cv::Mat& bgr) {
   const int sizes[] = {1, 3, input.height, input.width};
   cv::Mat blob(4, sizes, CV_32F);
@@ -132,10 +132,10 @@ Result<cv::Mat> makeBlob(const Input& input, const Frame& frame, int quarters) {
 
 int uprightQuarters(const Eigen::Vector3d& up_C, int present) {
   constexpr double kQuarter = std::numbers::pi / 2;
-  constexpr double kMargin = std::numbers::pi / 18;  // the turn changes at 45° plus this margin
-  constexpr double kLeast = 0.5;                     // share of `up_C` in the image plane
+  constexpr double kMargin = std::numbers::pi / 18;  // the turn changes beyond 45° plus this
+  constexpr double kLeast = 0.5;                     // least share of `up_C` in the image plane
   if (!(up_C.head<2>().norm() > kLeast)) return present;
-  // Clockwise turn after which `up_C` points to the top, that is against y.
+  // Clockwise turn after which `up_C` points to the top of the image, against y.
   const double turn = -std::atan2(up_C.x(), -up_C.y());
   const double lean = std::remainder(turn - present * kQuarter, 4 * kQuarter);
   if (std::abs(lean) <= kQuarter / 2 + kMargin) return present;

@@ -11,7 +11,7 @@ namespace {
 
 constexpr const char* kWho = "ONNX Runtime ";
 
-/// One environment for the process, without log output, because errors are thrown.
+/// Returns the environment of the process. It does not log errors, because they are also thrown.
 Ort::Env& environment() {
   static Ort::Env env(ORT_LOGGING_LEVEL_FATAL, "perdure");
   return env;
@@ -31,7 +31,7 @@ Ort::SessionOptions optionsOf(int threads) {
   Ort::SessionOptions options;
   options.SetIntraOpNumThreads(threads);
   options.SetInterOpNumThreads(1);
-  // Waiting threads sleep, because other services need the core.
+  // Waiting threads sleep, because other services need the CPU cores.
   options.AddConfigEntry("session.intra_op.allow_spinning", "0");
   return options;
 }
@@ -74,7 +74,7 @@ class OnnxRuntimeNetwork : public Network {
                                                blob.size[3]};
     const char* input = input_.c_str();
     try {
-      // The runtime does not write to an input, but its interface takes no const.
+      // The runtime does not write to an input, but its interface has no const.
       const Ort::Value image = Ort::Value::CreateTensor<float>(
           memory_, const_cast<float*>(blob.ptr<float>()), blob.total(), shape.data(), shape.size());
       outputs_ = session_.Run(Ort::RunOptions{nullptr}, &input, &image, 1, name_pointers_.data(),
@@ -121,7 +121,7 @@ Result<std::unique_ptr<Network>> loadWithOnnxRuntime(const NetworkFile& file,
   if (!file.darknet_weights.empty()) {
     return fail("model_unreadable", kWho + std::string("does not take Darknet files"));
   }
-  // Debian's library registers operators twice, which logs an error for each.
+  // Debian's library registers some operators twice and prints an error for each.
   const HeldErrors held(
       [](const std::string& line) { return !line.empty() && !line.starts_with("Schema error: "); });
   try {

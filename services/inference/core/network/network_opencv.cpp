@@ -7,7 +7,7 @@
 namespace perdure::inference {
 namespace {
 
-/// Stops OpenCV from printing the errors that it also throws.
+/// Prevents OpenCV from printing the errors that it also throws.
 class QuietOpenCv {
  public:
   QuietOpenCv() : before_(cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT)) {}
@@ -19,8 +19,8 @@ class QuietOpenCv {
   cv::utils::logging::LogLevel before_;
 };
 
-/// Summarises an OpenCV exception in one line. It is the unsupported operator if the text has one
-/// ("> Node [Where@ai.onnx]:(onnx_node!Where_2) parse error …"), otherwise the first line.
+/// Summarises an OpenCV exception in one line: the unsupported operator if the text names one (">
+/// Node [Where@ai.onnx]:(onnx_node!Where_2) parse error …"), otherwise the first line.
 std::string gist(const std::string& text) {
   const std::size_t begin = text.find("Node ["), end = text.find_first_of("@]", begin);
   if (begin != std::string::npos && end != std::string::npos) {
@@ -37,15 +37,15 @@ std::string lastOf(const std::vector<std::string>& names, std::size_t count) {
   return text;
 }
 
-/// OpenCV reads past the end of a short .weights file without an error.
+/// Checks the size of a .weights file, because OpenCV reads past its end without an error.
 Result<void> checkWeights(cv::dnn::Net& net, std::size_t bytes) {
   std::size_t needed = 0;
   for (const std::string& name : net.getLayerNames()) {
     const auto layer = net.getLayer(net.getLayerId(name));
-    if (layer->type == "Region") continue;  // its anchors come from the .cfg
+    if (layer->type == "Region") continue;  // its blobs are anchors, which come from the .cfg
     for (const cv::Mat& blob : layer->blobs) needed += blob.total() * sizeof(float);
   }
-  constexpr std::size_t kHeader = 16;  // 20 since Darknet 0.2
+  constexpr std::size_t kHeader = 16;  // bytes; 20 since Darknet 0.2
   if (bytes >= needed + kHeader) return {};
   return fail("model_unreadable", "its .weights has " + std::to_string(bytes) + " bytes and the " +
                                       ".cfg needs " + std::to_string(needed + kHeader));

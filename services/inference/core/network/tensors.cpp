@@ -15,7 +15,7 @@ std::string textOf(const Shape& shape) {
   return text.empty() ? "nothing" : text;
 }
 
-/// The other layout of a YOLOv5 head, (1,A,H,W,5+K); empty for all other networks.
+/// Returns the other layout of a YOLOv5 head, (1,A,H,W,5+K); an empty shape for other networks.
 Shape otherLayout(const ModelDescription& model, const Shape& shape) {
   if (model.family != Family::kYolov5 || shape.size() != 4) return {};
   const int row = 5 + static_cast<int>(model.classes.size());

@@ -6,11 +6,11 @@ namespace perdure::inference {
 namespace {
 
 constexpr std::size_t kMaxModels = 256;
-constexpr float kSure = 2.0F;       // nats of a certain class against clutter
-constexpr double kSameThing = 0.3;  // intersection over union
+constexpr float kSure = 2.0F;       // nats against clutter; a class with more is certain
+constexpr double kSameThing = 0.3;  // least IoU of boxes of the same object
 constexpr std::size_t kFlood = 10;
 
-/// Index of the most probable class, if the box is certain.
+/// Returns the index of the most probable class if the box is certain.
 std::optional<std::size_t> sureClass(const Detection& d) {
   if (d.activations.size() < 2) return std::nullopt;
   const auto best = std::max_element(d.activations.begin() + 1, d.activations.end());
@@ -28,7 +28,8 @@ bool hasBoxAt(const Detections& list, const Box& box) {
   });
 }
 
-/// Counts boxes without top-down answers, which are weak evidence about the network.
+/// Returns the number of boxes. Top-down answers are not counted, because they say little about the
+/// network.
 std::size_t boxesOf(const Detections& list) {
   return static_cast<std::size_t>(std::count_if(list.detections.begin(), list.detections.end(),
                                                 [](const Detection& d) { return !d.primed; }));

@@ -1,5 +1,6 @@
-// Strength with which a result may be written. A process that was considered dead, or that is late,
-// must not take the topic back with old results. It first writes with a strength below the others.
+// Strength with which a process may write its results. A process that is late, or that others
+// considered dead, must not take the topic back with old results. It first writes with a strength
+// below all others.
 #pragma once
 
 #include <chrono>
@@ -27,12 +28,12 @@ class Ownership {
 
   Ownership(std::int64_t strength, bool standby, Duration lease)
       : full_(strength - (standby ? 1 : 0)), lease_(lease) {}
-  /// Ownership of a rehearsing process: always below all others.
+  /// Returns the ownership of a rehearsing process, whose strength is below all others.
   static Ownership unheard(Duration lease) { return {kOutOfForm - 1, false, lease}; }
 
-  /// Returns the strength; call it before each write. `age`: time since this process received the
-  /// frame. `losses`: number of expired leases of its writer since the start. `alone`: no other
-  /// writer is received.
+  /// Reports a result and returns the strength. Call it before each write. `age` is the time since
+  /// this process received the frame, `losses` the number of expired leases of its writer since the
+  /// start. `alone` is true if no other writer is received.
   std::int64_t strengthFor(Time now, Duration age, std::uint64_t losses, bool alone) {
     failures_ = 0;
     if (losses > losses_ || age > lease_) {
@@ -41,17 +42,18 @@ class Ownership {
     } else if (!in_form_) {
       in_form_ = ++good_ >= kGoodResults && now - lost_at_ >= kLeases * lease_;
     }
-    // An unfit process that just resumed may not yet have received messages of other writers.
+    // A process out of form stays a spare, because after a suspension it may not yet have received
+    // messages of other writers.
     if (in_form_ && alone) spare_ = false;
     return strength();
   }
-  /// Reports that the network gave no result. Returns true if this causes the loss of form.
+  /// Reports a failure of the network. Returns true if form is lost by it.
   bool noteFailure(Time now) {
     const bool lost = ++failures_ >= kFailures && in_form_;
     if (failures_ >= kFailures) loseForm(now);
     return lost;
   }
-  /// Sets a strength above all others, as the swap decides.
+  /// Sets the strength that the swap has chosen above all others.
   void lead(std::int64_t strength) {
     full_ = strength;
     spare_ = false;
@@ -60,7 +62,8 @@ class Ownership {
     return in_form_ && !spare_ ? full_ : full_ < kOutOfForm ? full_ : kOutOfForm;
   }
   bool inForm() const { return in_form_; }
-  /// The process is fit, but another process writes and continues to write.
+  /// Returns true if the process lost its form and has not been alone since it regained it. It then
+  /// leaves the topic to another writer.
   bool spare() const { return spare_; }
 
  private:

@@ -6,14 +6,14 @@
 namespace perdure::inference {
 namespace {
 
-constexpr std::size_t kRemembered = 32;  // stored results of each side
-constexpr std::size_t kHeard = 128;      // stored frames
-// leases, and own results, after which a new process counts as silent
+constexpr std::size_t kRemembered = 32;  // number of stored results of each process
+constexpr std::size_t kHeard = 128;      // number of stored frame stamps
+// number of leases and of own results after which a new process counts as silent
 constexpr int kSilence = 3;
-constexpr int kWorth = 4;  // leases for which a result is repeated
-// time without other processes after which a new process takes over
+constexpr int kWorth = 4;  // results older than this many leases are not repeated
+// time without results of others after which a new process takes over
 constexpr std::chrono::seconds kNobody{3};
-// added to the probation, for the last notice of the new process
+// added to the probation, so that the last notice of the new process can arrive
 constexpr std::chrono::seconds kGrace{10};
 
 template <class T>
@@ -93,12 +93,12 @@ void Swap::heard(const Detections& detections, Time now) {
   other_at_ = now;
   if (watch_ && watch_->newcomer == other_) watch_->silent_results = 0;
   const auto before = findFrame(others_, detections.stamp, [](const auto& d) { return d.stamp; });
-  if (before != others_.rend() && before->instance == other_) return;  // a repetition
+  if (before != others_.rend() && before->instance == other_) return;  // a repeated result
   keep(others_, detections, kRemembered);
   const auto own = findFrame(own_, detections.stamp, stampOfMade);
   if (own != own_.rend()) compare(own->detections, detections);
   judgeNow(now);
-  // The other's result for this frame is here, so this process may take over from the next on.
+  // The other process has delivered this frame, so this process may take over from the next one on.
   if (role_ == Role::kRehearsing && good_ >= kRehearsal) return takeOver(now);
   const bool outbid = role_ == Role::kProbation && now - since_ > 2 * options_.lease &&
                       now - self_at_ > 2 * options_.lease;
@@ -148,7 +148,7 @@ void Swap::giveUp(const Reason& reason, bool tell) {
   if (tell) notify(SwapStep::kRolledBack, 0, reason);
 }
 
-/// Unknown reasons from other processes are counted as "other".
+/// Counts a roll-back by its reason. Unknown reasons from other processes are counted as "other".
 void Swap::countRollBack(const std::string& reason) {
   static const std::set<std::string> known = {
       "fails", "late", "slow", "silent", "empty", "flood", "elsewhere", "outbid", "unknown_model"};
@@ -196,7 +196,8 @@ void Swap::retire(const SwapNotice& notice, Time now) {
   actions_.end = true;
 }
 
-/// Results since `from` may have reached this process, but not yet others. tick() repeats them.
+/// Repeats recent own results of frames for which no result was received. Results since `from` may
+/// not have reached all readers, so tick() repeats them later.
 void Swap::sayAgain(Time from, Time now) {
   again_.clear();
   for (const Made& made : own_) {
@@ -211,7 +212,7 @@ void Swap::sayAgain(Time from, Time now) {
 }
 
 void Swap::tick(Time now) {
-  // Readers learn of a new owner at different times, so results are repeated.
+  // Repeats results, because readers switch to a new owner at different times.
   if (again_at_ != Time{} && now >= again_at_) {
     again_at_ = Time{};
     for (const Made& made : own_) {

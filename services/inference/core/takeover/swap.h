@@ -1,7 +1,6 @@
-// Takeover of one inference process by another while frames arrive, seen from each of the two. It
-// is a state machine over own results, received results and received notices. It has no clock: each
-// call passes the time. No third process is needed; the process that started the new one may have
-// ended.
+// A new inference process takes over from an old one while frames arrive. Each of them runs this
+// state machine over its own results, received results and received notices. It has no clock: each
+// call passes the time. The process that started the new one is not needed.
 //
 //   new one:   rehearsing ──► on probation ──► plain          gives up: silent, and ends
 //   old one:   plain ──► watches ──► retires                  takes back: outbids the new one
@@ -28,14 +27,14 @@ struct SwapOptions {
 
 class Swap {
  public:
-  static constexpr std::size_t kRehearsal = 15;  ///< plausible frames in a row
+  static constexpr std::size_t kRehearsal = 15;  ///< plausible frames in a row that suffice
   static constexpr std::size_t kPatience = 150;  ///< number of own results after which a rehearsal
                                                  ///< is too slow
-  static constexpr int kFailures = 3;            ///< failures of the network in a row
+  static constexpr int kFailures = 3;            ///< failures in a row that end a new process
   using Time = std::chrono::steady_clock::time_point;
 
   struct Actions {
-    bool lead = false;   ///< write with a strength above all others
+    bool lead = false;   ///< write with a strength above all others from now on
     bool yield = false;  ///< stop writing
     bool end = false;    ///< end the process; `failure` is empty on success
     std::string failure;
@@ -46,20 +45,20 @@ class Swap {
   explicit Swap(SwapOptions options);
 
   void learn(const ModelInfo& model) { judge_.learn(model); }
-  /// `in_form`: whether the result is in time and the lease has not expired.
+  /// Takes an own result. `in_form` is Ownership::inForm() after this result.
   void ownResult(const Detections& own, bool in_form, Time now);
   void ownFailure(const Reason& reason);
   /// Takes each message of `detections` that readers receive, including own ones.
   void heard(const Detections& detections, Time now);
   void told(const SwapNotice& notice, Time now);
-  /// Call it several times in a lease.
+  /// Advances the time. Call it several times in a lease.
   void tick(Time now);
   Actions take() { return std::exchange(actions_, {}); }
 
-  /// Whether no other writer was received for a lease.
+  /// Returns true if no other writer was received for a lease.
   bool alone(Time now) const { return now - other_at_ > options_.lease; }
   bool rehearsing() const { return role_ == Role::kRehearsing; }
-  /// Last event, for people; empty if there was none.
+  /// Returns the last event as a text; empty if there was none.
   const std::string& message() const { return message_; }
   const ReasonCounts& reasons() const { return reasons_; }
 
@@ -97,9 +96,9 @@ class Swap {
   std::string message_;
   ReasonCounts reasons_;
   std::deque<Made> own_;           ///< own results, the newest last
-  std::deque<Detections> others_;  ///< received from others
+  std::deque<Detections> others_;  ///< results of other processes, the newest last
   std::deque<FrameStamp> frames_heard_;
-  InstanceId other_ = 0;  ///< last writer received other than this process
+  InstanceId other_ = 0;  ///< last other process from which a result was received
   Time other_at_{}, self_at_{};
   bool hearing_self_ = false;
   Time since_{};  ///< start of the role; while rehearsing, time of the first result
@@ -108,7 +107,7 @@ class Swap {
   InstanceId follows_ = 0;  ///< process that this new process replaces
   std::optional<Watch> watch_;
   std::vector<Detections> again_;
-  Time again_at_{}, again_from_{};  ///< time of the repetition, and start of the results to repeat
+  Time again_at_{}, again_from_{};  ///< time of the next repetition; oldest result to repeat
 };
 
 }  // namespace perdure::inference

@@ -13,7 +13,7 @@ using mapping::AnchorId;
 
 constexpr std::size_t kLoopsPerAnchor = 8;
 
-/// Returns the requested anchors of a component, nearest first.
+/// Returns the anchors within the query's radius, nearest first; `all` are those of a component.
 std::vector<AnchorId> nearestAnchors(const mapping::PoseGraph& graph,
                                      const std::vector<AnchorId>& all, const MapQuery& query) {
   const double reach = query.radius > 0.0 ? query.radius : std::numeric_limits<double>::infinity();
@@ -28,7 +28,8 @@ std::vector<AnchorId> nearestAnchors(const mapping::PoseGraph& graph,
   return ids;
 }
 
-/// Returns zeros (not known) if the variances are not finite or are too large to be of use.
+/// Returns standard deviations; zeros, which mean unknown, if a variance is not finite or too
+/// large.
 Eigen::Vector4d sigmaOf(const Eigen::Vector4d& variances) {
   constexpr double kNothing = 1e8;  // (10 km)², in m²
   const bool known = (variances.array() >= 0.0).all() && (variances.array() < kNothing).all();

@@ -21,8 +21,9 @@ constexpr auto gaussianFields = [](auto& io, auto& gaussian) {
   io(gaussian.mean.p, gaussian.mean.yaw, gaussian.covariance);
 };
 
-constexpr std::uint16_t kOneScale = 1;      // of anchors, for place and height
-constexpr std::uint16_t kAnchorFormat = 2;  // with a scale for each
+constexpr std::uint16_t kOneScale = 1;      // version of anchors with one scale for place and
+                                            // height
+constexpr std::uint16_t kAnchorFormat = 2;  // version of anchors with two scales
 
 constexpr auto anchorOfOneScale = [](auto& io, auto& anchor) {
   auto& stamp = anchor.stamp;
@@ -81,7 +82,7 @@ tl::unexpected<Reason> malformed(const std::string& what, const ByteReader& in) 
                                                        : ": bytes are missing or invalid"));
 }
 
-/// Checks the version first, then that all bytes are read and the value is sound.
+/// Decodes a value. Checks the version, that all bytes are read, and that the value is sound.
 template <class T>
 Result<T> decode(const std::string& what, std::span<const std::uint8_t> bytes, auto fields,
                  std::uint16_t format = kGraphFormat) {

@@ -1,4 +1,4 @@
-// Converts the pose graph to bytes and back, versioned, little-endian and exact.
+// Converts parts of the pose graph to little-endian bytes with a version, and back, without loss.
 #pragma once
 
 #include <cstdint>
@@ -11,19 +11,20 @@
 
 namespace perdure::map_store {
 
-/// The first two bytes of every blob. A reader refuses unknown versions.
+/// The version, in the first two bytes of every blob. Readers refuse unknown versions.
 inline constexpr std::uint16_t kGraphFormat = 1;
 
-/// Whether the value is sound: finite numbers, rotations of length 1, all required ids, PMFs within
-/// bounds, and no anchor before its `previous`. Unsound values are neither written nor read.
+/// Whether a value is sound: its numbers are finite, quaternions have length 1, required ids are
+/// present, PMFs are within bounds, and an anchor's id is above that of its `previous`. Unsound
+/// values are neither written nor read.
 bool isSound(const mapping::LevelPose& pose);
 bool isSound(const mapping::Anchor& anchor);
 bool isSound(const mapping::Edge& edge);
 bool isSound(const mapping::ObjectRecord& record);
 bool isSound(const mapping::View& view);
 
-// The decoders refuse ("graph_malformed") bytes that are truncated, too long, of another version or
-// unsound.
+// The decoders fail with "graph_malformed" if the bytes are truncated, too long, of an unknown
+// version, or unsound.
 
 Bytes encodeAnchor(const mapping::Anchor& anchor);
 Result<mapping::Anchor> decodeAnchor(std::span<const std::uint8_t> bytes);
@@ -35,7 +36,7 @@ Result<mapping::Edge> decodeEdge(std::span<const std::uint8_t> bytes);
 Bytes encodeRecord(const mapping::ObjectRecord& record);
 Result<mapping::ObjectRecord> decodeRecord(std::span<const std::uint8_t> bytes);
 
-/// Exact, because positions and deviations are stored as floats.
+/// Encodes a view without loss, because its positions and deviations are floats in memory too.
 Bytes encodeView(const mapping::View& view);
 Result<mapping::View> decodeView(std::span<const std::uint8_t> bytes);
 

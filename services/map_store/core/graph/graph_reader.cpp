@@ -15,14 +15,15 @@ namespace {
 using mapping::AnchorId;
 using mapping::SavedMap;
 
-/// Calls `take` for each row. If it returns false, the row is malformed.
+/// Calls `take` for each row. Counts the row as malformed if `take` returns false.
 template <class Take>
 void takeRows(const Connection& connection, std::string_view sql, std::uint64_t& malformed,
               Take take) {
   need(connection.forRows(sql, [&](const Statement& row) { malformed += take(row) ? 0 : 1; }));
 }
 
-/// Class names by their numbers. Names after a gap or a repetition are left out.
+/// Reads the class names in the order of their numbers. Leaves out names after a gap or a
+/// repetition.
 void readClasses(const Connection& connection, SavedGraph& graph) {
   auto& classes = graph.map.classes;
   takeRows(connection, "SELECT number, name FROM graph_classes ORDER BY number", graph.malformed,
@@ -108,7 +109,7 @@ void readViews(const Connection& connection, SavedGraph& graph) {
            });
 }
 
-/// Anchors that follow one that was left out are left out too.
+/// Leaves out anchors whose predecessor is missing, and all that follow them.
 void leaveOutBrokenChains(SavedGraph& graph) {
   auto& anchors = graph.map.anchors;
   for (auto at = anchors.begin(); at != anchors.end();) {
@@ -153,8 +154,8 @@ void leaveOutDangling(SavedGraph& graph) {
   }
 }
 
-/// Facts of a loop closure that was left out remain valid. If facts are missing (a map from a
-/// server), each object is one track.
+/// Adds the facts. Those of a loop closure that was left out become final. Sightings of an object
+/// without facts get its id as track id, because a map from a server has no facts.
 void takeFacts(SavedGraph& graph, const std::set<mapping::SameObject>& facts) {
   SavedMap& map = graph.map;
   for (mapping::SameObject fact : facts) {
@@ -172,8 +173,8 @@ void takeFacts(SavedGraph& graph, const std::set<mapping::SameObject>& facts) {
   }
 }
 
-/// Fixes the first anchor of each component without a fixed anchor, because that anchor or an edge
-/// to it may have been left out.
+/// Fixes the first anchor of each component that has no fixed anchor, because the fixed one or an
+/// edge to it may have been left out.
 void holdEachComponent(SavedMap& map) {
   DisjointSets<AnchorId> components;
   for (const auto& [id, saved] : map.edges) components.join(saved.edge.a, saved.edge.b);

@@ -7,9 +7,9 @@
 
 namespace perdure::map_store {
 
-// The blobs are encoded by core/graph/graph_codec.h. The columns beside them repeat some of their
-// values for queries. Values that change without their blob are in columns only: poses in M,
-// held_fast, weight. These columns have no type, because REAL would lose the sign of zero.
+// core/graph/graph_codec.h encodes the blobs. Other columns repeat some of their values for
+// queries. Values that change without their blob are only in columns: poses in M, held_fast,
+// weight. These columns have no type, because REAL would lose the sign of zero.
 const char* const kGraphSchema = R"sql(
 CREATE TABLE graph_classes(number INTEGER PRIMARY KEY, name TEXT NOT NULL);
 CREATE TABLE anchors(
@@ -67,7 +67,7 @@ constexpr char kPutClass[] =
     "INSERT INTO graph_classes VALUES(?1, ?2) ON CONFLICT(number) DO UPDATE SET name = ?2 "
     "WHERE name <> ?2";
 
-/// Runs `sql` for each element, bound by `bind`.
+/// Runs `sql` for each element of `all`; `bind` binds the element to the parameters.
 template <class All, class Bind>
 void runForEach(const Connection& connection, std::string_view sql, const All& all, Bind bind) {
   if (all.empty()) return;
@@ -118,7 +118,7 @@ void bindFact(Statement& to, const mapping::SameObject& fact) {
 
 void bindView(Statement& to, const ViewRow& row) { to.bindAll(row.first, encodeView(row.second)); }
 
-/// The elements of `all` that may be written; adds the number of the others to `refused`.
+/// Returns the elements of `all` that may be written. Adds the number of the others to `refused`.
 template <class All, class MayBeWritten>
 std::vector<std::reference_wrapper<const typename All::value_type>> soundOnes(
     const All& all, std::uint64_t& refused, MayBeWritten mayBeWritten) {

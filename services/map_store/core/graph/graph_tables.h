@@ -1,4 +1,4 @@
-// The tables of the pose graph. They are read as a whole.
+// The tables of the pose graph. The graph is always read as a whole.
 #pragma once
 
 #include <cstdint>
@@ -10,36 +10,38 @@
 
 namespace perdure::map_store {
 
-/// Maps of older versions have no tables of the graph.
+/// The first schema with tables of the graph.
 inline constexpr int kFirstSchemaWithGraph = 3;
 
 extern const char* const kGraphSchema;
-/// SQL that creates the later tables if they do not exist: views, and tracks that share an object.
+/// SQL that creates tables of later versions if they do not exist: views, and tracks that share an
+/// object.
 extern const char* const kAddedSchema;
 
-/// The graph in a file. The ends of edges, the anchors of sightings and predecessors of the same
-/// session exist. One anchor of each component is fixed.
+/// The graph in a file. It is consistent: it has the ends of all edges, the anchors of all
+/// sightings, and the predecessors of all anchors. Each component has a fixed anchor.
 struct SavedGraph {
   mapping::SavedMap map;
   /// Number of parts left out because they, or parts that they depend on, could not be read.
   std::uint64_t malformed = 0;
-  std::set<ObjectId> shortened;  ///< records that lost `earlier`
+  std::set<ObjectId> shortened;  ///< records whose `earlier` was left out
 };
 
-/// Reads one state of the file, even during writes. Returns an empty graph for older maps.
+/// Reads one state of the file, even while it is written. Returns an empty graph for maps with an
+/// older schema.
 Result<SavedGraph> readGraph(const Connection& connection);
 
-// The functions that write do so within the caller's transaction and throw Failed.
+// The write functions run within the caller's transaction and throw Failed.
 
-/// Unsound parts (graph_codec.h) stay as they are stored; returns their number. Records of objects
-/// that were not confirmed are not written.
+/// Writes the changes. Does not write unsound parts (graph_codec.h), whose stored rows remain, and
+/// returns their number. Does not write records of unconfirmed objects.
 std::uint64_t writeGraph(const Connection& connection, const mapping::Unsaved& unsaved);
 
-/// Returns which tracks are one object; empty for maps of older versions.
+/// Reads which tracks are one object. Returns an empty set for maps with an older schema.
 Result<std::set<mapping::SameObject>> readFacts(const Connection& connection);
 void writeFacts(const Connection& connection, const mapping::Unsaved& unsaved);
 
-/// Deletes the rows that readGraph leaves out, because their ids are reused.
+/// Deletes the rows that readGraph() leaves out, because their ids will be reused.
 void sweepGraph(const Connection& connection);
 
 }  // namespace perdure::map_store

@@ -70,7 +70,7 @@ void reviseOcclusion(Belief& belief, ScratchVector<TrackVisibility>& visibilitie
 void explainPartialViews(const Belief& belief, const ScratchVector<TrackVisibility>& visibilities,
                          FrameInput& input, const Parameters& parameters,
                          const ClassPriors& priors) {
-  ScratchVector<std::pair<std::size_t, double>> partial_views;  // and its expected number of boxes
+  ScratchVector<std::pair<std::size_t, double>> partial_views;  // track, expected boxes
   for (std::size_t j = 0; j < visibilities.size(); ++j) {
     if (visibilities[j].residual_fraction <= 0.0) continue;
     const Track& o = belief.tracks[j];
@@ -81,7 +81,7 @@ void explainPartialViews(const Belief& belief, const ScratchVector<TrackVisibili
   if (partial_views.empty()) return;
   BoxExplanations expected(belief, input, parameters);
   for (BoxDetection& box : *input.boxes) {
-    double ratio = 0.0;  // to clutter
+    double ratio = 0.0;  // of the likelihood of all partial views to clutter
     for (const auto& [j, detections] : partial_views) {
       const auto fit = expected.fit(j, visibilities[j].hidden_sides, box);
       if (fit) ratio += detections * std::exp(*fit);

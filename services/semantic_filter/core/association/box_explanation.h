@@ -1,5 +1,5 @@
-// How well the best hypothesis of each track explains a box: the measurement likelihood of one
-// hypothesis (paper, eq. 7). Derivation: tools/docs/maths/measurement_likelihood.md.
+// Measurement likelihood of a box (paper, eq. 7) given the best hypothesis of each track.
+// Derivation: tools/docs/maths/measurement_likelihood.md.
 #pragma once
 
 #include <array>
@@ -16,8 +16,9 @@ class BoxExplanations {
  public:
   BoxExplanations(const Belief& belief, const FrameInput& input, const Parameters& parameters);
 
-  /// Returns the log-likelihood ratio of the box, sides and class, to clutter, nats; nothing
-  /// outside the gate of track j (index). `hidden`: sides that a nearer object hides.
+  /// Returns the log-likelihood ratio of the box (sides and class) to clutter given the track with
+  /// index j, in nats. Returns nothing if the box is outside the gate or the object is not in front
+  /// of the camera. `hidden`: sides that a nearer object hides.
   std::optional<double> fit(std::size_t j, const std::array<bool, 4>& hidden,
                             const BoxDetection& box);
 
@@ -26,11 +27,11 @@ class BoxExplanations {
   const FrameInput& input_;
   Projector from_;
   Judge judge_;
-  ScratchVector<std::optional<std::optional<PredictedBox>>> at_;  ///< outer: computed
+  ScratchVector<std::optional<std::optional<PredictedBox>>> at_;  ///< outer empty: not computed
 };
 
 /// Adds the partial views of tracks with v = 0 to the clutter of each box (log_partial_views). The
-/// box is then less likely a new object or that of another track. The tracks do not change.
+/// box then supports a new or another track less. The tracks do not change.
 void explainPartialViews(const Belief& belief, const ScratchVector<TrackVisibility>& visibilities,
                          FrameInput& input, const Parameters& parameters,
                          const ClassPriors& priors);

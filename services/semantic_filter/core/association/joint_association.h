@@ -9,7 +9,8 @@
 namespace perdure::semantic_filter {
 
 struct Association {
-  /// eta(j, z): message from all other tracks to track j, in (0, 1]: how free box z is for it.
+  /// eta(j, z): message from all other tracks to track j, in (0, 1]. The better another track or a
+  /// new one explains box z, the smaller it is.
   Eigen::MatrixXd eta;
   /// explained(z): probability that some track made box z.
   Eigen::VectorXd explained;

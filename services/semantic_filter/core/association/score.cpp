@@ -9,7 +9,7 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kMaxLogLikelihood = 40.0;  // nats, keeps products finite
-constexpr double kMaxDetection = 0.98;      // of v without an unmapped occluder
+constexpr double kMaxDetection = 0.98;      // largest v P_D, as a share of v
 
 /// Returns the number of earlier observations that share the errors of this view of `position`.
 double correlatedObservations(const Eigen::Vector3d& position, const Viewpoint& last,
@@ -21,7 +21,7 @@ double correlatedObservations(const Eigen::Vector3d& position, const Viewpoint& 
   return last.observations * correlation;
 }
 
-/// Returns the log clutter density of the compared sides. With fewer sides it has other units.
+/// Returns the log clutter density of the compared sides. Its unit depends on their number.
 double logClutterOf(const BoxDetection& e, const BoxScore& score, const View& view,
                     const ClutterParameters& parameters) {
   const auto& ignored = score.ignored;
@@ -53,11 +53,11 @@ HypothesisScore scoreHypothesis(const Hypothesis& hypothesis, const Track& track
   return h;
 }
 
-/// Bounds of the boxes that mayOverlap can accept. To reject boxes elsewhere is most of the work.
+/// Bounds of the boxes that mayOverlap can accept. They reject most boxes at little cost.
 struct Reach {
   double least[2], most[2];
 
-  /// False only if mayOverlap is surely false.
+  /// Returns false only if mayOverlap rejects the box for every hypothesis.
   bool touches(const BoxMeasurement& z) const {
     for (int axis = 0; axis < 2; ++axis) {
       if (z.sides[axis] > most[axis] || z.sides[axis + 2] < least[axis]) return false;
@@ -68,7 +68,7 @@ struct Reach {
 
 Reach reachOf(const ScratchVector<HypothesisScore>& hypotheses,
               const std::vector<BoxDetection>& boxes) {
-  constexpr double kFar = 1e30, kReach = 5.01;  // deviations, a little more than mayOverlap takes
+  constexpr double kFar = 1e30, kReach = 5.01;  // deviations, slightly more than in mayOverlap
   double noise[2] = {0.0, 0.0};
   for (const BoxDetection& e : boxes) {
     for (int axis = 0; axis < 2; ++axis) noise[axis] = std::max(noise[axis], e.z.variance[axis]);
@@ -182,7 +182,8 @@ void applyTopDown(TrackScore& score, const Track& track, const std::vector<doubl
                   const FrameContext& frame) {
   const auto k = frame.model->index.find(track.best().class_name);
   if (k == frame.model->index.end() || k->second >= log_ratio.size()) return;
-  // Correlated mistakes temper an answer in favour; the unmapped occluder limits one against.
+  // Evidence for the object is tempered, because it shares errors with earlier observations.
+  // Evidence against it is limited by the probability of an unmapped occluder.
   double nats = log_ratio[k->second];
   if (nats > 0.0) {
     nats *= temperingExponent(score.hypotheses.front().correlated_observations,

@@ -1,5 +1,5 @@
-// Likelihoods of all hypotheses of a track for all boxes (paper, eq. 7 at b = π(g s)), and
-// correlation. Derivation: tools/docs/maths/measurement_likelihood.md.
+// Likelihoods of all hypotheses of a track for all boxes (paper, eq. 7 at b = π(g s)), and the
+// correlation of observations. Derivation: tools/docs/maths/measurement_likelihood.md.
 #pragma once
 
 #include <optional>
@@ -13,27 +13,29 @@
 
 namespace perdure::semantic_filter {
 
-/// What a hypothesis of a class should be detected as.
+/// The box that the network is expected to report for a hypothesis.
 struct PredictedBox {
   ProjectedBox box;
-  /// of the predicted sides, without noise, px²
+  /// covariance of the predicted sides without measurement noise, px²
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
 };
-/// Returns nothing if no part of the object is before the camera.
+/// Predicts the box of a hypothesis in state `x`. Returns nothing if no part of the object is in
+/// front of the camera.
 std::optional<PredictedBox> predictBox(const Hypothesis& h, const State& x, const Projector& from,
                                        const BoxStyle& style, const PoseError& pose_error);
 
-/// Who judges how a box is explained: the network, the view and what is assumed of both.
+/// The network, the view and the parameters by which a box is scored.
 struct Judge {
   const Model* model;
   const View* view;
   const Parameters* parameters;
 };
 struct Explanation {
-  double log_ratio = 0.0;  ///< of the likelihoods of the box, sides and class, to clutter, nats
+  double log_ratio = 0.0;  ///< of the likelihood of the box (sides and class) to clutter, nats
   BoxScore sides;
 };
-/// Returns nothing outside the gate. `hidden`: by a nearer object. Last two: as for logRatio.
+/// Scores a detection against a predicted box. Returns nothing if it is outside the gate. `hidden`:
+/// sides that a nearer object hides. `class_name` and `lookalike_nats`: as for logRatio.
 std::optional<Explanation> explain(const BoxDetection& detection, const PredictedBox& predicted,
                                    const std::array<bool, 4>& hidden, const std::string& class_name,
                                    double lookalike_nats, const Judge& judge);
@@ -47,15 +49,15 @@ struct BoxMatch {
 struct HypothesisScore {
   std::optional<PredictedBox> predicted;
   double detection_probability = 0.0;  ///< v P_D: probability that the network reports the object
-  double undetected = 0.0;             ///< v (1 - P_D): probability of visible and not reported
-  double no_box = 1.0;  ///< A without a box: 1 - v P_D, with a top-down answer if there is one
-  ScratchVector<BoxMatch> matches;  ///< for each of TrackScore::boxes
+  double undetected = 0.0;             ///< v (1 - P_D): visible, but not reported
+  double no_box = 1.0;              ///< A without a box: 1 - v P_D, as changed by a top-down answer
+  ScratchVector<BoxMatch> matches;  ///< one for each of TrackScore::boxes
   double expected = 0.0;            ///< v P_D without the detection rate of earlier visits
   /// number of earlier observations with correlated errors, given this hypothesis
   double correlated_observations = 0.0;
 };
 
-/// Lives within one step.
+/// Scores of one track. The memory is valid within one step only.
 struct TrackScore {
   TrackVisibility visibility;
   bool top_down = false;             ///< a top-down answer is applied (applyTopDown)
@@ -70,18 +72,19 @@ TrackScore scoreTrack(const Track& track, const TrackVisibility& visibility,
 std::array<bool, 4> hiddenSides(const TrackScore& score, std::size_t box,
                                 const BoxDetection& detection);
 
-/// Returns ψ: "it made this box" against "none, or does not exist". `box`: in TrackScore::boxes.
+/// Returns ψ: the weight of "the track made this box" against "it made none, or does not exist".
+/// `box`: index in TrackScore::boxes.
 double associationWeight(const Track& track, const TrackScore& score, std::size_t box);
 
-/// Returns the tempering exponent τ, because observations from one viewpoint share the errors of
-/// the network: the information of one more after n correlated ones, I(n+1) - I(n) with I(n) = n /
-/// (ρ n + 1 - ρ). Derivation: tools/docs/maths/class_and_existence_update.md.
+/// Returns the tempering exponent τ = I(n + 1) - I(n): the information of one more observation
+/// after n = `observations` with correlated errors. I(n) = n / (ρ n + 1 - ρ), ρ = `correlation`.
+/// Derivation: tools/docs/maths/class_and_existence_update.md.
 double temperingExponent(double observations, double correlation);
 
 /// Applies the network's answer at a predicted measurement without a box (paper, eq. 7;
 /// services/inference/README.md, "Top-down"), as evidence of existence only. Derivation:
-/// tools/docs/maths/joint_association.md, "Top-down likelihood". `log_ratio`: by class of the
-/// model; if the model does not know the track's best class, nothing changes.
+/// tools/docs/maths/joint_association.md, "Top-down likelihood". `log_ratio`: nats, one for each
+/// class of the model. If the model does not have the track's best class, nothing changes.
 void applyTopDown(TrackScore& score, const Track& track, const std::vector<double>& log_ratio,
                   const FrameContext& frame);
 

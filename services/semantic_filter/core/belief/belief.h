@@ -1,4 +1,4 @@
-// Everything that the filter believes, as one plain value: all tracks and what was learned.
+// The belief of the filter as one plain value: all tracks and the learned parameters.
 // Derivation: tools/docs/maths/state_and_mixture.md.
 #pragma once
 
@@ -14,7 +14,7 @@
 
 namespace perdure::semantic_filter {
 
-/// What the filter learns of networks, ground and classes. It is kept when a new `world` begins.
+/// Learned parameters of networks, ground and classes. They are kept when a new `world` begins.
 struct Learned {
   SideVariances sides;
   NoiseScales azimuths{200.0};  ///< scales of the variances of azimuths
@@ -27,13 +27,15 @@ struct Learned {
 struct Belief {
   std::vector<Track> tracks;            ///< ordered by id
   std::vector<Track> recently_deleted;  ///< kept for re-identification (core/tracks/reidentify.h)
-  /// Tracks of the map that were fused with a track of the same object: not fused a second time.
+  /// Tracks of the map that were fused, each with the track of the same object that remained. They
+  /// are not fused a second time.
   std::map<TrackId, TrackId> fused = {};
   Learned learned = {};
   BodyPath path = {};  ///< recent positions of the body
 };
 
-/// One box of one frame always gets the same id, so repeated steps rename no tracks.
+/// Gives ids to new tracks. A box of a frame always gets the same id, so a repeated step does not
+/// rename tracks.
 class IdBook {
  public:
   ObjectId idFor(std::uint64_t frame_sequence, std::size_t box) {

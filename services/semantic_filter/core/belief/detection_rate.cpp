@@ -5,7 +5,7 @@
 namespace perdure::semantic_filter {
 
 constexpr double kSameView = 0.5;  // view change below which observations share one count
-constexpr std::size_t kRoom = 32;  // counts that most visits have room for
+constexpr std::size_t kRoom = 32;  // initial capacity, enough for most visits
 
 void DetectionRate::addTo(Counts& counts, const Count& count, const ViewScales& scales) {
   const auto same = std::find_if(counts.begin(), counts.end(), [&](const Count& c) {

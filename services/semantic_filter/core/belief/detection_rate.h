@@ -11,19 +11,19 @@
 
 namespace perdure::semantic_filter {
 
-/// Copies, as beliefs are kept for late detections, share the counts of earlier visits.
+/// Copies share the counts of earlier visits, because the history copies the belief at each frame.
 class DetectionRate {
  public:
-  /// at most, of one visit and of all earlier visits
+  /// most counts of one visit, and of all earlier visits together
   static constexpr std::size_t kMostViews = 96;
 
   /// Adds an observation in which a detection had the probability `expected`.
   void add(const ViewRay& from, double expected, bool found, const ViewScales& scales);
-  /// Begins a visit: the counts so far apply from now on. Within one visit, misses do not excuse
-  /// each other, because the object may have gone.
+  /// Begins a visit: factor() uses the counts so far from now on. It ignores the misses of the
+  /// present visit, because the object may have gone.
   void beginVisit(const ViewScales& scales);
   /// Returns the factor on P_D at this viewpoint: the mean of a beta prior of `prior` observations,
-  /// updated by earlier visits from similar viewpoints; 1 without any.
+  /// updated by earlier visits from similar viewpoints; 1 if there was no earlier visit.
   double factor(const ViewRay& from, double prior, const ViewScales& scales) const;
   /// Adds the counts of a track that proved to be the same object.
   void join(const DetectionRate& other, const ViewScales& scales);

@@ -14,10 +14,10 @@ constexpr int kMostHeights = static_cast<int>(kNearest + BodyPath::kPlaces);
 using PerHeight = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostHeights, 1>;
 using HeightMatrix =
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostHeights, kMostHeights>;
-// m, of the ground beside the mean of the contributing heights
+// m, standard deviation of the ground from the mean of the contributing heights
 constexpr double kLevelSigma = 10.0;
 constexpr double kBounce = 0.03;       // m, variation of the body's height as it moves
-constexpr double kSurelyStands = 0.9;  // of a class whose objects contribute
+constexpr double kSurelyStands = 0.9;  // least ClassPrior::stands of a class that contributes
 
 double GroundRoughness::ratio(double assumed) const {
   constexpr double kLeastRatio = 0.01, kMostRatio = 9.0;
@@ -131,7 +131,7 @@ std::optional<GroundHeight> GroundSurface::below(const Eigen::Vector3d& place,
     if (!S.positive()) return std::nullopt;
     const HeightMatrix J = S.solve(HeightMatrix::Identity(n, n));
     const PerHeight weighed = J * z;
-    // The difference of each object from what the others say.
+    // Finds the object whose height differs most from the prediction by the others.
     Eigen::Index worst = 0;
     double most_off = 0.0;
     for (Eigen::Index i = m; i < n; ++i) {

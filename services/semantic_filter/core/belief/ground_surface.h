@@ -16,15 +16,17 @@ namespace perdure::semantic_filter {
 
 struct GroundHeight {
   double mean = 0.0, variance = 0.0;  ///< m, m²
-  double uneven = 0.0;                ///< the part of the variance that slope and roughness cause
+  double uneven = 0.0;                ///< m²; part of the variance, by slope and roughness
 };
 
-/// How uneven the ground is relative to ground.slope and ground.roughness, learned from objects.
+/// Unevenness of the ground relative to ground.slope and ground.roughness, learned from objects.
 class GroundRoughness {
  public:
-  /// Returns true over assumed variance. The assumption weighs as much as `assumed` objects.
+  /// Returns the ratio of the true to the assumed variance. The assumption weighs as much as
+  /// `assumed` objects.
   double ratio(double assumed) const;
-  /// Learns from an object that stands `above` (m) over the others. `share`: of new keyframes.
+  /// Learns from an object that stands `above` (m) over the ground that the others predict.
+  /// `share`: its weight, the share of new keyframes. `ratio`: as used for `others`.
   void learn(double above, const GroundHeight& others, double own_variance, double ratio,
              double share);
 
@@ -48,13 +50,13 @@ class BodyPath {
 
 class GroundSurface {
  public:
-  /// Uses the tracks that surely stand, that parallax has placed, and whose class stands on the
-  /// ground. It also uses the path, if the height of the body is known.
+  /// Uses static tracks that very probably exist, whose boxes give the ground contact, and whose
+  /// class stands on the ground. It also uses the path, if the height of the body is known.
   GroundSurface(const std::vector<Track>& tracks, const BodyPath& path,
                 const GroundRoughness& roughness_scale, const Eigen::Vector3d& up_W,
                 const ClassPriors& priors, const GroundParameters& parameters);
 
-  /// Lets `roughness_scale` learn from the ground contact of the track.
+  /// Updates `roughness_scale` by the ground contact of the track. `share`: of new keyframes.
   void updateRoughness(GroundRoughness& roughness_scale, const Track& track, double share) const;
   /// Returns the height of the ground below `place` without track `except`; nothing if fewer than
   /// three objects contribute and the height of the body is not known.
@@ -62,7 +64,7 @@ class GroundSurface {
 
  private:
   struct Stand {
-    ObjectId id;            ///< 0: the body
+    ObjectId id;            ///< 0: a point of the path
     Eigen::Vector2d place;  ///< horizontal, m
     double height, variance;
   };
@@ -72,7 +74,8 @@ class GroundSurface {
     const Stand* stand;
   };
 
-  /// Returns the `most` nearest of `stands` in reach of a place, nearest first, without `except`.
+  /// Returns the `most` nearest of `stands` within ground.reach_m of `here`, nearest first, without
+  /// `except`.
   ScratchVector<Near> around(const std::vector<Stand>& stands, const Eigen::Vector2d& here,
                              ObjectId except, std::size_t most) const;
   Eigen::Vector2d horizontal(const Eigen::Vector3d& p) const { return axes_ * p; }
@@ -81,11 +84,11 @@ class GroundSurface {
   double ratio_;
   Eigen::Matrix<double, 2, 3> axes_;
   Eigen::Vector3d up_;
-  /// points of the path have the error of the body's height in common
+  /// The points of the path share the error of the body's height.
   std::vector<Stand> stands_, path_;
 };
 
-/// Returns the height of the underside of a cuboid, m.
+/// Returns the height of the underside of a cuboid along `up`, m.
 double underside(const State& x, const Eigen::Vector3d& up);
 
 }  // namespace perdure::semantic_filter

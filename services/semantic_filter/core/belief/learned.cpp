@@ -9,7 +9,7 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// Returns the value of a network in a list, which is added if it is missing.
+/// Returns the value of a network in the list, and adds it if it is missing.
 template <class T>
 T& entryOf(std::vector<std::pair<std::uint64_t, T>>& list, std::uint64_t model) {
   const auto it = std::find_if(list.begin(), list.end(),
@@ -29,9 +29,9 @@ SideScales SideVariances::scales(std::uint64_t model) const {
 }
 
 void SideVariances::learn(std::uint64_t model, const SideEvidence& evidence, double assumed) {
-  // A network has other errors on another road.
+  // A network has other errors on another road, so older residuals lose weight.
   constexpr double kRemembered = 4000.0;  // sides
-  // How much of an error lasts differs more between networks than their noise. So the assumed share
+  // The lasting error differs more between networks than their noise does. So its assumed value
   // has a smaller weight than the assumed noise.
   constexpr double kLastingWeight = 0.1;
   if (assumed <= 0.0 || !evidence.gradient.allFinite() || !(evidence.information.trace() > 0.0)) {
@@ -95,8 +95,8 @@ double DetectionSizes::scale(std::uint64_t model) const {
 }
 
 void DetectionSizes::learn(std::uint64_t model, const SizeEvidence& evidence) {
-  constexpr double kAssumed = 4.0;       // its deviation is .5, a factor of 1.6
-  constexpr double kRemembered = 400.0;  // on another road, other things hide what is far away
+  constexpr double kAssumed = 4.0;       // a standard deviation of .5: a factor of 1.6
+  constexpr double kRemembered = 400.0;  // other roads have other occluders of far objects
   constexpr double kMost = 1.8;          // a factor of 6
   if (!(evidence.information > 0.0) || !std::isfinite(evidence.gradient)) return;
   Estimate& e = entryOf(estimates_, model);

@@ -19,8 +19,8 @@ struct ResidualRatio {
   double count = 0.0;  ///< number of new residuals; keyframes of an earlier fit do not count again
 };
 
-/// True over assumed variances of the sides of boxes: of the errors that are new in each box, and
-/// of those that last while the view hardly changes (b).
+/// Ratios of the true to the assumed variances of the sides of boxes. `noise`: of errors that are
+/// new in each box. `lasting`: of errors that last while the view hardly changes (b).
 struct SideScales {
   double noise = 1.0, lasting = 1.0;
 };
@@ -28,16 +28,16 @@ struct SideScales {
 /// Evidence of the residuals of one fit about the logarithms of both scales [noise, lasting], at
 /// the scales that the fit used.
 struct SideEvidence {
-  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();  ///< Fisher's, doubled: about sides
+  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();  ///< Fisher's, doubled: number of sides
   Eigen::Vector2d gradient = Eigen::Vector2d::Zero();     ///< of the log likelihood, doubled
 };
 
-/// The scales of the sides for each network, by Fisher scoring. Derivation:
+/// Learns the scales of the sides for each network by Fisher scoring. Derivation:
 /// tools/docs/maths/noise_scale.md.
 class SideVariances {
  public:
   SideScales scales(std::uint64_t model) const;
-  /// The assumption weighs `assumed` sides; 0: the scales stay 1.
+  /// The assumption weighs as much as `assumed` sides; 0: the scales stay 1.
   void learn(std::uint64_t model, const SideEvidence& evidence, double assumed);
 
  private:
@@ -55,9 +55,10 @@ class NoiseScales {
   /// Remembers at most `remembered` residuals, because a network has other errors on another road.
   explicit NoiseScales(double remembered) : remembered_(remembered) {}
 
-  /// Returns true over assumed variance. The assumption weighs `assumed` residuals; 0: fixed.
+  /// Returns the ratio of the true to the assumed variance. The assumption weighs as much as
+  /// `assumed` residuals; 0: the ratio is 1.
   double ratio(std::uint64_t model, double assumed) const;
-  /// `over` is relative to the first assumption, not to the present ratio.
+  /// `over`: relative to the assumed variance, not to the variance by the present ratio.
   void learn(std::uint64_t model, const ResidualRatio& over);
 
  private:
@@ -68,15 +69,15 @@ class NoiseScales {
   std::vector<std::pair<std::uint64_t, Sums>> sums_;  ///< a list, because networks are few
 };
 
-/// Whether the boxes of a network that does not say it enclose outlines or images of cuboids. Boxes
-/// count as images of cuboids until the evidence of objects at rest exceeds 6 nats. Derivation:
-/// tools/docs/maths/box_extent.md.
+/// Learns whether the boxes of a network enclose outlines or images of cuboids, if its model does
+/// not state it. Boxes count as images of cuboids until the evidence of objects at rest exceeds 6
+/// nats. Derivation: tools/docs/maths/box_extent.md.
 class BoxExtents {
  public:
   bool outlines(std::uint64_t model) const { return of(model).outlines; }
-  /// The evidence is so large that more of it is not needed.
+  /// Whether the evidence is so large that no more is needed.
   bool decided(std::uint64_t model) const;
-  /// Adds nats for outlines.
+  /// Adds evidence; positive nats are for outlines, negative ones for images of cuboids.
   void learn(std::uint64_t model, double nats);
 
  private:
@@ -88,8 +89,8 @@ class BoxExtents {
   std::vector<std::pair<std::uint64_t, Odds>> odds_;  ///< a list, because networks are few
 };
 
-/// For each network, the size at which P_D is halved, relative to the assumed one. By Fisher
-/// scoring from the observations of confirmed objects at rest. Derivation:
+/// Learns for each network the size at which P_D is halved, relative to the assumed one. It uses
+/// Fisher scoring and the observations of confirmed objects at rest. Derivation:
 /// tools/docs/maths/detectability.md.
 class DetectionSizes {
  public:
@@ -103,13 +104,13 @@ class DetectionSizes {
   std::vector<std::pair<std::uint64_t, Estimate>> estimates_;  ///< a list, because networks are few
 };
 
-/// Share of the instances of a class that move, learned from the objects of this drive beside the
-/// prior, each once and when it can be judged. Derivation: tools/docs/maths/state_and_mixture.md.
+/// Share of the objects of a class that move, from the prior and the objects of this drive. Each
+/// object counts once, at its 20th detection. Derivation: tools/docs/maths/state_and_mixture.md.
 class MoverShares {
  public:
-  /// Counts a track if this was the detection at which tracks are judged.
+  /// Counts a track at its 20th detection, if it has been confirmed. `min_speed`: m/s.
   void learn(const Track& track, double min_speed);
-  /// Returns the prior probability that an instance of the class moves; 0 stays 0.
+  /// Returns the prior probability that an object of the class moves; 0 if the class prior is 0.
   double of(const ClassPrior& prior) const;
 
  private:

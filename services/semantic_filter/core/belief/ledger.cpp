@@ -9,16 +9,17 @@ namespace {
 
 double sumOf(const auto& nats) { return std::accumulate(nats.begin(), nats.end(), 0.0); }
 
-/// Stays finite for probability 0.
+/// Returns the logarithm of a probability; it is finite for probability 0.
 double logOf(double probability) { return std::log(std::max(probability, 1e-300)); }
 
-/// Entries of kinds that this program does not know are left out.
+/// Copies the entries. Leaves out kinds that this program does not have.
 template <std::size_t N>
 void copyKnown(const std::vector<double>& from, std::array<double, N>& to) {
   std::copy_n(from.begin(), std::min(from.size(), N), to.begin());
 }
 
-/// A ledger from elsewhere may have later times. The last time never lies before the first.
+/// Adds the count of `more`. The last time never decreases, because an entry that came in a message
+/// may have a later time than `more`.
 void count(LedgerEntry& entry, const LedgerEntry& more) {
   if (entry.count == 0) entry.first = entry.last = more.first;
   entry.count += more.count;

@@ -15,19 +15,19 @@
 
 namespace perdure::semantic_filter {
 
-/// Probability that the object exists, with its reasons. A new one is 1/2.
+/// Probability that the object exists, with its reasons. Initially it is 1/2.
 class Existence {
  public:
   Existence() = default;
   Existence(double r, ExistenceEvidence why, TimePoint at) { become(r, why, at); }
-  /// Takes the entries of a known ledger. What they do not explain is booked under `why`.
+  /// Takes the entries of a known ledger. The rest of log r / (1 - r) is booked under `why`.
   Existence(double r, const std::vector<LedgerEntry>& known, ExistenceEvidence why, TimePoint at);
 
   operator double() const { return r_; }
   void become(double r, ExistenceEvidence why, TimePoint at);
-  /// Moves `nats` from entry `from` to entry `to`, and counts it once there if it is not zero.
+  /// Moves `nats` from entry `from` to entry `to`, whose count grows by 1. 0 nats change nothing.
   void shift(ExistenceEvidence from, ExistenceEvidence to, double nats, TimePoint at);
-  /// Counts observations that changed nothing.
+  /// Counts observations that did not change r.
   void note(ExistenceEvidence why, const LedgerEntry& observations);
 
   const LedgerEntry& of(ExistenceEvidence why) const {
@@ -46,7 +46,7 @@ struct ClassNumber {
   double value = 0.0;
 };
 
-/// Of the classes of a track; lives within one step.
+/// Numbers for the classes of a track; valid within one step only.
 using ClassNumbers = ScratchVector<ClassNumber>;
 
 /// log π of each class, with its reasons.
@@ -55,12 +55,13 @@ class ClassAccount {
   ClassAccount() = default;
   ClassAccount(const std::vector<ClassLedger>& known, const std::vector<OustedClass>& ousted);
 
-  /// `pmf` sums to 1. Of classes that leave, the one that came closest to the best is the ousted.
+  /// Books the change of each log π under `why`. `pmf` sums to 1. Among the classes that it lacks,
+  /// the one that was closest to the best is stored as the ousted class.
   void book(const ClassNumbers& pmf, ClassEvidence why, TimePoint at);
   /// Moves a part of entry `from` to entry `to`, for each class.
   void shift(ClassEvidence from, ClassEvidence to, const ClassNumbers& nats);
 
-  /// Writes the classes and the ousted one, and uses the memory of `to` again.
+  /// Writes the classes and the ousted class to `to`, whose memory is reused.
   void publish(Ledger& to) const;
 
  private:
@@ -81,7 +82,7 @@ class ClassAccount {
   std::optional<Ousted> ousted_;
 };
 
-/// Returns what each class gains by Bayes' rule: log_likelihood - log Σ π exp(log_likelihood).
+/// Returns the gain of log π by Bayes' rule: log_likelihood - log Σ π exp(log_likelihood).
 ClassNumbers gains(const ClassNumbers& pmf, const ClassNumbers& log_likelihood);
 
 }  // namespace perdure::semantic_filter

@@ -49,7 +49,7 @@ double classProbability(const Track& track, const std::string& class_name) {
 bool sound(const Track& track) {
   double sum = 0.0;
   for (const auto& h : track.hypotheses) {
-    // A sum is finite if all its terms are.
+    // The sum is not finite if one of its terms is not.
     if (!std::isfinite(h.x.sum() + h.P.sum() + h.C.sum())) return false;
     sum += h.weight;
   }

@@ -21,14 +21,14 @@ void book(Track& track, ClassEvidence why);
 void normalise(Track& track, ClassEvidence why);
 /// Returns a - b of the cuboids, with yaw modulo 180°, because a turned cuboid is the same.
 Vector7d geometryDifference(const Hypothesis& a, const Hypothesis& b);
-/// Merges b into a: adds the weights and keeps two moments of the pair, yaw modulo 180°.
+/// Merges b into a: adds the weights and keeps mean and covariance of the pair, yaw modulo 180°.
 void mergeInto(Hypothesis& a, const Hypothesis& b);
 
-/// Returns the squared Mahalanobis distance of b from a, by the covariance of a: of the geometry
-/// (yaw modulo 180°), and of the velocity if a moves.
+/// Returns the squared Mahalanobis distance of b from a, by the covariance of a. It compares the
+/// geometry (yaw modulo 180°) and, if a moves, the velocity.
 double distance2(const Hypothesis& a, const Hypothesis& b);
 
-/// Whether its size differs from that of the class by `size_gate` deviations or more.
+/// Whether the size of `h` differs from that of the class by `size_gate` deviations or more.
 bool misshapen(const Hypothesis& h, const ClassPrior& prior, double size_gate);
 
 }  // namespace perdure::semantic_filter

@@ -15,14 +15,15 @@ double movingProbability(const Track& track, double min_speed);
 /// Applies motion and process noise of `dt` seconds.
 void predictHypothesis(Hypothesis& h, double dt, const MotionParameters& m);
 
-/// Conditions the hypothesis on v = 0, with the error of position that looked like motion.
+/// Conditions the hypothesis on v = 0. This also corrects the position, because part of its error
+/// was taken for motion.
 void stop(Hypothesis& h);
 /// Called when the track leaves the view. Splits moving hypotheses that are probably slower than
 /// `min_speed` (m/s): the slow share stops where it was, the fast share moves on.
 void stopSlowHypotheses(Track& track, double min_speed);
 /// Returns x after `dt` seconds: static hypotheses stay, moving ones go on at constant velocity.
 State stateAt(const Hypothesis& h, double dt);
-/// Returns the track as its motion predicts it for `time`; as_of stays. For publishing only.
+/// Returns the track as its motion predicts it for `time`; as_of does not change. For publishing.
 Track extrapolated(Track track, TimePoint time, const MotionParameters& parameters);
 
 /// Returns a moving copy of a hypothesis at rest, for an object that may just be starting to move.

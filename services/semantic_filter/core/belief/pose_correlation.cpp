@@ -22,7 +22,7 @@ bool isExplained(const Hypothesis& h, const Matrix6d& L_pose, double share) {
   return choleskyInPlace(still);
 }
 
-/// Cholesky factor of the pose's covariance; nothing if it is not positive definite.
+/// Returns the Cholesky factor of P_pose; nothing if P_pose is not positive definite.
 std::optional<Matrix6d> factorOf(const Matrix6d& P_pose) {
   std::optional<Matrix6d> L = P_pose;
   if (!choleskyInPlace(*L)) L.reset();
@@ -43,7 +43,7 @@ double sigmaGivenPose(const Hypothesis& h, const std::optional<Matrix6d>& L_pose
 std::optional<Matrix6d> transitionBetween(const Matrix6d& earlier, const Matrix6d& later) {
   constexpr double kLargest = 10.0;
   if (earlier == later) return Matrix6d::Identity();
-  // Most tracks of a frame were last updated at the same frame.
+  // The inverse is stored, because most tracks of a frame were last updated at the same frame.
   thread_local Matrix6d product = Matrix6d::Identity(), inverted = Matrix6d::Identity();
   if (earlier != product) {
     product = earlier;
@@ -60,9 +60,8 @@ bool isJointCovariance(const Hypothesis& h, const Matrix6d& P_pose) {
   return choleskyInPlace(L) && isExplained(h, L, 1.0);
 }
 
-/// Transitions are approximate, and the updates of vio shrink P_pose. So the pose may explain more
-/// of P than there is. Much of P may truly be the pose: a limit of 0.9 here costs half of the
-/// recall on KITTI.
+/// Transitions are approximate, and the updates of vio shrink P_pose. So the pose error may explain
+/// more than P. It may truly cause most of P: a limit of 0.9 costs half of the recall on KITTI.
 void keepConsistent(Hypothesis& h, const Matrix6d& P_pose, const std::optional<Matrix6d>& L_pose) {
   constexpr double kExplained = 0.9999;
   if (h.C.isZero(0.0) || (L_pose && isExplained(h, *L_pose, kExplained))) return;

@@ -8,7 +8,8 @@
 
 namespace perdure::semantic_filter {
 
-/// Returns the transition of the pose error between two products; nothing without a usable inverse.
+/// Returns the transition of the pose error between two values of PoseError::product; nothing if
+/// `earlier` has no usable inverse.
 std::optional<Matrix6d> transitionBetween(const Matrix6d& earlier, const Matrix6d& later);
 
 /// Whether [P C; Cᵀ P_pose] is a covariance.
@@ -17,14 +18,14 @@ bool isJointCovariance(const Hypothesis& h, const Matrix6d& P_pose);
 /// Scales C down until [P C; Cᵀ P_pose] is a covariance. `L_pose`: Cholesky factor of P_pose.
 void keepConsistent(Hypothesis& h, const Matrix6d& P_pose, const std::optional<Matrix6d>& L_pose);
 
-/// Adds the error of the body's pose to what is known relative to the body: δp = p - R_WB [p_B]x θ,
-/// δψ = up · R_WB θ. C becomes what follows from that alone.
+/// Adds the error of the body's pose to a state that is known relative to the body: δp = p - R_WB
+/// [p_B]x θ, δψ = up · R_WB θ. C becomes the cross-covariance with this error alone.
 void addPoseError(Hypothesis& h, const RigidTransform& T_WB, const Eigen::Vector3d& up_W,
                   const Matrix6d& P_pose);
 
 /// Returns the standard deviation of the position given the pose error, m.
 double placeSigma(const Hypothesis& h, const Matrix6d& P_pose);
-/// The same for a track: it includes the distances between its hypotheses.
+/// Returns the same for a track, with the distances between its hypotheses.
 double placeSigma(const Track& track, const Matrix6d& P_pose);
 
 }  // namespace perdure::semantic_filter

@@ -12,9 +12,9 @@
 namespace perdure::semantic_filter {
 
 /// x = [p_WO (m), yaw about gravity (rad), log l, log w, log h (log m), b, v_W (m/s)]. The detector
-/// bias b says how far the detector places each side (x1, y1, x2, y2) from the image of the cuboid,
-/// in widths and heights of the box. It stays while the view stays. v and its covariance are zero
-/// in a static hypothesis.
+/// bias b is the offset of each detected side (x1, y1, x2, y2) from the image of the cuboid, in
+/// widths and heights of the box. b stays while the view stays. v and its covariance are zero in a
+/// static hypothesis.
 inline constexpr int kStateDim = 14;
 using State = Eigen::Matrix<double, kStateDim, 1>;
 using StateCovariance = Eigen::Matrix<double, kStateDim, kStateDim>;
@@ -22,23 +22,23 @@ using CrossPose = Eigen::Matrix<double, kStateDim, 6>;  ///< with the pose error
 inline constexpr int kYaw = 3, kSize = 4, kBias = 7, kVelocity = 11;
 inline constexpr int kGeometry = kBias;  ///< dimensions of the cuboid without b and v
 
-/// What the boxes of an object alone say of the ground below it (core/update/ground_contact.h).
+/// Height of the ground below an object, from its boxes alone (core/update/ground_contact.h).
 struct GroundContact {
-  double above = 0.0;     ///< m; height of the ground beside the underside of the hypothesis
-  double variance = 0.0;  ///< m², given the pose; 0: they say nothing
+  double above = 0.0;     ///< m; height of the ground above the underside of the hypothesis
+  double variance = 0.0;  ///< m², given the pose; 0: the boxes give no height
 };
 
 struct Hypothesis {
   std::string class_name;
   bool moving = false;
-  bool upper_part = false;  ///< x is of the part that is seen (core/belief/classes/upper_part.h)
-  double weight = 0.0;      ///< of the hypothesis given that the object exists; all sum to 1
+  bool upper_part = false;  ///< x describes the visible part (core/belief/classes/upper_part.h)
+  double weight = 0.0;      ///< its probability if the object exists; all sum to 1
   State x = State::Zero();
   StateCovariance P = StateCovariance::Identity();
   CrossPose C = CrossPose::Zero();
   double heading_log_odds = 0.0;  ///< log-odds that the yaw is not turned by 180°
   double speed_prior_ratio =
-      1.0;  ///< moving: prior of its speed against the Gaussian that it began with
+      1.0;                      ///< moving: ratio of the prior of its speed to the initial Gaussian
   bool modes_searched = false;  ///< a mode search of yaw has weighed it by all keyframes
   GroundContact ground_contact = {};
 

@@ -21,20 +21,20 @@
 
 namespace perdure::semantic_filter {
 
-/// Out of the image for longer than this: what comes next is another visit.
+/// A track that was out of the image for longer than this begins another visit when it returns.
 inline constexpr double kAnotherVisit_s = 1.0;
 
 /// Published lifecycle of the track: confirmation, times and counts of detections.
 struct Lifecycle {
   bool confirmed = false;
-  bool once_confirmed = false;  ///< it was confirmed at some time, so that the map knows it
+  bool once_confirmed = false;  ///< it was confirmed at some time, so the map has it
   bool recalled = false;        ///< recalled from the map and not detected since
   bool detected_on_revisit = false;
   TimePoint first_seen, last_seen;
-  TimePoint visit_began;  ///< when it last came back into the image
+  TimePoint visit_began;  ///< time at which the track last came back into the image
   std::uint32_t hits = 0, visible_misses = 0;
 
-  /// `other` is the same object.
+  /// Adds the lifecycle of another track of the same object.
   void merge(const Lifecycle& other);
 };
 
@@ -50,7 +50,7 @@ struct DetectionHistory {
   double recent_share = 1.0;             ///< share of the latest observations that were detections
   double existence_when_detected = 0.0;  ///< existence after the latest detection
   double running_nis = 1.0;              ///< normalised innovation of its boxes, per dimension
-  std::optional<AssignedBox> first_box, last_box;  ///< none of a track that came back
+  std::optional<AssignedBox> first_box, last_box;  ///< empty after a recall
 
   void add(bool is_visible, bool is_detected) {
     visible = visible << 1 | (is_visible ? 1U : 0U);
@@ -75,32 +75,32 @@ struct Viewpoints {
 
 /// Evidence about the logarithm of the size at which P_D is halved, at the value that was used.
 struct SizeEvidence {
-  double gradient = 0.0, information = 0.0;  ///< of the log likelihood; Fisher's
+  double gradient = 0.0, information = 0.0;  ///< of the log likelihood; Fisher's information
 
   SizeEvidence& operator+=(const SizeEvidence& more);
 };
 
-/// What makes P_D of this track differ from that of its class.
+/// Causes of a P_D of this track that differs from that of its class.
 struct Detectability {
   double unmapped_occluder = 0.0;  ///< probability that something not on the map hides the object
-  double hard_to_detect = 0.0;  ///< that nothing does, and the network seldom detects it from here
+  double hard_to_detect = 0.0;     ///< that nothing hides it, but it is seldom detected from here
   Directions seen_from = Directions::Zero();  ///< in W, on earlier visits
   Directions seen_now = Directions::Zero();   ///< in W, on this visit
   SizeEvidence missed;  ///< of the misses since the last detection; the object may be gone
-  SizeEvidence proven;  ///< of the detections, and of misses before them; not learned from yet
+  SizeEvidence proven;  ///< of detections, and of misses before them; not yet learned from
   DetectionRate rate;   ///< how often earlier visits detected it, by view
 };
 
 /// Evidence that the network reports an object of no known class as a known class.
 struct Lookalike {
-  double nats = 0.0;       ///< evidence for "it resembles a known class", if it is of none
-  std::string class_name;  ///< the class that the network last saw in it; empty: none
+  double nats = 0.0;       ///< that it resembles a known class, if it is of none
+  std::string class_name;  ///< the latest known class that the network reported; empty: none
 };
 
-/// One observation that is kept for the batch; smoothing knows what it holds.
+/// One observation that is stored for the batch; core/smoothing defines it.
 struct Keyframe;
 
-/// What BoxExtents has counted of a track.
+/// The evidence of a track that BoxExtents has counted.
 struct CountedExtent {
   std::uint64_t model = 0;
   double nats = 0.0;  ///< for outlines
@@ -108,12 +108,12 @@ struct CountedExtent {
 
 struct BatchState {
   SharedVector<std::shared_ptr<const Keyframe>> keyframes;  ///< in order of time
-  /// False for a track that came back: a batch of later keyframes would lose what it knew before.
+  /// False for a track that came from the map, because later keyframes lack its earlier evidence.
   bool complete = true;
   std::uint32_t fresh = 0;            ///< keyframes since the latest fit
   std::uint32_t seen = 0;             ///< keyframes since there were enough for a fit
   std::uint32_t mode_search_due = 0;  ///< modes are searched when `seen` reaches it
-  std::uint32_t patience = 1;         ///< fits are this much rarer while they change little
+  std::uint32_t patience = 1;         ///< factor by which fits are rarer while they change little
   CountedExtent extent;
 };
 
@@ -123,7 +123,7 @@ struct PublishedVisibility {
   ObjectId blocked_by = 0;
 };
 
-/// Frames that said nothing since the track was last predicted. They change no published value.
+/// Frames without evidence since the track was last predicted. They change no published value.
 struct UnusedFrames {
   LedgerEntry occluded, out_of_view;
 
@@ -133,13 +133,13 @@ struct UnusedFrames {
 struct Track {
   TrackId id = 0;
   Existence existence;
-  /// Log-odds of "it is a real object" above those of "it is still there"
+  /// Log-odds of "it is a real object" minus those of "it is still there"
   /// (tools/docs/maths/class_and_existence_update.md).
   double existence_lead = 0.0;
   SharedVector<Hypothesis> hypotheses;  ///< not empty, the heaviest first
   TimePoint as_of;                      ///< time of the state
   ClassAccount classes;                 ///< the reasons of the hypotheses' weights
-  /// Classes that the models which saw it could name; none of a track that came back.
+  /// Classes of the models that have observed it; null for a track that came from the map.
   std::shared_ptr<const std::set<std::string>> classes_considered;
   Lookalike lookalike;
   Lifecycle life;
@@ -154,7 +154,7 @@ struct Track {
   const Hypothesis& best() const { return hypotheses.front(); }
 };
 
-/// Upper limit of the existence probability, so that later misses can lower it.
+/// Returns the upper limit of the existence probability. It lets later misses lower the existence.
 double existenceCeiling(const Track& track, const TrackParameters& parameters);
 
 }  // namespace perdure::semantic_filter

@@ -16,9 +16,9 @@ namespace perdure::semantic_filter {
 namespace {
 
 /// Makes P positive definite, because readers refuse other messages. Rounding may leave a pivot
-/// just below zero. The eigenvalues of the correlations get the least definite value.
+/// just below zero. Smaller eigenvalues of the correlations are raised to kLeastEigenvalue.
 Matrix7d definite(const Matrix7d& P) {
-  constexpr double kLeastEigenvalue = 1e-9;  // of the correlations; also m² or rad², of a variance
+  constexpr double kLeastEigenvalue = 1e-9;  // of the correlations; also least variance, m² or rad²
   constexpr double kRounding = 1e-12;
   Matrix7d L = P;
   // A reader checks the correlations: their pivots are the pivots of P over its variances.
@@ -38,7 +38,8 @@ Matrix7d definite(const Matrix7d& P) {
   return result;
 }
 
-/// The Gaussian of the heaviest hypothesis of a class, with the second moments of the others.
+/// Writes the mean of the heaviest hypothesis of a class, and the second moments about it of all
+/// hypotheses of the class with the same motion.
 void toClassBelief(const Track& track, const ClassPrior& prior, const std::string& name,
                    ClassBelief& belief) {
   belief.name = name;
@@ -61,7 +62,7 @@ void toClassBelief(const Track& track, const ClassPrior& prior, const std::strin
   belief.mean = heaviest->x.head<7>();
   belief.covariance = definite(moments / weight);
   if (name == kOtherClass && !heaviest->modes_searched) {
-    // variance of a yaw that may be any, modulo 180°
+    // variance of an unknown yaw, modulo 180°
     constexpr double kAnyYaw = M_PI * M_PI / 12.0;
     belief.covariance(kYaw, kYaw) = std::max(belief.covariance(kYaw, kYaw), kAnyYaw);
   }
@@ -132,7 +133,7 @@ Track fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product, Exist
     h.moving = belief.moving > 0.5;
     if (h.moving) {
       h.x.tail<3>() = belief.velocity;
-      h.P.diagonal().tail<3>().setConstant(1.0);  // (1 m/s)²; the message does not carry it
+      h.P.diagonal().tail<3>().setConstant(1.0);  // (1 m/s)²; the message has none
     }
     track.hypotheses.push_back(h);
   }

@@ -7,14 +7,14 @@
 
 namespace perdure::semantic_filter {
 
-/// Publishes for each class the mean of its heaviest hypothesis with the second moments of the
-/// others about it, and of an upper part the whole object. `min_speed`: m/s.
+/// Returns for each class the mean of its heaviest hypothesis, and the second moments about it of
+/// all with the same motion. An upper part is published as the whole object. `min_speed`: m/s.
 ObjectBelief toBelief(const Track& track, const ClassPriors& priors, double min_speed);
-/// The same into `belief`, whose memory it uses again.
+/// Writes the same to `belief`, whose memory is reused.
 void toBelief(const Track& track, const ClassPriors& priors, double min_speed,
               ObjectBelief& belief);
 
-/// Makes a track with one hypothesis for each class. `back`: kRestore or kRecall.
+/// Returns a track with one hypothesis for each class. `back`: kRestore or kRecall.
 Track fromBelief(const ObjectBelief& belief, const Matrix6d& pose_product, ExistenceEvidence back);
 
 }  // namespace perdure::semantic_filter

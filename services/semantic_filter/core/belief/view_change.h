@@ -15,7 +15,7 @@ namespace perdure::semantic_filter {
 struct ViewScales {
   double angle, log_distance, image_angle;
 };
-/// A point as one camera pose sees it.
+/// Direction and distance of a point from one camera pose.
 struct ViewRay {
   Eigen::Vector3d ray_W, ray_C;  ///< unit vectors from the camera to the point
   double log_distance;

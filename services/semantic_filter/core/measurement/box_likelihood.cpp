@@ -10,12 +10,12 @@
 namespace perdure::semantic_filter {
 namespace {
 
-/// log P(X < 0) for X ~ N(mean, variance).
+/// Returns log P(X < 0) for X ~ N(mean, variance).
 double logBelowZero(double mean, double variance) {
   return std::log(std::max(0.5 * std::erfc(mean / std::sqrt(2.0 * variance)), 1e-12));
 }
 
-/// log of the multivariate t density in n dimensions, from the squared Mahalanobis distance.
+/// Returns the log of the t density in n dimensions, from the squared Mahalanobis distance `nis`.
 double logStudent(double nis, double log_det, int n, double tail) {
   thread_local double cached_tail = -1.0;
   thread_local std::array<double, 5> constant{};  // for 1 to 4 dimensions
@@ -29,7 +29,7 @@ double logStudent(double nis, double log_det, int n, double tail) {
   return constant[n] - 0.5 * log_det - 0.5 * (tail + n) * std::log1p(nis / tail);
 }
 
-/// χ² quantile of the gate for 1 to 4 degrees of freedom, computed once for each gate value.
+/// Returns the χ² quantile of the gate for 1 to 4 degrees of freedom. It is computed once.
 double gateThreshold(double gate, int dof) {
   thread_local double cached_gate = -1.0;
   thread_local std::array<double, 5> quantile{};
@@ -40,8 +40,8 @@ double gateThreshold(double gate, int dof) {
   return quantile[dof];
 }
 
-/// How far the predicted side lies inside the observed one, px. The true side lies at or beyond a
-/// censored side: left and top at smaller coordinates, right and bottom at larger ones.
+/// Returns the distance of the predicted side inside the observed one, px. The true side lies at or
+/// beyond a censored side: left and top at smaller coordinates, right and bottom at larger ones.
 double within(const BoxMeasurement& z, const ProjectedBox& predicted, int side) {
   const double d = predicted.sides[side] - z.sides[side];
   return side < 2 ? d : -d;
@@ -57,6 +57,7 @@ bool outsideOf(double gate, const BoxMeasurement& z, const ProjectedBox& predict
 }
 
 /// Scores the sides in use. The others count with the probability that the true side lies beyond.
+/// Returns nothing outside the gate.
 std::optional<BoxScore> scoreSides(const BoxMeasurement& z, const ProjectedBox& predicted,
                                    const Eigen::Matrix4d& covariance, const Sides& use,
                                    const BoxParameters& parameters) {
@@ -93,13 +94,14 @@ std::optional<BoxScore> scoreSides(const BoxMeasurement& z, const ProjectedBox& 
   return score;
 }
 
-/// Log density of a hidden side: it ends anywhere within the object.
+/// Returns the log density of a hidden side, which may lie anywhere within the object.
 double logAnywhere(const ProjectedBox& predicted, int side) {
   const int axis = side % 2;
   return -std::log(std::max(predicted.sides[axis + 2] - predicted.sides[axis], 1.0));
 }
 
-/// Returns the sides in use that may be hidden: without one, no other side alone is outside.
+/// Returns the sides in use that may be hidden. Each lies inside the predicted side, and no other
+/// side alone is outside the gate.
 Sides mayBeHidden(const BoxMeasurement& z, const ProjectedBox& predicted,
                   const Eigen::Matrix4d& covariance, const Sides& use,
                   const BoxParameters& parameters) {
@@ -250,7 +252,7 @@ std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& pr
     if (!parts[i]) continue;
     Sides others = use;
     others[i] = false;
-    // Something unmapped hides each of the four sides with the same probability.
+    // An unmapped object hides each of the four sides with the same probability.
     consider(others,
              log_shown + std::log(0.25 * parameters.partial_view) + logAnywhere(predicted, i), i);
   }

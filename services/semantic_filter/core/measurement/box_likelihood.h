@@ -1,7 +1,7 @@
 // Measurement likelihood L_k(z): how much better a hypothesis explains a box than clutter does
-// (paper, eq. 6 and 7). A measured side has a density (px⁻¹); of a censored side, cut by the border
-// or a nearer object, only the probability that the true side lies beyond is known. Derivation:
-// tools/docs/maths/measurement_likelihood.md.
+// (paper, eq. 6 and 7). A measured side counts with its density (px⁻¹). A censored side, which the
+// border or a nearer object cuts, counts with the probability that the true side lies beyond.
+// Derivation: tools/docs/maths/measurement_likelihood.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,10 +26,10 @@ struct BoxMeasurement {
   Box box() const { return {sides[0], sides[1], sides[2], sides[3]}; }
 };
 
-/// What a network says about the errors of its boxes; 0: nothing.
+/// Errors of boxes as the network states them; 0: not stated.
 struct BoxNoise {
   double relative = 0.0;             ///< deviation of a side of a large box, in widths or heights
-  double pixel = 0.0;                ///< a pixel of the network's input, in image pixels
+  double pixel = 0.0;                ///< size of a pixel of the network's input, in image pixels
   std::array<double, 4> sides{};     ///< deviations of this box's sides, in image pixels
   double clutter_probability = 0.0;  ///< boxes with a high clutter probability have larger errors
 };
@@ -41,9 +41,9 @@ struct SideError {
   double at(double size_px) const { return pixels + relative * size_px; }
   SideError operator*(double factor) const { return {pixels * factor, relative * factor}; }
 };
-/// Returns the deviation of noise and b together.
+/// Returns the standard deviation of a side, by noise and b together.
 SideError sideError(const BoxParameters& parameters, const BoxNoise& noise);
-/// Returns the deviation of b, the part that stays with the object while the view stays.
+/// Returns the standard deviation of a side by b, the error that stays while the view stays.
 SideError lastingError(const BoxParameters& parameters, const BoxNoise& noise);
 
 /// Returns the measurement of a box in an image of width × height pixels. Sides at the image border
@@ -72,12 +72,12 @@ struct BoxScore {
   std::array<bool, 4> ignored{};  ///< measured sides that the hypothesis does not predict
   double nis = 0.0;               ///< squared Mahalanobis distance of the measured sides
   int dof = 0;
-  int part = -1;  ///< side where a partial view ends within the object; -1: none
+  int part = -1;  ///< side at which a partial view ends within the object; -1: none
 };
 
 /// Returns log t(z; h(x), S), with `tail` degrees of freedom and censoring. If a nearer object
 /// hides a side (`hidden`), the box spans the whole object all the same (`amodal`) or ends anywhere
-/// within it. Something unmapped may hide one more side (`part`). Returns nothing outside the gate,
+/// within it. An unmapped object may hide one more side (`part`). Returns nothing outside the gate,
 /// or if no side can be compared.
 std::optional<BoxScore> scoreBox(const BoxMeasurement& z, const ProjectedBox& predicted,
                                  const Eigen::Matrix4d& covariance,

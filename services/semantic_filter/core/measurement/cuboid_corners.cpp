@@ -7,7 +7,7 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// In C: from the camera to the middle of a cuboid, and from there along half of each axis.
+/// Vectors in C: from the camera to the middle of a cuboid, and from there along half of each axis.
 struct Frame {
   Eigen::Vector3d centre, along, across, up;
   double heading;
@@ -41,7 +41,7 @@ PERDURE_ALSO_AVX2 void placeCorners(const Frame& frame, const Shape& shape, PerC
   depths = {{simd::leastOf(least)}, {simd::mostOf(most)}};
 }
 
-/// Computes their pixels for a camera without distortion, and the box around them.
+/// Computes the pixels of the corners for a camera without distortion, and the box around them.
 PERDURE_ALSO_AVX2 void projectPoints(const CameraModel& camera, const PerCorner& x,
                                      const PerCorner& y, const PerCorner& z, int corners, double* u,
                                      double* v, Range<2>& box) {
@@ -66,7 +66,7 @@ PERDURE_ALSO_AVX2 void projectPoints(const CameraModel& camera, const PerCorner&
   }
 }
 
-/// Adds the cuts of the cuboid's edges at corner i by the near plane.
+/// Adds the points at which the near plane cuts the edges of the cuboid at corner i.
 void addCuts(ImagePoints& points, int i, const Corners& corners, const CameraModel& camera) {
   const Eigen::Vector3d a = corners.p_C(i);
   for (int axis = 1; axis < 8; axis <<= 1) {
@@ -148,7 +148,7 @@ void setSide(ProjectedBox& box, int side, const SidePoint& point, const Projecto
   const Eigen::RowVector3d by_O = by_W * corners.R_WO;
   box.exact[side] = true;
   box.H.row(side).head<3>() = by_W;
-  // Turns x towards y.
+  // A positive yaw turns x towards y.
   box.H(side, kYaw) = by_O.y() * point.local.x() - by_O.x() * point.local.y();
   box.H.row(side).segment<3>(kSize) = by_O.cwiseProduct(point.local.transpose());
   const Eigen::Vector3d p_B = from.R_BC * point.p_C + from.camera->T_BC().p;

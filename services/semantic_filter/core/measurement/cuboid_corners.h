@@ -1,4 +1,4 @@
-// The corners of a shape before the camera, and their images
+// The corners of a shape in front of the camera, and their images
 // (tools/docs/maths/cuboid_projection.md).
 #pragma once
 
@@ -19,13 +19,13 @@ using PerCorner = std::array<double, Shape::kMostCorners>;
 
 struct Corners {
   Eigen::Matrix3d R_WO;
-  Eigen::Vector3d half;  ///< of length, width, height
+  Eigen::Vector3d half;  ///< of length, width and height, m
   const Shape* shape = nullptr;
   double heading = 0.0;
   PerCorner x, y, z;       ///< in C
-  bool all_before = true;  ///< all corners are before the near plane
+  bool all_before = true;  ///< no corner is behind the near plane
 
-  /// Returns corner i from the centre, along the axes of the cuboid.
+  /// Returns corner i in O, m.
   Eigen::Vector3d local(int i) const { return half.cwiseProduct(shape->corner(i, heading)); }
   Eigen::Vector3d p_C(int i) const {
     const auto k = static_cast<std::size_t>(i);
@@ -35,7 +35,7 @@ struct Corners {
 
 inline constexpr int kCut = -1;
 
-/// Pixels of corners, and of cuts of edges by the near plane.
+/// Pixels of corners, and of the points at which the near plane cuts edges.
 struct ImagePoints {
   using Coordinates = std::array<double, kMostOutline>;
   Coordinates u, v;
@@ -45,7 +45,7 @@ struct ImagePoints {
   std::size_t size = 0;
   Eigen::Vector4d sides;
 
-  /// Returns the corner whose u or v has this value, or kCut.
+  /// Returns the corner with this value. `values`: u or v. Returns kCut if it is not a corner.
   int at(const Coordinates& values, double value) const {
     for (std::size_t i = 0; i < size; ++i) {
       if (values[i] == value) return in_order ? static_cast<int>(i) : corner[i];
@@ -65,31 +65,33 @@ struct ImagePoints {
   }
 };
 
-/// Returns false if the whole object is behind the near plane. An object that reaches the near
-/// plane is treated as its cuboid, whose edges are cut there.
+/// Computes the corners in C. Returns false if the whole object is behind the near plane. An object
+/// that reaches the near plane is treated as its cuboid, whose edges are cut there.
 bool cornersBeforeCamera(const State& x, const Projector& from, const Shape& shape, double heading,
                          Corners& corners);
 
-/// Computes the pixels of all corners, and of the cuts of the edges by the near plane.
+/// Computes the pixels of all corners, and of the points at which the near plane cuts edges.
 void projectCorners(const Corners& corners, const CameraModel& camera, ImagePoints& points);
 
-/// Returns the pixel of a point in front; far outside the image where distortion is not defined.
+/// Returns the pixel of a point in front of the camera. If its distortion is not defined, the pixel
+/// is far outside the image.
 Eigen::Vector2d pixelOf(const CameraModel& camera, const Eigen::Vector3d& p_C);
 
-/// Derivative of one image coordinate of a point in front; false where there is none.
+/// Computes the derivative of one image coordinate of a point in front of the camera by the point.
+/// Returns false if it is not defined.
 bool coordinateByPoint(const CameraModel& camera, const Eigen::Vector3d& p_C, int axis,
                        Eigen::RowVector3d& by_C);
 
-/// A point of the body that makes a side of its box.
+/// A point of the object that determines a side of its box.
 struct SidePoint {
   Eigen::Vector3d p_C;
   Eigen::Vector3d local;    ///< from the centre, along the axes of the cuboid
-  Eigen::RowVector3d by_C;  ///< of the side's coordinate
+  Eigen::RowVector3d by_C;  ///< derivative of the side's coordinate by p_C
 };
 
 void setSide(ProjectedBox& box, int side, const SidePoint& point, const Projector& from,
              const Corners& corners);
-/// The same of a side that is the image of a corner. With kCut the side is not exact.
+/// Sets a side that is the image of a corner. With kCut the side is not exact.
 void setSide(ProjectedBox& box, int side, int corner, const Projector& from,
              const Corners& corners);
 

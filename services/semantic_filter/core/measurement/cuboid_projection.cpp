@@ -10,7 +10,7 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// Part of a line between two corners, by shares of the way: what is before the near plane.
+/// The part in front of the near plane of a line from corner a to corner b, in shares of the line.
 struct Segment {
   int a, b;
   double from = 0.0, to = 1.0;
@@ -25,7 +25,8 @@ std::optional<Segment> beforeNearPlane(int a, int b, const Corners& corners) {
   return segment;
 }
 
-/// Returns the share of the way at which a line crosses a border (first step exact undistorted).
+/// Returns the share of a line at which it crosses a border, px, by the method of false position.
+/// Without distortion the first step is exact. Returns nothing if the line does not cross.
 std::optional<double> crossing(const Segment& segment, const Corners& corners,
                                const CameraModel& camera, int axis, double border) {
   const Eigen::Vector3d a = corners.p_C(segment.a), way = corners.p_C(segment.b) - a;
@@ -47,7 +48,8 @@ std::optional<double> crossing(const Segment& segment, const Corners& corners,
   return s;
 }
 
-/// The point where a line between corners crosses the border, along which it slides, if defined.
+/// Returns the point at which a line between corners crosses the border. Its derivative is that
+/// along the border, because it stays on the border. Returns nothing if it is not defined.
 std::optional<SidePoint> crossingPoint(const Segment& segment, double s, const Corners& corners,
                                        const CameraModel& camera, int axis) {
   const Eigen::Vector3d a = corners.p_C(segment.a), way = corners.p_C(segment.b) - a;
@@ -64,7 +66,7 @@ std::optional<SidePoint> crossingPoint(const Segment& segment, double s, const C
   return point;
 }
 
-/// The ends, along one axis of the image, of what lies within the borders of the other axis.
+/// The part of the object within the borders of one image axis, and its ends along the other axis.
 class EndsWithin {
  public:
   EndsWithin(const Corners& corners, const ImagePoints& points, const CameraModel& camera, int axis)
@@ -125,7 +127,7 @@ class EndsWithin {
   std::optional<End> least_, most_;
 };
 
-/// Where the border cuts the object, moves the other sides of its box to the part inside.
+/// If the border cuts the object, moves the other sides of its box to the part inside.
 void endWithinImage(ProjectedBox& box, const Corners& corners, const ImagePoints& points,
                     const Projector& from) {
   const Eigen::Vector4d whole = box.sides;

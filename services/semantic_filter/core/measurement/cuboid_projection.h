@@ -17,25 +17,26 @@ struct ProjectedBox {
   /// x1, y1, x2, y2, px; may lie outside the image
   Eigen::Vector4d sides = Eigen::Vector4d::Zero();
   Eigen::Matrix<double, 4, kStateDim> H = Eigen::Matrix<double, 4, kStateDim>::Zero();
-  /// by the pose error [θ, p] of T_WB
+  /// derivative of the sides by the pose error [θ, p] of T_WB
   Eigen::Matrix<double, 4, 6> H_pose = Eigen::Matrix<double, 4, 6>::Zero();
   /// false: the side is a cut by the near plane
   std::array<bool, 4> exact{true, true, true, true};
 };
 
-/// The same without derivatives, with the points of the outline.
+/// A projected box without derivatives, but with the points of the outline.
 struct ProjectedOutline {
   Eigen::Vector4d sides;  ///< x1, y1, x2, y2, px; may lie outside the image
   Polygon points;         ///< px; corners and cuts by the near plane, in no order
 };
 
-/// Projects `shape`, or the whole cuboid if it reaches the near plane (0.2 m); nothing behind it.
+/// Projects `shape`, or the whole cuboid if it reaches the near plane (0.2 m). Returns nothing if
+/// the object is behind this plane.
 std::optional<ProjectedBox> projectCuboid(const State& x, const Projector& from,
                                           const Shape& shape = cuboidShape(), double heading = 0.0);
 std::optional<ProjectedOutline> projectOutline(const State& x, const Projector& from,
                                                const Shape& shape = cuboidShape());
 
-/// How a network draws its boxes around objects of a class.
+/// Properties of the boxes that a network draws around objects of a class.
 struct BoxStyle {
   /// mean offset of the sides, in widths and heights, like b
   Eigen::Vector4d offset = Eigen::Vector4d::Zero();

@@ -26,7 +26,8 @@ BoxStyles stylesOf(const ModelInfo& info, const ClassPriors& priors, BoxExtent b
   return styles;
 }
 
-/// To the network, an object of no known class resembles clutter or one of its classes.
+/// Returns the log ratio of *other* to clutter. To the network, an object of no known class
+/// resembles clutter or one of its classes.
 double logRatioOfOther(const BoxDetection& e, double lookalike_nats) {
   const double share = lookalikeProbability(e.lookalike, lookalike_nats);
   return std::log(1.0 - share + share * std::exp(e.log_ratio_best));
@@ -36,7 +37,7 @@ double shared(double a1, double a2, double b1, double b2) {
   return std::min(a2, b2) - std::max(a1, b1);
 }
 
-/// Variance of a side with b.
+/// Returns the variance of a side, by noise and b, px².
 double variance(const BoxMeasurement& z, int side) { return z.variance[side] + z.lasting[side]; }
 
 /// Whether two sides may be the same edge in the image.
@@ -46,7 +47,7 @@ bool sameEdge(const BoxMeasurement& a, int side_a, const BoxMeasurement& b, int 
          d * d < gates::kSameEdge * (variance(a, side_a) + variance(b, side_b));
 }
 
-/// Whether `a` stands lower in the image than `b`. `slope` (dy/dx): of a level line.
+/// Whether `a` stands lower in the image than `b`. `slope`: dy/dx of a level line.
 bool reachesLower(const BoxMeasurement& a, const BoxMeasurement& b, double slope) {
   const double apart = 0.5 * (a.sides[0] + a.sides[2] - b.sides[0] - b.sides[2]);
   const double lower =
@@ -172,7 +173,7 @@ std::string classSeenIn(const BoxDetection& detection, const Model& model) {
 }
 
 double lookalikeProbability(double prior, double lookalike_nats) {
-  constexpr double kMost = 0.5;  // from another side it may resemble nothing
+  constexpr double kMost = 0.5;  // limit; from another side it may resemble no class
   const double looks_alike = prior * std::exp(std::min(lookalike_nats, 100.0));
   return std::min(looks_alike / (1.0 - prior + looks_alike), std::max(kMost, prior));
 }

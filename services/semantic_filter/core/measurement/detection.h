@@ -30,11 +30,11 @@ struct BoxStyles {
 
 using ClassNames = std::set<std::string>;
 
-/// What the filter keeps of a ModelInfo.
+/// The part of a ModelInfo that the filter needs.
 struct Model {
   std::uint64_t hash = 0;
-  /// Hash of the first model of the same network. The filter stores the learned properties of its
-  /// boxes by it. It differs from `hash` if the list of classes grew.
+  /// Hash of the first model of the same network. It is the key of the learned properties of the
+  /// network's boxes. It differs from `hash` if the list of classes grew.
   std::uint64_t network = 0;
   std::vector<std::string> classes;
   /// the same as `classes`
@@ -43,12 +43,13 @@ struct Model {
   double input_width = 0.0;                  ///< of the network's input, px; 0: unknown
   double box_sigma = 0.0;
   std::shared_ptr<const BoxStyles> styles = std::make_shared<const BoxStyles>();
-  /// If the model does not say what its boxes enclose: `styles` of cuboids, and these of outlines.
+  /// Styles of outlines; set if the model does not state what its boxes enclose. `styles` is then
+  /// that of cuboids.
   std::shared_ptr<const BoxStyles> outline_styles = nullptr;
 };
-/// Shapes come from the priors if the model says that its boxes enclose outlines.
+/// Shapes come from the priors if the model states that its boxes enclose outlines.
 Model makeModel(const ModelInfo& info, const ClassPriors& priors = {});
-/// Returns what the model says about all its boxes, in images `image_width` pixels wide.
+/// Returns the errors that the model states for all its boxes, in images `image_width` pixels wide.
 BoxNoise boxNoise(const Model& model, double image_width);
 
 struct BoxDetection {
@@ -56,7 +57,7 @@ struct BoxDetection {
   double log_clutter = 0.0;
   /// Nats by which partial views of objects below visibility.minimum make such a box more frequent.
   double log_partial_views = 0.0;
-  SharedVector<double> log_ratio;  ///< by class of the model, clamped
+  SharedVector<double> log_ratio;  ///< nats, by class of the model, clamped
   double log_ratio_best = 0.0;     ///< the largest of them
   double log_ratio_other = 0.0;    ///< of *other*, at its first observation
   double lookalike = 0.0;          ///< share of *other* objects that resemble a known class
@@ -66,9 +67,9 @@ struct BoxDetection {
   std::array<bool, 4> beside_nearer{};
 };
 
-/// Marks `beside_nearer` of all boxes. On level ground, nearer things stand lower in the image.
+/// Marks `beside_nearer` of all boxes. On level ground, nearer objects stand lower in the image.
 void markSidesBesideNearer(std::vector<BoxDetection>& boxes, const View& view);
-/// Returns `hidden` and the sides beside nearer boxes.
+/// Returns the sides that are `hidden` or beside a nearer box.
 std::array<bool, 4> withSidesBesideNearer(std::array<bool, 4> hidden, const BoxDetection& box);
 
 /// Returns the name of the first fault of a detection, as counted in Health, or nullptr:
@@ -77,12 +78,13 @@ std::array<bool, 4> withSidesBesideNearer(std::array<bool, 4> hidden, const BoxD
 /// because a missing detection would count as a miss.
 const char* flawOf(const Detection& detection, const Model& model);
 
-/// Returns nothing for a flawed detection or one without a pixel in the image (width, height: px).
+/// Returns nothing if the detection has a fault, or less than a pixel of it is in the image
+/// (`width`, `height`: px).
 std::optional<BoxDetection> makeBoxDetection(const Detection& detection, const Model& model,
                                              double width, double height, const BoxParameters& box,
                                              const ClutterParameters& clutter);
 
-/// Top-down answers of the network: log-likelihood ratios by class, for each track asked for.
+/// Top-down answers of the network: log-likelihood ratios by class, for each predicted track.
 using TopDownAnswers = std::map<ObjectId, std::vector<double>>;
 /// Returns the ratios of one answer, clamped; nothing if it is not usable.
 std::optional<std::vector<double>> topDownRatios(const Detection& detection, const Model& model,
@@ -94,7 +96,7 @@ std::string classSeenIn(const BoxDetection& detection, const Model& model);
 /// Returns the probability that an *other* object resembles a class, from `prior` and earlier nats.
 double lookalikeProbability(double prior, double lookalike_nats);
 
-/// Returns log g_k; a class that the model does not know is scored as *other*. `lookalike_nats`:
+/// Returns log g_k; a class that the model does not have is scored as *other*. `lookalike_nats`:
 /// the nats by which an *other* object resembled a known class before, as a toy car does.
 double logRatio(const BoxDetection& detection, const Model& model, const std::string& class_name,
                 double lookalike_nats = 0.0);

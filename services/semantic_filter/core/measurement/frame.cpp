@@ -4,7 +4,7 @@
 
 namespace perdure::semantic_filter {
 
-constexpr double kNever = 1e9;  // a scale that makes a view change count nothing
+constexpr double kNever = 1e9;  // a scale at which a view change does not count
 
 Projector FrameContext::projector() const { return frame_view ? frame_view->projector : view; }
 
@@ -36,7 +36,7 @@ ViewWalk viewWalkOf(const FrameContext& frame) {
 void advancePoseError(PoseError& error, const Odometry& odometry,
                       const std::optional<RigidTransform>& last_T_WB,
                       const PoseParameters& parameters) {
-  // Nothing that was driven adds an error.
+  // Motion adds no error, so the pose error follows from the reported covariance and transition.
   error.reported = odometry.has_increment && odometry.increment_covariance.isZero(0.0);
   if (error.reported) {
     error.covariance = odometry.covariance.topLeftCorner<6, 6>();
@@ -44,7 +44,7 @@ void advancePoseError(PoseError& error, const Odometry& odometry,
     return;
   }
   if (!last_T_WB) return;
-  // The error of rotation is expressed in the body, which turns against W.
+  // The rotation error is expressed in B, which turns relative to W.
   Matrix6d A = Matrix6d::Identity();
   A.topLeftCorner<3, 3>() = odometry.T_WB.R().transpose() * last_T_WB->R();
   Eigen::Matrix<double, 6, 1> q;

@@ -1,5 +1,5 @@
-// Everything that the filter needs about one image: input, view, pose error, learned noise scales,
-// and the keyframes taken from it. Derivation: tools/docs/maths/pose_error.md.
+// The data of one image that the filter needs: input, view, pose error, learned noise scales, and
+// the keyframes taken from it. Derivation: tools/docs/maths/pose_error.md.
 #pragma once
 
 #include <memory>
@@ -19,37 +19,39 @@ namespace perdure::semantic_filter {
 /// Error of the body's pose at one frame, [θ, p] (rad, m).
 struct PoseError {
   Matrix6d covariance = Matrix6d::Zero();
-  /// Product of the transitions of all frames. A track of product A has C (B A⁻¹)ᵀ at product B.
+  /// Product of the transitions of all frames. C of a track at product A becomes C (B A⁻¹)ᵀ at
+  /// product B.
   Matrix6d product = Matrix6d::Identity();
-  /// The covariance is that of the odometry. Corrections shrink it, so that cross-covariances
-  /// (belief/pose_correlation.h) may become too large for it. A walk only grows.
+  /// Whether the covariance is that of the odometry. Corrections reduce it, so cross-covariances
+  /// may become too large for it (belief/pose_correlation.h). A random walk only increases it.
   bool reported = false;
 };
 
-/// Brings `error` from the frame before to the frame of `odometry`. `last_T_WB`: pose of the frame
-/// before; without one a walk adds nothing.
+/// Advances `error` from the previous frame to the frame of `odometry`. `last_T_WB`: pose of the
+/// previous frame. Without it the random walk adds nothing.
 void advancePoseError(PoseError& error, const Odometry& odometry,
                       const std::optional<RigidTransform>& last_T_WB,
                       const PoseParameters& parameters);
 
-/// A landmark in the image. It lies before or behind an object.
+/// A landmark in the image. It lies in front of an object or behind it.
 struct LandmarkDepth {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
   double distance_m = 0.0;
   double sigma_m = 0.0;
 };
 
-/// The input of one frame. Without `boxes` it says nothing; an empty list misses visible tracks.
+/// The input of one frame. Without `boxes` it is no evidence. An empty list of boxes is a miss of
+/// every visible track.
 struct FrameInput {
   FrameStamp stamp;
   View view;
   PoseError pose_error;
   std::vector<LandmarkDepth> points;  ///< landmarks in this image
   std::optional<std::vector<BoxDetection>> boxes;
-  TopDownAnswers top_down = {};  ///< for predictions that no box met
+  TopDownAnswers top_down = {};  ///< for predictions without a reported box
   /// the classes of the boxes refer to it; never null
   std::shared_ptr<const Model> model = std::make_shared<const Model>();
-  /// of the model, by the extent that is estimated; null: `model->styles`
+  /// styles by the estimated extent of the boxes; null: `model->styles`
   std::shared_ptr<const BoxStyles> estimated_styles = nullptr;
 
   const std::shared_ptr<const BoxStyles>& styles() const {
@@ -85,15 +87,15 @@ struct FrameView {
   CameraModel camera;
   View view;
   PoseError error;
-  Matrix6d product_inverse;  ///< of error.product; not finite where there is none
+  Matrix6d product_inverse;  ///< of error.product; not finite if it has no inverse
   TimePoint time;
   RigidTransform T_WC;
   Projector projector;
   std::shared_ptr<const BoxStyles> styles;  ///< of the network that made the boxes
-  NoiseScale noise_scale;                   ///< of its boxes, as estimated then
+  NoiseScale noise_scale;                   ///< of its boxes, as estimated at `time`
 };
 
-/// An observation with an assigned box that is kept for the batch estimate.
+/// An observation with an assigned box that is stored for the batch estimate.
 struct Keyframe {
   std::shared_ptr<const FrameView> from;
   BoxMeasurement z;
@@ -102,7 +104,7 @@ struct Keyframe {
   double azimuth_sigma = 0.35;
 };
 
-/// Everything about one frame that scoring, updating and initiation need.
+/// The data of one frame that scoring, updating and initiation need.
 struct FrameContext {
   View view;
   PoseError pose_error;
@@ -111,11 +113,11 @@ struct FrameContext {
   const Parameters* parameters = nullptr;
   std::shared_ptr<const FrameView> frame_view = {};  ///< of this frame, for its keyframes
   NoiseScale noise_scale = {};
-  std::shared_ptr<const GroundSurface> ground = {};  ///< before this frame; null: nothing is known
+  std::shared_ptr<const GroundSurface> ground = {};  ///< before this frame; null: not known
   const MoverShares* movers = nullptr;               ///< null: the shares of the class priors
   /// Box styles of the present network, also used for its earlier keyframes. Null: as declared.
   const BoxStyles* styles = nullptr;
-  double size_scale = 1.0;        ///< of the size at which P_D is halved: learned over assumed
+  double size_scale = 1.0;        ///< learned over assumed size at which P_D is halved
   bool estimates_extent = false;  ///< true while the extent of the boxes is estimated
 
   Projector projector() const;
@@ -123,12 +125,12 @@ struct FrameContext {
   double moverShare(const ClassPrior& prior) const {
     return movers ? movers->of(prior) : prior.moving;
   }
-  /// Returns the styles of the boxes of an earlier frame: the present ones if its network is the
-  /// same, because the extent of the boxes is estimated.
+  /// Returns the styles of the boxes of an earlier frame. If its network is the present one, these
+  /// are the present styles, because the estimated extent of the boxes may have changed.
   const BoxStyles& stylesOf(const FrameView& from) const {
     return styles && from.noise_scale.model == noise_scale.model ? *styles : *from.styles;
   }
-  /// Returns how the network draws boxes around objects of a class, for projectObserved.
+  /// Returns the style of the present network's boxes for a class, as projectObserved needs it.
   const BoxStyle& styleOf(const std::string& class_name) const {
     static const BoxStyle plain;
     if (styles) return styles->of(class_name);
@@ -136,21 +138,21 @@ struct FrameContext {
   }
 };
 
-/// What a view change alters at a track: b and detectability return to their stationary values.
+/// Parameters of a view change: b and detectability of a track return to their stationary values.
 struct ViewWalk {
   RigidTransform T_WC;  ///< the new view
   double focal = 1.0;   ///< px
   SideError lasting;    ///< stationary deviation of b
   ViewScales bias{1, 1, 1};
-  double unmapped_occluder = 0.0;  ///< stationary probability that one hides it
+  double unmapped_occluder = 0.0;  ///< stationary probability of an unmapped occluder
   ViewScales occluder{1, 1, 1};
-  double hard_to_detect = 0.0;  ///< the same, that the view makes it so
+  double hard_to_detect = 0.0;  ///< stationary probability of a view with rare detections
   ViewScales detectability{1, 1, 1};
 };
 
 /// Returns the view changes after which the detector bias has fallen to 1/e.
 ViewScales biasScales(const BoxParameters& box);
-/// Returns the view changes after which detectability no longer correlates.
+/// Returns the view changes after which the correlation of detectability has fallen to 1/e.
 ViewScales detectabilityScales(const VisibilityParameters& visibility);
 ViewWalk viewWalkOf(const FrameContext& frame);
 

@@ -7,9 +7,10 @@
 
 namespace perdure::semantic_filter {
 
-/// Most points of an outline: corners of a shape, or of a cuboid with cuts by the near plane.
+/// Largest number of points of an outline: corners of a shape, or of a cuboid that the near plane
+/// cuts.
 inline constexpr std::size_t kMostOutline = 24;
-/// Has room for the points that clipping at the four image borders adds.
+/// A polygon with room for the points that clipping at the four image borders adds.
 using Polygon = InplaceVector<Eigen::Vector2d, kMostOutline + 8>;
 
 /// Returns twice the signed area of the triangle o, a, b.

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::size_t kMostReferences = 20000;  // about 8 MB
 
-/// The map has the track, or will have it with the next commit. A track may be unconfirmed now
+/// Whether the map has the track, or will have it with the next commit. It may be unconfirmed now
 /// because its position relative to the body is too uncertain. Its stored row remains useful.
 bool onTheMap(const Track& track) {
   return track.life.confirmed || (track.life.once_confirmed && track.existence >= 0.5);
@@ -19,7 +19,7 @@ bool mayMove(const Track& track, double min_speed) {
   return movingProbability(track, min_speed) > 0.5;
 }
 
-/// Half of the largest side: a track is near if any part of it is near.
+/// Returns half of the largest side, m, because a track is near if any part of it is near.
 double extentOf(const Track& track) {
   return 0.5 * track.best().x.segment<3>(kSize).array().exp().maxCoeff();
 }
@@ -62,7 +62,7 @@ Archive::Leaving Archive::leaving(const std::vector<Track>& tracks, const Eigen:
 
 double Archive::nearRadius() const {
   constexpr double kShare =
-      1.0 / 3.0;  // of the margin, for objects that come near before the next message
+      1.0 / 3.0;  // of the margin: objects may come near before the next message
   return parameters_.archive ? parameters_.recall_m + kShare * parameters_.margin_m : 0.0;
 }
 

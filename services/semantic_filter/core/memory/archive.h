@@ -22,12 +22,12 @@ class Archive {
     std::vector<TrackId> archived;   ///< at rest and on the map, until they are recalled
     std::vector<TrackId> forgotten;  ///< never confirmed, or moving and out of view
   };
-  /// Must be called after the step of a frame at `now`, with the body at p_WB. Tracks that were
-  /// detected in frames from `oldest` on stay, because these frames may be stepped again.
+  /// Returns the tracks that leave. Must be called after the step of a frame at `now`, with the
+  /// body at p_WB. Tracks detected since `oldest` stay, because these frames may be stepped again.
   Leaving leaving(const std::vector<Track>& tracks, const Eigen::Vector3d& p_WB, TimePoint now,
                   TimePoint oldest);
 
-  /// The map has everything on disk that was published up to `time`.
+  /// Must be called if the map store has all tracks on disk that were published up to `time`.
   void onKept(TimePoint time) { kept_ = std::max(kept_, time); }
   TimePoint kept() const { return kept_; }
   /// The distance from the body up to which the map gives objects, m; 0: none. Tracks leave at a
@@ -36,7 +36,8 @@ class Archive {
 
   /// Stores the product that the cross-covariance of an archived track refers to. The map lacks it.
   void rememberReference(const Track& track);
-  /// Returns nothing if the belief is of another run, or if too many tracks were archived since.
+  /// Returns the product stored for a belief of time `as_of`; nothing if the belief is of another
+  /// run, or if too many tracks were archived since.
   std::optional<Matrix6d> referenceAt(TimePoint as_of) const;
 
   void clear();
@@ -47,7 +48,8 @@ class Archive {
 
   MemoryParameters parameters_;
   double min_speed_;  ///< m/s; a slower track is at rest
-  /// Since when each track could leave. It leaves once the map has a frame of this time or later.
+  /// Time since which each track could leave. It leaves once the map has a frame of this time or
+  /// later on disk.
   std::map<TrackId, TimePoint> waiting_;
   TimePoint kept_;
   std::map<TimePoint, Matrix6d> references_;

@@ -17,7 +17,7 @@ constexpr double kYawSpread = 0.8;      // rad, deviation of the yaw prior aroun
 constexpr double kAzimuthCorrelation = 0.5;
 constexpr double kOtherScale = 1.0;   // deviation that all three log sizes of *other* share
 constexpr double kAzimuthTail = 3.0;  // degrees of freedom of the t distribution
-constexpr double kAcross = 0.2;  // deviation of the speed across the length, share of that along it
+constexpr double kAcross = 0.2;   // speed deviation across the length, as a share of that along it
 constexpr double kUpwards = 0.2;  // m/s, deviation of the vertical speed
 
 Matrix6d transition(const PoseError& earlier, const PoseError& later) {
@@ -102,7 +102,7 @@ BatchProblem::BatchProblem(const KeyframeBatch& batch, const Hypothesis& kind, c
       class_name_(kind.class_name),
       yaw_(start[kYaw]),
       dim_(kind.moving ? kMostFree : kGeometry) {
-  // *Other* is initiated with three sizes; here one Gaussian has to cover them.
+  // *Other* is initiated with three sizes; here one Gaussian must cover them.
   if (class_name_ == kOtherClass) size_.covariance.array() += kOtherScale * kOtherScale;
   size_information_ = size_.covariance.inverse();
   const auto& box = frame.parameters->box;

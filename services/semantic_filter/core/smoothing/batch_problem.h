@@ -16,16 +16,16 @@ namespace perdure::semantic_filter {
 
 using Keyframes = std::vector<std::shared_ptr<const Keyframe>>;
 
-/// The matrices of a batch have bounded sizes, so that they stay off the heap.
+/// The matrices of a batch have bounded sizes, so they need no heap memory.
 inline constexpr int kMostSides = 4 * kMostKeyframes;
 using PerKeyframe = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostKeyframes, 1>;
-/// One number for each side, four sides a keyframe.
+/// One number for each side, four sides per keyframe.
 using PerSide = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostSides, 1>;
 using SideMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostSides, kMostSides>;
 
 using PoseJacobian = Eigen::Matrix<double, 4, 6>;
 
-/// The keyframes of one track, with the covariances of their pose errors and the present one.
+/// The keyframes of one track, with the covariances of their pose errors and of the present one.
 class KeyframeBatch {
  public:
   /// `keyframes`: in order of time; they outlive this object.
@@ -42,16 +42,16 @@ class KeyframeBatch {
 
  private:
   const Keyframes* keyframes_;
-  /// Fills onto_, from_ and now_. Returns false where a transition has no usable inverse.
+  /// Fills onto_, from_ and now_. Returns false if a transition has no usable inverse.
   bool chain(const PoseError& now);
-  /// Fills pairs_ and now_ instead.
+  /// Fills pairs_ and now_, if chain() fails.
   void pairUp(const PoseError& now);
 
   /// Φ_i (from the first keyframe to keyframe i) and Φ_i⁻¹ P_i. Keyframe i and an earlier keyframe
   /// j have the covariance Φ_i (Φ_j⁻¹ P_j). Empty if a Φ_i has no usable inverse.
   ScratchVector<Matrix6d> onto_, from_;
-  ScratchVector<Matrix6d> pairs_;  ///< in that case: the covariances of i and j <= i
-  ScratchVector<Matrix6d> now_;    ///< of the present pose error with keyframe i
+  ScratchVector<Matrix6d> pairs_;  ///< if chain() fails: covariances of i and j <= i
+  ScratchVector<Matrix6d> now_;    ///< covariance of the present pose error with keyframe i
   bool exact_ = true;
 };
 
@@ -83,9 +83,10 @@ Gram gramOf(const SideRows& whitened);
 /// Covariance of the rows of a Stack, given the cuboid, in two parts, px². Only lower triangles.
 struct SideCovariance {
   SideMatrix own;   ///< of noise, b and acceleration
-  SideMatrix pose;  ///< of the pose errors; empty where poses are exact
+  SideMatrix pose;  ///< of the pose errors; empty if poses are exact
 
-  /// Factorises R with `own` widened by the inflations, but not `pose`: it would seem observed.
+  /// Factorises R: the sum of `own`, widened by the inflations, and `pose`. `pose` is not widened,
+  /// because the pose error would then seem observed.
   void factorise(const PerKeyframe& inflations, Cholesky<SideMatrix>& R) const;
   /// Returns the residuals r without the pose errors estimated from them. `explained`: R⁻¹ r.
   PerSide withoutPose(const PerSide& residual, const PerSide& explained) const;
@@ -98,13 +99,15 @@ using SideColumns = Eigen::Matrix<double, Eigen::Dynamic, Columns, 0, kMostSides
 
 struct Quadratic {
   FreeMatrix G;  ///< information
-  FreeVector g;  ///< its gradient: the maximum is at x + G⁻¹ g
+  FreeVector g;  ///< gradient; the maximum is at x + G⁻¹ g
 };
 
-/// Every x has b = 0. `inflations`: one for each keyframe, >= 1; widens all its sides.
+/// Posterior of a cuboid given all keyframes. Every x has b = 0. `inflations`: one for each
+/// keyframe, >= 1, the factor on the variances of its sides.
 class BatchProblem {
  public:
-  /// The problem of hypotheses like `kind`. `start`: mean of the yaw prior, and for the heading.
+  /// `kind`: gives class, motion and extent (whole object or upper part). `start`: gives the mean
+  /// of the yaw prior, and the heading.
   BatchProblem(const KeyframeBatch& batch, const Hypothesis& kind, const State& start,
                const FrameContext& frame);
 
@@ -113,23 +116,25 @@ class BatchProblem {
   State at(const State& x, const FreeVector& step) const;
   /// Returns nothing if the cuboid has no projection in one of the keyframes.
   std::optional<Stack> linearise(const State& x) const;
-  /// Writes into `result` and uses its memory.
+  /// Writes the covariance of the rows of `s` to `result`, whose memory is reused.
   void covariance(const State& x, const Stack& s, SideCovariance& result) const;
   Quadratic quadratic(const State& x, const Gram& gram) const;
   /// Returns -2 log of the priors, without a constant and without the azimuths.
   double priorCost(const State& x) const;
-  /// Returns the part of priorCost that holds the yaw to its start.
+  /// Returns the part of priorCost that comes from the yaw prior around the start.
   double yawPriorCost(const State& x) const;
   /// Returns log p(azimuths | yaw modulo 180°), without a constant.
   double logAzimuths(const State& x) const;
   /// Returns the log-odds, by the azimuths, that the yaw of x is not turned by 180°.
   double logHeading(const State& x) const;
-  /// Returns the residuals of informative azimuths, by the first assumption. `yaw_variance`: rad².
+  /// Returns the squared residuals of informative azimuths, relative to the assumed variances.
+  /// `yaw_variance`: of the estimate, rad².
   ResidualRatio azimuthResidualRatio(const State& x, double yaw_variance) const;
   /// Returns log |Λ / 2π| of the velocity prior; 0 at rest.
   double logSpeedPrior() const;
   double logSizePrior() const;
-  /// Returns the part of log |R| that belongs to no density: of cut sides and whether they count.
+  /// Returns the part of log |R| that is not part of a density: that of sides that are cut or do
+  /// not count.
   double logVolumeOfCuts(const Stack& s, const PerKeyframe& inflations) const;
   /// Returns the covariance of all rows with the present b of deviations `sigma` (widths, heights).
   SideColumns<4> biasNow(const State& x, const Stack& s, const Eigen::Vector4d& sigma,
@@ -140,9 +145,10 @@ class BatchProblem {
   SideColumns<6> poseNow(const Stack& s) const;
 
  private:
-  /// Returns the seconds from a keyframe to the newest one, whose time the position has; 0 at rest.
+  /// Returns the time from a keyframe to the newest one, s; 0 at rest. The position is that at the
+  /// newest keyframe.
   double age(std::size_t keyframe) const;
-  /// Return the variances of the sides, px², with the present scales of the network.
+  /// Return the variances of the sides by noise and by b, px², with the present scales.
   Eigen::Vector4d noise(const Keyframe& k) const;
   Eigen::Vector4d lasting(const Keyframe& k) const;
   /// Returns the covariance of the sides of keyframe i and an earlier or equal j that white

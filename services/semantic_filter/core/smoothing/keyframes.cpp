@@ -12,7 +12,7 @@ namespace {
 
 using Keyframes = std::vector<std::shared_ptr<const Keyframe>>;
 
-/// The view of an object in one keyframe, as far as keyframes can differ.
+/// The view of an object in one keyframe, by which keyframes are compared.
 struct KeyframeView {
   ViewRay ray;
   Eigen::Vector2d centre;  ///< of the box, rad
@@ -25,7 +25,7 @@ KeyframeView keyframeViewOf(const Eigen::Vector3d& place, const Keyframe& k) {
           std::log(k.z.height())};
 }
 
-/// The larger of two changes, in correlation lengths: of the view, and of the box.
+/// Returns the larger of two changes, in correlation lengths: that of the view and that of the box.
 double changeBetween(const KeyframeView& a, const KeyframeView& b, const ViewScales& scales) {
   return std::max(viewChange(a.ray, b.ray, scales),
                   (a.centre - b.centre).norm() / scales.image_angle +

@@ -1,4 +1,4 @@
-// Observations that are kept for the batch estimate. Derivation: tools/docs/maths/map_fit.md.
+// Observations that are stored for the batch estimate. Derivation: tools/docs/maths/map_fit.md.
 #pragma once
 
 #include "services/semantic_filter/core/belief/track.h"

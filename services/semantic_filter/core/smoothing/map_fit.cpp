@@ -17,7 +17,7 @@ struct MapFit::Fit {
   State x;
   Stack stack;
   std::shared_ptr<SideCovariance> covariance;  ///< fits of the same batch share it
-  State covariance_at;                         ///< the x that it was computed at
+  State covariance_at;                         ///< the x at which the covariance was computed
   PerKeyframe inflations;
   KeyframeCounts contradicted;
   std::shared_ptr<Cholesky<SideMatrix>> R;
@@ -56,7 +56,7 @@ bool movedInView(const Fit& fit, const Eigen::Vector3d& from) {
   return (fit.x - fit.covariance_at).head<3>().norm() > kLittle * distance;
 }
 
-/// Returns a value of its own, whose memory is used again.
+/// Returns a value that no other fit shares. If it was not shared, its memory is reused.
 template <class T>
 T& ownOf(std::shared_ptr<T>& shared) {
   if (!shared || shared.use_count() > 1) {
@@ -77,8 +77,8 @@ bool factorise(const BatchProblem& model, Fit& fit, bool anew) {
 }
 
 /// Damping of Levenberg-Marquardt steps. It falls by the ratio of true to predicted gain (Nielsen
-/// 1999). The cost has a kink at a change of the extreme corner. A damping that falls after each
-/// success would fail there at every other step.
+/// 1999). The cost has a kink at a change of the extreme corner. If the damping fell after each
+/// success, every other step would fail there.
 class Damping {
  public:
   double value() const { return value_; }
@@ -92,7 +92,8 @@ class Damping {
   double value_ = 1e-4;
 };
 
-/// Takes one step and returns its predicted gain, squared deviations; false if none helps.
+/// Takes one step and sets its predicted gain (squared deviations). Returns false if no step lowers
+/// the cost.
 bool descend(const BatchProblem& model, Fit& fit, Damping& damping, double& predicted_gain) {
   const Quadratic q = model.quadratic(fit.x, gramOf(fit.whitened));
   const double cost = fit.squaredResidual() + model.priorCost(fit.x);
@@ -145,7 +146,8 @@ bool isOneOf(const ScratchVector<const Hypothesis*>& found, const State& x) {
   });
 }
 
-/// `like`: fit of another mode of the batch, whose covariance and inflations this fit begins with.
+/// Returns the fit from `start`; nothing if it fails or reaches one of the modes `found`. `like`:
+/// fit of another mode of the batch, whose covariance and inflations this fit begins with.
 std::optional<Fit> fitKeyframes(const BatchProblem& model, const State& start,
                                 const KeyframeBatch& batch, double tail, const Fit* like,
                                 const ScratchVector<const Hypothesis*>& found) {
@@ -202,7 +204,7 @@ std::optional<Hypothesis> stateOf(const BatchProblem& model, const Fit& fit,
   using FourFree = Eigen::Matrix<double, 4, Eigen::Dynamic, 0, 4, kMostFree>;
   const auto Bw = fit.R->whiten(model.biasNow(fit.x, fit.stack, sigma, fit.inflations));
   const auto Ew = fit.R->whiten(model.poseNow(fit.stack));
-  // The factors are tall and narrow: to pack them for Eigen's product costs more than the sums.
+  // The factors are tall and narrow, so packing them for Eigen's product costs more than the sums.
   const FourFree BJ = Bw.transpose().lazyProduct(Jw);
   const FreeColumns C = -P.lazyProduct(Jw.transpose().lazyProduct(Ew).eval());
 
@@ -253,7 +255,7 @@ std::optional<MapFit> MapFit::make(const Hypothesis& start, const KeyframeBatch&
   if (!fit) return std::nullopt;
   auto h = stateOf(model, *fit, start, frame);
   if (!h) return std::nullopt;
-  // At another state, a common motion of object and pose resembles information.
+  // With R of another state, a common motion of object and pose would seem observed.
   if (fit->covariance_at != fit->x && !isJointCovariance(*h, frame.pose_error.covariance)) {
     h = factorise(model, *fit, true) ? stateOf(model, *fit, start, frame) : std::nullopt;
     if (!h) return std::nullopt;
@@ -283,7 +285,7 @@ SideEvidence MapFit::sideEvidence() const {
   constexpr double kMost = 9.0;  // times the expected squares; one fit must not decide alone
   const BatchProblem model = modelOf();
   Fit fit = *fit_;
-  // At another state, other sides count, and the parts would not add up to R.
+  // At another state other sides count, so the parts would not add up to R.
   if (fit.covariance_at != fit.x && !factorise(model, fit, true)) return {};
   const SideRows J = fit.whitened.leftCols(model.dim());
   const Cholesky G(model.quadratic(fit.x, gramOf(fit.whitened)).G);
@@ -296,7 +298,7 @@ SideEvidence MapFit::sideEvidence() const {
   for (int c = 0; c < 2; ++c) {
     const SideMatrix M = fit.R->whiten(fit.R->whiten(parts[c]).transpose().eval());
     const double squares = (M * r).cwiseProduct(r).sum() / kShareAfterWeights;
-    // What the estimate of the geometry takes away: Q M, where Q = I - J G⁻¹ Jᵀ.
+    // Removes the part that the estimate of the geometry explains: Q M, with Q = I - J G⁻¹ Jᵀ.
     parts[c] = M - J * G.solve((J.transpose() * M).eval());
     const double expected = parts[c].trace();
     evidence.gradient[c] = std::min(squares, kMost * expected) - expected;
@@ -320,7 +322,7 @@ double MapFit::logEvidence(bool of_yaw) const {
   const PerKeyframe& inflations = fit_->inflations;
   const BatchProblem model = modelOf();
   const Stack& stack = fit_->stack;
-  // R is computed at exactly this state: its determinant of a hundred dimensions depends on it.
+  // R must be of exactly this state, on which its determinant of a hundred dimensions depends.
   thread_local SideCovariance covariance;
   model.covariance(fit_->x, stack, covariance);
   thread_local Cholesky<SideMatrix> R;

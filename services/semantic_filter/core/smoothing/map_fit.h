@@ -12,13 +12,13 @@ namespace perdure::semantic_filter {
 
 using KeyframeCounts = Eigen::Array<int, Eigen::Dynamic, 1, 0, kMostKeyframes, 1>;
 
-/// One hypothesis, fitted to all keyframes. Batch and frame outlive it; it lives within one step.
+/// One hypothesis, fitted to all keyframes; valid within one step. Batch and frame must outlive it.
 class MapFit {
  public:
   struct Fit;
 
-  /// Returns nothing if `start` has no projection in a keyframe, if the place stays undetermined,
-  /// or if the fit comes to one of the modes `found`. `like`: a mode of the same batch and motion,
+  /// Returns nothing if `start` has no projection in a keyframe, if the position stays uncertain,
+  /// or if the fit reaches one of the modes `found`. `like`: a mode of the same batch and motion,
   /// whose inflations and covariance the fit begins with.
   static std::optional<MapFit> make(const Hypothesis& start, const KeyframeBatch& batch,
                                     const FrameContext& frame, const MapFit* like = nullptr,
@@ -30,8 +30,8 @@ class MapFit {
   /// Returns the evidence about the variances of the sides, by restricted likelihood, for an object
   /// at rest.
   SideEvidence sideEvidence() const;
-  /// Returns the residuals of the azimuths, by the first assumption; their count is the degrees of
-  /// freedom.
+  /// Returns the squared residuals of the azimuths, relative to the assumed variances. The count is
+  /// that of the degrees of freedom.
   ResidualRatio azimuthResidualRatio() const;
   std::size_t sides() const;
   /// Returns 1 for each keyframe that contradicts the fit, 0 for the others.
@@ -40,7 +40,7 @@ class MapFit {
   /// the t distribution of each keyframe, without a constant. `of_yaw`: for modes of yaw; with the
   /// azimuths and without the yaw prior around the start.
   double logEvidence(bool of_yaw = false) const;
-  /// Returns the log-odds, by the azimuths, that its yaw is not turned by 180°.
+  /// Returns the log-odds, by the azimuths, that the fitted yaw is not turned by 180°.
   double logHeading() const;
 
  private:

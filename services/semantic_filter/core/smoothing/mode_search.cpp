@@ -19,8 +19,8 @@ bool sameMode(const Hypothesis& a, const Hypothesis& b) {
          std::min(distance2(a, b), distance2(b, a)) < gates::kSameMode;
 }
 
-/// Returns starts at rest with other yaws, turned by 45°, 90° and 135°, and of usual size. An upper
-/// part keeps the observed size.
+/// Returns starts with other yaws, turned by 45°, 90° and 135°, and of usual size. An upper part
+/// keeps the observed size.
 ScratchVector<Hypothesis> otherStarts(const Hypothesis& best, const ClassPrior& prior) {
   ScratchVector<Hypothesis> starts;
   if (!prior.has_yaw && best.class_name != kOtherClass) return starts;
@@ -34,9 +34,8 @@ ScratchVector<Hypothesis> otherStarts(const Hypothesis& best, const ClassPrior& 
   return starts;
 }
 
-/// Returns the fits of the keyframes of an *other* track as one of a class, from four yaws.
-/// `upper_part`: by the visible upper part of an object of the class. `like`: a fit of the same
-/// batch.
+/// Returns fits of an *other* track as an object of a class, from four yaws. `upper_part`: fits the
+/// upper part of such an object. `as_other`: the fit of the same batch as *other*.
 ScratchVector<MapFit> fitsAs(const Hypothesis& other, const ClassPrior& prior, bool upper_part,
                              const KeyframeBatch& batch, const FrameContext& frame,
                              const MapFit& as_other) {
@@ -71,7 +70,7 @@ std::optional<MapFit> fit(const Hypothesis& start, const KeyframeBatch& batch,
 }
 
 double besideKeyframes(Hypothesis& h, ObjectId id, const FrameContext& frame) {
-  // Something unmapped hides each of the four sides with the same probability.
+  // An unmapped object hides each of the four sides with the same probability.
   const double share = h.upper_part ? 0.25 * frame.parameters->box.partial_view : 1.0;
   return updateWithGround(h, id, frame) + std::log(share);
 }
@@ -154,7 +153,7 @@ void searchModes(Track& track, const KeyframeBatch& batch, const FrameContext& f
   const Hypothesis best = track.hypotheses[fits.front().index];
   const ClassPrior& prior = frame.priors->of(best.class_name);
   ScratchVector<Hypothesis> starts = otherStarts(best, prior);
-  if (best.upper_part) {  // by now the whole object may be seen
+  if (best.upper_part) {  // the whole object may be visible by now
     starts.push_back(wholeOf(best, prior));
     starts.back().weight = 0.0;
   }

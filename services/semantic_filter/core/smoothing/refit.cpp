@@ -19,7 +19,7 @@ struct ContradictionCounts {
   }
 };
 
-/// Removes the keyframes that contradict every fit: they showed something else.
+/// Removes the keyframes that contradict every fit, because they show another object.
 void dropContradicted(Track& track, const ContradictionCounts& contradictions, std::size_t least) {
   if (contradictions.fits == 0) return;
   std::vector<std::shared_ptr<const Keyframe>> kept;
@@ -31,8 +31,8 @@ void dropContradicted(Track& track, const ContradictionCounts& contradictions, s
   if (kept.size() >= least) track.batch.keyframes = std::move(kept);
 }
 
-/// Returns the nats by which the boxes of an object at rest enclose its outline, not its cuboid;
-/// nothing without a fit of the other extent.
+/// Returns the evidence, in nats, that the boxes of an object at rest enclose its outline, not its
+/// cuboid; nothing if the fit with the other extent fails.
 std::optional<double> outlineNats(const MapFit& at_rest, const KeyframeBatch& batch,
                                   const FrameContext& frame) {
   constexpr double kMost = 3.0;  // nats; an object of an unusual shape must not decide alone
@@ -92,7 +92,8 @@ std::optional<NetworkEvidence> refitClass(Track& track, const std::string& name,
   return evidence;
 }
 
-/// Whether the track surely exists and stands, with a known class and the present network.
+/// Whether the track surely exists, is at rest, has a known class, and all its keyframes are of the
+/// present network.
 bool informsAboutNetwork(const Track& track, const FrameContext& frame) {
   constexpr double kSure = 0.9;
   const Hypothesis& best = track.best();
@@ -136,7 +137,7 @@ std::optional<NetworkEvidence> refit(Track& track, const FrameContext& frame) {
     if (at == names.end() || *at != h.class_name) names.insert(at, h.class_name);
   }
   const bool search = track.batch.seen >= track.batch.mode_search_due;
-  // The sides are judged with the mode search, because their evidence costs as much as a fit.
+  // The evidence about sides is computed at a mode search only, because it costs as much as a fit.
   const double since_search =
       (track.batch.seen - 0.5 * track.batch.mode_search_due) / static_cast<double>(batch.size());
   const double unsearched =

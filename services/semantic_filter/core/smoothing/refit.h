@@ -1,4 +1,4 @@
-// When a track is fitted to its keyframes, and the fits of all its hypotheses
+// Decides when a track is fitted to its keyframes, and fits all its hypotheses
 // (tools/docs/maths/map_fit.md).
 #pragma once
 
@@ -7,15 +7,17 @@
 
 namespace perdure::semantic_filter {
 
-/// Keeps the assigned box as a keyframe if its view is new. Returns whether to fit the track.
+/// Stores the assigned box as a keyframe if its view is new. Returns whether a fit is due.
 bool considerKeyframe(Track& track, const BoxDetection& box, const std::array<bool, 4>& hidden,
                       const FrameContext& frame);
-/// Returns the number of new keyframes over the awaited `fresh` share; from 1 on a fit is due.
+/// Returns the number of new keyframes over the number that makes a fit due. `fresh`: the share
+/// of new keyframes that requires a fit.
 double refitNeed(const Track& track, double fresh);
 struct NetworkEvidence {
-  SideEvidence sides;      ///< of keyframes that no earlier evidence counted; with mode searches
+  SideEvidence sides;      ///< of keyframes not yet counted; only after a mode search
   ResidualRatio azimuths;  ///< of keyframes that no earlier fit counted
-  /// Nats for boxes that enclose outlines, not cuboids, by all keyframes; if the frame asks for it.
+  /// Nats for boxes that enclose outlines, not cuboids, by all keyframes; only if the frame
+  /// `estimates_extent`.
   std::optional<double> outline_nats = {};
 };
 /// Fits the hypotheses and weighs rest against motion. Returns the evidence about the network, if

@@ -12,7 +12,7 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// Residuals of a state without a projection: the solver reads them and must not take the step.
+/// Residual of a state without a projection, so large that the solver refuses the step.
 constexpr double kNoStep = 1e100;
 
 /// Whitened residuals: 4 sides, 3 position (weak), 1 yaw, 3 size, 1 range, 4 bias.
@@ -123,7 +123,7 @@ std::optional<RangeHint> rangeFromLandmarks(const BoxDetection& detection,
     if (std::abs(u) > 1.0 || std::abs(v) > 1.0 || p.distance_m <= 0.0) continue;
     const double weight = std::exp(-std::hypot(u, v) / parameters.landmark_decay) /
                           (1.0 + p.sigma_m * p.sigma_m / (p.distance_m * p.distance_m));
-    const double inverse = 1.0 / p.distance_m;  // in its mean, far landmarks count less
+    const double inverse = 1.0 / p.distance_m;  // far landmarks count less in the mean of inverses
     sum += weight, mean += weight * inverse, square += weight * inverse * inverse;
     ++n;
   }

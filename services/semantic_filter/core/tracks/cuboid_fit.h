@@ -33,7 +33,8 @@ std::optional<CuboidFit> fitCuboid(const BoxDetection& detection, const ClassPri
                                    const std::optional<RangeHint>& range,
                                    const FrameContext& frame);
 
-/// Returns the ray in W from the camera through the box's centre, as long as 1 m of depth.
+/// Returns the ray in W from the camera through the box's centre, to a depth of 1 m; nothing if the
+/// centre cannot be unprojected.
 std::optional<Eigen::Vector3d> centreRay(const BoxMeasurement& z, const View& view);
 
 }  // namespace perdure::semantic_filter

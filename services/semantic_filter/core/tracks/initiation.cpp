@@ -22,7 +22,8 @@ struct YawStart {
   double yaw, sigma, weight;
 };
 
-/// Returns four starts that cover a half turn: a cuboid is the same when turned by 180°.
+/// Returns four starts that cover a half turn, because a cuboid is the same when turned by 180°.
+/// Returns one start if the class has no yaw.
 ScratchVector<YawStart> yawStarts(const ClassPrior& prior, const FrameContext& frame,
                                   const Eigen::Vector3d& ray) {
   const Eigen::Vector3d level = levelling(frame.view.up_W) * ray;
@@ -62,8 +63,8 @@ void weighByAzimuth(ScratchVector<Hypothesis>& fits, const BoxDetection& detecti
   for (auto& h : fits) h.weight *= after > 0.0 ? before / after : 1.0;
 }
 
-/// Returns the log-likelihood ratio of the box's shape to log-uniform clutter: of the ratio of
-/// width to height, and of the cost of the fit. If a side is cut, only the cost counts.
+/// Returns the log-likelihood ratio of the box's shape to log-uniform clutter. It is computed from
+/// the ratio of width to height and the cost of the fit; if a side is cut, from the cost only.
 double logShapeRatio(const CuboidFit& fit, const ClassPrior& prior, double yaw_sigma,
                      const BoxDetection& detection, const FrameContext& frame) {
   const auto& z = detection.z;
@@ -89,7 +90,8 @@ double logShapeRatio(const CuboidFit& fit, const ClassPrior& prior, double yaw_s
   return -fit.cost - 0.5 * std::log(2.0 * M_PI * variance) + std::log(range);
 }
 
-/// Returns how much better the underside fits the ground than clutter; 1 for unknown ground.
+/// Updates `h` by the ground. Returns the likelihood ratio of its underside to clutter; 1 if the
+/// ground is unknown.
 double groundRatio(Hypothesis& h, const FrameContext& frame) {
   const double log_ratio = updateWithGround(h, 0, frame);
   if (log_ratio == 0.0) return 1.0;
@@ -120,7 +122,8 @@ void addClass(Track& track, const ClassPrior& prior, double ratio, const BoxDete
   }
 }
 
-/// *Other* has three starts of size, so that each Gaussian is narrow enough to be linear in depth.
+/// Adds *other* with three starts of size, so that each Gaussian is narrow enough for a linear
+/// model of the depth.
 void addOther(Track& track, double ratio, const BoxDetection& detection, const Eigen::Vector3d& ray,
               const std::optional<RangeHint>& range, const FrameContext& frame) {
   constexpr double kScales[3] = {-1.2, 0.0, 1.2};
@@ -162,7 +165,7 @@ double frequencies(const FrameContext& frame) {
   return std::max(std::min(sum, 10.0), 1e-9);
 }
 
-/// The object may reach on behind what is nearer.
+/// Censors the sides beside nearer boxes, because the object may continue behind these.
 BoxDetection censoredBesideNearer(BoxDetection detection) {
   for (std::size_t i = 0; i < 4; ++i) {
     detection.z.measured[i] = detection.z.measured[i] && !detection.beside_nearer[i];
@@ -204,10 +207,10 @@ bool sameObject(const BoxMeasurement& a, const BoxMeasurement& b) {
   return intersectionOverUnion(box_a, box_b) > 0.65;
 }
 
-/// Whether the box is the rest of an object that is almost out of the image.
+/// Whether the box is the rest of a confirmed object that is almost out of the image.
 bool leavesView(BoxExplanations& expected, const Belief& belief,
                 const ScratchVector<TrackVisibility>& visibilities, const BoxDetection& box) {
-  if (box.z.count() == 4) return false;  // what leaves is cut by the border
+  if (box.z.count() == 4) return false;  // the border cuts an object that leaves
   for (std::size_t j = 0; j < visibilities.size(); ++j) {
     if (visibilities[j].state != Visibility::kOutOfView || !belief.tracks[j].life.confirmed)
       continue;

@@ -17,8 +17,8 @@ double logInitiationRatio(const BoxDetection& detection, const FrameContext& fra
 std::optional<Track> initiate(const BoxDetection& detection, const std::optional<RangeHint>& range,
                               TimePoint now, const FrameContext& frame);
 
-/// Finds state and shape of a track again from a box assigned to it. `pmf`: of the track before it
-/// lost its shape. Returns false, and changes nothing, if the box does not determine a track.
+/// Gives a track a new state and shape from a box assigned to it. `pmf`: of the track before it
+/// lost its hypotheses. Returns false, and changes nothing, if the box does not determine a track.
 bool reinitialise(Track& track, const ClassNumbers& pmf, const BoxDetection& detection,
                   const std::optional<RangeHint>& range, const FrameContext& frame);
 

@@ -12,7 +12,7 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-constexpr double kWithdrawn = 1.5;  // confirmation ends at so many times confirm_sigma_m
+constexpr double kWithdrawn = 1.5;  // confirmation ends at this multiple of confirm_sigma_m
 
 /// Whether a track has few hits, was never confirmed, and has been invisible for tentative_s.
 bool forgettable(const Track& o, const TrackParameters& parameters) {
@@ -23,10 +23,10 @@ bool forgettable(const Track& o, const TrackParameters& parameters) {
   return invisible && toSeconds(last - o.life.last_seen) > parameters.tentative_s;
 }
 
-/// Whether the track may be an older confirmed one that was seen in part, which is visible or
-/// hidden by this track. It waits until misses remove that one or a merge joins both, but not for
-/// longer than kMost hits: two objects may overlap by the errors of their estimates.
-/// Source of the number: merge_and_fusion.md, "Waiting".
+/// Whether the confirmation must wait, because the track may be an older confirmed one that was
+/// visible in part. That one must be visible now, or hidden by this track. The wait ends if misses
+/// delete the older track, if a merge joins both, or after kMost hits, because two objects may
+/// overlap by the errors of their estimates. Source of the number: merge_and_fusion.md, "Waiting".
 bool waits(const Track& o, const std::vector<Track>& tracks, const FrameContext& frame) {
   constexpr std::uint32_t kMost = 12;
   return o.life.hits < kMost && std::any_of(tracks.begin(), tracks.end(), [&](const Track& t) {

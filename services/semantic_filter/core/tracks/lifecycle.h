@@ -9,15 +9,16 @@
 
 namespace perdure::semantic_filter {
 
-/// Whether the track surely exists and its best hypothesis is placed. Re-identification needs no
-/// more; confirmation also needs that all hypotheses agree on the place.
+/// Whether the track surely exists and the position of its best hypothesis is known. This suffices
+/// for re-identification. Confirmation also requires that all hypotheses agree on the position.
 bool established(const Track& track, const FrameContext& frame);
-/// Withdraws the confirmation of tracks that were not seen since they moved on to a place that is
-/// no longer known.
+/// Withdraws the confirmation of moving tracks that are not visible and whose predicted position is
+/// too uncertain.
 void withdrawLostMovers(std::vector<Track>& tracks, const FrameInput& frame,
                         const Parameters& parameters);
-/// Confirms visible tracks that surely exist at a known place, and withdraws the confirmation if
-/// either is lost. Removes and returns the tracks whose existence fell below the threshold.
+/// Confirms visible tracks that surely exist at a known position, and withdraws the confirmation if
+/// one of both becomes uncertain. Removes deleted and forgotten tracks, and returns the deleted
+/// ones: those whose existence fell below the threshold.
 std::vector<Track> confirmAndDelete(std::vector<Track>& tracks, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

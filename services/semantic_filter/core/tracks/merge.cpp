@@ -30,8 +30,8 @@ void multiplyPmf(Track& a, const Track& b) {
   normalise(a, ClassEvidence::kMerge);
 }
 
-/// Whether a track of a known class has enough hits to replace an *other* track. Tracks of a few
-/// boxes, as at the border of the image, do not.
+/// Whether a track of a known class has enough hits to replace an *other* track. A track of a few
+/// boxes, as at the border of the image, has not.
 bool hasEnoughHits(const Track& known, const Track& other) {
   constexpr std::uint32_t kFewer = 4;  // times fewer hits
   return known.life.once_confirmed || kFewer * known.life.hits >= other.life.hits;
@@ -49,7 +49,8 @@ bool contradict(const Hypothesis& a, const Hypothesis& b) {
   return !P.positive() || P.whiten(d).squaredNorm() > gates::kNoFusion;
 }
 
-/// Keeps the hypotheses of both, weighted by their numbers of hits. Later observations decide.
+/// Keeps the hypotheses of both tracks, weighted by their numbers of hits. Later observations
+/// decide between them.
 void keepBoth(Track& a, const Track& b) {
   const double share =
       static_cast<double>(b.life.hits) / std::max(1.0, double(a.life.hits) + double(b.life.hits));
@@ -61,9 +62,9 @@ void keepBoth(Track& a, const Track& b) {
   normalise(a, ClassEvidence::kMerge);
 }
 
-/// Removes keyframes of a seldom detected track that the other does not explain.
+/// Removes keyframes of a seldom detected track that the other track does not explain.
 void forgetForeignKeyframes(Track& a, Track& b, const FrameContext& frame) {
-  constexpr double kSeldomDetected = 0.2;  // share of late observations
+  constexpr double kSeldomDetected = 0.2;  // share of recent observations
   Track& seldom_detected = a.history.recent_share < b.history.recent_share ? a : b;
   const Hypothesis& often_detected =
       (a.history.recent_share < b.history.recent_share ? b : a).best();
@@ -98,13 +99,13 @@ void absorb(Track& a, Track& b, const FrameContext& frame) {
   a.views.merge(b.views);
   a.detectability.seen_now = a.detectability.seen_now.cwiseMax(b.detectability.seen_now);
   a.detectability.seen_from = a.detectability.seen_from.cwiseMax(b.detectability.seen_from);
-  a.detectability.missed = {};  // a copy had its boxes
+  a.detectability.missed = {};  // b had the boxes
   a.detectability.rate.join(b.detectability.rate,
                             detectabilityScales(frame.parameters->visibility));
   mergeBatches(a, b, biasScales(frame.parameters->box), frame.parameters->smoothing);
 }
 
-/// Whether two cuboids overlap in the image, as one object does and objects side by side do not.
+/// Whether two cuboids overlap so much in the image that they may be one object.
 bool sameInImage(const State& a, const State& b, const Projector& from) {
   const auto box_a = projectCuboid(a, from), box_b = projectCuboid(b, from);
   if (!box_a || !box_b) return true;
@@ -116,13 +117,14 @@ bool bothVisible(const Track& a, const Track& b) {
   return a.visibility.fraction > 0.0 && b.visibility.fraction > 0.0;
 }
 
-/// Whether a is visible and occludes b: a copy behind its original is no object of its own.
+/// Whether a is visible and occludes b. b may then be a copy of a behind it.
 bool occludes(const Track& a, const Track& b) {
   return a.visibility.fraction > 0.0 && b.visibility.state == Visibility::kOccluded &&
          b.visibility.blocked_by == a.id;
 }
 
-/// Predicts invisible tracks, which have the time of their last observation, to the later time.
+/// Predicts tracks that are not visible to the later of both times. Their states have the time of
+/// their last observation.
 void predictToSameTime(Track& a, Track& b, const FrameContext& frame) {
   const TimePoint now = std::max(a.as_of, b.as_of);
   for (Track* o : {&a, &b}) {
@@ -131,7 +133,7 @@ void predictToSameTime(Track& a, Track& b, const FrameContext& frame) {
   }
 }
 
-/// Whether the id of a survives that of b: the confirmed one, or else the older one.
+/// Whether the id of a survives that of b. The confirmed track survives, or else the older one.
 bool survives(const Track& a, const Track& b) {
   if (a.life.once_confirmed != b.life.once_confirmed) return a.life.once_confirmed;
   return a.life.first_seen < b.life.first_seen ||
@@ -166,12 +168,12 @@ SharedVolume sharedVolume(const State& a, const State& b, const Eigen::Vector3d&
           shared / std::min(size_a.prod(), size_b.prod())};
 }
 
-/// Whether one frame detected both: its two boxes are of two objects.
+/// Whether one frame detected both tracks, because two boxes of one frame are of two objects.
 bool detectedTogether(const Track& a, const Track& b) {
   return (a.history.detected & b.history.detected) != 0;
 }
 
-/// Whether the box was assigned now to the one and now to the other of two visible tracks.
+/// Whether two visible tracks were detected in turns: never both, and kTurns times only one.
 bool alternate(const Track& a, const Track& b) {
   constexpr int kTurns = 4;  // frames
   const DetectionHistory &of_a = a.history, &of_b = b.history;
@@ -194,7 +196,8 @@ bool sameSpace(const Track& a, const Track& b, const FrameContext& frame) {
   return shared.of_joint >= parameters.merge_overlap && sameInImage(x, y, frame.projector());
 }
 
-/// Sphere around a track's cuboid, stored apart: few pairs touch, and the test is most of the work.
+/// Sphere around a track's cuboid. Spheres are stored in a separate list, because few pairs touch
+/// and their test is most of the work.
 struct Ball {
   Eigen::Vector3d centre;
   double radius;
@@ -213,8 +216,8 @@ bool touch(const Ball& a, const Ball& b) {
          (a.centre - b.centre).squaredNorm() <= reach * reach;
 }
 
-/// Whether one is an object of the map that was not detected since, the other one was, and their
-/// relative position is known better than half the width of the narrower one.
+/// Whether one track comes from the map and was not detected since, the other was detected, and
+/// their relative position is known better than half the width of the narrower one.
 bool metOnTheMap(const Track& a, const Track& b) {
   if (a.life.recalled == b.life.recalled) return false;
   const Hypothesis &x = a.best(), &y = b.best();
@@ -235,7 +238,7 @@ bool sameKind(const Track& a, const Track& b) {
 }
 
 bool mayBeOne(const Track& a, const Track& b, const FrameContext& frame) {
-  constexpr double kShared = 0.2;  // of the lesser volume; merge_and_fusion.md, "Waiting"
+  constexpr double kShared = 0.2;  // share of the lesser volume; merge_and_fusion.md, "Waiting"
   return sameKind(a, b) && !detectedTogether(a, b) &&
          sharedVolume(a.best().x, b.best().x, frame.view.up_W).of_lesser > kShared;
 }

@@ -1,4 +1,4 @@
-// Merge: which two tracks are one object, and what is then believed (paper, "Merge", line 286).
+// Merge: decides which tracks are one object, and fuses them (paper, "Merge", line 286).
 // Derivation: tools/docs/maths/merge_and_fusion.md.
 #pragma once
 
@@ -13,18 +13,18 @@ struct MergeRecord {
   TrackId survivor = 0, absorbed = 0;
   bool moved = false;  ///< re-identified: the object was moved or drove off (tracks/reidentify.h)
   bool returned = false;  ///< re-identified: the survivor had been deleted
-  bool by_map = false;    ///< the map holds both to be one object
+  bool by_map = false;    ///< the map reports both as one object
 };
 
 /// Returns the shared volume over the joint volume of two upright cuboids. `up_W`: against gravity.
 double overlap(const State& a, const State& b, const Eigen::Vector3d& up_W);
 
 /// Merges tracks of one kind in the same space. The confirmed one survives, or else the older one.
-/// Pairs wait unless both are visible or one occludes the other.
+/// A pair can merge if both are visible, one occludes the other, or one comes from the map.
 std::vector<MergeRecord> mergeObjects(std::vector<Track>& tracks, const FrameContext& frame);
 
-/// Whether two tracks of one kind share a part of their space, and no frame detected both: one may
-/// be the part of the other that was visible earlier.
+/// Whether two tracks of one kind share a part of their space, and no frame detected both. One may
+/// then be the part of the other that was visible earlier.
 bool mayBeOne(const Track& a, const Track& b, const FrameContext& frame);
 
 /// Whether class and motion allow that both are one object.

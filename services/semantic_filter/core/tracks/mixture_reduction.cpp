@@ -26,7 +26,7 @@ void settleSlowHypotheses(Track& track, double min_speed) {
   }
 }
 
-/// The Gaussian speed prior gets a hole around zero: moving objects seldom creep.
+/// Lowers the weights of slow moving hypotheses, because moving objects seldom creep.
 void applySpeedPrior(Track& track, const ClassPriors& priors, const MotionParameters& motion) {
   if (!hasMoving(track)) return;
   for (auto& h : track.hypotheses) {
@@ -39,7 +39,8 @@ void applySpeedPrior(Track& track, const ClassPriors& priors, const MotionParame
   }
 }
 
-/// Two hypotheses at one place with very different certainty are two explanations.
+/// Whether the variances of two positions differ by more than a factor of 4. Such hypotheses are
+/// two explanations, even at one place.
 bool differInCertainty(const Hypothesis& a, const Hypothesis& b) {
   const double va = a.P.topLeftCorner<3, 3>().trace(), vb = b.P.topLeftCorner<3, 3>().trace();
   return std::max(va, vb) > 4.0 * std::min(va, vb);
@@ -59,7 +60,8 @@ void mergeNearHypotheses(Track& track, double threshold) {
   }
 }
 
-/// Without parallax a toy resembles a car: until the distance is known, *other* stays.
+/// Whether the distance is unknown. *Other* then stays, because without parallax a toy resembles a
+/// car.
 bool scaleIsUnknown(const Track& track, const TrackParameters& parameters) {
   const double distance = (track.best().x.head<3>() - track.views.detected_from.T_WC.p).norm();
   const double variance = track.best().P.topLeftCorner<3, 3>().trace();
@@ -90,7 +92,8 @@ void pruneLightHypotheses(Track& track, const TrackParameters& parameters) {
   });
 }
 
-/// The moving hypothesis becomes rarer with the share of movers. A wrong depth does not.
+/// Adds a moving and a misplaced hypothesis to a static track with large innovations. Only the
+/// weight of the moving one depends on the learned share of movers.
 void addMovingAndMisplaced(Track& track, const FrameContext& frame) {
   const MotionParameters& motion = frame.parameters->motion;
   if (track.history.running_nis < motion.start_nis || hasMoving(track)) return;
@@ -99,7 +102,7 @@ void addMovingAndMisplaced(Track& track, const FrameContext& frame) {
   Hypothesis copy = asMoving(track.best());
   copy.weight *= motion.start_probability * frame.moverShare(prior) / prior.moving;
   copy.P.topLeftCorner<2, 2>().diagonal().array() += 0.25;
-  // The alternative to motion: the object stands, but nearer or farther along the ray.
+  // The alternative to motion: the object is at rest, but nearer or farther along the ray.
   Hypothesis misplaced = track.best();
   misplaced.ground_contact = {};
   misplaced.weight *= motion.start_probability * motion.misplaced_odds;

@@ -8,10 +8,10 @@
 namespace perdure::semantic_filter {
 
 /// - Merges near hypotheses of the same class and motion.
-/// - Prunes light hypotheses, those of implausible size, and all others if one class dominates.
+/// - Prunes light hypotheses, those of implausible size, and other classes if one class dominates.
 /// - Stops moving hypotheses that are slow.
-/// - Adds a moving copy, and one misplaced along the ray, to a contradicted static track.
-/// Possibly no hypothesis is left.
+/// - Adds a moving copy, and one misplaced along the ray, to a static track that boxes contradict.
+/// The result may have no hypothesis.
 void reduceMixture(Track& track, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

@@ -10,7 +10,7 @@
 namespace perdure::semantic_filter {
 namespace {
 
-/// Returns the box inside the gate that fits the geometry of the track best, of whatever class.
+/// Returns the box inside the gate that fits the geometry of the track best, whatever its class.
 const BoxDetection* boxOf(const TrackScore& score, const std::vector<BoxDetection>& boxes) {
   const HypothesisScore& best = score.hypotheses.front();
   const BoxDetection* nearest = nullptr;
@@ -84,7 +84,8 @@ double frequencyOf(const Track& track, const ClassPriors& priors) {
   return sum;
 }
 
-/// Returns the entering hypotheses, one for each mode and motion of the best class; sum 1.
+/// Returns the hypotheses of a new class, one for each mode and motion of the best class. Their
+/// weights sum to 1.
 std::vector<Hypothesis> recastAll(const Track& track, const ClassPrior& prior,
                                   const FrameContext& frame) {
   std::vector<Hypothesis> all;
@@ -100,7 +101,8 @@ std::vector<Hypothesis> recastAll(const Track& track, const ClassPrior& prior,
   return all;
 }
 
-/// The hypotheses that enter, and how well the size fits each class (at most 1, the best).
+/// Hypotheses of new classes. `fits`: for each new class, the likelihood of the size relative to
+/// the best class, at most 1.
 struct Entrants {
   std::vector<Hypothesis> hypotheses;
   ClassNumbers fits;

@@ -12,13 +12,13 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kMissing = 0.5;    // existence below which a once confirmed track is missing
-constexpr double kOverlap_s = 0.5;  // both may have been detected for so long
-constexpr double kDriven_s = 2.0;   // from the last detection of one to the first of the other
-constexpr double kTraced_s = 3.0;   // over which a velocity shows where an object came from
-constexpr double kCarried_m = 2.5;  // by which objects are carried
-constexpr int kLeastKeyframes = 3;  // that had the empty place in the image
+constexpr double kOverlap_s = 0.5;  // longest time for which both may have been detected
+constexpr double kDriven_s = 2.0;   // longest time between the detections of both
+constexpr double kTraced_s = 3.0;   // longest time over which a velocity gives an earlier position
+constexpr double kCarried_m = 2.5;  // longest distance by which objects are carried
+constexpr int kLeastKeyframes = 3;  // least number that shows that the place was empty
 
-/// A track that was confirmed once and is no longer believed.
+/// A track that was confirmed once and probably no longer exists in its place.
 struct Missing {
   Track* track;
   bool deleted;
@@ -26,7 +26,7 @@ struct Missing {
 
 bool isMissing(const Track& o) { return o.life.once_confirmed && o.existence < kMissing; }
 
-/// Whether most keyframes of the missing track had the new one's place in the image, empty.
+/// Whether most keyframes of the missing track show `place`, which was empty then.
 bool wasInView(const Eigen::Vector3d& place, const Track& missing) {
   const auto& keyframes = missing.batch.keyframes;
   const auto count = std::count_if(keyframes.begin(), keyframes.end(), [&](const auto& k) {
@@ -41,8 +41,8 @@ bool confirmedOrEstablished(const Track& o, const FrameContext& frame) {
   return o.life.confirmed || established(o, frame);
 }
 
-/// Whether the first box of a moving track is almost the last one of the missing track, and follows
-/// at once. Both are then one object, even if misplaced or deformed.
+/// Whether the first box of a moving track is almost the last box of the missing track, and follows
+/// it at once. Both are then one object, even if the missing track was misplaced or deformed.
 bool takesOver(const Track& new_track, const Track& missing) {
   constexpr double kAtOnce_s = 0.5, kSameBox = 0.5;  // kSameBox: intersection over union
   if (!new_track.best().moving || !new_track.history.first_box || !missing.history.last_box)
@@ -57,8 +57,8 @@ bool takesOver(const Track& new_track, const Track& missing) {
 }
 
 struct Match {
-  double metres;  ///< between the place of the missing track and where the new one was then
-  bool returned;  ///< it stands where it stood
+  double metres;  ///< from the missing track to the position of the new one at that time
+  bool returned;  ///< the object is in its old place
 };
 
 std::optional<Match> matchOf(const Missing& missing, const Track& new_track,
@@ -80,13 +80,13 @@ std::optional<Match> matchOf(const Missing& missing, const Track& new_track,
   const bool carried =
       frame.priors->of(h.class_name).moving <= 0.0 && wasInView(h.x.head<3>(), was);
   if (h.moving ? since > kDriven_s || ago > kTraced_s : !carried) return std::nullopt;
-  // A belief at rest follows an object that drives off for a while.
+  // An estimate at rest follows an object that drives off for some time, so a distance is allowed.
   const double length = h.x.segment<3>(kSize).array().exp().maxCoeff();
   if (metres >= (h.moving ? 0.75 * length : kCarried_m)) return std::nullopt;
   return Match{metres, false};
 }
 
-/// The new track keeps its belief and takes over id, first times and counts of the old one.
+/// Replaces the old track by the new one, with the id, first times and counts of the old one.
 void takeOverIdentity(Track& past, Track&& now) {
   now.id = past.id;
   now.life.first_seen = past.life.first_seen;
@@ -142,7 +142,7 @@ std::vector<MergeRecord> reidentify(std::vector<Track>& tracks,
   std::vector<MergeRecord> merges;
   const auto nearer = [](const Pair& a, const Pair& b) { return a.match.metres < b.match.metres; };
   std::stable_sort(pairs.begin(), pairs.end(), nearer);
-  // Nearest pairs first: then each of a pair is nearest to the other among those that are left.
+  // In this order, each track of a pair is the nearest to the other among those that are left.
   ScratchVector<bool> found(missing.size(), false), used(fresh.size(), false);
   for (const Pair& pair : pairs) {
     Track &past = *missing[pair.missing].track, &now = *fresh[pair.fresh];

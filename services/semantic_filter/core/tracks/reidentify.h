@@ -9,13 +9,13 @@
 
 namespace perdure::semantic_filter {
 
-/// Keeps deleted tracks that were confirmed once, for `parameters.reidentify_s`.
+/// Stores deleted tracks that were confirmed once, for `parameters.reidentify_s`.
 void keepDeleted(std::vector<Track>& recently_deleted, std::vector<Track> deleted, TimePoint now,
                  const TrackParameters& parameters);
 
-/// Gives new tracks the ids and the past of missing ones, nearest pairs first; their own ids are
-/// absorbed. The derivation lists the cases. If the new track stands in the old place, both beliefs
-/// are merged; otherwise the new one applies.
+/// Gives new tracks the ids and first times of missing ones, nearest pairs first, and returns these
+/// merges. The derivation lists the cases. If the new track is in the old place, both beliefs are
+/// merged; otherwise the belief of the new one is kept.
 std::vector<MergeRecord> reidentify(std::vector<Track>& tracks,
                                     std::vector<Track>& recently_deleted,
                                     const FrameContext& frame);

@@ -44,7 +44,7 @@ double excusedByOccluder(const Track& track, const ClassNumbers& pmf, const AllS
 }
 
 /// Returns log(A / A without g_k) of a class. "Without g_k": the same boxes from a network that
-/// cannot tell classes from clutter.
+/// cannot distinguish classes from clutter.
 double activationNats(const Track& track, const AllShares& shares, const std::string& class_name,
                       const ScratchVector<std::size_t>& gated,
                       const std::vector<BoxDetection>& boxes, const FrameContext& frame) {

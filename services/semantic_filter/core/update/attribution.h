@@ -9,25 +9,26 @@
 
 namespace perdure::semantic_filter {
 
-/// How one hypothesis divides an observation among "none of the boxes" and each box.
+/// A of one hypothesis, and its division among "none of the boxes" and each box.
 struct Shares {
   double A = 1.0;             ///< P(frame | hypothesis) / P(frame | nothing there)
   double none = 1.0;          ///< β_0, posterior share of "none of the boxes"
   ScratchVector<double> box;  ///< β_z, posterior share of each gated box
 };
 
-using AllShares = ScratchVector<Shares>;  ///< of the hypotheses of a track, in order
+using AllShares = ScratchVector<Shares>;  ///< one for each hypothesis of a track
 
 /// The reasons of an observation. They are computed before the weights change.
 struct UpdateReasons {
   ExistenceEvidence kind = ExistenceEvidence::kHit;
   double excused = 0.0;  ///< nats of a miss that an unmapped occluder excuses, >= 0
-  /// At a hit: what the activations of the network add to log π of each class, nats.
+  /// At a hit: the gain of log π of each class by the activations of the network, nats.
   ClassNumbers activation;
 };
 
-/// `detected`: probability that a box is the track's. `tempering`: exponent τ of a hit. `exponent`:
-/// that of A between classes. `gated`: indices of the boxes near the track.
+/// Returns the reasons of one update. `detected`: probability that a box is the track's.
+/// `tempering`: exponent τ of a hit. `exponent`: exponent of A between classes. `gated`: indices of
+/// the boxes near the track.
 UpdateReasons reasonsOf(const Track& track, const AllShares& shares, double detected,
                         double tempering, double exponent, const ScratchVector<std::size_t>& gated,
                         const std::vector<BoxDetection>& boxes, const FrameContext& frame);

@@ -15,7 +15,8 @@ constexpr double kMaxHeading = 6.0;  // nats
 constexpr double kOutlier = 0.2;     // share of azimuths that carry no information
 constexpr double kFlip = 0.1;        // share of azimuths that are turned by 180°
 
-/// Multiplies the weights of yaw modes by the azimuths' likelihood, within class and motion.
+/// Multiplies the weights of yaw modes by the likelihood of the azimuths. The sum of the weights of
+/// each class and motion stays.
 void weighYawModes(Track& track, const ScratchVector<double>& likelihood) {
   ScratchMap<std::pair<std::string_view, bool>, std::pair<double, double>> totals;
   for (std::size_t i = 0; i < track.hypotheses.size(); ++i) {

@@ -16,18 +16,19 @@ struct AzimuthMatch {
   double inlier = 0.0;      ///< probability that the azimuth carries information
 };
 
-/// `azimuth`: rad. `variance`: of the azimuth and of the yaw together, rad².
+/// Compares an azimuth (rad) with the yaw of x. `variance`: of azimuth and yaw together, rad².
 AzimuthMatch matchAzimuth(double azimuth, const State& x, const View& view, double variance);
 
-/// Returns what one such azimuth adds to the log-odds of the heading, nats.
+/// Returns the gain of the log-odds of the heading by one such azimuth, nats.
 double headingOdds(const AzimuthMatch& match);
 
-/// Returns the deviation of an azimuth before learning. `told`: by the network; rad.
+/// Returns the standard deviation of an azimuth before learning, rad. `told`: as the network
+/// reports it, rad.
 double azimuthSigma(double told, const ClassPrior& prior);
 
 /// Updates the yaw (modulo 180°) by an EKF and the heading by its log-odds. `azimuth`, `sigma`:
-/// rad. `weight`: in (0, 1]. Returns the likelihood of the azimuth, 1/rad. It is for the weights of
-/// yaw modes only.
+/// rad. `weight`: in (0, 1]. Returns the likelihood of the azimuth, 1/rad, which may change the
+/// weights of yaw modes only.
 double updateWithAzimuth(Hypothesis& h, double azimuth, double sigma, double weight,
                          const FrameContext& frame);
 

@@ -14,7 +14,7 @@ namespace {
 using SideRows = Eigen::Matrix<double, 4, kVelocity>;  // no side depends on the velocity
 using Gains = Eigen::Matrix<double, kStateDim, 4>;
 
-/// Innovation of the four sides. A side that does not take part has zero residual and zero rows.
+/// Innovation of the four sides. A side that is not used has zero residual and zero rows.
 struct Innovation {
   Eigen::Vector4d residual = Eigen::Vector4d::Zero(), variance = Eigen::Vector4d::Ones();
   SideRows H = SideRows::Zero();
@@ -22,7 +22,8 @@ struct Innovation {
   int count = 0;
 };
 
-/// Uses comparable sides, and cut or hidden sides whose prediction ends inside the box.
+/// Returns the innovation of comparable sides, and of other sides whose prediction ends inside the
+/// box.
 Innovation innovation(const BoxMeasurement& z, const ProjectedBox& p,
                       const std::array<bool, 4>& hidden) {
   Innovation y;
@@ -46,6 +47,7 @@ struct Gain {
 };
 
 /// Returns nothing if S is not positive definite. `PHt`: P Hᵀ + C H_gᵀ. `S`: without the noise.
+/// `variance`: of the noise.
 std::optional<Gain> gainOf(const Gains& PHt, const Eigen::Matrix4d& S,
                            const Eigen::Vector4d& variance) {
   Gain gain{PHt, S};

@@ -11,14 +11,15 @@ namespace perdure::semantic_filter {
 
 /// Returns the posterior given that box `z` is the object's. `repetition`: factor >= 1 on the
 /// variance of the sides, for noise that repeats that of the last detection; an outlier is widened
-/// further. `hidden`: sides that are not compared because something hides them. `at_prior`:
+/// further. `hidden`: sides that are not compared because a nearer object hides them. `at_prior`:
 /// projection of the prior, if it is known.
 Hypothesis updateWithBox(const Hypothesis& prior, const BoxMeasurement& z,
                          const std::array<bool, 4>& hidden, double repetition,
                          const FrameContext& frame, const ProjectedBox* at_prior = nullptr);
 
 /// Mixes the prior `none` ("none of the boxes") and the posteriors `parts`, weighted by their
-/// shares, to one Gaussian with the same two moments (probabilistic data association), in `none`.
+/// shares, to one Gaussian with the same mean and covariance (probabilistic data association). The
+/// result is in `none`.
 void mix(Hypothesis& none, double share_none, std::vector<Hypothesis>& parts);
 inline constexpr double kNegligible = 0.01;  ///< posterior share below which a box is left out
 

@@ -23,7 +23,7 @@ Row undersideByState(const State& x, const Eigen::Vector3d& up) {
   return a;
 }
 
-/// Returns the derivative of a believed height by the pose error, as in addPoseError.
+/// Returns the derivative of an estimated height by the pose error, as in addPoseError.
 Eigen::Matrix<double, 1, 6> heightByPose(const Eigen::Vector3d& place, const View& view) {
   Eigen::Matrix<double, 1, 6> a;
   const Eigen::Vector3d p_B = view.T_WB.inverse() * place;
@@ -32,7 +32,7 @@ Eigen::Matrix<double, 1, 6> heightByPose(const Eigen::Vector3d& place, const Vie
   return a;
 }
 
-/// Returns what the boxes alone say of the underside, given the pose; nothing without parallax.
+/// Returns the variance of the underside by the boxes alone, given the pose; 0 without parallax.
 GroundContact groundContactOf(const Hypothesis& h, const FrameContext& frame) {
   const Matrix6d& P_pose = frame.pose_error.covariance;
   const double distance = (h.x.head<3>() - frame.view.T_WC().p).norm();
@@ -54,7 +54,7 @@ double updateWithGround(Hypothesis& h, ObjectId id, const FrameContext& frame) {
   const GroundParameters& p = frame.parameters->ground;
   const double stands = frame.priors->of(h.class_name).stands;
   h.ground_contact = {};
-  if (h.upper_part) {  // it is the whole object that stands
+  if (h.upper_part) {  // only the whole object stands on the ground
     Hypothesis whole = wholeOf(h, frame.priors->of(h.class_name));
     return updateWithGround(whole, id, frame);
   }

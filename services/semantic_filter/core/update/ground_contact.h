@@ -1,5 +1,5 @@
 // Ground contact: a consider update of a hypothesis by the height of the ground below it (Schmidt
-// 1966; the paper has none). Derivation: tools/docs/maths/ground_contact.md.
+// 1966; not in the paper). Derivation: tools/docs/maths/ground_contact.md.
 #pragma once
 
 #include "services/semantic_filter/core/belief/state.h"
@@ -8,9 +8,9 @@
 namespace perdure::semantic_filter {
 
 /// Stores the evidence of the boxes alone about the ground (GroundContact). Then updates the
-/// hypothesis by the ground below it, as far as objects of its class stand on the ground. The
-/// evidence of track `id` itself is left out. Returns log p(underside | ground) against an
-/// underside that is uniform within ground.span_m, nats; 0 if the ground is unknown.
+/// hypothesis by the ground below it, if objects of its class stand on the ground. The ground is
+/// computed without track `id`. Returns log p(underside | ground) against an underside that is
+/// uniform within ground.span_m, nats; 0 if the ground is unknown.
 double updateWithGround(Hypothesis& h, ObjectId id, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter

@@ -15,7 +15,7 @@ namespace perdure::semantic_filter {
 
 namespace {
 
-/// Returns the stationary deviation of b in this view, for the mean extent over all directions.
+/// Returns the stationary deviation of b in this view, for the mean width over all directions.
 Eigen::Vector4d stationaryBias(const State& x, const RigidTransform& T_WC, const ViewWalk& walk) {
   const double scale = walk.focal / std::max((x.head<3>() - T_WC.p).norm(), 1.0);
   const Eigen::Vector3d size = x.segment<3>(kSize).array().exp();
@@ -23,7 +23,7 @@ Eigen::Vector4d stationaryBias(const State& x, const RigidTransform& T_WC, const
   return biasSigma(walk.lasting, width, std::max(scale * size.z(), 1.0));
 }
 
-/// b is an Ornstein-Uhlenbeck process along the view change, relative to the box's size.
+/// Predicts b: an Ornstein-Uhlenbeck process along the view change, relative to the box's size.
 void predictBias(Hypothesis& h, const std::optional<RigidTransform>& last, const ViewWalk& walk) {
   const Eigen::Vector4d sigma = stationaryBias(h.x, walk.T_WC, walk);
   Eigen::Vector4d keep = Eigen::Vector4d::Zero();
@@ -56,7 +56,8 @@ void dropLostHypotheses(Track& track, TimePoint now, double lost_sigma_m) {
   normalise(track, ClassEvidence::kMotion);
 }
 
-/// A moving object that is not detected may turn off, park or leave.
+/// Lowers the weights of moving hypotheses and the existence, because an undetected moving object
+/// may turn off, park or leave.
 void decayUndetectedMoving(Track& track, double dt, double survival_s) {
   const double stays = std::exp(-dt / survival_s);
   double kept = 0.0;

@@ -50,7 +50,7 @@ void updateState(Hypothesis& h, const Shares& shares, const TrackScore& score,
   h.weight = weight;
 }
 
-/// Probability that one of the boxes is the track's, given that it exists.
+/// Returns the probability that one of the boxes is the track's, if its object exists.
 double probabilityDetected(const Track& track, const AllShares& shares) {
   double detected = 0.0, total = 0.0;
   for (std::size_t i = 0; i < shares.size(); ++i) {
@@ -61,7 +61,8 @@ double probabilityDetected(const Track& track, const AllShares& shares) {
   return total > 0.0 ? detected / total : 0.0;
 }
 
-/// The assigned box, an index into TrackScore::boxes, with a share of at least kAssigned.
+/// Returns the assigned box, an index into TrackScore::boxes; nothing if no box has a share of at
+/// least kAssigned.
 std::optional<std::size_t> assignedBox(const Track& track, const AllShares& shares) {
   constexpr double kAssigned = 0.8;
   double total = 0.0;
@@ -106,7 +107,7 @@ void countForDetectionRate(Track& track, const TrackScore& score, bool is_detect
                                detectabilityScales(frame.parameters->visibility));
 }
 
-/// Adds the direction of a detection; those of a moving object are forgotten.
+/// Stores the direction of a detection. If the object moves, removes all directions.
 void countDirection(Track& track, const RigidTransform& T_WC) {
   Directions& seen_from = track.detectability.seen_now;
   const Hypothesis& best = track.best();
@@ -120,7 +121,7 @@ void countDirection(Track& track, const RigidTransform& T_WC) {
 }
 
 /// Counts an observation of a confirmed object at rest for the size at which P_D is halved. A miss
-/// counts when the object is detected later.
+/// counts only after a later detection.
 void countForDetectionSize(Track& track, const TrackScore& score, bool detected, double exponent,
                            const FrameContext& frame) {
   const auto& predicted = score.hypotheses.front().predicted;
@@ -148,10 +149,10 @@ double noiseRepetition(const Track& track, const FrameContext& frame) {
   return (1.0 + correlation) / std::max(1.0 - correlation, 1e-6);
 }
 
-/// Returns the share of an observation that counts between rest and motion, `seconds` after the
-/// last one: errors of consecutive boxes are correlated, and a velocity can fit them.
+/// Returns the exponent of an observation between rest and motion, `seconds` after the last one. It
+/// is below 1, because errors of consecutive boxes are correlated and a velocity can fit them.
 double motionExponent(double seconds) {
-  // Boxes of a tracker on KITTI: .6, .44, .3 and .13 after .1, .2, .3 and .5 s.
+  // Correlation of a tracker's boxes on KITTI: .6, .44, .3 and .13 after .1, .2, .3 and .5 s.
   constexpr double kCorrelation = 0.8, kSeconds = 0.3;
   const double correlation = kCorrelation * std::exp(-std::max(seconds, 0.0) / kSeconds);
   return (1.0 - correlation) / (1.0 + correlation);
@@ -160,7 +161,7 @@ double motionExponent(double seconds) {
 /// Tempering of an observation, for the hypothesis with the largest posterior.
 struct Tempering {
   double exponent = 1.0;
-  double observations = 0.0;  ///< earlier ones with correlated errors
+  double observations = 0.0;  ///< number of earlier ones with correlated errors
 };
 
 Tempering temperingOf(const Track& track, const TrackScore& score, const AllShares& shares,
@@ -179,7 +180,7 @@ struct MeanA {
   double tempered = 0.0, full = 0.0;
 };
 
-/// Weight of a group of hypotheses, and of the same with their A.
+/// Weight of a group of hypotheses, and the weighted sum of their A.
 struct Group {
   double weight = 0.0, sum = 0.0;
   void add(double w, double A) { weight += w, sum += w * A; }
@@ -188,14 +189,14 @@ struct Group {
   double temper(double exponent) const { return A() > 0.0 ? std::pow(A(), exponent - 1.0) : 0.0; }
 };
 
-/// What one observation counts between hypotheses that differ in more than geometry.
+/// Exponents of one observation between hypotheses of different classes or motions.
 struct Exponents {
   double classes = 1.0, motion = 1.0;
 };
 
-/// π ∝ π A. A counts in full among hypotheses that differ by geometry only, with the exponents
-/// between rest and motion of a class and between classes (there also for existence). Returns the
-/// prior means of A.
+/// Updates the weights: π ∝ π A. A counts in full among hypotheses that differ by geometry only,
+/// and with its exponents between rest and motion of a class and between classes. Returns the prior
+/// means of A.
 MeanA updateWeights(Track& track, const AllShares& shares, const Exponents& tempering) {
   struct Class {
     Group all, motion[2];
@@ -215,7 +216,7 @@ MeanA updateWeights(Track& track, const AllShares& shares, const Exponents& temp
   for (std::size_t i = 0; i < shares.size(); ++i) {
     Hypothesis& h = track.hypotheses[i];
     const Class& c = classes[h.class_name];
-    double tempered = 0.0;  // keeps the sum of the class, w_c Ā_c^τ
+    double tempered = 0.0;  // so that the sum of the class stays w_c Ā_c^τ
     for (const Group& m : c.motion) tempered += m.sum * m.temper(tempering.motion);
     const double same = tempered > 0.0 ? c.all.sum / tempered : 0.0;
     h.weight *= shares[i].A * c.motion[h.moving].temper(tempering.motion) * same *
@@ -225,8 +226,8 @@ MeanA updateWeights(Track& track, const AllShares& shares, const Exponents& temp
 }
 
 /// Protects yaw modes that a mode search has weighed by all keyframes, because later observations
-/// alone could end true modes. One that explains this observation about as well as the best keeps
-/// at least `least` of its class, whose weight stays.
+/// alone could end true modes. A mode whose A is comparable to the best keeps at least the share
+/// `least` of its class. The weight of the class stays.
 void keepSearchedModes(std::vector<Hypothesis>& hs, const AllShares& shares, double least) {
   constexpr double kComparable = 0.05;  // least ratio to the largest A of the class
   struct Class {
@@ -278,7 +279,7 @@ double updateClassAndExistence(Track& track, const AllShares& shares, const Expo
   return existenceAfter(track, mean_A, existenceCeiling(track, parameters.tracks));
 }
 
-/// Whether a box that another track most probably has fits the best hypothesis, also by its class.
+/// Whether a box that is probably another track's fits the best hypothesis, also by its class.
 bool anotherHasItsBox(const TrackScore& score, const EtaRow& eta) {
   constexpr double kFits = 2.37;  // normalised innovation of four sides, 95 %
   constexpr double kOthers = 0.5;
@@ -320,7 +321,7 @@ std::optional<std::size_t> update(Track& track, const TrackScore& score, const E
                               detected >= 0.5, *frame.parameters);
   if (detected >= 0.5) {
     track.history.existence_when_detected = next;
-  } else if (score.top_down) {  // an answer never raises existence above what the last hit left
+  } else if (score.top_down) {  // an answer raises existence at most to its value at the last hit
     next = std::min(next, std::max(r, track.history.existence_when_detected));
   }
   bookExistence(track, next, reasons);

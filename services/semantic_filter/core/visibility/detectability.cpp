@@ -10,7 +10,7 @@ namespace perdure::semantic_filter {
 namespace {
 
 /// Returns the stationary probability that an unmapped static object hides the track from this
-/// camera. Up to a distance at which it was detected from this direction, nothing does.
+/// camera. It is 0 up to a distance at which the track was detected from this direction.
 double stationaryOccluder(const Track& track, const RigidTransform& T_WC, const ViewWalk& walk) {
   const Eigen::Vector3d ray = track.best().x.head<3>() - T_WC.p;
   const double azimuth = std::atan2(ray.y(), ray.x()), distance = ray.norm();
@@ -25,16 +25,16 @@ double stationaryOccluder(const Track& track, const RigidTransform& T_WC, const 
   return walk.unmapped_occluder * (1.0 - free);
 }
 
-/// Moves the probability `s` of an occluder to a view in which its stationary value is `now` and
-/// not `before`: on the way along one ray, occluders are only passed, or only come between.
+/// Returns the probability of an occluder after a motion along the ray. `s`: before the motion.
+/// `before`, `now`: stationary values. Such a motion only passes occluders or only adds some.
 double alongTheRay(double s, double before, double now) {
   return now <= before ? (before > 0.0 ? s * now / before : s)
                        : s + (1.0 - s) * (now - before) / (1.0 - before);
 }
 
-constexpr double kSizeSpread = 0.2;  // of the sizes at which single objects are detected, relative
+constexpr double kSizeSpread = 0.2;  // relative, of the sizes at which objects are detected
 
-/// Returns how many spreads a size is above the one at which P_D is halved.
+/// Returns the difference of a size from that at which P_D is halved, in spreads.
 double overHalfSize(double size_px, const FrameContext& frame) {
   const BoxParameters& box = frame.parameters->box;
   double half = box.min_size_px;
@@ -98,7 +98,7 @@ void predictDetectability(Track& track, const ViewWalk& walk) {
     occluder = alongTheRay(occluder, stationaryOccluder(track, *before, walk), stationary);
   occluder = stationary + keepWith(walk.occluder) * (occluder - stationary);
   const double keep = keepWith(walk.detectability);
-  // A moving undetected track is lost rather than hard to detect: it would take other boxes.
+  // A moving undetected track counts as lost. If it stayed, it would take boxes of other objects.
   track.detectability.hard_to_detect =
       track.best().moving
           ? 0.0
@@ -107,8 +107,8 @@ void predictDetectability(Track& track, const ViewWalk& walk) {
       std::min(track.detectability.hard_to_detect, 1.0 - track.detectability.unmapped_occluder);
 }
 
-/// A miss makes both reasons more likely. If A' is A without them, A is 1 behind an unmapped
-/// occluder, and 1 + q (A' - 1) where the object is hard to detect, q being the share of P_D.
+/// A miss makes both causes more likely. If A' is A without them, A is 1 behind an unmapped
+/// occluder, and 1 + q (A' - 1) if the object is hard to detect, with q = `hard_detection_share`.
 void updateDetectability(Track& track, double mean_A, double hard_detection_share) {
   const double detectable = detectableShare(track, hard_detection_share);
   const double hard_share = detectable > 0.0 ? hard_detection_share / detectable : 0.0;

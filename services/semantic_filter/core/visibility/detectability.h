@@ -1,4 +1,4 @@
-// Detectability: why P_D of a track differs from that of its class (Mahler 2007; not in the paper).
+// Detectability: causes of a different P_D at one track (Mahler 2007; not in the paper).
 // Derivation: tools/docs/maths/detectability.md.
 #pragma once
 
@@ -8,13 +8,13 @@
 namespace perdure::semantic_filter {
 
 /// Returns the factor on v P_D. Behind an unmapped occluder the object is not detected. For an
-/// object that is hard to detect, the share `hard_detection_share` of P_D is left.
+/// object that is hard to detect, the share `hard_detection_share` of P_D remains.
 double detectableShare(const Track& track, double hard_detection_share);
 
 /// Returns P_D of a class for a fully visible object. `size_px`: root of its box's area.
 double detectionProbability(const ClassPrior& prior, double size_px, const FrameContext& frame);
 
-/// Returns what one observation says about the size at which P_D is halved.
+/// Returns the evidence of one observation about the size at which P_D is halved.
 SizeEvidence sizeEvidence(const ClassPrior& prior, double size_px, bool detected,
                           const FrameContext& frame);
 
@@ -27,7 +27,7 @@ double detectionRateFactor(const Track& track, const FrameContext& frame);
 /// Moves detectability towards its stationary value as the view changes.
 void predictDetectability(Track& track, const ViewWalk& walk);
 
-/// Updates the reasons of misses by an observation. `mean_A`: mean of A over the hypotheses.
+/// Updates the causes of misses by an observation. `mean_A`: mean of A over the hypotheses.
 void updateDetectability(Track& track, double mean_A, double hard_detection_share);
 
 }  // namespace perdure::semantic_filter

@@ -12,7 +12,7 @@ namespace perdure::semantic_filter {
 namespace {
 
 struct Cell {
-  double transmittance = 1.0;              ///< probability that nothing nearer is here
+  double transmittance = 1.0;              ///< probability that nothing painted hides it
   double distance_m = 0.0, sigma_m = 0.0;  ///< of the most solid occluder
   double strongest = 0.0;
   ObjectId blocker = 0;
@@ -120,7 +120,7 @@ double nearer(const Cell& cell, const Outline& o) {
   return 0.5 * std::erfc((cell.distance_m - o.distance_m) / (std::sqrt(2.0) * sigma));
 }
 
-/// How much one occluder hides in the cells of an object.
+/// An occluder of an object. `hidden`: the number of the object's cells that it hides.
 struct Blocked {
   ObjectId by;
   double nearer;  ///< probability that the occluder is nearer than the object
@@ -131,7 +131,8 @@ class Blockers {
  public:
   explicit Blockers(const Outline& outline) : o_(outline) {}
 
-  /// Searches from the newest: adjacent cells usually have the same occluder.
+  /// Returns the entry of the cell's occluder. The search begins with the newest entry, because
+  /// adjacent cells usually have the same occluder.
   Blocked& of(const Cell& cell) {
     for (auto b = all_.rbegin(); b != all_.rend(); ++b) {
       if (b->by == cell.blocker) return *b;
@@ -156,7 +157,7 @@ struct Tally {
   /// Adds a row of cells as if nothing hid them.
   void add(const Span& span, double cell_px) {
     const double cells = span.cells;
-    const auto upTo = [&](double limit) {  // number of cells whose centre is below it
+    const auto upTo = [&](double limit) {  // number of cells whose centre is below
       return std::clamp(std::ceil((limit - span.x) / cell_px), 0.0, cells);
     };
     total += cells;
@@ -178,7 +179,7 @@ struct Tally {
   }
 
   const Outline& o;
-  std::array<double, 4> inner;  ///< where the bands along the four sides end
+  std::array<double, 4> inner;  ///< inner ends of the bands along the four sides
   double total = 0.0, hidden = 0.0;
   Blockers blockers;
   std::array<double, 4> side_total{}, side_hidden{};
@@ -194,8 +195,8 @@ void paint(Cell& cell, const Outline& o) {
   cell.transmittance *= 1.0 - o.solidity;
 }
 
-/// Returns the share of the outline's landmarks that lie before the surface of the object.
-/// Landmarks at or behind it count against (paper, line 190: the co-visibility cue).
+/// Returns the share of the outline's landmarks that lie in front of the surface of the object.
+/// Landmarks at or behind it lower the share (paper, line 190: the co-visibility cue).
 double hiddenByPoints(const Outline& o, const Polygon& hull,
                       const std::vector<LandmarkDepth>& points) {
   double before = 0.0, through = 0.0;
@@ -209,7 +210,7 @@ double hiddenByPoints(const Outline& o, const Polygon& hull,
     const double margin = 2.0 * std::hypot(p.sigma_m, o.depth_sigma_m) + 0.1 * surface;
     (p.distance_m < surface - margin ? before : through) += 1.0;
   }
-  // three free pseudo-landmarks, so that a few cannot decide
+  // three pseudo-landmarks on the object, so that a few landmarks cannot decide
   return before / (before + through + 3.0);
 }
 

@@ -14,7 +14,7 @@ namespace perdure::semantic_filter {
 
 struct Outline {
   ObjectId id = 0;
-  double solidity = 0.0;       ///< probability that the object is there and hides what is behind it
+  double solidity = 0.0;       ///< probability that the object exists and hides others
   double distance_m = 0.0;     ///< from the camera to the centre
   double depth_sigma_m = 0.0;  ///< standard deviation of that distance
   double extent_m = 0.0;       ///< half of the cuboid's largest side
@@ -23,7 +23,7 @@ struct Outline {
 
 struct TrackVisibility {
   Visibility state = Visibility::kBehind;
-  double fraction = 0.0;  ///< v; exactly 0 where a frame changes nothing about the track
+  double fraction = 0.0;  ///< v; exactly 0 if a frame does not change the track
   double residual_fraction =
       0.0;  ///< visible fraction of a track whose v is 0; below visibility.minimum
   ObjectId blocked_by = 0;

@@ -8,7 +8,7 @@
 
 namespace perdure::semantic_filter {
 
-constexpr double kPredictionFloor = 0.05;  // r·π·v below which inference is not asked
+constexpr double kPredictionFloor = 0.05;  // r·π·v below which inference gets no prediction
 constexpr double kFastest = 1e5;           // px/s; a faster side passes close to the lens
 constexpr double kLeastSigma = 1;          // px
 constexpr double kFarthest = 1e5;  // px; a side further away is of an object beside the camera

@@ -11,11 +11,11 @@ namespace perdure::semantic_filter {
 
 struct ComingFrame {
   View view;
-  double seconds = 0.0;  ///< after the present one
+  double seconds = 0.0;  ///< time after the present frame
 };
 
 /// Returns the box that the network should report, with the velocity of its sides (px/s) towards
-/// `coming`; nothing if r·π·v is below 0.05 or nothing is before the camera.
+/// `coming`; nothing if r·π·v is below 0.05 or the object is not in front of the camera.
 std::optional<Prediction> predictionOf(const Track& track, const FrameInput& now,
                                        const std::optional<ComingFrame>& coming);
 

@@ -10,17 +10,17 @@ namespace perdure::semantic_filter {
 namespace {
 
 constexpr double kHorizon_s = 10.0;
-constexpr double kStride_s = 0.25;        // the object may be missed if it is visible for less
-constexpr std::size_t kMostBlockers = 6;  // those nearest to it in the image
+constexpr double kStride_s = 0.25;        // a shorter visible time may be overlooked
+constexpr std::size_t kMostBlockers = 6;  // those nearest to the object in the image
 constexpr double kCellsAcross = 16.0;     // cells of the depth buffer across the object
-// share of the visible fraction below which a miss means nothing
+// share of visibility.minimum from which the object may be detected
 constexpr double kMayBeFound = 0.5;
 constexpr double kSliver = 0.01;      // visible fraction that is never detected
 constexpr double kNineInTen = 1.645;  // deviations of a Gaussian, for an interval of nine in ten
 
 using Walk = ScratchVector<View>;  // one view for each frame, the present one first
 
-/// `way_scale`: factor on the translation.
+/// Returns the views of the next kHorizon_s. `way_scale`: factor on the translation.
 Walk walkOn(const View& now, const Way& way, double way_scale) {
   Walk walk{now};
   const RigidTransform step(way.step.q, way_scale * way.step.p);
@@ -42,7 +42,8 @@ const Shape& shapeOf(const Track& track, const FrameInput& now) {
   return now.styles()->of(track.best().class_name).shape;
 }
 
-/// Returns the tracks that may hide it along the path: solid, nearer, and next to it in the image.
+/// Returns the tracks that may hide `hidden` along the path: solid, nearer, and next to it in the
+/// image.
 ScratchVector<Standing> blockersOf(const std::vector<Track>& tracks, const Track& hidden,
                                    const FrameInput& now, const VisibilityParameters& parameters) {
   const Eigen::Vector3d eye = now.view.T_WC().p;
@@ -74,7 +75,7 @@ Polygon within(const Eigen::Vector4d& sides, const Polygon& points) {
   return clip(clip(part, 1, sides[1], true), 1, sides[3], false);
 }
 
-/// The visible fraction of the first of `things`, by a finer depth buffer than a frame's.
+/// Returns the visible fraction of the first of `things`, by a finer depth buffer than a frame's.
 double shareInSight(const ScratchVector<Standing>& things, const View& view,
                     VisibilityParameters parameters) {
   const Projector from(view);
@@ -124,7 +125,7 @@ std::optional<std::size_t> firstInSight(const ScratchVector<Standing>& things, c
   return std::nullopt;
 }
 
-/// Returns the frames after `first` until it is almost surely detected.
+/// Returns the number of frames after `first` until the object is almost surely detected.
 std::size_t framesToFind(const ScratchVector<Standing>& things, const Walk& walk, std::size_t first,
                          const VisibilityParameters& parameters) {
   constexpr double kMissed = 0.05;
@@ -136,7 +137,7 @@ std::size_t framesToFind(const ScratchVector<Standing>& things, const Walk& walk
   return n - first;
 }
 
-/// Returns deviations of state, one sigma each, that move the edges which hide the object.
+/// Returns deviations of the state, one sigma each, that move the occluding edges.
 ScratchVector<State> deviationsOf(const Standing& thing, const Eigen::Vector3d& eye) {
   const StateCovariance& P = thing.track->best().P;
   const Eigen::Vector3d ray = (thing.x.head<3>() - eye).normalized();
@@ -154,7 +155,7 @@ ScratchVector<State> deviationsOf(const Standing& thing, const Eigen::Vector3d& 
   return deviations;
 }
 
-/// Squared distances of the ends of the interval from the expected time; they differ.
+/// Squared distances of both ends of the interval from the expected time, s². They may differ.
 struct Spread {
   Spread(double expected_s, double frame_s)
       : expected(expected_s), early(frame_s * frame_s), late(early) {}

@@ -9,16 +9,17 @@ namespace {
 
 std::int64_t viewsOf(const Track& track) { return static_cast<std::int64_t>(track.views()); }
 
-constexpr std::size_t kViews = 24;   // stored poses
-constexpr std::size_t kRecent = 12;  // newest poses, which are always stored
+constexpr std::size_t kViews = 24;   // largest number of stored poses
+constexpr std::size_t kRecent = 12;  // number of newest poses, which stay stored
 constexpr double kForget = 0.05;     // weight of a new image in the scale
-constexpr double kMany = 10.0;       // points needed for this weight; with fewer points it is lower
-constexpr double kMoved = 0.05;      // m; a smaller displacement is rest
-constexpr double kTurned = 0.05;     // rad
-constexpr double kGate = 3.0;        // a point's residuals relative to those of the others
+constexpr double kMany = 10.0;       // points for the full weight; fewer reduce it
+constexpr double kMoved = 0.05;      // m; the body rests if it moves less than this,
+constexpr double kTurned = 0.05;     // rad; and turns less than this
+constexpr double kGate = 3.0;        // largest ratio of a point's residuals to scale_
 
 double lackOfFit(const Triangulated& point, std::size_t rays) {
-  // rms² averages 2n residuals, and the point uses three of their degrees of freedom.
+  // rms² is the mean of 2n squares, which have 2n − 3 degrees of freedom after the fit of the
+  // point.
   const auto n = static_cast<double>(rays);
   return point.rms * point.rms * 2.0 * n / (2.0 * n - 3.0);
 }
@@ -48,7 +49,8 @@ void PointMapper::forgetEnded() {
   std::erase_if(views_, [&](const View& view) { return view.frame < oldest; });
 }
 
-/// Removes the pose that adds the least baseline. The newest ones stay: most tracks are short.
+/// Removes the pose that adds the least baseline. The newest poses are not removed, because most
+/// tracks are short.
 void PointMapper::forgetOne() {
   std::size_t least = 1;
   double shortest = std::numeric_limits<double>::infinity();
@@ -85,7 +87,8 @@ std::vector<Ray> PointMapper::raysOf(const Track& track) const {
   return rays;
 }
 
-/// Not used by triangulation and scale, because a scale raised by bad poses could not fall again.
+/// Returns true if the point fits and its depth is known well. Triangulation and scale also use
+/// other points, because otherwise a scale that bad poses raised could not fall again.
 bool PointMapper::isSure(const Triangulated& point) const {
   return point.rms <= kGate * scale_ && point.relative_sigma * scale_ < options_.max_relative_sigma;
 }
@@ -147,10 +150,10 @@ void PointMapper::add(const KnownPose& pose, const TrackedFrame& tracked) {
 }
 
 constexpr double kForgets = 1.0 / 40;  // weight of each new image
-constexpr std::size_t kFewest = 40;    // images before the first verdict
-constexpr double kTracks = 2.0;        // mean number of tracks in an image that a verdict needs
+constexpr std::size_t kFewest = 40;    // number of images before the first verdict
+constexpr double kTracks = 2.0;        // mean tracks per image that a verdict needs
 constexpr double kMisfit = 15.0;       // limit of the scale; inaccurate poses reach up to 8
-constexpr double kFewTracks = 0.5;     // limit if nearly all tracks contradict
+constexpr double kFewTracks = 0.5;     // mean tracks needed if nearly all contradict
 constexpr double kNearlyAll = 10.0;    // ratio of contradicting to agreeing tracks
 
 void Agreement::add(const Mapped& mapped, double scale, bool moved) {

@@ -1,5 +1,5 @@
-// Maps points from tracks and given poses, and estimates how they agree. Derivation:
-// tools/docs/maths/vio-known-poses.md.
+// Maps points from tracks and given poses, and estimates how well tracks and poses agree.
+// Derivation: tools/docs/maths/vio-known-poses.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,20 +16,20 @@ namespace perdure::vio {
 
 /// Counts of the tracks of one image, by the result of their triangulation.
 struct Mapped {
-  std::size_t contradicted = 0;  ///< rays that do not meet before the cameras, or fail the gate
-  std::size_t far = 0;           ///< points beyond VisionOptions::max_depth_m
-  std::size_t sure = 0;          ///< landmarks, and tracks that an update has used
+  std::size_t contradicted = 0;  ///< rays do not meet in front of the cameras, or fail the gate
+  std::size_t far = 0;           ///< point is beyond VisionOptions::max_depth_m
+  std::size_t sure = 0;          ///< track is a landmark, or was used by an update
 };
 
-/// Whether poses agree with the images, by the tracks with parallax.
+/// Judges from the tracks with parallax whether the poses agree with the images.
 class Agreement {
  public:
   enum class Verdict { kGood, kContradicted, kFar };
 
-  /// Adds the next image. scale: residuals relative to those of exact poses, at least 1. moved:
-  /// whether the poses have moved recently. If they have not, the image is ignored.
+  /// Adds the next image. scale: ratio of the residuals to those of exact poses, at least 1. moved:
+  /// true if the body has moved recently; otherwise the image is ignored.
   void add(const Mapped& mapped, double scale, bool moved);
-  /// Verdict on about the last two seconds of motion, at 20 Hz.
+  /// Returns the verdict on the last 40 images or so in which the body moved.
   Verdict verdict() const;
   void clear() { *this = {}; }
 
@@ -47,19 +47,22 @@ struct KnownPose {
 
 class PointMapper {
  public:
-  /// readout_s: read-out time of each camera, 0 for a global shutter; empty: all global.
+  /// readout_s is the read-out time of each camera, 0 for a global shutter; empty if all are
+  /// global.
   PointMapper(const VisionOptions& options, const WindowOptions& window,
               std::vector<RigidTransform> T_BC, std::vector<double> readout_s = {});
 
   void add(const KnownPose& pose, const TrackedFrame& tracked);
-  /// Points of the newest image with known position, by rising id, without misfits.
+  /// Returns the points of the newest image whose position is known and fits, in order of rising
+  /// id.
   const std::vector<Landmark>& landmarks() const { return landmarks_; }
   const Mapped& mapped() const { return mapped_; }
-  /// Ratio of the tracks' residuals to VisionOptions::sigma_px, at least 1.
+  /// Returns the ratio of the tracks' residuals to VisionOptions::sigma_px, at least 1.
   double scale() const { return scale_; }
-  /// Whether the body moved between the oldest and the newest stored pose.
+  /// Returns true if the oldest and the newest stored pose differ by more than 0.05 m or 0.05 rad.
   bool moved() const;
-  /// Standard deviation of a tracked point from its projection, px; grows with the poses' errors.
+  /// Returns the standard deviation, in px, of a tracked point from its projection. It grows with
+  /// the errors of the poses.
   double noisePx() const { return scale_ * options_.sigma_px; }
   void clear();
 

@@ -7,7 +7,7 @@
 namespace perdure::vio {
 namespace {
 
-// Above these values, two equal samples are at the sensor's limit.
+// If two successive samples are equal and above these values, they are at the sensor's limit.
 constexpr double kLargeRate = 3.0, kLargeForce = 12.0;  // rad/s, m/s²
 
 const auto kEarlier = [](const auto& item, TimePoint t) { return item.time < t; };
@@ -81,7 +81,7 @@ void ImuBuffer::between(TimePoint from, TimePoint to, std::vector<ImuReading>& r
 Duration ImuBuffer::longestGap(TimePoint from, TimePoint to) const {
   TimePoint previous = from;
   Duration longest{0};
-  // Samples around the interval also limit the gap.
+  // The gaps at the ends extend to the samples outside the interval.
   auto it = std::lower_bound(raw_.begin(), raw_.end(), from, kEarlier);
   if (it != raw_.begin() && it != raw_.end()) previous = (it - 1)->time;
   for (; it != raw_.end(); ++it) {

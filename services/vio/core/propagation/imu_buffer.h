@@ -1,4 +1,5 @@
-// Inertial samples in time order, interpolated at the ends of an interval and if saturated.
+// Inertial samples in time order. They are interpolated at the ends of an interval and where they
+// are saturated.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,14 +30,15 @@ class ImuBuffer {
   bool empty() const { return raw_.empty(); }
   TimePoint first() const { return raw_.front().time; }
   TimePoint last() const { return raw_.back().time; }
-  /// Readings at `from`, at all samples between, and at `to` (from < to). Outside the samples the
-  /// nearest one is used. Empty if the buffer is empty.
+  /// Returns readings at `from`, at all samples between, and at `to` (from < to). Before the first
+  /// and after the last sample, that sample's values are used. Returns nothing if the buffer is
+  /// empty.
   std::vector<ImuReading> between(TimePoint from, TimePoint to) const;
   /// Writes the same readings into `readings` and reuses its memory.
   void between(TimePoint from, TimePoint to, std::vector<ImuReading>& readings) const;
-  /// Longest time without a sample inside [from, to].
+  /// Returns the longest gap between samples that overlaps [from, to].
   Duration longestGap(TimePoint from, TimePoint to) const;
-  /// Median interval of the newest samples; empty for fewer than three samples.
+  /// Returns the median interval of the newest samples; nothing for fewer than three samples.
   std::optional<Duration> period() const;
   void dropBefore(TimePoint time);
   void clear() { *this = {}; }
@@ -52,7 +54,7 @@ class ImuBuffer {
   ImuReading reading(TimePoint time) const;
 
   std::deque<ImuReading> raw_;  ///< samples as received
-  Values rates_, forces_;       ///< values without the saturated ones
+  Values rates_, forces_;       ///< values that are not saturated
 };
 
 }  // namespace perdure::vio

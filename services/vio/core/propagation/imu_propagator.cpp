@@ -11,14 +11,16 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// Rotation over `dt` if the rate changes linearly from w0 to w1 (second-order Magnus).
+/// Returns the rotation vector over `dt` if the rate changes linearly from w0 to w1 (second-order
+/// Magnus).
 Vector3d turned(const Vector3d& w0, const Vector3d& w1, double dt) {
   return 0.5 * (w0 + w1) * dt + w0.cross(w1) * (dt * dt / 12.0);
 }
 
-/// Rotation of one step, and its derivatives by bias and scale, which affect both rates.
+/// Rotation of one step, and its derivatives by bias and scale. Both affect the rates at the start
+/// and at the end.
 struct Turn {
-  Matrix3d R, J_bias, J_scale;  ///< J: right tangent of R by the bias, by the scale
+  Matrix3d R, J_bias, J_scale;  ///< derivatives of R's right tangent by bias and scale
 };
 
 Turn turn(const Vector3d& w0, const Vector3d& w1, double dt, const Vector3d& scale) {
@@ -38,7 +40,8 @@ struct Densities {
   double gyro2, accel2;
 };
 
-/// Square density added if values interpolated over `span` change by `change` over `dt` of it.
+/// Returns the square noise density of values interpolated over `span`. `change2` is the square of
+/// their change over `dt`, a part of it.
 double interpolationDensity(double span, double dt, double change2, double floor, double gap,
                             const ImuNoise& noise) {
   if (span <= noise.interpolation_from_s) return 0.0;
@@ -48,7 +51,8 @@ double interpolationDensity(double span, double dt, double change2, double floor
   return span * variance;
 }
 
-/// Square noise densities of one step, including the interpolation error of sparse samples.
+/// Returns the squared noise densities of one step, including the interpolation error of sparse
+/// samples.
 Densities densities(const ImuReading& a, const ImuReading& b, double dt, const ImuNoise& noise) {
   const auto added = [&](double span, const Vector3d& change, double floor, double gap) {
     return interpolationDensity(std::max(span, dt), dt, change.squaredNorm(), floor, gap, noise);
@@ -69,7 +73,8 @@ void step(ImuIncrement& x, const ImuReading& a, const ImuReading& b, const Vecto
   const Turn half = turn(w0, wm, 0.5 * dt, scale), whole = turn(w0, w1, dt, scale);
   const Matrix3d R0 = x.dq.toRotationMatrix(), Rm = R0 * half.R, R1 = R0 * whole.R;
 
-  // d (R f) by rotation at the start, gyro bias and scale; at start, middle and end.
+  // Derivatives of R f by the rotation at the start, the gyro bias and the scale, at the start,
+  // middle and end of the step.
   const Matrix3d A0 = -R0 * skew(f0), Am = -Rm * skew(fm), A1 = -R1 * skew(f1);
   const Matrix3d Am_t = Am * half.R.transpose(), A1_t = A1 * whole.R.transpose();
   const Matrix3d Am_b = Am * half.J_bias, A1_b = A1 * whole.J_bias;
@@ -114,7 +119,7 @@ void step(ImuIncrement& x, const ImuReading& a, const ImuReading& b, const Vecto
   x.mean_force += dt * fm;
 }
 
-/// Transition of the navigation error, and its derivative by an estimated scale's error.
+/// Transition of the navigation error, and its derivative by the error of the gyroscope's scale.
 struct Moves {
   const Matrix15d& Phi;
   Matrix93d by_scale;
@@ -231,7 +236,7 @@ void propagate(State& state, const ImuIncrement& x, TimePoint to, double gravity
   const Eigen::Index rest = state.size() - kNavSize;
   const Matrix15d P_nav = movedNav(state, moves, G * x.Q * G.transpose());
   P.topLeftCorner<kNavSize, kNavSize>() = 0.5 * (P_nav + P_nav.transpose());
-  // Processed in blocks that fit on the stack.
+  // Multiplies in blocks of columns that fit on the stack.
   constexpr int kPiece = 32;
   for (Eigen::Index at = 0; at < rest; at += kPiece) {
     auto cross = P.block(0, kNavSize + at, kNavSize, std::min<Eigen::Index>(kPiece, rest - at));

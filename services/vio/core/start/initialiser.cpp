@@ -12,12 +12,12 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kGauge = 1e-4;        // rad and m: yaw and position at the start define W
-constexpr double kMaxTurn = 0.3;       // rad/s, largest plausible bias
-constexpr double kSpeedWindow = 0.5;   // s, duration of the average of the force
-constexpr double kForceTolerance = 3;  // m/s², of the mean force's length from gravity
+constexpr double kGauge = 1e-4;        // rad, m; the start's yaw and position define W
+constexpr double kMaxTurn = 0.3;       // rad/s; a larger mean rate at rest is a turn
+constexpr double kSpeedWindow = 0.5;   // s; the force is averaged over this time
+constexpr double kForceTolerance = 3;  // m/s², for the length of the mean force
 
-/// Mean dv/dt of the speeds in [from, to]; 0 for fewer than two speeds.
+/// Returns the mean dv/dt of the speeds in [from, to], in m/s²; 0 for fewer than two speeds.
 double acceleration(const std::vector<SpeedSample>& speeds, TimePoint from, TimePoint to) {
   const SpeedSample *first = nullptr, *last = nullptr;
   for (const SpeedSample& s : speeds) {
@@ -65,7 +65,7 @@ Result<Start> startAtRest(const ImuBuffer& imu, TimePoint now, const Options& op
     return fail("start_force_not_gravity");
   }
   if (sample.rate.norm() > kMaxTurn) return fail("start_turning");
-  // A wide prior, then the rest update. It correlates tilt and accelerometer bias.
+  // Begins with a wide prior. The rest update then correlates tilt and accelerometer bias.
   State state({RigidTransform()}, 0.0, 1, 1);
   state.nav.q_WB = levelAttitude(sample.force);
   state.nav.gyro_bias = sample.rate;
@@ -83,7 +83,7 @@ Result<Start> startWithSpeed(const ImuBuffer& imu, TimePoint now, const SpeedRea
   const TimePoint from = std::max(imu.first(), now - durationFromSeconds(kSpeedWindow));
   const auto readings = imu.between(from, now);
   const RestSample mean = restSample(readings, options.imu);
-  // Force = acceleration − gravity: subtract dv/dt along x and the centripetal acceleration.
+  // Force = acceleration − gravity. Subtracts dv/dt along x and the centripetal acceleration.
   const Vector3d motion(acceleration(speeds, from, now), 0, 0);
   const Vector3d up = mean.force - motion - mean.rate.cross(Vector3d(speed.speed, 0, 0));
   if (std::abs(up.norm() - options.gravity) > kForceTolerance) {

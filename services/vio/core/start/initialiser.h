@@ -1,4 +1,5 @@
-// Initial state at rest, or in motion with a speed sensor (images alone: motion_initialiser.h).
+// Initial state at rest, or in motion with a speed sensor. Starts in motion without one:
+// motion_initialiser.h.
 #pragma once
 
 #include <vector>
@@ -11,19 +12,21 @@
 
 namespace perdure::vio {
 
-/// Start at rest at `now`, from the samples of the window before it, with yaw 0 and position 0.
-/// Fails with "start_window_short", "start_force_not_gravity" or "start_turning".
+/// Returns a start at rest at `now`, with yaw 0 and position 0, from the samples of the last
+/// `start.rest_window_s`. Fails with "start_window_short", "start_force_not_gravity" or
+/// "start_turning".
 Result<Start> startAtRest(const ImuBuffer& imu, TimePoint now, const Options& options);
 
-/// Start at `now` with the speed along body x. `speeds` around `now` give the acceleration. Fails
-/// with "start_window_short" or "start_force_not_gravity".
+/// Returns a start at `now` with the speed along body x. The acceleration is computed from
+/// `speeds`. Fails with "start_window_short" or "start_force_not_gravity".
 Result<Start> startWithSpeed(const ImuBuffer& imu, TimePoint now, const SpeedReading& speed,
                              const std::vector<SpeedSample>& speeds, const Options& options);
 
-/// Attitude with yaw 0 that aligns `up_B` (not zero) with z of W.
+/// Returns the attitude with yaw 0 that aligns `up_B` (not zero) with z of W.
 Eigen::Quaterniond levelAttitude(const Eigen::Vector3d& up_B);
 
-/// Covariance of a start. Yaw and position define W; the other deviations are arguments.
+/// Returns the covariance of a start from standard deviations (rad, rad/s, m/s², m/s). Those of yaw
+/// and position are nearly zero, because they define W.
 Eigen::Matrix<double, 15, 15> startCovariance(const Nav& nav, double tilt, double gyro_bias,
                                               double accel_bias, const Eigen::Vector3d& velocity_B);
 

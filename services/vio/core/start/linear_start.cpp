@@ -17,7 +17,7 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 namespace {
 
-/// Rows of one view: [A_f | A_x] [f; v0; g] = b, in pixels times depth.
+/// Computes the rows of one view: [A_f | A_x] [f; v0; g] = b, in pixels times depth.
 void rowsOf(const LinearView& v, Eigen::Matrix<double, 2, 3>& A_f, Eigen::Matrix<double, 2, 6>& A_x,
             Eigen::Vector2d& b) {
   Eigen::Matrix<double, 2, 3> J;

@@ -1,5 +1,6 @@
-// Linear estimate of velocity and gravity over a window, with the points eliminated (Dong-Si &
-// Mourikis, IROS 2012) and the length of gravity known. Derivation: tools/docs/maths/vio-starts.md.
+// Linear estimate of velocity and gravity over a window. The points are eliminated (Dong-Si &
+// Mourikis, IROS 2012), and the length of gravity is known. Derivation:
+// tools/docs/maths/vio-starts.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,11 +19,11 @@ struct Keyframe {
   Eigen::Matrix3d R;  ///< R_B0_Bi
   Eigen::Vector3d dp, dv;
   const TrackedFrame* tracked = nullptr;
-  /// Angular rate of the body, for a rolling shutter.
+  /// Angular rate of the body, rad/s in B; used only with a rolling shutter.
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();
 };
 
-/// A point as one camera saw it from one keyframe.
+/// Observation of a point by one camera at one keyframe.
 struct LinearView {
   Eigen::Matrix3d R_CB0;    ///< rotates B0 into this camera
   Eigen::Vector3d p_BC_B0;  ///< position of the camera relative to the body, in B0
@@ -33,11 +34,11 @@ struct LinearView {
 };
 using Views = std::map<std::uint64_t, std::vector<LinearView>>;
 
-/// Views of the points that two thirds of the keyframes saw, by id.
+/// Returns, by id, the views of the points that at least two thirds of the keyframes saw.
 Views viewsOf(const std::vector<Keyframe>& keyframes, const std::vector<CameraModel>& cameras);
 
 struct LinearStart {
-  Eigen::Matrix<double, 6, 1> x;  ///< v0, g in B0
+  Eigen::Matrix<double, 6, 1> x;  ///< [v0; g] in B0, m/s and m/s²
   Eigen::Matrix<double, 6, 6> information;
   double rms_px = 0.0;
   double in_front = 0.0;  ///< share of points in front of all cameras that saw them
@@ -48,7 +49,8 @@ struct PointEstimate {
   bool known = false;
 };
 
-/// One weighted linear solution. The depths of the previous solution give the weights of the rows.
+/// Computes one weighted linear solution. The rows are weighted by the depths of the previous
+/// solution.
 LinearStart solveOnce(const Views& views, std::map<std::uint64_t, PointEstimate>& points,
                       const Eigen::Matrix<double, 6, 1>& x_before, double gravity);
 

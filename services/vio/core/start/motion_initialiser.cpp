@@ -21,26 +21,27 @@ using Eigen::Vector3d;
 
 constexpr std::size_t kKeyframes = 8, kFewestTracks = 15, kFewestViews = 3, kMostPoints = 120;
 constexpr double kShortestWindow = 0.2;  // s
-constexpr double kGrowth = 0.1;          // relative growth of the window between searches
-constexpr double kMostNoise = 1.25;      // ratio of the residuals to their expected size
-constexpr double kFewestInFront = 0.8;   // share of points, in the linear solution
-constexpr double kMostLinearPx = 3.0;    // residual of the linear solution
+constexpr double kGrowth = 0.1;          // share of the window's duration between searches
+constexpr double kMostNoise = 1.25;      // largest RefinedWindow::noise_ratio
+constexpr double kFewestInFront = 0.8;   // least share of points, linear solution
+constexpr double kMostLinearPx = 3.0;    // largest RMS residual of the linear solution
 constexpr double kFewestParallaxPx = 2.0;
-constexpr double kMostAcceleration = 5.0;  // m/s², mean over a window
+constexpr double kMostAcceleration = 5.0;  // m/s², largest mean over a window
 
-/// Bearing at the attitude of the middle row. turn_C: rotation of C from first to last row.
+/// Returns the bearing of a point, rotated to the camera's attitude at the middle row. turn_C is
+/// the camera's rotation vector from the first to the last row.
 Vector3d bearing(const ImagePoint& seen, const Vector3d& turn_C) {
   const Vector3d ray = seen.normalised.homogeneous().normalized();
   return turn_C.isZero(0.0) ? ray : Vector3d(expQuaternion(seen.row * turn_C) * ray);
 }
 
-/// Points of a keyframe, and the rotation of the first camera during read-out.
+/// Points of a keyframe, and the rotation vector of the first camera during read-out.
 struct Bearings {
   const TrackedFrame* tracked = nullptr;
   Vector3d turn_C = Vector3d::Zero();
 };
 
-/// Angular rates of the body during the read-out of a rolling shutter; zero for a global shutter.
+/// Returns the body's angular rates during the read-outs at `times`; zero for global shutters.
 std::vector<Vector3d> ratesAt(const std::vector<TimePoint>& times, const ImuBuffer& imu,
                               const std::vector<CameraModel>& cameras, const Vector3d& gyro_bias) {
   std::vector<Vector3d> rates(times.size(), Vector3d::Zero());
@@ -66,7 +67,8 @@ struct BearingPair {
   Matrix3d J_bias;  ///< derivative of R_B0_B1 (right tangent) by the gyro bias
 };
 
-/// Smallest eigenvalue of Σ n nᵀ over the epipolar normals n. It is zero for the true R.
+/// Returns the smallest eigenvalue of Σ n nᵀ over the epipolar normals n. It is zero for the true
+/// R.
 double coplanarity(const BearingPair& pair, const Matrix3d& R_C0_C1) {
   Matrix3d M = Matrix3d::Zero();
   for (const auto& [f0, f1] : pair.bearings) {
@@ -77,7 +79,8 @@ double coplanarity(const BearingPair& pair, const Matrix3d& R_C0_C1) {
   return Eigen::SelfAdjointEigenSolver<Matrix3d>(M, Eigen::EigenvaluesOnly).eigenvalues()[0];
 }
 
-/// Gyro bias of coplanar epipolar normals (Kneip & Lynen, ICCV 2013; He et al., CVPR 2023).
+/// Returns the gyro bias for which the epipolar normals are most coplanar (Kneip & Lynen, ICCV
+/// 2013; He et al., CVPR 2023).
 Vector3d gyroBiasFromPairs(const std::vector<BearingPair>& pairs, const Matrix3d& R_BC) {
   const auto residuals = [&](const Vector3d& bias) {
     Eigen::VectorXd r(static_cast<Eigen::Index>(pairs.size()));
@@ -117,7 +120,8 @@ Vector3d gyroBiasFromPairs(const std::vector<BearingPair>& pairs, const Matrix3d
   return bias;
 }
 
-/// Matches of points seen in both frames. Their displacements in pixels are appended to `moved`.
+/// Returns the matches of points seen in both frames. Appends their displacements in pixels to
+/// `moved`.
 BearingPair pairOf(const Bearings& from, const Bearings& to, const ImuIncrement& x,
                    std::vector<double>& moved) {
   const TrackedFrame &first = *from.tracked, &second = *to.tracked;
@@ -135,7 +139,7 @@ BearingPair pairOf(const Bearings& from, const Bearings& to, const ImuIncrement&
   return pair;
 }
 
-/// Tracks of at least three views, the longest first.
+/// Returns the tracks with at least three views, the longest first.
 std::vector<WindowPoint> windowPoints(const std::vector<const TrackedFrame*>& tracked,
                                       const std::vector<CameraModel>& cameras) {
   std::map<std::uint64_t, WindowPoint> tracks;
@@ -159,8 +163,8 @@ std::vector<WindowPoint> windowPoints(const std::vector<const TrackedFrame*>& tr
   return points;
 }
 
-/// State at the newest pose, from the error [θ, v, gravity, b_g, b_a] of a window. Its W is the
-/// level frame that is rotated least, because yaw 0 is discontinuous if x points up.
+/// Returns the state at the newest pose after a correction by the error [θ, v, gravity, b_g, b_a].
+/// W is the level frame with the smallest rotation, because yaw 0 is discontinuous if x points up.
 Nav navOf(const MotionWindow& w, const Eigen::Matrix<double, kWindowError, 1>& error,
           const Eigen::Quaterniond& level) {
   const WindowPose& last = w.poses.back();
@@ -203,7 +207,7 @@ Start startOf(const RefinedWindow& refined, const Options& options) {
 }  // namespace
 
 void MotionInitialiser::add(const FrameInput& input, TimePoint imu_time) {
-  // The clock restarted: its frames and the earlier ones have no common window.
+  // The clock restarted, so the new frames cannot share a window with earlier ones.
   if (!frames_.empty() && imu_time <= frames_.back().time) clear();
   frames_.push_back({imu_time, input.tracked});
   const Duration window = durationFromSeconds(options_.start.motion_window_s * 1.05);
@@ -218,7 +222,7 @@ Result<Start> MotionInitialiser::start(const ImuBuffer& imu,
   }
   if (frames_.empty()) return fail("start_window_short");
   const TimePoint now = frames_.back().time;
-  // A search takes as long as several frames, and another view of the same scene adds little.
+  // A search takes the time of several frames, so the next one waits until the window has grown.
   if (failed_ && now < next_attempt_) return tl::unexpected(*failed_);
   Result<Start> result = attempt(imu, cameras);
   failed_.reset();
@@ -252,7 +256,7 @@ Result<Start> MotionInitialiser::attempt(const ImuBuffer& imu,
   }
   std::vector<BearingPair> pairs;
   std::vector<double> moved;
-  // long spans constrain the bias well, and short spans are numerous
+  // Long spans constrain the bias well, and there are many short spans.
   for (const std::size_t span : {1u, 3u, 6u}) {
     for (std::size_t i = 0; i + span < count; ++i) {
       const ImuIncrement x = integrate(imu.between(times[i], times[i + span]), Vector3d::Zero(),
@@ -288,7 +292,8 @@ Result<Start> MotionInitialiser::attempt(const ImuBuffer& imu,
   s.x.setZero();
   for (int i = 0; i < 4; ++i) s = solveOnce(views, estimates, s.x, options_.gravity);
   if (!s.x.allFinite() || s.in_front < kFewestInFront || s.rms_px > kMostLinearPx) {
-    // Far from the truth: the search begins at rest, with gravity opposite to the mean force.
+    // The linear solution is unusable. The search begins at rest, with gravity opposite to the mean
+    // force.
     s.x.setZero();
     s.x.tail<3>() = -options_.gravity * keyframes.back().dv.normalized();
   }

@@ -1,5 +1,5 @@
-// Start in motion from images and samples: gyro bias from epipolar normals, velocity and gravity
-// (linear_start.h), then jointly (motion_refinement.h).
+// Start in motion from images and samples. The gyro bias is estimated from epipolar normals,
+// velocity and gravity linearly (linear_start.h), then all of them jointly (motion_refinement.h).
 #pragma once
 
 #include <deque>
@@ -15,12 +15,12 @@ class MotionInitialiser {
  public:
   explicit MotionInitialiser(const Options& options) : options_(options) {}
 
-  /// Adds a frame. If its time is not later than the last one, a new window begins.
+  /// Adds a frame. A new window begins if its time is not later than that of the last frame.
   void add(const FrameInput& input, TimePoint imu_time);
   void clear() { frames_.clear(), failed_.reset(); }
-  /// Start at the newest frame, once the window has grown enough since the last search. Fails with
-  /// "start_window_short", "start_few_tracks", "start_no_parallax", "start_force_not_gravity",
-  /// "start_unobservable" or "start_inconsistent".
+  /// Returns a start at the newest frame. After a failed search it returns the same failure until
+  /// the window has grown by a tenth. Fails with "start_window_short", "start_few_tracks",
+  /// "start_no_parallax", "start_force_not_gravity", "start_unobservable" or "start_inconsistent".
   Result<Start> start(const ImuBuffer& imu, const std::vector<CameraModel>& cameras);
 
  private:
@@ -32,7 +32,7 @@ class MotionInitialiser {
 
   Options options_;
   std::deque<Seen> frames_;
-  std::optional<Reason> failed_;  ///< why the last search failed
+  std::optional<Reason> failed_;  ///< the reason, if the last search failed
   TimePoint next_attempt_{};
 };
 

@@ -16,18 +16,19 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr double kGyroBiasPrior = 0.3;  // rad/s: prior deviation of the gyro bias
+constexpr double kGyroBiasPrior = 0.3;  // rad/s, prior deviation of the gyro bias
 constexpr int kIterations = 50;
 constexpr double kLittleDamping = 1e-3;
-constexpr double kLargestStretch = 1.0;  // largest scaling by a step, natural logarithm
-constexpr double kInertialCost = 6.0;    // usual upper limit of the cost of samples and biases
+constexpr double kLargestStretch = 1.0;  // largest logarithm of the window's scaling by a step
+constexpr double kInertialCost = 6.0;    // usual upper limit of inertialCost()
 constexpr double kLeastGain = 0.1;       // smallest expected gain of a step, in cost
 
 double huber(double deviations) {
   return deviations <= kHuber ? deviations * deviations : kHuber * (2.0 * deviations - kHuber);
 }
 
-/// Information on an inverse depth. Without it, vanishing motion and depths also fit.
+/// Returns the prior information on an inverse depth. Without this prior, a window with zero motion
+/// and zero depths would fit too.
 double nearness(const Options& o) { return o.vision.min_depth_m * o.vision.min_depth_m; }
 
 double priorCost(const MotionWindow& w, const Options& o) {
@@ -52,14 +53,16 @@ double costOf(const Estimate& e, const Inertial& inertial, const Options& o) {
     cost += e.rays[j].abr[2] * e.rays[j].abr[2] * nearness(o);
     for (const WindowView& v : e.window.points[j].views) {
       const auto term = viewTerm(e, j, v, inertial, o.vision.sigma_px);
-      // A point behind a camera counts as a distant outlier, because a step may bring it back.
+      // A point behind a camera has the cost of a large residual, because a later step may move it
+      // back.
       cost += term ? huber(term->r.norm()) : huber(1000.0);
     }
   }
   return cost;
 }
 
-/// Normal equations with the points eliminated, and what recovers the points' part of a step.
+/// Normal equations with the points eliminated, and the factors that give the points' part of a
+/// step.
 struct Normal {
   MatrixXd H;  ///< only the lower half is valid
   VectorXd b;
@@ -135,7 +138,8 @@ Normal normalOf(const Estimate& e, const Inertial& inertial, const Options& o, d
   return n;
 }
 
-/// Share of a step that scales the whole window: positions, points and velocities.
+/// Returns the component of a step that scales the whole window (positions, points and velocities),
+/// as a logarithm.
 double stretchOf(const MotionWindow& w, const VectorXd& dx) {
   double along = 0.0, square = 1e-12;
   for (std::size_t k = 1; k < w.poses.size(); ++k) {
@@ -145,7 +149,8 @@ double stretchOf(const MotionWindow& w, const VectorXd& dx) {
   return std::clamp(along / square, -kLargestStretch, kLargestStretch);
 }
 
-/// Adds a step; its scale part is a factor, which preserves the fit to the images.
+/// Adds a step. Its component along the scale is applied as a factor, which preserves the fit to
+/// the images.
 void move(Estimate& e, const VectorXd& dx, const Normal& n) {
   const double stretch = stretchOf(e.window, dx), factor = std::exp(stretch);
   VectorXd rest = dx;
@@ -165,7 +170,8 @@ void move(Estimate& e, const VectorXd& dx, const Normal& n) {
   }
 }
 
-/// Covariance of the newest pose and of the window's parameters, from the covariance of all.
+/// Extracts the covariance of the newest pose and of the window's parameters from that of all
+/// errors.
 WindowCovariance marginal(const MatrixXd& covariance, std::size_t last) {
   std::vector<Index> at;
   for (Index i = 0; i < 3; ++i) at.push_back(poseAt(last) + i);
@@ -196,7 +202,7 @@ Result<Minimum> minimise(Estimate e, const ImuBuffer& imu, const Options& option
     if (expected < kLeastGain) {
       settled = damping < kLittleDamping;
       if (settled) break;
-      damping *= 0.01;  // the step may be small only because of the damping
+      damping *= 0.01;  // the step may be small because of the damping only
       growth = 2.0;
       continue;
     }
@@ -220,7 +226,8 @@ Result<Minimum> minimise(Estimate e, const ImuBuffer& imu, const Options& option
   return Minimum{std::move(e), std::move(*inertial), cost};
 }
 
-/// RMS of the views' residuals, in deviations, per remaining degree of freedom.
+/// Returns the root of the views' squared residuals, in deviations, per remaining degree of
+/// freedom.
 double imageNoise(const Minimum& m, double sigma_px) {
   double sum = 0.0, freedom = -6.0 * static_cast<double>(m.estimate.window.poses.size());
   for (std::size_t j = 0; j < m.estimate.rays.size(); ++j) {
@@ -250,7 +257,8 @@ Result<RefinedWindow> refinedBy(Minimum m, const Options& options) {
   if (!covariance.allFinite() || !(covariance.diagonal().minCoeff() > 0.0)) {
     return fail("start_unobservable");
   }
-  // The ratio of two thousand image rows hardly depends on the few rows of inertial samples.
+  // The inertial rows have their own ratio, because they are too few to affect that of two thousand
+  // image rows.
   const double inertial_ratio = inertialCost(e, m.inertial, options) / kInertialCost;
   const double scale = std::max({1.0, result.noise_ratio * result.noise_ratio, inertial_ratio});
   result.covariance = scale * marginal(covariance, e.window.poses.size() - 1);

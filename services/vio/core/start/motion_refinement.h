@@ -1,5 +1,5 @@
-// Maximum a posteriori estimate of a window in motion (Levenberg-Marquardt, points eliminated),
-// whose covariance is the start's; tools/docs/maths/vio-starts.md.
+// Maximum a posteriori estimate of a window in motion by Levenberg-Marquardt, with the points
+// eliminated. Its covariance becomes that of the start. Derivation: tools/docs/maths/vio-starts.md.
 #pragma once
 
 #include <Eigen/Core>
@@ -35,16 +35,17 @@ struct WindowPose {
 struct MotionWindow {
   std::vector<WindowPose> poses;
   std::vector<WindowPoint> points;
-  Eigen::Vector3d gravity_B0 = Eigen::Vector3d::Zero();  ///< fixed length
+  Eigen::Vector3d gravity_B0 = Eigen::Vector3d::Zero();  ///< m/s², of fixed length
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = Eigen::Vector3d::Zero();
-  /// Time offset of the images, in addition to that applied to `poses`.
+  /// Time offset of the images, in addition to the one that the times of `poses` include.
   double time_offset_s = 0.0;
 };
 
 /// Error of the newest pose and of the window's parameters: [θ, v (B0), gravity (2), b_g, b_a].
 inline constexpr int kWindowError = 14;
 using WindowCovariance = Eigen::Matrix<double, kWindowError, kWindowError>;
-/// Two directions across gravity of its length: times two error components, the error in B0.
+/// Returns two vectors across gravity with its length. Multiplied by the two components of the
+/// gravity error, they give the error in B0.
 Eigen::Matrix<double, 3, 2> acrossGravity(const Eigen::Vector3d& gravity_B0);
 
 struct RefinedWindow {
@@ -59,15 +60,16 @@ struct RefinedWindow {
 /// information is singular. The failures of inertialOf() (motion_terms.h) are passed on.
 Result<RefinedWindow> refine(MotionWindow window, const ImuBuffer& imu, const Options& options);
 
-// Defined in motion_search.cpp: the best minimum of a window from several initial values.
+// The following are defined in motion_search.cpp: a search from several initial values.
 
-/// Largest error of a usable velocity, as a share of the largest velocity in the window. The same
-/// limit applies to the distance of other minima that fit about as well.
+/// Largest standard deviation of a usable velocity, as a share of the largest velocity in the
+/// window. The velocities of minima that fit about as well may not differ by a larger share.
 inline constexpr double kVelocityShare = 0.16;
 
 void placePoints(MotionWindow& window);
 
-/// Fails as refine() does, and with "start_unobservable" if another minimum fits about as well.
+/// Returns the best minimum. Fails as refine() does, and with "start_unobservable" if another
+/// minimum with a different velocity fits about as well.
 Result<RefinedWindow> searchMinimum(MotionWindow window, const ImuBuffer& imu,
                                     const Options& options);
 

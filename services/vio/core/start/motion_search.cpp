@@ -15,11 +15,11 @@ using Eigen::Vector3d;
 constexpr double kUsualDepth = 3.0;  // m
 constexpr double kAsLikely = 9.0;    // largest difference in cost of minima that fit about as well
 constexpr double kSame = 0.01;       // largest relative difference in velocity of equal minima
-// Part of a view's error is constant along its track, and the residuals do not show it.
+// The residuals do not contain the part of a view's error that is constant along its track.
 constexpr double kNoiseMargin = 1.2;
-constexpr double kLeastNoise = 0.25;  // share of vision.sigma_px
+constexpr double kLeastNoise = 0.25;  // least noise, as a share of vision.sigma_px
 
-/// Places all points `depth` m from the first pose, in the direction of their first view.
+/// Places all points at the depth `depth`, in m, of the camera of their first view.
 void placeAt(MotionWindow& window, double depth) {
   for (WindowPoint& point : window.points) {
     const WindowView& v = point.views.front();
@@ -35,7 +35,8 @@ bool apart(const RefinedWindow& a, const RefinedWindow& b, double share) {
          share * std::max(velocity(a).norm(), velocity(b).norm());
 }
 
-/// Refines all, the lowest cost first. Fails if no refinement succeeds.
+/// Refines all windows and sorts the results by cost, the lowest first. Fails if no refinement
+/// succeeds.
 using Minima = std::vector<RefinedWindow>;
 Result<Minima> refineAll(std::vector<MotionWindow> beginnings, const ImuBuffer& imu,
                          const Options& options) {
@@ -54,7 +55,7 @@ Result<Minima> refineAll(std::vector<MotionWindow> beginnings, const ImuBuffer& 
   return minima;
 }
 
-/// Keeps the lowest cost of each group of equal minima.
+/// Removes all but the minimum of lowest cost from each group of equal minima.
 void keepApart(Minima& minima) {
   stableSortBy(minima, [](const RefinedWindow& m) { return m.cost; });
   for (auto i = minima.begin(); i != minima.end(); ++i) {
@@ -63,7 +64,8 @@ void keepApart(Minima& minima) {
   }
 }
 
-/// Whether rotation moves a camera as far as translation: then a third search begins at rest.
+/// Returns true if the body's rotation moves a camera about as far as its translation does. A third
+/// search then begins at rest.
 bool turnMovesCameras(const MotionWindow& window) {
   constexpr double kShare = 0.3;
   double by_turn = 0.0, by_body = 0.0;
@@ -97,7 +99,8 @@ void placePoints(MotionWindow& window) {
 
 Result<RefinedWindow> searchMinimum(MotionWindow window, const ImuBuffer& imu,
                                     const Options& options) {
-  // The linear solution may be degenerate, so a second search begins at the usual depth.
+  // A second search begins with all points at the usual depth, because the linear solution may be
+  // degenerate.
   MotionWindow usual = window;
   placeAt(usual, kUsualDepth);
   MotionWindow resting = window;

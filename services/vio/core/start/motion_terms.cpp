@@ -85,7 +85,7 @@ std::optional<ViewTerm> viewTerm(const Estimate& e, std::size_t point, const Win
   const Vector3d p = pose.p_B0 + pose.v_B0 * later_s;
   const Ray& ray = e.rays[point];
   const double inverse = ray.abr[2];
-  // Position of the point relative to the body and to the camera, multiplied by the inverse depth.
+  // Positions of the point relative to the body and to the camera, times the inverse depth.
   const Vector3d q = R.transpose() * (ray.R_B0_C * Vector3d(ray.abr[0], ray.abr[1], 1.0) +
                                       inverse * (ray.origin - p));
   const Vector3d p_C = v.R_BC.transpose() * (q - inverse * v.p_BC);

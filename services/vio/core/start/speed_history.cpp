@@ -6,7 +6,7 @@
 namespace perdure::vio {
 
 constexpr std::size_t kSamples = 512;
-constexpr double kSpeedChange = 2.0;  // m/s², assumed unknown acceleration
+constexpr double kSpeedChange = 2.0;  // m/s², deviation of the unknown acceleration
 
 Result<void> SpeedHistory::add(const SpeedSample& sample) {
   if (!std::isfinite(sample.speed) || !(sample.sigma > 0) || !std::isfinite(sample.sigma)) {

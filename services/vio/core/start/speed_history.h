@@ -13,13 +13,14 @@ namespace perdure::vio {
 
 class SpeedHistory {
  public:
-  /// `max_age_s`: largest distance in time at which a sample is used.
+  /// `max_age_s`: a sample is used up to this time before and after its own.
   explicit SpeedHistory(double max_age_s) : max_age_s_(max_age_s) {}
 
-  /// Refuses "speed_not_finite" and "speed_out_of_order".
+  /// Adds a sample. Refuses it with "speed_not_finite" or "speed_out_of_order".
   Result<void> add(const SpeedSample& sample);
-  /// Interpolates between samples at most two ages apart, or returns the nearest with a larger
-  /// sigma. Empty if that is too old.
+  /// Interpolates between samples that are at most 2 `max_age_s` apart; otherwise returns the
+  /// nearest sample with a larger sigma. Returns nothing if that sample is farther than
+  /// `max_age_s`.
   std::optional<SpeedReading> at(TimePoint time) const;
   bool reaches(TimePoint time) const { return !samples_.empty() && samples_.back().time >= time; }
   std::vector<SpeedSample> samples() const { return {samples_.begin(), samples_.end()}; }

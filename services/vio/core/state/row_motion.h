@@ -10,25 +10,27 @@
 
 namespace perdure::vio {
 
-/// Motion of the body during an image, in B at its middle row. Accelerations are constant.
+/// Motion of the body during an image, in B at its middle row. The acceleration and the rate's
+/// change are constant.
 struct RowMotion {
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();          ///< w_WB, rad/s
   Eigen::Vector3d rate_change = Eigen::Vector3d::Zero();   ///< rad/s²
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();      ///< m/s
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  ///< m/s², without gravity
 
-  /// Rotation of the body from the middle row until `s` later, as a rotation vector.
+  /// Returns the rotation vector of the body from the middle row to `s` seconds later.
   Eigen::Vector3d turn(double s) const { return s * rate + 0.5 * s * s * rate_change; }
 };
 
 struct RowCamera {
-  RigidTransform T_BC;        ///< B at the middle row, C at this row
-  Eigen::Matrix3d R_BR;       ///< R: body frame at this row; rotates errors of p_BC into B
+  RigidTransform T_BC;        ///< pose of C at this row in B at the middle row
+  Eigen::Matrix3d R_BR;       ///< R: body at this row; rotates errors of p_BC into B
   Eigen::Vector3d theta_dot;  ///< derivative of T_BC's rotation (right tangent) by s, rad/s
   Eigen::Vector3d p_dot;      ///< derivative of T_BC's position by s, m/s in B
 };
 
-/// Camera mounted at T_BC, `s` seconds after the middle row. |s| is a few hundredths of a second.
+/// Returns the pose of the camera mounted at T_BC, `s` seconds after the middle row. |s| is at most
+/// a few hundredths of a second.
 inline RowCamera rowCamera(const RowMotion& m, const RigidTransform& T_BC, double s) {
   const Eigen::Vector3d turned = m.turn(s);
   const Eigen::Vector3d rate = rightJacobianSo3(turned) * (m.rate + s * m.rate_change);

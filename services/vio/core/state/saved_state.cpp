@@ -8,12 +8,13 @@ namespace perdure::vio {
 namespace {
 
 constexpr const char* kMagic = "perdure-vio-state-3";
-// Assumed unobserved turn rate and acceleration of a vehicle.
+// Standard deviations of a vehicle's unobserved turn rate (rad/s) and acceleration (m/s²).
 constexpr double kTurnRate = 0.3, kAcceleration = 1.5;
-// Factor for the lost correlations with the window.
+// Factor on the covariance, because its correlations with the window are lost.
 constexpr double kInflation = 1.5;
 
-/// Calls `each` for every number of the state in the order of the text; sizes are set.
+/// Calls `each` for every number of the state, in the order of the text. The sizes of vectors and
+/// matrices must be set.
 template <class State, class Each>
 void forNumbers(State& s, Each each) {
   const auto all = [&](auto&& m) {
@@ -86,7 +87,7 @@ void coast(SavedState& s, double gap_s) {
   const double gap = std::max(gap_s, 0.0);
   s.time += durationFromSeconds(gap);
   s.nav.p_WB += gap * s.nav.v_WB;
-  // The error in v adds to the error in p, and correlations follow.
+  // The error of v adds to that of p; rows and columns give the correlations too.
   s.covariance.middleRows(kPosition, 3) += gap * s.covariance.middleRows(kVelocity, 3).eval();
   s.covariance.middleCols(kPosition, 3) += gap * s.covariance.middleCols(kVelocity, 3).eval();
   s.covariance *= kInflation;

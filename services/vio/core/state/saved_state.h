@@ -19,16 +19,19 @@ struct SavedState {
   double time_offset_s = 0.0;
   std::vector<double> readout_s;  ///< read-out time of each camera
   Eigen::Vector3d gyro_scale = Eigen::Vector3d::Ones();
-  /// Covariance of [nav, extrinsics, time offset], then read-outs and scale if estimated.
+  /// Covariance of [nav, extrinsics, time offset, read-outs, scale]; the last two only if
+  /// estimated.
   Eigen::MatrixXd covariance;
   std::uint64_t next_track = 1;
 };
 
 std::string toText(const SavedState& saved);
-/// Fails with "state_malformed": truncated, altered, of another version or not finite.
+/// Parses a state. Fails with "state_malformed" if the text is truncated, altered, of another
+/// version or not finite.
 Result<SavedState> fromText(const std::string& text);
 
-/// Propagates at constant velocity over `gap`, with more covariance for unobserved motion.
+/// Propagates the state at constant velocity over `gap_s`, and enlarges the covariance for the
+/// unobserved motion.
 void coast(SavedState& saved, double gap_s);
 
 }  // namespace perdure::vio

@@ -8,7 +8,7 @@
 namespace perdure::vio {
 namespace {
 
-/// Size of the workspace for an update with m rows of a state of size n.
+/// Returns the size of the workspace, in numbers, for an update with m rows of a state of size n.
 Eigen::Index roomOfUpdate(Eigen::Index n, Eigen::Index m) {
   return 2 * Workspace::need(n, m) + Workspace::need(m, m) + Workspace::need(m, 1) +
          Workspace::need(n, 1);
@@ -39,7 +39,8 @@ State::State(const std::vector<RigidTransform>& cameras, double offset, int max_
   size_ = calibrationEnd();
   const int capacity = size_ + 6 * (max_clones + 2) + 3 * max_points;
   P_ = Eigen::MatrixXd::Zero(capacity, capacity);
-  // The largest updates: all points, or compressed rows of calibration and clones.
+  // Reserves room for the larger of two updates: all points, or compressed rows of calibration and
+  // clones.
   const int count = static_cast<int>(cameras.size());
   workspace_.begin(roomOfUpdate(
       capacity, std::max(2 * count * max_points, 6 * (count + max_clones + 2) + readoutCount())));
@@ -78,7 +79,8 @@ int State::append(int size) {
 }
 
 void State::remove(int at, int size) {
-  // Column by column, without a copy: values that move never overwrite values still to be moved.
+  // Moves the columns in order and without a copy. No value overwrites one that is still to be
+  // moved.
   const int tail = size_ - at - size;
   for (int column = 0; column < size_; ++column) {
     if (column >= at && column < at + size) continue;

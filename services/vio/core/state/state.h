@@ -32,12 +32,12 @@ struct Nav {
   RigidTransform T_WB() const { return RigidTransform(q_WB, p_WB); }
 };
 
-/// Pose of the body at an image. `linear`: linearisation point, taken from nav_linear.
+/// Pose of the body at an image. `linear` is the linearisation point, copied from nav_linear.
 struct Clone {
   std::uint64_t frame = 0;
   TimePoint image_time;
   RigidTransform T_WB, linear;
-  int at = 0;      ///< index of its error
+  int at = 0;      ///< index of the clone's error
   RowMotion rows;  ///< used only for rolling shutters
 };
 
@@ -48,7 +48,7 @@ struct PointState {
   int failed_gates = 0;
 };
 
-/// Position of a Jacobian's column block in the error state.
+/// Position of a block of a Jacobian's columns in the error state.
 struct Block {
   int at = 0, size = 0;
 };
@@ -60,7 +60,8 @@ struct Measurement {
   VectorView r;
 };
 
-/// Reused memory for matrices, so that a running filter does not allocate. Copies start without.
+/// Memory for matrices that is reused, so that a running filter does not allocate. It is not
+/// copied.
 class Workspace {
  public:
   using Matrix = Eigen::Map<Eigen::MatrixXd, Eigen::Aligned16>;
@@ -69,16 +70,16 @@ class Workspace {
   Workspace(const Workspace&) {}
   Workspace& operator=(const Workspace&) { return *this; }
 
-  /// Reserves room for `size` numbers in all. Matrices taken before become invalid.
+  /// Reserves room for `size` numbers in total. Matrices taken earlier become invalid.
   void begin(Eigen::Index size) {
     if (memory_.size() < size) memory_.resize(size);
     taken_ = 0;
   }
-  /// Share of begin()'s room that a matrix takes.
+  /// Returns the number of begin()'s numbers that a matrix takes.
   static Eigen::Index need(Eigen::Index rows, Eigen::Index columns) {
     return (rows * columns + 1) / 2 * 2;
   }
-  /// The matrix is not initialised.
+  /// Returns a matrix with undefined elements.
   Matrix take(Eigen::Index rows, Eigen::Index columns);
 
  private:
@@ -91,19 +92,20 @@ inline constexpr int kTheta = 0, kPosition = 3, kVelocity = 6, kGyroBias = 9, kA
 
 class State {
  public:
-  /// readout_s: read-out time of each camera, 0 for a global shutter; empty: all global. The last
-  /// two add non-zero read-outs and the gyroscope's scale to the error.
+  /// readout_s is the read-out time of each camera, 0 for a global shutter; empty if all are
+  /// global. The last two arguments add non-zero read-outs and the gyroscope's scale to the error.
   State(const std::vector<RigidTransform>& T_BC, double time_offset_s, int max_clones,
         int max_points, const std::vector<double>& readout_s = {}, bool estimate_readout = false,
         bool estimate_scale = false);
 
-  /// nav_linear: linearisation point with the predicted q, and p and v that updates do not change.
+  /// nav_linear is the linearisation point: the predicted q, and a p and v that updates do not
+  /// change.
   Nav nav, nav_linear;
   TimePoint time;                    ///< IMU clock
-  std::vector<RigidTransform> T_BC;  ///< camera pose of each camera
+  std::vector<RigidTransform> T_BC;  ///< pose of each camera in B
   double time_offset_s = 0.0;        ///< t_imu = t_image + time_offset_s
   std::vector<double> readout_s;     ///< s from first to last row of each camera; 0: global shutter
-  /// Ratio of a reading without its bias to the true rate, for each axis.
+  /// Ratio, for each axis, of a reading without bias to the true rate.
   Eigen::Vector3d gyro_scale = Eigen::Vector3d::Ones();
   std::vector<Clone> clones;  ///< oldest first
   std::vector<PointState> points;
@@ -111,25 +113,26 @@ class State {
   int size() const { return size_; }
   int extrinsicsAt(int camera) const { return kNavSize + 6 * camera; }
   int timeOffsetAt() const { return kNavSize + 6 * static_cast<int>(T_BC.size()); }
-  /// Index of the error of a camera's read-out; empty if it is not estimated.
+  /// Returns the index of the error of a camera's read-out; nothing if it is not estimated.
   std::optional<int> readoutAt(std::size_t camera) const;
   int readoutCount() const;
-  /// Index of the error of the gyroscope's scale; empty if it is not estimated.
+  /// Returns the index of the error of the gyroscope's scale; nothing if it is not estimated.
   std::optional<int> scaleAt() const {
     return estimates_scale_ ? std::optional(timeOffsetAt() + 1 + readoutCount()) : std::nullopt;
   }
-  /// Size of the error without clones and points.
+  /// Returns the size of the error without clones and points.
   int calibrationEnd() const {
     return timeOffsetAt() + 1 + readoutCount() + (estimates_scale_ ? kScaleSize : 0);
   }
   bool rolls(std::size_t camera) const { return readout_s[camera] != 0.0; }
-  /// Longest read-out of all cameras; 0 if none has a rolling shutter.
+  /// Returns the longest read-out of all cameras, in s; 0 if none has a rolling shutter.
   double longestReadout() const {
     double longest = 0.0;  // an estimate may be negative
     for (const double s : readout_s) longest = std::max(longest, std::abs(s));
     return longest;
   }
-  /// The camera at the time it exposed a row. `row`: −½ … ½, first to last.
+  /// Returns the camera at the time at which it exposed `row`: −½ … ½ from the first to the last
+  /// row.
   RowCamera rowCamera(const Clone& clone, std::size_t camera, double row) const {
     return vio::rowCamera(clone.rows, T_BC[camera], row * readout_s[camera]);
   }
@@ -139,16 +142,17 @@ class State {
   const Clone* clone(std::uint64_t frame) const;
   const PointState* point(std::uint64_t id) const;
 
-  /// Adds a clone of the current pose. rate_B correlates it with the time offset.
+  /// Adds a clone of the current pose. The body's rate rate_B, in rad/s, gives its correlation with
+  /// the time offset.
   void addClone(std::uint64_t frame, TimePoint image_time, const Eigen::Vector3d& rate_B,
                 bool first_estimates);
-  /// Enlarges the covariance of the current pose and of the newest clone, which is the same pose.
-  /// Deviations are in rad about the body's axes and in m along the world's axes.
+  /// Enlarges the covariance of the current pose and of the newest clone, which must be the same
+  /// pose. The deviations are in rad about the body's axes and in m along those of W.
   void widenPose(double rotation, double position_m);
-  /// Adds a common error to all positions, m along each axis.
+  /// Adds a common error with deviation sigma_m along each axis to all positions.
   void widenPositions(double sigma_m);
   void removeClone(std::uint64_t frame);
-  /// Adds a point with its covariance and its cross-covariance (3 × size()).
+  /// Adds a point with its covariance, and its cross-covariance with the state (3 × size()).
   void addPoint(std::uint64_t id, const Eigen::Vector3d& p_W, const Eigen::Matrix3d& covariance,
                 const Eigen::MatrixXd& cross);
   void removePoint(std::uint64_t id);
@@ -156,10 +160,11 @@ class State {
   /// x ← x ⊞ dx.
   void apply(const VectorView& dx);
   /// EKF update with r = H·error + noise of unit covariance; H has the columns of `blocks`. Fails
-  /// with "update_not_positive" or "update_not_finite" and then does not change the state.
+  /// with "update_not_positive" or "update_not_finite"; the state is then unchanged.
   Result<void> update(const Eigen::MatrixXd& H, const std::vector<Block>& blocks,
                       const Eigen::VectorXd& r);
-  /// Updates with measurements that each depend on few blocks, without their zero columns.
+  /// Updates in the same way with several measurements. Each has only the columns of its own few
+  /// blocks.
   Result<void> update(std::span<const Measurement> measurements);
   /// Returns H P Hᵀ for an H with the columns of `blocks`.
   Eigen::MatrixXd project(const MatrixView& H, std::span<const Block> blocks) const;
@@ -167,7 +172,7 @@ class State {
   Eigen::MatrixXd covarianceOf(std::initializer_list<Block> blocks) const {
     return covarianceOf(std::span(blocks.begin(), blocks.size()));
   }
-  /// True if all numbers are finite and all variances positive.
+  /// Returns true if all numbers are finite and all variances are positive.
   bool healthy() const;
 
  private:

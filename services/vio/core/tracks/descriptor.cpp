@@ -6,9 +6,9 @@
 namespace perdure::vio {
 namespace {
 
-constexpr int kReach = 13, kRadius = kReach + 2;  // radius of the pattern, without and with the box
+constexpr int kReach = 13, kRadius = kReach + 2;  // px, pattern without and with the box
 
-// Rows are slightly longer than the patch, so that the compiler can vectorise the loops.
+// Rows are longer than the patch, so that the compiler can vectorise the loops.
 constexpr std::size_t kSide = 2 * kReach + 1, kStride = 32, kOuter = 2 * kRadius + 1;
 using Smooth = std::array<std::uint16_t, kSide * kStride>;
 
@@ -21,7 +21,8 @@ struct Pair {
   std::uint16_t first, second;
 };
 
-/// Approximately normal pairs in the patch: sums of uniform draws of a fixed generator.
+/// Returns pairs of pixels with approximately normal coordinates: sums of draws from a fixed
+/// generator.
 std::array<Pair, 256> makePattern() {
   std::uint64_t seed = 20111129;
   const auto draw = [&seed] {
@@ -42,7 +43,8 @@ std::array<Pair, 256> makePattern() {
   return pattern;
 }
 
-/// Smooths the patch with a 5×5 box, which extends beyond the patch, in whole grey levels.
+/// Smooths the patch around (x, y) with a 5×5 box. At the border, the box includes pixels outside
+/// the patch.
 Smooth smoothAround(const cv::Mat& image, int x, int y) {
   std::array<std::uint16_t, kOuter * kStride> sums{};
   for (std::size_t r = 0; r < kOuter; ++r) {

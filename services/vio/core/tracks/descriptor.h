@@ -1,4 +1,5 @@
-// 256-bit upright BRIEF descriptor (Calonder et al., ECCV 2010), smoothed by a 5×5 box.
+// Upright BRIEF descriptor of 256 bits (Calonder et al., ECCV 2010), of an image that a 5×5 box
+// smooths.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,10 +16,12 @@ namespace perdure::vio {
 
 using Descriptor = std::array<std::uint8_t, 32>;
 
-/// Takes a CV_8UC1 image. Empty if the pixel is nearer than 16 pixels to the border.
+/// Returns the descriptor of a pixel of a CV_8UC1 image; nothing if the pixel is less than 16
+/// pixels from the border.
 std::optional<Descriptor> descriptorAt(const cv::Mat& image, const Eigen::Vector2d& pixel);
 
-/// Landmarks of an image (CV_8UC1) of `camera`, with descriptors, without non-finite ones.
+/// Returns the message with the landmarks of an image (CV_8UC1) of `camera`, with descriptors.
+/// Landmarks with non-finite numbers are left out.
 Landmarks landmarksMessage(const FrameStamp& stamp, InstanceId instance, const WorldId& world,
                            const std::string& camera, std::vector<Landmark> landmarks,
                            const cv::Mat& image);

@@ -10,15 +10,16 @@ namespace perdure::vio {
 namespace {
 
 constexpr int kSteps = 10;
-constexpr float kSettled = 0.01F;        // px
-constexpr float kLeastDeviation = 2.0F;  // grey levels; below it, the texture is noise
+constexpr float kSettled = 0.01F;        // px; a smaller step ends the search
+constexpr float kLeastDeviation = 2.0F;  // grey levels; less texture is noise
 constexpr float kFarthest = 4.0F;        // px from the seed
-// Damping of affine terms, grey levels² per (pixel at the rim)²; little texture keeps the warp.
+// Damping of affine terms, grey levels² per (pixel at the rim)². With little texture, it preserves
+// the warp.
 constexpr float kAffineDamping = 600.0F;
 
 using Values = Eigen::Matrix<float, Patch::kPixels, 1>;
 
-/// Samples the warped patch; false if it exceeds the image.
+/// Samples the warped patch. Returns false if the patch exceeds the image.
 bool sample(const cv::Mat& image, const Eigen::Matrix2f& warp, const Eigen::Vector2f& centre,
             Values& out) {
   constexpr float h = Patch::kHalf, kRounding = 0.01F;
@@ -28,7 +29,8 @@ bool sample(const cv::Mat& image, const Eigen::Matrix2f& warp, const Eigen::Vect
       !(centre.y() + reach.y() < static_cast<float>(image.rows - 1))) {
     return false;
   }
-  // All rows together, a column at a time, for loops of fixed length. Rows beyond repeat the last.
+  // Samples column by column, in loops over a fixed number of rows. Rows beyond the patch repeat
+  // its last row.
   constexpr std::size_t kRows = 16;
   static_assert(kRows >= Patch::kSide);
   std::array<float, kRows> px, py, a, b;
@@ -112,7 +114,7 @@ float Patch::growth() const { return std::sqrt(std::abs(warp_.determinant())); }
 
 std::optional<Patch::Found> Patch::find(const std::vector<cv::Mat>& levels,
                                         const cv::Point2f& seed) {
-  // A grown patch is searched for in a smaller image, at its first scale.
+  // A patch that has grown is searched for in a smaller image, in which it has its first size.
   const int last = static_cast<int>(levels.size()) - 1;
   const int level =
       std::clamp(static_cast<int>(std::lround(std::log2(std::max(growth(), 1.0F)))), 0, last);

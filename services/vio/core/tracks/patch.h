@@ -1,5 +1,5 @@
-// Appearance of a corner at its first observation, and warp, gain and offset since then
-// (inverse-compositional Gauss-Newton, Baker & Matthews, IJCV 2004).
+// Appearance of a corner at its first observation, and its warp, gain and offset since then, found
+// by inverse-compositional Gauss-Newton (Baker & Matthews, IJCV 2004).
 #pragma once
 
 #include <Eigen/Core>
@@ -18,14 +18,16 @@ class Patch {
     float similarity = 0;  ///< −1 … 1: normalised cross-correlation with the first observation
   };
 
-  /// Cuts a patch of a CV_8UC1 image. Empty beyond the image or with too little texture.
+  /// Cuts a patch from a CV_8UC1 image. Returns nothing if the patch exceeds the image or has too
+  /// little texture.
   static std::optional<Patch> cut(const cv::Mat& image, const cv::Point2f& pixel);
 
-  /// Finds the patch, starting from `seed`, in images each of half the size of the previous. Empty,
-  /// with an unchanged warp, outside the image or without convergence.
+  /// Finds the patch from `seed` on. Each of `levels` has half the size of the one before. Returns
+  /// nothing, and leaves the warp unchanged, if the patch leaves the image or the search does not
+  /// converge.
   std::optional<Found> find(const std::vector<cv::Mat>& levels, const cv::Point2f& seed);
 
-  /// Current size in pixels relative to the first observation.
+  /// Returns the ratio of the present size to that at the first observation.
   float growth() const;
 
  private:

@@ -6,7 +6,8 @@
 namespace perdure::vio {
 namespace {
 
-/// Distance in pixels from the line through the rotated point along the translation.
+/// Returns the distance in pixels of `m.now` from the line through `turned` along the translation
+/// `t`.
 double lineDistance(const Eigen::Vector3d& turned, const Match& m, const Eigen::Vector3d& t) {
   const Eigen::Vector3d line = t.cross(turned);
   const double norm = line.head<2>().norm();
@@ -28,7 +29,7 @@ std::vector<bool> twoPointRansac(const std::vector<Match>& matches,
   std::vector<bool> best(n, true);
   if (n < 4) return best;
   std::vector<Eigen::Vector3d> turned(n), normals(n);
-  std::vector<bool> still(n);  // without parallax a match agrees with every translation
+  std::vector<bool> still(n);  // matches without parallax agree with every translation
   for (std::size_t i = 0; i < n; ++i) {
     turned[i] = R_now_before * matches[i].before.homogeneous();
     normals[i] = turned[i].cross(Eigen::Vector3d(matches[i].now.homogeneous()));

@@ -12,12 +12,14 @@ struct Match {
   double scale = 1.0;           ///< pixels per normalised unit
 };
 
-/// Marks matches within threshold_px of their epipolar lines by the best translation, repeatably.
+/// Returns, for each match, true if it lies within threshold_px of its epipolar line for the best
+/// translation. The result is repeatable.
 std::vector<bool> twoPointRansac(const std::vector<Match>& matches,
                                  const Eigen::Matrix3d& R_now_before, double threshold_px);
 
-/// Distance in pixels of `now` from the epipolar line of `before`. translation: direction in the
-/// frame of `now`. If no epipolar line exists, the result is the distance between the two points.
+/// Returns the distance in pixels of `now` from the epipolar line of `before`. `translation` is a
+/// direction in the frame of `now`. If there is no epipolar line, returns the distance between the
+/// points.
 double epipolarDistance(const Match& match, const Eigen::Matrix3d& R_now_before,
                         const Eigen::Vector3d& translation);
 

@@ -14,10 +14,10 @@ namespace perdure::vio {
 namespace {
 
 constexpr double kBorder = 4.0;
-constexpr double kStill = 0.5;           // px, largest distance from its position
-constexpr std::size_t kFewestStill = 8;  // smallest number of points of a background
+constexpr double kStill = 0.5;           // px, largest motion of a point at rest
+constexpr std::size_t kFewestStill = 8;  // least number of points at rest
 constexpr double kLeastSpreadOfStill =
-    0.05;  // RMS distance from their centre, relative to the image's width
+    0.05;  // least RMS distance of points at rest from their centre, in image widths
 
 Eigen::Vector2d toEigen(const cv::Point2f& p) { return {p.x, p.y}; }
 cv::Point2f toCv(const Eigen::Vector2d& p) {
@@ -28,7 +28,8 @@ cv::TermCriteria criteria(std::int64_t iterations) {
   return {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, static_cast<int>(iterations), 0.01};
 }
 
-/// Compares by response; equal responses are ordered by rows, then columns.
+/// Returns true if `a` has a smaller response than `b`. Equal responses are ordered by row, then
+/// column.
 bool worse(const cv::KeyPoint& a, const cv::KeyPoint& b) {
   return std::tuple(-a.response, a.pt.y, a.pt.x) > std::tuple(-b.response, b.pt.y, b.pt.x);
 }
@@ -72,7 +73,8 @@ std::vector<cv::Point2f> Tracker::seeds(const std::optional<Eigen::Matrix3d>& R)
   return result;
 }
 
-/// The translation of the body between the rows moves the point along the epipolar line.
+/// Returns the point rotated to the camera's attitude at the middle row. The body's translation
+/// between the rows is ignored, because it moves the point along the epipolar line only.
 Eigen::Vector2d Tracker::atMiddle(const ImagePoint& seen) const {
   if (turn_.isZero(0.0)) return seen.normalised;
   const Eigen::Vector3d ray = expQuaternion(seen.row * turn_) * seen.normalised.homogeneous();
@@ -130,7 +132,7 @@ void Tracker::follow(const Images& now, const std::optional<Eigen::Matrix3d>& R)
     if (!seen) continue;
     const Eigen::Vector2d at_middle = atMiddle(*seen);
     matches.push_back({p.at_middle, at_middle, seen->scale});
-    p.second += found->pixel - p.pixel;  // moves the start of the search in the second camera
+    p.second += found->pixel - p.pixel;  // start of the search in the second camera
     p.pixel = found->pixel;
     p.normalised = seen->normalised;
     p.at_middle = at_middle;
@@ -150,7 +152,7 @@ void Tracker::follow(const Images& now, const std::optional<Eigen::Matrix3d>& R)
     const bool grown = kept[i].patch->growth() > options_.growth;
     (grown ? renewed : points_).push_back(std::move(kept[i]));
   }
-  // Renewed points are appended, because points are in order of their ids.
+  // Renewed points have new ids and are appended, because points are in order of their ids.
   for (Point& p : renewed) {
     const auto patch = Patch::cut(now.levels.front(), p.pixel);
     if (!patch) continue;
@@ -183,9 +185,10 @@ void Tracker::detect(const cv::Mat& image, const std::vector<cv::Rect2f>& masked
   std::vector<cv::KeyPoint> corners;
   for (int cell = 0; cell < columns * rows; ++cell) {
     const std::int64_t wanted = per_cell - filled[static_cast<std::size_t>(cell)];
-    // Skips half-full cells, because detection costs more than it gains.
+    // Skips cells that are at least half full, because detection costs more time there than it
+    // gains.
     if (2 * wanted <= per_cell) continue;
-    // FAST's circle needs three more pixels on each side.
+    // FAST's circle needs a margin of three pixels on each side.
     const cv::Rect inner(static_cast<int>(cell % columns * cell_w),
                          static_cast<int>(cell / columns * cell_h), static_cast<int>(cell_w),
                          static_cast<int>(cell_h));
@@ -259,7 +262,7 @@ void Tracker::followIntoSecond(const std::vector<cv::Mat>& first,
     if (!seen) continue;
     const Match match{p.normalised, seen->normalised, seen->scale};
     if (epipolarDistance(match, T_10.R(), T_10.p) > options_.stereo_px) continue;
-    // In front of both cameras, the disparity points along the baseline.
+    // If the point is in front of both cameras, its disparity points along the baseline.
     const Eigen::Vector3d turned = T_10.R() * p.normalised.homogeneous();
     const Eigen::Vector3d d = seen->normalised.homogeneous() - turned / turned.z();
     const Eigen::Vector3d along(T_10.p.x() - turned.x() / turned.z() * T_10.p.z(),

@@ -1,5 +1,5 @@
-// Tracks corners: pyramidal Lucas-Kanade from the gyroscope's prediction, then comparison with the
-// first observation. New corners (FAST) fill a grid.
+// Tracks corners by pyramidal Lucas-Kanade from the gyroscope's prediction, and compares them with
+// their first observation. New corners (FAST) fill a grid.
 #pragma once
 
 #include <Eigen/Core>
@@ -32,7 +32,7 @@ struct TrackerOptions {
   double ransac_px = 1.5;
   double stereo_px = 2.0;    ///< largest distance from the calibration's epipolar line
   double similarity = 0.75;  ///< smallest similarity to the first observation of a point
-  double growth = 1.7;       ///< largest growth of a patch; above it, a new point begins
+  double growth = 1.7;       ///< a patch that grows more begins a new point
   std::int64_t memory = 10;  ///< number of frames over which motion can be queried
 };
 
@@ -40,21 +40,23 @@ class Tracker {
  public:
   Tracker(const TrackerOptions& options, const std::vector<CameraModel>& cameras);
 
-  /// Images are CV_8UC1; `second` may be empty. R_now_before: rotation of the body, if known.
-  /// masked: boxes of the first image in which no points are used. turn_of_readout: rotation of the
-  /// body, in its frame, from the first to the last row of the first image. Epipolar lines refer to
-  /// middle rows.
+  /// Tracks the points into the next images (CV_8UC1); `second` may be empty. R_now_before is the
+  /// rotation of the body, if known. No points are used inside the boxes `masked` of the first
+  /// image. turn_of_readout is the body's rotation vector, in B, from the first to the last row of
+  /// that image.
   TrackedFrame track(const cv::Mat& first, const cv::Mat& second,
                      const std::optional<Eigen::Matrix3d>& R_now_before,
                      const std::vector<cv::Rect2f>& masked = {},
                      const Eigen::Vector3d& turn_of_readout = Eigen::Vector3d::Zero());
-  /// Quantile of the points' image motion, px, over the last `frames`. Empty for too few points.
+  /// Returns a quantile of the points' image motion, in px, over the last `frames` frames; nothing
+  /// if there are too few frames, or fewer than ten points.
   std::optional<double> motionSince(std::size_t frames, double quantile = 0.5) const;
-  /// Share of points still within half a pixel for `frames` images; 0 if few or close together.
+  /// Returns the share of points that have moved less than half a pixel for `frames` images; 0 if
+  /// these are fewer than eight or close together.
   double stillShare(std::size_t frames) const;
-  /// Clears all tracks. Ids continue.
+  /// Removes all points. New points do not reuse ids.
   void reset();
-  /// Sets the lowest id for new tracks.
+  /// Sets the least id of new points.
   void continueIdsFrom(std::uint64_t id) { next_id_ = std::max(next_id_, id); }
   std::uint64_t nextId() const { return next_id_; }
   const ReasonCounts& reasons() const { return reasons_; }
@@ -67,12 +69,12 @@ class Tracker {
     Eigen::Vector2d normalised;
     Eigen::Vector2d at_middle;  ///< normalised, rotated to the camera's attitude at the middle row
     std::unique_ptr<Patch> patch;
-    cv::Point2f place = pixel;  ///< the point has moved by less than half a pixel from here
+    cv::Point2f place = pixel;  ///< the point is still within half a pixel of it
     std::size_t still = 0;
   };
   std::vector<cv::Mat> pyramid(const cv::Mat& image, std::int64_t levels) const;
   struct Images {
-    std::vector<cv::Mat> half;    ///< cv::buildOpticalFlowPyramid from half size on
+    std::vector<cv::Mat> half;    ///< cv::buildOpticalFlowPyramid, from half size on
     std::vector<cv::Mat> levels;  ///< the image itself, then each of half the previous size
   };
   void follow(const Images& now, const std::optional<Eigen::Matrix3d>& R);
@@ -82,7 +84,7 @@ class Tracker {
                             const std::optional<Eigen::Matrix3d>& R);
   void detect(const cv::Mat& image, const std::vector<cv::Rect2f>& masked);
   void followIntoSecond(const std::vector<cv::Mat>& first, const std::vector<cv::Mat>& second);
-  /// Returns the second image with the size and scale of the first, if their sizes differ.
+  /// Returns the second image, converted to the size and scale of the first if their sizes differ.
   cv::Mat asFirst(const cv::Mat& second) const;
   TrackedFrame result() const;
 
@@ -92,7 +94,7 @@ class Tracker {
     double scale;
     cv::Point2f shift;
   };
-  /// Table for pixels of the second camera; empty if the images have equal sizes.
+  /// Scale and shift from pixels of the second image to asFirst(); empty if the sizes are equal.
   std::optional<Placed> as_first_;
   std::vector<Point> points_;
   Eigen::Vector3d turn_ = Eigen::Vector3d::Zero();  ///< rotation of camera 0 during read-out, in C

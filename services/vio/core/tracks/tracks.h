@@ -1,4 +1,4 @@
-// Output of the tracker for the filter, and a database of the points seen in each image.
+// Output of the tracker for the filter, and a database of the observations of each point.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,7 +22,7 @@ struct ImagePoint {
   double row = 0.0;  ///< −½ … ½: time since the middle row, as a share of the read-out
 };
 
-/// Undistorts a pixel. Empty if the lens model has no inverse there.
+/// Undistorts a pixel. Returns nothing if the lens model has no inverse there.
 std::optional<ImagePoint> imagePoint(const CameraModel& camera, const Eigen::Vector2d& pixel);
 
 /// One tracked point at one time, in the cameras that see it. The first camera always sees it.
@@ -67,7 +67,7 @@ class FeatureDatabase {
 
  private:
   using Tracks = std::map<std::uint64_t, Track>;
-  Tracks::iterator forget(Tracks::iterator track);  ///< returns the next track
+  Tracks::iterator forget(Tracks::iterator track);  ///< removes a track and returns the next
 
   Tracks tracks_;
   std::vector<Tracks::node_type> spare_;  ///< nodes of removed tracks, whose memory is reused

@@ -13,9 +13,10 @@ namespace {
 
 constexpr int kFailuresToLeave = 3;
 constexpr int kFewestJumped = 8;
-constexpr double kFarOff = 25.0;  ///< mean square of the rows, in variances of a pixel
+constexpr double kFarOff = 25.0;  ///< limit of a row's mean square, in pixel variances
 
-/// Rows of one point in the newest clone; columns [extrinsics, read-outs, clone, point].
+/// Measurement of one point in the newest clone, with the columns [extrinsics, read-outs, clone,
+/// point].
 struct PointRows {
   static constexpr int kRows = 2 * kMaxCameras, kColumns = 7 * kMaxCameras + 9;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kRows, kColumns> H;
@@ -71,13 +72,15 @@ struct Seen {
     const auto of_views = [&] { return state.project(rows.H, rows.measurement().blocks); };
     passes = passesGateWith(rows.r, of_views, probability);
   }
-  /// The views differ by more than the pixels' noise explains, even with an exact prediction.
+  /// Returns true if the point fails the gate, and its residual is so large that pixel noise alone
+  /// cannot explain it.
   bool isFarOff() const {
     return !passes && rows.r.squaredNorm() > kFarOff * static_cast<double>(rows.r.size());
   }
 };
 
-/// Points behind the camera are added to `leaving`.
+/// Returns the state's points that the newest clone sees. Adds the ids of points behind a camera to
+/// `leaving`.
 std::vector<Seen> seenPoints(const State& state, const FeatureDatabase& database,
                              const VisionOptions& options, ReasonCounts& reasons,
                              std::vector<std::uint64_t>& leaving) {
@@ -99,14 +102,16 @@ std::vector<Seen> seenPoints(const State& state, const FeatureDatabase& database
   return seen;
 }
 
-/// True if nearly all points differ by much at once, which a single moving object cannot cause.
+/// Returns true if nearly all points are far off at once, which a single moving object cannot
+/// cause.
 bool haveJumped(const std::vector<Seen>& seen) {
   const auto far =
       std::count_if(seen.begin(), seen.end(), [](const Seen& s) { return s.isFarOff(); });
   return far >= kFewestJumped && 4 * far > 3 * static_cast<std::ptrdiff_t>(seen.size());
 }
 
-/// The first two rows belong to the first camera, which sees every tracked point.
+/// Returns the innovation of a point. Its first two rows belong to the first camera, which sees
+/// every tracked point.
 Innovation innovationOf(const State& state, const PointRows& rows, const ImagePoint& seen,
                         double sigma_px, bool used) {
   const Measurement m = rows.measurement();
@@ -117,8 +122,9 @@ Innovation innovationOf(const State& state, const PointRows& rows, const ImagePo
           used};
 }
 
-/// The rows of a track that depend on the state alone. A point without parallax gets the depth of
-/// the scene, unless the state gives one (tools/docs/maths/vio-visual-update.md).
+/// Returns the rows of a track that depend on the state alone. A point without parallax gets the
+/// scene's depth, and `supposed` becomes true, unless the state determines the depth
+/// (tools/docs/maths/vio-visual-update.md).
 Result<PointSystem> rowsOfTrack(const Track& track, const State& state, const MatrixView& P,
                                 const VisionOptions& options, bool& supposed) {
   const std::vector<Ray> rays = raysOf(track, state, options.sigma_px);
@@ -250,7 +256,8 @@ Result<void> initialisePoint(State& state, const Track& track, const VisionOptio
   const auto of_views = [&] { return state.project(s.H_x, blocks); };
   if (!passesGateWith(s.r, of_views, options.gate_probability)) return fail("slam_gated");
 
-  // δf = R_f⁻¹ (r₁ − H₁ δx − n₁): mean, covariance and cross-covariance of the new point.
+  // Mean, covariance and cross-covariance of the new point follow from δf = R_f⁻¹ (r₁ − H₁ δx −
+  // n₁).
   const Eigen::Matrix3d R_inverse = R_f.inverse();
   const Eigen::MatrixXd J = -R_inverse * H_1;
   Eigen::MatrixXd cross = Eigen::MatrixXd::Zero(3, state.size());

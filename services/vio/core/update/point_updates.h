@@ -1,5 +1,5 @@
-// Updates with points used once (Mourikis & Roumeliotis, ICRA 2007) and with points of the state:
-// delayed initialisation, newest image (Li & Mourikis, RSS 2012).
+// Updates with points used once (Mourikis & Roumeliotis, ICRA 2007), and with points of the state:
+// these are initialised late and updated by the newest image (Li & Mourikis, RSS 2012).
 #pragma once
 
 #include <vector>
@@ -13,11 +13,12 @@ namespace perdure::vio {
 
 struct UpdateCounts {
   int used = 0, gated = 0;
-  int supposed = 0;  ///< number of used points that have the depth of the scene
-  int behind = 0;    ///< not triangulated because the rays do not meet in front of the cameras
+  int supposed = 0;  ///< number of used points with the scene's depth
+  int behind = 0;    ///< points whose rays do not meet in front of the cameras
 };
 
-/// Triangulates and gates each track, counts failures, and updates once. Fails with the update.
+/// Triangulates and gates each track, counts failures in `reasons`, and updates the state once with
+/// all tracks. Fails if State::update() fails.
 Result<UpdateCounts> updateMsckf(State& state, const std::vector<const Track*>& tracks,
                                  const VisionOptions& options, ReasonCounts& reasons);
 
@@ -37,7 +38,9 @@ Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
                                 const VisionOptions& options, bool may_jump, ReasonCounts& reasons,
                                 std::vector<Innovation>* innovations = nullptr);
 
-/// Adds the track's point by all views. Fails as triangulation, the update, or "slam_gated".
+/// Adds the point of the track to the state, using all views. Fails as triangulate() and
+/// State::update() do, or with "slam_few_views", "slam_depth_unknown", "slam_unobserved" or
+/// "slam_gated".
 Result<void> initialisePoint(State& state, const Track& track, const VisionOptions& options);
 
 }  // namespace perdure::vio

@@ -8,11 +8,13 @@
 namespace perdure::vio {
 namespace {
 
-// Gain over a window, in addition to noise, because a body at rest rocks slightly.
+// Allowed change of speed and angle over a window, in addition to noise, because a body at rest
+// rocks slightly.
 constexpr double kSpeedGain = 0.02, kTurnGain = 0.002;  // m/s, rad
-constexpr double kDeviations = 3.8;                     // χ² of three axes at 0.998
+constexpr double kDeviations = 3.8;                     // root of χ² of three axes at 0.998
 constexpr std::chrono::milliseconds kShort{500}, kLong{2000};
-// Shorter than kLong. At a smooth departure, the long window then still contains the acceleration.
+// This must be shorter than kLong, so that at a smooth departure the long window still contains the
+// acceleration.
 constexpr std::chrono::milliseconds kLongestPush{1000};
 constexpr std::chrono::seconds kLongestUnseen{120};
 
@@ -79,7 +81,7 @@ bool Standstill::holds(const ImuBuffer& imu, TimePoint now, const ImuNoise& nois
     forget();
     return false;
   }
-  // The window must not include the motion before this standstill.
+  // The windows must not include the motion before this standstill.
   const auto rests = [&](Duration window) {
     return imuRests(imu, now, std::min(window, now - begun_), reference_.expected,
                     now - reference_.time, noise);

@@ -27,7 +27,8 @@ Vector3d nearestToRays(const std::vector<Ray>& rays, double& condition) {
   return A.ldlt().solve(b);
 }
 
-/// One view in the coordinates (x/z, y/z, 1/z) of the newest camera A.
+/// Pose of one view's camera C relative to A, the camera of the newest view. The point is (x/z,
+/// y/z, 1/z) in A.
 struct Relative {
   Matrix3d R;  ///< R_CA
   Vector3d t;  ///< p_CA
@@ -42,7 +43,7 @@ struct Normal {
   bool in_front = true;
 };
 
-/// Expected inverse depth, and 1 / σ; 0: no prior.
+/// Expected inverse depth and its weight 1 / σ; a weight of 0 means no prior.
 struct Prior {
   double inverse_depth, weight;
 };
@@ -92,7 +93,7 @@ Result<Triangulated> triangulate(const std::vector<Ray>& rays, const VisionOptio
   if (!parallel && !(p_A.z() > 0.5 * options.min_depth_m)) return fail("triangulation_depth");
   Vector3d m(p_A.x() / p_A.z(), p_A.y() / p_A.z(), 1.0 / p_A.z());
   if (parallel) m << rays.back().normalised, *scene;
-  // Only parallel rays need the prior.
+  // The prior is used for parallel rays only.
   const Prior prior{m.z(), parallel ? 1.0 / (options.scene_scatter * *scene) : 0.0};
   Normal n = linearise(views, m, prior);
   double lambda = 1e-4;

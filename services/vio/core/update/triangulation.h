@@ -23,20 +23,22 @@ struct Ray {
 
 struct Triangulated {
   Eigen::Vector3d p_W;
-  Eigen::Matrix3d covariance;  ///< covariance in W, from the pixel noise alone
+  Eigen::Matrix3d covariance;  ///< m², in W, from the pixel noise alone
   double relative_sigma;       ///< σ / depth, from the newest view
   double rms;                  ///< RMS of the weighted residuals
 };
 
-/// Needs two rays. Fails with "triangulation_…": views, parallel, depth (behind a camera, or too
-/// near), far, condition. With the inverse depth of the scene, parallel rays get the nearest depth
-/// to it that they permit, at most the largest.
+/// Triangulates at least two rays, the newest last. Fails with "triangulation_…": views, parallel,
+/// depth (behind a camera, or too near), far, or condition. If `scene`, its inverse depth in 1/m,
+/// is given, parallel rays get the depth nearest to the scene's that they permit, limited to the
+/// largest one.
 Result<Triangulated> triangulate(const std::vector<Ray>& rays, const VisionOptions& options,
                                  std::optional<double> scene = {});
 
 std::vector<Ray> raysOf(const Track& track, const State& state, double sigma_px);
 
-/// Cross-covariance with the pose [θ, p] of a point rigid with T_WB: −R [p_B]× θ + δp + R δp_B.
+/// Returns the cross-covariance with the pose [θ, p] of a point whose position in B is independent
+/// of the pose. Its error is −R [p_B]× θ + δp + R δp_B.
 Eigen::Matrix<double, 3, 6> crossOfRigid(const Eigen::Vector3d& p_W, const RigidTransform& T_WB,
                                          const Matrix6d& pose_covariance);
 

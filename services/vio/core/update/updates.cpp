@@ -48,7 +48,7 @@ RestSample restSample(const std::vector<ImuReading>& readings, const ImuNoise& n
     force2 += (r.accel - s.force).squaredNorm() / 3.0;
   }
   const double dt = toSeconds(readings.back().time - readings.front().time);
-  // Vibration is not white, so the mean counts as that of a quarter of the samples.
+  // Vibration is not white. The mean is therefore as accurate as that of a quarter of the samples.
   const double credit = std::max(1.0, n / 4.0) * (n - 1.0);
   s.rate_sigma = std::sqrt(noise.gyro * noise.gyro / dt + rate2 / credit);
   s.force_sigma = std::sqrt(noise.accel * noise.accel / dt + force2 / credit);

@@ -8,11 +8,12 @@
 
 namespace perdure::vio {
 
-/// Velocity in the body frame and its derivative by [θ, v].
+/// Returns the velocity in the body frame, and its derivative by [θ, v] in `J`.
 Eigen::Vector3d bodyVelocity(const Nav& nav, Eigen::Matrix<double, 3, 6>* J = nullptr);
 
-/// Speed along body x (m/s, σ > 0). With options.planar, lateral and vertical velocity are also
-/// constrained to about zero. Fails with "speed_gated".
+/// Updates with the speed along body x, in m/s; `sigma` must be positive. With options.planar,
+/// lateral and vertical velocity are also constrained to about zero. Fails with "speed_gated", or
+/// as State::update() does.
 Result<void> updateSpeed(State& state, double speed, double sigma, const SpeedOptions& options);
 
 /// Mean inertial readings over an interval at rest, with their standard deviations.
@@ -22,15 +23,17 @@ struct RestSample {
 };
 RestSample restSample(const std::vector<ImuReading>& readings, const ImuNoise& noise);
 
-/// Predicted [rate, force] at rest and its derivative by [θ, b_g, b_a] (6×9).
+/// Returns the predicted [rate, force] at rest, and its derivative by [θ, b_g, b_a] in `J`.
 Eigen::Matrix<double, 6, 1> restPrediction(const Nav& nav, double gravity,
                                            Eigen::Matrix<double, 6, 9>* J = nullptr);
 
-/// Sets velocity and rotation rate to zero, the force to gravity. Fails with "rest_gated".
+/// Constrains velocity and rotation rate to zero, and the force to gravity. If `gated`, fails with
+/// "rest_gated" for contradicting samples.
 Result<void> updateRest(State& state, const RestSample& sample, const RestOptions& options,
                         double gravity, bool gated = true);
 
-/// Constrains the pose of clone `frame` to that of clone `before`, within the options' deviations.
+/// Constrains the pose of clone `frame` to that of clone `before`, with the deviations of
+/// `options`.
 Result<void> updateNoMotion(State& state, std::uint64_t before, std::uint64_t frame,
                             const RestOptions& options);
 

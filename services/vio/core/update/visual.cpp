@@ -13,7 +13,7 @@
 namespace perdure::vio {
 namespace {
 
-/// Quantiles are cached, because they are needed hundreds of times a frame.
+/// Returns the χ² quantile. Quantiles are cached, because a frame needs hundreds of them.
 double gate(int dof, double probability) {
   constexpr int kTable = 128;
   thread_local std::array<double, kTable> table{};
@@ -28,7 +28,7 @@ double gate(int dof, double probability) {
   return entry;
 }
 
-/// Derivatives of a quantity with derivative J_C by p_C, a point in the camera.
+/// Chain rule for a quantity with the derivative J_C by p_C, a point in the camera's frame.
 template <class Row>
 struct Chain {
   Chain(const Row& J_C, const RigidTransform& T_WB, const RigidTransform& T_BC,

@@ -1,4 +1,4 @@
-// Reprojection of a point of W into the clones that saw it: residuals and Jacobians, projection on
+// Reprojection of a point of W into the clones that saw it: residuals, Jacobians, the projection on
 // the left null space of the point (Mourikis & Roumeliotis 2007, eq. 24), and χ² gates.
 #pragma once
 
@@ -19,7 +19,7 @@ struct ProjectionJacobians {
   Eigen::Matrix<double, 2, 3> point;      ///< derivative by p_W
 };
 
-/// Projects p_W to the normalised image. False if p_W is not in front of the camera.
+/// Projects p_W to the normalised image. Returns false if p_W is not in front of the camera.
 bool projectPoint(const RigidTransform& T_WB, const RigidTransform& T_BC,
                   const Eigen::Vector3d& p_W, Eigen::Vector2d& normalised,
                   ProjectionJacobians* J = nullptr);
@@ -32,7 +32,8 @@ struct View {
   Eigen::Vector2d readout = Eigen::Vector2d::Zero();  ///< derivative by the read-out time
 };
 
-/// The residual uses estimate and p_W, the Jacobians `linear` and p_linear. Empty if behind.
+/// Returns the view of a point. The residual uses the estimated pose and p_W; the Jacobians use the
+/// clone's `linear` and p_linear. Returns nothing if the point is not in front of the camera.
 std::optional<View> viewOf(const State& state, const Clone& clone, std::size_t camera,
                            const ImagePoint& seen, const Eigen::Vector3d& p_W,
                            const Eigen::Vector3d& p_linear, double sigma_px);
@@ -44,19 +45,20 @@ struct PointSystem {
   Eigen::VectorXd r;
 };
 
-/// Blocks of all extrinsics, of the estimated read-outs, and of the clones.
+/// Returns the blocks of all extrinsics, of the estimated read-outs, and of the clones.
 std::vector<Block> calibrationAndClones(const State& state);
 
-/// Linearisation point of an estimated point, which moves with the track's newest clone.
+/// Returns the linearisation point of p_W. It has the same position relative to the track's newest
+/// clone, placed by that clone's `linear`.
 Eigen::Vector3d linearisationPoint(const State& state, const Track& track,
                                    const Eigen::Vector3d& p_W);
 
-/// Stacks all views of `track` by clones of the state, with the columns of calibrationAndClones. r
-/// is empty if the point lies behind a camera.
+/// Stacks the views of `track` in clones of the state, with the columns of calibrationAndClones().
+/// r is empty if the point lies behind a camera.
 PointSystem stackViews(const Track& track, const State& state, const Eigen::Vector3d& p_W,
                        double sigma_px);
 
-/// Inverse depth of a point in the first camera at its newest view, ρ; δρ = x δx + f δf.
+/// Inverse depth ρ of a point in the first camera at its newest view, with δρ = x δx + f δf.
 struct InverseDepth {
   double value = 0.0;
   Eigen::RowVectorXd x;
@@ -64,27 +66,29 @@ struct InverseDepth {
 };
 InverseDepth inverseDepth(const Track& track, const State& state, const Eigen::Vector3d& p_W);
 
-/// Standard deviation of ρ by the views and the state, where P is the covariance of
-/// calibrationAndClones. Needs separatePoint before. Not finite if the views give no depth.
+/// Returns the standard deviation of ρ, in 1/m, given the views and the state. P is the covariance
+/// of calibrationAndClones(). Call separatePoint() before. The result is not finite if the views
+/// give no depth.
 double depthSigma(const PointSystem& system, const InverseDepth& depth, const MatrixView& P);
 
-/// Appends the row of the prior: ρ is that of the scene, up to its scatter.
+/// Appends the row of a prior: ρ equals the scene's inverse depth within `options.scene_scatter`.
 void addScene(PointSystem& system, const InverseDepth& depth, const VisionOptions& options);
 
-/// Makes H_f upper triangular: only the first three rows then depend on the point.
+/// Makes H_f upper triangular, so that only the first three rows depend on the point.
 void separatePoint(PointSystem& system);
 
-/// Keeps the rows that depend on the state alone. Needs separatePoint before.
+/// Removes the rows that depend on the point. Call separatePoint() before.
 void dropPoint(PointSystem& system);
 
-/// True if rᵀ S⁻¹ r is below the χ² quantile; S = H P Hᵀ + I.
+/// Returns true if rᵀ S⁻¹ r, with S = H P Hᵀ + I, is below the χ² quantile of `probability`.
 bool passesGate(const VectorView& r, const MatrixView& S, double probability);
 
-/// Gate with S = P + I. P is evaluated only if rᵀ r, an upper bound, reaches the quantile.
+/// Does the same with S = P() + I. P is called only if rᵀ r, an upper bound of rᵀ S⁻¹ r, reaches
+/// the quantile.
 bool passesGateWith(const VectorView& r, const std::function<Eigen::MatrixXd()>& P,
                     double probability);
 
-/// Reduces the system by QR to at most as many rows as columns, without loss.
+/// Reduces the system by QR to at most as many rows as columns, without loss of information.
 void compress(Eigen::MatrixXd& H, Eigen::VectorXd& r);
 
 }  // namespace perdure::vio

@@ -13,7 +13,7 @@ struct ChairMaterials {
   int frame, seat;
 };
 
-/// The front of the chair is +x. Dimensions in metres, for a chair of 0.5 × 0.5 × 0.9.
+/// The chair's front is +x. Dimensions in metres, for a chair of 0.5 × 0.5 × 0.9 m.
 void addSeatAndLegs(MeshBuilder& b, const ChairMaterials& m, bool round, Dice& dice) {
   const float splay = dice.uniform(0.0F, 0.04F), thick = dice.uniform(0.015F, 0.024F);
   b.box({-0.21F, -0.22F, 0.43F}, {0.23F, 0.22F, 0.475F}, m.seat);

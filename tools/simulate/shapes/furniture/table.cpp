@@ -52,7 +52,7 @@ void addTrestle(MeshBuilder& b, const Vec3& s, int top, int legs, Dice& dice) {
   }
 }
 
-/// Adds a plate, a bowl or a jug on the table. It counts for the height.
+/// Adds up to three items such as plates on the table; they count for its height.
 void addThings(MeshBuilder& b, const Vec3& s, Dice& dice) {
   const int count = dice.below(4);
   for (int i = 0; i < count; ++i) {

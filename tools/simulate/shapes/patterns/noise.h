@@ -1,4 +1,4 @@
-// Noise that tiles: value noise on a lattice with period `frequency`, and its octaves.
+// Noise with period 1: value noise on a lattice of fx × fy cells, and sums of its octaves.
 #pragma once
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 
 namespace perdure::tools::shapes {
 
-/// Returns a number in [0, 1) that is constant for a cell and a seed.
+/// Returns a number in [0, 1) that depends on cell and seed only.
 inline float cellNoise(int x, int y, std::uint32_t seed) {
   std::uint32_t h = static_cast<std::uint32_t>(x) * 0x8DA6B343U ^
                     static_cast<std::uint32_t>(y) * 0xD8163841U ^ seed * 0xCB1AB31FU;
@@ -22,7 +22,7 @@ inline int wrapCell(int i, int period) {
   return m < 0 ? m + period : m;
 }
 
-/// In [0, 1), smooth in u and v, with period 1 in both; fx, fy > 0 cells.
+/// Value noise in [0, 1), smooth in u and v with period 1; fx, fy > 0 are numbers of cells.
 inline float valueNoise(float u, float v, int fx, int fy, std::uint32_t seed) {
   const float x = u * static_cast<float>(fx), y = v * static_cast<float>(fy);
   const int ix = static_cast<int>(std::floor(x)), iy = static_cast<int>(std::floor(y));
@@ -36,7 +36,8 @@ inline float valueNoise(float u, float v, int fx, int fy, std::uint32_t seed) {
   return low + (c + (d - c) * sx - low) * sy;
 }
 
-/// Sum of octaves, each with half the amplitude and twice the frequency; in [0, 1), mean 0.5.
+/// Normalised sum of octaves, each with half the amplitude and twice the frequency; [0, 1), mean
+/// 0.5.
 inline float octaves(float u, float v, int fx, int fy, int count, std::uint32_t seed) {
   float sum = 0.0F, weight = 1.0F, total = 0.0F;
   for (int i = 0; i < count; ++i) {
@@ -47,7 +48,7 @@ inline float octaves(float u, float v, int fx, int fy, int count, std::uint32_t 
   return sum / total;
 }
 
-/// Distance to the nearest grid line, in cells, of a coordinate in cells.
+/// Distance in cells to the nearest grid line, for a coordinate in cells.
 inline float toLine(float cells) {
   const float part = cells - std::floor(cells);
   return std::min(part, 1.0F - part);

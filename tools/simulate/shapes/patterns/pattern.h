@@ -1,4 +1,4 @@
-// The content of textures as functions of (u, v) in [0, 1)², with period 1: linear RGB.
+// Patterns of textures: linear RGB as a function of (u, v) in [0, 1)², with period 1.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,13 +15,13 @@ using Pattern = std::function<Colour(float u, float v)>;
 inline Colour mix(const Colour& a, const Colour& b, float share) {
   return a + std::clamp(share, 0.0F, 1.0F) * (b - a);
 }
-/// 0 below `from`, 1 above `to`, smooth between them.
+/// Returns 0 below `from`, 1 above `to`, and a smooth value in between.
 inline float smoothStep(float from, float to, float x) {
   const float s = std::clamp((x - from) / (to - from), 0.0F, 1.0F);
   return s * s * (3.0F - 2.0F * s);
 }
 
-// Grounds, roads, floors and wood.
+// Patterns of grounds, roads, floors and wood.
 Pattern asphaltPattern(Dice& dice);
 Pattern pavingPattern(Dice& dice);
 Pattern grassPattern(Dice& dice);
@@ -31,7 +31,7 @@ Pattern markingsPattern(Dice& dice);
 Pattern woodPattern(Dice& dice);
 Pattern timberPattern(Dice& dice);
 
-// Walls, plants, cloth, metal and screens.
+// Patterns of walls, plants, cloth, metal and screens.
 Pattern brickPattern(Dice& dice);
 Pattern plasterPattern(Dice& dice);
 Pattern windowsPattern(Dice& dice);

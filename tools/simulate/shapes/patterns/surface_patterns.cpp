@@ -181,7 +181,7 @@ Pattern booksPattern(Dice& dice) {
   return patchwork(grey(0.02F), std::move(patches));
 }
 
-/// Strokes similar to letters, on a board about ten times as wide as high.
+/// Strokes that resemble letters, on a sign about ten times as wide as high.
 Pattern signPattern(Dice& dice) {
   std::vector<Patch> patches;
   const bool light = dice.chance(0.5F);

@@ -20,7 +20,7 @@ int wallSkin(MeshBuilder& b, const Order& order, Dice& dice) {
                     2.2F);
 }
 
-/// Adds pictures on both broad sides of a wall, if its height is that of a room.
+/// Adds pictures on both broad sides of a wall if it is as high as a room.
 void addPictures(MeshBuilder& b, const Order& order, const Vec3& s, float depth, Dice& dice) {
   const bool along_x = s.x() > s.y();
   const float length = along_x ? s.x() : s.y();
@@ -62,7 +62,7 @@ Mesh makeWall(const Order& order) {
   const float in = std::min(0.03F, 0.2F * std::min(s.x(), s.y()));
   b.box({-half.x() + in, -half.y() + in, -half.z()},
         {half.x() - in, half.y() - in, half.z() - 0.02F}, skin);
-  if (s.z() > 2.1F) {  // wall of a room: skirting and pictures
+  if (s.z() > 2.1F) {  // wall of a room: add skirting and pictures
     b.box({-half.x() + 0.5F * in, -half.y() + 0.5F * in, -half.z()},
           {half.x() - 0.5F * in, half.y() - 0.5F * in, -half.z() + 0.1F}, trim);
     addPictures(b, order, s, in, dice);

@@ -19,7 +19,7 @@ struct Look {
   bool ledges, bars, bands, shutters, shop;
 };
 
-/// One side of the house: u to the right seen from outside, z up, out away from it.
+/// One side of the house: u points right (seen from outside), z up, out away from the house.
 class Side {
  public:
   Side(MeshBuilder& b, const Look& look, const Vec3& origin, const Vec3& right, float width,

@@ -10,7 +10,8 @@ namespace {
 
 using namespace shapes;
 
-// Layers are a few millimetres apart, so that a ray hits exactly one; the road is at z = 0.
+// Layers are a few millimetres apart, so that the upper one hides the lower ones; the road is at z
+// = 0.
 constexpr float kGrassZ = -0.01F, kPavementZ = -0.005F, kRoadZ = 0.0F, kPatchZ = 0.002F,
                 kSpotZ = 0.004F, kMarkingZ = 0.006F;
 constexpr float kPavement = 3.4F;  // width beside the road, metres

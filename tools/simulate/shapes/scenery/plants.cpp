@@ -25,7 +25,7 @@ std::array<int, 2> leafMaterials(MeshBuilder& b, const Order& order, Dice& dice)
   return leaves;
 }
 
-/// An irregular ball: the dark, opaque inside of a cluster.
+/// Adds an irregular ball, which is the dark, opaque inside of a cluster.
 void addLump(MeshBuilder& b, const Vec3& centre, const Vec3& radii, int material, Dice& dice) {
   constexpr int kSides = 7;
   std::vector<Ring> rings;
@@ -38,7 +38,7 @@ void addLump(MeshBuilder& b, const Vec3& centre, const Vec3& radii, int material
   b.loft(rings, material, 80.0F);
 }
 
-/// Leaves at the surface of a cluster: small sheets with random rotations.
+/// Adds leaves at the surface of a cluster: small sheets in random orientations.
 void addSheets(MeshBuilder& b, const Vec3& centre, const Vec3& radii, int count, float size,
                const std::array<int, 2>& leaves, Dice& dice) {
   for (int i = 0; i < count; ++i) {

@@ -48,7 +48,7 @@ void addBollard(MeshBuilder& b, const Vec3& s, int metal, Dice& dice) {
   }
 }
 
-/// A post with a lantern that is not wider than its foot.
+/// Adds a post with a lantern that is not wider than its foot.
 void addPost(MeshBuilder& b, const Vec3& s, int metal, int light, Dice& dice) {
   const float r = 0.5F * std::min(s.x(), s.y());
   const auto up = [](float z) { return Vec3(0.0F, 0.0F, z); };

@@ -14,7 +14,7 @@ struct Bicycle {
   int frame, rubber, metal, spokes, saddle;
 };
 
-/// Spokes are thin two-sided strips in the plane of the wheel.
+/// Adds a wheel; its spokes are thin two-sided strips in the wheel's plane.
 void addWheel(MeshBuilder& b, const Bicycle& m, float x) {
   const Vec3 hub(x, 0.0F, kWheel);
   b.torus(hub, Vec3::UnitY(), kWheel - 0.02F, 0.02F, 22, 5, m.rubber);

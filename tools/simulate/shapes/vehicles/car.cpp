@@ -67,7 +67,7 @@ BodyProfile suv() {
   return p;
 }
 
-/// Varies cars of one kind: shifts the cabin, and raises or lowers the roof and the belt line.
+/// Varies cars of one kind: shifts the cabin, and raises or lowers roof and belt line.
 void vary(BodyProfile& p, Dice& dice) {
   const float bonnet = dice.uniform(-0.03F, 0.03F), belt = dice.uniform(-0.02F, 0.02F);
   for (Vec2& v : p.top) {

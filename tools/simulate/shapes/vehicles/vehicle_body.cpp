@@ -48,7 +48,7 @@ class Body {
     }
     std::erase_if(xs, [](float x) { return x < 0.0F || x > 1.0F; });
     std::ranges::sort(xs);
-    // Merges stations closer than a few millimetres; seams are wider.
+    // Merges stations that are closer than a few millimetres; seams are wider.
     xs.erase(std::unique(xs.begin(), xs.end(), [](float a, float c) { return c - a < 1.2e-3F; }),
              xs.end());
     return xs;
@@ -138,7 +138,7 @@ class Body {
     return m_.paint;
   }
 
-  /// The flat end, in strips between both flanks and three columns.
+  /// Adds a flat end, in strips between both flanks and in three columns.
   void end(const Ring& ring, bool front) {
     constexpr std::array<float, 4> kColumns{0.0F, 0.2F, 0.8F, 1.0F};
     const auto at = [&](std::size_t i, std::size_t column) {

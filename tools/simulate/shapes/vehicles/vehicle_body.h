@@ -13,7 +13,7 @@ struct Span {
   bool holds(float x) const { return x > from && x < to; }
 };
 
-/// x is the share of the length from the front; z is the share of the height.
+/// Side view of a body: x is the share of the length from the front, z the share of the height.
 struct BodyProfile {
   std::vector<Vec2> top;   ///< outline seen from the side, x increasing, from 0 to 1
   std::vector<Vec2> belt;  ///< lower edge of the windows
@@ -32,11 +32,12 @@ struct BodyMaterials {
   int paint, trim, glass, headlight, taillight, plate, dark;
 };
 
-/// Adds the body from x = +length/2 (front) to −length/2, with wheels on z = 0. `size`: metres.
+/// Adds the body from x = +length/2 (front) to −length/2, with the wheels on z = 0. `size` in
+/// metres.
 void addBody(MeshBuilder& builder, const BodyProfile& profile, const Vec3& size,
              const BodyMaterials& materials);
 
-/// Interpolated value at x of the line through the points; constant outside.
+/// Value at x of the polyline through the points; constant outside.
 float lineAt(const std::vector<Vec2>& points, float x);
 
 }  // namespace perdure::tools::shapes

@@ -8,7 +8,7 @@
 namespace perdure::tools::shapes {
 namespace {
 
-constexpr float kBodyShare = 0.955F;  // share of the width; the mirrors take the rest
+constexpr float kBodyShare = 0.955F;  // share of the width without the mirrors
 
 void addMirrors(MeshBuilder& b, const BodyProfile& p, const Vec3& size, float full_width,
                 int material) {
@@ -66,7 +66,7 @@ void addSpokes(MeshBuilder& b, const Vec3& hub, float reach, float half_width, i
   }
 }
 
-/// The axle points to +y (outside), before the builder's transform.
+/// Adds a wheel whose axle points to +y (outside), before the builder's transform.
 void addWheel(MeshBuilder& b, const Vec3& centre, float radius, float width,
               const WheelLook& look) {
   const float rim = look.rim_share;

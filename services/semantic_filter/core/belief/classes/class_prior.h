@@ -1,4 +1,4 @@
-// What is known of a class before any image: size, frequency, detection probability and motion. It
+// Prior of a class before any image: size, frequency, detection probability and motion. It
 // implements the paper's class-dependent shape prior (section "Filter Organization"). Derivation:
 // tools/docs/maths/state_and_mixture.md.
 #pragma once
@@ -21,9 +21,9 @@ struct ClassPrior {
   double speed_sigma = 0.0;  ///< of moving objects, along their length, m/s
   double stands = 0.0;       ///< probability that an object stands on the ground, [0, 1)
   bool has_yaw = true;       ///< false: the object is so round that a box does not show its yaw
-  /// rad; least deviation of an azimuth until a smaller one is learned
+  /// rad; least standard deviation of an azimuth, until a smaller one is learned
   double azimuth_sigma = 0.35;
-  Shape shape = cuboidShape();  ///< what the object fills of its cuboid
+  Shape shape = cuboidShape();  ///< the part of the cuboid that the object fills
 };
 
 /// Priors by class name, with a fallback for names that are not listed.
@@ -32,7 +32,7 @@ struct ClassPriors {
   ClassPrior fallback;  ///< broad; its name is empty
   ClassPrior other;     ///< of an object of no known class; its name is kOtherClass
 
-  /// Returns the fallback where no class has this name.
+  /// Returns `other` for kOtherClass, and the fallback for names that are not listed.
   const ClassPrior& of(const std::string& name) const {
     for (const auto& c : classes) {
       if (c.name == name) return c;

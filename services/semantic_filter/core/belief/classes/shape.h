@@ -1,4 +1,4 @@
-// What an object fills of its cuboid: level outlines with cut corners. A car stands on wheels, and
+// Shape of an object in its cuboid: level outlines with cut corners. A car stands on wheels, and
 // its corners and its roof are round. Derivation: tools/docs/maths/cuboid_projection.md.
 #pragma once
 
@@ -12,22 +12,23 @@ namespace perdure::semantic_filter {
 struct ShapeLevel {
   double height = 0.0;               ///< -1 (the ground) to 1 (the top)
   double along = 1.0, across = 1.0;  ///< in halves of length and width, (0, 1]
-  double corner = 1.0;               ///< where the cut begins, in halves of each side; 1: no cut
-  /// offset of its middle before the cuboid's middle, in halves of the length
+  double corner = 1.0;               ///< start of the cut, in halves of each side; 1: no cut
+  /// forward offset of its middle from the cuboid's middle, in halves of the length
   double forward = 0.0;
 };
 
-/// The corners of a convex solid. The image of the object is the hull of their images.
+/// The corners of a convex solid. The image of the object is the convex hull of their images.
 struct Shape {
   static constexpr int kMostLevels = 3, kMostCorners = 8 * kMostLevels;
   using PerCorner = Eigen::Array<double, Eigen::Dynamic, 1, 0, kMostCorners, 1>;
 
   PerCorner along, across, up;  ///< from the middle, in halves of length, width and height, -1 to 1
-  PerCorner forward;            ///< is added to `along` if the object surely faces along its yaw
+  PerCorner forward;            ///< added to `along`, times the heading
   bool is_cuboid = false;
 
   int corners() const { return static_cast<int>(along.size()); }
-  /// `heading`: 1 if it faces along its yaw, -1 if it faces the other way, 0 if unknown.
+  /// Returns corner i. `heading`: 1 if the object faces along its yaw, -1 if it faces the other
+  /// way, 0 if unknown.
   Eigen::Vector3d corner(int i, double heading) const {
     return {along[i] + heading * forward[i], across[i], up[i]};
   }
@@ -36,9 +37,9 @@ struct Shape {
 /// Returns the expected heading, -1 to 1, from the log-odds that the yaw is not turned by 180°.
 inline double headingOf(double log_odds) { return std::tanh(0.5 * log_odds); }
 
-/// Bit i of a corner's number is set on the positive side of axis i.
+/// Returns the whole cuboid. Bit i of a corner's number is set on the positive side of axis i.
 const Shape& cuboidShape();
-/// Takes at most Shape::kMostLevels levels.
+/// Returns the shape with these levels, at most Shape::kMostLevels.
 Shape shapeOf(const std::vector<ShapeLevel>& levels);
 
 }  // namespace perdure::semantic_filter

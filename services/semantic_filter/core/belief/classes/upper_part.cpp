@@ -8,13 +8,13 @@
 namespace perdure::semantic_filter {
 namespace {
 
-constexpr int kLength = 0, kWidth = 1, kHeight = 2;  // of log(l, w, h)
+constexpr int kLength = 0, kWidth = 1, kHeight = 2;  // indices of log(l, w, h)
 
 struct LogExtent {
   double mean, variance;
 };
 
-/// Returns the log length or height of an object of this width.
+/// Returns the usual log length (`which` = kLength) or log height of an object of this width.
 LogExtent usual(int which, const Hypothesis& h, const ClassPrior& prior) {
   const Eigen::Matrix3d& P = prior.log_size_covariance;
   const double gain = P(which, kWidth) / P(kWidth, kWidth);
@@ -23,9 +23,9 @@ LogExtent usual(int which, const Hypothesis& h, const ClassPrior& prior) {
           std::max(P(which, which) - gain * P(which, kWidth), 1e-6)};
 }
 
-/// Returns the moments of a Gaussian above `least`.
+/// Returns the moments of a Gaussian that is truncated to values above `least`.
 LogExtent above(const LogExtent& usual, double least) {
-  constexpr double kFarAbove = 5.0;  // deviations; there the density is that of an exponential
+  constexpr double kFarAbove = 5.0;  // deviations; the density is then nearly exponential
   const double sigma = std::sqrt(usual.variance);
   const double a = std::min((least - usual.mean) / sigma, kFarAbove);
   const double density = std::exp(-0.5 * a * a) / std::sqrt(2.0 * M_PI);

@@ -1,6 +1,7 @@
-// Upper part: what is seen of an object whose lower part something off the map hides, as a table a
-// chair. Such a hypothesis has the object's class and the part's cuboid, so that it pays for the
-// hiding thing once. Beyond the paper. Derivation: tools/docs/maths/upper_part.md.
+// Upper part: the visible part of an object whose lower part an unmapped object hides, as a table
+// hides a chair. Such a hypothesis has the object's class and the part's cuboid, so the hidden part
+// does not lower its likelihood again and again. Not in the paper. Derivation:
+// tools/docs/maths/upper_part.md.
 #pragma once
 
 #include "services/semantic_filter/core/belief/classes/class_prior.h"
@@ -14,15 +15,16 @@ struct SizePrior {
   Eigen::Matrix3d covariance;
 };
 
-/// Returns the prior of the cuboid of an object, or of its upper part: any share of the length and
-/// of the height up to a half, and the width of the object.
+/// Returns the size prior of an object or, if `upper_part`, of its upper part. The part has the
+/// width of the object, any share of its length, and any share of its height up to a half.
 SizePrior sizePriorOf(const ClassPrior& prior, bool upper_part);
 
-/// Whether it has less than half of the usual height, as only the cuboid of an upper part has.
+/// Whether the cuboid has less than half of the height that is usual for its width. Only the cuboid
+/// of an upper part has.
 bool lessThanHalf(const Hypothesis& h, const ClassPrior& prior);
 
-/// Returns the belief of the whole object: the top stays; height and length follow from the class,
-/// given what is seen. Objects are upright along z of W, which is level to some degrees.
+/// Returns the belief of the whole object. The top stays; height and length follow from the class,
+/// given the visible part. Objects are upright along z of W, which is level to some degrees.
 Hypothesis wholeOf(const Hypothesis& h, const ClassPrior& prior);
 
 }  // namespace perdure::semantic_filter
