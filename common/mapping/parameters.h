@@ -53,7 +53,7 @@ struct LoopParameters {
   /// A match farther from the expected position needs `nats`, because that position was not known
   /// well (χ² with 4 degrees of freedom, .99).
   double far_chi2 = 13.3;
-  double far_m = 2.5;      ///< above this deviation four objects are required
+  double far_m = 2.5;  ///< above this deviation four objects are required
   /// A tie needs least_tracked objects observed again under their old ids. The standard deviation
   /// of its position must be at most tracked_gain times that by the graph.
   std::uint64_t least_tracked = 2;

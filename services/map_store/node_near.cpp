@@ -28,8 +28,8 @@ std::uint64_t digestOf(const std::vector<ObjectBelief>& beliefs) {
 /// Compares the messages without stamp, revision and next id.
 bool sameContent(const MapNear& a, const MapNear& b) {
   return a.client == b.client && a.world == b.world && a.kept == b.kept &&
-         a.corrects_drift == b.corrects_drift && a.more == b.more &&
-         a.members == b.members && digestOf(a.placed) == digestOf(b.placed) &&
+         a.corrects_drift == b.corrects_drift && a.more == b.more && a.members == b.members &&
+         digestOf(a.placed) == digestOf(b.placed) &&
          digestOf(a.as_published) == digestOf(b.as_published);
 }
 
@@ -56,7 +56,8 @@ void Node::sendNear() {
 void Node::publish(MapNear near) {
   const mapping::Identity& identity = mapper_.identity();
   const auto addMember = [&](TrackId track) {
-    if (identity.objectOf(track) != track) near.members.push_back({track, identity.objectOf(track)});
+    if (identity.objectOf(track) != track)
+      near.members.push_back({track, identity.objectOf(track)});
   };
   if (newest_ && newest_->instance == near.client) {
     for (const ObjectBelief& belief : newest_->objects) addMember(belief.id);
@@ -90,9 +91,8 @@ MapNear Node::nearNow() {
   for (auto* list : {&near.placed, &near.as_published}) {
     if (list->size() <= most) continue;
     near.more = true;
-    std::stable_sort(list->begin(), list->end(), [&](const auto& a, const auto& b) {
-      return distance_m(a) < distance_m(b);
-    });
+    std::stable_sort(list->begin(), list->end(),
+                     [&](const auto& a, const auto& b) { return distance_m(a) < distance_m(b); });
     list->resize(most);
   }
   return near;
@@ -144,7 +144,8 @@ void Node::putNearAsStored(MapNear& near) {
   if (found->malformed > 0) reasons_.add("belief_malformed", found->malformed);
   near.more = found->truncated;
   for (ObjectBelief& belief : found->beliefs) {
-    if (present.contains(belief.id) || removed_.contains(belief.id) || belief.moving > 0.5) continue;
+    if (present.contains(belief.id) || removed_.contains(belief.id) || belief.moving > 0.5)
+      continue;
     if (belief.last_seen >= client_since_) {
       near.as_published.push_back(std::move(belief));
       continue;

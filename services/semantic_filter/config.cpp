@@ -112,8 +112,9 @@ void describeExpertLikelihood(Parameters& p, Fields& fields) {
                 {"weight of the class's detection probability, in observations"});
   fields.number("visibility.minimum", p.visibility.minimum, between(0, 1),
                 {"a smaller visible fraction is no evidence"});
-  fields.number("visibility.unmapped_occluder", p.visibility.unmapped_occluder, between(0, 0.99),
-                {"that something off the map hides an object, far from the directions of detections"});
+  fields.number(
+      "visibility.unmapped_occluder", p.visibility.unmapped_occluder, between(0, 0.99),
+      {"that something off the map hides an object, far from the directions of detections"});
   fields.number("visibility.hard_to_detect", p.visibility.hard_to_detect, between(0, 0.9),
                 {"that a new view is one from which detections are rare"});
   fields.number("visibility.solid", p.visibility.solid, between(0, 1),

@@ -14,8 +14,8 @@
 #include "services/vio/cameras.h"
 #include "services/vio/config.h"
 #include "services/vio/core/known_poses/point_mapper.h"
-#include "services/vio/moving_mask.h"
 #include "services/vio/doubts.h"
+#include "services/vio/moving_mask.h"
 #include "services/vio/waiting_frames.h"
 
 namespace perdure::vio {

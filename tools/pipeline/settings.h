@@ -18,9 +18,9 @@ namespace perdure::tools {
 
 struct PipelineOptions {
   std::string data, sequence, rig, out;
-  std::string map;            ///< a stored map to start from; empty: start with an empty map
-  std::string odometry;       ///< vio, truth, drifting, recorded, or a pose file
-  std::string odometry_of;    ///< frame of a pose file: "body", "camera"; empty: body, checked
+  std::string map;          ///< a stored map to start from; empty: start with an empty map
+  std::string odometry;     ///< vio, truth, drifting, recorded, or a pose file
+  std::string odometry_of;  ///< frame of a pose file: "body", "camera"; empty: body, checked
   std::string odometry_walk;  ///< drift of a pose file, "m/√m,rad/√m"; empty: the map store's keys
   std::string detections;     ///< "model", "simulated", "recorded", "none", or a CSV file
   std::string model, class_name;

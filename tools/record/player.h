@@ -14,9 +14,9 @@
 namespace perdure::tools {
 
 struct PlayOptions {
-  std::vector<std::string> topics;  ///< empty: all except health and map queries and answers
-  std::string for_service;          ///< service whose inputs replace `topics`
-  double rate = 1.0;                ///< seconds of the recording per second
+  std::vector<std::string> topics;      ///< empty: all except health and map queries and answers
+  std::string for_service;              ///< service whose inputs replace `topics`
+  double rate = 1.0;                    ///< seconds of the recording per second
   double start_s = 0.0, seconds = 0.0;  ///< start and duration; 0: to the end
   double wait_s = 2.0;                  ///< longest wait for a reader of each topic
   bool loop = false, force = false;
