@@ -29,7 +29,7 @@ class Demo {
   /// If --keep is given, keeps all services running after the drive until interrupted; then ends
   /// them.
   void keep();
-  /// Doubts about the run, which the end of the last line shows.
+  /// Warnings about the run, to be appended to the last line of the output.
   const std::string& endOfLine() const { return end_of_line_; }
 
  private:

@@ -47,7 +47,7 @@ void copyTruth(const fs::path& from, const fs::path& to, const std::string& sequ
   }
 }
 
-/// The frames of the data that this run used, by the numbers that the CSV files have.
+/// The frames of the data that this run used, numbered as in the CSV files.
 std::set<std::uint64_t> usedFrames(const Pipeline& pipeline) {
   if (const auto& recorded = pipeline.recordedFrames()) return *recorded;
   std::set<std::uint64_t> used;

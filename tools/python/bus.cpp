@@ -27,7 +27,7 @@ bus::Options applied(const BusSettings& settings, bus::Options options) {
   return bus::withEnvironment(options);
 }
 
-/// Throws StartupError if the open domain has other options than the requested one.
+/// Throws StartupError if the open domain has other options than those requested.
 void requireSame(const bus::Options& open, const bus::Options& wanted) {
   if (wanted.interface != open.interface || wanted.peers != open.peers) {
     throw StartupError(ExitCode::kUsage,

@@ -9,7 +9,7 @@
 
 namespace perdure::tools {
 
-/// A row of the places' file: the position of an object as measured by sensors on one visit.
+/// A row of the file of places: the position of an object, measured on one visit.
 struct PlaceVisit {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< in the frame of the true poses
   std::vector<std::uint64_t> frames;
