@@ -37,7 +37,7 @@ Result<SavedGraph> readGraph(const Connection& connection);
 /// returns their number. Does not write records of unconfirmed objects.
 std::uint64_t writeGraph(const Connection& connection, const mapping::Unsaved& unsaved);
 
-/// Reads the pairs of tracks of the same object. Returns an empty set for maps with an older schema.
+/// Reads the pairs of tracks of the same object. Empty for maps with an older schema.
 Result<std::set<mapping::SameObject>> readFacts(const Connection& connection);
 void writeFacts(const Connection& connection, const mapping::Unsaved& unsaved);
 
