@@ -386,7 +386,8 @@ TEST(Node, ABoxOfAPartialViewIsNotThatOfARemovedObjectBesideIt) {
     if (o.id == 1) continue;
     EXPECT_EQ(o.id, 2u);
     EXPECT_EQ(o.life.hits, 4u);
-    EXPECT_LT(o.existence, 0.85);  // something off the map may hide it, too
+    // Something off the map may hide it too: it is restored without directions of detections.
+    EXPECT_LT(o.existence, 0.9);
   }
 }
 
