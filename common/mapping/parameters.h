@@ -50,8 +50,8 @@ struct LoopParameters {
   double nats = 8.0;       ///< least score above the second best pose, plus log(PlaceMatch::cells)
   double near_m = 1.6;     ///< deviation of the body's position below which near_nats applies
   double near_nats = 2.5;  ///< replaces nats below near_m
-  /// A match farther from the expected position needs `nats`, because that position was not known
-  /// well (χ² with 4 degrees of freedom, .99).
+  /// A match farther from the expected position needs `nats` and two pairs, because that position
+  /// was not known well (χ² with 4 degrees of freedom, .99).
   double far_chi2 = 13.3;
   double far_m = 2.5;  ///< above this deviation four objects are required
   /// A tie needs least_tracked objects observed again under their old ids. The standard deviation

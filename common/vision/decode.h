@@ -22,8 +22,8 @@ Result<cv::Mat> decodeImage(std::string_view bytes, std::optional<ImageEncoding>
 /// is smaller by that factor, which decodes large JPEGs faster.
 Result<cv::Mat> decodeImageFile(const std::string& path, std::optional<ImageEncoding> encoding,
                                 int bits = 16, int reduce = 1);
-/// A depth image (16 bits, one channel) without conversion, CV_16UC1. Reasons as above, and
-/// image_depth for another kind of image.
+/// Decodes a depth image (16 bits, one channel) without conversion, CV_16UC1. Fails with
+/// image_missing, image_corrupt, or image_depth for another kind of image.
 Result<cv::Mat> decodeDepthFile(const std::string& path);
 /// Number of used bits of a 16-bit image: the smallest of 8, 10, 12, 14, 16 that holds its
 /// brightest value. Returns 16 for other images and for invalid files.

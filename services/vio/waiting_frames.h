@@ -26,7 +26,8 @@ class WaitingFrames {
   /// dropped frames that were farther ahead than transports reorder.
   Result<void> addFirst(const Frame& frame);
   /// Adds a frame of the second camera. Fails with "stereo_unpaired" if it dropped the oldest
-  /// unpaired frame, and with "frame_late" if the partner of `frame` was already taken.
+  /// unpaired frame, and with "frame_late" if `frame` is not later than the last frame that was
+  /// taken.
   Result<void> addSecond(const Frame& frame);
   /// Reports an unusable frame of the second camera; `why` is a sentence.
   void refuseSecond(std::string why) { trouble_ = std::move(why); }

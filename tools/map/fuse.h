@@ -48,7 +48,7 @@ struct FuseOutcome {
 FuseOutcome fuseFiles(const FuseRequest& request);
 
 /// Fuses the newest map of each vehicle on the server with the files of the request. Stores the
-/// result on the server as `name`, where it replaces an older one, and in the file request.out
+/// result on the server as `name`, replacing an older one, and in the file request.out
 /// unless that is empty. Leaves out incomplete maps. Throws StartupError with the fix.
 FuseOutcome fuseFleet(FuseRequest request, const std::string& url, const std::string& name);
 

@@ -22,7 +22,7 @@ class DriftScale {
   DriftScale(const DriftScaleParameters& parameters, const std::vector<Anchor>& way);
 
   /// Uses loops between anchors of the way jointly, because loops with common increments have
-  /// common errors. Of the loops that end in one stretch of `apart_m`, uses the most accurate one,
+  /// common errors. Uses the most accurate of the loops that end in one stretch of `apart_m`,
   /// and of all stretches the newest twelve. Leaves out loops that the others contradict, and other
   /// edges. Returns whether any loop was used.
   bool use(const std::vector<Edge>& loops, double apart_m);

@@ -28,10 +28,11 @@ class FrameBook {
   std::deque<Entry> frames_;
 };
 
-/// Returns the activations of one box: log-likelihoods of clutter and of `classes` classes.
+/// Returns the activations of one box: clutter, then `classes` classes.
 /// `named`: class and score, 0 < score ≤ 1. If the scores sum to less than 1, a soft-max of the
 /// result gives the same scores; `other_share` of the remaining probability goes to classes without
-/// a score, and the rest to clutter. Otherwise the scores are independent.
+/// a score, and the rest to clutter. Otherwise the scores are independent: the result has the
+/// log-odds of each class, 0 for clutter, and `other_share` is not used.
 std::vector<float> activationsOf(const std::vector<std::pair<std::size_t, double>>& named,
                                  std::size_t classes, double other_share);
 

@@ -17,8 +17,9 @@ struct RangeHint {
   double distance_m = 0.0, sigma_m = 0.0;
 };
 
-/// Returns the weighted centroid, along the ray, of the landmarks inside the box. Weights fall
-/// exponentially from its centre. Returns nothing with fewer than `parameters.min_landmarks`.
+/// Returns the range from the weighted mean of the inverse distances of landmarks inside the box.
+/// Weights fall exponentially from its centre and with the relative variance of a landmark. Returns
+/// nothing with fewer than `parameters.min_landmarks`.
 std::optional<RangeHint> rangeFromLandmarks(const BoxDetection& detection,
                                             const std::vector<LandmarkDepth>& points,
                                             const InitiationParameters& parameters);

@@ -16,9 +16,10 @@ bool established(const Track& track, const FrameContext& frame);
 /// too uncertain.
 void withdrawLostMovers(std::vector<Track>& tracks, const FrameInput& frame,
                         const Parameters& parameters);
-/// Confirms visible tracks that surely exist at a known position, and withdraws the confirmation if
-/// one of both becomes uncertain. Removes deleted and forgotten tracks, and returns the deleted
-/// ones: those whose existence fell below the threshold.
+/// Confirms visible tracks that surely exist at a known position. Withdraws the confirmation if
+/// existence falls below 0.5 or the deviation exceeds 1.5 confirm_sigma_m. Removes three kinds of
+/// tracks: those with an existence below the threshold, which are returned; those with few hits
+/// that have been invisible for long; and the least likely ones beyond max_objects.
 std::vector<Track> confirmAndDelete(std::vector<Track>& tracks, const FrameContext& frame);
 
 }  // namespace perdure::semantic_filter
