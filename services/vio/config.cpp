@@ -129,6 +129,12 @@ void describeExpertVision(Options& o, Fields& f) {
            {"standard deviation of the given time offset", "s"});
   f.number("calibration.readout", o.calibration.readout_s, positive(),
            {"standard deviation of the given read-out time of a rolling shutter", "s"});
+  f.number("calibration.focal", o.calibration.focal, between(0, 0.3),
+           {"relative standard deviation of the given focal length; 0: the lens is not estimated"});
+  f.number("calibration.centre", o.calibration.centre_px, positive(),
+           {"standard deviation of the given principal point, if the lens is estimated", "px"});
+  f.number("calibration.distortion", o.calibration.distortion, positive(),
+           {"standard deviation of the given k1 and k2, if the lens is estimated"});
 }
 
 void describeExpertTracker(TrackerOptions& t, Config& c, Fields& f) {

@@ -1,6 +1,9 @@
 #include "services/vio/node.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 
 #include "common/vision/image.h"
 #include "services/vio/core/tracks/descriptor.h"
@@ -109,6 +112,12 @@ std::string Node::status() const {
   }
   if (agreement_.verdict() == Agreement::Verdict::kContradicted) return kImagesContradict;
   if (started() && *speed_doubt_.sentence() != '\0') return speed_doubt_.sentence();
+  if (const auto turn = cameras_->estimator.mountTurn()) {
+    return fmt::format(
+        "the camera has turned on the body by {:.1f}°; fasten it, then correct its T_BS or calibrate "
+        "the rig again",
+        *turn * 180.0 / M_PI);
+  }
   if (last_state_ != OdometryState::kDegraded) return whyAlone();
   if (position_doubt_.uncertain()) return kPositionUncertain;
   return degraded_frames_ > 0 ? "has just come over a gap or a restart"
@@ -218,6 +227,9 @@ void Node::noteGaps(TimePoint now) {
 }
 
 TrackedFrame Node::trackImages(const cv::Mat& first, const cv::Mat& second, TimePoint now) {
+  if (config_.core.calibration.focal > 0.0) {
+    cameras_->tracker.setCameras(cameras_->estimator.cameras(cameras_->models));
+  }
   std::optional<Eigen::Matrix3d> R;
   const double gap_from = config_.core.imu.gap_from_s;
   if (started() && !imu_.empty() && imu_.last() > cameras_->estimator.state().time &&

@@ -49,6 +49,17 @@ Eigen::Vector3d Estimator::turnOfReadout(const ImuBuffer& imu, TimePoint time) {
   return readout_s * rowMotion(nav, imu, time, half, options_.gravity, readings_, scale).rate;
 }
 
+std::vector<CameraModel> Estimator::cameras(const std::vector<CameraModel>& calibrated) const {
+  if (!state_) return calibrated;
+  std::vector<CameraModel> result;
+  for (std::size_t c = 0; c < calibrated.size(); ++c) {
+    CameraCalibration camera = calibrated[c].calibration();
+    camera.T_BC = state_->T_BC[c];
+    result.push_back(withLens(CameraModel(camera), state_->lens[c]));
+  }
+  return result;
+}
+
 /// Computes the row motion of the newest clone. It is repeated after the update.
 void Estimator::measureRows(const ImuBuffer& imu) {
   const double readout_s = state_->longestReadout();
@@ -74,7 +85,10 @@ Result<void> Estimator::propagateTo(const FrameInput& input, const ImuBuffer& im
   } else {
     return fail("frame_not_after_state");
   }
-  state_->addClone(input.frame, input.image_time, rate, options_.window.first_estimates);
+  check(input.tracked.cameras || !options_.calibration.estimated().lens,
+        "an image whose lens is estimated names its cameras");
+  state_->addClone(input.frame, input.image_time, rate, options_.window.first_estimates,
+                   input.tracked.cameras);
   measureRows(imu);
   database_.add(input.frame, input.tracked);
   return {};
@@ -183,6 +197,16 @@ void Estimator::dropLostPoints(std::uint64_t frame) {
   }
 }
 
+/// Removes all images before the newest one, in which the cameras may have had another pose on the
+/// body.
+void Estimator::dropEarlierImages(std::uint64_t newest) {
+  while (state_->clones.front().frame != newest) {
+    const std::uint64_t frame = state_->clones.front().frame;
+    database_.removeFrame(frame);
+    state_->removeClone(frame);
+  }
+}
+
 Result<void> Estimator::admitPoints(std::uint64_t frame, bool window_full) {
   if (!window_full) return {};
   const std::uint64_t oldest = state_->clones.front().frame;
@@ -213,9 +237,14 @@ Result<void> Estimator::admitPoints(std::uint64_t frame, bool window_full) {
 Result<void> Estimator::visionUpdate(const FrameInput& input, FrameEstimate& out) {
   const bool full = asInt(state_->clones.size()) > options_.window.clones;
   dropLostPoints(input.frame);
+  const MountPose mount = MountPose::of(*state_);
   const auto slam = updateSlam(*state_, database_, options_.vision, agreed_, reasons_,
                                keeps_innovations_ ? &out.innovations : nullptr);
   if (!slam) return tl::unexpected(slam.error());
+  if (slam->jumped) {
+    mount_.begin(mount, state_->time);
+    dropEarlierImages(input.frame);
+  }
   agreed_ = slam->used > slam->gated;
   for (const PointState& point : state_->points) database_.erase(point.id);
   if (const auto admitted = admitPoints(input.frame, full); !admitted) return admitted;
@@ -314,6 +343,10 @@ Result<FrameEstimate> Estimator::process(const FrameInput& input, const ImuBuffe
   if (const auto fine = sane(); !fine) {
     stop();
     return tl::unexpected(fine.error());
+  }
+  if (mount_.judge(MountPose::of(*state_), state_->time)) {
+    reasons_.add("camera_turned_on_body");
+    T_BC_ = state_->T_BC;
   }
   measureRows(imu);
   newest_ = input.tracked;

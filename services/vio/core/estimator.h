@@ -15,6 +15,7 @@
 #include "services/vio/core/state/saved_state.h"
 #include "services/vio/core/state/state.h"
 #include "services/vio/core/tracks/tracks.h"
+#include "services/vio/core/update/mount_monitor.h"
 #include "services/vio/core/update/point_updates.h"
 #include "services/vio/core/update/standstill.h"
 
@@ -92,6 +93,14 @@ class Estimator {
   /// for a global shutter.
   Eigen::Vector3d turnOfReadout(const ImuBuffer& imu, TimePoint time);
 
+  /// Returns the cameras of `calibrated` with the estimated pose on the body and the estimated
+  /// lens. Before a start they are as calibrated.
+  std::vector<CameraModel> cameras(const std::vector<CameraModel>& calibrated) const;
+
+  /// Returns the angle, in rad, by which the cameras last turned on the body; nothing if no turn was
+  /// found. Later starts use the cameras' new pose.
+  std::optional<double> mountTurn() const { return mount_.turn(); }
+
   /// Returns the points of the newest image whose position is known, without descriptors.
   std::vector<Landmark> landmarks() const;
 
@@ -110,6 +119,7 @@ class Estimator {
   std::vector<const Track*> onceUsed(std::uint64_t frame, bool window_full) const;
   void forgetUsed(const std::vector<const Track*>& used, std::uint64_t frame);
   Result<void> admitPoints(std::uint64_t frame, bool window_full);
+  void dropEarlierImages(std::uint64_t newest);
   void dropLostPoints(std::uint64_t frame);
   void widenBySupposedDepth();
   void report(const FrameInput& input, FrameEstimate& out);
@@ -126,6 +136,7 @@ class Estimator {
   bool keeps_innovations_ = false;
   std::optional<State> state_;
   Standstill standstill_;
+  MountMonitor mount_;
   FeatureDatabase database_;
   TrackedFrame newest_;
   /// Readings of one interval; a member so that its memory is reused.

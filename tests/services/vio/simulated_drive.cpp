@@ -186,7 +186,8 @@ Eigen::Vector2d SimulatedDrive::pixelOf(std::size_t point, double t) const {
 }
 
 RigidTransform SimulatedDrive::seenFrom(double t) const {
-  const RigidTransform T_WB = truth(t + options_.time_offset_s).T_WB();
+  RigidTransform T_WB = truth(t + options_.time_offset_s).T_WB();
+  if (t >= options_.mount_from_s) T_WB = T_WB * options_.mount;
   return t >= options_.jump_from_s && t < options_.jump_until_s ? options_.jump * T_WB : T_WB;
 }
 

@@ -37,6 +37,8 @@ struct DriveOptions {
   /// Motion of the world that the cameras see, during this interval of their clock.
   RigidTransform jump;
   double jump_from_s = 1e9, jump_until_s = 1e9;
+  RigidTransform mount;  ///< motion of the cameras on the body, from mount_from_s on
+  double mount_from_s = 1e9;
   Eigen::Vector3d gyro_bias{0.01, -0.02, 0.015}, accel_bias{0.05, -0.03, 0.02};
   Eigen::Vector3d gyro_scale = Eigen::Vector3d::Ones();  ///< reading without bias, divided by the
                                                          ///< rate
@@ -55,7 +57,7 @@ class SimulatedDrive {
   TimePoint time(double t) const { return fromNanoseconds(1'000'000'000) + durationFromSeconds(t); }
   /// Returns all samples in [0, until].
   std::vector<ImuReading> imu(double until);
-  /// Returns the body's pose that the images show: the truth, apart from the jump.
+  /// Returns the body's pose that the images show: the truth, apart from jump and mount.
   RigidTransform seenFrom(double t) const;
   /// Returns the pixel of a point in camera `c` at image time `t`, with each row at its own time.
   std::optional<Eigen::Vector2d> project(std::size_t c, const Eigen::Vector3d& p_W, double t) const;

@@ -202,6 +202,9 @@ Result<MotionRig> rigFromMotion(const replay::Recording& recording, const Window
   }
   found.prior_sigma = joint.prior_sigma;
   found.rig.cameras = {found.joint.state.camera};
+  // A read-out time that does not differ from 0 is that of a global shutter.
+  double& readout_s = found.rig.cameras[0].readout_s;
+  if (readout_s < 3.0 * found.joint.sigma[kReadout]) readout_s = 0.0;
   found.rig.imu = recording.calibration.imu;
   found.images = tracks->images;
   found.second_px = guess->second_px;

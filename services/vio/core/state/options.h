@@ -1,8 +1,11 @@
 // Options of the filter's core. Defaults suit a 20 Hz camera with a 200 Hz MEMS IMU.
 #pragma once
 
+#include <Eigen/Core>
 #include <cmath>
 #include <cstdint>
+
+#include "services/vio/core/state/state.h"
 
 namespace perdure::vio {
 
@@ -65,6 +68,14 @@ struct CalibrationOptions {
   double time_offset_s = 0.005;
   double readout_s = 0.005;  ///< deviation of the read-out time of a rolling shutter
   double gyro_scale = 0.0;   ///< deviation of each axis from 1; 0: exact, not estimated
+  double focal = 0.0;        ///< relative deviation of the focal length; 0: lens not estimated
+  double centre_px = 6.0;    ///< deviation of the principal point, if the lens is estimated
+  double distortion = 0.03;  ///< deviation of k1 and k2, if the lens is estimated
+
+  Estimated estimated() const { return {estimate_readout, gyro_scale > 0.0, focal > 0.0}; }
+  LensError lensSigma() const {
+    return (LensError() << focal, centre_px, centre_px, distortion, distortion).finished();
+  }
 };
 
 struct StartOptions {

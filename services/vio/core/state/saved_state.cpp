@@ -7,7 +7,7 @@
 namespace perdure::vio {
 namespace {
 
-constexpr const char* kMagic = "perdure-vio-state-3";
+constexpr const char* kMagic = "perdure-vio-state-4";
 // Standard deviations of a vehicle's unobserved turn rate (rad/s) and acceleration (m/s²).
 constexpr double kTurnRate = 0.3, kAcceleration = 1.5;
 // Factor on the covariance, because its correlations with the window are lost.
@@ -27,6 +27,7 @@ void forNumbers(State& s, Each each) {
   for (auto& T : s.T_BC) all(T.q.coeffs()), all(T.p);
   each(s.time_offset_s);
   for (auto& readout : s.readout_s) each(readout);
+  for (auto& lens : s.lens) all(lens);
   all(s.gyro_scale);
   all(s.covariance);
 }
@@ -37,6 +38,8 @@ std::string toText(const SavedState& s) {
   std::string body = std::to_string(s.world.world) + ' ' + std::to_string(s.world.epoch) + ' ' +
                      std::to_string(toNanoseconds(s.time)) + ' ' + std::to_string(s.next_track) +
                      ' ' + std::to_string(s.T_BC.size()) + ' ' +
+                     std::to_string(s.estimated.readout) + ' ' + std::to_string(s.estimated.scale) +
+                     ' ' + std::to_string(s.estimated.lens) + ' ' +
                      std::to_string(s.covariance.rows()) + '\n';
   forNumbers(s, [&](double value) {
     char buffer[40];
@@ -58,15 +61,17 @@ Result<SavedState> fromText(const std::string& text) {
   std::int64_t time = 0;
   std::size_t cameras = 0;
   Eigen::Index n = 0;
-  in >> s.world.world >> s.world.epoch >> time >> s.next_track >> cameras >> n;
+  in >> s.world.world >> s.world.epoch >> time >> s.next_track >> cameras;
+  in >> s.estimated.readout >> s.estimated.scale >> s.estimated.lens >> n;
   if (!in || cameras < 1 || cameras > 2) return malformed("its head");
   const Eigen::Index least = kNavSize + 6 * static_cast<Eigen::Index>(cameras) + 1;
-  if (n < least || n > least + static_cast<Eigen::Index>(cameras) + kScaleSize) {
-    return malformed("its head");
-  }
+  const Eigen::Index most =
+      least + (1 + kLensSize) * static_cast<Eigen::Index>(cameras) + kScaleSize;
+  if (n < least || n > most) return malformed("its head");
   s.time = fromNanoseconds(time);
   s.T_BC.resize(cameras);
   s.readout_s.resize(cameras);
+  s.lens.resize(cameras);
   s.covariance.resize(n, n);
   bool good = true;
   forNumbers(s, [&](double& value) {
@@ -76,6 +81,7 @@ Result<SavedState> fromText(const std::string& text) {
     const auto [stop, error] = std::from_chars(word.data(), end, value);
     good = good && error == std::errc() && stop == end && std::isfinite(value);
   });
+  good = good && n == calibrationSize(s.readout_s, s.estimated);
   const auto isUnit = [](const Eigen::Quaterniond& q) { return std::abs(q.norm() - 1.0) < 1e-6; };
   good = good && isUnit(s.nav.q_WB);
   for (RigidTransform& T : s.T_BC) good = good && isUnit(T.q), T.q.normalize();

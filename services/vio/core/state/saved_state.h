@@ -18,10 +18,10 @@ struct SavedState {
   std::vector<RigidTransform> T_BC;
   double time_offset_s = 0.0;
   std::vector<double> readout_s;  ///< read-out time of each camera
+  std::vector<LensError> lens;    ///< of each camera
   Eigen::Vector3d gyro_scale = Eigen::Vector3d::Ones();
-  /// Covariance of [nav, extrinsics, time offset, read-outs, scale]; the last two only if
-  /// estimated.
-  Eigen::MatrixXd covariance;
+  Estimated estimated;
+  Eigen::MatrixXd covariance;  ///< of State's error without clones and points
   std::uint64_t next_track = 1;
 };
 

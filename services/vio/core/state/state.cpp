@@ -14,7 +14,18 @@ Eigen::Index roomOfUpdate(Eigen::Index n, Eigen::Index m) {
          Workspace::need(n, 1);
 }
 
+/// Returns the number of errors of a camera.
+int cameraSize(double readout_s, const Estimated& estimated) {
+  return 6 + (estimated.lens ? kLensSize : 0) + (estimated.readout && readout_s != 0.0 ? 1 : 0);
+}
+
 }  // namespace
+
+int calibrationSize(const std::vector<double>& readout_s, const Estimated& estimated) {
+  int size = kNavSize + 1 + (estimated.scale ? kScaleSize : 0);
+  for (const double s : readout_s) size += cameraSize(s, estimated);
+  return size;
+}
 
 Workspace::Matrix Workspace::take(Eigen::Index rows, Eigen::Index columns) {
   double* const at = memory_.data() + taken_;
@@ -24,17 +35,18 @@ Workspace::Matrix Workspace::take(Eigen::Index rows, Eigen::Index columns) {
 }
 
 State::State(const std::vector<RigidTransform>& cameras, double offset, int max_clones,
-             int max_points, const std::vector<double>& readouts, bool estimate_readout,
-             bool estimate_scale)
+             int max_points, const std::vector<double>& readouts, const Estimated& estimated)
     : T_BC(cameras),
       time_offset_s(offset),
       readout_s(readouts.empty() ? std::vector<double>(cameras.size(), 0.0) : readouts),
-      readout_at_(cameras.size(), -1),
-      estimates_scale_(estimate_scale),
-      size_(kNavSize + 6 * static_cast<int>(cameras.size()) + 1) {
-  check(readout_s.size() == cameras.size(), "each camera has a read-out, or none");
+      lens(cameras.size(), LensError::Zero()),
+      estimated_(estimated) {
+  check(cameras.size() <= kMaxCameras && readout_s.size() == cameras.size(),
+        "each of at most two cameras has a read-out, or none");
+  cameras_[0] = kNavSize;
   for (std::size_t c = 0; c < cameras.size(); ++c) {
-    if (estimate_readout && rolls(c)) readout_at_[c] = size_++;
+    rolls_[c] = readout_s[c] != 0.0;
+    cameras_[c + 1] = cameras_[c] + cameraSize(readout_s[c], estimated);
   }
   size_ = calibrationEnd();
   const int capacity = size_ + 6 * (max_clones + 2) + 3 * max_points;
@@ -43,18 +55,9 @@ State::State(const std::vector<RigidTransform>& cameras, double offset, int max_
   // clones.
   const int count = static_cast<int>(cameras.size());
   workspace_.begin(roomOfUpdate(
-      capacity, std::max(2 * count * max_points, 6 * (count + max_clones + 2) + readoutCount())));
+      capacity, std::max(2 * count * max_points, camerasSize() + 6 * (max_clones + 2))));
   clones.reserve(static_cast<std::size_t>(max_clones + 2));
   points.reserve(static_cast<std::size_t>(max_points));
-}
-
-std::optional<int> State::readoutAt(std::size_t camera) const {
-  return readout_at_[camera] < 0 ? std::nullopt : std::optional(readout_at_[camera]);
-}
-
-int State::readoutCount() const {
-  return static_cast<int>(
-      std::count_if(readout_at_.begin(), readout_at_.end(), [](int at) { return at >= 0; }));
 }
 
 const Clone* State::clone(std::uint64_t frame) const {
@@ -99,7 +102,7 @@ void State::remove(int at, int size) {
 }
 
 void State::addClone(std::uint64_t frame, TimePoint image_time, const Eigen::Vector3d& rate_B,
-                     bool first_estimates) {
+                     bool first_estimates, SharedCameras cameras) {
   const int n = size_, at = append(6), offset = timeOffsetAt();
   const Nav& there = first_estimates ? nav_linear : nav;
   Eigen::Matrix<double, 6, 1> J_offset;
@@ -110,7 +113,26 @@ void State::addClone(std::uint64_t frame, TimePoint image_time, const Eigen::Vec
   P_.block(0, at, n, 6) = P_.block(at, 0, 6, n).transpose();
   P_.block<6, 6>(at, at) =
       P_.block<6, 6>(at, 0) + P_.block<6, 1>(at, offset) * J_offset.transpose();
-  clones.push_back({frame, image_time, nav.T_WB(), there.T_WB(), at, {}});
+  clones.push_back({frame, image_time, nav.T_WB(), there.T_WB(), at, {}, std::move(cameras), {}});
+  std::copy(lens.begin(), lens.end(), clones.back().lens.begin());
+}
+
+void State::widenMount(double rotation, double position_m) {
+  Matrix6d Q = Matrix6d::Zero();
+  Q.diagonal() << Eigen::Vector3d::Constant(rotation * rotation),
+      Eigen::Vector3d::Constant(position_m * position_m);
+  const int a = camera(0).at;
+  P_.block<6, 6>(a, a) += Q;
+  if (T_BC.size() < 2) return;
+  const int b = camera(1).at;
+  const RigidTransform T_01 = T_BC[0].inverse() * T_BC[1];
+  Matrix6d J = Matrix6d::Zero();  // T_BC1 = T_BC0 · T_01
+  J.topLeftCorner<3, 3>() = T_01.R().transpose();
+  J.bottomLeftCorner<3, 3>() = -T_BC[0].R() * skew(T_01.p);
+  J.bottomRightCorner<3, 3>().setIdentity();
+  P_.block<6, 6>(b, a) += J * Q;
+  P_.block<6, 6>(a, b) += (J * Q).transpose();
+  P_.block<6, 6>(b, b) += J * Q * J.transpose();
 }
 
 void State::widenPose(double rotation, double position_m) {
@@ -166,14 +188,12 @@ void State::apply(const VectorView& dx) {
   nav.v_WB += dx.segment<3>(kVelocity);
   nav.gyro_bias += dx.segment<3>(kGyroBias);
   nav.accel_bias += dx.segment<3>(kAccelBias);
-  for (int i = 0; i < static_cast<int>(T_BC.size()); ++i) {
-    T_BC[static_cast<std::size_t>(i)] =
-        boxPlus(T_BC[static_cast<std::size_t>(i)], dx.segment<6>(extrinsicsAt(i)));
-  }
-  time_offset_s += dx[timeOffsetAt()];
-  for (std::size_t c = 0; c < readout_s.size(); ++c) {
+  for (std::size_t c = 0; c < T_BC.size(); ++c) {
+    T_BC[c] = boxPlus(T_BC[c], dx.segment<6>(camera(c).at));
+    if (const auto at = lensAt(c)) lens[c] += dx.segment<kLensSize>(*at);
     if (const auto at = readoutAt(c)) readout_s[c] += dx[*at];
   }
+  time_offset_s += dx[timeOffsetAt()];
   if (const auto at = scaleAt()) gyro_scale += dx.segment<kScaleSize>(*at);
   for (Clone& c : clones) c.T_WB = boxPlus(c.T_WB, dx.segment<6>(c.at));
   for (PointState& p : points) p.p_W += dx.segment<3>(p.at);
@@ -256,8 +276,8 @@ bool State::healthy() const {
       !nav.accel_bias.allFinite() || !std::isfinite(time_offset_s) || !gyro_scale.allFinite()) {
     return false;
   }
-  if (!std::all_of(readout_s.begin(), readout_s.end(), [](double s) { return std::isfinite(s); })) {
-    return false;
+  for (std::size_t c = 0; c < T_BC.size(); ++c) {
+    if (!std::isfinite(readout_s[c]) || !lens[c].allFinite()) return false;
   }
   const auto active = P_.topLeftCorner(size_, size_);
   return active.allFinite() && active.diagonal().minCoeff() >= 0.0;

@@ -1,13 +1,14 @@
 // State of the filter: navigation, camera-IMU calibration, a window of past poses and points, and
 // the joint covariance of their errors. Paper, eq. 3; MSCKF: Mourikis & Roumeliotis, ICRA 2007.
-// Order of the error: nav [θ, p, v, b_g, b_a]; [θ_BC, p_BC] of each camera; time offset; read-outs
-// and gyroscope scale if estimated; then clones and points in order of insertion. Rotation errors
-// are right multiplied, R = R̂ Exp(θ).
+// Order of the error: nav [θ, p, v, b_g, b_a]; [θ_BC, p_BC, lens, read-out] of each camera, the
+// last two if estimated; time offset; gyroscope scale if estimated; then clones and points in order
+// of insertion. Rotation errors are right multiplied, R = R̂ Exp(θ).
 #pragma once
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <initializer_list>
 #include <optional>
@@ -19,6 +20,8 @@
 #include "common/math/gaussian.h"
 #include "common/math/rigid_transform.h"
 #include "services/vio/core/state/row_motion.h"
+#include "services/vio/core/tracks/lens_error.h"
+#include "services/vio/core/tracks/tracks.h"
 
 namespace perdure::vio {
 
@@ -37,8 +40,10 @@ struct Clone {
   std::uint64_t frame = 0;
   TimePoint image_time;
   RigidTransform T_WB, linear;
-  int at = 0;      ///< index of the clone's error
-  RowMotion rows;  ///< used only for rolling shutters
+  int at = 0;                               ///< index of the clone's error
+  RowMotion rows;                           ///< used only for rolling shutters
+  SharedCameras cameras;                    ///< TrackedFrame::cameras
+  std::array<LensError, kMaxCameras> lens;  ///< of these cameras
 };
 
 struct PointState {
@@ -90,13 +95,25 @@ class Workspace {
 inline constexpr int kNavSize = 15, kScaleSize = 3;
 inline constexpr int kTheta = 0, kPosition = 3, kVelocity = 6, kGyroBias = 9, kAccelBias = 12;
 
+/// Calibration values that are part of the error, besides extrinsics and time offset.
+struct Estimated {
+  bool readout = false;  ///< of cameras whose read-out time is not 0
+  bool scale = false;    ///< of the gyroscope
+  bool lens = false;     ///< of each camera
+
+  bool operator==(const Estimated&) const = default;
+};
+
+/// Returns the size of the error without clones and points. readout_s is the read-out time of each
+/// camera.
+int calibrationSize(const std::vector<double>& readout_s, const Estimated& estimated);
+
 class State {
  public:
   /// readout_s is the read-out time of each camera, 0 for a global shutter; empty if all are
-  /// global. The last two arguments add non-zero read-outs and the gyroscope's scale to the error.
+  /// global.
   State(const std::vector<RigidTransform>& T_BC, double time_offset_s, int max_clones,
-        int max_points, const std::vector<double>& readout_s = {}, bool estimate_readout = false,
-        bool estimate_scale = false);
+        int max_points, const std::vector<double>& readout_s = {}, const Estimated& estimated = {});
 
   /// nav_linear is the linearisation point: the predicted q, and a p and v that updates do not
   /// change.
@@ -105,26 +122,33 @@ class State {
   std::vector<RigidTransform> T_BC;  ///< pose of each camera in B
   double time_offset_s = 0.0;        ///< t_imu = t_image + time_offset_s
   std::vector<double> readout_s;     ///< s from first to last row of each camera; 0: global shutter
+  std::vector<LensError> lens;       ///< of each camera; 0 if not estimated
   /// Ratio, for each axis, of a reading without bias to the true rate.
   Eigen::Vector3d gyro_scale = Eigen::Vector3d::Ones();
   std::vector<Clone> clones;  ///< oldest first
   std::vector<PointState> points;
 
   int size() const { return size_; }
-  int extrinsicsAt(int camera) const { return kNavSize + 6 * camera; }
-  int timeOffsetAt() const { return kNavSize + 6 * static_cast<int>(T_BC.size()); }
+  /// Returns the errors of a camera, which begin with its extrinsics.
+  Block camera(std::size_t c) const { return {cameras_[c], cameras_[c + 1] - cameras_[c]}; }
+  /// Returns the index of the error of a camera's lens; nothing if it is not estimated.
+  std::optional<int> lensAt(std::size_t c) const {
+    return estimated_.lens ? std::optional(cameras_[c] + 6) : std::nullopt;
+  }
   /// Returns the index of the error of a camera's read-out; nothing if it is not estimated.
-  std::optional<int> readoutAt(std::size_t camera) const;
-  int readoutCount() const;
+  std::optional<int> readoutAt(std::size_t c) const {
+    return estimated_.readout && rolls(c) ? std::optional(cameras_[c + 1] - 1) : std::nullopt;
+  }
+  int timeOffsetAt() const { return cameras_[T_BC.size()]; }
+  /// Returns the number of errors of all cameras.
+  int camerasSize() const { return timeOffsetAt() - kNavSize; }
   /// Returns the index of the error of the gyroscope's scale; nothing if it is not estimated.
   std::optional<int> scaleAt() const {
-    return estimates_scale_ ? std::optional(timeOffsetAt() + 1 + readoutCount()) : std::nullopt;
+    return estimated_.scale ? std::optional(timeOffsetAt() + 1) : std::nullopt;
   }
   /// Returns the size of the error without clones and points.
-  int calibrationEnd() const {
-    return timeOffsetAt() + 1 + readoutCount() + (estimates_scale_ ? kScaleSize : 0);
-  }
-  bool rolls(std::size_t camera) const { return readout_s[camera] != 0.0; }
+  int calibrationEnd() const { return timeOffsetAt() + 1 + (estimated_.scale ? kScaleSize : 0); }
+  bool rolls(std::size_t c) const { return rolls_[c]; }
   /// Returns the longest read-out of all cameras, in s; 0 if none has a rolling shutter.
   double longestReadout() const {
     double longest = 0.0;  // an estimate may be negative
@@ -145,7 +169,10 @@ class State {
   /// Adds a clone of the current pose. The body's rate rate_B, in rad/s, gives its correlation with
   /// the time offset.
   void addClone(std::uint64_t frame, TimePoint image_time, const Eigen::Vector3d& rate_B,
-                bool first_estimates);
+                bool first_estimates, SharedCameras cameras = {});
+  /// Adds an error to the pose of the rig on the body, which all cameras share. The deviations are
+  /// in rad and m.
+  void widenMount(double rotation, double position_m);
   /// Enlarges the covariance of the current pose and of the newest clone, which must be the same
   /// pose. The deviations are in rad about the body's axes and in m along those of W.
   void widenPose(double rotation, double position_m);
@@ -179,8 +206,9 @@ class State {
   int append(int size);
   void remove(int at, int size);
 
-  std::vector<int> readout_at_;  ///< index for each camera; −1: not estimated
-  bool estimates_scale_;
+  Estimated estimated_;
+  std::array<bool, kMaxCameras> rolls_{};
+  std::array<int, kMaxCameras + 1> cameras_;  ///< index of the errors of each camera; then the end
   int size_;
   Eigen::MatrixXd P_;  ///< allocated to capacity; only the upper left size_ × size_ block is valid
   Workspace workspace_;

@@ -37,13 +37,24 @@ bool worse(const cv::KeyPoint& a, const cv::KeyPoint& b) {
 }  // namespace
 
 Tracker::Tracker(const TrackerOptions& options, const std::vector<CameraModel>& cameras)
-    : options_(options), cameras_(cameras) {
+    : options_(options), shared_(std::make_shared<const std::vector<CameraModel>>(cameras)) {
   check(!cameras.empty() && cameras.size() <= kMaxCameras, "one or two cameras");
   if (cameras.size() < 2) return;
   const CameraModel &a = cameras[0], &b = cameras[1];
   if (a.width() == b.width() && a.height() == b.height()) return;
   const double scale = a.fx() / b.fx();
   as_first_ = {scale, toCv({a.cx() - scale * b.cx(), a.cy() - scale * b.cy()})};
+}
+
+void Tracker::setCameras(std::vector<CameraModel> cameras) {
+  shared_ = std::make_shared<const std::vector<CameraModel>>(std::move(cameras));
+  std::erase_if(points_, [&](Point& p) {
+    const auto seen = imagePoint(camera(0), toEigen(p.pixel));
+    if (!seen) return true;
+    p.normalised = seen->normalised;
+    p.at_middle = atMiddle(*seen);
+    return false;
+  });
 }
 
 void Tracker::reset() {
@@ -62,13 +73,13 @@ std::vector<cv::Mat> Tracker::pyramid(const cv::Mat& image, std::int64_t levels)
 std::vector<cv::Point2f> Tracker::seeds(const std::optional<Eigen::Matrix3d>& R) const {
   std::vector<cv::Point2f> result;
   result.reserve(points_.size());
-  const Eigen::Matrix3d R_BC = cameras_[0].T_BC().R();
+  const Eigen::Matrix3d R_BC = camera(0).T_BC().R();
   const Eigen::Matrix3d R_C =
       R ? Eigen::Matrix3d(R_BC.transpose() * *R * R_BC) : Eigen::Matrix3d::Identity();
   for (const Point& p : points_) {
     std::optional<Eigen::Vector2d> pixel;
-    if (R) pixel = cameras_[0].project(R_C * p.normalised.homogeneous());
-    result.push_back(pixel && cameras_[0].inImage(*pixel) ? toCv(*pixel) : p.pixel);
+    if (R) pixel = camera(0).project(R_C * p.normalised.homogeneous());
+    result.push_back(pixel && camera(0).inImage(*pixel) ? toCv(*pixel) : p.pixel);
   }
   return result;
 }
@@ -85,7 +96,7 @@ std::vector<bool> Tracker::inliers(const std::vector<Match>& matches,
                                    const std::optional<Eigen::Matrix3d>& R) {
   std::vector<bool> two_point;
   if (R) {
-    const Eigen::Matrix3d R_BC = cameras_[0].T_BC().R();
+    const Eigen::Matrix3d R_BC = camera(0).T_BC().R();
     two_point = twoPointRansac(matches, R_BC.transpose() * *R * R_BC, options_.ransac_px);
     const auto agreeing = std::count(two_point.begin(), two_point.end(), true);
     if (2 * agreeing > static_cast<long>(matches.size())) return two_point;
@@ -93,7 +104,7 @@ std::vector<bool> Tracker::inliers(const std::vector<Match>& matches,
   }
   if (matches.size() < 12) return R ? two_point : std::vector<bool>(matches.size(), true);
   std::vector<cv::Point2f> before, now;
-  const double f = cameras_[0].fx();
+  const double f = camera(0).fx();
   for (const Match& m : matches) {
     before.push_back(toCv(f * m.before));
     now.push_back(toCv(f * m.now));
@@ -128,7 +139,7 @@ void Tracker::follow(const Images& now, const std::optional<Eigen::Matrix3d>& R)
     Point& p = points_[i];
     const auto found = p.patch->find(now.levels, to[i]);
     if (!found || !(found->similarity >= options_.similarity)) continue;
-    const auto seen = imagePoint(cameras_[0], toEigen(found->pixel));
+    const auto seen = imagePoint(camera(0), toEigen(found->pixel));
     if (!seen) continue;
     const Eigen::Vector2d at_middle = atMiddle(*seen);
     matches.push_back({p.at_middle, at_middle, seen->scale});
@@ -204,7 +215,7 @@ void Tracker::detect(const cv::Mat& image, const std::vector<cv::Rect2f>& masked
       std::pop_heap(corners.begin(), end, worse);
       const cv::KeyPoint& corner = *(end - 1);
       const cv::Point2f p = corner.pt + cv::Point2f(roi.tl());
-      if (!cameras_[0].inImage(toEigen(p), 8.0) || taken.at<std::uint8_t>(cv::Point(p))) continue;
+      if (!camera(0).inImage(toEigen(p), 8.0) || taken.at<std::uint8_t>(cv::Point(p))) continue;
       cv::circle(taken, cv::Point(p), radius, 255, cv::FILLED);
       fresh.push_back(p);
       ++added;
@@ -212,7 +223,7 @@ void Tracker::detect(const cv::Mat& image, const std::vector<cv::Rect2f>& masked
   }
   if (fresh.empty()) return;
   for (const cv::Point2f& p : fresh) {
-    const auto seen = imagePoint(cameras_[0], toEigen(p));
+    const auto seen = imagePoint(camera(0), toEigen(p));
     auto patch = Patch::cut(image, p);
     if (seen && patch) {
       points_.push_back({next_id_++, p, p, false, seen->normalised, atMiddle(*seen),
@@ -225,7 +236,7 @@ cv::Mat Tracker::asFirst(const cv::Mat& second) const {
   if (!as_first_) return second;
   const auto [scale, shift] = *as_first_;
   const auto size =
-      cv::Size(static_cast<int>(cameras_[0].width()), static_cast<int>(cameras_[0].height()));
+      cv::Size(static_cast<int>(camera(0).width()), static_cast<int>(camera(0).height()));
   cv::Mat smooth = second, image;
   if (scale < 0.75) cv::GaussianBlur(second, smooth, {}, 0.4 / scale);  // against aliasing
   const cv::Matx23d to(scale, 0, shift.x, 0, scale, shift.y);
@@ -251,14 +262,14 @@ void Tracker::followIntoSecond(const std::vector<cv::Mat>& first,
                            criteria(options_.iterations), cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
   cv::calcOpticalFlowPyrLK(second, first, to, back, status_back, cv::noArray(), {w, w}, 1,
                            criteria(options_.iterations), cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
-  const RigidTransform T_10 = cameras_[1].T_BC().inverse() * cameras_[0].T_BC();
+  const RigidTransform T_10 = camera(1).T_BC().inverse() * camera(0).T_BC();
   for (std::size_t i = 0; i < points_.size(); ++i) {
     Point& p = points_[i];
     p.has_second = false;
     if (!status[i] || !status_back[i] || cv::norm(back[i] - from[i]) > 1.0) continue;
     if (as_first_) to[i] = (to[i] - as_first_->shift) / as_first_->scale;
-    if (!cameras_[1].inImage(toEigen(to[i]), kBorder)) continue;
-    const auto seen = imagePoint(cameras_[1], toEigen(to[i]));
+    if (!camera(1).inImage(toEigen(to[i]), kBorder)) continue;
+    const auto seen = imagePoint(camera(1), toEigen(to[i]));
     if (!seen) continue;
     const Match match{p.normalised, seen->normalised, seen->scale};
     if (epipolarDistance(match, T_10.R(), T_10.p) > options_.stereo_px) continue;
@@ -275,10 +286,11 @@ void Tracker::followIntoSecond(const std::vector<cv::Mat>& first,
 
 TrackedFrame Tracker::result() const {
   TrackedFrame frame;
+  frame.cameras = shared_;
   for (const Point& p : points_) {
     TrackedPoint tracked{p.id, {}};
-    tracked.seen[0] = imagePoint(cameras_[0], toEigen(p.pixel));
-    if (p.has_second) tracked.seen[1] = imagePoint(cameras_[1], toEigen(p.second));
+    tracked.seen[0] = imagePoint(camera(0), toEigen(p.pixel));
+    if (p.has_second) tracked.seen[1] = imagePoint(camera(1), toEigen(p.second));
     if (tracked.seen[0]) frame.points.push_back(tracked);
   }
   std::sort(frame.points.begin(), frame.points.end(),
@@ -290,8 +302,8 @@ TrackedFrame Tracker::track(const cv::Mat& first, const cv::Mat& second,
                             const std::optional<Eigen::Matrix3d>& R_now_before,
                             const std::vector<cv::Rect2f>& masked,
                             const Eigen::Vector3d& turn_of_readout) {
-  turn_ = cameras_[0].T_BC().q.conjugate() * turn_of_readout;
-  const bool stereo = cameras_.size() == 2 && !second.empty();
+  turn_ = camera(0).T_BC().q.conjugate() * turn_of_readout;
+  const bool stereo = shared_->size() == 2 && !second.empty();
   Images now;
   cv::Mat half;
   cv::pyrDown(first, half);
@@ -349,7 +361,7 @@ double Tracker::stillShare(std::size_t frames) const {
   if (n < kFewestStill) return 0.0;
   const auto count = static_cast<double>(n);
   const double spread = std::sqrt(std::max(0.0, squares / count - sum.dot(sum) / (count * count)));
-  if (spread < kLeastSpreadOfStill * cameras_[0].width()) return 0.0;
+  if (spread < kLeastSpreadOfStill * camera(0).width()) return 0.0;
   return count / static_cast<double>(points_.size());
 }
 

@@ -54,6 +54,8 @@ class Tracker {
   /// Returns the share of points that have moved less than half a pixel for `frames` images; 0 if
   /// these are fewer than eight or close together.
   double stillShare(std::size_t frames) const;
+  /// Replaces the cameras by others of the same sizes, and undistorts the points again.
+  void setCameras(std::vector<CameraModel> cameras);
   /// Removes all points. New points do not reuse ids.
   void reset();
   /// Sets the least id of new points.
@@ -72,6 +74,7 @@ class Tracker {
     cv::Point2f place = pixel;  ///< the point is still within half a pixel of it
     std::size_t still = 0;
   };
+  const CameraModel& camera(std::size_t c) const { return (*shared_)[c]; }
   std::vector<cv::Mat> pyramid(const cv::Mat& image, std::int64_t levels) const;
   struct Images {
     std::vector<cv::Mat> half;    ///< cv::buildOpticalFlowPyramid, from half size on
@@ -89,7 +92,7 @@ class Tracker {
   TrackedFrame result() const;
 
   TrackerOptions options_;
-  std::vector<CameraModel> cameras_;
+  SharedCameras shared_;
   struct Placed {
     double scale;
     cv::Point2f shift;

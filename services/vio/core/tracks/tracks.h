@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -31,8 +32,12 @@ struct TrackedPoint {
   std::array<std::optional<ImagePoint>, kMaxCameras> seen;
 };
 
+/// One or two cameras. The pointer keeps them as they were when an image's points were undistorted.
+using SharedCameras = std::shared_ptr<const std::vector<CameraModel>>;
+
 struct TrackedFrame {
   std::vector<TrackedPoint> points;  ///< in order of rising id
+  SharedCameras cameras = {};        ///< that undistorted the points; needed to estimate the lens
 };
 
 struct Observation {

@@ -15,13 +15,12 @@ constexpr int kFailuresToLeave = 3;
 constexpr int kFewestJumped = 8;
 constexpr double kFarOff = 25.0;  ///< limit of a row's mean square, in pixel variances
 
-/// Measurement of one point in the newest clone, with the columns [extrinsics, read-outs, clone,
-/// point].
+/// Measurement of one point in the newest clone, with the columns [cameras, clone, point].
 struct PointRows {
-  static constexpr int kRows = 2 * kMaxCameras, kColumns = 7 * kMaxCameras + 9;
+  static constexpr int kRows = 2 * kMaxCameras, kColumns = (7 + kLensSize) * kMaxCameras + 9;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kRows, kColumns> H;
   Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kRows, 1> r;
-  std::array<Block, 2 * kMaxCameras + 2> block;
+  std::array<Block, kMaxCameras + 2> block;
   std::size_t blocks = 0;
 
   Measurement measurement() const { return {H, std::span(block.data(), blocks), r}; }
@@ -34,14 +33,11 @@ Result<PointRows> rowsOf(const State& state, const PointState& point, const Obse
   const auto views = std::count_if(seen.seen.begin(), seen.seen.begin() + cameras,
                                    [](const auto& s) { return s.has_value(); });
   PointRows rows;
-  const Eigen::Index pose = 6 * cameras + state.readoutCount();
+  const Eigen::Index pose = state.camerasSize();
   rows.H.setZero(2 * views, pose + 9);
   rows.r.resize(2 * views);
-  for (int c = 0; c < static_cast<int>(cameras); ++c) {
-    rows.block[rows.blocks++] = {state.extrinsicsAt(c), 6};
-  }
   for (std::size_t c = 0; c < state.T_BC.size(); ++c) {
-    if (const auto at = state.readoutAt(c)) rows.block[rows.blocks++] = {*at, 1};
+    rows.block[rows.blocks++] = state.camera(c);
   }
   rows.block[rows.blocks++] = {clone.at, 6};
   rows.block[rows.blocks++] = {point.at, 3};
@@ -50,10 +46,8 @@ Result<PointRows> rowsOf(const State& state, const PointState& point, const Obse
     if (!seen.seen[c]) continue;
     const auto view = viewOf(state, clone, c, *seen.seen[c], point.p_W, point.linear, sigma_px);
     if (!view) return fail("slam_behind_camera");
-    rows.H.block<2, 6>(row, 6 * static_cast<Eigen::Index>(c)) = view->J.extrinsic;
-    if (const auto at = state.readoutAt(c)) {
-      rows.H.block<2, 1>(row, 6 * cameras + *at - state.timeOffsetAt() - 1) = view->readout;
-    }
+    const Block camera = rows.block[c];
+    putCamera(state, c, *view, rows.H.block(row, camera.at - kNavSize, 2, camera.size));
     rows.H.block<2, 6>(row, pose) = view->J.pose;
     rows.H.block<2, 3>(row, pose + 6) = view->J.point;
     rows.r.segment<2>(row) = view->r;
@@ -102,12 +96,15 @@ std::vector<Seen> seenPoints(const State& state, const FeatureDatabase& database
   return seen;
 }
 
-/// Returns true if nearly all points are far off at once, which a single moving object cannot
-/// cause.
+/// Returns true if nearly all points fail the gate at once and most are far off, which a single
+/// moving object cannot cause. Points near the axis of a turn are not far off.
 bool haveJumped(const std::vector<Seen>& seen) {
+  const auto all = static_cast<std::ptrdiff_t>(seen.size());
+  const auto failed =
+      std::count_if(seen.begin(), seen.end(), [](const Seen& s) { return !s.passes; });
   const auto far =
       std::count_if(seen.begin(), seen.end(), [](const Seen& s) { return s.isFarOff(); });
-  return far >= kFewestJumped && 4 * far > 3 * static_cast<std::ptrdiff_t>(seen.size());
+  return far >= kFewestJumped && 4 * failed > 3 * all && 2 * far > all;
 }
 
 /// Returns the innovation of a point. Its first two rows belong to the first camera, which sees
@@ -208,7 +205,9 @@ Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
   counts.gated = static_cast<int>(leaving.size());
   if (may_jump && haveJumped(seen)) {
     reasons.add("images_jumped");
+    counts.jumped = true;
     state.widenPose(options.jump_rotation, options.jump_position_m);
+    state.widenMount(options.jump_rotation, 0.0);
     for (Seen& s : seen) s.judge(state, options.gate_probability);
   }
   std::vector<Measurement> used;

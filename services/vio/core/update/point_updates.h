@@ -13,8 +13,9 @@ namespace perdure::vio {
 
 struct UpdateCounts {
   int used = 0, gated = 0;
-  int supposed = 0;  ///< number of used points with the scene's depth
-  int behind = 0;    ///< points whose rays do not meet in front of the cameras
+  int supposed = 0;     ///< number of used points with the scene's depth
+  int behind = 0;       ///< points whose rays do not meet in front of the cameras
+  bool jumped = false;  ///< most points failed at once by a wide margin
 };
 
 /// Triangulates and gates each track, counts failures in `reasons`, and updates the state once with

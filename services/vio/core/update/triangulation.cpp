@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/math/so3.h"
+#include "services/vio/core/update/visual.h"
 
 namespace perdure::vio {
 namespace {
@@ -138,7 +139,8 @@ std::vector<Ray> raysOf(const Track& track, const State& state, double sigma_px)
       const ImagePoint& seen = *o.seen[c];
       const RigidTransform T_BC =
           state.rolls(c) ? state.rowCamera(*clone, c, seen.row).T_BC : state.T_BC[c];
-      rays.push_back({clone->T_WB * T_BC, seen.normalised, seen.scale / sigma_px});
+      rays.push_back(
+          {clone->T_WB * T_BC, normalisedOf(state, *clone, c, seen), seen.scale / sigma_px});
     }
   }
   return rays;

@@ -73,7 +73,10 @@ std::optional<View> viewOf(const State& state, const Clone& clone, std::size_t c
     return std::nullopt;
   }
   const Eigen::Matrix2d weight = seen.to_pixels / sigma_px;
-  view.r = weight * (seen.normalised - now);
+  view.r = weight * (normalisedOf(state, clone, camera, seen) - now);
+  // Evaluated at the prediction: at the observation, the derivative and the residual would share
+  // their noise, and focal lengths would be too long.
+  if (state.lensAt(camera)) view.lens = pixelByLens((*clone.cameras)[camera], there) / sigma_px;
   view.J.pose = (weight * view.J.pose).eval();
   view.J.extrinsic = (weight * view.J.extrinsic).eval();
   view.J.point = (weight * view.J.point).eval();
@@ -84,15 +87,25 @@ std::optional<View> viewOf(const State& state, const Clone& clone, std::size_t c
   return view;
 }
 
+void putCamera(const State& state, std::size_t camera, const View& view,
+               Eigen::Ref<Eigen::MatrixXd> H) {
+  H.leftCols<6>() = view.J.extrinsic;
+  if (state.lensAt(camera)) H.middleCols<kLensSize>(6) = view.lens;
+  if (state.readoutAt(camera)) H.rightCols<1>() = view.readout;
+}
+
+Eigen::Vector2d normalisedOf(const State& state, const Clone& clone, std::size_t camera,
+                             const ImagePoint& seen) {
+  if (!state.lensAt(camera)) return seen.normalised;
+  const LensError since = state.lens[camera] - clone.lens[camera];
+  const auto by_lens = pixelByLens((*clone.cameras)[camera], seen.normalised);
+  return seen.normalised - seen.to_pixels.inverse() * (by_lens * since);
+}
+
 std::vector<Block> calibrationAndClones(const State& state) {
   std::vector<Block> blocks;
-  blocks.reserve(2 * state.T_BC.size() + state.clones.size());
-  for (int c = 0; c < static_cast<int>(state.T_BC.size()); ++c) {
-    blocks.push_back({state.extrinsicsAt(c), 6});
-  }
-  for (std::size_t c = 0; c < state.T_BC.size(); ++c) {
-    if (const auto at = state.readoutAt(c)) blocks.push_back({*at, 1});
-  }
+  blocks.reserve(state.T_BC.size() + state.clones.size());
+  for (std::size_t c = 0; c < state.T_BC.size(); ++c) blocks.push_back(state.camera(c));
   for (const Clone& clone : state.clones) blocks.push_back({clone.at, 6});
   return blocks;
 }
@@ -106,8 +119,7 @@ Eigen::Vector3d linearisationPoint(const State& state, const Track& track,
 
 PointSystem stackViews(const Track& track, const State& state, const Eigen::Vector3d& p_W,
                        double sigma_px) {
-  const Eigen::Index cameras = static_cast<Eigen::Index>(state.T_BC.size());
-  const Eigen::Index first_clone = 6 * cameras + state.readoutCount();
+  const Eigen::Index first_clone = state.camerasSize();
   const Eigen::Index columns = first_clone + 6 * static_cast<Eigen::Index>(state.clones.size());
   const Eigen::Index capacity = 2 * static_cast<Eigen::Index>(track.views());
   PointSystem s{Eigen::MatrixXd::Zero(capacity, columns), Eigen::MatrixXd(capacity, 3),
@@ -126,10 +138,8 @@ PointSystem stackViews(const Track& track, const State& state, const Eigen::Vect
       const auto view = viewOf(state, clone, c, *seen, p_W, p_linear, sigma_px);
       if (!view) return {};
       s.r.segment<2>(row) = view->r;
-      s.H_x.block<2, 6>(row, 6 * static_cast<Eigen::Index>(c)) = view->J.extrinsic;
-      if (const auto at = state.readoutAt(c)) {
-        s.H_x.block<2, 1>(row, 6 * cameras + *at - state.timeOffsetAt() - 1) = view->readout;
-      }
+      const Block block = state.camera(c);
+      putCamera(state, c, *view, s.H_x.block(row, block.at - kNavSize, 2, block.size));
       s.H_x.block<2, 6>(row, column) = view->J.pose;
       s.H_f.middleRows<2>(row) = view->J.point;
       row += 2;
@@ -142,8 +152,7 @@ PointSystem stackViews(const Track& track, const State& state, const Eigen::Vect
 }
 
 InverseDepth inverseDepth(const Track& track, const State& state, const Eigen::Vector3d& p_W) {
-  const Eigen::Index first_clone =
-      6 * static_cast<Eigen::Index>(state.T_BC.size()) + state.readoutCount();
+  const Eigen::Index first_clone = state.camerasSize();
   const auto clone = std::find_if(state.clones.begin(), state.clones.end(), [&](const Clone& c) {
     return c.frame == track.observations.back().frame;
   });

@@ -24,11 +24,13 @@ bool projectPoint(const RigidTransform& T_WB, const RigidTransform& T_BC,
                   const Eigen::Vector3d& p_W, Eigen::Vector2d& normalised,
                   ProjectionJacobians* J = nullptr);
 
-/// A point seen in one image, whitened: r = pose δT_WB + extrinsic δT_BC + readout δt_r + point
-/// δp_W + n, n ~ N(0, I). The camera pose is that at the exposure of the point's row.
+/// A point seen in one image, whitened: r = pose δT_WB + extrinsic δT_BC + lens δlens + readout
+/// δt_r
+/// + point δp_W + n, n ~ N(0, I). The camera pose is that at the exposure of the point's row.
 struct View {
   Eigen::Vector2d r;
   ProjectionJacobians J;
+  Eigen::Matrix<double, 2, kLensSize> lens;           ///< derivative by the lens error
   Eigen::Vector2d readout = Eigen::Vector2d::Zero();  ///< derivative by the read-out time
 };
 
@@ -38,6 +40,14 @@ std::optional<View> viewOf(const State& state, const Clone& clone, std::size_t c
                            const ImagePoint& seen, const Eigen::Vector3d& p_W,
                            const Eigen::Vector3d& p_linear, double sigma_px);
 
+/// Writes the columns of State::camera() into `H`, 2 rows of a Jacobian.
+void putCamera(const State& state, std::size_t camera, const View& view,
+               Eigen::Ref<Eigen::MatrixXd> H);
+
+/// Returns the point undistorted with the state's present lens.
+Eigen::Vector2d normalisedOf(const State& state, const Clone& clone, std::size_t camera,
+                             const ImagePoint& seen);
+
 /// Measurements of a point, whitened: r = H_x δx + H_f δf + n, n ~ N(0, I).
 struct PointSystem {
   Eigen::MatrixXd H_x;  ///< columns of calibrationAndClones
@@ -45,7 +55,7 @@ struct PointSystem {
   Eigen::VectorXd r;
 };
 
-/// Returns the blocks of all extrinsics, of the estimated read-outs, and of the clones.
+/// Returns the blocks of all cameras and clones.
 std::vector<Block> calibrationAndClones(const State& state);
 
 /// Returns the linearisation point of p_W. It has the same position relative to the track's newest

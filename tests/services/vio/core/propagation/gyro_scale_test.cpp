@@ -77,7 +77,7 @@ TEST(GyroScale, AScaledReadingIsTheSameRate) {
 }
 
 TEST(GyroScale, TheCovarianceFollowsTheDerivatives) {
-  State state(std::vector<RigidTransform>(2), 0.0, 8, 4, {}, false, true);
+  State state(std::vector<RigidTransform>(2), 0.0, 8, 4, {}, {.scale = true});
   state.nav = state.nav_linear = test::navInTheMiddle();
   state.gyro_scale = kScale;
   for (std::uint64_t frame = 1; frame <= 8; ++frame) {
@@ -103,8 +103,8 @@ TEST(GyroScale, TheCovarianceFollowsTheDerivatives) {
 TEST(GyroScale, IsInTheErrorOnlyWhereItIsEstimated) {
   const std::vector<RigidTransform> T_BC(1);
   EXPECT_FALSE(State(T_BC, 0.0, 3, 3).scaleAt());
-  State state(T_BC, 0.0, 3, 3, {0.02}, true, true);
-  EXPECT_EQ(state.scaleAt(), state.timeOffsetAt() + 2);
+  State state(T_BC, 0.0, 3, 3, {0.02}, {.readout = true, .scale = true});
+  EXPECT_EQ(state.scaleAt(), state.timeOffsetAt() + 1);
   EXPECT_EQ(state.size(), state.calibrationEnd());
   VectorXd d = VectorXd::Zero(state.size());
   d.tail<3>() << 0.01, -0.02, 0.03;
@@ -127,10 +127,10 @@ TEST(GyroScale, ComesBackFromASavedStateWhereItIsEstimated) {
   const auto saved = fromText(toText(with.save()));
   ASSERT_TRUE(saved) << saved.error().detail;
   ASSERT_FALSE(without.fits(*saved));
-  EXPECT_EQ(without.fits(*saved).error().code, "state_other_gyro_scale");
+  EXPECT_EQ(without.fits(*saved).error().code, "state_other_estimates");
   without.start(test::startAt(drive, 0.2, 1, 1.0));
   ASSERT_FALSE(with.fits(without.save()));
-  EXPECT_EQ(with.fits(without.save()).error().code, "state_other_gyro_scale");
+  EXPECT_EQ(with.fits(without.save()).error().code, "state_other_estimates");
   ASSERT_TRUE(with.fits(*saved));
   with.restore(*saved);
   EXPECT_EQ(with.state().gyro_scale, kScale);

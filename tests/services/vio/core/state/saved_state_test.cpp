@@ -22,8 +22,10 @@ SavedState someState() {
   s.T_BC = {RigidTransform(expQuaternion(Eigen::Vector3d(1, 1, 0)), Eigen::Vector3d(0.1, 0, 0))};
   s.time_offset_s = 0.0071;
   s.readout_s = {0.0213};
+  s.lens.assign(1, (LensError() << 1e-3, 2.0, -1.0, 1.0 / 3.0, 0.02).finished());
+  s.estimated = {.readout = true, .scale = true, .lens = true};
   s.gyro_scale = {1.003, 0.999, 1.0 / 0.995};
-  s.covariance = 0.01 * Eigen::MatrixXd::Identity(26, 26);
+  s.covariance = 0.01 * Eigen::MatrixXd::Identity(31, 31);
   s.next_track = 12345;
   return s;
 }
@@ -38,6 +40,7 @@ TEST(SavedState, ComesBackToTheLastBit) {
   EXPECT_EQ(back->nav.p_WB, s.nav.p_WB);
   EXPECT_EQ(back->time_offset_s, s.time_offset_s);
   EXPECT_EQ(back->readout_s, s.readout_s);
+  EXPECT_EQ(back->lens, s.lens);
   EXPECT_EQ(back->gyro_scale, s.gyro_scale);
   EXPECT_EQ(back->covariance, s.covariance);
   EXPECT_EQ(back->next_track, s.next_track);
@@ -50,7 +53,7 @@ TEST(SavedState, WhatIsCutOffOrAlteredIsRefused) {
     EXPECT_EQ(fromText(text.substr(0, length)).error().code, "state_malformed");
   }
   std::string earlier = text;
-  earlier.replace(earlier.find("state-3"), 7, "state-2");
+  earlier.replace(earlier.find("state-4"), 7, "state-3");
   EXPECT_EQ(fromText(earlier).error().detail, "its check sum or version does not fit");
   std::string altered = text;
   altered[text.size() / 2] = altered[text.size() / 2] == '1' ? '2' : '1';
