@@ -242,7 +242,7 @@ struct FromMotionRequest {
 };
 
 void findRig(const FromMotionRequest& request) {
-  for (const auto& line : writeMotionRig(request.data, request.windows, request.out)) {
+  for (const auto& line : linesOf(writeMotionRig(request.data, request.windows, request.out))) {
     std::cout << line << "\n";
   }
   std::cout << "written           " << request.out.string() << "\n";

@@ -153,7 +153,7 @@ std::optional<StartupError> runInto(const PipelineOptions& options, const std::s
   return std::nullopt;
 }
 
-/// Implements `--rig auto`: finds the rig and writes it to OUT/rig.yaml.
+/// Implements `--rig auto`: finds the rig, writes it to OUT/rig.yaml, and lets vio refine it.
 void findRig(PipelineOptions& options) {
   constexpr double kFirst_s = 60.0;
   const std::string file = options.out + "/rig.yaml";
@@ -161,9 +161,14 @@ void findRig(PipelineOptions& options) {
   const replay::DatasetOptions drive{.path = options.data,
                                      .sequence = options.sequence,
                                      .topics = replay::topicsOf(options.topics)};
-  for (const auto& line : calibrate::writeMotionRig(drive, {.until_s = kFirst_s}, file)) {
+  const auto found = calibrate::writeMotionRig(drive, {.until_s = kFirst_s}, file);
+  for (const auto& line : calibrate::linesOf(found)) {
     std::fprintf(stderr, "rig: %s\n", line.c_str());
   }
+  // Before the user's own, which replace them.
+  std::vector<std::string> deviations = calibrate::vioDeviations(found);
+  for (std::string& line : deviations) line.insert(0, "vio.");
+  options.assignments.insert(options.assignments.begin(), deviations.begin(), deviations.end());
   options.rig = file;
 }
 

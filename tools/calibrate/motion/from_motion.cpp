@@ -244,9 +244,23 @@ std::vector<std::string> linesOf(const MotionRig& found) {
                   found.joint.windows, found.images, found.second_px, found.joint.residual_px)};
 }
 
-std::vector<std::string> writeMotionRig(const replay::DatasetOptions& drive,
-                                        const WindowOptions& options,
-                                        const std::filesystem::path& file) {
+std::vector<std::string> vioDeviations(const MotionRig& found) {
+  // Stretches share the error of the lens model, which their scatter does not show. On EuRoC clips
+  // the errors are up to seven reported deviations.
+  const auto line = [&](const char* key, int first, int count, double least) {
+    const double scatter = found.joint.sigma.segment(first, count).maxCoeff();
+    return fmt::format("calibration.{}={:.5f}", key, std::max(least, 3.0 * scatter));
+  };
+  return {line("focal", kFocal, 1, 0.003),
+          line("centre", kCentre, 2, 2.0),
+          line("distortion", kDistortion, 2, 0.005),
+          line("extrinsic_rotation", kTurnOf, 3, 0.01),
+          line("extrinsic_position", kPlace, 3, 0.01),
+          line("time_offset", kLater, 1, 0.005)};
+}
+
+MotionRig writeMotionRig(const replay::DatasetOptions& drive, const WindowOptions& options,
+                         const std::filesystem::path& file) {
   const auto dataset = replay::Dataset::open(drive);
   const replay::Recording& recording = dataset->recording();
   const std::string where = drive.path.string() + ": ";
@@ -257,13 +271,12 @@ std::vector<std::string> writeMotionRig(const replay::DatasetOptions& drive,
   const auto doubts = replay::checkData(recording, {});
   replay::refuseFatal(doubts, drive.path.string());
   tools::printDoubts(recording, doubts);
-  const auto found = rigFromMotion(recording, options);
+  auto found = rigFromMotion(recording, options);
   if (!found) throw StartupError(ExitCode::kData, where + found.error().detail);
-  const auto lines = linesOf(*found);
   std::string comment = "written by perdure calibrate from-motion:";
-  for (const auto& line : lines) comment += "\n  " + line;
+  for (const auto& line : linesOf(*found)) comment += "\n  " + line;
   writeChecked(file, replay::rigText(found->rig, comment));
-  return lines;
+  return std::move(*found);
 }
 
 FirstGuess guessFromTurns(const std::vector<TrackWindow>& windows,

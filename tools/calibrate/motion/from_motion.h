@@ -42,11 +42,13 @@ Result<MotionRig> rigFromMotion(const replay::Recording& recording, const Window
 /// One line per parameter: value, standard deviation, and whether the motion determines it.
 std::vector<std::string> linesOf(const MotionRig& found);
 
-/// Writes the rig file of a drive and returns its linesOf(). Throws StartupError(kData) with the
-/// reason if no rig can be estimated.
-std::vector<std::string> writeMotionRig(const replay::DatasetOptions& drive,
-                                        const WindowOptions& options,
-                                        const std::filesystem::path& file);
+/// Returns the deviations of the rig as "key=value" lines for vio, which refines such a rig further.
+std::vector<std::string> vioDeviations(const MotionRig& found);
+
+/// Writes the rig file of a drive. Throws StartupError(kData) with the reason if no rig can be
+/// estimated.
+MotionRig writeMotionRig(const replay::DatasetOptions& drive, const WindowOptions& options,
+                         const std::filesystem::path& file);
 
 struct MotionCheck {
   replay::DataFindings findings;  ///< codes: focal_length, time_offset, readout
