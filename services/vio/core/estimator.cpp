@@ -242,7 +242,7 @@ Result<void> Estimator::visionUpdate(const FrameInput& input, FrameEstimate& out
                                keeps_innovations_ ? &out.innovations : nullptr);
   if (!slam) return tl::unexpected(slam.error());
   if (slam->jumped) {
-    mount_.begin(mount, state_->time);
+    mount_.compareWith(mount, state_->time);
     dropEarlierImages(input.frame);
   }
   agreed_ = slam->used > slam->gated;

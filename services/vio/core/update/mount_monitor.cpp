@@ -7,7 +7,7 @@
 namespace perdure::vio {
 namespace {
 
-constexpr std::chrono::seconds kJudged{30};  // time after a jump in which a turn is found
+constexpr std::chrono::seconds kCompared{30};  // longest time between two compared rotations
 constexpr double kProbability = 0.999;
 constexpr double kLeastTurn = 0.005;  // rad, smaller turns are corrected but not reported
 
@@ -18,19 +18,20 @@ MountPose MountPose::of(const State& state) {
   return {state.T_BC[0].q, state.P().block<3, 3>(at, at)};
 }
 
-void MountMonitor::begin(const MountPose& before, TimePoint now) {
-  if (before_) return;
+void MountMonitor::compareWith(const MountPose& before, TimePoint now) {
   before_ = before;
   since_ = now;
 }
 
 bool MountMonitor::judge(const MountPose& now, TimePoint time) {
-  if (!before_) return false;
-  const Eigen::Vector3d turned = logSo3(before_->q_BC.conjugate() * now.q_BC);
-  const double chi2 = squaredMahalanobis(turned, before_->covariance + now.covariance);
-  const bool found = turned.norm() > kLeastTurn && chi2 > chi2Quantile(kProbability, 3);
-  if (found) turn_ = turned.norm();
-  if (found || time > since_ + kJudged) before_.reset();
+  bool found = false;
+  if (before_) {
+    const Eigen::Vector3d turned = logSo3(before_->q_BC.conjugate() * now.q_BC);
+    const double chi2 = squaredMahalanobis(turned, before_->covariance + now.covariance);
+    found = turned.norm() > kLeastTurn && chi2 > chi2Quantile(kProbability, 3);
+    if (found) turn_ = turned.norm();
+  }
+  if (!before_ || found || time > since_ + kCompared) compareWith(now, time);
   return found;
 }
 

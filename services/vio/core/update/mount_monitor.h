@@ -1,6 +1,7 @@
 // Detects that the rig has turned on the body: a bracket that slips, or a camera that is touched.
-// Images that jump (images_jumped) have one of two causes: the body moved in a way that the IMU did
-// not measure, or the rig did. The filter allows both, and its later estimates distinguish them.
+// The rotation on the body is a constant of the state, which must not contradict earlier estimates.
+// If images jump (images_jumped), either the body or the rig has moved; the filter allows both, and
+// its later estimates distinguish them.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,11 +23,11 @@ struct MountPose {
 
 class MountMonitor {
  public:
-  /// Remembers the rotation before a jump. A jump that is still being judged is kept.
-  void begin(const MountPose& before, TimePoint now);
-  /// Returns true once if the rotation contradicts the one before the jump.
+  /// Compares with the rotation before a jump of the images from now on.
+  void compareWith(const MountPose& before, TimePoint now);
+  /// Returns true once if the rotation contradicts that of up to half a minute before.
   bool judge(const MountPose& now, TimePoint time);
-  /// Ends the judgement of a jump, for a new start.
+  /// Begins anew with the next rotation, for a new start.
   void forget() { before_.reset(); }
   /// Returns the angle of the newest turn, in rad; nothing if none was found.
   std::optional<double> turn() const { return turn_; }
