@@ -53,7 +53,7 @@ void checkEqual(const char* of, std::uint64_t repeated, std::size_t kept, DataFi
   if (2 * repeated <= all || repeated < 3) return;
   findings.push_back(
       {unusable ? StampGrade::kFatal : StampGrade::kWarning, "stamps_equal",
-       fmt::format("{} of {} stamps of the {} equal other ones: they lost digits (written as "
+       fmt::format("{} of {} stamps of the {} are equal to others: they lost digits (written as "
                    "float?){}; write them as integers of nanoseconds or with 9 decimals",
                    repeated, all, of, unusable ? "" : ", or are those of packets")});
 }

@@ -115,9 +115,9 @@ TEST(ClockCheck, AClockOfAnotherRateIsSaidByTheDeclaredRatesOfBothSensors) {
     drive.calibration.cameras.emplace_back().rate_hz = images_hz;
     return finding(drive, DataFinding::Grade::kWarning, "declared_rates");
   };
-  EXPECT_THAT(warningOf(105.0, 10.5), HasSubstr("both 4.8 % less often than rate_hz says (10.5 and "
+  EXPECT_THAT(warningOf(105.0, 10.5), HasSubstr("both 4.8 % lower than rate_hz (10.5 and "
                                                 "105): their clock runs too fast"));
-  EXPECT_THAT(warningOf(95.0, 9.5), HasSubstr("5.3 % more often"));
+  EXPECT_THAT(warningOf(95.0, 9.5), HasSubstr("5.3 % higher"));
   EXPECT_EQ(warningOf(105.0, 10.0), "none");
   EXPECT_EQ(warningOf(101.0, 10.1), "none");
 }
