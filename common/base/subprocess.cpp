@@ -121,7 +121,9 @@ bool readAll(int fd, std::string& text, Clock::time_point end) {
   for (;;) {
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now());
     pollfd ready{.fd = fd, .events = POLLIN, .revents = 0};
-    if (left.count() <= 0 || poll(&ready, 1, static_cast<int>(left.count())) == 0) return false;
+    const int state = left.count() > 0 ? poll(&ready, 1, static_cast<int>(left.count())) : 0;
+    if (state == 0) return false;
+    if (state < 0) continue;  // a signal arrived
     const ssize_t n = read(fd, buffer, sizeof buffer);
     if (n == 0) return true;
     if (n > 0) text.append(buffer, static_cast<std::size_t>(n));

@@ -140,7 +140,7 @@ SharedMemory findSharedMemory(const Options& options) {
   refuseOpenMemory(options);
   if (options.shared_memory_mb == 0) return {};
   if (givenConfiguration() != nullptr) {
-    return {{}, "CYCLONEDDS_URI, which is set, goes before bus.shared_memory_mb"};
+    return {{}, "CYCLONEDDS_URI is set and overrides bus.shared_memory_mb"};
   }
   constexpr std::size_t kAround = 1024;  // bytes; largest size of a message without pixels
   const auto locator = sharedMemoryLocator();
@@ -161,10 +161,10 @@ std::int32_t createDomain(const Options& options, const std::string& locator) {
   requireNames("bus", options);
   const char* given = givenConfiguration();
   if (!options.security.empty()) (void)securityLog(given == nullptr);
-  return createDomain(
-      options.domain, options, given != nullptr ? given : configurationXml(options, locator),
-      std::string("bus.interface names an interface that `ip link` shows as up") +
-          (given != nullptr ? ", and CYCLONEDDS_URI, which is set, goes before it" : ""));
+  return createDomain(options.domain, options,
+                      given != nullptr ? given : configurationXml(options, locator),
+                      std::string("bus.interface names an interface that `ip link` shows as up") +
+                          (given != nullptr ? "; CYCLONEDDS_URI, which is set, overrides it" : ""));
 }
 
 /// Assigns the identity in `folder` to a participant. The properties of the identity take
@@ -208,23 +208,23 @@ Entity& Entity::operator=(Entity&& other) noexcept {
 
 void describe(Options& options, config::Fields& fields) {
   fields.text("bus.interface", options.interface,
-              {"network interface of the topics: lo, or one that other hosts are on"});
+              {"network interface of the topics: lo, or that of the network with the other hosts"});
   fields.texts(
       "bus.peers", options.peers,
-      {"addresses of the other hosts, where multicast does not reach them; none: multicast"});
+      {"addresses of the other hosts, if multicast does not reach them; empty: multicast"});
   fields.integer("bus.domain", options.domain, config::between(0, double{kMaxDomain}),
-                 {"DDS domain; the variable PERDURE_DOMAIN goes before it"});
-  fields.text("bus.vehicle", options.vehicle, {"the vehicle's name in the topics' names"});
-  fields.integer("bus.shared_memory_mb", options.shared_memory_mb,
-                 config::between(0, kMostSharedMemory),
-                 {"largest image that goes through shared memory, where iox-roudi runs with chunks "
-                  "of that size; 0: none does",
-                  "MB"});
+                 {"DDS domain; the variable PERDURE_DOMAIN overrides it"});
+  fields.text("bus.vehicle", options.vehicle, {"name of the vehicle in the names of the topics"});
+  fields.integer(
+      "bus.shared_memory_mb", options.shared_memory_mb, config::between(0, kMostSharedMemory),
+      {"largest image that is sent through shared memory; requires iox-roudi with chunks of "
+       "this size; 0: no image",
+       "MB"});
   fields.text("bus.security", options.security,
-              {"folder of the identities that `perdure security` makes; who has none is shut out; "
-               "empty: the bus is open"});
+              {"folder of the identities of `perdure security`; processes without an identity are "
+               "refused; empty: the bus is open"});
   fields.text("bus.identity", options.identity,
-              {"the identity, a folder in bus.security; empty: the one named as the service"});
+              {"name of the identity, a folder in bus.security; empty: the name of the service"});
 }
 
 Options commonOptions(const std::string& folder, std::vector<config::Problem>& problems) {

@@ -162,12 +162,12 @@ void MapState::erase(TrackId id) {
   combine(identity_.objectOf(id));
 }
 
-/// Between other sessions, compares times, although their clocks may differ.
+/// Between two other sessions, compares anchors: their ids increase, but the clocks of two sessions
+/// may differ.
 bool MapState::isNewer(const ObjectRecord& a, const ObjectRecord& b) const {
-  if (a.session != b.session && (a.session == session_ || b.session == session_)) {
-    return a.session == session_;
-  }
-  return a.last_seen >= b.last_seen;
+  if (a.session == b.session) return a.last_seen >= b.last_seen;
+  if (a.session == session_ || b.session == session_) return a.session == session_;
+  return a.sighting.anchor > b.sighting.anchor;
 }
 
 /// Returns the record of an object from those of its tracks. Its newest track determines its

@@ -45,18 +45,17 @@ StampList stampsOfCamera(const Recording& recording) {
 }
 
 /// Adds stamps_equal if more than half of the stamps equal earlier ones and were left out
-/// (`repeated`). Returns true if fewer than a tenth remain (`kept`).
-bool checkEqual(const char* of, std::uint64_t repeated, std::size_t kept, DataFindings& findings) {
+/// (`repeated`). They are fatal if fewer than a tenth remain (`kept`).
+void checkEqual(const char* of, std::uint64_t repeated, std::size_t kept, DataFindings& findings) {
   const auto all = repeated + kept;
   const bool unusable = 10 * kept < all;
   // A list that contains each line twice has lost no data.
-  if (2 * repeated <= all || repeated < 3) return false;
+  if (2 * repeated <= all || repeated < 3) return;
   findings.push_back(
       {unusable ? StampGrade::kFatal : StampGrade::kWarning, "stamps_equal",
-       fmt::format("{} of {} stamps of the {} are equal to another: they lost digits (written as "
+       fmt::format("{} of {} stamps of the {} are equal to others: they lost digits (written as "
                    "float?){}; write them as integers of nanoseconds or with 9 decimals",
                    repeated, all, of, unusable ? "" : ", or are those of packets")});
-  return unusable;
 }
 
 /// Adds stamps_count if the stamps are consecutive numbers (0, 1, 2 …) instead of times.
@@ -69,8 +68,8 @@ void checkCount(const char* of, const StampList& stamps, DataFindings& findings)
   findings.push_back(
       {StampGrade::kFatal, "stamps_count",
        fmt::format(
-           "the stamps of the {} ({} … {}) count them and are not times: write when each was "
-           "taken, in nanoseconds, on the clock of the other sensors",
+           "the stamps of the {} ({} … {}) are counts instead of times: write the time of each, "
+           "in nanoseconds, on the clock of the other sensors",
            of, first, toNanoseconds(stamps.back()))});
 }
 
@@ -141,8 +140,8 @@ void checkRate(const Recording& recording, DataFindings& findings) {
   if (said <= 0.0 || (rate < 1.5 * said && rate > said / 1.5)) return;
   findings.push_back(
       {StampGrade::kWarning, "imu_rate",
-       fmt::format("inertial samples come at {:.4g} Hz, the calibration says {:.4g}: "
-                   "see the unit of their stamps, or set rate_hz",
+       fmt::format("the rate of the inertial samples is {:.4g} Hz, that of the calibration {:.4g}: "
+                   "check the unit of their stamps, or set rate_hz",
                    rate, said)});
 }
 
@@ -182,11 +181,11 @@ void checkCommonRate(const Recording& recording, const StampList& imu, const Sta
   findings.push_back(
       {StampGrade::kWarning, "declared_rates",
        fmt::format(
-           "images come at {:.4g} Hz and inertial samples at {:.4g}, both {:.1f} % {} often "
-           "than rate_hz says ({:.4g} and {:.4g}): their clock runs too {}, which changes "
+           "the rates of images and inertial samples, {:.4g} and {:.4g} Hz, are both {:.1f} % {} "
+           "than rate_hz ({:.4g} and {:.4g}): their clock runs too {}, which changes "
            "all distances, or both rate_hz are wrong",
            1e9 / *of_images, 1e9 / *of_imu, 100.0 * std::abs(1.0 / slower - 1.0),
-           slower > 1.0 ? "less" : "more", images_hz, imu_hz, slower > 1.0 ? "fast" : "slow")});
+           slower > 1.0 ? "lower" : "higher", images_hz, imu_hz, slower > 1.0 ? "fast" : "slow")});
 }
 
 using Kind = ClockChange::Kind;
@@ -299,30 +298,30 @@ DataFinding findingOf(const ClockChange& first, std::size_t count, const std::st
                     step = secondsText(between(first.after, first.before)) + more;
   if (first.kind == Kind::kCounter) {
     return {Grade::kWarning, "clock_wrapped",
-            fmt::format("{}: the stamps of {} go back by {}: a counter of {} came round; they are "
-                        "read on from there",
+            fmt::format("{}: the stamps of {} go back by {}: a counter of {} wrapped; the "
+                        "stamps continue from there",
                         places, sensor, step, first.counter)};
   }
   if (first.kind == Kind::kPause) {
     return {Grade::kWarning, "clock_paused",
-            fmt::format("{}: nothing from {} for {}: the recording paused, or its clock was set "
+            fmt::format("{}: no data of {} for {}: the recording paused, or its clock was set "
                         "ahead{}",
                         places, sensor, step, ends_vio ? "; vio starts again after it" : "")};
   }
   if (first.common) {
     return {Grade::kWarning, "clock_set",
-            fmt::format("{}: the clock was set {} by {} in mid-drive, for all sensors alike; the "
-                        "drive is read on without that step",
+            fmt::format("{}: the clock was set {} by {} during the drive, for all sensors; the "
+                        "drive is read without that step",
                         places, back ? "back" : "ahead", secondsText(first.added) + more)};
   }
   const bool judged = first.sensor == "imu" || first.sensor == "frame";
   return {judged ? Grade::kFatal : Grade::kWarning, "clock_set_alone",
           fmt::format("{}: the stamps of {} {} by {}{}: cut the drive there into two", places,
                       sensor, back ? "go back" : "jump ahead", step,
-                      isRestart(first) ? ", to their start: the device was restarted"
-
-                                       : ", those of the other sensors show no such step (they "
-                                         "come too seldom, or have another clock)")};
+                      isRestart(first)
+                          ? ", to their start: the device was restarted"
+                          : ", those of the other sensors show no such step (their rate is "
+                            "too low, or they have another clock)")};
 }
 
 bool isShort(const ClockChange& pause) {
@@ -360,8 +359,8 @@ void addSetAhead(const Recording& recording, const ClockChange& pause, DataFindi
   finding.grade = isShort(pause) ? DataFinding::Grade::kWarning : DataFinding::Grade::kFatal;
   finding.code = "clock_set_alone";
   finding.text = fmt::format(
-      "{}: the stamps of {} jump ahead by {}, and end so much later than "
-      "those of the other sensor: its clock was set; subtract it from there "
+      "{}: the stamps of {} jump ahead by {}, and end later by this time than "
+      "those of the other sensor: its clock was set; subtract the time from there "
       "on, or cut the drive",
       pause.place, nameOfSensor(pause.sensor), secondsText(stepOf(pause)));
 }
@@ -454,10 +453,11 @@ DataFindings checkClocks(const Recording& recording, const DataUse& use) {
   } else {
     findings.push_back(
         {StampGrade::kFatal, "stamps_unit",
-         fmt::format("the stamps are in {}, not nanoseconds (in those images would come every "
-                     "{:.0f} ns and inertial samples every {:.0f} ns): multiply them by {}, or let "
-                     "perdure doctor --data DRIVE --fix COPY do it",
-                     factor == 1000 ? "µs" : "ms", *intervalOf(images), *intervalOf(imu), factor)});
+         fmt::format(
+             "the stamps are in {}, not nanoseconds (otherwise the interval of the images would be "
+             "{:.0f} ns and that of the inertial samples {:.0f} ns): multiply them by {}, or let "
+             "perdure doctor --data DRIVE --fix COPY do it",
+             factor == 1000 ? "µs" : "ms", *intervalOf(images), *intervalOf(imu), factor)});
   }
   if (std::any_of(findings.begin(), findings.end(),
                   [](const auto& one) { return one.grade == StampGrade::kFatal; })) {

@@ -275,11 +275,13 @@ int Dataset::bitsOf(const Recording::FrameFile& file) {
   if (known != bits_.end()) return known->second;
   int& bits = bits_[file.camera] = vision::usedBits(file.path);
   if (bits == 16) return bits;
+  std::vector<const std::string*> paths;
+  for (const auto& frame : recording_.frames) {
+    if (frame.camera == file.camera) paths.push_back(&frame.path);
+  }
   constexpr std::size_t kLooks = 5;
-  const auto& frames = recording_.frames;
   for (std::size_t i = 0; i < kLooks; ++i) {
-    const auto& one = frames[i * (frames.size() - 1) / (kLooks - 1)];
-    if (one.camera == file.camera) bits = std::max(bits, vision::usedBits(one.path));
+    bits = std::max(bits, vision::usedBits(*paths[i * (paths.size() - 1) / (kLooks - 1)]));
   }
   return bits;
 }

@@ -164,8 +164,9 @@ void Playback::finish() {
   saveState();
   context_.log().info("end of drive after {} frames", node_->framesGiven());
   if (config_.run.on_end != "exit") return;
-  constexpr double kLongest = 0.5;  // limit, because SIGTERM must end a service within a second
-  for (const auto& [camera, writer] : frames_) writer->waitForAcknowledgement(kLongest);
+  // limit for all cameras together, because SIGTERM must end a service within a second
+  const double longest = 0.5 / static_cast<double>(frames_.size());
+  for (const auto& [camera, writer] : frames_) writer->waitForAcknowledgement(longest);
   context_.stop();
 }
 

@@ -304,10 +304,6 @@ std::size_t Node::sendMap() {
   return shown.size();
 }
 
-bool Node::hearsNothing(std::int64_t now_ns, std::int64_t longest_ns) const {
-  return now_ns - std::max(last_.objects_ns, last_.odometry_ns) > longest_ns;
-}
-
 void Node::tick(std::int64_t now_ns) {
   ticked_ns_ = now_ns;
   sendAwaited();

@@ -75,8 +75,6 @@ class Node {
   std::optional<TimePoint> shownTime() const {
     return objects_ ? std::optional(objects_->stamp.time) : std::nullopt;
   }
-  /// Returns whether the last objects and odometry arrived more than `longest_ns` ago, or never.
-  bool hearsNothing(std::int64_t now_ns, std::int64_t longest_ns) const;
   const ReasonCounts& reasons() const { return reasons_; }
 
  private:

@@ -14,12 +14,13 @@ StoreOptions storeOptions(const Config& c) {
 }  // namespace
 
 std::string faultOf(const MapQuery& query) {
-  if (query.limit == 0) return "limit is 0; ask for at least one object";
+  if (query.limit == 0) return "limit is 0; it must be at least 1";
   switch (query.kind) {
     case MapQueryKind::kByRadius:
     case MapQueryKind::kGraph:
       if (!query.low.allFinite() || !std::isfinite(query.radius) || query.radius < 0.0) {
-        return "a radius query needs a finite centre and a radius of at least 0 m";
+        return std::string(query.kind == MapQueryKind::kGraph ? "a graph" : "a radius") +
+               " query needs a finite centre and a radius of at least 0 m";
       }
       return {};
     case MapQueryKind::kByBox:

@@ -15,110 +15,118 @@ using config::positive;
 
 void describeDetector(Parameters& p, Fields& fields) {
   fields.number("box.sigma_px", p.box.sigma_px, positive(),
-                {"least standard deviation of a side", "px"});
+                {"minimum standard deviation of a side", "px"});
   fields.number("box.sigma_relative", p.box.sigma_relative, positive(),
-                {"added to it, relative to the box, where the model does not say"});
+                {"standard deviation added to sigma_px, relative to the box size, if the model has "
+                 "no value"});
   fields.number("clutter.per_frame", p.clutter.per_frame, positive(),
-                {"expected false boxes in an image"});
+                {"expected number of false boxes in an image"});
 }
 
 void describePose(PoseParameters& p, Fields& fields) {
-  fields.number("pose.walk_position", p.walk_position, atLeast(0),
-                {"random walk of the pose error, by distance; exact poses have none", "m/√m"});
+  fields.number(
+      "pose.walk_position", p.walk_position, atLeast(0),
+      {"random walk added to the position error, by distance travelled; exact poses have none",
+       "m/√m"});
   fields.number("pose.walk_rotation", p.walk_rotation, atLeast(0),
-                {"the same of their rotation", "rad/√m"});
+                {"random walk added to the rotation error, by distance travelled", "rad/√m"});
 }
 
 void describeTracks(Parameters& p, Fields& fields) {
   fields.number("motion.survival_s", p.motion.survival_s, positive(),
-                {"mean time for which an object stays where it is", "s"});
+                {"mean time for which a static object keeps its place", "s"});
   fields.number("motion.min_speed", p.motion.min_speed, positive(),
                 {"slower objects count as static", "m/s"});
   auto& t = p.tracks;
-  fields.number("tracks.confirm", t.confirm, between(0, 1), {"existence that confirms a track"});
+  fields.number("tracks.confirm", t.confirm, between(0, 1),
+                {"existence probability that confirms a track"});
   fields.integer("tracks.confirm_hits", t.confirm_hits, between(1, 1000),
-                 {"detections that it takes"});
-  fields.number(
-      "tracks.confirm_sigma_m", t.confirm_sigma_m, positive(),
-      {"deviation of its place relative to the body, at most; given up at 1.5 times that", "m"});
+                 {"number of detections that a confirmation requires"});
+  fields.number("tracks.confirm_sigma_m", t.confirm_sigma_m, positive(),
+                {"largest standard deviation of the position relative to the body that confirms a "
+                 "track; the confirmation ends at 1.5 times this value",
+                 "m"});
   fields.number("tracks.delete_below", t.delete_below, between(0, 1),
-                {"existence below which a track is deleted"});
+                {"existence probability below which a track is deleted"});
   fields.number("tracks.reidentify_s", t.reidentify_s, atLeast(0),
-                {"a deleted track may be re-identified for this time", "s"});
+                {"time for which a deleted track can be re-identified", "s"});
   fields.integer("tracks.max_objects", t.max_objects, between(1, 1000000),
-                 {"in the working set; the least likely are deleted"});
+                 {"largest number of objects in the working set; those with the lowest existence "
+                  "are deleted"});
   fields.boolean("ground.use", p.ground.use,
-                 {"objects that stand near tell how high the ground is"});
+                 {"estimate the height of the ground from near objects that stand on it"});
   fields.number("ground.body_height_m", p.ground.body_height_m, between(0, 100),
-                {"of the IMU above the ground under the vehicle; 0: not known", "m"});
+                {"height of the IMU above the ground under the vehicle; 0: unknown", "m"});
 }
 
 void describeMemory(Parameters& p, Fields& fields) {
   fields.boolean("memory.archive", p.memory.archive,
-                 {"objects that are far and long unseen wait on the map"});
+                 {"archive objects on the map that are far and were not detected for a long time"});
   fields.number("memory.recall_m", p.memory.recall_m, between(5, 10000),
-                {"objects of the map that are nearer to the body are recalled", "m"});
+                {"distance to the body within which objects of the map are recalled", "m"});
   fields.number("memory.margin_m", p.memory.margin_m, between(3, 10000),
-                {"tracks farther than recall_m by more than this are archived", "m"});
+                {"tracks are archived beyond recall_m plus this margin", "m"});
   fields.number("memory.after_s", p.memory.after_s, positive(),
-                {"once they were not detected for this time", "s"});
+                {"time without a detection before a track is archived", "s"});
 }
 
 void describeExpertBox(BoxParameters& p, Fields& fields) {
-  fields.number(
-      "box.sigma_network_px", p.sigma_network_px, atLeast(0),
-      {"least deviation of a side in the network's input, where its size is known", "px"});
+  fields.number("box.sigma_network_px", p.sigma_network_px, atLeast(0),
+                {"minimum standard deviation of a side in the network's input, if the size of the "
+                 "input is known",
+                 "px"});
   fields.number("box.sigma_weak", p.sigma_weak, atLeast(0),
-                {"added to the relative one times the probability that the box is clutter"});
+                {"added to sigma_relative, times the probability that the box is clutter"});
   fields.number("box.border_px", p.border_px, atLeast(0),
-                {"the image border censors a side that is nearer", "px"});
+                {"distance to the image border within which a side is censored", "px"});
   fields.number("box.gate", p.gate, between(0.5, 1.0 - 1e-12),
                 {"probability inside the gate of the normalised innovation"});
   fields.number("box.min_size_px", p.min_size_px, positive(),
-                {"root of a box's area at which detection is half as likely", "px"});
+                {"square root of the box area at which the detection probability is halved", "px"});
   fields.number("box.min_network_px", p.min_network_px, positive(),
-                {"the same in the network's input, where its size is known", "px"});
+                {"the same in the network's input, if the size of the input is known", "px"});
   fields.number("box.noise_view", p.noise_view, positive(),
-                {"view change that renews the noise of a side", "rad"});
+                {"view change after which the noise of a side is independent", "rad"});
   fields.number("box.amodal", p.amodal, between(0.01, 0.99),
-                {"share of boxes that span what an occluder hides of the object"});
+                {"share of boxes that include the occluded part of the object"});
   fields.number("box.partial_view", p.partial_view, between(0, 1),
-                {"share of boxes that show a part of the object only"});
+                {"share of boxes that show only a part of the object"});
   fields.number("box.bias_share", p.bias_share, between(0, 0.99),
-                {"share of a side's variance that is detector bias"});
+                {"share of the detector bias in the variance of a side"});
   fields.number("box.bias_angle", p.bias_angle, positive(),
-                {"view change after which the bias has fallen to 1/e", "rad"});
+                {"view change after which the correlation of the bias is 1/e", "rad"});
   fields.number("box.prior_sides", p.prior_sides, atLeast(0),
-                {"weight of the assumed noise in sides of boxes, before it is learned; 0: it is "
+                {"weight of the prior of the learned noise, as a number of sides; 0: the noise is "
                  "not learned"});
   fields.number("box.prior_azimuths", p.prior_azimuths, atLeast(0),
-                {"the same of azimuths, each of another object"});
+                {"the same for azimuths, as a number of objects"});
 }
 
 void describeExpertLikelihood(Parameters& p, Fields& fields) {
-  fields.number("clutter.max_log_ratio", p.clutter.max_log_ratio, positive(),
-                {"activations are clamped to this against clutter", "nats"});
+  fields.number(
+      "clutter.max_log_ratio", p.clutter.max_log_ratio, positive(),
+      {"largest log-ratio of a class against clutter; larger activations are clamped", "nats"});
   fields.number("clutter.other_lookalike", p.clutter.other_lookalike, between(0, 1),
-                {"share of objects of no known class that look like a known one"});
+                {"share of objects of unknown classes that resemble a known class"});
   fields.number("clutter.other_prior", p.clutter.other_prior, between(1e-6, 0.999999),
-                {"probability of \"other\" at initiation"});
+                {"probability of class \"other\" at the initiation of a track"});
   fields.number("initiation.odds", p.initiation.odds, positive(),
-                {"new objects against false boxes, in one box"});
+                {"odds that a box without a track is a new object instead of clutter"});
   fields.number("initiation.min_log_ratio", p.initiation.min_log_ratio, {},
-                {"weaker boxes support tracks and start none", "nats"});
+                {"log-ratio below which a box does not initiate a track", "nats"});
   fields.number("tempering.correlation", p.tempering.correlation, between(0, 1),
-                {"of the errors of two observations from one viewpoint"});
+                {"correlation of the errors of two observations from one viewpoint"});
   fields.number("tempering.detection_rate_prior", p.tempering.detection_rate_prior, positive(),
                 {"weight of the class's detection probability, in observations"});
   fields.number("visibility.minimum", p.visibility.minimum, between(0, 1),
-                {"a smaller visible fraction is no evidence"});
-  fields.number(
-      "visibility.unmapped_occluder", p.visibility.unmapped_occluder, between(0, 0.99),
-      {"that something off the map hides an object, far from the directions of detections"});
+                {"visible fraction below which a missed detection is not evidence"});
+  fields.number("visibility.unmapped_occluder", p.visibility.unmapped_occluder, between(0, 0.99),
+                {"probability that an unmapped occluder hides an object, far from the directions "
+                 "of detections"});
   fields.number("visibility.hard_to_detect", p.visibility.hard_to_detect, between(0, 0.9),
-                {"that a new view is one from which detections are rare"});
+                {"probability that detections from a new view are rare"});
   fields.number("visibility.solid", p.visibility.solid, between(0, 1),
-                {"existence from which an object occludes others"});
+                {"existence probability from which an object occludes others"});
 }
 
 void describeExpertTracks(Parameters& p, Fields& fields) {
@@ -128,20 +136,22 @@ void describeExpertTracks(Parameters& p, Fields& fields) {
   fields.number("motion.acceleration", m.acceleration, positive(),
                 {"white acceleration of a moving object", "m/s²/√Hz"});
   fields.number("motion.mover_survival_s", m.mover_survival_s, positive(),
-                {"mean time for which an unseen moving object goes on", "s"});
-  fields.number("tracks.certain", p.tracks.certain, between(0.9, 0.999999),
-                {"existence stays below it, so that misses count"});
+                {"mean survival time of a moving object that is not detected", "s"});
+  fields.number(
+      "tracks.certain", p.tracks.certain, between(0.9, 0.999999),
+      {"largest existence probability of a track, so that missed detections have an effect"});
   fields.number("tracks.certain_again", p.tracks.certain_again, between(0.9, 0.999999),
                 {"the same after a detection on another visit"});
   fields.number("tracks.size_gate", p.tracks.size_gate, positive(),
-                {"deviations of a class's size beyond which an object is not of the class"});
+                {"distance to the size of a class, in standard deviations, beyond which the class "
+                 "is excluded"});
   fields.number("tracks.merge_overlap", p.tracks.merge_overlap, between(0, 1),
-                {"shared over joint volume at which two tracks are one object"});
+                {"intersection over union of the volumes at which two tracks are one object"});
   auto& s = p.smoothing;
   fields.integer("smoothing.keyframes", s.keyframes, between(0, kMostKeyframes),
-                 {"kept for one track at most; 0: no batch estimate"});
+                 {"largest number of keyframes of a track; 0: no batch estimate"});
   fields.integer("smoothing.per_frame", s.per_frame, between(1, 10000),
-                 {"tracks that are fitted in one frame at most; the others wait"});
+                 {"largest number of tracks that are fitted in one frame; the others wait"});
 }
 
 /// Declares keys of earlier versions with the message that refuses them.
@@ -174,7 +184,7 @@ void describeFormer(Fields& fields) {
                              {"pose.drift_position", "pose.walk_position, of all odometry"},
                              {"pose.drift_rotation", "pose.walk_rotation, of all odometry"}};
   for (const auto& [old, now] : renamed) fields.formerly(old, std::string("is now ") + now);
-  fields.formerly("context", "is gone: context is no longer laid over the classes; leave it out");
+  fields.formerly("context", "was removed: context is not used any more; remove this key");
   // Former keys that are constants in core/parameters.h now.
   std::istringstream fixed(
       "box.tail box.iterations box.bias_log_distance box.bias_image_angle "
@@ -191,14 +201,15 @@ void describeFormer(Fields& fields) {
       "ground.roughness ground.assumed ground.sigma_m ground.reach_m ground.resolved "
       "ground.span_m ground.body_height_sigma_m");
   for (std::string old; fixed >> old;) {
-    fields.formerly(old, "is fixed now; leave it out");
+    fields.formerly(old, "is fixed now; remove this key");
   }
   for (const char* old :
        {"alignment.nats", "alignment.margin_nats", "alignment.pairs", "alignment.known_share"}) {
-    fields.formerly(old, "is gone: the map store alone searches for earlier maps; leave it out");
+    fields.formerly(old,
+                    "was removed: only the map store searches for earlier maps; remove this key");
   }
   for (const char* old : {"drift.position", "drift.rotation", "drift.things", "drift.within_m"}) {
-    fields.formerly(old, "is gone: the map store's graph takes drift out; leave it out");
+    fields.formerly(old, "was removed: the graph of the map store corrects drift; remove this key");
   }
 }
 
@@ -206,14 +217,14 @@ void describeFormer(Fields& fields) {
 
 void describe(Config& c, Fields& fields) {
   fields.text("class_priors", c.class_priors,
-              {"file of sizes and detection probabilities by class"});
+              {"file with sizes and detection probabilities by class"});
   fields.integer("history.frames", c.history.frames, between(2, 1000),
-                 {"frames for which late detections are still applied"});
+                 {"number of past frames to which late detections are applied"});
   fields.boolean("history.wait_for_detections", c.history.wait_for_detections,
-                 {"publish a frame with its detections, or else when the next frame comes; "
-                  "false: publish at once, detections show in the next frame"});
+                 {"true: publish a frame with its detections, or when the next frame arrives; "
+                  "false: publish at once, detections take effect in the next frame"});
   fields.number("restore.timeout_s", c.restore.timeout_s, atLeast(0),
-                {"wait so long at the start for the working set of an earlier run", "s"});
+                {"longest wait at the start for the working set of an earlier run", "s"});
   describeDetector(c.filter, fields);
   describePose(c.filter.pose, fields);
   describeTracks(c.filter, fields);

@@ -113,7 +113,7 @@ class PriorsReader {
       complain(at,
                "shape: one to three levels from the ground up, each [height, along, across, "
                "corner] or [height, along, across, corner, forward]: -1 to 1, three shares from "
-               "0.05 to 1, and what keeps it within the length");
+               "0.05 to 1, and at most 1 - along");
     };
     if (!node.IsSequence() || node.size() == 0 || node.size() > Shape::kMostLevels) {
       return wrong(node);

@@ -97,7 +97,8 @@ Folder::~Folder() {
 }
 
 Child::Child(std::vector<std::string> command, std::string log)
-    : log_(std::move(log)), process_({.command = std::move(command), .log = emptied(log_)}) {}
+    : log_(std::move(log)),
+      process_({.command = std::move(command), .log = emptied(log_), .ends_with_parent = true}) {}
 
 int Child::wait(std::chrono::milliseconds longest) { return process_.wait(longest).value_or(-1); }
 

@@ -13,7 +13,7 @@ void addBusOptions(CLI::App& command, bus::Options& options) {
   command.add_option("--interface", options.interface, "network interface of the topics")
       ->capture_default_str();
   command.add_option("--peers", options.peers, "addresses of other hosts, without multicast");
-  command.add_option("--domain", options.domain, "DDS domain (PERDURE_DOMAIN goes before it)")
+  command.add_option("--domain", options.domain, "DDS domain (PERDURE_DOMAIN overrides it)")
       ->check(CLI::Range(0, bus::kMaxDomain))
       ->capture_default_str();
   command.add_option("--vehicle", options.vehicle, "the vehicle's name")->capture_default_str();

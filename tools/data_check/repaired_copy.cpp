@@ -46,7 +46,7 @@ constexpr std::array kFixes{
         [](Recording& r) { forEachSample(r, [](ImuSample& s) { s.gyro *= kRadians; }); }},
     Fix{"imu_columns_exchanged", "the gyroscope's columns are before the accelerometer's now",
         [](Recording& r) { forEachSample(r, [](ImuSample& s) { std::swap(s.gyro, s.accel); }); }},
-    Fix{"clock_wrapped", "the stamps go on where a counter came round",
+    Fix{"clock_wrapped", "the stamps continue where a counter wrapped",
         [](Recording& r) {
           std::erase_if(r.clock_changes, [](const auto& change) {
             return change.kind == replay::ClockChange::Kind::kCounter;

@@ -47,10 +47,10 @@ std::string line(const Station& station, const char* what) {
 }
 
 std::string line(const Standing::Loop& loop) {
-  return fmt::format("    loop {} of anchors {} and {}, by {}: {} (weight {:.2f})\n", loop.id,
-                     loop.a, loop.b,
-                     loop.by_tracking ? "objects seen again under their ids" : "how objects lie",
-                     loop.weight >= mapping::kBelieved ? "believed" : "not believed", loop.weight);
+  return fmt::format(
+      "    loop {} of anchors {} and {}, by {}: {} (weight {:.2f})\n", loop.id, loop.a, loop.b,
+      loop.by_tracking ? "objects seen again under their ids" : "positions of objects or landmarks",
+      loop.weight >= mapping::kBelieved ? "believed" : "not believed", loop.weight);
 }
 
 std::string loopLines(const Standing& standing) {

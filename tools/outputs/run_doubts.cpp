@@ -18,22 +18,21 @@ struct Rule {
 };
 
 constexpr Rule kRules[] = {
-    {"frame_without_update", 10, "no point of the image was of use",
-     "poses came from the IMU alone there; see exposure, contrast, size and lens of the images"},
+    {"frame_without_update", 10, "no image point could be used",
+     "their poses are from the IMU alone; check exposure, contrast, size and lens of the images"},
     {"images_contradict_imu", 20, "images contradict the IMU",
      "T_BS, the IMU's axes, signs or units, the focal length or time_offset_s may be wrong; see "
      "perdure doctor --data"},
     {"position_uncertain", 20, "the position is uncertain",
-     "its deviation grew by more than vio.odometry.position_growth in ten seconds: turn less on "
-     "the "
-     "spot, or calibrate the rig (perdure doctor --data)"},
+     "its standard deviation grew by more than vio.odometry.position_growth in ten seconds: turn "
+     "less on the spot, or calibrate the rig (perdure doctor --data)"},
     {"poses_contradict_images", 20, "the poses contradict the images",
      "they may be inverted (T_BW for T_WB), in other axes than T_BS says, with the quaternion's w "
      "at the wrong end, or on another clock"},
     {"points_too_far", 20, "nearly all points lie beyond vision.max_depth",
-     "see that the poses are in metres, or raise it"},
+     "check that the poses are in metres, or raise the limit"},
     {"speed_gated", 5, "the speed contradicts camera and IMU and was refused",
-     "see its unit (m/s), its stamps and the IMU, or leave it away (vio.speed.enabled=false)"},
+     "check its unit (m/s), its stamps and the IMU, or disable it (vio.speed.enabled=false)"},
 };
 
 std::string sentenceOf(const Doubt& doubt) { return doubt.what + ": " + doubt.fix; }
@@ -57,38 +56,39 @@ Doubts doubtsOfRun(const RunFacts& facts) {
         {fmt::format("{} at {} of {} frames", rule.what, times, facts.frames), rule.fix});
   }
   if (const std::uint64_t times = facts.vio.of("reset"); times > 0) {
-    doubts.push_back({fmt::format("vio lost its way {} times and began anew", times),
-                      "what came before and after is not in one frame of reference; perdure doctor "
-                      "--data says why"});
+    doubts.push_back(
+        {fmt::format("vio was reset {} times", times),
+         "poses before and after a reset are not in one frame of reference; perdure doctor "
+         "--data reports the cause"});
   }
   constexpr std::uint64_t kOneLost = 20;  // tolerates one lost image in 20; recordings lose some
   const std::uint64_t lost = imagesLost(facts.capture), all = facts.frames + lost;
   if (kOneLost * lost > all) {
     doubts.push_back(
         {fmt::format("{} of {} images are missing or cannot be read", lost, all),
-         "the reasons of capture in report.json count why; fetch or copy the drive again"});
+         "report.json counts the reasons of capture; download or copy the drive again"});
   }
   if (4 * facts.without_pose > facts.frames) {
-    doubts.push_back({fmt::format("{} of {} frames have no pose and were left out",
+    doubts.push_back({fmt::format("{} of {} frames have no pose and were not used",
                                   facts.without_pose, facts.frames),
-                      "give poses of the whole drive, at most .5 s apart"});
+                      "provide poses of the whole drive, at most 0.5 s apart"});
   }
   if (facts.boxes > 0 && facts.objects == 0) {
-    doubts.push_back({fmt::format("the map is empty though {} boxes came", facts.boxes),
-                      "do they belong to these frames, are they of known classes, and does the "
-                      "camera move past what they show?"});
+    doubts.push_back({fmt::format("the map is empty although there are {} boxes", facts.boxes),
+                      "check that they belong to these frames, that their classes are known, and "
+                      "that the camera moves past the objects"});
   }
   constexpr std::pair<const char*, const char*> kFindings[] = {
       {"clock_wrapped", "stamps were changed"},
       {"clock_set", "stamps were changed"},
       {"clock_rate", "the clocks of camera and IMU run at different rates"},
       {"clock_", "stamps pause or jump"},
-      {"declared_rates", "stamps come at other rates than declared"},
+      {"declared_rates", "sensor rates differ from the declared ones"},
       {"imu_covers_part", "images lie outside of the inertial samples"},
-      {"images_frozen", "the images stand still"},
+      {"images_frozen", "the images do not change"},
       {"images_repeated", "images are repeated"},
-      {"lines_lost", "lines of the recording were left out"},
-      {"boxes_beyond", "boxes of other frames were left out"},
+      {"lines_lost", "lines of the recording were not used"},
+      {"boxes_beyond", "boxes of other frames were not used"},
       {"poses_", "the poses contradict the drive"}};
   for (const auto& finding : facts.findings) {
     const auto kind = std::ranges::find_if(

@@ -38,8 +38,9 @@ void requireName(const std::string& name) {
                          "most 48, and not \"authority\"");
 }
 
-/// Restricts the permissions to `topics`. Throws StartupError if a ros2_driver may not write one.
-void narrow(Permissions& permissions, bus::Role role, const std::vector<std::string>& topics) {
+/// Replaces the topics that the role reads by `topics`, if there are any. For a ros2_driver,
+/// replaces those that it writes; throws StartupError if it may not write one.
+void choose(Permissions& permissions, bus::Role role, const std::vector<std::string>& topics) {
   if (topics.empty()) return;
   if (role != bus::Role::kRos2Driver) {
     permissions.reads = topics;
@@ -133,7 +134,7 @@ void Authority::add(const Wanted& wanted, const Validity& validity) {
   if (known_.contains(wanted.name)) {
     throw StartupError(ExitCode::kUsage, "there is an identity " + wanted.name +
                                              " already; `perdure security renew " + wanted.name +
-                                             "` makes it anew");
+                                             "` makes new keys for it");
   }
   const Known known{wanted.role, wanted.topics};
   write(wanted.name, known, validity, wanted.owner);
@@ -156,7 +157,7 @@ void Authority::write(const std::string& name, const Known& known, const Validit
   const auto owner = owner_name.empty() ? ownerOf(folder) : ownerNamed(owner_name);
   const Subject subject{name, known.role};
   Permissions permissions = permissionsOf(roleNamed(known.role));
-  narrow(permissions, roleNamed(known.role), known.topics);
+  choose(permissions, roleNamed(known.role), known.topics);
   const bus::Key key = makeKey();
   const bus::Certificate certificate = issue(signer(), key.get(), subject, validity);
   const std::string pem = toPem(certificate.get());

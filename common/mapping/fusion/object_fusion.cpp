@@ -115,6 +115,8 @@ class Renewal {
     return far_m > kFar_m && far_m > kSigmas * planeSigma(was.covariance + is.covariance);
   }
 
+  /// Fuses the two beliefs. If their relative pose is unknown, returns the other map's belief. The
+  /// origins of the lost belief remain, because they identify the object in later fusions.
   StoredObject fusedWithBefore(const Renewed& each) {
     if (!each.record_before || !each.record_now) return each.now;
     const auto T_ab =

@@ -92,7 +92,8 @@ struct Replicator::Work {
   bool stopping = false;
   std::uint64_t wakes = 1, served = 0;  ///< number of wakes, and of those whose changes are all
                                         ///< sent
-  std::optional<Clock::time_point> woken_at;
+  /// Times of the first unserved wake before the present portion, and of the first wake since.
+  std::optional<Clock::time_point> serving_since, woken_at;
   Progress progress;
 
   std::thread thread;  // last member: it uses the others
@@ -130,6 +131,8 @@ Result<void> Replicator::Work::sendAll() {
       const std::lock_guard lock(mutex);
       if (stopping) return perdure::fail("stopped");
       before = wakes;
+      if (!serving_since) serving_since = woken_at;
+      woken_at.reset();
     }
     const auto more = pusher.hasMore();
     if (!more) return tl::unexpected<Reason>(more.error());
@@ -154,11 +157,13 @@ void Replicator::Work::succeed(const Portion& portion, std::uint64_t wakes_befor
     progress.portions += portion.rows > 0 ? 1 : 0;
     progress.failing.clear();
     progress.trouble.clear();
-    if (portion.whole && portion.rows > 0 && woken_at) {
-      progress.latency_s = std::chrono::duration<double>(Clock::now() - *woken_at).count();
-      woken_at.reset();
+    if (portion.whole) {
+      if (portion.rows > 0 && serving_since) {
+        progress.latency_s = std::chrono::duration<double>(Clock::now() - *serving_since).count();
+      }
+      serving_since.reset();
+      served = wakes_before;
     }
-    if (portion.whole) served = wakes_before;
     progress.whole = served == wakes;
   }
   advanced.notify_all();

@@ -18,18 +18,25 @@ constexpr double kUnknownVariance = 1e6;  ///< ROS filters write such values for
 
 Eigen::Vector3d vectorOf(const ros::Vector3& v) { return {v.x, v.y, v.z}; }
 
-/// Returns the covariance of a message; nothing if it is zero or marked as unknown.
-Result<std::optional<Matrix6>> covarianceOf(const std::array<double, 36>& numbers) {
-  const Matrix6 given = Eigen::Map<const Matrix6>(numbers.data());
+/// Returns the covariance of a message; `otherwise` if it is zero or marked as unknown. Axes with
+/// unknown variances get the variances of `otherwise`.
+Result<Matrix6> covarianceOf(const std::array<double, 36>& numbers, const Matrix6& otherwise) {
+  Matrix6 given = Eigen::Map<const Matrix6>(numbers.data());
   if (!given.allFinite())
     return fail("covariance", "the covariance has values that are not finite");
+  if (given.diagonal().maxCoeff() <= 0.0 || numbers[0] == -1.0) return otherwise;
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    if (given(i, i) < kUnknownVariance) continue;
+    given.row(i).setZero();
+    given.col(i).setZero();
+    given(i, i) = otherwise(i, i);
+  }
   const double most = given.diagonal().maxCoeff(), least = given.diagonal().minCoeff();
-  if (most <= 0.0 || most >= kUnknownVariance || numbers[0] == -1.0) return std::nullopt;
   const Matrix6 even = (given + given.transpose()) / 2;
   const double smallest = Eigen::SelfAdjointEigenSolver<Matrix6>(even).eigenvalues().minCoeff();
   if (least < 0.0 || smallest < -1e-6 * most)
     return fail("covariance", "the covariance of its pose is none: not positive");
-  return std::optional(even);
+  return even;
 }
 
 }  // namespace
@@ -51,8 +58,11 @@ Result<void> PoseTrack::onOdometry(const ros::Odometry& message, TimePoint time,
                 "the orientation of odometry is no rotation: its quaternion is "
                 "not of length 1");
   }
-  const auto given = covarianceOf(message.pose.covariance);
-  if (!given) return tl::unexpected(given.error());
+  Matrix6 configured = Matrix6::Zero();
+  configured.diagonal().head<3>().setConstant(options_.sigma_position * options_.sigma_position);
+  configured.diagonal().tail<3>().setConstant(options_.sigma_rotation * options_.sigma_rotation);
+  const auto covariance = covarianceOf(message.pose.covariance, configured);
+  if (!covariance) return tl::unexpected(covariance.error());
   const RigidTransform T_W_child(Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized(),
                                  {p.x, p.y, p.z});
   Odometry one;
@@ -66,11 +76,7 @@ Result<void> PoseTrack::onOdometry(const ros::Odometry& message, TimePoint time,
   J.block<3, 3>(0, 3) = R.transpose();
   J.block<3, 3>(3, 0).setIdentity();
   J.block<3, 3>(3, 3) = -skew(T_W_child.q * T_child_body.p);
-  Matrix6 covariance = Matrix6::Zero();
-  covariance.diagonal().head<3>().setConstant(options_.sigma_position * options_.sigma_position);
-  covariance.diagonal().tail<3>().setConstant(options_.sigma_rotation * options_.sigma_rotation);
-  if (*given) covariance = **given;
-  one.covariance.topLeftCorner<6, 6>() = J * covariance * J.transpose();
+  one.covariance.topLeftCorner<6, 6>() = J * *covariance * J.transpose();
   one.covariance.diagonal().array() += 1e-12;
   constexpr double kSigmaSpeed = 0.2;  // m/s; the value is not critical
   one.covariance.bottomRightCorner<3, 3>().diagonal().array() += kSigmaSpeed * kSigmaSpeed;

@@ -12,7 +12,7 @@
 namespace perdure::ros2 {
 
 struct PoseTrackOptions {
-  /// Standard deviations (m, rad) for messages without a covariance.
+  /// Standard deviations (m, rad) for axes whose covariance is not in the message.
   double sigma_position = 0.05, sigma_rotation = 0.01;
   double jump_m = 3.0;
 };

@@ -5,6 +5,7 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
@@ -94,6 +95,21 @@ TEST(Subprocess, IsKilledWhereItTakesTooLong) {
   // The program has closed its output but still runs.
   const auto mute = runProgram({.command = {"sh", "-c", "exec sleep 100 > /dev/null 2>&1"}}, 50ms);
   EXPECT_TRUE(mute.too_late);
+}
+
+TEST(Subprocess, ASignalDoesNotExtendTheTimeLimit) {
+  struct sigaction noted {};
+  noted.sa_handler = [](int) {};
+  sigaction(SIGUSR1, &noted, nullptr);
+  const pthread_t self = pthread_self();
+  std::thread other([self] {
+    std::this_thread::sleep_for(50ms);
+    pthread_kill(self, SIGUSR1);
+  });
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_TRUE(runProgram({.command = {"sleep", "10"}}, 200ms).too_late);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, 5s);
+  other.join();
 }
 
 TEST(Subprocess, WaitsNoLongerThanItIsTold) {

@@ -226,6 +226,22 @@ TEST_F(JoinedTracks, TheRecordOfAnObjectIsThatOfItsNewestTrack) {
   EXPECT_EQ(state_.records().at(1).earlier->in_anchor.id, 2u);
 }
 
+/// The sensor clock restarts with the computer, so a later session can have smaller times.
+TEST(Records, TheNewerOfTwoEarlierSessionsIsThatWithTheLaterAnchor) {
+  MapState state = emptyMap();
+  state.follow({3, 0});
+  std::mt19937 random(5);
+  for (const TrackId id : {1, 2}) {
+    ObjectRecord record = detected(random, id == 1 ? 5000.0 : 10.0);
+    record.sighting.anchor = id == 1 ? 2 : 5;
+    record.session = kSessions[id - 1];
+    state.put(id, record);
+  }
+  state.unite({kOneLoop, 2, 1});
+  EXPECT_EQ(state.records().at(1).sighting.anchor, 5u);
+  EXPECT_EQ(state.records().at(1).earlier->anchor, 2u);
+}
+
 /// The first track was detected again on this visit before the second one was joined with it.
 TEST_F(JoinedTracks, TheEarlierSightingIsOfAnotherVisit) {
   MapState state = emptyMap();

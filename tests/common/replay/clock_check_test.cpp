@@ -49,7 +49,7 @@ TEST(ClockCheck, AClockThatWasSetForAllSensorsIsReadOnAndSaid) {
   const auto drive = readWith(setBy(-milliseconds(2003)), setBy(-milliseconds(2003)));
   EXPECT_THAT(finding(drive, DataFinding::Grade::kWarning, "clock_set"),
               HasSubstr("imu.csv, message 1001, images.csv, message 101: the clock was set back by "
-                        "2.003 s in mid-drive"));
+                        "2.003 s during the drive"));
   ASSERT_EQ(drive.frames.size(), 200U);
   EXPECT_EQ(drive.frames.back().time - drive.imu.back().time, -milliseconds(90));
 }
@@ -85,7 +85,7 @@ TEST(ClockCheck, AClockThatWasSetForOneSensorIsRefusedWithItsPlace) {
 TEST(ClockCheck, APauseOfBothSensorsIsNoFault) {
   const auto drive = readWith(setBy(seconds(60)), setBy(seconds(60)));
   EXPECT_THAT(finding(drive, DataFinding::Grade::kWarning, "clock_paused"),
-              HasSubstr("message 1001: nothing from the IMU for 60.01 s"));
+              HasSubstr("message 1001: no data of the IMU for 60.01 s"));
 }
 
 TEST(ClockCheck, AShortJumpAheadOfOneClockIsSaidAndLostImagesAreNot) {
@@ -96,7 +96,7 @@ TEST(ClockCheck, AShortJumpAheadOfOneClockIsSaidAndLostImagesAreNot) {
         << ms;
     const auto pause = finding(readWith(setBy(milliseconds(ms)), setBy(milliseconds(ms))),
                                DataFinding::Grade::kWarning, "clock_paused");
-    EXPECT_THAT(pause, HasSubstr("nothing from the IMU"));
+    EXPECT_THAT(pause, HasSubstr("no data of the IMU"));
     EXPECT_EQ(pause.ends_with("; vio starts again after it"), ms > 800) << pause;
     const auto lost = [&](Duration time) {  // repeated stamps are left out
       const bool inside = time >= seconds(110) && time < seconds(110) + milliseconds(ms);
@@ -115,9 +115,9 @@ TEST(ClockCheck, AClockOfAnotherRateIsSaidByTheDeclaredRatesOfBothSensors) {
     drive.calibration.cameras.emplace_back().rate_hz = images_hz;
     return finding(drive, DataFinding::Grade::kWarning, "declared_rates");
   };
-  EXPECT_THAT(warningOf(105.0, 10.5), HasSubstr("both 4.8 % less often than rate_hz says (10.5 and "
+  EXPECT_THAT(warningOf(105.0, 10.5), HasSubstr("both 4.8 % lower than rate_hz (10.5 and "
                                                 "105): their clock runs too fast"));
-  EXPECT_THAT(warningOf(95.0, 9.5), HasSubstr("5.3 % more often"));
+  EXPECT_THAT(warningOf(95.0, 9.5), HasSubstr("5.3 % higher"));
   EXPECT_EQ(warningOf(105.0, 10.0), "none");
   EXPECT_EQ(warningOf(101.0, 10.1), "none");
 }
@@ -151,7 +151,7 @@ TEST(ClockCheck, ACounterThatOneSensorDoesNotHaveIsContinuedInBoth) {
   for (const auto& drive : {readWith(round, round), readWith(round, whole)}) {
     EXPECT_THAT(finding(drive, DataFinding::Grade::kWarning, "clock_wrapped"),
                 HasSubstr("imu.csv, message 1001: the stamps of the IMU go back by 4294.957296 s: "
-                          "a counter of 32 bits of µs came round"));
+                          "a counter of 32 bits of µs wrapped"));
     EXPECT_EQ(drive.frames.back().time - drive.imu.back().time, -milliseconds(90));
   }
   const auto behind = [&](Duration time) { return time - seconds(90); };  // after the wrap only

@@ -128,7 +128,7 @@ TEST(DamagedFolder, AnIndexIsNoTime) {
   for (int i = 5; i < 20; ++i) list += std::to_string(i) + ",1050000000.png\n";
   writeText(root / "mav0/cam0/data.csv", list);
   EXPECT_THAT(textOf(root, "stamps_count"),
-              AllOf(HasSubstr("fatal the stamps of the images (0 … 19) count them")));
+              AllOf(HasSubstr("fatal the stamps of the images (0 … 19) are counts")));
   EXPECT_THAT(textOf(root, "clocks_apart"), IsEmpty());
 }
 

@@ -93,6 +93,23 @@ TEST(Dataset, AnImageOfAnotherSizeThanTheCalibrationsIsCounted) {
   EXPECT_EQ(dataset->reasons().of("image_size"), 1U);
 }
 
+/// The brightest image of the first camera is its last one, at an odd place among those of both.
+TEST(Dataset, TheScaleOfDeepImagesIsSampledFromEachCameraOfAStereoDrive) {
+  const auto root = tinyEuroc("deep_stereo", true);
+  for (const char* stamp : {"1000000000", "1050000000", "1100000000", "1150000000", "1200000000"}) {
+    const bool last = std::string(stamp) == "1200000000";
+    writeDeepImage(root / "mav0/cam0/data" / (std::string(stamp) + ".png"), 32, 24, last ? 14 : 10);
+  }
+  const auto dataset = Dataset::open({.path = root});
+  int brightest = 0;
+  while (const auto message = dataset->next()) {
+    const auto* frame = std::get_if<Frame>(&*message);
+    if (frame == nullptr || frame->camera != "cam0" || frame->stamp.sequence != 0) continue;
+    for (const auto byte : *frame->data) brightest = std::max(brightest, static_cast<int>(byte));
+  }
+  EXPECT_EQ(brightest, 16) << "all images have the scale of 14 bits";
+}
+
 TEST(Dataset, SamplesThatAreDecadesApartAreNoGap) {
   const auto root = tinyEuroc("decades");
   std::string text = "#timestamp [ns],w,w,w,a,a,a\n";

@@ -63,6 +63,12 @@ TEST_F(GraphAnswer, HoldsAnchorsWhereTheyLieInMAndHowWellThatIsKnown) {
   EXPECT_GE(objects, things_.size() / 2);
 }
 
+TEST_F(GraphAnswer, ABadQueryIsRefusedAsOneOfTheGraph) {
+  start();
+  EXPECT_THAT(graph(-1.0).error, HasSubstr("a graph query needs"));
+  EXPECT_THAT(graph(0.0, 0).error, HasSubstr("limit is 0; it must be at least 1"));
+}
+
 TEST_F(GraphAnswer, SaysOfALoopByWhichObjectsAndHowWellItFits) {
   start();
   driveToTheLoop();

@@ -41,8 +41,7 @@ TEST(Ros2PoseTrack, IsTheInverseOfWhatTheMirrorWrites) {
   pose.covariance = a * a.transpose();
   PoseTrack poses = track();
   ASSERT_TRUE(poses.onFrame({1, 4, at(10.0), 0}));
-  const auto taken =
-      poses.onOdometry(ros::odometryOf(pose, std::nullopt), at(10.0), {});
+  const auto taken = poses.onOdometry(ros::odometryOf(pose, std::nullopt), at(10.0), {});
   ASSERT_TRUE(taken) << taken.error().code;
   const Odometry back = poses.take().at(0);
   EXPECT_LT((back.T_WB.matrix() - pose.T_WB.matrix()).norm(), 1e-12);
@@ -93,6 +92,24 @@ TEST(Ros2PoseTrack, TakesItsOwnSigmasWhereTheMessageHasNone) {
   const Odometry told = poses.take().at(0);
   EXPECT_NEAR(told.covariance(0, 0), 0.0625, 1e-9);
   EXPECT_NEAR(told.covariance(3, 3), 0.25, 1e-9);
+}
+
+/// A robot in the plane has no estimate of z, roll and pitch.
+TEST(Ros2PoseTrack, TakesItsOwnSigmasForAxesWithUnknownVariances) {
+  PoseTrack poses({0.5, 0.25, 3.0}, {7, 0});
+  ros::Odometry m = odometryAt(0);
+  m.pose.covariance[0] = m.pose.covariance[7] = 0.01;
+  m.pose.covariance[1] = m.pose.covariance[6] = 0.005;
+  for (const std::size_t axis : {2, 3, 4}) m.pose.covariance[7 * axis] = 1e9;
+  m.pose.covariance[5 * 7] = 0.0004;
+  ASSERT_TRUE(poses.onFrame({1, 4, at(10.0), 0}));
+  ASSERT_TRUE(poses.onOdometry(m, at(10.0), {}));
+  const Odometry told = poses.take().at(0);
+  EXPECT_NEAR(told.covariance(3, 3), 0.01, 1e-9);
+  EXPECT_NEAR(told.covariance(3, 4), 0.005, 1e-9);
+  EXPECT_NEAR(told.covariance(5, 5), 0.25, 1e-9);
+  EXPECT_NEAR(told.covariance(0, 0), 0.0625, 1e-9);
+  EXPECT_NEAR(told.covariance(2, 2), 0.0004, 1e-9);
 }
 
 TEST(Ros2PoseTrack, AJumpBeginsANewEpochAndNoFrameIsPutAcrossIt) {

@@ -381,6 +381,15 @@ TEST(PoseCheck, ASpeedThatNothingHasIsToldWithoutAnImu) {
   EXPECT_THAT(codesIn(findingsOf(way, inUnit(way.poses, 1000.0))), ElementsAre("poses_too_fast"));
 }
 
+TEST(PoseCheck, AnOffsetAtTheEndOfTheSearchIsReportedAsALowerLimit) {
+  Poses late = phone().poses;
+  for (auto& pose : late) pose.time += std::chrono::milliseconds(2050);
+  const auto findings = findingsOf(phone(), late);
+  ASSERT_THAT(codesIn(findings), ElementsAre("poses_time_offset"));
+  EXPECT_THAT(findings[0].text, HasSubstr("turns at least 2.00 s before"));
+  EXPECT_THAT(findings[0].text, HasSubstr("of the poses and check again"));
+}
+
 TEST(PoseCheck, PosesOnAnotherClockAreToldByTheGyroscope) {
   Poses late = phone().poses;
   for (auto& pose : late) pose.time += std::chrono::milliseconds(400);

@@ -145,7 +145,8 @@ TEST_F(MapSource, TellsWhatTheGraphKnowsOfAnObject) {
   EXPECT_THAT(text, HasSubstr("on the visit before from anchor 1"));
   EXPECT_THAT(text, HasSubstr("recalled from the map 2 times"));
   EXPECT_THAT(text, HasSubstr("merged into it: 30"));
-  EXPECT_THAT(text, HasSubstr("loop 5 of anchors 1 and 3, by how objects lie: believed"));
+  EXPECT_THAT(text, HasSubstr("loop 5 of anchors 1 and 3, by positions of objects or "
+                              "landmarks: believed"));
   EXPECT_THAT(text, HasSubstr("loop 6 of anchors 1 and 2, by objects seen again under their ids: "
                               "not believed"));
   EXPECT_THAT(text, Not(HasSubstr("provisional")));

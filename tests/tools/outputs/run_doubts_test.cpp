@@ -66,8 +66,8 @@ TEST(Doubts, TheLastLineNamesWhatWouldElseBeSilent) {
   facts.findings.push_back({{}, "clock_set", "set back by 2 s"});
   facts.findings.push_back({{}, "time_offset", "not of this kind"});
   EXPECT_EQ(endOfLine(doubtsOfRun(facts)),
-            " | WARNING: no point of the image was of use at 90 of 240 frames; the map is empty "
-            "though 70 boxes came; stamps were changed");
+            " | WARNING: no image point could be used at 90 of 240 frames; the map is empty "
+            "although there are 70 boxes; stamps were changed");
   EXPECT_THAT(sentences(facts), Contains(HasSubstr("set back by 2 s")));
   for (const char* code : {"clock_paused", "poses_other_axes", "boxes_beyond", "lines_lost"}) {
     EXPECT_THAT(sentences({.frames = 9, .findings = {{{}, code, "the amount"}}}),

@@ -139,7 +139,7 @@ TEST(PipelineRefusal, DetectionsThatCountFromOneAreRefusedAndBoxesBeyondTheDrive
   EXPECT_THAT(endOf(options), testing::Pair(HasSubstr("1 … 41, those of the drive 0 … 40"), 65));
   writeText(options.detections, header + "0" + box + "40" + box + "60" + box);
   const Pipeline pipeline(options);
-  EXPECT_THAT(endOfLine(pipeline.doubts()), HasSubstr("boxes of other frames were left out"));
+  EXPECT_THAT(endOfLine(pipeline.doubts()), HasSubstr("boxes of other frames were not used"));
   EXPECT_THAT(pipeline.findings().back().text, HasSubstr("1 of 3 boxes"));
 }
 

@@ -91,7 +91,7 @@ void append(Findings& to, const Findings& more) { to.insert(to.end(), more.begin
 Findings checkBus(const bus::Options& options, double seconds) {
   Findings findings;
   if (const char* uri = std::getenv("CYCLONEDDS_URI"); uri != nullptr && *uri != '\0') {
-    findings.push_back({Verdict::kOk, "CYCLONEDDS_URI is set and goes before bus.interface"});
+    findings.push_back({Verdict::kOk, "CYCLONEDDS_URI is set and overrides bus.interface"});
   }
   try {
     const bus::Domain domain(options);

@@ -212,10 +212,12 @@ std::optional<DataFinding> otherAxes(const std::vector<Step>& steps, const Quate
           100.0 * (1.0 - left), axesText(R), sensor.else_see)};
 }
 
+constexpr double kMostLater_s = 2.0;  ///< largest time offset that is tried
+
 /// Returns the time in s to add to the poses' times, if it explains their rotations clearly better.
 std::optional<double> betterTime(const std::vector<StampedPose>& poses, const TurnIntegral& gyro,
                                  const CameraCalibration& camera, const Limits& limits) {
-  constexpr double kStep_s = 0.3, kMost_s = 2.0, kEach_s = 0.02, kShown = 0.2, kClearly = 3.0;
+  constexpr double kStep_s = 0.3, kEach_s = 0.02, kShown = 0.2, kClearly = 3.0;
   const auto leftAt = [&](double later) {
     const auto steps = stepsOf(poses, gyro, kStep_s, camera.time_offset_s + later);
     if (steps.size() < limits.fewest) return 1.0;
@@ -226,7 +228,7 @@ std::optional<double> betterTime(const std::vector<StampedPose>& poses, const Tu
   if (now < kShown) return std::nullopt;
   double best = std::min(limits.explained, now / kClearly);
   std::optional<double> offset;
-  const int most = static_cast<int>(std::lround(kMost_s / kEach_s));
+  const int most = static_cast<int>(std::lround(kMostLater_s / kEach_s));
   for (int i = -most; i <= most; ++i) {
     const double left = leftAt(kEach_s * i);
     if (left < best) best = left, offset = kEach_s * i;
@@ -243,8 +245,7 @@ struct GrowingOffset {
 std::optional<GrowingOffset> growingOffset(const std::vector<StampedPose>& poses,
                                            const TurnIntegral& gyro,
                                            const CameraCalibration& camera, const Limits& limits) {
-  constexpr double kStep_s = 0.3, kMost_s = 2.0, kEach_s = 0.02, kGrows_s = 0.1, kClearly = 3.0,
-                   kShown = 0.02;
+  constexpr double kStep_s = 0.3, kEach_s = 0.02, kGrows_s = 0.1, kClearly = 3.0, kShown = 0.02;
   if (poses.size() < 6) return std::nullopt;
   const auto leftAt = [&](const std::vector<StampedPose>& some, double later) {
     const auto steps = stepsOf(some, gyro, kStep_s, camera.time_offset_s + later);
@@ -257,7 +258,7 @@ std::optional<GrowingOffset> growingOffset(const std::vector<StampedPose>& poses
   const std::array thirds{std::vector<StampedPose>(poses.begin(), poses.begin() + third),
                           std::vector<StampedPose>(poses.end() - third, poses.end())};
   std::array<double, 2> offset{}, left{};
-  const int most = static_cast<int>(std::lround(kMost_s / kEach_s));
+  const int most = static_cast<int>(std::lround(kMostLater_s / kEach_s));
   for (std::size_t k = 0; k < thirds.size(); ++k) {
     left[k] = 1.0;
     for (int i = -most; i <= most; ++i) {
@@ -339,12 +340,14 @@ DataFindings judgePosesByGyro(const std::vector<StampedPose>& poses,
   }
   if (const auto later = betterTime(poses, gyro, camera, kLimits)) {
     if (std::abs(*later) < 0.1) return {};
+    const bool may_be_more = std::abs(*later) >= kMostLater_s;
     return {{Grade::kWarning, "poses_time_offset",
-             fmt::format("the gyroscope turns {:.2f} s {} the poses that are given: {} {:.2f} s {} "
-                         "the times of the poses, or see which frame each of them is of",
-                         std::abs(*later), *later < 0 ? "before" : "after",
-                         *later < 0 ? "subtract" : "add", std::abs(*later),
-                         *later < 0 ? "from" : "to")}};
+             fmt::format(
+                 "the gyroscope turns {}{:.2f} s {} the poses that are given: {} {:.2f} s {} "
+                 "the times of the poses{}, or see which frame each of them is of",
+                 may_be_more ? "at least " : "", std::abs(*later), *later < 0 ? "before" : "after",
+                 *later < 0 ? "subtract" : "add", std::abs(*later), *later < 0 ? "from" : "to",
+                 may_be_more ? " and check again" : "")}};
   }
   for (const auto& steps : all) {
     if (auto finding = otherAxes(steps, q_BC, kLimits, kGyro)) return {*finding};

@@ -6,8 +6,8 @@ namespace perdure::inference {
 namespace {
 
 constexpr std::size_t kMaxModels = 256;
-constexpr float kSure = 2.0F;       // nats against clutter; a class with more is certain
-constexpr double kSameThing = 0.3;  // least IoU of boxes of the same object
+constexpr float kSure = 2.0F;        // nats against clutter; a class with more is certain
+constexpr double kSameObject = 0.3;  // least IoU of boxes of the same object
 constexpr std::size_t kFlood = 10;
 
 /// Returns the index of the most probable class if the box is certain.
@@ -24,7 +24,7 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
 
 bool hasBoxAt(const Detections& list, const Box& box) {
   return std::any_of(list.detections.begin(), list.detections.end(), [&](const Detection& d) {
-    return !d.primed && intersectionOverUnion(d.box, box) >= kSameThing;
+    return !d.primed && intersectionOverUnion(d.box, box) >= kSameObject;
   });
 }
 
@@ -75,29 +75,29 @@ std::optional<Reason> Judge::complaint() const {
   }
   const auto text = [](std::size_t n) { return std::to_string(n); };
   if (untold >= kEnough) {
-    return Reason{"unknown_model", "its detections are of a model that it never published"};
+    return Reason{"unknown_model", "it has not published the model of its detections"};
   }
   if (with_sure >= kEnough && 10 * empty >= 9 * with_sure) {
-    return Reason{"empty", text(empty) + " of " + text(with_sure) +
-                               " frames are empty in which the other is sure of " + text(sum.sure) +
-                               " things"};
+    return Reason{"empty", "no boxes in " + text(empty) + " of " + text(with_sure) +
+                               " frames, in which the old network detects " + text(sum.sure) +
+                               " certain objects"};
   }
   if (with_sure >= kEnough && 10 * sum.found < sum.sure) {
-    return Reason{"elsewhere", "of " + text(sum.sure) +
-                                   " things that the other is sure of it has " + text(sum.found)};
+    return Reason{"elsewhere", "it detects " + text(sum.found) + " of " + text(sum.sure) +
+                                   " certain objects of the old network"};
   }
   if (with_any >= kEnough && sum.newcomer >= kFlood * sum.elder) {
     return Reason{"flood", text(sum.newcomer) + " boxes in " + text(with_any) +
-                               " frames where the other has " + text(sum.elder)};
+                               " frames in which the old network has " + text(sum.elder)};
   }
   return std::nullopt;
 }
 
 std::string Judge::summary() const {
   std::string text = std::to_string(frames_) + " frames";
-  if (sure_ == 0) return text + "; nothing in them to compare by";
+  if (sure_ == 0) return text + "; no certain objects to compare";
   return text + "; " + std::to_string(100 * found_ / sure_) + " % of " + std::to_string(sure_) +
-         " sure things found";
+         " certain objects detected";
 }
 
 }  // namespace perdure::inference

@@ -31,8 +31,8 @@ class Judge {
   void reset();
 
   std::size_t frames() const { return frames_; }
-  /// Returns a text such as "450 frames; 97 % of 1200 sure things found", counted since the last
-  /// reset().
+  /// Returns a text such as "450 frames; 97 % of 1200 certain objects detected", counted since the
+  /// last reset().
   std::string summary() const;
 
  private:

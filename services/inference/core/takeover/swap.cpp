@@ -226,6 +226,7 @@ void Swap::tick(Time now) {
   if (watch_ && now > watch_->until) {
     watch_.reset();
     message_ = "stands by";
+    reasons_.add("swap_no_last_notice");
   }
 }
 

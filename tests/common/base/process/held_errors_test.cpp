@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <iostream>
 
 namespace perdure {
@@ -16,6 +17,16 @@ TEST(HeldErrors, PassOnWhatIsWorthItAndEndWithTheirLife) {
   }
   std::cerr << "dull no more\n";
   EXPECT_EQ(::testing::internal::GetCapturedStderr(), "worse\ndull no more\n");
+}
+
+TEST(HeldErrors, PrintALineBeforeTheProcessAborts) {
+  EXPECT_DEATH(
+      {
+        const HeldErrors held([](const std::string&) { return true; });
+        std::cerr << "the cause\n";
+        std::abort();
+      },
+      "the cause");
 }
 
 }  // namespace

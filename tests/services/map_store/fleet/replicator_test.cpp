@@ -7,6 +7,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
+#include <thread>
 #include <utility>
 
 #include "common/base/check.h"
@@ -102,6 +104,24 @@ TEST(FleetReplicator, WhatTheServerHasLeavesTheOutbox) {
   vehicle.fleet().wake();
   ASSERT_TRUE(vehicle.fleet().finish(kLong));
   EXPECT_EQ(vehicle.fleet().progress().rows, rows);
+}
+
+TEST(FleetReplicator, AWakeWithoutChangesDoesNotCountInTheLatencyOfTheNextOne) {
+  auto* server = PERDURE_SERVER_OR_SKIP();
+  const TemporaryFolder folder;
+  const std::string url = server->makeDatabase(), file = folder.file("map.sqlite");
+  Vehicle vehicle(configOf(file, url), quick());
+  vehicle.step(1);
+  ASSERT_TRUE(vehicle.fleet().finish(kLong)) << vehicle.fleet().progress().trouble;
+  vehicle.fleet().wake();
+  ASSERT_TRUE(vehicle.fleet().finish(kLong));
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  const auto stepped = std::chrono::steady_clock::now();
+  vehicle.step(2);
+  ASSERT_TRUE(vehicle.fleet().finish(kLong));
+  const auto done = std::chrono::steady_clock::now();
+  EXPECT_LE(vehicle.fleet().progress().latency_s,
+            std::chrono::duration<double>(done - stepped).count());
 }
 
 TEST(FleetReplicator, TwoVehiclesWithTheSameIdsStayApart) {

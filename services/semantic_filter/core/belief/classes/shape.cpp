@@ -12,7 +12,7 @@ struct Corner {
 
 Shape shapeOf(const std::vector<Corner>& corners) {
   const auto n = static_cast<Eigen::Index>(corners.size());
-  check(n <= Shape::kMostCorners, "a shape has no more than so many levels");
+  check(n <= Shape::kMostCorners, "a shape has at most kMostCorners corners");
   check(n % 4 == 0, "a level has four corners or eight");
   Shape shape;
   for (auto* axis : {&shape.along, &shape.across, &shape.up, &shape.forward}) axis->resize(n);

@@ -25,7 +25,7 @@ TEST(Judge, AsksForNonsenseOnlyWhereThereIsEnoughToCompare) {
     judge.compare(listOf(kOld, i, kStreet), listOf(kNew, i, {boxAt(21, 0.1F)}));
     EXPECT_FALSE(judge.complaint());
   }
-  EXPECT_EQ(judge.summary(), "50 frames; 50 % of 100 sure things found");
+  EXPECT_EQ(judge.summary(), "50 frames; 50 % of 100 certain objects detected");
 }
 
 TEST(Judge, AnswersToPredictionsAreNoSight) {

@@ -285,6 +285,13 @@ TEST(Swap, APassOfOneThatIsNotHeardRetiresNobody) {
   EXPECT_EQ(bus.elder().swap.reasons().of("swap_passed_unheard"), 1u);
 }
 
+TEST(Swap, ANewcomerWithoutALastNoticeIsCounted) {
+  Bus bus;
+  bus.runUntilTakenOver();
+  bus.elder().swap.tick(bus.now + std::chrono::minutes(1));
+  EXPECT_EQ(bus.elder().swap.reasons().of("swap_no_last_notice"), 1u);
+}
+
 TEST(Swap, WhatASpareSaysWhileReadersLearnOfItIsSaidAgain) {
   Swap spare({kNew, "spare", 0.0, kShortLease});
   Swap::Time now{std::chrono::hours(1)};
