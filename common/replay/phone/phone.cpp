@@ -4,10 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 
 #include "common/base/algorithms/median.h"
 #include "common/base/errors.h"
+#include "common/replay/files/rig_file.h"
 #include "common/replay/files/stamps.h"
 #include "common/replay/phone/parts.h"
 
@@ -136,7 +136,7 @@ Recording readPhone(const DatasetOptions& options) {
   phone::dropPausesOfAccel(recording);
   phone::joinImu(parts, recording);
   recording.calibration.imu = phone::usualNoise(recording.imu);
-  if (options.rig.empty()) {
+  if (options.rig.empty() || !readRig(options.rig).imu) {
     recording.notes.push_back(parts.where +
                               ": the noise of the inertial unit is not in the recording, and that "
                               "of usual phones is taken; imu0 in a rig file sets it");

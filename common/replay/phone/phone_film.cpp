@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <memory>
-#include <utility>
 
 #include "common/base/algorithms/folder.h"
 #include "common/base/algorithms/median.h"
@@ -47,75 +46,50 @@ Result<Frame> loadFrame(Film& film, std::size_t index, std::optional<ImageEncodi
   return frame;
 }
 
-/// How a list of stamps and a film with another number of frames belong together: frame i of the
-/// film has entry i + shift.
-struct Match {
-  std::ptrdiff_t shift = 0;
-  Duration apart{0};  ///< median distance of the film's times from those of the list
-};
-
-/// The distance of the film's times from the listed ones, after the first of both is subtracted.
-Duration distanceAt(std::ptrdiff_t shift, const std::vector<ListedFrame>& frames,
-                    const std::vector<Duration>& film) {
+/// The median distance of the film's times from the listed ones, apart from their start.
+Duration distanceOf(const std::vector<ListedFrame>& frames, const std::vector<Duration>& film) {
   std::vector<Duration> offsets;
   for (const ListedFrame& frame : frames) {
-    const auto i = static_cast<std::ptrdiff_t>(frame.number) - shift;
-    if (i < 0 || i >= std::ssize(film)) continue;
-    offsets.push_back(frame.time.time_since_epoch() - film[static_cast<std::size_t>(i)]);
+    if (frame.number < film.size()) {
+      offsets.push_back(between(frame.time, TimePoint(film[frame.number])));
+    }
   }
   const Duration middle = medianOf(offsets);
   for (Duration& offset : offsets) offset = std::chrono::abs(offset - middle);
   return medianOf(std::move(offsets));
 }
 
-/// Finds the shift by which the times agree best. A recorder begins film and list together, so that
-/// the end of one of them is missing, unless another shift agrees clearly better.
-Match matchOf(const PhoneCamera& camera, const std::vector<Duration>& film) {
-  constexpr int kClearly = 3;
-  const std::ptrdiff_t more = std::ssize(film) - static_cast<std::ptrdiff_t>(camera.listed);
-  Match best{0, distanceAt(0, camera.frames, film)};
-  const Duration at_start = best.apart;
-  for (std::ptrdiff_t shift = std::min<std::ptrdiff_t>(0, -more);
-       shift <= std::max<std::ptrdiff_t>(0, -more); ++shift) {
-    const Duration apart = distanceAt(shift, camera.frames, film);
-    if (kClearly * apart < at_start && apart < best.apart) best = {shift, apart};
-  }
-  return best;
-}
-
-/// Refuses a film and a list that cannot be of one recording, and notes smaller differences.
-void reportMatch(const PhoneCamera& camera, const Match& match, std::size_t in_film,
-                 Recording& recording) {
+/// Refuses a film and a list that cannot be of one recording. Recorders begin both together, so
+/// that the end of one of them is missing if their lengths differ a little.
+void checkLengths(const PhoneCamera& camera, std::size_t in_film, Recording& recording) {
   constexpr std::size_t kMost = 10;  // one frame in this number may be missing
   const std::size_t listed = camera.listed;
   const std::size_t lost = in_film < listed ? listed - in_film : in_film - listed;
   if (lost == 0) return;
   if (kMost * lost > listed) {
     throw StartupError(ExitCode::kData,
-                       "{} has {} frames, its list of stamps {}: they are not of one recording, or "
+                       "{} has {} frames, its list {} stamps: they are not of one recording, or "
                        "one of them was cut; copy both again",
                        camera.film.string(), in_film, listed);
   }
-  recording.reasons.add(in_film < listed ? "frame_not_in_film" : "frame_unlisted", lost);
-  const bool at_end = match.shift == 0, at_start = std::cmp_equal(std::abs(match.shift), lost);
+  recording.reasons.add(in_film < listed ? "frame_not_in_film" : "frame_without_stamp", lost);
   recording.notes.push_back(fmt::format(
-      "{} has {} frames, its list {} stamps; {} {} at the {} are left out", camera.film.string(),
-      in_film, listed, lost, in_film < listed ? "stamps" : "frames",
-      at_end ? "end" : (at_start ? "start" : "start and the end")));
+      "{} has {} frames, its list {} stamps; {} {} at the end are left out", camera.film.string(),
+      in_film, listed, lost, in_film < listed ? "stamps" : "frames"));
 }
 
 /// Notes that the film was converted or lost frames, if its own times contradict the list.
-void noteApart(const PhoneCamera& camera, const Match& match, const std::vector<Duration>& film,
-               Recording& recording) {
+void checkTimes(const PhoneCamera& camera, const std::vector<Duration>& film,
+                Recording& recording) {
   std::vector<Duration> intervals;
   for (std::size_t i = 1; i < film.size(); ++i) intervals.push_back(film[i] - film[i - 1]);
-  const Duration usual = medianOf(std::move(intervals));
-  if (2 * match.apart <= usual) return;
+  const Duration apart = distanceOf(camera.frames, film);
+  if (apart <= medianOf(std::move(intervals)) / 2) return;
   recording.notes.push_back(
       fmt::format("{}: the times in the film differ from its list of stamps by {:.0f} ms (median), "
                   "and those of the list are taken: the film was converted, or frames were lost "
                   "inside of it",
-                  camera.film.string(), 1e3 * toSeconds(match.apart)));
+                  camera.film.string(), 1e3 * toSeconds(apart)));
 }
 
 /// The frames as the film has them, from its start.
@@ -131,9 +105,8 @@ void addFilm(const PhoneCamera& given, std::size_t index, const std::shared_ptr<
              std::optional<ImageEncoding> encoding, Recording& recording) {
   const auto& times = film->times();
   const PhoneCamera camera = given.frames.empty() ? listedByFilm(given, times) : given;
-  const Match match = matchOf(camera, times);
-  reportMatch(camera, match, times.size(), recording);
-  noteApart(camera, match, times, recording);
+  checkLengths(camera, times.size(), recording);
+  checkTimes(camera, times, recording);
   if (film->rotation_deg() != 0) {
     recording.notes.push_back(
         fmt::format("{} is to be shown turned by {}°; it is read as the sensor gave it, as lens "
@@ -142,15 +115,14 @@ void addFilm(const PhoneCamera& given, std::size_t index, const std::shared_ptr<
   }
   const std::vector<Recording::FrameFile> first = recording.frames;
   for (const ListedFrame& listed : camera.frames) {
-    const auto i = static_cast<std::ptrdiff_t>(listed.number) - match.shift;
-    if (i < 0 || i >= std::ssize(times)) continue;
-    const auto at = static_cast<std::size_t>(i);
+    const std::size_t at = listed.number;
+    if (at >= times.size()) continue;
     Recording::FrameFile frame{listed.time, at, index, {}};
     frame.load = [film, at, encoding] { return loadFrame(*film, at, encoding); };
     if (index > 0 && !pairWith(first, frame, recording)) continue;
     recording.frames.push_back(std::move(frame));
   }
-  if (index == 0) recording.frame_count = times.size();
+  if (index == 0) recording.frame_count = std::min(camera.listed, times.size());
 }
 
 void addImages(const PhoneCamera& camera, std::size_t index, Recording& recording) {

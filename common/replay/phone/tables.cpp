@@ -189,7 +189,11 @@ StampColumn stampOf(const fs::path& file) {
   std::string line;
   std::getline(lines, line);
   const Texts fields = fieldsOf(trim(line));
-  return {.last = !fields.empty() && !parseInteger(fields.front())};
+  if (fields.empty()) return {};
+  const auto sizeOf = [](std::string_view field) {
+    return std::abs(parseNumber(field).value_or(0.0));
+  };
+  return {.last = sizeOf(fields.back()) > sizeOf(fields.front())};  // stamps are large
 }
 
 /// The one table of a kind that belongs to the recording NAME.

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-#include <numeric>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
 
 #include "tests/common/replay/tiny_datasets.h"
@@ -26,6 +26,18 @@ std::vector<std::int64_t> stampsEach(std::int64_t step_ns) {
   return stamps;
 }
 
+constexpr std::size_t kBits = 6, kStripe = 10;
+
+/// Stripes that are white for the bits of a number, on dark grey.
+cv::Mat pictureOf(int number) {
+  cv::Mat grey(48, 64, CV_8UC1, cv::Scalar(40));
+  for (int bit = 0; bit < static_cast<int>(kBits); ++bit) {
+    constexpr int kWide = kStripe;
+    if ((number >> bit & 1) != 0) grey.colRange(kWide * bit, kWide * (bit + 1)) = cv::Scalar(220);
+  }
+  return grey;
+}
+
 /// A line of x, y, z in a format of three numbers.
 std::string text(const char* format, const Eigen::Vector3d& v) {
   return fmt::format(fmt::runtime(format), v.x(), v.y(), v.z());
@@ -36,25 +48,35 @@ std::string text(const char* format, const Eigen::Vector3d& v) {
 void writeFilm(const fs::path& file, int frames, const std::string& codec) {
   fs::create_directories(file.parent_path());
   const cv::Size size(64, 48);
-  cv::VideoWriter writer(file.string(),
-                         cv::VideoWriter::fourcc(codec[0], codec[1], codec[2], codec[3]), 20.0,
-                         size);
+  cv::VideoWriter writer(
+      file.string(), cv::VideoWriter::fourcc(codec[0], codec[1], codec[2], codec[3]), 20.0, size);
   for (int i = 0; i < frames; ++i) {
-    writer.write(cv::Mat(size, CV_8UC3, cv::Scalar::all(20 + 5 * i)));
+    cv::Mat colour;
+    cv::merge(std::vector<cv::Mat>(3, pictureOf(i)), colour);
+    writer.write(colour);
   }
 }
 
+void writePicture(const fs::path& file, int number) {
+  fs::create_directories(file.parent_path());
+  cv::imwrite(file.string(), pictureOf(number));
+}
+
 int numberOf(const Frame& frame) {
-  const double sum = std::accumulate(frame.data->begin(), frame.data->end(), 0.0);
-  return static_cast<int>(
-      std::lround((sum / static_cast<double>(frame.data->size()) - 20.0) / 5.0));
+  const std::size_t channels = channelsOf(frame.encoding);
+  int number = 0;
+  for (std::size_t bit = 0; bit < kBits; ++bit) {
+    const std::size_t middle = (frame.height / 2 * frame.width + kStripe * bit + kStripe / 2);
+    if ((*frame.data)[channels * middle] > 128) number |= 1 << bit;
+  }
+  return number;
 }
 
 void turnFilm(const fs::path& file) {
   std::string bytes = readText(file);
   const std::size_t matrix = bytes.find("tkhd") + 44;  // of ISO 14496-12, version 0
-  const unsigned char quarter[36] = {0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 255, 255, 0, 0, 0, 0,
-                                     0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,   0,   64};
+  const unsigned char quarter[36] = {0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 255, 255, 0, 0, 0,
+                                     0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,   0,   0, 64};
   bytes.replace(matrix, sizeof quarter, reinterpret_cast<const char*>(quarter), sizeof quarter);
   writeText(file, bytes);
 }
@@ -77,8 +99,8 @@ fs::path tinyMars(const std::string& name, int frames) {
                        text("{}, {}, {}", forceAt(ns)), 1'700'000'000'000 + ns / 1'000'000);
   }
   writeText(folder / "gyro_accel.csv", imu);
-  std::string list = "Frame timestamp[nanosec],Unix time[nanosec]\n", metadata =
-      "Timestamp[nanosec],fx[px],fy[px],Frame No.,Exposure time[nanosec]\n";
+  std::string list = "Frame timestamp[nanosec],Unix time[nanosec]\n",
+              metadata = "Timestamp[nanosec],fx[px],fy[px],Frame No.,Exposure time[nanosec]\n";
   for (int i = 0; i < kFilmFrames; ++i) {
     list += fmt::format("{},1\n", frameStamp(i));
     if (i % 4 != 0) metadata += fmt::format("{},{},51,{},10000000\n", frameStamp(i), 50 + i % 2, i);
@@ -116,8 +138,7 @@ fs::path tinyRecords(const std::string& name) {
   std::string frames, samples;
   for (int i = 0; i < kFilmFrames; ++i) {
     const std::string image = fmt::format("frame_{:06}.png", i + 1);
-    fs::create_directories(folder / "images");
-    writeGrey(folder / "images" / image, 64, 48, 20 + 5 * i);
+    writePicture(folder / "images" / image, i);
     frames += fmt::format(
         "{{\n  \"fileName\": \"{}\",\n  \"frameNumber\": {},\n  \"timestamp\": {}\n}}\n", image,
         i + 1, frameStamp(i));
@@ -161,7 +182,8 @@ fs::path tinySensorLogger(const std::string& name) {
   };
   const Eigen::Vector3d up(0.0, kG, 0.0);
   for (const auto ns : gyroStamps()) gyro += line(ns, kTurn);
-  for (const auto ns : accelStamps()) motion += line(ns, up - forceAt(ns)), gravity += line(ns, -up);
+  for (const auto ns : accelStamps())
+    motion += line(ns, up - forceAt(ns)), gravity += line(ns, -up);
   writeText(folder / "Gyroscope.csv", gyro);
   writeText(folder / "Accelerometer.csv", motion);
   writeText(folder / "Gravity.csv", gravity);
@@ -179,8 +201,8 @@ fs::path tinyIosLogger(const std::string& name) {
     gyro += fmt::format("{},{}\n", seconds(ns), text("{},{},{}", kTurn));
   }
   for (const auto ns : accelStamps()) {
-    accel += fmt::format("{},{}\n", seconds(ns),
-                         text("{:.12f},{:.12f},{:.12f}", -forceAt(ns) / kG));
+    accel +=
+        fmt::format("{},{}\n", seconds(ns), text("{:.12f},{:.12f},{:.12f}", -forceAt(ns) / kG));
   }
   for (int i = 0; i < kFilmFrames; ++i) {
     list += fmt::format("{},{},50.5,50.5,31.5,23.5\n", seconds(frameStamp(i)), i);

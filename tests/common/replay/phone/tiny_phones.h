@@ -12,10 +12,12 @@ namespace perdure::replay {
 
 inline constexpr int kFilmFrames = 40;  ///< at 20 Hz from 1 s
 
-/// Writes a film of 64×48 pixels; frame i has the grey value 20 + 5 i.
+/// Writes a film of 64×48 pixels, whose frames show their numbers.
 void writeFilm(const std::filesystem::path& file, int frames = kFilmFrames,
                const std::string& codec = "mp4v");
-/// The number of a frame of writeFilm(), by its brightness.
+/// Writes an image like frame `number` of a film.
+void writePicture(const std::filesystem::path& file, int number);
+/// The number that a frame shows.
 int numberOf(const Frame& frame);
 /// Declares in an MP4 that its frames are to be turned clockwise by 90°.
 void turnFilm(const std::filesystem::path& file);
