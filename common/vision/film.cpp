@@ -32,9 +32,21 @@ std::string errorText(int code) {
   return text;
 }
 
-int rotationOf(const AVStream& stream) {
-  const auto* matrix = reinterpret_cast<const std::int32_t*>(
+/// The matrix by which players turn the pictures; null if there is none.
+const std::int32_t* displayMatrix(const AVStream& stream) {
+#if LIBAVCODEC_VERSION_MAJOR >= 61  // of Debian 13
+  const AVPacketSideData* data =
+      av_packet_side_data_get(stream.codecpar->coded_side_data, stream.codecpar->nb_coded_side_data,
+                              AV_PKT_DATA_DISPLAYMATRIX);
+  return data == nullptr ? nullptr : reinterpret_cast<const std::int32_t*>(data->data);
+#else
+  return reinterpret_cast<const std::int32_t*>(
       av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr));
+#endif
+}
+
+int rotationOf(const AVStream& stream) {
+  const std::int32_t* matrix = displayMatrix(stream);
   if (matrix == nullptr) return 0;
   const double counter_clockwise = av_display_rotation_get(matrix);
   if (!std::isfinite(counter_clockwise)) return 0;

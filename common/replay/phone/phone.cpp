@@ -33,7 +33,7 @@ std::optional<Eigen::Vector3d> valueAt(const Stream& stream, TimePoint time, Dur
   const Duration gap = between(after->time, before.time);
   if (gap > widest) return std::nullopt;
   const double share = toSeconds(between(time, before.time)) / toSeconds(gap);
-  return before.value + share * (after->value - before.value);
+  return (1.0 - share) * before.value + share * after->value;
 }
 
 namespace {
@@ -66,7 +66,7 @@ void joinImu(const Parts& parts, Recording& recording) {
   const Duration widest = widestOf(parts.accel);
   for (const Reading& gyro : parts.gyro) {
     const auto accel = valueAt(parts.accel, gyro.time, widest);
-    if (!accel) continue;
+    if (!accel || !accel->allFinite() || !gyro.value.allFinite()) continue;
     ImuSample sample;
     sample.time = gyro.time, sample.sequence = recording.imu.size();
     sample.gyro = gyro.value, sample.accel = *accel;

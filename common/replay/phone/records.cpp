@@ -233,7 +233,9 @@ class SpectacularReader {
     const Json& frames = valueOf(record, {"frames"});
     if (!sensor.is_object() && !frames.is_array()) return {};  // GNSS, poses, metadata
     const auto seconds = numberOf(valueOf(record, {"time"}));
-    if (!seconds || std::abs(*seconds) > 9e9) return "`time` is missing or no number of seconds";
+    constexpr double kMost_s = 4e9;  // the year 2096
+    if (!seconds || std::abs(*seconds) > kMost_s)
+      return "`time` is missing or no number of seconds";
     const TimePoint time(durationFromSeconds(*seconds));
     return sensor.is_object() ? takeSensor(sensor, time) : takeFrames(frames, time);
   }

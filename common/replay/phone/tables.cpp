@@ -322,8 +322,10 @@ Stream readForce(const fs::path& folder, Recording& recording) {
 
 /// The time in a file's name, in milliseconds since 1970.
 std::optional<TimePoint> timeInName(const fs::path& file) {
+  constexpr std::int64_t kMost_ms = 4'000'000'000'000;  // the year 2096
   const auto ms = parseInteger(file.stem().string());
-  return ms ? std::optional(fromNanoseconds(*ms * 1'000'000)) : std::nullopt;
+  if (!ms || *ms < 0 || *ms > kMost_ms) return std::nullopt;
+  return fromNanoseconds(*ms * 1'000'000);
 }
 
 PhoneCamera cameraOfSensorLogger(const fs::path& folder, Recording& recording) {
