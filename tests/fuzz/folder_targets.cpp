@@ -192,11 +192,11 @@ std::vector<Target> folderTargets() {
     };
   };
   return {
-      {"mars", 600, whole(marsFolder, kMarsFiles), phone(marsFolder, kMarsFiles)},
-      {"spectacular", 600, whole(spectacularFolder, kSpectacularFiles),
+      {"mars", 300, whole(marsFolder, kMarsFiles), phone(marsFolder, kMarsFiles)},
+      {"spectacular", 300, whole(spectacularFolder, kSpectacularFiles),
        phone(spectacularFolder, kSpectacularFiles)},
-      {"sensor_records", 600, whole(recordFolder, kRecordFiles), phone(recordFolder, kRecordFiles)},
-      {"sensor_logger", 600, whole(sensorLoggerFolder, kSensorLoggerFiles),
+      {"sensor_records", 300, whole(recordFolder, kRecordFiles), phone(recordFolder, kRecordFiles)},
+      {"sensor_logger", 300, whole(sensorLoggerFolder, kSensorLoggerFiles),
        phone(sensorLoggerFolder, kSensorLoggerFiles)},
       {"euroc", 2400, whole(eurocFolder, kEurocFiles), euroc},
       {"kitti_raw", 2400, whole(rawFolder, kRawFiles), raw},

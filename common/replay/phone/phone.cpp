@@ -95,9 +95,9 @@ void dropPausesOfAccel(Recording& recording) {
   });
 }
 
-/// Noise of the IMU, which no phone records. Data sheets of phones' sensors (BMI160, LSM6DSO) have
-/// 0.12 mrad/s/√Hz and 1.5 mm/s²/√Hz. In phones their axes, temperature and vibration add to it, so
-/// that filters need about four times as much.
+/// Noise of the IMU, which no phone records. The values are assumed, not estimated: larger than
+/// those of the sensors' data sheets, because errors of scale, temperature and vibration add to
+/// them.
 ImuCalibration usualNoise(const std::vector<ImuSample>& samples) {
   ImuCalibration imu;
   imu.gyro_noise = 5e-4, imu.gyro_bias_walk = 2e-5;

@@ -257,7 +257,7 @@ TEST(Phone, UnitsInTheHeadAreConverted) {
   const auto folder = tinyMars("units");
   replaceAll(folder / "gyro_accel.csv", "gx[rad/s]", "gx[deg/s]");
   replaceAll(folder / "gyro_accel.csv", "ax[m/s^2]", "ax[g]");
-  const auto& first = openPhone(folder)->recording().imu.front();
+  const ImuSample first = openPhone(folder)->recording().imu.front();
   EXPECT_TRUE(first.gyro.isApprox(kTurn * M_PI / 180.0, 1e-9));
   EXPECT_TRUE(first.accel.isApprox(9.80665 * forceAt(900'000'000), 1e-9));
 }
