@@ -193,6 +193,7 @@ using Kind = ClockChange::Kind;
 const char* nameOfSensor(const std::string& sensor) {
   if (sensor == "imu") return "the IMU";
   if (sensor == "frame") return "the images";
+  if (sensor == "accel") return "the accelerometer";
   return sensor == "stereo" ? "cam1" : sensor == "speed" ? "the speed" : "the ground truth";
 }
 
@@ -233,7 +234,7 @@ bool isAlike(const ClockChange& change, const ClockChange& imu) {
 
 void settleSet(Recording& recording) {
   const auto of_imu = changesOf(recording, "imu", Kind::kSet);
-  for (const std::string sensor : {"frame", "stereo", "speed", "truth"}) {
+  for (const std::string sensor : {"frame", "stereo", "speed", "truth", "accel"}) {
     const auto of_sensor = changesOf(recording, sensor, Kind::kSet);
     if (!std::equal(of_sensor.begin(), of_sensor.end(), of_imu.begin(), of_imu.end(),
                     [](const auto* one, const auto* imu) { return isAlike(*one, *imu); })) {

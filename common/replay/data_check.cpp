@@ -78,6 +78,7 @@ void addForceUnit(const std::vector<ImuSample>& samples, double force, DataFindi
 void checkUpright(const Recording& recording, DataFindings& findings) {
   if (recording.imu.size() < 20 || recording.calibration.cameras.empty()) return;
   const CameraCalibration& camera = recording.calibration.cameras.front();
+  if (camera.fx <= 0.0) return;  // the pose is not known either
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const ImuSample& sample : recording.imu) sum += sample.accel;
   const Eigen::Vector3d up_C = camera.T_BC.q.conjugate() * sum.normalized();

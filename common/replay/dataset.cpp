@@ -105,6 +105,7 @@ std::optional<Reader> readerOf(const std::filesystem::path& folder) {
   if (looksLikeKittiTracking(folder)) return readKittiTracking;
   if (looksLikeKittiRaw(folder)) return readKittiRaw;
   if (looksLikeSevenScenes(folder)) return readSevenScenes;
+  if (looksLikePhone(folder)) return readPhone;
   return std::nullopt;
 }
 
@@ -129,9 +130,10 @@ Recording readRecording(const DatasetOptions& options) {
     std::error_code error;
     if (std::filesystem::exists(path, error) && hasMessages(path)) return readMessages(options);
     if (std::filesystem::is_regular_file(path, error)) refuseFile(path);
-    throwMissing(path, "the dataset folder",
-                 "--data takes a folder in EuRoC, KITTI raw, KITTI tracking or 7-Scenes layout, or "
-                 "a recording (.mcap; of ROS also .db3 and .bag)");
+    throwMissing(
+        path, "the dataset folder",
+        "--data takes a folder in EuRoC, KITTI raw, KITTI tracking or 7-Scenes layout, the "
+        "folder of a phone's logger, or a recording (.mcap; of ROS also .db3 and .bag)");
   }
   const auto folder = readerOf(path);
   const bool messages = hasMessages(path);
@@ -143,8 +145,10 @@ Recording readRecording(const DatasetOptions& options) {
                          " is no dataset folder that is known: give a folder with "
                          "mav0 (EuRoC), with image_02 and oxts (KITTI raw, *_sync), "
                          "with calib (KITTI tracking), with color and pose or "
-                         "frame-000000.color.png and .pose.txt (7-Scenes), or with recordings "
-                         "(.mcap, .db3, .bag)");
+                         "frame-000000.color.png and .pose.txt (7-Scenes), of a phone's logger "
+                         "(with gyro_accel.csv, data.jsonl, NAME_gyro.csv and NAME_accel.csv, "
+                         "Gyroscope.csv, Gyro.txt and Frames.txt, or JSON records of sensors), or "
+                         "with recordings (.mcap, .db3, .bag)");
 }
 
 void numberFrames(Recording& recording) {

@@ -1,5 +1,5 @@
 // Plays dataset folders and recordings as messages: EuRoC ASL, KITTI raw, KITTI tracking, 7-Scenes,
-// recordings of `perdure record`, and recordings of ROS. The format is detected automatically.
+// recordings of phones, of `perdure record`, and of ROS. The format is detected automatically.
 // Samples and frames are merged by time in a fixed order; images are decoded on request.
 #pragma once
 
@@ -36,6 +36,9 @@ struct DatasetOptions {
   std::filesystem::path rig = {};  ///< rig file that replaces the drive's own calibration
   std::size_t every = 1;           ///< use only each N-th frame of cam0, with its partner
   bool decode = true;              ///< false: frames have stamp and size, but no pixels
+  /// Accepts a phone's recording without lens or camera pose, in order to find them. Unknown
+  /// cameras have a focal length of 0.
+  bool uncalibrated = false;
   /// Topics of a ROS recording by cam0, cam1 and imu. Required if types and names do not identify
   /// them.
   std::map<std::string, std::string> topics = {};
@@ -46,6 +49,7 @@ enum class DatasetKind {
   kKittiRaw,
   kKittiTracking,
   kSevenScenes,
+  kPhone,
   kRecording,
   kRosRecording
 };

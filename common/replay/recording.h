@@ -29,6 +29,8 @@ bool looksLikeKittiTracking(const std::filesystem::path& folder);
 /// The folder has colour images with one pose file each, or is a scene of such sequences (seq-01
 /// …).
 bool looksLikeSevenScenes(const std::filesystem::path& folder);
+/// The folder was written by a logger of a phone (phone/parts.h).
+bool looksLikePhone(const std::filesystem::path& folder);
 /// Reads a recording of `perdure record`. Frames are numbered from 0 in the order of their times. A
 /// recording without images has the frames of its odometry, without pixels.
 Recording readRecordedDrive(const DatasetOptions& options);
@@ -38,6 +40,7 @@ Recording readEuroc(const DatasetOptions& options);
 Recording readKittiRaw(const DatasetOptions& options);
 Recording readKittiTracking(const DatasetOptions& options);
 Recording readSevenScenes(const DatasetOptions& options);
+Recording readPhone(const DatasetOptions& options);
 
 /// Returns FOLDER/NAME.png, .jpg or .jpeg, whichever exists; otherwise FOLDER/NAME.png.
 std::filesystem::path imagePath(const std::filesystem::path& folder, const std::string& name);

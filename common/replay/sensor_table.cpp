@@ -12,11 +12,20 @@ bool beginsNumber(std::string_view text) {
   return !text.empty() && text.find_first_of("0123456789+-.") == 0;
 }
 
+std::vector<std::string_view> stampFirst(std::vector<std::string_view> fields, StampColumn stamp) {
+  if (stamp.last) std::rotate(fields.begin(), fields.end() - 1, fields.end());
+  return fields;
+}
+
+std::string whyNoSeconds(std::string_view text) {
+  return parseSeconds(text) ? "" : fmt::format("`{}` is no stamp in seconds", text);
+}
+
 }  // namespace
 
 SensorTable::SensorTable(const std::filesystem::path& file, const std::string& kind,
-                         Recording& recording, const Judge& judge)
-    : text_(readLines(file, "EuRoC keeps data.csv in each sensor's folder")) {
+                         Recording& recording, const Judge& judge, StampColumn stamp)
+    : text_(readLines(file, "it lists the samples or images of a sensor")) {
   std::string first_wrong;
   constexpr std::size_t kFewNegative = 3;
   std::size_t wrong = 0, negative = 0;
@@ -26,9 +35,11 @@ SensorTable::SensorTable(const std::filesystem::path& file, const std::string& k
       takeHead(line.text);
       continue;
     }
-    TableRow row{lines_++, line.number, {}, fieldsOf(line.text)};
-    const auto time = parseNanoseconds(row.fields[0]);
-    const std::string why = time ? judge(row.fields) : whyNoStamp(row.fields[0]);
+    TableRow row{lines_++, line.number, {}, stampFirst(fieldsOf(line.text), stamp)};
+    const auto time = stamp.seconds ? parseSeconds(row.fields[0]) : parseNanoseconds(row.fields[0]);
+    const std::string why = time            ? judge(row.fields)
+                            : stamp.seconds ? whyNoSeconds(row.fields[0])
+                                            : whyNoStamp(row.fields[0]);
     if (!time && parseNumber(row.fields[0]).value_or(0.0) < 0.0) {
       ++negative;
       if (!first_negative) first_negative = &line;
@@ -41,11 +52,12 @@ SensorTable::SensorTable(const std::filesystem::path& file, const std::string& k
     rows_.push_back(std::move(row));
   }
   if (first_negative && negative > kFewNegative && 20 * negative > lines_) {
-    throw StartupError(ExitCode::kData,
-                       "{}:{}: {} of {} stamps are negative, the first is `{}`; add the same number "
-                       "to the stamps of all sensors",
-                       file.c_str(), first_negative->number, negative, lines_,
-                       fieldsOf(first_negative->text)[0]);
+    throw StartupError(
+        ExitCode::kData,
+        "{}:{}: {} of {} stamps are negative, the first is `{}`; add the same number "
+        "to the stamps of all sensors",
+        file.c_str(), first_negative->number, negative, lines_,
+        stampFirst(fieldsOf(first_negative->text), stamp)[0]);
   }
   if (2 * rows_.size() < lines_) {
     if (wrong == 1) throw StartupError(ExitCode::kData, first_wrong);

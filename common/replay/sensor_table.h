@@ -14,11 +14,17 @@
 
 namespace perdure::replay {
 
+/// Where a row has its stamp, and the unit of the stamp.
+struct StampColumn {
+  bool last = false;     ///< the last column instead of the first
+  bool seconds = false;  ///< seconds with decimals instead of whole nanoseconds
+};
+
 struct TableRow {
   std::size_t number = 0;  ///< row number from 0, including skipped rows
   std::size_t line = 0;    ///< line number in the file, from 1
   TimePoint time;
-  std::vector<std::string_view> fields;  ///< the first is the stamp
+  std::vector<std::string_view> fields;  ///< the first is the stamp, wherever the row has it
 
   /// Returns whether two rows have the same values apart from the stamp.
   bool isSame(const TableRow& other) const {
@@ -38,7 +44,7 @@ class SensorTable {
   /// Fields are separated by commas, semicolons or blanks. Throws StartupError(kData) with the
   /// first wrong line if fewer than half of the rows can be used.
   SensorTable(const std::filesystem::path& file, const std::string& kind, Recording& recording,
-              const Judge& judge);
+              const Judge& judge, StampColumn stamp = {});
   SensorTable(const SensorTable&) = delete;  // not copyable, because rows refer to the text
   SensorTable& operator=(const SensorTable&) = delete;
 

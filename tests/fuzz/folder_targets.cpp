@@ -4,6 +4,7 @@
 
 #include "common/replay/dataset.h"
 #include "common/sim/truth.h"
+#include "tests/common/replay/phone/tiny_phones.h"
 #include "tests/common/replay/tiny_datasets.h"
 #include "tests/fuzz/scratch.h"
 #include "tests/fuzz/target.h"
@@ -33,6 +34,10 @@ const Names kRawFiles{"calib_cam_to_cam.txt",
                       "2011_09_26_drive_9999_sync/oxts/data/0000000001.txt"};
 const Names kTrackingFiles{"calib/0000.txt", "calib/0001.txt", "label_02/0001.txt"};
 const Names kSceneFiles{"sensor.yaml", "frame-000000.pose.txt", "frame-000001.pose.txt"};
+const Names kMarsFiles{"gyro_accel.csv", "frame_timestamps.txt", "movie_metadata.csv"};
+const Names kSpectacularFiles{"data.jsonl", "calibration.json"};
+const Names kRecordFiles{"imu_data.jsonl", "camera_frames.jsonl"};
+const Names kSensorLoggerFiles{"Gyroscope.csv", "Accelerometer.csv", "Gravity.csv", "Metadata.csv"};
 const Names kTruthFiles{sim::kObjectsTruthFile, sim::kVisibilityTruthFile, sim::kInsideTruthFile};
 
 /// Each folder is made once, in scratch(). The damaged files replace those of the seeds.
@@ -72,6 +77,23 @@ const fs::path& sceneFolder() {
                       "up: [0.1, -0.9, -0.4]\nresolution: [8, 6]\nintrinsics: [7, 7, 4, 3]\n");
     return made;
   }();
+  return folder;
+}
+
+const fs::path& marsFolder() {
+  static const fs::path folder = (scratch(), replay::tinyMars("fuzz_mars"));
+  return folder;
+}
+const fs::path& spectacularFolder() {
+  static const fs::path folder = (scratch(), replay::tinySpectacular("fuzz_spectacular"));
+  return folder;
+}
+const fs::path& recordFolder() {
+  static const fs::path folder = (scratch(), replay::tinyRecords("fuzz_records"));
+  return folder;
+}
+const fs::path& sensorLoggerFolder() {
+  static const fs::path folder = (scratch(), replay::tinySensorLogger("fuzz_sensor_logger"));
   return folder;
 }
 
@@ -164,11 +186,23 @@ std::vector<Target> folderTargets() {
     return takeFolder(bytes, rawFolder(), kRawFiles,
                       {.path = rawFolder() / "2011_09_26_drive_9999_sync"});
   };
-  return {{"euroc", 2400, whole(eurocFolder, kEurocFiles), euroc},
-          {"kitti_raw", 2400, whole(rawFolder, kRawFiles), raw},
-          {"kitti_tracking", 2400, whole(trackingFolder, kTrackingFiles), takeTracking},
-          {"seven_scenes", 2400, whole(sceneFolder, kSceneFiles), takeScene},
-          {"simulated_truth", 4200, [] { return std::vector<Bytes>{bytesOf(kTruth)}; }, takeTruth}};
+  const auto phone = [](const fs::path& (*folder)(), const Names& files) {
+    return [folder, files](View bytes) {
+      return takeFolder(bytes, folder(), files, {.path = folder(), .uncalibrated = true});
+    };
+  };
+  return {
+      {"mars", 300, whole(marsFolder, kMarsFiles), phone(marsFolder, kMarsFiles)},
+      {"spectacular", 300, whole(spectacularFolder, kSpectacularFiles),
+       phone(spectacularFolder, kSpectacularFiles)},
+      {"sensor_records", 300, whole(recordFolder, kRecordFiles), phone(recordFolder, kRecordFiles)},
+      {"sensor_logger", 300, whole(sensorLoggerFolder, kSensorLoggerFiles),
+       phone(sensorLoggerFolder, kSensorLoggerFiles)},
+      {"euroc", 2400, whole(eurocFolder, kEurocFiles), euroc},
+      {"kitti_raw", 2400, whole(rawFolder, kRawFiles), raw},
+      {"kitti_tracking", 2400, whole(trackingFolder, kTrackingFiles), takeTracking},
+      {"seven_scenes", 2400, whole(sceneFolder, kSceneFiles), takeScene},
+      {"simulated_truth", 4200, [] { return std::vector<Bytes>{bytesOf(kTruth)}; }, takeTruth}};
 }
 
 }  // namespace perdure::fuzz

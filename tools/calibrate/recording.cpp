@@ -108,6 +108,7 @@ void readDataset(const Board& board, const ReadOptions& options, CalibrationDriv
   replay::DatasetOptions wanted;
   wanted.path = options.data, wanted.sequence = options.sequence, wanted.rig = options.rig;
   wanted.encoding = wanted.second_encoding = ImageEncoding::kMono8;
+  wanted.uncalibrated = true;
   const auto dataset = replay::Dataset::open(wanted);
   const auto doubts = replay::checkData(dataset->recording(), {});
   replay::refuseFatal(doubts, options.data.string());

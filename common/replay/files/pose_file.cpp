@@ -18,26 +18,6 @@ namespace {
 
 constexpr double kUnitTolerance = 1e-2;
 
-/// Parses seconds exactly to the nanosecond; a double resolves only 0.2 µs of a Unix time.
-std::optional<TimePoint> parseSeconds(std::string_view text) {
-  const auto dot = text.find('.');
-  const bool plain = text.find_first_of("eE") == text.npos;
-  const auto whole = parseInteger(text.substr(0, dot));
-  if (plain && whole && dot != text.npos) {
-    std::string digits(text.substr(dot + 1, 9));
-    digits.resize(9, '0');
-    const auto fraction = parseInteger(digits);
-    constexpr std::int64_t kMost = 9'000'000'000;
-    const bool fits = *whole >= -kMost && *whole <= kMost;
-    if (!fraction || *fraction < 0 || !fits) return std::nullopt;
-    const std::int64_t sign = text.starts_with('-') ? -1 : 1;
-    return fromNanoseconds(*whole * 1'000'000'000 + sign * *fraction);
-  }
-  const auto seconds = parseNumber(text);
-  if (!seconds || std::abs(*seconds) > 9e9) return std::nullopt;
-  return TimePoint(durationFromSeconds(*seconds));
-}
-
 /// Returns whether the names of eight columns put w of the quaternion first (q_w, qx [], q_RS_y …).
 bool namesWFirst(const std::vector<std::string_view>& names) {
   constexpr std::string_view kOrder = "wxyz";

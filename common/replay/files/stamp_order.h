@@ -26,7 +26,7 @@ struct ClockChange {
   Duration added{0};         ///< offset that is added to `after` and all later stamps
   Duration usual{0};         ///< median interval of the sensor
   std::string counter = {};  ///< kCounter: "32 bits of µs", "a day"
-  std::string sensor = {};   ///< "imu", "frame", "stereo", "speed", "truth"
+  std::string sensor = {};   ///< "imu", "accel", "frame", "stereo", "speed", "truth"
   std::string place = {};    ///< "FILE:LINE", or the number of the message
   TimePoint continues = {};  ///< `after` in the corrected time
   bool common = false;       ///< kSet: the clocks of all sensors were set by the same amount

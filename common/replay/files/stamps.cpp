@@ -52,6 +52,25 @@ std::optional<TimePoint> parseNanoseconds(std::string_view text) {
   return value ? std::optional(fromNanoseconds(*value)) : std::nullopt;
 }
 
+std::optional<TimePoint> parseSeconds(std::string_view text) {
+  const auto dot = text.find('.');
+  const bool plain = text.find_first_of("eE") == text.npos;
+  const auto whole = parseInteger(text.substr(0, dot));
+  if (plain && whole && dot != text.npos) {
+    std::string digits(text.substr(dot + 1, 9));
+    digits.resize(9, '0');
+    const auto fraction = parseInteger(digits);
+    constexpr std::int64_t kMost = 9'000'000'000;
+    const bool fits = *whole >= -kMost && *whole <= kMost;
+    if (!fraction || *fraction < 0 || !fits) return std::nullopt;
+    const std::int64_t sign = text.starts_with('-') ? -1 : 1;
+    return fromNanoseconds(*whole * 1'000'000'000 + sign * *fraction);
+  }
+  const auto seconds = parseNumber(text);
+  if (!seconds || std::abs(*seconds) > 9e9) return std::nullopt;
+  return TimePoint(durationFromSeconds(*seconds));
+}
+
 std::string whyNoStamp(std::string_view text) {
   text = trim(text);
   if (parseNanoseconds(text)) return {};

@@ -16,6 +16,9 @@ namespace perdure::replay {
 /// fraction remains.
 std::optional<TimePoint> parseNanoseconds(std::string_view text);
 
+/// Parses seconds exactly to the nanosecond; a double resolves only 0.2 µs of a Unix time.
+std::optional<TimePoint> parseSeconds(std::string_view text);
+
 /// Returns the reason and the fix if parseNanoseconds() returns nothing. Otherwise returns "".
 std::string whyNoStamp(std::string_view text);
 

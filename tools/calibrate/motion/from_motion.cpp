@@ -261,7 +261,9 @@ std::vector<std::string> vioDeviations(const MotionRig& found) {
 
 MotionRig writeMotionRig(const replay::DatasetOptions& drive, const WindowOptions& options,
                          const std::filesystem::path& file) {
-  const auto dataset = replay::Dataset::open(drive);
+  replay::DatasetOptions data = drive;
+  data.uncalibrated = true;
+  const auto dataset = replay::Dataset::open(data);
   const replay::Recording& recording = dataset->recording();
   const std::string where = drive.path.string() + ": ";
   if (recording.imu.empty() || recording.calibration.cameras.empty()) {
