@@ -155,10 +155,16 @@ Doubts Pipeline::doubts() const {
                              .boxes = counts_.detections,
                              .objects = outputs_->history().lastBeliefs().size(),
                              .findings = findings_});
-  if (!rig_watch_ || !doubts.empty()) return doubts;
-  for (const auto& judgement : calibrate::judgeBelief(rig_watch_->check(of_vio))) {
-    if (judgement.grade == calibrate::Grade::kBad)
-      doubts.push_back({"the rig, or an axis of the IMU, does not fit the run", judgement.text});
+  if (rig_watch_ && doubts.empty()) {
+    for (const auto& judgement : calibrate::judgeBelief(rig_watch_->check(of_vio))) {
+      if (judgement.grade == calibrate::Grade::kBad)
+        doubts.push_back({"the rig, or an axis of the IMU, does not fit the run", judgement.text});
+    }
+  }
+  if (!options_.map.empty() && map_->reasons().of("relocalised") == 0) {
+    doubts.push_back({"this run was not found on the given map",
+                      "its objects are new ones beside those of the map; it is another place, or "
+                      "too few of the map's objects were seen again"});
   }
   return doubts;
 }

@@ -39,6 +39,19 @@ TEST(ClassPriors, AClassThatIsNotListedIsTheFallback) {
   EXPECT_EQ(p.log_size, priors.fallback.log_size);
 }
 
+TEST(ClassPriors, DarknetsNamesHaveThePriorsOfCocos) {
+  const ClassPriors priors = loadClassPriors(sourceFolder() + "/config/class_priors.yaml");
+  for (const auto& [darknet, coco] : {std::pair("tvmonitor", "tv"),
+                                      {"diningtable", "dining table"},
+                                      {"pottedplant", "potted plant"},
+                                      {"motorbike", "motorcycle"},
+                                      {"aeroplane", "airplane"},
+                                      {"sofa", "couch"}}) {
+    EXPECT_EQ(priors.of(darknet).name, darknet);
+    EXPECT_EQ(priors.of(darknet).log_size, priors.of(coco).log_size) << darknet;
+  }
+}
+
 TEST(ClassPriors, NamesEveryMistakeWithItsPlace) {
   const std::string yaml =
       "fallback: {size: [1, 1, 1], spread: [0.3, 0.3, 0.3]}\n"

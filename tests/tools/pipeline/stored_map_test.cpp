@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
@@ -26,6 +27,7 @@ using replay::startupErrorOf;
 using replay::writeText;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 PipelineOptions tinyOptions(const std::string& name) {
   PipelineOptions options;
@@ -229,6 +231,91 @@ TEST_F(StreetAgain, WhatIsSeenAgainHasItsIdAndNoIdIsGivenTwice) {
 TEST_F(StreetAgain, TheSessionsAreOfTwoWorlds) {
   const auto connection = map_store::openStoreForReading((folder() / "two/map.sqlite").string());
   EXPECT_EQ(map_store::MapReader(&connection).worlds().value(), (std::set<std::uint64_t>{1, 2}));
+}
+
+/// The second half of a walk through a room, or a walk through another room, starts from the map of
+/// the first half. Each has a frame of its own, with drift.
+class RoomAgain : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder() = replay::freshFolder("room_again");
+    const fs::path room = simulateRoom(1);
+    PipelineOptions first = optionsOf(room, "one");
+    first.odometry = "truth";
+    first.seconds = kHalf_s;
+    runNoting(first);
+    PipelineOptions again = optionsOf(room, "again"), other = optionsOf(simulateRoom(2), "other");
+    again.from = kHalf_s;
+    for (PipelineOptions* options : {&again, &other}) {
+      options->odometry = "drifting";
+      options->assignments = {"drifting.own_frame=true"};
+      options->map = (folder() / "one/map.sqlite").string();
+      runNoting(*options);
+    }
+  }
+
+  static void runNoting(const PipelineOptions& options) {
+    Pipeline pipeline(options);
+    pipeline.run([](const PipelineCounts&) {});
+    pipeline.finish();
+    doubts()[fs::path(options.out).filename()] = endOfLine(pipeline.doubts());
+  }
+
+  static fs::path simulateRoom(std::uint64_t seed) {
+    SimulateOptions simulation;
+    simulation.scene = "room";
+    simulation.seed = seed;
+    simulation.images = false;
+    simulation.world.rate_hz = 10.0;
+    simulation.out = folder() / ("room" + std::to_string(seed));
+    simulate(simulation, {});
+    return simulation.out;
+  }
+  static PipelineOptions optionsOf(const fs::path& room, const std::string& name) {
+    PipelineOptions options;
+    options.data = room.string();
+    options.detections = "simulated";
+    options.quiet = true;
+    options.out = (folder() / name).string();
+    return options;
+  }
+  static fs::path& folder() {
+    static fs::path path;
+    return path;
+  }
+  /// The end of each run's last line, by the name of the run.
+  static std::map<std::string, std::string>& doubts() {
+    static std::map<std::string, std::string> of_runs;
+    return of_runs;
+  }
+  static std::string eventsOf(const char* run) { return readText(folder() / run / "events.jsonl"); }
+  static std::size_t knownObjectsOf(const char* run) {
+    std::set<ObjectId> known, reported;
+    for (const auto& row : readObjectRows(folder() / "one/objects_inst.csv")) known.insert(row.id);
+    for (const auto& row : readObjectRows(folder() / run / "objects_inst.csv")) {
+      if (known.contains(row.id)) reported.insert(row.id);
+    }
+    return reported.size();
+  }
+
+  static constexpr double kHalf_s = 22.0;
+  static constexpr const char* kUnplaced = "not found on the given map";
+};
+
+TEST_F(RoomAgain, TheSameRoomIsFoundAndItsObjectsHaveTheirIds) {
+  EXPECT_THAT(eventsOf("again"), HasSubstr("relocalised"));
+  EXPECT_THAT(doubts().at("again"), Not(HasSubstr(kUnplaced)));
+  EXPECT_GE(knownObjectsOf("again"), 15U);
+}
+
+TEST_F(RoomAgain, AnotherRoomIsNotFoundAndTheLastLineStatesIt) {
+  EXPECT_THAT(eventsOf("other"), Not(HasSubstr("relocalised")));
+  EXPECT_THAT(doubts().at("other"), HasSubstr(kUnplaced));
+  EXPECT_EQ(knownObjectsOf("other"), 0U);
+}
+
+TEST_F(RoomAgain, ARunWithoutAMapStatesNothingOfOne) {
+  EXPECT_THAT(doubts().at("one"), Not(HasSubstr(kUnplaced)));
 }
 
 }  // namespace

@@ -137,12 +137,13 @@ std::optional<CuboidFit> fitCuboid(const BoxDetection& detection, const ClassPri
                                    double yaw, double yaw_sigma,
                                    const std::optional<RangeHint>& range,
                                    const FrameContext& frame) {
-  const auto depth = depthFromSize(detection.z, prior, *frame.view.camera);
   const auto ray = centreRay(detection.z, frame.view);
-  if (!depth || !ray) return std::nullopt;
+  if (!ray) return std::nullopt;
+  const auto depth = range ? range->distance_m / ray->norm()
+                           : depthFromSize(detection.z, prior, *frame.view.camera);
+  if (!depth) return std::nullopt;
   const double minimum = frame.parameters->initiation.min_distance_m;
-  const double start_depth = range ? range->distance_m / ray->norm() : *depth;
-  const Eigen::Vector3d start = frame.view.T_WC().p + *ray * std::max(start_depth, minimum);
+  const Eigen::Vector3d start = frame.view.T_WC().p + *ray * std::max(*depth, minimum);
   const CuboidCost cost(detection, prior, yaw, yaw_sigma, range, frame, start);
   VectorFit x = VectorFit::Zero();
   x.head<7>() << start, yaw, prior.log_size;

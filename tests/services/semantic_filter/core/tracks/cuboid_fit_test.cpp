@@ -32,6 +32,22 @@ TEST_F(FitCuboid, RecoversSizeAndPlaceFromAnExactBoxAtTheTrueYaw) {
   EXPECT_LT(depth_sigma, 0.2 * 14.0);
 }
 
+TEST_F(FitCuboid, ABoxThatTheBorderCutsInBothAxesNeedsTheRangeOfLandmarks) {
+  const State truth = makeState(6.0, -1.0, 0.75, 0.6, 4.2, 1.75, 1.5);
+  const auto s = projectCuboid(truth, frame.view)->sides;
+  Detection d;
+  d.box = {s[0], s[1], s[2], s[3]};
+  d.activations = {0, 2, -2, -2, -2};
+  auto e = *makeBoxDetection(d, model, camera.width(), camera.height(), parameters.box, {});
+  e.z.measured = {true, true, false, false};
+  EXPECT_FALSE(fitCuboid(e, priors.of("car"), 0.6, 0.05, std::nullopt, frame));
+  const double range = (truth.head<3>() - frame.view.T_WC().p).norm();
+  const auto fit = fitCuboid(e, priors.of("car"), 0.6, 0.05, RangeHint{range, 0.3}, frame);
+  ASSERT_TRUE(fit);
+  EXPECT_NEAR((fit->hypothesis.x.head<3>() - frame.view.T_WC().p).norm(), range, 0.3);
+  EXPECT_LT((fit->hypothesis.x - truth).head<3>().norm(), 0.5);
+}
+
 TEST_F(FitCuboid, LandmarksNearTheCentreGiveTheDepthDespiteABackground) {
   BoxDetection e;
   e.z.sides << 100, 100, 200, 200;
