@@ -21,11 +21,12 @@ namespace fs = std::filesystem;
 using Eigen::Vector3d;
 
 constexpr double kDegrees = 180.0 / M_PI;
-constexpr double kRate_hz = 20.0;
+constexpr double kRate_hz = 15.0;
+constexpr std::uint32_t kWidth = 480, kHeight = 360;
 
 struct Settings {
   std::uint64_t first = 1, last = 20, step = 1;
-  double seconds = 25.0;
+  double seconds = 16.0;
   bool car = false;
   fs::path cache = "build/motion_bench";
 };
@@ -100,6 +101,7 @@ Draw drawOf(std::uint64_t seed, const Settings& settings) {
   sim::Dice dice(sim::seedOf("motion_bench", {seed}));
   sim::SceneOptions options;
   options.mono8 = true, options.rate_hz = kRate_hz;
+  options.width = kWidth, options.height = kHeight;
   const bool street = settings.car || seed % 4 >= 2;
   Draw draw;
   draw.scene = sim::makeScene(street ? "street" : "room", seed, options);
@@ -142,6 +144,7 @@ fs::path recordingOf(const Draw& draw, std::uint64_t seed, const Settings& setti
   tools::SimulateOptions options;
   options.out = settings.cache / fmt::format("{}{:02}", settings.car ? "car" : "", seed);
   options.world.mono8 = true, options.world.rate_hz = kRate_hz;
+  options.world.width = kWidth, options.world.height = kHeight;
   options.threads = 1;
   tools::simulate(draw.scene, options, {});
   return options.out;
