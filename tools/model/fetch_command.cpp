@@ -172,7 +172,7 @@ void calibrated(const fs::path& description, const KnownNetwork& network, const 
     std::printf("note        %s: perdure model calibrate\n", why.c_str());
     return;
   }
-  json["calibration"] = use.calibration;  // replaces the bias that the import assumed
+  for (const auto& [key, value] : use.calibration.items()) json["calibration"][key] = value;
   writeChecked(description, json.dump(1) + "\n");
   std::printf("calibrated  %s (%s)\n", use.calibration.dump().c_str(), use.measured.c_str());
 }

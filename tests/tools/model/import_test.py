@@ -205,12 +205,6 @@ class Classes(Importing):
         self.assertEqual(self.run_import(self.folder / "yolov8/net.onnx", "--classes=A,B,C")[1]["classes"],
                          ["a", "b", "c"])
 
-    def test_their_number_gives_the_bias(self):
-        bias = self.run_import(self.made(tiny.yolox), "--classes=car,person,dog")[1]["calibration"]["bias"]
-        self.assertAlmostEqual(bias, 1.0986, 3)  # log 3
-        self.assertEqual(importer.class_bias(["car"]), 0.0)
-        self.assertEqual(importer.class_bias(["thing"] * 80), importer.class_bias(["thing"] * 10))
-
     def test_a_list_longer_than_a_path_is_a_list(self):
         message, _ = self.refused(self.made(tiny.yolox), "--classes=" + ",".join(f"thing{i}" for i in range(800)))
         self.assertIn("(yolox) has 3 classes and 800 names were given", message)

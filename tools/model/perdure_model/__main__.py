@@ -3,7 +3,6 @@ network, its model.json and reference outputs for the comparison with OpenCV; pr
 """
 
 import json
-import math
 import os
 import sys
 from pathlib import Path
@@ -114,12 +113,6 @@ def input_of(found, request):
     return {**INPUTS[found.family], **found.input, **request.input}
 
 
-def class_bias(names):
-    """The score contains the share of the class among all objects, and the filter multiplies by it
-    again, by at least a tenth (tools/docs/maths/inference-activations.md)."""
-    return round(math.log(min(len(names), 10)), 3)
-
-
 def description(args, found, names, size, request):
     keys = dict(found.keys)
     if keys.get("boxes", {}).get("form") == "offsets":
@@ -127,7 +120,7 @@ def description(args, found, names, size, request):
     return {"comment": f"written by perdure model import from {args.network.name}", "name": args.network.stem,
             "family": found.family,
             "input": {"width": size[0], "height": size[1], **input_of(found, request)}, "classes": names, **keys,
-            "calibration": {"temperature": 1.0, "clutter_rate": USUAL_CLUTTER_RATE, "bias": class_bias(names)}}
+            "calibration": {"temperature": 1.0, "clutter_rate": USUAL_CLUTTER_RATE}}
 
 
 def write_reference(args, graph, size, given, found, inside):
