@@ -125,7 +125,9 @@ std::vector<Bytes> vioStates() {
   state.world = {17, 2};
   state.T_BC.resize(1);
   state.readout_s = {0.02};
-  const Eigen::Index size = vio::kNavSize + 6 + 1 + 1;
+  state.lens.assign(1, vio::LensError::Zero());
+  state.estimated = {.readout = true, .scale = false, .lens = true};
+  const int size = vio::calibrationSize(state.readout_s, state.estimated);
   state.covariance = 0.01 * Eigen::MatrixXd::Identity(size, size);
   return {bytesOf(vio::toText(state))};
 }
