@@ -19,9 +19,8 @@
 #include "common/base/time.h"
 #include "common/math/gaussian.h"
 #include "common/math/rigid_transform.h"
+#include "services/vio/core/state/lens_error.h"
 #include "services/vio/core/state/row_motion.h"
-#include "services/vio/core/tracks/lens_error.h"
-#include "services/vio/core/tracks/tracks.h"
 
 namespace perdure::vio {
 

@@ -5,15 +5,13 @@
 #include <array>
 #include <cstdint>
 #include <map>
-#include <memory>
 #include <optional>
 #include <vector>
 
 #include "common/camera/camera_model.h"
+#include "services/vio/core/state/lens_error.h"
 
 namespace perdure::vio {
-
-inline constexpr std::size_t kMaxCameras = 2;
 
 struct ImagePoint {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();       ///< observed pixel, with distortion
@@ -31,9 +29,6 @@ struct TrackedPoint {
   std::uint64_t id = 0;
   std::array<std::optional<ImagePoint>, kMaxCameras> seen;
 };
-
-/// One or two cameras. The pointer keeps them as they were when an image's points were undistorted.
-using SharedCameras = std::shared_ptr<const std::vector<CameraModel>>;
 
 struct TrackedFrame {
   std::vector<TrackedPoint> points;  ///< in order of rising id

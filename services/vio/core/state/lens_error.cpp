@@ -1,4 +1,4 @@
-#include "services/vio/core/tracks/lens_error.h"
+#include "services/vio/core/state/lens_error.h"
 
 #include <cmath>
 

@@ -1,11 +1,19 @@
-// Error of a camera's lens, relative to its calibration, and its effect on pixels.
+// Cameras of the filter, the error of a lens relative to its calibration, and its effect on pixels.
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
+#include <memory>
+#include <vector>
 
 #include "common/camera/camera_model.h"
 
 namespace perdure::vio {
+
+inline constexpr std::size_t kMaxCameras = 2;
+
+/// One or two cameras. The pointer keeps them as they were when an image's points were undistorted.
+using SharedCameras = std::shared_ptr<const std::vector<CameraModel>>;
 
 /// [logarithm of both focal lengths, c_x and c_y in px, k1, k2]: true minus calibrated.
 inline constexpr int kLensSize = 5;
