@@ -114,9 +114,7 @@ std::string Node::status() const {
   if (started() && *speed_doubt_.sentence() != '\0') return speed_doubt_.sentence();
   if (const auto turn = cameras_->estimator.mountTurn()) {
     return fmt::format(
-        "the camera has turned on the body by {:.1f}°; fasten it, then correct its T_BS or "
-        "calibrate "
-        "the rig again",
+        "the camera has turned on the body by {:.1f}°; fasten it, then calibrate the rig again",
         *turn * 180.0 / M_PI);
   }
   if (last_state_ != OdometryState::kDegraded) return whyAlone();

@@ -27,8 +27,9 @@ bool MountMonitor::judge(const MountPose& now, TimePoint time) {
   bool found = false;
   if (before_) {
     const Eigen::Vector3d turned = logSo3(before_->q_BC.conjugate() * now.q_BC);
-    const double chi2 = squaredMahalanobis(turned, before_->covariance + now.covariance);
-    found = turned.norm() > kLeastTurn && chi2 > chi2Quantile(kProbability, 3);
+    found = turned.norm() > kLeastTurn &&
+            squaredMahalanobis(turned, before_->covariance + now.covariance) >
+                chi2Quantile(kProbability, 3);
     if (found) turn_ = turned.norm();
   }
   if (!before_ || found || time > since_ + kCompared) compareWith(now, time);

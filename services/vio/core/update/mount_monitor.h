@@ -27,7 +27,7 @@ class MountMonitor {
   void compareWith(const MountPose& before, TimePoint now);
   /// Returns true once if the rotation contradicts that of up to half a minute before.
   bool judge(const MountPose& now, TimePoint time);
-  /// Begins anew with the next rotation, for a new start.
+  /// Discards the compared rotation. Call it at a start.
   void forget() { before_.reset(); }
   /// Returns the angle of the newest turn, in rad; nothing if none was found.
   std::optional<double> turn() const { return turn_; }

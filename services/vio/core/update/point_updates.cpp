@@ -207,7 +207,9 @@ Result<UpdateCounts> updateSlam(State& state, const FeatureDatabase& database,
     reasons.add("images_jumped");
     counts.jumped = true;
     state.widenPose(options.jump_rotation, options.jump_position_m);
-    state.widenMount(options.jump_rotation, 0.0);
+    // A rotation on the body that is not estimated stays exact.
+    const int mount = state.camera(0).at;
+    if (state.P()(mount, mount) > 0.0) state.widenMount(options.jump_rotation, 0.0);
     for (Seen& s : seen) s.judge(state, options.gate_probability);
   }
   std::vector<Measurement> used;

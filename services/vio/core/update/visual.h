@@ -24,9 +24,9 @@ bool projectPoint(const RigidTransform& T_WB, const RigidTransform& T_BC,
                   const Eigen::Vector3d& p_W, Eigen::Vector2d& normalised,
                   ProjectionJacobians* J = nullptr);
 
-/// A point seen in one image, whitened: r = pose δT_WB + extrinsic δT_BC + lens δlens + readout
-/// δt_r
-/// + point δp_W + n, n ~ N(0, I). The camera pose is that at the exposure of the point's row.
+/// A point seen in one image, whitened: r = pose δT_WB + extrinsic δT_BC + lens δlens +
+/// readout δt_r + point δp_W + n, n ~ N(0, I). The camera pose is that at the exposure of the
+/// point's row.
 struct View {
   Eigen::Vector2d r;
   ProjectionJacobians J;

@@ -169,7 +169,7 @@ struct Turned {
   double nees = 0.0;      ///< of the pose at the end, per dimension
 };
 
-Turned driveWith(test::DriveOptions drive_options) {
+Turned driveWith(test::DriveOptions drive_options, const Options& options = {}) {
   Turned result;
   constexpr double kFrom = 12.025, kUntil_s = 42.0;
   drive_options.mount_from_s = kFrom;
@@ -179,7 +179,7 @@ Turned driveWith(test::DriveOptions drive_options) {
     test::SimulatedDrive drive(drive_options);
     ImuBuffer imu;
     for (const ImuReading& r : drive.imu(kUntil_s + 1.0)) EXPECT_TRUE(imu.add(r));
-    Estimator estimator(Options{}, drive.T_BC(), 0.0);
+    Estimator estimator(options, drive.T_BC(), 0.0);
     estimator.start(test::startAt(drive, 0.2, seed, 1.0));
     std::uint64_t frame = 0;
     bool noticed = false;
@@ -217,6 +217,16 @@ TEST(Mount, ATurnOfTheCameraByADegreeIsReportedAndFollowed) {
     EXPECT_LT(turned.rotation, 0.004);
     EXPECT_LT(turned.nees, 5.0);
   }
+}
+
+TEST(Mount, ThatIsNotEstimatedStaysAsItIsIfImagesJump) {
+  Options exact;
+  exact.calibration.estimate_extrinsics = false;
+  test::DriveOptions options;
+  options.mount.q = expQuaternion(M_PI / 180.0 * Vector3d(0, 1, 0));
+  const Turned turned = driveWith(options, exact);
+  EXPECT_EQ(turned.noticed, 0);
+  EXPECT_NEAR(turned.rotation, M_PI / 180.0, 1e-9);
 }
 
 TEST(Mount, ABodyThatIsMovedIsNoTurnOfTheCamera) {
