@@ -30,7 +30,7 @@ fs::path data() { return source() / "../shared/data"; }
 
 struct Answer {
   std::vector<Detection> detections;
-  double clutter;  ///< the offset that calibration adds to each activation
+  inference::Calibration calibration;
 };
 
 Answer answerOf(const fs::path& network, const fs::path& description, const Frame& frame) {
@@ -41,8 +41,7 @@ Answer answerOf(const fs::path& network, const fs::path& description, const Fram
   const auto file = inference::readModelFile(config.model.path, config.model.description, {});
   const auto out = node.infer(frame);
   EXPECT_TRUE(out) << out.error().detail;
-  return {out ? out->detections : std::vector<Detection>{},
-          inference::logit(file.description.calibration.clutter_rate)};
+  return {out ? out->detections : std::vector<Detection>{}, file.description.calibration};
 }
 
 std::string cocoNames() { return (source() / "config/models/coco.names").string(); }
@@ -154,7 +153,8 @@ TEST_P(RealFiles, SayWhatTheirDescriptionsInConfigSay) {
     EXPECT_NEAR(a.box.x1, b.box.x1, 1e-3);
     EXPECT_NEAR(a.box.y2, b.box.y2, 1e-3);
     for (std::size_t k = 1; k < b.activations.size(); ++k) {
-      EXPECT_NEAR(a.activations[k] - imported.clutter, b.activations[k] - described.clutter, 1e-4);
+      EXPECT_NEAR(inference::oddsOf(imported.calibration, a.activations[k]),
+                  inference::oddsOf(described.calibration, b.activations[k]), 1e-4);
     }
   }
 }

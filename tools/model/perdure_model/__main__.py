@@ -25,7 +25,8 @@ from .graph import Graph
 from .opencv import Repair
 from .options import Request, parsed
 
-USUAL_CLUTTER_RATE = 0.79  # measured for the networks in services/inference/README.md
+# Between the fits of six networks of COCO to KITTI drive 0005 (tools/docs/adr/0055).
+USUAL_CALIBRATION = {"temperature": 0.3, "bias": -2.4, "clutter_rate": 0.97}
 
 
 def recognise(path, graph, size, request):
@@ -120,7 +121,7 @@ def description(args, found, names, size, request):
     return {"comment": f"written by perdure model import from {args.network.name}", "name": args.network.stem,
             "family": found.family,
             "input": {"width": size[0], "height": size[1], **input_of(found, request)}, "classes": names, **keys,
-            "calibration": {"temperature": 1.0, "clutter_rate": USUAL_CLUTTER_RATE}}
+            "calibration": USUAL_CALIBRATION}
 
 
 def write_reference(args, graph, size, given, found, inside):

@@ -157,12 +157,13 @@ ScratchVector<Candidate> candidates(const BoxDetection& detection, const FrameCo
   return all;
 }
 
-/// Returns the sum of the frequencies of the network's classes, at most 10. A class of frequency 1
-/// then has at least a tenth of the prior, for any number of classes.
-double frequencies(const FrameContext& frame) {
+/// Returns the mean frequency of the network's classes. A score already contains the share of its
+/// class in the training images, so that frequencies only state how other shares are here.
+double meanFrequency(const FrameContext& frame) {
+  const auto& classes = frame.model->classes;
   double sum = 0.0;
-  for (const auto& name : frame.model->classes) sum += frame.priors->of(name).frequency;
-  return std::max(std::min(sum, 10.0), 1e-9);
+  for (const auto& name : classes) sum += frame.priors->of(name).frequency;
+  return std::max(sum / std::max<double>(static_cast<double>(classes.size()), 1.0), 1e-9);
 }
 
 /// Censors the sides beside nearer boxes, because the object may continue behind these.
@@ -227,7 +228,7 @@ double logInitiationRatio(const BoxDetection& detection, const FrameContext& fra
   for (const auto& name : frame.model->classes) {
     sum += frame.priors->of(name).frequency * std::exp(logRatio(detection, *frame.model, name));
   }
-  const double named = sum / frequencies(frame);
+  const double named = sum / meanFrequency(frame);
   return std::log(p.initiation.odds) - detection.log_partial_views +
          std::log((1.0 - p.clutter.other_prior) * named +
                   p.clutter.other_prior * std::exp(detection.log_ratio_other));
@@ -241,7 +242,7 @@ std::optional<Track> initiate(const BoxDetection& detection, const std::optional
   const BoxDetection seen = censoredBesideNearer(detection);
   Track track;
   const double other = frame.parameters->clutter.other_prior;
-  const double named = (1.0 - other) / frequencies(frame);
+  const double named = (1.0 - other) / meanFrequency(frame);
   for (const auto& c : kept) {
     addClass(track, c.prior, named * std::exp(c.log_weight), seen, yawStarts(c.prior, frame, *ray),
              range, frame);
