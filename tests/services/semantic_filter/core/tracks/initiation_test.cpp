@@ -67,7 +67,8 @@ TEST_F(InitiationInARow, TheUpdateDoesNotCompareASideAtANearerCar) {
 }
 
 // The score of a network for 80 classes contains the share of the class, as that for four does.
-TEST_F(InitiationInARow, ClassesThatTheNetworkExcludesDoNotChangeTheEvidenceOfABox) {
+// Without the factor of the number of classes the evidence would fall by log(80 / 4) = 3.
+TEST_F(InitiationInARow, ClassesThatTheNetworkExcludesDoNotLowerTheEvidenceOfABox) {
   const double of_four = logInitiationRatio(boxes_[0], frame);
   ModelInfo info = testing::makeModelInfo();
   std::vector<double> ratios(boxes_[0].log_ratio.begin(), boxes_[0].log_ratio.end());
@@ -79,7 +80,7 @@ TEST_F(InitiationInARow, ClassesThatTheNetworkExcludesDoNotChangeTheEvidenceOfAB
   }
   model = makeModel(info);
   boxes_[0].log_ratio = ratios;
-  EXPECT_NEAR(logInitiationRatio(boxes_[0], frame), of_four, 0.05);
+  EXPECT_NEAR(logInitiationRatio(boxes_[0], frame), of_four, 0.3);
 }
 
 }  // namespace
