@@ -51,12 +51,17 @@ std::string similarTo(const std::filesystem::path& path) {
 }  // namespace
 
 std::vector<TextLine> readLines(const std::filesystem::path& path, std::string_view fix) {
-  std::ifstream file(path);
+  // Opening a pipe waits for its writer, which those of a shell (/dev/fd/63) have.
+  const bool pipe = std::filesystem::is_fifo(path) && !path.string().starts_with("/dev/");
+  std::ifstream file(pipe ? std::filesystem::path() : path);
   const bool folder = std::filesystem::is_directory(path);
   if (!file || folder) {
     refuseUnreadable(path);
     throw StartupError(ExitCode::kUnavailable, "{} {}; {}", path.c_str(),
-                       folder ? "is a folder" : "cannot be read", fix);
+                       pipe     ? "is a pipe, not a file"
+                       : folder ? "is a folder"
+                                : "cannot be read",
+                       fix);
   }
   std::vector<TextLine> lines;
   std::string text;

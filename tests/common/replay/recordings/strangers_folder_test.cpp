@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sqlite3.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cstring>
@@ -178,6 +179,13 @@ TEST(StrangersFolder, ALinkThatLeadsNowhereIsNamed) {
   fs::create_symlink("/nowhere/SHA256-1.csv", drive / "mav0/imu0/data.csv");
   EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = drive}); }),
               HasSubstr("is a link to /nowhere/SHA256-1.csv, which does not exist"));
+}
+
+TEST(StrangersFolder, APipeInPlaceOfAFileIsNamed) {
+  const fs::path drive = tinyEuroc("pipe");
+  fs::remove(drive / "mav0/imu0/data.csv");
+  ASSERT_EQ(mkfifo((drive / "mav0/imu0/data.csv").c_str(), 0600), 0);
+  EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = drive}); }), HasSubstr("is a pipe"));
 }
 
 TEST(StrangersFolder, DrivesInsideTheFolderAreListed) {
