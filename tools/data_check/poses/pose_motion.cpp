@@ -132,6 +132,9 @@ DataFindings judgePosesFrozen(const Poses& poses, const replay::Recording& recor
   for (const auto& [are_same, what] : kParts) {
     const auto still = longestStill(poses, are_same);
     if (!still) continue;
+    // At an end of the poses, a rest with other stamps looks like a part that stands still.
+    const bool at_end = still->first == 0 || still->last + 1 == poses.size();
+    if (at_end && are_same != areSamePoses) continue;
     const TimePoint from = poses[still->first].time, to = poses[still->last].time;
     const std::string moves = movingIn(recording, from, to, are_same, images);
     if (moves.empty()) continue;
