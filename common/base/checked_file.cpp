@@ -1,5 +1,7 @@
 #include "common/base/checked_file.h"
 
+#include <sys/resource.h>
+
 #include <cerrno>
 #include <cstring>
 #include <string>
@@ -17,6 +19,15 @@ fs::path placeOf(const fs::path& file) {
   fs::path part = file;
   part += ".part";
   return part;
+}
+
+/// How to get room for a file. A limit of this process is as likely a cause as a full disk.
+std::string fixOfRoom() {
+  rlimit limit{};
+  const bool limited = getrlimit(RLIMIT_FSIZE, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY;
+  return limited ? "raise the size limit of files, which is " + std::to_string(limit.rlim_cur) +
+                       " bytes (ulimit -f), or free space"
+                 : "free space, or write to another disk";
 }
 
 }  // namespace
@@ -67,9 +78,8 @@ void flushChecked(std::ostream& stream, const fs::path& file) {
 void throwUnwritten(const fs::path& file, std::string_view why) {
   std::string reason(why);
   if (reason.empty()) reason = errno != 0 ? std::strerror(errno) : "not all of it could be written";
-  throw StartupError(ExitCode::kInputOutput,
-                     "{}: {}; free space, or write to another disk: the results are not whole",
-                     file.c_str(), reason);
+  throw StartupError(ExitCode::kInputOutput, "{}: {}; {}: the results are not whole", file.c_str(),
+                     reason, fixOfRoom());
 }
 
 }  // namespace perdure

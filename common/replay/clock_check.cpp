@@ -150,7 +150,7 @@ void checkRate(const Recording& recording, DataFindings& findings) {
 /// by the same share. If only the camera's declared rate is wrong, both sensors end together.
 void checkOneRate(const Recording& recording, const StampList& imu, const StampList& images,
                   double apart, DataFindings& findings) {
-  constexpr double kLeast = 0.02, kStarts_s = 0.1, kAlike = 0.2, kShows_s = 0.5;
+  constexpr double kLeast = 0.02, kStarts_s = 0.1, kAlike = 0.2, kShows_s = 0.25;
   const double awaited = apart * toSeconds(between(imu.back(), imu.front())),
                ends = toSeconds(between(images.back(), imu.back()));
   if (std::abs(apart) < kLeast || !std::isfinite(awaited) || std::abs(awaited) < kShows_s ||

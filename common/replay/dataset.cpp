@@ -1,5 +1,7 @@
 #include "common/replay/dataset.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <fstream>
 #include <set>
@@ -124,6 +126,18 @@ std::optional<Reader> readerOf(const std::filesystem::path& folder) {
                      folder.string(), part, file);
 }
 
+/// Lists the folders inside `folder` that are datasets or contain recordings.
+std::string datasetsIn(const std::filesystem::path& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const bool known =
+        entry.is_directory() && (readerOf(entry.path()) || hasMessages(entry.path()));
+    if (known) names.push_back(entry.path().filename());
+  }
+  std::ranges::sort(names);
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
 Recording readRecording(const DatasetOptions& options) {
   const auto& path = options.path;
   if (!std::filesystem::is_directory(path)) {
@@ -140,6 +154,11 @@ Recording readRecording(const DatasetOptions& options) {
   if (folder && messages) refuseBoth(path);
   if (folder) return (*folder)(options);
   if (messages) return readMessages(options);
+  if (const std::string names = datasetsIn(path); !names.empty()) {
+    throw StartupError(ExitCode::kUnavailable,
+                       "{} is no dataset folder, but it has {} inside: give --data one of these",
+                       path.string(), names);
+  }
   throw StartupError(ExitCode::kUnavailable,
                      path.string() +
                          " is no dataset folder that is known: give a folder with "

@@ -5,6 +5,8 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
+#include "common/base/files/text_mode.h"
+
 namespace perdure::vision {
 namespace {
 
@@ -94,6 +96,7 @@ int bitsOf(const cv::Mat& image) {
 Result<cv::Mat> decodeImage(std::string_view bytes, std::optional<ImageEncoding> encoding, int bits,
                             int reduce) {
   if (bytes.empty()) return fail("image_truncated", "the file is empty");
+  if (wasCopiedAsText(bytes)) return fail("image_corrupt", std::string("it ") + kCopiedAsText);
   if (!endsAsItShould(bytes)) return fail("image_truncated", "the end of the image is missing");
   auto* data = const_cast<char*>(bytes.data());
   const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8UC1, data);

@@ -7,6 +7,7 @@
 
 #include "common/base/errors.h"
 #include "common/base/files/access.h"
+#include "common/base/files/text_mode.h"
 #include "common/base/ids.h"
 
 namespace perdure::inference {
@@ -65,6 +66,13 @@ std::string whyNoNetwork(std::string_view bytes) {
   if (begins.starts_with("ftrt")) {
     return "is an engine of TensorRT, for one kind of GPU; export the network as ONNX";
   }
+  constexpr std::size_t kJson = 8, kTar = 257;  // places of their first characters
+  if (begins.size() > kJson && begins.substr(kJson).starts_with("{\"")) {
+    return "is a file of weights (safetensors), without the network; export the network as ONNX";
+  }
+  if (begins.size() > kTar && begins.substr(kTar).starts_with("ustar")) {
+    return "is a tar archive; unpack it";
+  }
   if (begins.starts_with("7767517")) return "is a network of ncnn; export it as ONNX";
   if (begins.size() == 512 && begins.find_first_not_of('\0') == begins.npos) {
     return "begins with zeros only: it was not copied whole; fetch it again";
@@ -72,8 +80,13 @@ std::string whyNoNetwork(std::string_view bytes) {
   const auto isPrinted = [](unsigned char c) {
     return c >= ' ' || c == '\n' || c == '\r' || c == '\t';
   };
-  if (!text.empty() && std::ranges::all_of(begins, isPrinted) && text[0] != '[' && text[0] != '#' &&
-      text[0] != ';') {
+  const bool printed = std::ranges::all_of(begins, isPrinted);
+  if (!printed && begins.starts_with('\n')) {  // ONNX begins with another field
+    return "is a graph of TensorFlow (.pb); export it as ONNX (python -m tf2onnx.convert "
+           "--graphdef)";
+  }
+  if (!printed && wasCopiedAsText(bytes)) return kCopiedAsText;
+  if (!text.empty() && printed && text[0] != '[' && text[0] != '#' && text[0] != ';') {
     return "is a text that begins with `" +
            std::string(text.substr(0, text.find('\n')).substr(0, 60)) + "`; fetch the file itself";
   }

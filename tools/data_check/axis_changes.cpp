@@ -16,6 +16,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr std::size_t kFewestChanges = 60;
+constexpr double kUnseen = 0.2;  ///< largest correlation of an axis that is another one
 
 /// Changes of rotation rate from one image pair to the next, by images and by gyroscope, in B.
 struct AxisChanges {
@@ -108,7 +109,8 @@ std::vector<ImuSample> livelinessOfAxes(const std::vector<ImuSample>& samples) {
 
 bool axesSurelyAgree(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,
                      const CameraCalibration& camera) {
-  constexpr double kAgree = 0.8;
+  // With this correlation in a few changes, more of them would hardly show less than kUnseen.
+  constexpr double kAgree = 0.5;
   constexpr std::size_t kFew = 30;
   const AxisChanges changes = axisChangesOf(turns, samples, camera);
   return changes.images.size() >= kFew && correlationOf(changes).diagonal().minCoeff() > kAgree;
@@ -118,7 +120,7 @@ replay::DataFindings judgeAxisChanges(const std::vector<Turn>& turns,
                                       const std::vector<ImuSample>& samples,
                                       const CameraCalibration& camera) {
   constexpr double kSurely = 4.0;  // limit, in standard deviations of a chance correlation
-  constexpr double kSeen = 0.4, kUnseen = 0.2;
+  constexpr double kSeen = 0.4;
   const AxisChanges changes = axisChangesOf(turns, samples, camera);
   if (changes.images.size() < kFewestChanges) return {};
   const double chance = 1.0 / std::sqrt(static_cast<double>(changes.images.size()));

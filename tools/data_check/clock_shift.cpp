@@ -37,9 +37,8 @@ class TurnGrid {
     }
   }
   std::int64_t cells() const { return static_cast<std::int64_t>(cells_.size()); }
-  std::int64_t cellOf(TimePoint time) const {
-    return std::llround(toSeconds(time - start_) / kStep_s);
-  }
+  double cellsTo(TimePoint time) const { return toSeconds(time - start_) / kStep_s; }
+  std::int64_t cellOf(TimePoint time) const { return std::llround(cellsTo(time)); }
   /// Returns nothing if samples are missing between the two cells.
   std::optional<Eigen::Vector3d> between(std::int64_t from, std::int64_t to) const {
     if (from < 0 || to >= cells()) return std::nullopt;
@@ -109,6 +108,12 @@ double unexplainedAt(const CellTurns& turns, const TurnGrid& gyro, const ClockLi
   return std::min(1.0, (off_squared - off.squaredNorm() / n) / std::max(1e-18, all));
 }
 
+/// The minimum of the parabola through three neighbours, in cells from the middle one.
+double vertexOf(double before, double middle, double after) {
+  const double bend = before - 2.0 * middle + after;
+  return bend > 0.0 ? 0.5 * (before - after) / bend : 0.0;
+}
+
 /// A match explains all but a share kMostLeft; the second best one leaves kTimesLeft times as much.
 constexpr double kMostLeft = 0.3, kTimesLeft = 2.0;
 
@@ -134,7 +139,14 @@ std::optional<double> shiftOfTurns(const std::vector<Turn>& turns,
     if (std::abs(other - best) > apart) second = std::min(second, *other);
   }
   if (*best > kMostLeft || kTimesLeft * *best > second) return std::nullopt;
-  return kStep_s * static_cast<double>(least + (best - left.begin()));
+  double shift = static_cast<double>(least + (best - left.begin()));
+  if (best != left.begin() && best + 1 != left.end()) shift += vertexOf(best[-1], *best, best[1]);
+  double rounded = 0.0;  // images with regular stamps have a common rounding error
+  for (std::size_t i = 0; i < turns.size(); ++i) {
+    rounded += static_cast<double>(cells[i].from) - gyro.cellsTo(turns[i].from);
+  }
+  const double seconds = kStep_s * (shift + rounded / static_cast<double>(turns.size()));
+  return std::round(1e3 * seconds) / 1e3;
 }
 
 std::optional<double> rateOfTurns(const std::vector<Turn>& turns,

@@ -45,8 +45,18 @@ bool offsetExplainsAxes(const std::vector<Turn>& turns, const std::vector<ImuSam
   return judgeAxes(turns, samples, camera).empty();
 }
 
+/// Whether images and gyroscope agree in everything that is judged, so that no more images are
+/// needed.
+bool surelyAgree(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,
+                 const CameraCalibration& camera) {
+  return axesSurelyAgree(turns, samples, camera) && !disagree(turns, samples, camera) &&
+         judgeTurns(turns, samples, camera).empty() && judgeAxes(turns, samples, camera).empty();
+}
+
 replay::DataFindings checkTurns(const replay::Recording& recording) {
   const CameraCalibration& camera = recording.calibration.cameras.front();
+  const auto lively = livelinessOfAxes(recording.imu);
+  if (surelyAgree(turnsOfImages(recording, lively, 36), recording.imu, camera)) return {};
   const auto turns = turnsOfImages(recording, recording.imu);
   if (disagree(turns, recording.imu, camera)) {
     if (auto clocks = checkClockLine(recording); !clocks.empty()) return clocks;
@@ -67,8 +77,7 @@ replay::DataFindings checkTurns(const replay::Recording& recording) {
   }
   if (!findings.empty() || axesSurelyAgree(turns, recording.imu, camera)) return findings;
   constexpr std::size_t kTurns = 120;  // an axis with little rotation needs more pairs
-  return judgeAxisChanges(turnsOfImages(recording, livelinessOfAxes(recording.imu), kTurns),
-                          recording.imu, camera);
+  return judgeAxisChanges(turnsOfImages(recording, lively, kTurns), recording.imu, camera);
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ Eigen::Matrix3d crossOf(const Eigen::Vector3d& v) {
   return m;
 }
 
-constexpr double kLeastScale = 1e-5;
+constexpr double kLeastScale = 1e-5, kLeastStep = 1e-6;  // rad
 
 /// A rotation, the direction of translation, and the median error of the predicted flow.
 struct Motion {
@@ -91,6 +91,7 @@ Motion withWay(const std::vector<Flow>& flow, const Motion& start) {
     const Eigen::Matrix<double, 6, 1> step = A.ldlt().solve(b);
     motion.rotation += step.head<3>();
     motion.way = (motion.way + step.tail<3>()).normalized();
+    if (step.norm() < kLeastStep) break;
   }
   return motion;
 }

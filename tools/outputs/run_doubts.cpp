@@ -68,7 +68,7 @@ Doubts doubtsOfRun(const RunFacts& facts) {
         {fmt::format("{} of {} images are missing or cannot be read", lost, all),
          "report.json counts the reasons of capture; download or copy the drive again"});
   }
-  if (4 * facts.without_pose > facts.frames) {
+  if (10 * facts.without_pose > facts.frames) {
     doubts.push_back({fmt::format("{} of {} frames have no pose and were not used",
                                   facts.without_pose, facts.frames),
                       "provide poses of the whole drive, at most 0.5 s apart"});

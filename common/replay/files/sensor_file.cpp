@@ -25,6 +25,12 @@ SensorFile::SensorFile(const std::filesystem::path& file) : name_(file.string())
   if (!stream) throwMissing(file, "a sensor's calibration", "EuRoC keeps it beside data.csv");
   std::string text, line;
   while (std::getline(stream, line)) {
+    if (text.empty() && line.starts_with("Calibration results")) {
+      throw StartupError(ExitCode::kData,
+                         "{} is Kalibr's report for readers; give the camchain-imucam yaml that "
+                         "Kalibr writes beside it",
+                         name_);
+    }
     if (line.starts_with('%')) line.clear();  // OpenCV's "%YAML:1.0" is not valid YAML
     text += line + "\n";
   }

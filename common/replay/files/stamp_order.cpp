@@ -37,13 +37,14 @@ std::vector<Counter> counters() {
                               Tick{1000, "µs"},        Tick{10'000, "10 µs"},
                               Tick{100'000, "100 µs"}, Tick{1'000'000, "ms"}};
   std::vector<Counter> all;
-  for (const int bits : {16, 24, 30, 31, 32}) {
+  for (const int bits : {16, 20, 24, 30, 31, 32}) {
     for (const Tick& tick : kTicks) {
       all.push_back({Duration((std::int64_t{1} << bits) * tick.ns),
                      fmt::format("{} bits of {}", bits, tick.name)});
     }
   }
-  all.insert(all.end(), {{std::chrono::minutes(1), "a minute"},
+  all.insert(all.end(), {{Duration(std::int64_t{1} << 48), "48 bits of ns"},
+                         {std::chrono::minutes(1), "a minute"},
                          {hours(1), "an hour"},
                          {hours(24), "a day"},
                          {hours(7 * 24), "a week"}});

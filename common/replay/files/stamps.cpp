@@ -75,6 +75,11 @@ std::string whyNoStamp(std::string_view text) {
   text = trim(text);
   if (parseNanoseconds(text)) return {};
   std::string why = "`" + std::string(text) + "` is no stamp in whole nanoseconds";
+  if (text.find(';') != text.npos) {
+    return why +
+           ": semicolons separate the columns, and numbers have decimal commas; export the "
+           "table with commas and decimal points";
+  }
   const auto value = parseNumber(text);
   if (!value) return why;
   if (*value < 0.0) return why + ": it is negative";

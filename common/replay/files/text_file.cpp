@@ -27,8 +27,8 @@ std::optional<Number> parseWhole(std::string_view text) {
   return value;
 }
 
-/// Returns the existing neighbour whose name differs from the missing one only in case or Unicode
-/// form, or "" if there is none.
+/// Returns the existing neighbour whose name differs from the missing one only in case, Unicode
+/// form, blanks at the end or a further ".txt", or "" if there is none.
 std::string similarTo(const std::filesystem::path& path) {
   namespace fs = std::filesystem;
   std::error_code error;
@@ -37,7 +37,10 @@ std::string similarTo(const std::filesystem::path& path) {
     missing = missing.parent_path();
   }
   const auto key = [](const fs::path& of) {
-    return withoutAccents(toLower(of.filename().string()));
+    const std::string name = withoutAccents(toLower(of.filename().string()));
+    std::string_view stem = trim(name);
+    if (stem.ends_with(".txt")) stem.remove_suffix(4);
+    return std::string(stem);
   };
   for (const auto& entry : fs::directory_iterator(missing.parent_path(), error)) {
     if (key(entry.path()) == key(missing) && entry.path() != missing) return entry.path().string();
@@ -48,12 +51,17 @@ std::string similarTo(const std::filesystem::path& path) {
 }  // namespace
 
 std::vector<TextLine> readLines(const std::filesystem::path& path, std::string_view fix) {
-  std::ifstream file(path);
+  // Opening a pipe waits for its writer, which those of a shell (/dev/fd/63) have.
+  const bool pipe = std::filesystem::is_fifo(path) && !path.string().starts_with("/dev/");
+  std::ifstream file(pipe ? std::filesystem::path() : path);
   const bool folder = std::filesystem::is_directory(path);
   if (!file || folder) {
     refuseUnreadable(path);
     throw StartupError(ExitCode::kUnavailable, "{} {}; {}", path.c_str(),
-                       folder ? "is a folder" : "cannot be read", fix);
+                       pipe     ? "is a pipe, not a file"
+                       : folder ? "is a folder"
+                                : "cannot be read",
+                       fix);
   }
   std::vector<TextLine> lines;
   std::string text;
@@ -76,12 +84,19 @@ void refuseUnreadable(const std::filesystem::path& path) {
 
 void throwMissing(const std::filesystem::path& path, std::string_view what, std::string_view fix) {
   refuseUnreadable(path);
+  std::error_code error;
+  if (const auto target = std::filesystem::read_symlink(path, error); !error) {
+    throw StartupError(ExitCode::kUnavailable,
+                       "{} is missing: {} is a link to {}, which does not exist; fetch that file "
+                       "(for example with git annex get), or correct the link",
+                       what, path.c_str(), target.c_str());
+  }
   const std::string similar = std::filesystem::exists(path) ? "" : similarTo(path);
   if (!similar.empty()) {
     throw StartupError(
         ExitCode::kUnavailable,
-        "{} is missing: {}; {} is there, whose name differs in case or in its Unicode "
-        "form (composed or decomposed); rename it",
+        "{} is missing: {}; {} is there, whose name differs in case, in its Unicode form (composed "
+        "or decomposed) or at its end; rename it",
         what, path.c_str(), similar);
   }
   throw StartupError(ExitCode::kUnavailable, "{} is missing: {}; {}", what, path.c_str(), fix);

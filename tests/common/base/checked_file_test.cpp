@@ -2,8 +2,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <functional>
 #include <iterator>
 
@@ -64,6 +66,24 @@ TEST_F(CheckedFileTest, AFullDiskIsSaid) {
   std::ofstream full("/dev/full");
   full << "text";
   EXPECT_EQ(codeOf([&] { flushChecked(full, "/dev/full"); }), ExitCode::kInputOutput);
+}
+
+TEST_F(CheckedFileTest, ALimitOfTheFileSizeIsNamed) {
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  rlimit limit = before;
+  limit.rlim_cur = 1000;
+  const auto on_excess = std::signal(SIGXFSZ, SIG_IGN);
+  setrlimit(RLIMIT_FSIZE, &limit);
+  std::string message;
+  try {
+    writeChecked(folder / "result.csv", std::string(1 << 20, 'x'));
+  } catch (const StartupError& error) {
+    message = error.what();
+  }
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, on_excess);
+  EXPECT_THAT(message, testing::HasSubstr("which is 1000 bytes (ulimit -f)"));
 }
 
 TEST_F(CheckedFileTest, AFolderThatIsNotThereIsSaid) {

@@ -63,6 +63,18 @@ TEST(Image, AFrameWhoseBytesDoNotFitItsSizeIsRefused) {
   EXPECT_EQ(setPixels(frame, cv::Mat(2, 2, CV_16UC1)).error().code, "image_malformed");
 }
 
+TEST(Decode, ACopyInTextModeIsNamed) {
+  cv::Mat noise(200, 200, CV_8UC1);
+  cv::RNG(1).fill(noise, cv::RNG::UNIFORM, 0, 256);
+  const std::string whole = encoded(".jpg", noise);
+  ASSERT_TRUE(decodeImage(whole, std::nullopt));
+  std::string copied;
+  for (const char byte : whole) copied += byte == '\n' ? "\r\n" : std::string(1, byte);
+  const auto image = decodeImage(copied, std::nullopt);
+  ASSERT_FALSE(image);
+  EXPECT_NE(image.error().detail.find("copied in text mode"), std::string::npos);
+}
+
 TEST(Decode, KeepsTheFilesChannelsUnlessToldOtherwise) {
   const std::string colour = encoded(".png", colours());
   const std::string grey = encoded(".png", cv::Mat(3, 3, CV_8UC1, cv::Scalar(5)));

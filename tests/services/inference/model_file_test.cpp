@@ -15,6 +15,12 @@ namespace {
 
 using ::testing::HasSubstr;
 
+std::string repeated(const std::string& text, int times) {
+  std::string all;
+  for (int i = 0; i < times; ++i) all += text;
+  return all;
+}
+
 TEST(ModelFile, WhatIsNoNetworkIsNamed) {
   const std::pair<std::string, const char*> cases[] = {
       {"version https://git-lfs.github.com/spec/v1\noid sha256:1\nsize 3\n", "git lfs pull"},
@@ -27,12 +33,18 @@ TEST(ModelFile, WhatIsNoNetworkIsNamed) {
       {"\x89HDF\r\n", "Keras"},
       {"ftrt\x01", "TensorRT"},
       {"7767517\n3 3\n", "ncnn"},
+      {std::string("\x40\0\0\0\0\0\0\0{\"w\":{}}", 16), "safetensors"},
+      {std::string(257, 'm') + "ustar" + std::string(300, '\0'), "tar archive"},
+      {"\n\x10\n\x05input\x12\x0bPlaceholder", "TensorFlow (.pb)"},
+      {"\x08\x07" + repeated("\r\n\x12", 20), "text mode"},
       {std::string(600, '\0'), "zeros only"},
       {"Quota exceeded\n", "text that begins with `Quota exceeded`"}};
   for (const auto& [bytes, words] : cases) EXPECT_THAT(whyNoNetwork(bytes), HasSubstr(words));
   EXPECT_EQ(whyNoNetwork(""), "");
   EXPECT_EQ(whyNoNetwork("\x08\x07\x12\x07pytorch"), "") << "ONNX";
   EXPECT_EQ(whyNoNetwork("[net]\nwidth=320\n"), "") << "Darknet";
+  EXPECT_EQ(whyNoNetwork("\r\n[net]" + repeated("\r\nwidth=320", 20)), "") << "with CR LF";
+  EXPECT_EQ(whyNoNetwork("\x08\x07" + repeated("\r\n\x12", 20) + "\n"), "") << "a lone line feed";
 }
 
 TEST(ModelFile, ADamagedNetworkIsRefusedByTheDigestOfItsDescription) {

@@ -357,6 +357,24 @@ TEST(PoseCheck, PosesThatStandStillWhileTheBodyMovesAreToldWithTheTime) {
   }
 }
 
+TEST(PoseCheck, PartsOfPosesThatStandStillAreNamed) {
+  const Poses sound = eachOf(phone().poses, 10);
+  Poses poses = sound;
+  for (std::size_t i = 200; i < 230; ++i) poses[i].T_WB.q = poses[200].T_WB.q;
+  auto findings = findingsOf(phone(), poses);
+  ASSERT_THAT(codesIn(findings), ElementsAre("poses_frozen"));
+  EXPECT_THAT(findings[0].text, HasSubstr("the orientations of the poses stand still"));
+  Way way = phone();
+  SpeedSample speed;
+  speed.time = sound[215].time, speed.speed = 2.0;
+  way.recording.speed = {speed};
+  poses = sound;
+  for (std::size_t i = 200; i < 230; ++i) poses[i].T_WB.p = poses[200].T_WB.p;
+  findings = findingsOf(way, poses);
+  ASSERT_THAT(codesIn(findings), ElementsAre("poses_frozen"));
+  EXPECT_THAT(findings[0].text, HasSubstr("the positions of the poses stand still"));
+}
+
 TEST(PoseCheck, ABodyAtRestMayRepeatItsPose) {
   Way way = curve(0.4);
   for (std::size_t i = 50; i < 100; ++i) way.poses[i].T_WB = way.poses[50].T_WB;

@@ -78,6 +78,8 @@ TEST(Doubts, TheLastLineNamesWhatWouldElseBeSilent) {
 
 TEST(Doubts, PosesOfAPartOfTheDriveAreTold) {
   EXPECT_THAT(sentences({.frames = 240, .without_pose = 10}), IsEmpty());
+  EXPECT_THAT(sentences({.frames = 240, .without_pose = 30}),
+              ElementsAre(HasSubstr("30 of 240 frames have no pose")));
   EXPECT_THAT(sentences({.frames = 240, .without_pose = 234}),
               ElementsAre(HasSubstr("234 of 240 frames have no pose")));
 }

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -46,6 +47,7 @@ void runDoctor(const DoctorOptions& given) {
   }
   if (!given.drive.data.empty()) {
     keepFreedMemory();
+    std::fprintf(stderr, "checks %s\n", given.drive.data.c_str());  // large images take seconds
     Findings findings = given.copy.empty() ? checkRigBy(given.drive, given.rig_seconds)
                                            : fixRecording(given.drive, given.copy);
     const bool named = !given.network.empty();

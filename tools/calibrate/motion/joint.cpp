@@ -14,14 +14,20 @@ namespace {
 
 using namespace joint;
 
-/// Normal equations of one window after the elimination of its corners and of its own unknowns.
+/// Normal equations of one window by the last N of the shared unknowns, after the elimination of
+/// its corners. The last kOwn of these are the window's own.
+template <int N>
 struct Reduced {
-  SharedMatrix H = SharedMatrix::Zero();
-  Shared g = Shared::Zero();                         ///< gradient of half the cost
-  std::vector<Eigen::Matrix<double, kAll, 1>> rows;  ///< for each corner: coupling, information
-  std::vector<double> pulls;                         ///< gradients of the inverse depths
-  JointMatrix H_joint = JointMatrix::Zero();
-  JointVector g_joint = JointVector::Zero();
+  Eigen::Matrix<double, N, N> H = Eigen::Matrix<double, N, N>::Zero();
+  Eigen::Matrix<double, N, 1> g = Eigen::Matrix<double, N, 1>::Zero();  ///< of half the cost
+  std::vector<Eigen::Matrix<double, N + 1, 1>> rows;  ///< for each corner: coupling, information
+  std::vector<double> pulls;                          ///< gradients of the inverse depths
+};
+
+/// The same after the elimination of the window's own unknowns as well.
+struct Joint {
+  JointMatrix H;
+  JointVector g;
 };
 
 /// The weight of Cauchy's loss for a squared residual.
@@ -54,22 +60,29 @@ class Problem {
   }
   /// Initial gravity: minus the mean force, as if the body did not accelerate.
   Eigen::Vector3d gravityIn(const Window& window) const;
-  std::vector<double> squares(const JointState& state, const Window& window) const;
+  Exposures exposuresOf(const JointState& state, const Window& window) const {
+    return joint::exposuresOf(window, pathOf(window, state), state.camera);
+  }
+  std::vector<double> squares(const JointState& state, const Window& window,
+                              const Exposures& exposures) const;
   std::vector<double> allSquares() const;
-  double cost(const JointState& state, const Window& window) const;
+  double cost(const JointState& state, const Window& window, const Exposures& exposures) const;
   double cost(const JointState& state, const std::vector<Window>& windows) const;
-  Reduced reduce(const JointState& state, const Window& window) const;
-  std::vector<Reduced> reduceAll() const;
+  template <int N>
+  Reduced<N> reduce(const JointState& state, const Window& window,
+                    const Exposures& exposures) const;
+  std::vector<Reduced<kShared>> reduceAll() const;
   JointVector priorWeights() const {
     return excess_ * unit() * options_.prior_sigma.cwiseAbs2().cwiseInverse();
   }
-  JointVector solveJoint(const std::vector<Reduced>& all) const;
+  JointVector solveJoint(const std::vector<Reduced<kShared>>& all) const;
   /// Minimises the cost over the window's own unknowns for a given state, in a few steps.
   void settle(const JointState& state, Window& window) const;
   std::vector<Window> settled(const JointState& state, std::vector<Window> windows) const;
-  Window advanced(const Window& window, const Reduced& reduced, const JointVector& step,
-                  double length) const;
-  JointVector sigmaOf(const std::vector<Reduced>& all);
+  template <int N>
+  Window advanced(const Window& window, const Reduced<N>& reduced,
+                  const Eigen::Matrix<double, N - kOwn, 1>& step, double length) const;
+  JointVector sigmaOf(const std::vector<Reduced<kShared>>& all);
 
   /// Variance of a residual in px²; the priors are weighted relative to it.
   double unit() const { return 0.25 * scale_ * scale_; }
@@ -89,21 +102,22 @@ Eigen::Vector3d Problem::gravityIn(const Window& window) const {
   return -kGravity * pathOf(window, state_).at(length).velocity.normalized();
 }
 
-std::vector<double> Problem::squares(const JointState& state, const Window& window) const {
+std::vector<double> Problem::squares(const JointState& state, const Window& window,
+                                     const Exposures& exposures) const {
   std::vector<double> all;
   const CameraModel lens(state.camera);
-  const InertialPath path = pathOf(window, state);
   const auto u = unknownsOf<double>(state, window.own);
   for (std::size_t k = 0; k < window.inverse.size(); ++k) {
-    forResiduals<double>(window, k, path, lens, state, u,
+    forResiduals<double>(window, k, exposures, lens, u,
                          [&](const Eigen::Vector2d& r) { all.push_back(r.squaredNorm()); });
   }
   return all;
 }
 
-double Problem::cost(const JointState& state, const Window& window) const {
+double Problem::cost(const JointState& state, const Window& window,
+                     const Exposures& exposures) const {
   double sum = 0.0, priors = 0.0;
-  for (const double squared : squares(state, window)) sum += costOf(squared, scale_);
+  for (const double squared : squares(state, window, exposures)) sum += costOf(squared, scale_);
   for (const double inverse : window.inverse) {
     const double off = (inverse - kUsualInverse) / kInverseSigma;
     priors += off * off;
@@ -114,83 +128,91 @@ double Problem::cost(const JointState& state, const Window& window) const {
 
 double Problem::cost(const JointState& state, const std::vector<Window>& windows) const {
   double sum = 0.0;
-  for (const Window& window : windows) sum += cost(state, window);
+  for (const Window& window : windows) sum += cost(state, window, exposuresOf(state, window));
   const JointVector off = between(options_.prior, state).cwiseQuotient(options_.prior_sigma);
   return sum + 0.5 * excess_ * unit() * off.squaredNorm();
 }
 
-Reduced Problem::reduce(const JointState& state, const Window& window) const {
-  Reduced out;
+template <int N>
+Reduced<N> Problem::reduce(const JointState& state, const Window& window,
+                           const Exposures& exposures) const {
+  Reduced<N> out;
   const CameraModel lens(state.camera);
-  const InertialPath path = pathOf(window, state);
-  const auto u = unknownsOf<Jet>(state, window.own);
-  using Row = Eigen::Matrix<double, kAll, 1>;
-  using Full = Eigen::Matrix<double, kAll, kAll>;
+  const auto u = unknownsOf<Jet<N>>(state, window.own);
+  using Row = Eigen::Matrix<double, N + 1, 1>;
+  using Full = Eigen::Matrix<double, N + 1, N + 1>;
   for (std::size_t k = 0; k < window.inverse.size(); ++k) {
     Full H = Full::Zero();
     Row g = Row::Zero();
-    H(kShared, kShared) = unit() / (kInverseSigma * kInverseSigma);
-    g[kShared] = H(kShared, kShared) * (window.inverse[k] - kUsualInverse);
-    forResiduals<Jet>(window, k, path, lens, state, u, [&](const Eigen::Matrix<Jet, 2, 1>& r) {
+    H(N, N) = unit() / (kInverseSigma * kInverseSigma);
+    g[N] = H(N, N) * (window.inverse[k] - kUsualInverse);
+    forResiduals<Jet<N>>(window, k, exposures, lens, u, [&](const auto& r) {
       const double weight = weightOf(r[0].a * r[0].a + r[1].a * r[1].a, scale_);
-      for (const Jet& one : {r[0], r[1]}) {
+      for (const Jet<N>& one : {r[0], r[1]}) {
         H.noalias() += weight * one.v * one.v.transpose();
         g += weight * one.a * one.v;
       }
     });
-    const Shared coupling = H.col(kShared).head<kShared>();
-    const double information = H(kShared, kShared);
-    out.H += H.topLeftCorner<kShared, kShared>() - coupling * coupling.transpose() / information;
-    out.g += g.head<kShared>() - coupling * (g[kShared] / information);
-    out.rows.push_back(H.col(kShared));
-    out.pulls.push_back(g[kShared]);
+    const Eigen::Matrix<double, N, 1> coupling = H.col(N).template head<N>();
+    out.H += H.template topLeftCorner<N, N>() - coupling * coupling.transpose() / H(N, N);
+    out.g += g.template head<N>() - coupling * (g[N] / H(N, N));
+    out.rows.push_back(H.col(N));
+    out.pulls.push_back(g[N]);
   }
   const Eigen::Vector3d gravity = window.own.tail<3>(), down = gravity.normalized();
   const double information = unit() / (kGravitySigma * kGravitySigma);
-  out.H.bottomRightCorner<3, 3>() += information * down * down.transpose();
-  out.g.tail<3>() += information * (gravity.norm() - kGravity) * down;
+  out.H.template bottomRightCorner<3, 3>() += information * down * down.transpose();
+  out.g.template tail<3>() += information * (gravity.norm() - kGravity) * down;
   // A weak prior at the present value keeps a window with few corners solvable.
-  out.H.bottomRightCorner<kOwn, kOwn>().diagonal().array() += 1e-3 * unit();
-  const Eigen::LDLT<Eigen::Matrix<double, kOwn, kOwn>> own(out.H.bottomRightCorner<kOwn, kOwn>());
-  const Eigen::Matrix<double, kOwn, kParameters> cross =
-      out.H.bottomLeftCorner<kOwn, kParameters>();
-  out.H_joint =
-      out.H.topLeftCorner<kParameters, kParameters>() - cross.transpose() * own.solve(cross);
-  out.g_joint = out.g.head<kParameters>() - cross.transpose() * own.solve(out.g.tail<kOwn>());
+  out.H.template bottomRightCorner<kOwn, kOwn>().diagonal().array() += 1e-3 * unit();
   return out;
 }
 
-std::vector<Reduced> Problem::reduceAll() const {
-  std::vector<Reduced> all(windows_.size());
+std::vector<Reduced<kShared>> Problem::reduceAll() const {
+  std::vector<Reduced<kShared>> all(windows_.size());
   cv::parallel_for_(cv::Range(0, static_cast<int>(all.size())), [&](const cv::Range& range) {
     for (int i = range.start; i < range.end; ++i) {
-      all[static_cast<std::size_t>(i)] = reduce(state_, windows_[static_cast<std::size_t>(i)]);
+      const Window& window = windows_[static_cast<std::size_t>(i)];
+      all[static_cast<std::size_t>(i)] =
+          reduce<kShared>(state_, window, exposuresOf(state_, window));
     }
   });
   return all;
 }
 
-JointVector Problem::solveJoint(const std::vector<Reduced>& all) const {
+Joint jointOf(const Reduced<kShared>& window) {
+  const Eigen::LDLT<Eigen::Matrix<double, kOwn, kOwn>> own(
+      window.H.bottomRightCorner<kOwn, kOwn>());
+  const Eigen::Matrix<double, kOwn, kParameters> cross =
+      window.H.bottomLeftCorner<kOwn, kParameters>();
+  return {window.H.topLeftCorner<kParameters, kParameters>() - cross.transpose() * own.solve(cross),
+          window.g.head<kParameters>() - cross.transpose() * own.solve(window.g.tail<kOwn>())};
+}
+
+JointVector Problem::solveJoint(const std::vector<Reduced<kShared>>& all) const {
   const JointVector weight = priorWeights();
   JointMatrix H = weight.asDiagonal();
   JointVector g = weight.cwiseProduct(between(options_.prior, state_));
-  for (const Reduced& one : all) H += one.H_joint, g += one.g_joint;
+  for (const auto& window : all) {
+    const Joint one = jointOf(window);
+    H += one.H, g += one.g;
+  }
   return -H.ldlt().solve(g);
 }
 
-Window Problem::advanced(const Window& window, const Reduced& reduced, const JointVector& step,
-                         double length) const {
-  Shared all;
-  all.head<kParameters>() = step;
-  const Eigen::Matrix<double, kOwn, kParameters> cross =
-      reduced.H.bottomLeftCorner<kOwn, kParameters>();
-  all.tail<kOwn>() = -reduced.H.bottomRightCorner<kOwn, kOwn>().ldlt().solve(
-      reduced.g.tail<kOwn>() + cross * step);
+template <int N>
+Window Problem::advanced(const Window& window, const Reduced<N>& reduced,
+                         const Eigen::Matrix<double, N - kOwn, 1>& step, double length) const {
+  Eigen::Matrix<double, N, 1> all = Eigen::Matrix<double, N, 1>::Zero();
+  all.template head<N - kOwn>() = step;
+  const Own pull = reduced.g.template tail<kOwn>() + reduced.H.template bottomRows<kOwn>() * all;
+  all.template tail<kOwn>() =
+      -reduced.H.template bottomRightCorner<kOwn, kOwn>().ldlt().solve(pull);
   Window next = window;
-  next.own += length * all.tail<kOwn>();
+  next.own += length * all.template tail<kOwn>();
   for (std::size_t k = 0; k < next.inverse.size(); ++k) {
     const auto& row = reduced.rows[k];
-    next.inverse[k] -= length * (reduced.pulls[k] + row.head<kShared>().dot(all)) / row[kShared];
+    next.inverse[k] -= length * (reduced.pulls[k] + row.template head<N>().dot(all)) / row[N];
   }
   return next;
 }
@@ -198,13 +220,14 @@ Window Problem::advanced(const Window& window, const Reduced& reduced, const Joi
 void Problem::settle(const JointState& state, Window& window) const {
   constexpr int kRounds = 3;
   constexpr double kShortest = 1.0 / 32.0, kLittle = 1e-3;
-  double before = cost(state, window);
+  const Exposures exposures = exposuresOf(state, window);
+  double before = cost(state, window, exposures);
   for (int round = 0; round < kRounds; ++round) {
-    const Reduced reduced = reduce(state, window);
+    const auto reduced = reduce<kOwn>(state, window, exposures);
     double after = before;
     for (double length = 1.0; length > kShortest && !(after < before); length *= 0.5) {
-      Window next = advanced(window, reduced, JointVector::Zero(), length);
-      after = cost(state, next);
+      Window next = advanced<kOwn>(window, reduced, {}, length);
+      after = cost(state, next, exposures);
       if (after < before) window = std::move(next);
     }
     if (!(before - after > kLittle * before)) return;
@@ -224,11 +247,12 @@ std::vector<Window> Problem::settled(const JointState& state, std::vector<Window
 /// The sum of outer products of the windows' gradients (sandwich) accounts for residuals that are
 /// correlated within a window. With few windows, its mean ratio to the information is a lower
 /// bound.
-JointVector Problem::sigmaOf(const std::vector<Reduced>& all) {
+JointVector Problem::sigmaOf(const std::vector<Reduced<kShared>>& all) {
   JointMatrix H = JointMatrix::Zero(), meat = H;
-  for (const Reduced& one : all) {
-    H += one.H_joint;
-    meat += one.g_joint * one.g_joint.transpose();
+  for (const auto& window : all) {
+    const Joint one = jointOf(window);
+    H += one.H;
+    meat += one.g * one.g.transpose();
   }
   const JointVector weight = priorWeights();
   const JointMatrix inverse =
@@ -251,7 +275,7 @@ JointVector Problem::sigmaOf(const std::vector<Reduced>& all) {
 std::vector<double> Problem::allSquares() const {
   std::vector<double> all;
   for (const Window& window : windows_) {
-    const auto some = squares(state_, window);
+    const auto some = squares(state_, window, exposuresOf(state_, window));
     all.insert(all.end(), some.begin(), some.end());
   }
   return all;
@@ -273,7 +297,7 @@ void Problem::descend() {
       const JointState next = moved(state_, length * step);
       std::vector<Window> windows;
       for (std::size_t i = 0; i < windows_.size(); ++i) {
-        windows.push_back(advanced(windows_[i], reduced[i], step, length));
+        windows.push_back(advanced<kShared>(windows_[i], reduced[i], step, length));
       }
       windows = settled(next, std::move(windows));
       after = cost(next, windows);

@@ -26,11 +26,11 @@ inline constexpr double kLeastScale_px = 0.3;
 // largest change of the time offset
 inline constexpr Duration kMargin = std::chrono::milliseconds(100);
 
-using Jet = ceres::Jet<double, kAll>;
+/// Dual numbers with derivatives by the last N of the shared unknowns, and by an inverse depth.
+template <int N>
+using Jet = ceres::Jet<double, N + 1>;
 template <class T>
 using Vec3 = Eigen::Matrix<T, 3, 1>;
-using Shared = Eigen::Matrix<double, kShared, 1>;
-using SharedMatrix = Eigen::Matrix<double, kShared, kShared>;
 using Own = Eigen::Matrix<double, kOwn, 1>;
 
 /// Data of one window: its unknowns, and the results of the last linearisation.
@@ -54,7 +54,8 @@ T variable(double value, int index) {
   if constexpr (std::is_same_v<T, double>) {
     return value;
   } else {
-    return T(value, index);
+    constexpr int kFirst = kAll - T::DIMENSION;
+    return index < kFirst ? T(value) : T(value, index - kFirst);
   }
 }
 
@@ -116,13 +117,33 @@ inline double shareOfRow(double row, const CameraCalibration& camera) {
   return row / (camera.height - 1.0) - 0.5;
 }
 
+/// Time of a corner's exposure after the start of the window, and the IMU's state at that time.
+struct Exposure {
+  double share, t;
+  InertialState inertial;
+};
+/// For each track, the exposures of its corners. They depend on the shared unknowns only.
+using Exposures = std::vector<std::vector<Exposure>>;
+
+inline Exposures exposuresOf(const Window& window, const InertialPath& path,
+                             const CameraCalibration& camera) {
+  Exposures all;
+  for (const Track& track : window.tracks->tracks) {
+    auto& exposures = all.emplace_back();
+    for (std::size_t i = 0; i < track.size(); ++i) {
+      const double share = shareOfRow(track[i].y(), camera);
+      const double t = toSeconds(window.tracks->times[i] - window.from) + camera.time_offset_s +
+                       share * camera.readout_s;
+      exposures.push_back({share, t, path.at(t)});
+    }
+  }
+  return all;
+}
+
 template <class T>
-BodyAt<T> bodyAt(const InertialPath& path, double stamp_s, const Eigen::Vector2d& pixel,
-                 const JointState& state, const Unknowns<T>& u) {
-  const double share = shareOfRow(pixel.y(), state.camera);
-  const double t = stamp_s + state.camera.time_offset_s + share * state.camera.readout_s;
-  const InertialState inertial = path.at(t);
-  const T dt = u.later + share * u.readout, at = T(t) + dt;
+BodyAt<T> bodyAt(const Exposure& exposure, const Unknowns<T>& u) {
+  const InertialState& inertial = exposure.inertial;
+  const T dt = u.later + exposure.share * u.readout, at = T(exposure.t) + dt;
   BodyAt<T> body;
   body.R = inertial.q.toRotationMatrix();
   body.turn = scaled(inertial.rate, dt) - rotated<T>(inertial.by_bias, u.bias);
@@ -148,27 +169,24 @@ std::optional<Vec3<T>> rayOf(const CameraModel& lens, const Eigen::Vector2d& pix
 
 /// Calls `each(residual)`, in pixels, for every image of a track after the first.
 template <class T, class Each>
-void forResiduals(const Window& window, std::size_t k, const InertialPath& path,
-                  const CameraModel& lens, const JointState& state, const Unknowns<T>& u,
-                  const Each& each) {
+void forResiduals(const Window& window, std::size_t k, const Exposures& exposures,
+                  const CameraModel& lens, const Unknowns<T>& u, const Each& each) {
   const Track& track = window.tracks->tracks[k];
-  const auto stampOf = [&](std::size_t i) {
-    return toSeconds(window.tracks->times[i] - window.from);
-  };
+  const CameraCalibration& camera = lens.calibration();
   const auto ray = rayOf<T>(lens, track.front(), u);
   if (!ray) return;
   const T rho = variable<T>(window.inverse[k], kShared);
-  const Eigen::Matrix3d R_BC = state.camera.T_BC.R(), R_CB = R_BC.transpose();
+  const Eigen::Matrix3d R_BC = camera.T_BC.R(), R_CB = R_BC.transpose();
   const Vec3<T> in_body = rotated<T>(R_BC, *ray + u.turn.cross(*ray)) + rho * u.place;
-  const BodyAt<T> first = bodyAt<T>(path, stampOf(0), track.front(), state, u);
+  const BodyAt<T> first = bodyAt<T>(exposures[k][0], u);
   const Vec3<T> in_window = first.toWindow(in_body) + rho * first.position;
   for (std::size_t i = 1; i < track.size(); ++i) {
-    const BodyAt<T> body = bodyAt<T>(path, stampOf(i), track[i], state, u);
+    const BodyAt<T> body = bodyAt<T>(exposures[k][i], u);
     const Vec3<T> there =
         rotated<T>(R_CB, body.fromWindow(in_window - rho * body.position) - rho * u.place);
     const Vec3<T> seen = there - u.turn.cross(there);
     if (!(seen.z() > T(1e-2))) continue;
-    each(Eigen::Matrix<T, 2, 1>(track[i].cast<T>() - projectPoint<T>(state.camera.distortion,
+    each(Eigen::Matrix<T, 2, 1>(track[i].cast<T>() - projectPoint<T>(camera.distortion,
                                                                      u.focal.data(),
                                                                      u.distortion.data(), seen)));
   }

@@ -45,21 +45,47 @@ struct Still {
   std::size_t first, last;
 };
 
-/// The longest interval, over 0.4 s, in which a pose is repeated.
-std::optional<Still> longestStill(const Poses& poses) {
-  constexpr double kSame_m = 1e-4, kSame_rad = 1e-4;
+using AreSame = bool (*)(const RigidTransform&, const RigidTransform&);
+
+bool areSamePlaces(const RigidTransform& a, const RigidTransform& b) {
+  return (b.p - a.p).norm() <= 1e-4;  // m
+}
+bool areSameTurns(const RigidTransform& a, const RigidTransform& b) {
+  return a.q.angularDistance(b.q) <= 1e-4;  // rad
+}
+bool areSamePoses(const RigidTransform& a, const RigidTransform& b) {
+  return areSamePlaces(a, b) && areSameTurns(a, b);
+}
+
+/// The longest interval, over 0.4 s but not the whole drive, in which poses are the same.
+std::optional<Still> longestStill(const Poses& poses, AreSame are_same) {
   constexpr Duration kLeast = std::chrono::milliseconds(400);
   constexpr std::size_t kFewest = 5;
   std::optional<Still> longest;
   Duration most = kLeast;
   for (std::size_t i = 0, from = 0; i < poses.size(); ++i) {
-    const auto &a = poses[from].T_WB, &b = poses[i].T_WB;
-    if ((b.p - a.p).norm() > kSame_m || a.q.angularDistance(b.q) > kSame_rad) from = i;
+    if (!are_same(poses[from].T_WB, poses[i].T_WB)) from = i;
     if (poses[i].time - poses[from].time < most || i - from < kFewest) continue;
     most = poses[i].time - poses[from].time;
     longest = Still{from, i};
   }
+  if (longest && longest->first == 0 && longest->last + 1 == poses.size()) return std::nullopt;
   return longest;
+}
+
+/// What moves while the poses are still: the gyroscope, the speed or the images; else nothing.
+std::string movingIn(const replay::Recording& recording, TimePoint from, TimePoint to,
+                     AreSame are_same, bool images) {
+  constexpr double kTurns_rad = 0.02, kMoves_mps = 0.5, kFlows_px = 2.0;
+  if (are_same != areSamePlaces && turningIn(recording, from, to) > kTurns_rad) {
+    return "the gyroscope turns";
+  }
+  if (are_same == areSameTurns) return {};
+  if (const double speed = speedIn(recording, from, to); speed > kMoves_mps) {
+    return fmt::format("the speed is {:.1f} m/s", speed);
+  }
+  const bool flows = images && are_same == areSamePoses && flowIn(recording, from, to) > kFlows_px;
+  return flows ? "the images move" : "";
 }
 
 }  // namespace
@@ -98,27 +124,27 @@ DataFindings judgePosesBackwards(const Poses& poses, const replay::Recording& re
 }
 
 DataFindings judgePosesFrozen(const Poses& poses, const replay::Recording& recording, bool images) {
-  constexpr double kTurns_rad = 0.02, kMoves_mps = 0.5, kFlows_px = 2.0;
-  const auto still = longestStill(poses);
-  if (!still || recording.calibration.cameras.empty()) return {};
-  if (still->first == 0 && still->last + 1 == poses.size()) return {};
-  const TimePoint from = poses[still->first].time, to = poses[still->last].time;
-  std::string moves;
-  if (turningIn(recording, from, to) > kTurns_rad) {
-    moves = "the gyroscope turns";
-  } else if (const double speed = speedIn(recording, from, to); speed > kMoves_mps) {
-    moves = fmt::format("the speed is {:.1f} m/s", speed);
-  } else if (images && flowIn(recording, from, to) > kFlows_px) {
-    moves = "the images move";
-  } else {
-    return {};
+  if (recording.calibration.cameras.empty()) return {};
+  constexpr std::pair<AreSame, const char*> kParts[] = {
+      {areSamePoses, "poses stand"},
+      {areSamePlaces, "positions of the poses stand"},
+      {areSameTurns, "orientations of the poses stand"}};
+  for (const auto& [are_same, what] : kParts) {
+    const auto still = longestStill(poses, are_same);
+    if (!still) continue;
+    // At an end of the poses, a rest with other stamps looks like a part that stands still.
+    const bool at_end = still->first == 0 || still->last + 1 == poses.size();
+    if (at_end && are_same != areSamePoses) continue;
+    const TimePoint from = poses[still->first].time, to = poses[still->last].time;
+    const std::string moves = movingIn(recording, from, to, are_same, images);
+    if (moves.empty()) continue;
+    return {{Grade::kWarning, "poses_frozen",
+             fmt::format("the {} still from {} to {} ns ({:.1f} s, poses {} to {} of them) while "
+                         "{}: a tracker that is lost repeats its last pose; leave those lines out",
+                         what, toNanoseconds(from), toNanoseconds(to), toSeconds(to - from),
+                         still->first + 1, still->last + 1, moves)}};
   }
-  return {{Grade::kWarning, "poses_frozen",
-           fmt::format("the poses stand still from {} to {} ns ({:.1f} s, poses {} to {} of them) "
-                       "while {}: a tracker that is lost repeats its last pose; leave those lines "
-                       "out",
-                       toNanoseconds(from), toNanoseconds(to), toSeconds(to - from),
-                       still->first + 1, still->last + 1, moves)}};
+  return {};
 }
 
 }  // namespace perdure::tools

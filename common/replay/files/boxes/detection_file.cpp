@@ -48,7 +48,7 @@ Columns readHeader(const std::filesystem::path& file, const TextLine& line,
                                "frame,class,x1,y1,x2,y2,score[,azimuth][,logit:<class>]");
     return 0;
   };
-  if (at.contains("w") || at.contains("width")) {
+  if (!at.contains("xmax") && (at.contains("w") || at.contains("width"))) {
     wrong.add(line.number, "a width and a height are no corner: write x2 = x1 + w, y2 = y1 + h");
   }
   columns.frame = need("frame");
@@ -75,6 +75,18 @@ Columns headerlessColumns(const TextLine& line) {
   columns.x1 = x1, columns.y1 = x1 + 1, columns.x2 = x1 + 2, columns.y2 = x1 + 3;
   columns.score = x1 + 4;
   return columns;
+}
+
+/// Refuses files that are no tables. `text` is the first line.
+void refuseForeign(const std::filesystem::path& file, std::string_view text) {
+  const char* what =
+      text.starts_with('<') ? "XML, as of CVAT or Pascal VOC; export the boxes as COCO JSON"
+      : text.starts_with("PK\x03\x04") ? "a ZIP archive or a spreadsheet; save the table as CSV"
+                                       : nullptr;
+  if (!what) return;
+  throw StartupError(ExitCode::kData,
+                     "{} is {}, or write a table with the header frame,class,x1,y1,x2,y2,score",
+                     file.c_str(), what);
 }
 
 /// Refuses lines in which all numbers after the first one or two lie between 0 and 1.
@@ -282,6 +294,7 @@ void DetectionFile::takeCoco(const CocoBoxes& coco, const ClassAliases& aliases)
 
 void DetectionFile::takeLines(const std::vector<TextLine>& lines, const ClassAliases& aliases) {
   const DetectionFileOptions& options = options_;
+  if (!lines.empty()) refuseForeign(options.file, lines[0].text);
   refuseShareLines(options.file, lines);
   const bool headerless = isHeaderless(lines, options);
   const Columns columns =

@@ -159,6 +159,14 @@ TEST(DetectionFile, MotLinesAreReadWithFramesFromOne) {
   }
 }
 
+TEST(DetectionFile, FilesThatAreNoTablesAreNamed) {
+  EXPECT_THAT(errorOfCsv("<?xml version=\"1.0\"?>\n<annotations/>\n"),
+              HasSubstr("XML, as of CVAT"));
+  EXPECT_THAT(errorOfCsv("PK\x03\x04xl/workbook.xml\n"), HasSubstr("a spreadsheet"));
+  EXPECT_THAT(errorOfCsv("filename,width,height,class,xmin,ymin,xmax,ymax\n"),
+              AllOf(HasSubstr("column x1 is missing"), Not(HasSubstr("a width and a height"))));
+}
+
 constexpr char kCocoTables[] =
     R"({"images": [{"id": 11, "file_name": "0/000002.png"}, {"id": 12, "file_name": "x.png"}],
         "categories": [{"id": 3, "name": "Car"}, {"id": 4, "name": "Van"}], "annotations": [)";

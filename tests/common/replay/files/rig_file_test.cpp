@@ -78,6 +78,8 @@ TEST_F(RigFile, SaysWhatIsWrongAndWhere) {
   EXPECT_THAT(complaint(text), testing::HasSubstr("cam0: intrinsics"));
   EXPECT_THAT(complaint("cam0: 3\n"), testing::HasSubstr("cam0"));
   EXPECT_THAT(complaint("cam0: [\n"), testing::HasSubstr(".yaml"));
+  EXPECT_THAT(complaint("Calibration results\n===\nerror (cam0): mean 0.3\n"),
+              testing::HasSubstr("Kalibr's report"));
   EXPECT_THROW(readRig("/nowhere/rig.yaml"), StartupError);
 }
 

@@ -144,6 +144,8 @@ TEST(Clocks, ACounterThatCameRoundGoesOn) {
                    {milliseconds(1 << 24), "24 bits of ms"},
                    {milliseconds(1 << 16), "16 bits of ms"},
                    {Duration(4'294'967'296), "32 bits of ns"},
+                   {milliseconds(1 << 20), "20 bits of ms"},
+                   {Duration(1LL << 48), "48 bits of ns"},
                    {std::chrono::hours(24), "a day"},
                    {std::chrono::hours(7 * 24), "a week"}};
   for (const auto& [length, name] : kCounters) {

@@ -31,6 +31,7 @@ TEST(Stamps, ThatAreNoNanosecondsSayWhatTheyLookLike) {
     EXPECT_THAT(whyNoStamp(text), HasSubstr("no stamp")) << text;
   }
   EXPECT_THAT(whyNoStamp("1403636579.763555"), HasSubstr("looks like seconds"));
+  EXPECT_THAT(whyNoStamp("1403636579763555555;-4"), HasSubstr("decimal commas"));
   EXPECT_THAT(whyNoStamp("1403636579763.5"), HasSubstr("looks like milliseconds"));
   EXPECT_THAT(whyNoStamp("1403636579763555.5"), HasSubstr("looks like microseconds"));
 }

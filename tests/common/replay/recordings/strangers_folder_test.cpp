@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sqlite3.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cstring>
@@ -167,6 +168,33 @@ TEST(StrangersFolder, NamesThatDifferInUnicodeFormOrCaseAreFoundOrNamed) {
   EXPECT_THAT(
       startupErrorOf([&] { Dataset::open({.path = drive.parent_path() / "Strange_Names"}); }),
       HasSubstr("strange_names is there, whose name differs in case"));
+  fs::rename(cam0 / "data.CSV", cam0 / "data.csv.txt");
+  EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = drive}); }),
+              HasSubstr("data.csv.txt is there"));
+}
+
+TEST(StrangersFolder, ALinkThatLeadsNowhereIsNamed) {
+  const fs::path drive = tinyEuroc("dangling");
+  fs::remove(drive / "mav0/imu0/data.csv");
+  fs::create_symlink("/nowhere/SHA256-1.csv", drive / "mav0/imu0/data.csv");
+  EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = drive}); }),
+              HasSubstr("is a link to /nowhere/SHA256-1.csv, which does not exist"));
+}
+
+TEST(StrangersFolder, APipeInPlaceOfAFileIsNamed) {
+  const fs::path drive = tinyEuroc("pipe");
+  fs::remove(drive / "mav0/imu0/data.csv");
+  ASSERT_EQ(mkfifo((drive / "mav0/imu0/data.csv").c_str(), 0600), 0);
+  EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = drive}); }), HasSubstr("is a pipe"));
+}
+
+TEST(StrangersFolder, DrivesInsideTheFolderAreListed) {
+  const fs::path drive = tinyEuroc("outer");
+  fs::create_directories(drive / "b");
+  fs::rename(drive / "mav0", drive / "b/mav0");
+  fs::copy(drive / "b", drive / "a", fs::copy_options::recursive);
+  EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = drive}); }),
+              HasSubstr("has a, b inside: give --data one of these"));
 }
 
 TEST(StrangersFolder, ADriveThatMayNotBeReadIsNotCalledMissing) {
