@@ -29,15 +29,6 @@ T need(const std::string& path, Result<T> result) {
   return *std::move(result);
 }
 
-std::vector<Candidate> candidatesOf(const std::vector<ObjectBelief>& beliefs) {
-  std::vector<Candidate> candidates;
-  for (const ObjectBelief& belief : beliefs) {
-    candidates.push_back(
-        {semantic_filter::fromBelief(belief, Matrix6d::Identity(), ExistenceEvidence::kRecall)});
-  }
-  return candidates;
-}
-
 Prospect prospectOf(const std::vector<TimedView>& views, const std::vector<Candidate>& candidates,
                     const Observer& observer) {
   Prospect prospect{views, {}, {}};
@@ -116,6 +107,17 @@ LookSettings readLookSettings(const std::string& rig, const std::string& config)
           semantic_filter::loadClassPriors(priors.string()), filter.filter};
 }
 
+std::vector<Candidate> candidatesOf(const MapToLook& map, const std::vector<TimedView>& planned,
+                                    const Observer& observer) {
+  std::vector<Candidate> candidates;
+  for (const ObjectBelief& belief : map.beliefs) {
+    candidates.push_back(
+        {semantic_filter::fromBelief(belief, Matrix6d::Identity(), ExistenceEvidence::kRecall)});
+  }
+  semantic_filter::addPlaces(candidates, map.past, planned, observer);
+  return candidates;
+}
+
 std::vector<Prospect> prospectsOf(const MapToLook& map,
                                   const std::vector<std::vector<TimedView>>& plans,
                                   const LookSettings& settings) {
@@ -123,8 +125,7 @@ std::vector<Prospect> prospectsOf(const MapToLook& map,
                           semantic_filter::natsPerHit(map.beliefs)};
   std::vector<TimedView> planned;
   for (const auto& views : plans) planned.insert(planned.end(), views.begin(), views.end());
-  auto candidates = candidatesOf(map.beliefs);
-  semantic_filter::addPlaces(candidates, map.past, planned, observer);
+  const auto candidates = candidatesOf(map, planned, observer);
   std::vector<Prospect> prospects;
   for (const auto& views : plans) prospects.push_back(prospectOf(views, candidates, observer));
   return prospects;

@@ -50,6 +50,11 @@ struct LookSettings {
 /// folder. Throws StartupError.
 LookSettings readLookSettings(const std::string& rig, const std::string& config);
 
+/// Returns the objects of the map, and the places that `planned` views may show.
+std::vector<semantic_filter::Candidate> candidatesOf(const MapToLook& map,
+                                                     const std::vector<TimedView>& planned,
+                                                     const semantic_filter::Observer& observer);
+
 /// Returns the prospect of each list of views: of one pose, or of a route in its order.
 std::vector<Prospect> prospectsOf(const MapToLook& map,
                                   const std::vector<std::vector<TimedView>>& plans,
