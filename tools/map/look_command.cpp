@@ -70,7 +70,7 @@ std::vector<TimedView> viewsOf(const LookCommand& command, const MapToLook& map,
 }
 
 std::vector<std::vector<TimedView>> plansOf(const LookCommand& command, const MapToLook& map) {
-  const TimePoint at = map.newest + Duration(std::llround(1e9 * command.after_s));
+  const TimePoint at = map.newest + durationFromSeconds(command.after_s);
   if (!command.route.empty()) return {readPlan(command.route, at)};
   std::vector<std::vector<TimedView>> plans;
   for (const TimedView& view : viewsOf(command, map, at)) plans.push_back({view});
