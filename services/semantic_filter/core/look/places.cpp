@@ -6,6 +6,8 @@
 #include <map>
 #include <utility>
 
+#include "common/camera/ground_view.h"
+
 namespace perdure::semantic_filter {
 namespace {
 
@@ -37,21 +39,13 @@ class Ground {
 
   /// Marks the cells that a view shows. `height_m`: of the body's origin above the ground.
   void mark(const TimedView& view, double height_m, bool Cell::*what) {
-    const RigidTransform T_CW = (view.T_WB * observer_.camera->T_BC()).inverse();
     const double ground_m = view.T_WB.p.z() - height_m;
-    const Key centre = keyOf(view.T_WB.p);
-    const int reach = static_cast<int>(kReach);
-    for (int i = -reach; i <= reach; ++i) {
-      for (int j = -reach; j <= reach; ++j) {
-        if (i * i + j * j > reach * reach) continue;
-        const Key key{centre.first + i, centre.second + j};
-        const auto pixel = observer_.camera->project(T_CW * placeOf(key, ground_m));
-        if (!pixel || !observer_.camera->inImage(*pixel)) continue;
-        Cell& cell = cells_[key];
-        cell.*what = true;
-        cell.ground_m = ground_m;
-      }
-    }
+    const GroundGrid grid{cell_m_, kReach * cell_m_, placeOf({}, ground_m).z()};
+    forGroundInView(*observer_.camera, view.T_WB, grid, [&](int i, int j) {
+      Cell& cell = cells_[{i, j}];
+      cell.*what = true;
+      cell.ground_m = ground_m;
+    });
   }
 
   /// Returns the planned cells without a known object, as they were `since`.
