@@ -7,6 +7,7 @@
 #include "common/base/errors.h"
 #include "common/mapping/frames/laid_belief.h"
 #include "common/mapping/map_frames.h"
+#include "common/replay/dataset.h"
 #include "common/replay/files/pose_file.h"
 #include "common/replay/files/rig_file.h"
 #include "services/map_store/core/map_database.h"
@@ -103,7 +104,11 @@ LookSettings readLookSettings(const std::string& rig, const std::string& config)
   config::refuse(config::readFile(fields, file.string()));
   fs::path priors = filter.class_priors;
   if (!fs::exists(priors)) priors = file.parent_path() / priors.filename();
-  return {CameraModel(replay::readRig(rig).cameras.front()),
+  const bool drive = fs::is_directory(rig) || rig.ends_with(".mcap");
+  const Calibration calibration =
+      drive ? replay::Dataset::open({.path = rig, .decode = false})->calibration()
+            : replay::readRig(rig);
+  return {CameraModel(calibration.cameras.front()),
           semantic_filter::loadClassPriors(priors.string()), filter.filter};
 }
 

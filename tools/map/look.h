@@ -46,8 +46,8 @@ struct LookSettings {
   semantic_filter::ClassPriors priors;
   semantic_filter::Parameters parameters;
 };
-/// Reads a rig file, and the filter's configuration; "": semantic_filter.yaml of the configuration
-/// folder. Throws StartupError.
+/// Reads the camera of a rig file or of a drive, and the filter's configuration; "":
+/// semantic_filter.yaml of the configuration folder. Throws StartupError.
 LookSettings readLookSettings(const std::string& rig, const std::string& config);
 
 /// Returns the objects of the map, and the places that `planned` views may show.

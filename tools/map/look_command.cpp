@@ -168,7 +168,9 @@ void addLookCommand(CLI::App& map) {
   auto given = std::make_shared<LookCommand>();
   CLI::App* command = map.add_subcommand("look", "Where to look next: expected information");
   command->add_option("MAP", given->map, "the map's file, which is only read")->required();
-  command->add_option("--rig", given->rig, "the camera: a file that `perdure calibrate` writes")
+  command
+      ->add_option("--rig", given->rig,
+                   "the camera: a rig file of `perdure calibrate`, or a drive (folder or .mcap)")
       ->required();
   command->add_option("--pose", given->pose, "X Y Z YAW of the body in M, m and degrees")
       ->expected(4);

@@ -109,7 +109,7 @@ class Map:
     def look(self, poses, *, rig, route=False, step_s=1.0, after_s=0.0, by=()) -> List[dict]:
         """What poses of the body are expected to show, the most bits first: `perdure map look`.
 
-        poses: (N, 4): x, y, z [m] and yaw [rad] in M. rig: the rig file with the camera. route:
+        poses: (N, 4): x, y, z [m] and yaw [rad] in M. rig: the rig file, or a drive with the camera. route:
         evaluate the poses as one route, one each ``step_s``; the result has one entry. after_s:
         seconds after the newest data of the map. by: rank by these parts only, of "existence",
         "class", "position", "unseen". Needs the map's file, and the command `perdure`.
