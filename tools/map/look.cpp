@@ -12,7 +12,7 @@
 #include "common/replay/files/rig_file.h"
 #include "services/map_store/core/map_database.h"
 #include "services/semantic_filter/core/belief/track_message.h"
-#include "services/semantic_filter/core/look/places.h"
+#include "services/semantic_filter/core/planning/places.h"
 #include "services/semantic_filter/priors.h"
 #include "tools/base/config_folder.h"
 

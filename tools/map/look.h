@@ -1,5 +1,5 @@
 // Where to look next: ranks poses by the expected information about the objects of a map's file.
-// Derivation: tools/docs/maths/look.md.
+// Derivation: tools/docs/maths/expected_information.md.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -9,7 +9,7 @@
 #include "common/camera/camera_model.h"
 #include "common/types/objects.h"
 #include "services/semantic_filter/config.h"
-#include "services/semantic_filter/core/look/look.h"
+#include "services/semantic_filter/core/planning/expectation.h"
 
 namespace perdure::tools {
 

@@ -14,7 +14,7 @@
 
 #include "services/map_store/node.h"
 #include "services/semantic_filter/core/belief/track_message.h"
-#include "services/semantic_filter/core/look/places.h"
+#include "services/semantic_filter/core/planning/places.h"
 #include "tests/bench/look_bench/town.h"
 #include "tests/services/map_store/beliefs.h"
 #include "tools/map/look.h"

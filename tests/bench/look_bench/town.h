@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "services/semantic_filter/core/look/look.h"
+#include "services/semantic_filter/core/planning/expectation.h"
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter::bench {

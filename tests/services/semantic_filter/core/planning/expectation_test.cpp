@@ -1,6 +1,6 @@
 // Compares the expected fall of entropy with the mean over drawn worlds, and checks what raises and
 // lowers it.
-#include "services/semantic_filter/core/look/look.h"
+#include "services/semantic_filter/core/planning/expectation.h"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 #include <random>
 
 #include "services/semantic_filter/core/association/score.h"
-#include "services/semantic_filter/core/look/entropy.h"
-#include "services/semantic_filter/core/look/places.h"
+#include "services/semantic_filter/core/planning/entropy.h"
+#include "services/semantic_filter/core/planning/places.h"
 #include "services/semantic_filter/core/update/ekf.h"
 #include "services/semantic_filter/core/update/predict.h"
 #include "services/semantic_filter/core/visibility/detectability.h"

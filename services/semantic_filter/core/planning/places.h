@@ -1,10 +1,10 @@
 // Places of the ground where an object may stand that the map does not have: never seen, or not
-// seen for long. Derivation: tools/docs/maths/look.md.
+// seen for long. Derivation: tools/docs/maths/expected_information.md.
 #pragma once
 
 #include <vector>
 
-#include "services/semantic_filter/core/look/look.h"
+#include "services/semantic_filter/core/planning/expectation.h"
 
 namespace perdure::semantic_filter {
 

@@ -1,4 +1,4 @@
-#include "services/semantic_filter/core/look/look.h"
+#include "services/semantic_filter/core/planning/expectation.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include "common/math/gaussian.h"
 #include "services/semantic_filter/core/association/score.h"
 #include "services/semantic_filter/core/belief/mixture_ops.h"
-#include "services/semantic_filter/core/look/entropy.h"
+#include "services/semantic_filter/core/planning/entropy.h"
 #include "services/semantic_filter/core/update/ekf.h"
 #include "services/semantic_filter/core/update/predict.h"
 #include "services/semantic_filter/core/update/track_update.h"
@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kLeastShare = 1e-3;  // probability below which a detection is left out
 
-struct Sight {
+struct Observation {
   const TimedView* view;
   TrackVisibility visibility;
   double detected;  ///< probability of a detection in this view and not in the views before
@@ -29,7 +29,7 @@ struct Missed {
   Candidate candidate;
   double existence = 0.0;    ///< at the first view
   double probability = 1.0;  ///< that all views miss it, if it exists
-  std::vector<Sight> sights = {};
+  std::vector<Observation> observations = {};
 };
 
 FrameContext frameOf(const TimedView& view, const Observer& observer) {
@@ -110,16 +110,16 @@ struct Gained {
 };
 
 /// Applies the box of one view, which is reported with probability `share`.
-void hit(Track& track, const Sight& sight, double share, const FrameContext& frame,
+void hit(Track& track, const Observation& observation, double share, const FrameContext& frame,
          Gained& gained) {
-  const TrackScore score = scoreTrack(track, sight.visibility, {}, frame);
+  const TrackScore score = scoreTrack(track, observation.visibility, {}, frame);
   const HypothesisScore& best = score.hypotheses.front();
   if (!best.predicted) return;
   Hypothesis& h = track.hypotheses[0];
   const BoxMeasurement z = expectedBox(*best.predicted, frame);
   const double repetition = noiseRepetition(track, frame);
   const auto updated = [&](double factor) {
-    return updateWithBox(h, z, sight.visibility.hidden_sides, repetition * factor, frame,
+    return updateWithBox(h, z, observation.visibility.hidden_sides, repetition * factor, frame,
                          &best.predicted->box);
   };
   gained.position_bits += share * (positionEntropy(h) - positionEntropy(updated(1.0)));
@@ -132,13 +132,13 @@ void hit(Track& track, const Sight& sight, double share, const FrameContext& fra
 
 Gained gainOf(Candidate candidate, const Missed& missed, const Observer& observer) {
   Gained gained;
-  for (const Sight& sight : missed.sights) {
-    const double share = std::min(1.0, sight.detected / (1.0 - missed.probability));
+  for (const Observation& observation : missed.observations) {
+    const double share = std::min(1.0, observation.detected / (1.0 - missed.probability));
     if (share < kLeastShare) continue;
     const ScratchScope scope;
-    const FrameContext frame = frameOf(*sight.view, observer);
-    predictFor(candidate, *sight.view, frame);
-    hit(candidate.track, sight, share, frame, gained);
+    const FrameContext frame = frameOf(*observation.view, observer);
+    predictFor(candidate, *observation.view, frame);
+    hit(candidate.track, observation, share, frame, gained);
   }
   return gained;
 }
@@ -193,24 +193,24 @@ Fall& Fall::operator+=(const Fall& more) {
 
 std::vector<Expectation> expect(const std::vector<Candidate>& candidates,
                                 const std::vector<TimedView>& views, const Observer& observer) {
-  std::map<std::size_t, Missed> looks;
+  std::map<std::size_t, Missed> all;
   for (const TimedView& view : views) {
     const ScratchScope scope;
     const FrameContext frame = frameOf(view, observer);
     for (const auto& [k, visibility] : visibleFrom(candidates, frame.view, *observer.parameters)) {
-      const auto [at, first] = looks.try_emplace(k, Missed{candidates[k]});
-      Missed& look = at->second;
-      predictFor(look.candidate, view, frame);
-      if (look.candidate.track.hypotheses.empty()) continue;
-      if (first) look.existence = look.candidate.track.existence;
-      const double missed = miss(look.candidate.track, visibility, frame);
-      look.sights.push_back({&view, visibility, 1.0 - missed});
-      look.probability *= missed;
+      const auto [at, first] = all.try_emplace(k, Missed{candidates[k]});
+      Missed& so_far = at->second;
+      predictFor(so_far.candidate, view, frame);
+      if (so_far.candidate.track.hypotheses.empty()) continue;
+      if (first) so_far.existence = so_far.candidate.track.existence;
+      const double missed = miss(so_far.candidate.track, visibility, frame);
+      so_far.observations.push_back({&view, visibility, 1.0 - missed});
+      so_far.probability *= missed;
     }
   }
   std::vector<Expectation> result;
-  for (const auto& [k, look] : looks) {
-    result.push_back(expectationOf(k, candidates[k], look, observer));
+  for (const auto& [k, missed] : all) {
+    result.push_back(expectationOf(k, candidates[k], missed, observer));
   }
   return result;
 }

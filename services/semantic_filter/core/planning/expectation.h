@@ -1,6 +1,6 @@
 // Expected information of views that are not yet taken (paper, footnote at line 187: the vantage
 // point that would most reduce the uncertainty). Visibility, detection probability, survival and
-// EKF are those of the filter. Derivation: tools/docs/maths/look.md.
+// EKF are those of the filter. Derivation: tools/docs/maths/expected_information.md.
 #pragma once
 
 #include <vector>
@@ -25,7 +25,7 @@ struct Fall {
 /// An object of the map, or a place where an unknown one may stand.
 struct Candidate {
   Track track;
-  /// Of a place: probability that an object stands there if nobody has looked for long. 0: the
+  /// Of a place: probability that an object stands there if it was not observed for long. 0: the
   /// track is an object of the map.
   double stationary = 0.0;
 };
@@ -35,7 +35,7 @@ struct TimedView {
   TimePoint time;
 };
 
-/// Who looks. The pointers are not null.
+/// The camera and the filter's models. The pointers are not null.
 struct Observer {
   const CameraModel* camera;
   const ClassPriors* priors;

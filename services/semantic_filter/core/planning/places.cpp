@@ -1,4 +1,4 @@
-#include "services/semantic_filter/core/look/places.h"
+#include "services/semantic_filter/core/planning/places.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "services/semantic_filter/core/look/entropy.h"
+#include "services/semantic_filter/core/planning/entropy.h"
 
 #include <cmath>
 

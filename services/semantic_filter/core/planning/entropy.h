@@ -1,5 +1,5 @@
 // Entropies and their expected fall by an observation, in bits. Derivation:
-// tools/docs/maths/look.md.
+// tools/docs/maths/expected_information.md.
 #pragma once
 
 #include <vector>
