@@ -7,6 +7,7 @@
 #include "common/base/errors.h"
 #include "common/mapping/frames/laid_belief.h"
 #include "common/mapping/map_frames.h"
+#include "common/math/so3.h"
 #include "common/replay/dataset.h"
 #include "common/replay/files/pose_file.h"
 #include "common/replay/files/rig_file.h"
@@ -51,11 +52,6 @@ nlohmann::ordered_json toJson(const semantic_filter::Fall& fall) {
           {"class", fall.classes},
           {"position", fall.position},
           {"unseen", fall.unseen}};
-}
-
-double yawOf(const RigidTransform& T) {
-  const Eigen::Vector3d ahead = T.q * Eigen::Vector3d::UnitX();
-  return std::atan2(ahead.y(), ahead.x());
 }
 
 }  // namespace
@@ -166,7 +162,7 @@ nlohmann::ordered_json toJson(const Prospect& prospect) {
   for (const TimedView& view : prospect.views) {
     const Eigen::Vector3d& p = view.T_WB.p;
     views.push_back({{"place", {p.x(), p.y(), p.z()}},
-                     {"yaw", yawOf(view.T_WB)},
+                     {"yaw", yawOf(view.T_WB.R())},
                      {"time_ns", toNanoseconds(view.time)}});
   }
   for (const Prospect::Object& o : prospect.objects) {

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "common/base/errors.h"
+#include "common/math/so3.h"
 #include "tools/map/look.h"
 
 namespace perdure::tools {
@@ -16,7 +17,6 @@ namespace {
 
 using semantic_filter::Fall;
 
-constexpr std::size_t kShown = 3;  // objects in a line of the table
 constexpr double kDegree = std::numbers::pi / 180.0;
 
 struct LookCommand {
@@ -77,54 +77,26 @@ std::vector<std::vector<TimedView>> plansOf(const LookCommand& command, const Ma
   return plans;
 }
 
-void check(const LookCommand& command) {
-  const int given = !command.pose.empty() + !command.poses.empty() + !command.route.empty() +
-                    !command.around.empty();
-  if (given != 1) {
-    throw StartupError(ExitCode::kUsage,
-                       "give one of --pose X Y Z YAW, --poses FILE, --route FILE, "
-                       "--around X Y R");
-  }
-}
-
-std::string objectsOf(const Prospect& prospect, std::size_t most) {
+std::string objectsOf(const Prospect& prospect) {
+  constexpr std::size_t kShown = 3;
   std::string text;
-  for (std::size_t k = 0; k < std::min(most, prospect.objects.size()); ++k) {
+  for (std::size_t k = 0; k < std::min(kShown, prospect.objects.size()); ++k) {
     const auto& o = prospect.objects[k];
     text += fmt::format("{}{} {} ({:.2f})", k == 0 ? "" : ", ", o.class_name, o.id, o.existence);
   }
   return text;
 }
 
-std::string bitsOf(const Fall& fall, double value) {
-  return fmt::format("{:>8.2f} {:>9.2f} {:>7.2f} {:>9.2f} {:>7.2f}", value, fall.existence,
-                     fall.classes, fall.position, fall.unseen);
-}
-constexpr char kBits[] = "    bits existence   class  position  unseen";
-
 std::string tableOf(const std::vector<Prospect>& prospects, const LookCommand& command) {
-  std::string text =
-      fmt::format("{}  {:>9} {:>9} {:>6}  {}\n", kBits, "x", "y", "yaw", "objects (existence)");
+  std::string text = fmt::format("{:>8} {:>9} {:>7} {:>9} {:>7} {:>7} {:>9} {:>9} {:>6}  {}\n",
+                                 "bits", "existence", "class", "position", "unseen", "metres", "x",
+                                 "y", "yaw", "objects (existence)");
   for (const Prospect& p : prospects) {
     const RigidTransform& T = p.views.front().T_WB;
-    const Eigen::Vector3d ahead = T.q * Eigen::Vector3d::UnitX();
-    text += fmt::format("{}  {:>9.2f} {:>9.2f} {:>6.0f}  {}\n",
-                        bitsOf(p.fall, valueOf(p.fall, command.parts)), T.p.x(), T.p.y(),
-                        std::atan2(ahead.y(), ahead.x()) / kDegree, objectsOf(p, kShown));
-  }
-  return text;
-}
-
-std::string routeText(const Prospect& p, const LookCommand& command) {
-  const double value = valueOf(p.fall, command.parts), metres = p.length_m();
-  std::string text = fmt::format("{}\n{}\n{:.0f} m", kBits, bitsOf(p.fall, value), metres);
-  if (metres > 0.0) text += fmt::format(", {:.3f} bits/m", value / metres);
-  text += fmt::format("\n\n{:>6}  {:<14} {:>9} {:>8} {:>6}\n", "id", "class", "existence",
-                      "detected", "bits");
-  for (std::size_t k = 0; k < std::min(command.most, p.objects.size()); ++k) {
-    const auto& o = p.objects[k];
-    text += fmt::format("{:>6}  {:<14} {:>9.3f} {:>8.3f} {:>6.2f}\n", o.id, o.class_name,
-                        o.existence, o.detected, valueOf(o.fall, command.parts));
+    text += fmt::format(
+        "{:>8.2f} {:>9.2f} {:>7.2f} {:>9.2f} {:>7.2f} {:>7.0f} {:>9.2f} {:>9.2f} {:>6.0f}  {}\n",
+        valueOf(p.fall, command.parts), p.fall.existence, p.fall.classes, p.fall.position,
+        p.fall.unseen, p.length_m(), T.p.x(), T.p.y(), yawOf(T.R()) / kDegree, objectsOf(p));
   }
   return text;
 }
@@ -143,7 +115,6 @@ void warnWhatIsMissing(const LookCommand& command, const MapToLook& map) {
 }
 
 void look(const LookCommand& command) {
-  check(command);
   const LookSettings settings = readLookSettings(command.rig, command.config);
   const MapToLook map = readMapToLook(command.map);
   warnWhatIsMissing(command, map);
@@ -158,8 +129,7 @@ void look(const LookCommand& command) {
     std::cout << nlohmann::ordered_json{{"prospects", list}}.dump(1) << "\n";
     return;
   }
-  std::cout << (command.route.empty() ? tableOf(prospects, command)
-                                      : routeText(prospects.front(), command));
+  std::cout << tableOf(prospects, command);
 }
 
 }  // namespace
@@ -172,13 +142,13 @@ void addLookCommand(CLI::App& map) {
       ->add_option("--rig", given->rig,
                    "the camera: a rig file of `perdure calibrate`, or a drive (folder or .mcap)")
       ->required();
-  command->add_option("--pose", given->pose, "X Y Z YAW of the body in M, m and degrees")
-      ->expected(4);
-  command->add_option("--poses", given->poses, "ranks the poses of TUM lines")->type_name("FILE");
-  command->add_option("--route", given->route, "the poses of TUM lines as one route")
+  CLI::Option_group* what = command->add_option_group("what is evaluated");
+  what->require_option(1);
+  what->add_option("--pose", given->pose, "X Y Z YAW of the body in M, m and degrees")->expected(4);
+  what->add_option("--poses", given->poses, "ranks the poses of TUM lines")->type_name("FILE");
+  what->add_option("--route", given->route, "the poses of TUM lines as one route")
       ->type_name("FILE");
-  command
-      ->add_option("--around", given->around,
+  what->add_option("--around", given->around,
                    "X Y R: ranks poses at anchors within R metres, in eight directions")
       ->expected(3);
   command
@@ -188,7 +158,7 @@ void addLookCommand(CLI::App& map) {
       ->check(CLI::IsMember({"existence", "class", "position", "unseen"}));
   command->add_option("--after", given->after_s, "seconds after the newest data of the map")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("--most", given->most, "shows at most so many poses, or objects of a route")
+  command->add_option("--most", given->most, "shows at most so many poses")
       ->check(CLI::PositiveNumber);
   command->add_option("--config", given->config, "the semantic filter's configuration")
       ->type_name("FILE");
