@@ -1,6 +1,7 @@
 #include "services/gateway/node.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "common/vision/jpeg.h"
 #include "services/gateway/core/annotations.h"
@@ -93,6 +94,9 @@ void Node::sendNow(std::uint32_t channel) {
     case kMapGraphScene:
       if (graph_) sendGraph(channel);
       return;
+    case kMapSeen:
+      if (!seen_ground_.empty()) send(kMapSeen, seen_ground_.json(pose().p, time_));
+      return;
     case kPose:
       if (body()) send(kPose, poseInFrame(time_, pose()));
       return;
@@ -167,7 +171,29 @@ void Node::onOdometry(const Odometry& odometry, std::int64_t now_ns) {
   placeEvents();
   newest(odometry.stamp.time);
   trajectory_.add(odometry.stamp.time, odometry.world, odometry.T_WB);
+  if (wants(kMapSeen)) lookAtGround();
   if (pose_pace_.due(odometry.stamp.time)) sendPose(odometry.stamp.time);
+}
+
+/// Returns the height of the ground in W: the median underside of the confirmed objects.
+double Node::groundHeight() const {
+  constexpr double kBody_m = 1.2;  // height of the body's origin, if there is no object
+  std::vector<double> heights;
+  for (const ObjectBelief& o : objects_ ? objects_->objects : std::vector<ObjectBelief>{}) {
+    const Vector7d& x = o.best().mean;
+    if (o.confirmed) heights.push_back(x[2] - 0.5 * std::exp(x[6]));
+  }
+  if (heights.empty()) return pose().p.z() - kBody_m;
+  const auto middle = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 2);
+  std::nth_element(heights.begin(), middle, heights.end());
+  return *middle;
+}
+
+void Node::lookAtGround() {
+  for (const auto& camera : cameras_) {
+    if (camera) seen_ground_.add(*camera, pose(), groundHeight(), time_, world());
+  }
+  if (seen_pace_.due(time_)) sendNow(kMapSeen);
 }
 
 void Node::sendPose(TimePoint time) {
@@ -203,6 +229,7 @@ void Node::onModel(const ModelInfo& model) {
 void Node::beginAnew(TimePoint time) {
   if (!std::exchange(away_, false) || (time >= time_ && time - time_ < kGap)) return;
   trajectory_.clear();
+  seen_ground_.clear();
   history_.clear();
   detections_.clear();
   awaited_.clear();

@@ -20,6 +20,7 @@
 #include "services/gateway/core/map_graph.h"
 #include "services/gateway/core/map_layer.h"
 #include "services/gateway/core/scene.h"
+#include "services/gateway/core/seen_ground.h"
 #include "services/gateway/core/vital_signs.h"
 #include "services/gateway/core/world.h"
 
@@ -112,7 +113,9 @@ class Node {
   void placeEvents();
   bool wantsTiles() const { return wants(kMap) || wants(kMapScene); }
   std::size_t sendMap();  ///< number of objects sent
-  bool wantsGraph() const { return wants(kMapGraph) || wants(kMapGraphScene); }
+  bool wantsGraph() const { return wants(kMapGraph) || wants(kMapGraphScene) || wants(kMapSeen); }
+  double groundHeight() const;
+  void lookAtGround();
   // Defined in node_calls.cpp.
   void lookAtGraph(bool looked_before);
   void followGraph(std::int64_t now_ns);
@@ -163,9 +166,10 @@ class Node {
   double latency_ms_ = -1.0;
   Scene scene_;
   Trajectory trajectory_;
+  SeenGround seen_ground_;
   History history_;
   std::vector<Pace> image_pace_;
-  Pace scene_pace_, pose_pace_, trajectory_pace_{2.0};
+  Pace scene_pace_, pose_pace_, trajectory_pace_{2.0}, seen_pace_{0.5};
   std::int64_t next_health_ns_ = 0, next_map_ns_ = 0, ticked_ns_ = 0;
   std::map<std::uint64_t, Pending> pending_;
   std::uint64_t next_request_ = 1;

@@ -168,7 +168,13 @@ void Node::followGraph(std::int64_t now_ns) {
 void Node::onMapGraph(const MapReply& reply) {
   graph_ = reply;
   why_no_graph_ = reply.anchors.empty() ? "The map has no anchors yet." : "";
-  sendWanted({kMapGraph, kMapGraphScene});
+  for (const auto& camera : cameras_) {
+    if (!camera || !wants(kMapSeen)) continue;
+    const MapReply here = graphOn(map_.mapOf(world()), reply);
+    seen_ground_.addAnchors(*camera, here, map_.T_MW(world()), groundHeight());
+    break;  // the anchors replace those of an earlier call
+  }
+  sendWanted({kMapGraph, kMapGraphScene, kMapSeen});
 }
 
 /// Takes a failure of the graph query. A graph that is already known stays, because a recording has

@@ -27,7 +27,7 @@ const std::vector<Layers> kLayers{
     {"services/capture/live/", {"", "libcamera", "cameras"}},
     {"services/semantic_filter/core/",
      {"belief", "measurement", "visibility", "association", "update", "smoothing", "tracks",
-      "memory", ""}},
+      "memory", "planning", ""}},
     {"services/vio/core/", {"state", "propagation", "tracks", "update", "", "start"}},
     {"services/gateway/", {"core", "protocol", "web", ""}},
     {"services/inference/core/", {"", "network", "decode", "takeover"}},

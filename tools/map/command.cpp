@@ -14,6 +14,7 @@
 #include "tools/bus_tools/common.h"
 #include "tools/map/fuse.h"
 #include "tools/map/graph_view.h"
+#include "tools/map/look_command.h"
 #include "tools/map/map_source.h"
 #include "tools/map/render.h"
 #include "tools/map/why.h"
@@ -308,6 +309,7 @@ void setUpMap(CLI::App& map) {
 
   addServerCommands(map);
   addFuseCommand(map);
+  addLookCommand(map);
 
   for (CLI::App* command : {listing, showing, explaining, query, exporting})
     addSource(*command, *request);

@@ -11,7 +11,7 @@
 #include "services/inference/core/decode/suppress.h"
 #include "services/inference/core/network/image_fit.h"
 #include "services/inference/node.h"
-#include "tools/pipeline/settings.h"
+#include "tools/base/config_folder.h"
 
 namespace perdure::tools {
 namespace {

@@ -6,6 +6,7 @@
 #include "common/replay/files/output_place.h"
 #include "common/replay/ros_topics.h"
 #include "services/semantic_filter/priors.h"
+#include "tools/base/config_folder.h"
 #include "tools/evaluate/simulated_truth.h"
 #include "tools/pipeline/instances.h"
 #include "tools/pipeline/pipeline.h"

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -55,10 +54,5 @@ struct ServiceConfigs {
 /// of the simulated detector is simulated_detector.yaml. Throws StartupError: kConfiguration with
 /// all errors, kUsage for an unknown service or a malformed walk.
 ServiceConfigs readServiceConfigs(const PipelineOptions& options);
-
-/// The configuration folder: $PERDURE_CONFIG_DIR, or else `config` in the working directory, or in
-/// the source tree or installation above the program. Throws StartupError(kUnavailable) with the
-/// fix if there is none.
-std::filesystem::path configFolder();
 
 }  // namespace perdure::tools

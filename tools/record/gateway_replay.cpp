@@ -33,7 +33,8 @@ std::optional<TimePoint> sensorTimeOf(const replay::RecordedMessage& message) {
 }
 
 bool looksAtGraph(const gateway::Channels& wanted) {
-  return wanted.contains(gateway::kMapGraph) || wanted.contains(gateway::kMapGraphScene);
+  return wanted.contains(gateway::kMapGraph) || wanted.contains(gateway::kMapGraphScene) ||
+         wanted.contains(gateway::kMapSeen);
 }
 
 /// The channel that shows every message of a topic; empty for other topics.

@@ -52,6 +52,7 @@ std::vector<ChannelInfo> channelTable(const std::vector<std::string>& cameras) {
       json(kMapScene, "/map/scene", "foxglove.SceneUpdate"),
       json(kMapGraph, "/map/graph", "perdure.MapGraph"),
       json(kMapGraphScene, "/map/graph/scene", "foxglove.SceneUpdate"),
+      json(kMapSeen, "/map/seen", "perdure.SeenGround"),
       json(kModel, "/model", "perdure.Model")};
   for (std::size_t i = 0; i < cameras.size(); ++i) addCamera(i, cameras[i], table);
   return table;

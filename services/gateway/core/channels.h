@@ -32,6 +32,7 @@ enum Channel : std::uint32_t {
   kMapScene,
   kMapGraph,
   kMapGraphScene,
+  kMapSeen,
   kRaw = 50,  ///< first id of the topics that are passed on unchanged
   kCamera = 100,
 };

@@ -195,6 +195,11 @@ perdure.MapGraph!
  truncated boolean: these are the nearest to the vehicle
  anchors anchor[]
  loops loop[]: between these anchors
+perdure.SeenGround!
+ timestamp time; frame_id text
+ cell_m number: side of a cell
+ ground_m number: height of the ground in odom
+ cells number[][]: x y of the centre in odom, age of the last view in s; -1: before, not known when
 perdure.Model!
  name text; hash text; classes text[]; input_width natural; input_height natural
 perdure.ObjectRequest!

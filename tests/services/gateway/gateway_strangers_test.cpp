@@ -205,7 +205,7 @@ TEST_F(Strangers, FoxglovesClientSubscribesEveryChannelInBothSubprotocols) {
     const json said = answer("foxglove.mjs", {protocol});
     ASSERT_TRUE(said.is_object()) << contentsOf(folder_.file("foxglove.mjs"));
     EXPECT_THAT(said["problems"], IsEmpty()) << said.dump(1);
-    EXPECT_EQ(said["channels"], 24);
+    EXPECT_EQ(said["channels"], 25);
     EXPECT_EQ(status_, 0);
   }
 }

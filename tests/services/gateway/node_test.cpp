@@ -350,6 +350,41 @@ TEST_F(GatewayNode, AsksForTheGraphWhileSomebodyLooksAndNotTooOften) {
   EXPECT_EQ(queries_.size(), 3u) << "nobody looks any more";
 }
 
+TEST_F(GatewayNode, TellsWhatGroundWasSeenAndWhen) {
+  node_.onCalibration(test::forwardCamera());
+  node_.setWanted({kMapSeen});
+  Odometry odometry;
+  odometry.state = OdometryState::kTracking;
+  const auto drive = [&](double x, double seconds) {
+    odometry.stamp.time = fromNanoseconds(std::llround(1e9 * seconds));
+    odometry.T_WB.p = {x, 0, 1.2};
+    node_.onOdometry(odometry, kSecond);
+  };
+  drive(0, 1.0);
+  drive(60, 31.0);
+  const auto seen = on(kMapSeen);
+  ASSERT_EQ(seen.size(), 2u);
+  const auto ageAt = [&](const json& message, double x, double y) -> std::optional<double> {
+    for (const auto& cell : message["cells"]) {
+      const bool there = std::abs(cell[0].get<double>() - x) < 2.1;
+      if (there && std::abs(cell[1].get<double>() - y) < 2.1) return cell[2].get<double>();
+    }
+    return std::nullopt;
+  };
+  EXPECT_EQ(ageAt(seen[0], 22, 2), 0.0);
+  EXPECT_EQ(ageAt(seen[0], -22, 2), std::nullopt) << "behind the camera";
+  EXPECT_EQ(ageAt(seen[0], 82, 2), std::nullopt) << "too far";
+  EXPECT_EQ(ageAt(seen[1], 22, 2), 30.0);
+  EXPECT_EQ(ageAt(seen[1], 82, 2), 0.0);
+
+  MapReply graph;
+  graph.anchors.resize(1);
+  graph.anchors[0].p = {-60, 0, 1.2};
+  node_.onMapGraph(graph);
+  EXPECT_EQ(ageAt(on(kMapSeen).back(), -38, 2), -1.0) << "from an anchor of before";
+  EXPECT_EQ(ageAt(on(kMapSeen).back(), 22, 2), 30.0);
+}
+
 TEST_F(GatewayNode, TellsTheGraphInTheFrameOfTheMapWithWhatEachPartIs) {
   node_.onObjects(frameOf(1, {}), kSecond);
   node_.onMapFrame(frameOfMap());

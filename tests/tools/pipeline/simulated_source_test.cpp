@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/common/replay/tiny_datasets.h"
+#include "tools/base/config_folder.h"
 #include "tools/pipeline/pipeline.h"
 
 namespace perdure::tools {

@@ -203,6 +203,30 @@ class Maps(unittest.TestCase):
         with self.assertRaisesRegex(perdure.Refused, "3 numbers each"):
             map_.in_box((0, 0), (1, 1, 1))
 
+    def test_poses_are_ranked_as_perdure_map_look_ranks_them(self):
+        map_ = perdure.Map(drive.map)
+        poses = [(0, 0, 0, 0), (0, 0, 0, np.pi)]
+        ranked = map_.look(poses, rig=drive.mcap, after_s=600)
+        asked = json.loads(perdure_tool(
+            "map", "look", drive.map, "--rig", drive.mcap, "--pose", 0, 0, 0, 0, "--after", 600,
+            "--json",
+        ))["prospects"]  # fmt: skip
+        self.assertEqual(len(ranked), 2)
+        self.assertAlmostEqual(ranked[0]["views"][0]["yaw"], 0)
+        self.assertGreater(ranked[0]["bits"]["existence"], ranked[1]["bits"]["existence"])
+        self.assertAlmostEqual(
+            ranked[0]["bits"]["existence"], asked[0]["bits"]["existence"], places=6
+        )
+        route = map_.look(poses, rig=drive.mcap, route=True, by=("existence",))
+        self.assertEqual(len(route), 1)
+        self.assertEqual(len(route[0]["views"]), 2)
+        with self.assertRaisesRegex(perdure.Refused, r"shape \(N, 4\), not \(3,\)"):
+            map_.look([0, 0, 0], rig=drive.mcap)
+        with self.assertRaisesRegex(perdure.Unusable, "nothing.yaml"):
+            map_.look(poses, rig="nothing.yaml")
+        with self.assertRaisesRegex(perdure.Refused, "the map's file"):
+            perdure.Map().look(poses, rig=drive.mcap)
+
     def test_the_running_map_store_is_answered_as_perdure_map_answers(self):
         copy = drive.folder / "live.sqlite"
         shutil.copy(drive.map, copy)

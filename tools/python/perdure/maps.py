@@ -1,7 +1,12 @@
 """The durable map of objects: ``Map``."""
 
+import json
 import os
+import pathlib
 import secrets
+import shutil
+import subprocess
+import tempfile
 import time
 import warnings
 from typing import Iterator, List, Optional
@@ -23,6 +28,15 @@ def _files():
         messages.register(_map)
         _map.registered = True
     return _map
+
+
+def _command() -> str:
+    """The program `perdure`: that of this build folder, or of the installation."""
+    built = pathlib.Path(_files().__file__).parents[2] / "bin/perdure"
+    found = str(built) if built.exists() else shutil.which("perdure")
+    if found is None:
+        raise Unavailable("the program perdure is not installed: apt install perdure-tools")
+    return found
 
 
 class Map:
@@ -91,6 +105,37 @@ class Map:
         evidence. None if the object does not exist."""
         beliefs = self._ask(kind="by_id", object_id=object_id).beliefs
         return beliefs[0] if beliefs else None
+
+    def look(self, poses, *, rig, route=False, step_s=1.0, after_s=0.0, by=()) -> List[dict]:
+        """What poses of the body are expected to show, the most bits first: `perdure map look`.
+
+        poses: (N, 4): x, y, z [m] and yaw [rad] in M. rig: the rig file, or a drive with the camera. route:
+        evaluate the poses as one route, one each ``step_s``; the result has one entry. after_s:
+        seconds after the newest data of the map. by: rank by these parts only, of "existence",
+        "class", "position", "unseen". Needs the map's file, and the command `perdure`.
+        """
+        poses = np.asarray(poses, float)
+        if poses.ndim != 2 or poses.shape[1] != 4:
+            raise Refused(f"poses must have shape (N, 4), not {poses.shape}")
+        if self._path is None:
+            raise Refused("look() reads the map's file: give it to Map()")
+        with tempfile.NamedTemporaryFile("w", suffix=".tum") as plan:
+            for k, (x, y, z, yaw) in enumerate(poses):
+                turn = f"0 0 {np.sin(yaw / 2)} {np.cos(yaw / 2)}"
+                plan.write(f"{k * step_s} {x} {y} {z} {turn}\n")
+            plan.flush()
+            done = subprocess.run(
+                [_command(), "map", "look", self._path, "--json", "--rig", os.fspath(rig)]
+                + ["--route" if route else "--poses", plan.name, "--most", str(len(poses))]
+                + ["--after", str(after_s)]
+                + (["--by", ",".join(by)] if by else []),
+                capture_output=True, text=True, check=False,
+            )  # fmt: skip
+        if done.returncode != 0:
+            raise Unusable(done.stderr.strip())
+        if done.stderr:
+            warnings.warn(done.stderr.strip(), stacklevel=2)
+        return json.loads(done.stdout)["prospects"]
 
     def __iter__(self) -> Iterator["messages.MapObject"]:
         return iter(self.objects())

@@ -110,6 +110,7 @@ function showLegendOfGraph() {
   const part = model.graph?.truncated ? ` The nearest ${model.graph.anchors.length} anchors of ${model.graph.all_anchors}.` : '';
   document.querySelector('[data-key=g]').title = `Graph of the map: anchors and loops (G).${none}${part}`;
 }
+const takeSeen = (message) => world?.setSeen(message, model.time);
 connection.on('/map/graph', takeGraph);
 connection.on('/events', (event) => {
   log.add(event);
@@ -169,6 +170,13 @@ const toggles = {
     if (on) connection.on('/map/graph', takeGraph);
     else connection.off('/map/graph'); // a hidden view needs no data
     showLegendOfGraph();
+    return on;
+  },
+  s: () => {
+    const on = world?.toggle('seen');
+    if (on) connection.on('/map/seen', takeSeen);
+    else connection.off('/map/seen'); // a hidden view needs no data
+    for (const item of document.querySelectorAll('#legend [data-seen]')) item.hidden = !on;
     return on;
   },
   c: () => {

@@ -86,12 +86,12 @@ export class Thing {
     this.body.visible = !hidden;
     this.material.opacity = seen ? Math.min(1, 0.35 + 0.65 * known) : (this.remembered ? 0.14 : 0.28) * known;
     this.material.depthWrite = seen;
-    this.material.color.copy(this.colour);
+    this.material.color.copy(this.tinted ?? this.colour);
     this.material.emissive.copy(this.chosen ? this.colour : new THREE.Color(0)).multiplyScalar(0.45);
     // An occluded object is drawn over its occluder.
     this.lineMaterial.depthTest = !hidden;
     this.lines.renderOrder = hidden ? 5 : 1;
-    this.lineMaterial.color.copy(hidden ? new THREE.Color('#ffd98a') : this.colour).lerp(new THREE.Color('#ffffff'), this.chosen ? 0.7 : 0.15);
+    this.lineMaterial.color.copy(this.tinted ?? (hidden ? new THREE.Color('#ffd98a') : this.colour)).lerp(new THREE.Color('#ffffff'), this.chosen ? 0.7 : 0.15);
     this.lineMaterial.opacity = this.chosen ? 1 : hidden ? 0.95 : seen ? 0.55 * known : this.remembered ? 0.4 : 0.5;
     const wanted = `${dashed}/${o.size.map((s) => s.toFixed(2)).join()}`;
     if (wanted === this.outlined) return;
@@ -108,6 +108,12 @@ export class Thing {
     // An ellipsoid larger than its object must not hide the surroundings.
     const size = Math.max(...object.size) / 2, axis = Math.max(...this.ellipsoid.scale.toArray());
     this.ellipsoid.material.opacity = 0.16 * Math.min(1, Math.max(0.25, size / axis));
+  }
+
+  /** Replaces the colour of the class; undefined: not any more. */
+  tint(colour) {
+    this.tinted = colour && new THREE.Color(colour);
+    this.look();
   }
 
   choose(chosen) {

@@ -14,6 +14,15 @@ export function colourOf(name) {
   return FURTHER[hash % FURTHER.length];
 }
 
+const FRESH = [0x3f, 0xb9, 0x50], LATER = [0xd2, 0x99, 0x22], OLD = [0xf8, 0x51, 0x49], SOME_S = 10, LATER_S = 600, OLD_S = 3600;
+/** Returns the colour of what was seen `age` seconds ago; undefined or negative: not known when. */
+export function colourOfAge(age) {
+  if (!(age >= 0)) return '#7a6bb0';
+  const mixed = (from, to, t) => `rgb(${from.map((c, k) => Math.round(c + Math.min(1, Math.max(0, t)) * (to[k] - c))).join()})`;
+  const t = (low, high) => Math.log(Math.max(age, SOME_S) / low) / Math.log(high / low);
+  return age < LATER_S ? mixed(FRESH, LATER, t(SOME_S, LATER_S)) : mixed(LATER, OLD, t(LATER_S, OLD_S));
+}
+
 export const isHidden = (o) => o.visibility === 'occluded';
 export const isInSight = (o) => o.visibility === 'visible' || o.visibility === 'partial';
 /** Returns the object's class for the style sheet. */

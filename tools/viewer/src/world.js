@@ -3,7 +3,7 @@ import * as THREE from './vendor/three.module.js';
 import { Graph } from './graph.js';
 import { Orbit } from './orbit.js';
 import { Thing } from './things.js';
-import { colourOf, looksLike } from './words.js';
+import { colourOf, colourOfAge, looksLike } from './words.js';
 
 const MOST_LABELS = 40, MOST_MARKS = 100, SLOW_MS = 120, ANSWERED_MS = 150;
 
@@ -25,7 +25,7 @@ export class World {
     this.things = new Map();
     this.remembered = new Map();
     this.names = new Map(); // id → element
-    this.shows = { ellipsoids: true, points: true, map: true, graph: true };
+    this.shows = { ellipsoids: true, points: true, map: true, graph: true, seen: false };
     this.follow = true;
     this.chosen = 0;
     this.dirty = true;
@@ -121,7 +121,35 @@ export class World {
     this.graph.group.visible = this.shows.graph;
     for (const thing of this.things.values()) thing.ellipsoid.visible = this.shows.ellipsoids;
     for (const thing of this.remembered.values()) thing.group.visible = this.shows.map;
+    if (this.seen) this.seen.visible = this.shows.seen;
+    if (!this.shows.seen) this.tintByAge();
     this.dirty = true;
+  }
+
+  /** Processes a message of /map/seen: cells of the ground, by the age of their last view. */
+  setSeen(message, time) {
+    this.seen?.removeFromParent();
+    this.seen?.dispose();
+    const side = 0.94 * message.cell_m, { cells } = message;
+    this.seen = new THREE.InstancedMesh(new THREE.PlaneGeometry(side, side), new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.3, depthWrite: false }), Math.max(1, cells.length));
+    this.seen.frustumCulled = false;
+    this.seen.count = cells.length;
+    const at = new THREE.Matrix4(), colour = new THREE.Color();
+    cells.forEach(([x, y, age], i) => {
+      this.seen.setMatrixAt(i, at.makeTranslation(x, y, message.ground_m + 0.02));
+      this.seen.setColorAt(i, colour.set(colourOfAge(age)));
+    });
+    this.scene.add(this.seen);
+    this.tintByAge(time);
+    this.applyShows();
+  }
+
+  /** Gives the objects the colour of the time since their last detection; without `time`, that of
+      their class. */
+  tintByAge(time) {
+    for (const things of [this.things, this.remembered]) {
+      for (const thing of things.values()) thing.tint(time === undefined ? undefined : colourOfAge(time - thing.object.last_s));
+    }
   }
 
   fromAbove() {

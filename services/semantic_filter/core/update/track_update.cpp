@@ -138,17 +138,6 @@ void countForDetectionSize(Track& track, const TrackScore& score, bool detected,
   if (detected) d.proven += std::exchange(d.missed, {});
 }
 
-/// Returns the factor on the noise of a box whose noise repeats that of the last detection. It is
-/// that of a stationary first-order process whose correlation falls with the view change.
-double noiseRepetition(const Track& track, const FrameContext& frame) {
-  if (track.views.detected_from.observations <= 0.0) return 1.0;
-  const double scale = frame.parameters->box.noise_view;
-  const double correlation =
-      viewCorrelation(track.best().x.head<3>(), track.views.detected_from.T_WC, frame.view.T_WC(),
-                      {scale, scale, 0.5 * scale});
-  return (1.0 + correlation) / std::max(1.0 - correlation, 1e-6);
-}
-
 /// Returns the exponent of an observation between rest and motion, `seconds` after the last one. It
 /// is below 1, because errors of consecutive boxes are correlated and a velocity can fit them.
 double motionExponent(double seconds) {
@@ -292,6 +281,15 @@ bool anotherHasItsBox(const TrackScore& score, const EtaRow& eta) {
 }
 
 }  // namespace
+
+double noiseRepetition(const Track& track, const FrameContext& frame) {
+  if (track.views.detected_from.observations <= 0.0) return 1.0;
+  const double scale = frame.parameters->box.noise_view;
+  const double correlation =
+      viewCorrelation(track.best().x.head<3>(), track.views.detected_from.T_WC, frame.view.T_WC(),
+                      {scale, scale, 0.5 * scale});
+  return (1.0 + correlation) / std::max(1.0 - correlation, 1e-6);
+}
 
 std::optional<std::size_t> update(Track& track, const TrackScore& score, const EtaRow& eta,
                                   const std::vector<BoxDetection>& boxes,

@@ -27,6 +27,10 @@ std::optional<std::size_t> update(Track& track, const TrackScore& score, const E
                                   const std::vector<BoxDetection>& boxes,
                                   const FrameContext& frame);
 
+/// Returns the factor on the noise of a box whose noise repeats that of the last detection. It is
+/// that of a stationary first-order process whose correlation falls with the view change.
+double noiseRepetition(const Track& track, const FrameContext& frame);
+
 /// Returns the track as the same frame would leave it if none of the boxes were the track's.
 Track updateAsMissed(Track track, TrackScore score, const FrameContext& frame);
 

@@ -324,6 +324,24 @@ check(await page.evaluate(() => ![...window.perdure.connection.topics.values()].
 await page.keyboard.press('g');
 await page.keyboard.press('f');
 
+// Tests key S: the ground and the objects by the time since they were seen.
+const classColour = await page.evaluate(() => [...window.perdure.world.things.values()][0].material.color.getHexString());
+await page.keyboard.press('s');
+await page.waitForFunction(() => window.perdure.world.seen?.count > 0, { timeout: 20000, polling: 100 }).catch(() => {});
+figures.seen = await page.evaluate(() => {
+  const { seen, vehicle, things, shows } = window.perdure.world, sides = { ahead: 0, behind: 0 };
+  for (let i = 0; i < (seen?.count ?? 0); ++i) ++sides[seen.instanceMatrix.array[16 * i + 12] > vehicle.position.x ? 'ahead' : 'behind'];
+  return { ...sides, visible: seen?.visible, shows: shows.seen, colour: [...things.values()][0].material.color.getHexString() };
+});
+check(figures.seen.ahead > 20 && figures.seen.behind === 0 && figures.seen.visible, `S: the ground ahead is seen (${JSON.stringify(figures.seen)})`);
+check(figures.seen.colour !== classColour, 'S: an object has the colour of its age');
+await page.screenshot({ path: join(out, 'seen.png') });
+await page.keyboard.press('s');
+await pause(300);
+check(await page.evaluate(() => ![...window.perdure.connection.topics.values()].includes('/map/seen')), 'S again: nothing is asked');
+check(await page.evaluate(() => window.perdure.world.seen.visible) === false, 'S again: no ground is coloured');
+check(await page.evaluate(() => [...window.perdure.world.things.values()][0].material.color.getHexString()) === classColour, 'S again: the colour of the class');
+
 // Tests the layout on a phone.
 await page.setViewport({ width: 390, height: 844, isMobile: true, hasTouch: true, deviceScaleFactor: 1 });
 await page.waitForFunction(() => window.perdure?.world?.things.size > 0 && window.perdure.world.drawn > 0, { timeout: 120000 });
