@@ -2,6 +2,7 @@
 // HTTP session.
 #include <optional>
 
+#include "services/gateway/mcp/protocol.h"
 #include "services/gateway/protocol/server_message.h"
 #include "services/gateway/web/shared.h"
 
@@ -11,6 +12,7 @@ namespace {
 constexpr std::chrono::seconds kPatience{10};  // time limit of a request, and of its answer
 constexpr std::uint32_t kLongestHeader = 8192;
 constexpr int kMostRequests = 1000;  // requests of one connection
+constexpr std::string_view kMcpPath = "/mcp";
 
 constexpr char kNoPage[] =
     "The page was not built, because npm was not there when Perdure was configured: install npm, "
@@ -32,9 +34,10 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
     parser_->header_limit(kLongestHeader);
     parser_->body_limit(0);
     stream_.expires_after(kPatience);
-    http::async_read(
-        stream_, buffer_, *parser_,
-        [self = shared_from_this()](beast::error_code error, std::size_t) { self->onRead(error); });
+    http::async_read_header(stream_, buffer_, *parser_,
+                            [self = shared_from_this()](beast::error_code error, std::size_t) {
+                              self->onHeader(error);
+                            });
   }
   void end() override {
     beast::error_code ignored;
@@ -42,9 +45,13 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   }
 
  private:
+  void onHeader(beast::error_code error);
+  void onQuestion(beast::error_code error);
+  bool failed(beast::error_code error);
   void onRead(beast::error_code error);
   void upgrade();
   void answer();
+  void answerQuestion();
   void answerFile(std::string_view path);
   void refuse(http::status status, const Reason& reason);
   void say(http::status status, const char* type, std::string text);
@@ -54,30 +61,58 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   beast::tcp_stream stream_;
   beast::flat_buffer buffer_{kLongestHeader};
   std::optional<http::request_parser<http::empty_body>> parser_;
+  std::optional<http::request_parser<http::string_body>> question_;  ///< a POST to /mcp
   std::shared_ptr<Shared> shared_;
   int served_ = 0;
 };
 
 std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }
 
-void HttpSession::onRead(beast::error_code error) {
+/// Only messages of MCP clients have a body.
+void HttpSession::onHeader(beast::error_code error) {
+  if (failed(error)) return;
+  const Request& request = parser_->get();
+  if (request.method() != http::verb::post || pathOf(view(request.target())) != kMcpPath ||
+      !shared_->ask) {
+    http::async_read(
+        stream_, buffer_, *parser_,
+        [self = shared_from_this()](beast::error_code e, std::size_t) { self->onRead(e); });
+    return;
+  }
+  constexpr std::uint64_t kKilobyte = 1024;
+  question_.emplace(std::move(*parser_));
+  question_->body_limit(kKilobyte * static_cast<std::uint64_t>(shared_->options.most_message_kb));
+  http::async_read(
+      stream_, buffer_, *question_,
+      [self = shared_from_this()](beast::error_code e, std::size_t) { self->onQuestion(e); });
+}
+
+void HttpSession::onQuestion(beast::error_code error) {
+  parser_.emplace();
+  parser_->get() = Request(question_->get().base());
+  onRead(error);
+}
+
+/// Counts the error, if there is one. The connection then ends.
+bool HttpSession::failed(beast::error_code error) {
+  if (!error) return false;
   if (error == beast::error::timeout) {
     // The timeout of an idle connection is not counted, because browsers keep connections open.
     if (parser_->got_some()) shared_->hub.reasons().add("http_too_slow");
-    return;
-  }
-  if (error == http::error::header_limit || error == http::error::body_limit ||
-      error == http::error::buffer_overflow) {
+  } else if (error == http::error::header_limit || error == http::error::body_limit ||
+             error == http::error::buffer_overflow) {
     shared_->hub.reasons().add("http_too_large");
-    return;
-  }
-  if (error) {
+  } else {
     // A connection that the client closes is not counted as an error.
     const bool hung_up = error == http::error::end_of_stream || error == asio::error::eof ||
                          error.category() == asio::error::get_system_category();
     if (!hung_up) shared_->hub.reasons().add("http_malformed");
-    return;
   }
+  return true;
+}
+
+void HttpSession::onRead(beast::error_code error) {
+  if (failed(error)) return;
   ++shared_->requests;
   const auto host = view(parser_->get()[http::field::host]);
   if (const auto ours = shared_->guard.checkHost(host); !ours) {
@@ -111,8 +146,34 @@ void HttpSession::upgrade() {
   serveClient(std::move(stream_), parser_->release(), std::string(protocol), shared_);
 }
 
+/// Answers a message of an MCP client (Streamable HTTP without streams and sessions).
+void HttpSession::answerQuestion() {
+  const Request& request = parser_->get();
+  if (request.method() != http::verb::post) {
+    return refuse(http::status::method_not_allowed,
+                  {"method_refused", "only POST: there is no stream, and there are no sessions"});
+  }
+  const auto origin = shared_->guard.checkOrigin(view(request[http::field::origin]),
+                                                 view(request[http::field::host]));
+  if (!origin) return refuse(http::status::forbidden, origin.error());
+  const auto token =
+      shared_->guard.checkToken(view(request.target()), view(request[http::field::authorization]));
+  if (!token) return refuse(http::status::unauthorized, token.error());
+  const auto revision = view(request["MCP-Protocol-Version"]);
+  if (!revision.empty() && !mcp::isKnownRevision(revision)) {
+    return refuse(http::status::bad_request,
+                  {"mcp_revision_unknown", "MCP-Protocol-Version is none of this server's"});
+  }
+  const std::uint64_t number = ++shared_->questions;
+  shared_->replies[number] = [self = shared_from_this()](int status, std::string text) {
+    self->say(static_cast<http::status>(status), "application/json", std::move(text));
+  };
+  shared_->ask(number, std::move(question_->get().body()));
+}
+
 void HttpSession::answer() {
   const Request& request = parser_->get();
+  if (shared_->ask && pathOf(view(request.target())) == kMcpPath) return answerQuestion();
   if (request.method() != http::verb::get && request.method() != http::verb::head) {
     return refuse(http::status::method_not_allowed, {"method_refused", "only GET and HEAD"});
   }

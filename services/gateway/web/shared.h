@@ -9,6 +9,8 @@
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <memory>
 #include <set>
 #include <string>
@@ -34,6 +36,9 @@ class Connection {
   virtual void end() = 0;
 };
 
+/// Sends the answer to a question of an MCP client. `status` is that of HTTP.
+using Reply = std::function<void(int status, std::string text)>;
+
 struct Shared {
   Options options;
   Guard guard;
@@ -43,6 +48,9 @@ struct Shared {
   std::chrono::steady_clock::time_point texts_at{};  ///< last update by the service's loop
   std::uint64_t bytes_sent = 0, messages_sent = 0, requests = 0;
   std::set<Connection*> connections;
+  Ask ask;                                 ///< empty: /mcp does not exist
+  std::map<std::uint64_t, Reply> replies;  ///< by the number of the question
+  std::uint64_t questions = 0;
 };
 
 /// Reads and answers requests, and passes the socket to a client after an upgrade.
