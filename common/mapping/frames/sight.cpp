@@ -18,23 +18,18 @@ double azimuthOf(const Eigen::Vector3d& direction) {
   return std::atan2(direction.y(), direction.x());
 }
 
-/// Returns the range of azimuths of the image's border, in the axes of A.
+/// Returns the range of azimuths of nine points of the image, in the axes of A.
 std::optional<Sight> sightOf(const CameraModel& camera, const Eigen::Matrix3d& R_AC) {
-  constexpr int kSteps = 16;  // points on each side of the image
   const double axis = azimuthOf(R_AC.col(2));
   double least = std::numbers::pi, most = -std::numbers::pi;
-  for (int k = 0; k < 4 * kSteps; ++k) {
-    const double along = static_cast<double>(k % kSteps) / kSteps;
-    const int side = k / kSteps;
-    const double across = side < 2 ? 0.0 : 1.0;
-    const Eigen::Vector2d share =
-        side % 2 == 0 ? Eigen::Vector2d(along, across) : Eigen::Vector2d(across, along);
-    const auto ray = camera.unproject(
-        share.cwiseProduct(Eigen::Vector2d(camera.width() - 1.0, camera.height() - 1.0)));
-    if (!ray) continue;
-    const double off = wrapAngle(azimuthOf(R_AC * ray->homogeneous()) - axis);
-    least = std::min(least, off);
-    most = std::max(most, off);
+  for (const double x : {0.0, 0.5, 1.0}) {
+    for (const double y : {0.0, 0.5, 1.0}) {
+      const auto ray = camera.unproject({x * (camera.width() - 1), y * (camera.height() - 1)});
+      if (!ray) continue;
+      const double off = wrapAngle(azimuthOf(R_AC * ray->homogeneous()) - axis);
+      least = std::min(least, off);
+      most = std::max(most, off);
+    }
   }
   if (most <= least) return std::nullopt;
   return Sight{wrapAngle(axis + 0.5 * (least + most)), 0.5 * (most - least)};

@@ -17,7 +17,7 @@ struct Sight {
 };
 
 /// Returns the fields of view of the cameras on a body at T_WB. The unit vector `up_W` points
-/// against gravity. Leaves out cameras whose calibration is not usable.
+/// against gravity. Leaves out cameras whose lens model cannot be inverted.
 std::vector<Sight> sightsOf(const Calibration& calibration, const RigidTransform& T_WB,
                             const Eigen::Vector3d& up_W);
 

@@ -14,13 +14,14 @@ const Json& knownArguments() {
   static const Json known = Json::parse(R"({
     "class": {"type": "string", "description": "name of a class, for example car"},
     "text": {"type": "string", "description": "words; objects of the classes that they name"},
-    "near": {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3,
+    "near": {"type": "array",
+      "items": {"type": "number", "minimum": -1e7, "maximum": 1e7}, "minItems": 2, "maxItems": 3,
       "description": "place [x, y] or [x, y, z] in M, m; z is ignored"},
     "radius_m": {"type": "number", "exclusiveMinimum": 0, "maximum": 10000,
       "description": "horizontal distance from near, m"},
-    "seen_since_s": {"type": "number", "description": "seen at this time or later"},
-    "seen_until_s": {"type": "number", "description": "seen at this time or earlier"},
-    "since_s": {"type": "number", "description": "changes at this time or later"},
+    "seen_since_s": {"type": "number", "minimum": -4e9, "maximum": 4e9, "description": "seen at this time or later"},
+    "seen_until_s": {"type": "number", "minimum": -4e9, "maximum": 4e9, "description": "seen at this time or earlier"},
+    "since_s": {"type": "number", "minimum": -4e9, "maximum": 4e9, "description": "changes at this time or later"},
     "min_probability": {"type": "number", "minimum": 0, "maximum": 1,
       "description": "least match_probability"},
     "limit": {"type": "integer", "minimum": 1, "maximum": 50,
@@ -29,20 +30,20 @@ const Json& knownArguments() {
   return known;
 }
 
-bool hasType(const Json& value, const std::string& type) {
-  if (type == "string") return value.is_string();
-  if (type == "integer") return value.is_number_integer();
-  if (type == "number") return value.is_number() && std::isfinite(value.get<double>());
-  return value.is_array() &&
-         std::ranges::all_of(value, [](const Json& each) { return hasType(each, "number"); });
-}
-
-bool isInRange(const Json& value, const Json& schema) {
-  if (value.is_array())
-    return value.size() >= schema["minItems"] && value.size() <= schema["maxItems"];
-  return !value.is_number() || (value >= schema.value("minimum", Json(-1e300)) &&
-                                value <= schema.value("maximum", Json(1e300)) &&
-                                value > schema.value("exclusiveMinimum", Json(-1e300)));
+/// Whether a value meets its schema. Only the keywords of knownArguments() are known.
+bool isValid(const Json& value, const Json& schema) {
+  if (schema["type"] == "string") return value.is_string();
+  if (schema["type"] == "array") {
+    return value.is_array() && value.size() >= schema["minItems"] &&
+           value.size() <= schema["maxItems"] && std::ranges::all_of(value, [&](const Json& each) {
+             return isValid(each, schema["items"]);
+           });
+  }
+  const bool has_type = schema["type"] == "integer" ? value.is_number_integer() : value.is_number();
+  constexpr double kLargest = 1e300;
+  return has_type && value >= schema.value("minimum", -kLargest) &&
+         value <= schema.value("maximum", kLargest) &&
+         value > schema.value("exclusiveMinimum", -kLargest);
 }
 
 /// Returns the words in lower case. A final "s" is removed, because classes are in the singular.
@@ -61,11 +62,9 @@ std::vector<std::string> wordsOf(const std::string& text) {
   return words;
 }
 
-std::optional<TimePoint> timeIn(const Json& arguments, const char* name) {
-  constexpr double kLongest_s = 4e9;
-  if (!arguments.contains(name)) return std::nullopt;
-  const double s = std::clamp(arguments[name].get<double>(), -kLongest_s, kLongest_s);
-  return TimePoint(durationFromSeconds(s));
+TimePoint timeIn(const Json& arguments, const char* name, TimePoint otherwise) {
+  const auto at = arguments.find(name);
+  return at == arguments.end() ? otherwise : TimePoint(durationFromSeconds(at->get<double>()));
 }
 
 /// The probability that the centre lies within the radius, by the covariance along the line to it.
@@ -99,7 +98,7 @@ void checkArguments(const Json& arguments, const Json& schema) {
       throw NoAnswer("there is no argument " + name + "; this tool takes: " + names);
     }
     const Json& wanted = properties[name];
-    if (!hasType(value, wanted["type"]) || !isInRange(value, wanted)) {
+    if (!isValid(value, wanted)) {
       throw NoAnswer("the value of " + name + " is not valid; its schema is " + wanted.dump());
     }
   }
@@ -112,9 +111,9 @@ Conditions::Conditions(const Json& arguments)
     : class_name(arguments.value("class", "")),
       words(wordsOf(arguments.value("text", ""))),
       radius_m(arguments.value("radius_m", 0.0)),
-      since(timeIn(arguments, "seen_since_s").value_or(TimePoint::min())),
-      until(timeIn(arguments, "seen_until_s").value_or(TimePoint::max())),
-      changed_since(timeIn(arguments, "since_s").value_or(TimePoint::min())),
+      since(timeIn(arguments, "seen_since_s", TimePoint::min())),
+      until(timeIn(arguments, "seen_until_s", TimePoint::max())),
+      changed_since(timeIn(arguments, "since_s", TimePoint::min())),
       least_probability(arguments.value("min_probability", 0.0)),
       limit(arguments.value("limit", std::size_t{10})) {
   std::ranges::transform(class_name, class_name.begin(),

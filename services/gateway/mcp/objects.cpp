@@ -52,16 +52,6 @@ const Ended* endOf(const State& state, ObjectId id) {
   return at == state.ended.end() ? nullptr : &*at;
 }
 
-/// Follows merges.
-ObjectId presentId(const State& state, ObjectId id) {
-  for (std::size_t steps = 0; steps < state.ended.size(); ++steps) {
-    const Ended* ended = endOf(state, id);
-    if (ended == nullptr || ended->merged_into == 0) break;
-    id = ended->merged_into;
-  }
-  return id;
-}
-
 }  // namespace
 
 Json toJson(const ObjectBelief& object, const State& state) {
@@ -131,13 +121,17 @@ Matches matchesOf(Map& map, const Conditions& conditions, const Before& before,
 }
 
 Present presentOf(Map& map, const State& state, ObjectId id) {
-  const ObjectId now = presentId(state, id);
+  ObjectId now = id;
+  const Ended* ended = endOf(state, id);
+  for (std::size_t steps = 0; ended && ended->merged_into && steps < state.ended.size(); ++steps) {
+    now = ended->merged_into;
+    ended = endOf(state, now);
+  }
   Present present;
   if (auto belief = beliefOf(map, now)) {
-    present.belief = *std::move(belief);
-    present.json = toJson(present.belief, state);
+    present = {*belief, toJson(*belief, state)};
     present.json["status"] = "on_map";
-  } else if (const Ended* ended = endOf(state, now)) {
+  } else if (ended) {
     present = {ended->last, toJson(*ended, state)};
   } else {
     throw NoAnswer("The map has no object " + std::to_string(id) +

@@ -172,22 +172,16 @@ Json neverSeen(const Json& arguments, Map& map) {
   return answer;
 }
 
-/// The schema of an object in answers, and of regions and changes, which have some of its members.
+/// The schema of objects, changes and regions in answers.
 Json itemSchema() {
   return Json::parse(R"({"type": "object", "properties": {
     "id": {"type": "integer"}, "class": {"type": "string"},
     "probability": {"type": "number", "minimum": 0, "maximum": 1},
-    "match_probability": {"type": "number", "minimum": 0, "maximum": 1,
-      "description": "that it exists, has the class asked for and lies within the radius"},
     "log_odds": {"type": "number"},
     "evidence": {"type": "object", "additionalProperties": {"type": "object",
-      "properties": {"log_odds": {"type": "number"}, "count": {"type": "integer"}},
-      "required": ["log_odds"]}, "description": "entries that sum to log_odds"},
-    "age_s": {"type": ["number", "null"], "description": "since the last evidence; null: never"},
-    "class_probability": {"type": "number"}, "status": {"type": "string"},
-    "position_m": {"type": "array", "items": {"type": "number"}},
-    "sigma_m": {"type": "array", "items": {"type": "number"}},
-    "size_m": {"type": "array", "items": {"type": "number"}}},
+      "properties": {"log_odds": {"type": "number"}}, "required": ["log_odds"]},
+      "description": "entries that sum to log_odds"},
+    "age_s": {"type": ["number", "null"], "description": "since the last evidence; null: never"}},
     "required": ["probability", "log_odds", "evidence", "age_s"]})");
 }
 
@@ -199,9 +193,7 @@ Json resultSchema(const char* list) {
 }
 
 struct Tool {
-  const char* name;
-  const char* title;
-  const char* description;
+  const char *name, *description;
   Json input;
   const char* list;  ///< the member of the result with its items
   Json (*run)(const Json& arguments, Map& map);
@@ -209,34 +201,33 @@ struct Tool {
 
 const std::vector<Tool>& tools() {
   static const std::vector<Tool> all{
-      {"find_objects", "Find objects",
-       "Finds objects by class, text, place and time of sight. `probability` is that at least one "
-       "object matches, also on ground within the radius that was never looked at "
-       "(`expected_unseen` objects; null: not known). The entries of `log_none` sum to "
-       "log(1 - probability).",
+      {"find_objects",
+       "Finds objects by class, text, place and time. `probability` is that at least one object "
+       "matches, also on ground within the radius that was never looked at (`expected_unseen` "
+       "objects; null: not known). `log_none` has entries that sum to log(1 - probability). "
+       "`match_probability` is that an object exists, has the class and lies within the radius.",
        schemaOfArguments({"class", "text", "near", "radius_m", "seen_since_s", "seen_until_s",
                           "min_probability", "limit"},
                          {}),
        "objects", findObjects},
-      {"where_last_seen", "Where was it last seen",
-       "Where and when an object, or the objects of a class, were last seen, the latest first; "
-       "also "
-       "objects that are gone. `age_s` is the time since the last evidence.",
+      {"where_last_seen",
+       "Where and when an object, or the objects of a class, were last seen, the latest first. "
+       "Includes objects that are gone.",
        schemaOfArguments({"id", "class", "text", "near", "radius_m", "limit"}, {}), "objects",
        whereLastSeen},
-      {"why", "Why does the map have it",
+      {"why",
        "The evidence for one object: the entries that sum to the log-odds of its existence, and "
        "for each class those that sum to the logarithm of its probability.",
        schemaOfArguments({"id"}, {"id"}), "object", why},
-      {"what_changed", "What changed since",
+      {"what_changed",
        "Objects that appeared, moved or are gone since a time, the latest first. `appeared` means "
        "seen for the first time. Before `ended_from_s`, objects that ended may be missing.",
        schemaOfArguments({"since_s", "class", "text", "near", "radius_m", "limit"}, {"since_s"}),
        "changes", whatChanged},
-      {"never_seen", "What was never looked at",
+      {"never_seen",
        "Regions of the ground near a place that no camera has looked at, largest first, with the "
-       "number of objects to expect there. The walls of houses are not on the map: ground behind "
-       "them may count as looked at.",
+       "number of objects to expect there. Walls are not on the map: ground behind them may count "
+       "as looked at.",
        schemaOfArguments({"near", "radius_m", "class", "text", "limit"}, {"near", "radius_m"}),
        "regions", neverSeen}};
   return all;
@@ -262,16 +253,10 @@ Json listTools() {
   Json list = Json::array();
   for (const Tool& tool : tools()) {
     list.push_back({{"name", tool.name},
-                    {"title", tool.title},
                     {"description", tool.description},
                     {"inputSchema", tool.input},
                     {"outputSchema", resultSchema(tool.list)},
-                    {"annotations",
-                     {{"title", tool.title},
-                      {"readOnlyHint", true},
-                      {"destructiveHint", false},
-                      {"idempotentHint", true},
-                      {"openWorldHint", false}}}});
+                    {"annotations", {{"readOnlyHint", true}, {"openWorldHint", false}}}});
   }
   return list;
 }

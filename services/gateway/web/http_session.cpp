@@ -12,7 +12,6 @@ namespace {
 constexpr std::chrono::seconds kPatience{10};  // time limit of a request, and of its answer
 constexpr std::uint32_t kLongestHeader = 8192;
 constexpr int kMostRequests = 1000;  // requests of one connection
-constexpr std::string_view kMcpPath = "/mcp";
 
 constexpr char kNoPage[] =
     "The page was not built, because npm was not there when Perdure was configured: install npm, "
@@ -32,12 +31,12 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   void read() {
     parser_.emplace();
     parser_->header_limit(kLongestHeader);
-    parser_->body_limit(0);
+    constexpr std::uint64_t kKilobyte = 1024;
+    parser_->body_limit(kKilobyte * static_cast<std::uint64_t>(shared_->options.most_message_kb));
     stream_.expires_after(kPatience);
-    http::async_read_header(stream_, buffer_, *parser_,
-                            [self = shared_from_this()](beast::error_code error, std::size_t) {
-                              self->onHeader(error);
-                            });
+    http::async_read(
+        stream_, buffer_, *parser_,
+        [self = shared_from_this()](beast::error_code error, std::size_t) { self->onRead(error); });
   }
   void end() override {
     beast::error_code ignored;
@@ -45,9 +44,6 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   }
 
  private:
-  void onHeader(beast::error_code error);
-  void onQuestion(beast::error_code error);
-  bool failed(beast::error_code error);
   void onRead(beast::error_code error);
   void upgrade();
   void answer();
@@ -60,59 +56,31 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
 
   beast::tcp_stream stream_;
   beast::flat_buffer buffer_{kLongestHeader};
-  std::optional<http::request_parser<http::empty_body>> parser_;
-  std::optional<http::request_parser<http::string_body>> question_;  ///< a POST to /mcp
+  std::optional<http::request_parser<http::string_body>> parser_;
   std::shared_ptr<Shared> shared_;
   int served_ = 0;
 };
 
 std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }
 
-/// Only messages of MCP clients have a body.
-void HttpSession::onHeader(beast::error_code error) {
-  if (failed(error)) return;
-  const Request& request = parser_->get();
-  if (request.method() != http::verb::post || pathOf(view(request.target())) != kMcpPath ||
-      !shared_->ask) {
-    http::async_read(
-        stream_, buffer_, *parser_,
-        [self = shared_from_this()](beast::error_code e, std::size_t) { self->onRead(e); });
-    return;
-  }
-  constexpr std::uint64_t kKilobyte = 1024;
-  question_.emplace(std::move(*parser_));
-  question_->body_limit(kKilobyte * static_cast<std::uint64_t>(shared_->options.most_message_kb));
-  http::async_read(
-      stream_, buffer_, *question_,
-      [self = shared_from_this()](beast::error_code e, std::size_t) { self->onQuestion(e); });
-}
-
-void HttpSession::onQuestion(beast::error_code error) {
-  parser_.emplace();
-  parser_->get() = Request(question_->get().base());
-  onRead(error);
-}
-
-/// Counts the error, if there is one. The connection then ends.
-bool HttpSession::failed(beast::error_code error) {
-  if (!error) return false;
+void HttpSession::onRead(beast::error_code error) {
   if (error == beast::error::timeout) {
     // The timeout of an idle connection is not counted, because browsers keep connections open.
     if (parser_->got_some()) shared_->hub.reasons().add("http_too_slow");
-  } else if (error == http::error::header_limit || error == http::error::body_limit ||
-             error == http::error::buffer_overflow) {
+    return;
+  }
+  if (error == http::error::header_limit || error == http::error::body_limit ||
+      error == http::error::buffer_overflow) {
     shared_->hub.reasons().add("http_too_large");
-  } else {
+    return;
+  }
+  if (error) {
     // A connection that the client closes is not counted as an error.
     const bool hung_up = error == http::error::end_of_stream || error == asio::error::eof ||
                          error.category() == asio::error::get_system_category();
     if (!hung_up) shared_->hub.reasons().add("http_malformed");
+    return;
   }
-  return true;
-}
-
-void HttpSession::onRead(beast::error_code error) {
-  if (failed(error)) return;
   ++shared_->requests;
   const auto host = view(parser_->get()[http::field::host]);
   if (const auto ours = shared_->guard.checkHost(host); !ours) {
@@ -148,7 +116,7 @@ void HttpSession::upgrade() {
 
 /// Answers a message of an MCP client (Streamable HTTP without streams and sessions).
 void HttpSession::answerQuestion() {
-  const Request& request = parser_->get();
+  Request& request = parser_->get();
   if (request.method() != http::verb::post) {
     return refuse(http::status::method_not_allowed,
                   {"method_refused", "only POST: there is no stream, and there are no sessions"});
@@ -168,12 +136,12 @@ void HttpSession::answerQuestion() {
   shared_->replies[number] = [self = shared_from_this()](int status, std::string text) {
     self->say(static_cast<http::status>(status), "application/json", std::move(text));
   };
-  shared_->ask(number, std::move(question_->get().body()));
+  shared_->ask(number, std::move(request.body()));
 }
 
 void HttpSession::answer() {
   const Request& request = parser_->get();
-  if (shared_->ask && pathOf(view(request.target())) == kMcpPath) return answerQuestion();
+  if (shared_->ask && pathOf(view(request.target())) == "/mcp") return answerQuestion();
   if (request.method() != http::verb::get && request.method() != http::verb::head) {
     return refuse(http::status::method_not_allowed, {"method_refused", "only GET and HEAD"});
   }

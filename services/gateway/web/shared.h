@@ -27,7 +27,7 @@ namespace beast = boost::beast;
 namespace http = beast::http;
 namespace websocket = beast::websocket;
 using tcp = asio::ip::tcp;
-using Request = http::request<http::empty_body>;
+using Request = http::request<http::string_body>;
 
 /// A connection, closed when the server ends.
 class Connection {

@@ -154,7 +154,9 @@ TEST_F(McpTools, WrongArgumentsAreRefusedWithTheFix) {
   EXPECT_THAT(refusalOf("find_objects", R"({"near":[1,2]})"), HasSubstr("together"));
   EXPECT_THAT(refusalOf("find_objects", R"({"near":[1],"radius_m":2})"), HasSubstr("near"));
   EXPECT_THAT(refusalOf("find_objects", R"({"near":[1,2],"radius_m":-2})"), HasSubstr("radius_m"));
+  EXPECT_THAT(refusalOf("find_objects", R"({"near":[1e9,2],"radius_m":2})"), HasSubstr("near"));
   EXPECT_THAT(refusalOf("find_objects", R"({"limit":1.5})"), HasSubstr("limit"));
+  EXPECT_THAT(refusalOf("find_objects", R"({"limit":51})"), HasSubstr("limit"));
   EXPECT_THAT(refusalOf("why", R"({})"), HasSubstr("give the argument id"));
   EXPECT_THAT(refusalOf("where_last_seen", R"({})"), HasSubstr("give id"));
 }

@@ -10,7 +10,8 @@ namespace perdure::gateway::test {
 
 inline TimePoint at(double seconds) { return TimePoint(durationFromSeconds(seconds)); }
 
-/// An object with an existence of 0.9 that its ledger explains. Its last evidence is a miss at 25 s.
+/// An object with an existence of 0.9 that its ledger explains. Its last evidence is a miss at 25
+/// s.
 inline ObjectBelief known(ObjectId id, const std::string& class_name, const Eigen::Vector3d& p) {
   ObjectBelief object = objectAt(id, p, class_name);
   object.existence = 0.9;
