@@ -26,7 +26,7 @@ class McpProcess : public ::testing::Test {
   McpProcess() {
     const Objects objects = workingSet(1, {carAt(10, {5, 1, 0}), carAt(20, {9, 1, 0})});
     map_store::MapDatabase database({folder_.file("map.sqlite")});
-    EXPECT_TRUE(database.write({&objects}).has_value());
+    EXPECT_TRUE(database.write({&objects, {}, {}}).has_value());
   }
   /// Runs the server with `input`; sets status_, and returns its output and error messages.
   std::string outputOf(const std::string& map, const std::string& input) {
