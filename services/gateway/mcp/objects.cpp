@@ -24,8 +24,7 @@ TimePoint lastEvidence(const ObjectBelief& object) {
   return last;
 }
 
-/// `rest`: name of the part that the ledger lacks.
-void putExistence(const ObjectBelief& object, const char* rest, Json& json) {
+void putExistence(const ObjectBelief& object, Json& json) {
   constexpr double kTolerance = 1e-9;
   const double sum = object.why.logOdds();
   const bool explained =
@@ -34,7 +33,7 @@ void putExistence(const ObjectBelief& object, const char* rest, Json& json) {
   json["probability"] = rounded(object.existence);
   json["log_odds"] = rounded(log_odds);
   json["evidence"] = object.why.empty() ? Json::object() : toJson(object.why)["existence"];
-  if (!explained) json["evidence"][rest] = {{"log_odds", rounded(log_odds - sum)}};
+  if (!explained) json["evidence"]["unexplained"] = {{"log_odds", rounded(log_odds - sum)}};
 }
 
 /// Lists the objects that may meet the conditions.
@@ -55,9 +54,9 @@ const Ended* endOf(const State& state, ObjectId id) {
 
 }  // namespace
 
-Json toJson(const ObjectBelief& object, const State& state, const char* rest) {
+Json toJson(const ObjectBelief& object, const State& state) {
   Json json{{"id", object.id}};
-  putExistence(object, rest, json);
+  putExistence(object, json);
   if (object.classes.empty()) return json;
   const ClassBelief& best = object.best();
   json["age_s"] = rounded(toSeconds(state.now - lastEvidence(object)));
@@ -74,9 +73,7 @@ Json toJson(const ObjectBelief& object, const State& state, const char* rest) {
 }
 
 Json toJson(const Ended& ended, const State& state) {
-  ObjectBelief last = ended.last;
-  if (ended.kind == EventKind::kGone) last.existence = 0.0;  // its last stored value is older
-  Json json = toJson(last, state, "ended");
+  Json json = toJson(ended.last, state);
   json["status"] = perdure::nameOf(ended.kind);
   json["age_s"] = rounded(toSeconds(state.now - ended.time));
   json["ended_s"] = rounded(toSeconds(ended.time));

@@ -13,10 +13,9 @@ namespace perdure::gateway::mcp {
 inline constexpr std::uint32_t kMostListed = 1000;  // objects of one query
 inline constexpr std::size_t kMostInFull = 50;      // objects whose ledgers one answer reads
 
-/// Returns an object with the entries that sum to the log-odds of its existence. The entry `rest`
-/// is the part that the ledger lacks. An object without classes has only id and existence.
-Json toJson(const ObjectBelief& object, const State& state, const char* rest = "unexplained");
-/// The probability of an object that is gone is 0, because the filter has removed it.
+/// Returns an object with the entries that sum to the log-odds of its existence. "unexplained" is
+/// the part that the ledger lacks. An object without classes has only id and existence.
+Json toJson(const ObjectBelief& object, const State& state);
 Json toJson(const Ended& ended, const State& state);
 
 /// Returns the belief of an object on the map, in M.
