@@ -268,7 +268,7 @@ TEST_F(Questions, HaveAnswersThatAreCalibrated) {
             << sums_ << " sums, " << unexplained_ << " with an unexplained part\n";
   EXPECT_EQ(questions, 200);
   // Most of the error is of removed objects that the drive does not pass again.
-  EXPECT_LE(brier, 0.06);
+  EXPECT_LE(brier, 0.05);
   EXPECT_GT(sums_, 100);
   EXPECT_EQ(unexplained_, 0) << "the ledgers explain every answer";
 }
